@@ -1,0 +1,65 @@
+import mujoco
+import numpy as np
+import pytest
+
+from wbc_suite.errors import UnknownNameError
+from wbc_suite.viewers.offscreen import VIEWS, View, add_studio, render_model
+
+POLE = """<mujoco><worldbody><body pos="0 0 .5">
+<geom type="box" size=".05 .02 .5" rgba="1 0 0 1"/></body></worldbody></mujoco>"""
+
+
+def _studio() -> tuple[mujoco.MjModel, mujoco.MjData]:
+    spec = mujoco.MjSpec.from_string(POLE)
+    add_studio(spec)
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return model, data
+
+
+def _red(image):
+    red, green, _ = np.moveaxis(image.astype(int), 2, 0)
+    return red > green + 60
+
+
+@pytest.mark.parametrize("view", VIEWS)
+@pytest.mark.parametrize("size", [(120, 90), (90, 120)])
+def test_the_subject_fills_the_picture_and_stays_inside(view, size):
+    model, data = _studio()
+    image = render_model(model, data, width=size[0], height=size[1], camera=view)
+    rows = np.flatnonzero(_red(image).any(axis=1))
+    assert rows[0] > 0
+    assert rows[-1] < size[1] - 1
+    # The pole is tall: it takes the height but for the 8 % of margin.
+    assert rows[-1] - rows[0] > 0.85 * size[1]
+
+
+def test_the_front_view_sees_the_wide_face_from_plus_x():
+    model, data = _studio()
+    widths = {}
+    for name in ("front", "side"):
+        image = render_model(model, data, width=200, height=200, camera=name)
+        widths[name] = _red(image).any(axis=0).sum()
+    # 0.10 m deep along x, 0.04 m wide along y.
+    assert widths["side"] > 2 * widths["front"]
+
+
+def test_the_studio_is_bright_and_neutral():
+    model, data = _studio()
+    image = render_model(model, data, width=120, height=120).astype(int)
+    corner = image[2, 2]
+    assert corner.min() > 180
+    assert np.ptp(corner) < 20
+
+
+def test_an_own_view_is_taken():
+    model, data = _studio()
+    image = render_model(model, data, camera=View(azimuth=30, elevation=-80), width=64)
+    assert _red(image).any()
+
+
+def test_an_unknown_view_is_answered_with_the_nearest():
+    model, data = _studio()
+    with pytest.raises(UnknownNameError, match="Did you mean 'front'"):
+        render_model(model, data, camera="fornt")

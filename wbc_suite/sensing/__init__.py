@@ -1,0 +1,1 @@
+"""What environments observe: observables, cameras, and how pictures are drawn."""
