@@ -1,3 +1,42 @@
-"""Whole-body control toolkit on MuJoCo, Pinocchio, mink and QP solvers."""
+"""Whole-body control toolkit on MuJoCo, Pinocchio, mink and QP solvers.
+
+Importing the package is light: each public name is loaded when it is first used.
+"""
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from wbc_suite import errors, kinematics, qp
+    from wbc_suite.catalogue import Catalogue
+    from wbc_suite.robot import RobotDescription, load_robot
 
 __version__ = "0.1.0"
+
+_HOME = {
+    "Catalogue": "wbc_suite.catalogue",
+    "RobotDescription": "wbc_suite.robot",
+    "load_robot": "wbc_suite.robot",
+}
+_MODULES = ("errors", "kinematics", "qp")
+
+__all__ = [
+    "Catalogue",
+    "RobotDescription",
+    "errors",
+    "kinematics",
+    "load_robot",
+    "qp",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _MODULES:
+        return importlib.import_module(f"wbc_suite.{name}")
+    if name in _HOME:
+        return getattr(importlib.import_module(_HOME[name]), name)
+    raise AttributeError(f"module 'wbc_suite' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

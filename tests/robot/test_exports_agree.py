@@ -1,0 +1,123 @@
+"""The two exports of every robot against each other, at random states."""
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wbc_suite
+from wbc_suite.catalogue import Catalogue
+
+ROBOTS = Catalogue().names("robots")
+ROOTS = ("fixed", "planar", "free")
+STATES = 100
+TOLERANCE = 1e-9  # two independent loaders of one robot agree to 1e-13
+
+
+class Twin:
+    """One robot in both engines, and the maps between their coordinates."""
+
+    def __init__(self, robot):
+        self.robot = robot
+        self.m = robot.to_mjspec().compile()
+        self.d = mujoco.MjData(self.m)
+        self.model = robot.to_pinocchio()
+        self.data = self.model.createData()
+        self.free = robot.root.kind == "free"
+
+    def random_state(self, rng):
+        q = pin.neutral(self.model)
+        for joint in self.robot.joints:
+            low, high = joint.range or (-np.pi, np.pi)
+            index = self.model.joints[self.model.getJointId(joint.name)].idx_q
+            q[index] = rng.uniform(low, high)
+        if self.robot.root.kind == "planar":
+            q[:3] = rng.normal(size=3)
+        if self.free:
+            q[:3] = rng.normal(size=3)
+            quat = rng.normal(size=4)
+            q[3:7] = quat / np.linalg.norm(quat)
+        v = rng.normal(size=self.model.nv)
+        return q, v
+
+    def set_mujoco(self, q, v):
+        """q = x y z | x y z w ... in Pinocchio, x y z | w x y z ... in MuJoCo."""
+        self.d.qpos[:] = q
+        self.d.qvel[:] = v
+        if self.free:
+            self.d.qpos[3:7] = q[[6, 3, 4, 5]]
+            self.d.qvel[:3] = self.rotation(q) @ v[:3]
+        mujoco.mj_forward(self.m, self.d)
+
+    @staticmethod
+    def rotation(q):
+        return pin.Quaternion(*q[[6, 3, 4, 5]]).matrix()
+
+    def basis(self, q):
+        """v_pin = B v_mj."""
+        B = np.eye(self.model.nv)
+        if self.free:
+            B[:3, :3] = self.rotation(q).T
+        return B
+
+    def bias(self, q, v):
+        """Bias forces in MuJoCo's coordinates."""
+        a = np.zeros(self.model.nv)
+        if self.free:  # zero acceleration in MuJoCo's coordinates
+            a[:3] = -np.cross(v[3:6], v[:3])
+        return self.basis(q).T @ pin.rnea(self.model, self.data, q, v, a)
+
+
+def dense_inertia(twin):
+    full = np.zeros((twin.m.nv, twin.m.nv))
+    mujoco.mj_fullM(twin.m, twin.d, full)
+    return full
+
+
+@pytest.fixture(scope="module", params=[(r, k) for r in ROBOTS for k in ROOTS], ids=str)
+def twin(request):
+    name, kind = request.param
+    return Twin(wbc_suite.load_robot(name, root=kind))
+
+
+def test_same_joints_in_the_same_order(twin):
+    mine = [twin.m.joint(i).name for i in range(twin.m.njnt)]
+    assert mine == list(twin.model.names)[1:]
+    assert mine == [*twin.robot.root_joint_names, *twin.robot.joint_names]
+    assert twin.m.nv == twin.model.nv
+    for name in mine:
+        joint = twin.model.joints[twin.model.getJointId(name)]
+        assert twin.m.joint(name).dofadr[0] == joint.idx_v
+
+
+def test_poses_jacobians_inertia_and_bias_agree(twin):
+    rng = np.random.default_rng(7)
+    sites = [f.name for f in twin.robot.frames]
+    for _ in range(STATES):
+        q, v = twin.random_state(rng)
+        twin.set_mujoco(q, v)
+        pin.computeAllTerms(twin.model, twin.data, q, v)
+        pin.updateFramePlacements(twin.model, twin.data)
+        for link in twin.robot.links:
+            pose = twin.data.oMf[twin.model.getFrameId(link.name, pin.FrameType.BODY)]
+            body = twin.d.body(link.name)
+            np.testing.assert_allclose(body.xpos, pose.translation, atol=TOLERANCE)
+            np.testing.assert_allclose(
+                body.xmat.reshape(3, 3), pose.rotation, atol=TOLERANCE
+            )
+        B = twin.basis(q)
+        J = np.zeros((6, twin.m.nv))
+        for name in sites:
+            frame = twin.model.getFrameId(name, pin.FrameType.OP_FRAME)
+            mujoco.mj_jacSite(twin.m, twin.d, J[:3], J[3:], twin.m.site(name).id)
+            other = pin.getFrameJacobian(
+                twin.model, twin.data, frame, pin.LOCAL_WORLD_ALIGNED
+            )
+            np.testing.assert_allclose(J, other @ B, atol=TOLERANCE)
+        M = pin.crba(twin.model, twin.data, q)
+        M = np.triu(M) + np.triu(M, 1).T
+        np.testing.assert_allclose(dense_inertia(twin), B.T @ M @ B, atol=TOLERANCE)
+        scale = max(1.0, np.abs(twin.d.qfrc_bias).max())
+        np.testing.assert_allclose(
+            twin.d.qfrc_bias, twin.bias(q, v), atol=TOLERANCE * scale
+        )

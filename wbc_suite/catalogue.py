@@ -1,0 +1,82 @@
+"""Find the catalogue: the folders `robots/`, `tasks/` and `controllers/` of TOML files.
+
+An installed wheel carries them as `wbc_suite/_catalogue/`; in a checkout they lie at
+the top of the repository. A laboratory adds a folder of its own of the same shape with
+`Catalogue(extra=[...])`, with `--catalogue DIR` on the command line, or by setting
+`WBC_SUITE_CATALOGUE`; its files win over ours.
+"""
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from wbc_suite.errors import ConfigError, UnknownNameError
+
+__all__ = ["Catalogue"]
+
+ENVIRONMENT_VARIABLE = "WBC_SUITE_CATALOGUE"
+
+
+def _default_root() -> Path:
+    package = Path(__file__).resolve().parent
+    installed = package / "_catalogue"
+    return installed if installed.is_dir() else package.parent
+
+
+def _default_extra() -> tuple[Path, ...]:
+    value = os.environ.get(ENVIRONMENT_VARIABLE, "")
+    return tuple(Path(p) for p in value.split(os.pathsep) if p)
+
+
+def _key(name: str) -> str:
+    """Fold a name so that `SpotWithArm`, `spot_with_arm` and `spotwitharm` agree."""
+    return name.casefold().replace("_", "").replace("-", "")
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Catalogue:
+    """A set of folders of one shape, searched from the last to the first.
+
+    Attributes:
+        root: The folder that holds `robots/`, `tasks/` and `controllers/`.
+        extra: Further folders of the same shape; a later one wins.
+    """
+
+    root: Path = field(default_factory=_default_root)
+    extra: tuple[Path, ...] = field(default_factory=_default_extra)
+
+    def __post_init__(self) -> None:
+        for folder in self.extra:
+            if not Path(folder).is_dir():
+                raise ConfigError(f"Catalogue folder '{folder}' does not exist.")
+
+    def names(self, folder: str) -> tuple[str, ...]:
+        """Return the sorted file stems under a folder such as `robots/gripper`."""
+        return tuple(sorted({p.stem for p in self._files(folder)}))
+
+    def files(self, folder: str) -> tuple[Path, ...]:
+        """Return the files that `names` names, in the same order."""
+        found = {p.stem: p for p in self._files(folder)}
+        return tuple(found[name] for name in self.names(folder))
+
+    def find(self, folder: str, name: str, *, kind: str) -> Path:
+        """Return the file of a name, without regard to case and underscores.
+
+        Args:
+            folder: Folder relative to a root, such as `robots` or `robots/arm`.
+            name: Name to look up.
+            kind: What the name is, for the error: "robot", "gripper".
+
+        Raises:
+            UnknownNameError: If no root has such a file.
+        """
+        found = {_key(p.stem): p for p in self._files(folder)}
+        path = found.get(_key(name))
+        if path is None:
+            raise UnknownNameError(kind, name, self.names(folder))
+        return path
+
+    def _files(self, folder: str) -> Iterable[Path]:
+        for root in (self.root, *self.extra):
+            yield from sorted((Path(root) / folder).glob("*.toml"))

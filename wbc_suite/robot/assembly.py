@@ -1,0 +1,254 @@
+"""Join components into one robot."""
+
+import itertools
+from collections import Counter
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from wbc_suite.catalogue import Catalogue
+from wbc_suite.errors import ConfigError, DescriptionError, UnknownNameError
+from wbc_suite.robot.component import Assembly, Component, Part, read_robot_file
+from wbc_suite.robot.description import RobotDescription
+from wbc_suite.robot.parts import Link, Mount, Root
+from wbc_suite.robot.placing import compose, depth_first, locked, renamed
+from wbc_suite.tomlfile import parse_model
+
+__all__ = ["Choice", "assemble", "describe_component"]
+
+Choice = str | Mapping[str, str] | None
+"""A component for every side, or one for each side, or the assembly's own."""
+
+
+def describe_component(component: Component, *, source: str) -> RobotDescription:
+    """Make a robot of one component alone."""
+    header = component.component
+    data = _collect(component) | {
+        "name": header.name,
+        "title": header.title,
+        "source": header.source,
+        "license": header.license,
+        "deviations": header.deviations,
+        "root": component.root,
+        "links": depth_first(component.links),
+        "synergies": {"gripper": component.synergies} if component.synergies else {},
+    }
+    return parse_model(RobotDescription, data, source=source, error=DescriptionError)
+
+
+def assemble(
+    path: Path, *, catalogue: Catalogue, gripper: Choice = None, base: Choice = None
+) -> RobotDescription:
+    """Read an assembly file and mount its parts.
+
+    Args:
+        path: The assembly's file.
+        catalogue: Where components are looked up.
+        gripper: Other grippers: a name for all, or a mapping from side to name.
+        base: Another base.
+
+    Raises:
+        DescriptionError: If a part, a mount or a name does not fit.
+        UnknownNameError: If a component does not exist.
+    """
+    assembly = _extended(path, catalogue)
+    chosen = _choose(assembly, {"gripper": gripper, "base": base}, source=str(path))
+    builder = _Builder(path, catalogue)
+    repeated = Counter(part.component for part in chosen)
+    for part in chosen:
+        builder.mount(part, shared=repeated[part.component] > 1)
+    return builder.finish(assembly)
+
+
+def _extended(path: Path, catalogue: Catalogue, depth: int = 0) -> Assembly:
+    """Read an assembly, and lay it over the one that it extends."""
+    if depth > 5:
+        raise DescriptionError(f"{path}: 'extends' goes round in a circle.")
+    own = read_robot_file(path)
+    if not isinstance(own, Assembly):
+        raise DescriptionError(f"{path}: this is a component, not an assembly.")
+    if own.assembly.extends is None:
+        return own
+    parent = _extended(
+        catalogue.find("robots", own.assembly.extends, kind="robot"),
+        catalogue,
+        depth + 1,
+    )
+    given = {key: getattr(own, key) for key in own.model_fields_set}
+    for key in ("frames", "cameras", "sensors", "lock"):
+        given[key] = (*getattr(parent, key), *getattr(own, key))
+    given["keyframes"] = parent.keyframes | own.keyframes
+    given["contacts"] = parent.contacts.model_copy(
+        update={"exclude": (*parent.contacts.exclude, *own.contacts.exclude)}
+    )
+    header = parent.assembly.model_dump() | own.assembly.model_dump(exclude_unset=True)
+    given["assembly"] = type(own.assembly).model_validate(header)
+    return parent.model_copy(update=given)
+
+
+def _choose(
+    assembly: Assembly, choices: dict[str, Choice], *, source: str
+) -> tuple[Part, ...]:
+    """Replace the components that the caller wants otherwise."""
+    parts: list[Part] = []
+    used: set[str] = set()
+    for part in assembly.parts:
+        choice = choices.get(part.choice or "")
+        name = choice
+        if isinstance(choice, Mapping):
+            name = choice.get(part.side or "") or choice.get(part.name)
+        if name is not None:
+            used.add(str(part.choice))
+            if _key(str(name)) in ("none", "null"):
+                continue
+            folder = "" if _is_path(str(name)) else f"{part.choice}/"
+            part = part.model_copy(update={"component": f"{folder}{name}"})  # noqa: PLW2901 - the replaced part takes its place
+        parts.append(part)
+    for kind, choice in choices.items():
+        if choice is not None and kind not in used:
+            raise DescriptionError(
+                f"{source}: {assembly.assembly.name} has no place for a {kind}."
+            )
+        if isinstance(choice, Mapping):
+            sides = {p.side or p.name for p in assembly.parts if p.choice == kind}
+            for side in choice:
+                if side not in sides:
+                    raise UnknownNameError(f"side with a {kind}", side, sides)
+    return tuple(parts)
+
+
+def _key(name: str) -> str:
+    return name.casefold().removesuffix("gripper").removesuffix("mount")
+
+
+def _is_path(name: str) -> bool:
+    return name.endswith(".toml")
+
+
+class _Builder:
+    """Collects the parts of one assembly."""
+
+    def __init__(self, path: Path, catalogue: Catalogue) -> None:
+        self._path = path
+        self._catalogue = catalogue
+        self._links: list[Link] = []
+        self._mounts: dict[str, Mount] = {}
+        self._items: dict[str, list[Any]] = {}
+        self._headers: list[tuple[str, str, tuple[str, ...]]] = []
+        self._groups: dict[str, tuple[str, ...]] = {}
+        self._keyframes: dict[str, dict[str, float]] = {}
+        self._materials: dict[str, Any] = {}
+        self._synergies: dict[str, Any] = {}
+        self._excludes: list[tuple[str, str]] = []
+
+    def mount(self, part: Part, *, shared: bool) -> None:
+        """Add one component."""
+        component = self._read(part)
+        rename = shared if part.rename is None else part.rename
+        prefix = f"{part.side}_" if part.side else ""
+        component = renamed(
+            component, items=prefix, bodies=prefix if rename else "", part=part.name
+        )
+        links = depth_first(component.links)
+        first = links[0].model_copy(update=self._placement(part, links[0]))
+        self._links += [first, *links[1:]]
+        for mount in component.mounts:
+            self._mounts[f"{part.name}.{mount.name}"] = mount
+        data = _collect(component)
+        for key in _LISTS:
+            self._items.setdefault(key, []).extend(data[key])
+        for group, joints in component.groups.items():
+            self._groups[group] = (*self._groups.get(group, ()), *joints)
+        for name, values in component.keyframes.items():
+            self._keyframes[name] = self._keyframes.get(name, {}) | values
+        self._materials |= data["materials"]
+        self._excludes += component.contacts.exclude
+        if component.synergies:
+            self._synergies[part.name] = component.synergies
+        header = component.component
+        self._headers.append((header.source, header.license, header.deviations))
+
+    def _read(self, part: Part) -> Component:
+        if _is_path(part.component):
+            path = _inside(self._path.parent, part.component)
+        else:
+            folder, _, name = part.component.rpartition("/")
+            path = self._catalogue.find(
+                f"robots/{folder}".rstrip("/"), name, kind=folder or "component"
+            )
+        component = read_robot_file(path)
+        if not isinstance(component, Component):
+            raise DescriptionError(f"{path}: a part must be a component.")
+        return component
+
+    def _placement(self, part: Part, link: Link) -> dict[str, Any]:
+        if not self._links:
+            return {}
+        if part.on is None:
+            raise DescriptionError(
+                f"{self._path}: part '{part.name}' needs 'on': only the first part "
+                "stands alone."
+            )
+        mount = self._mounts.get(part.on)
+        if mount is None:
+            raise DescriptionError(
+                f"{self._path}: {UnknownNameError('mount', part.on, self._mounts)}"
+            )
+        return compose(mount, part, link) | {"parent": mount.link}
+
+    def finish(self, assembly: Assembly) -> RobotDescription:
+        """Check and freeze the whole."""
+        root = assembly.root or Root()
+        keyframes = dict(self._keyframes)
+        for name, values in assembly.keyframes.items():
+            keyframes[name] = keyframes.get(name, {}) | values
+        header = assembly.assembly
+        data: dict[str, Any] = {
+            key: [*items, *getattr(assembly, key, ())]
+            for key, items in self._items.items()
+        }
+        sources = [s for s, _, _ in self._headers]
+        licenses = [text for _, text, _ in self._headers]
+        deviations = itertools.chain(*(d for _, _, d in self._headers))
+        data |= {
+            "name": header.name,
+            "title": header.title,
+            "source": "; ".join(dict.fromkeys(filter(None, sources))),
+            "license": "; ".join(dict.fromkeys(filter(None, licenses))),
+            "deviations": (*deviations, *header.deviations),
+            "root": root,
+            "links": depth_first(tuple(self._links)),
+            "groups": self._groups,
+            "keyframes": keyframes,
+            "materials": self._materials,
+            "synergies": self._synergies,
+            "contacts": {"exclude": (*self._excludes, *assembly.contacts.exclude)},
+        }
+        data = locked(data, assembly.lock)
+        return parse_model(
+            RobotDescription, data, source=str(self._path), error=DescriptionError
+        )
+
+
+_LISTS = ("frames", "cameras", "actuators", "sensors", "connects")
+
+
+def _collect(component: Component) -> dict[str, Any]:
+    """Return the fields that a component shares with a robot."""
+    keys = ("groups", "keyframes", "contacts", "mounts", *_LISTS)
+    data = {key: getattr(component, key) for key in keys}
+    data["materials"] = {
+        name: (*color, 1.0)[:4] for name, color in component.materials.items()
+    }
+    return data
+
+
+def _inside(folder: Path, name: str) -> Path:
+    """Resolve a file below a folder; raises ConfigError when it leaves the folder."""
+    path = (folder / name).resolve()
+    if not path.is_relative_to(folder.resolve()):
+        raise ConfigError(
+            f"'{name}' leaves the folder {folder}: components lie beside or below the "
+            "assembly, or in a catalogue folder."
+        )
+    return path

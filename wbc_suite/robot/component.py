@@ -1,0 +1,145 @@
+"""The two kinds of robot file: a component, and an assembly of components."""
+
+from pathlib import Path
+from typing import Annotated, Literal, TypeAlias
+
+from pydantic import Field
+
+from wbc_suite.errors import ConfigError, DescriptionError
+from wbc_suite.robot.mirror import Mirror, reflect_component
+from wbc_suite.robot.parts import (
+    Actuator,
+    Camera,
+    Connect,
+    Contacts,
+    Frame,
+    Link,
+    Mount,
+    Name,
+    Root,
+    Sensor,
+    Synergy,
+)
+from wbc_suite.robot.shapes import Posed
+from wbc_suite.tomlfile import FrozenModel, parse_model, read_toml
+
+__all__ = ["Assembly", "Component", "Part", "read_robot_file"]
+
+Channel: TypeAlias = Annotated[float, Field(ge=0.0, le=1.0)]
+Rgb: TypeAlias = tuple[Channel, Channel, Channel]
+Rgba: TypeAlias = tuple[Channel, Channel, Channel, Channel]
+
+
+class Header(FrozenModel):
+    """What a component is, and where its figures come from."""
+
+    name: Name
+    kind: Literal["arm", "body", "gripper", "base"]
+    title: str = ""
+    source: str = ""
+    license: str = ""
+    deviations: tuple[str, ...] = ()
+
+
+class Component(FrozenModel):
+    """One component file, such as `robots/arm/panda.toml`.
+
+    The tables' names are singular, as TOML writes them: `[[link]]`, `[[frame]]`.
+    """
+
+    format: Literal[1]
+    component: Header
+    materials: dict[Name, Rgb | Rgba] = {}
+    links: tuple[Link, ...] = Field(alias="link", max_length=500)
+    frames: tuple[Frame, ...] = Field(default=(), alias="frame")
+    mounts: tuple[Mount, ...] = Field(default=(), alias="mount")
+    cameras: tuple[Camera, ...] = Field(default=(), alias="camera")
+    actuators: tuple[Actuator, ...] = Field(default=(), alias="actuator")
+    sensors: tuple[Sensor, ...] = Field(default=(), alias="sensor")
+    synergies: tuple[Synergy, ...] = Field(default=(), alias="synergy")
+    connects: tuple[Connect, ...] = Field(default=(), alias="connect")
+    groups: dict[Name, tuple[Name, ...]] = {}
+    keyframes: dict[Name, dict[Name, float]] = Field(default={}, alias="keyframe")
+    contacts: Contacts = Contacts()
+    root: Root = Root()
+    mirror: Mirror | None = None
+
+
+class Part(Posed):
+    """One component in an assembly.
+
+    Attributes:
+        name: Name of the part, such as `arm` or `right_gripper`.
+        component: Catalogue name with folder, such as `gripper/panda_hand`, or a path
+            to a TOML file relative to the assembly's file.
+        on: Where it is mounted: `part.mount`; absent for the first part.
+        side: Prefix of the component's frames, groups, cameras and sensors, so that
+            `tcp` becomes `right_tcp`.
+        rename: Whether links and joints get that prefix too. By default they do when
+            two parts share a component.
+        choice: The argument of `load_robot` that may replace the component.
+    """
+
+    name: Name
+    component: str
+    on: str | None = None
+    side: Name | None = None
+    rename: bool | None = None
+    choice: Literal["gripper", "base"] | None = None
+
+
+class AssemblyHeader(FrozenModel):
+    """Name of the whole robot."""
+
+    name: Name
+    title: str = ""
+    extends: str | None = None
+    deviations: tuple[str, ...] = ()
+
+
+class Assembly(FrozenModel):
+    """One assembly file, such as `robots/panda.toml`.
+
+    Attributes:
+        format: Version of the format.
+        assembly: Name; `extends` takes over another assembly and changes it.
+        parts: Components, each mounted on an earlier one.
+        root: How the robot stands in the world.
+        lock: Groups whose joints are fixed in the `ready` posture.
+        groups: Further groups, or renamed ones.
+        frames: Further frames.
+        cameras: Further cameras.
+        keyframes: Postures of the whole robot; they win over the components' own.
+        contacts: Pairs of links, across components too, that never collide.
+    """
+
+    format: Literal[1]
+    assembly: AssemblyHeader
+    parts: tuple[Part, ...] = Field(default=(), alias="part", max_length=50)
+    root: Root | None = None
+    lock: tuple[Name, ...] = ()
+    frames: tuple[Frame, ...] = Field(default=(), alias="frame")
+    cameras: tuple[Camera, ...] = Field(default=(), alias="camera")
+    sensors: tuple[Sensor, ...] = Field(default=(), alias="sensor")
+    keyframes: dict[Name, dict[Name, float]] = Field(default={}, alias="keyframe")
+    contacts: Contacts = Contacts()
+
+
+def read_robot_file(path: Path) -> Component | Assembly:
+    """Read a component or an assembly, whichever the file holds.
+
+    Raises:
+        ConfigError: If the file is neither, or breaks a rule of the format.
+    """
+    data = read_toml(path)
+    if "component" in data:
+        component = parse_model(
+            Component, data, source=str(path), error=DescriptionError
+        )
+        return reflect_component(component, source=str(path))
+    if "assembly" in data:
+        return parse_model(Assembly, data, source=str(path), error=DescriptionError)
+    raise ConfigError(
+        f"{path}: a robot file has a table [component] (links and joints) or "
+        f"[assembly] (parts); this one has {', '.join(sorted(data)) or 'nothing'}."
+    )

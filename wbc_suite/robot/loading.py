@@ -1,0 +1,77 @@
+"""`load_robot`: from a catalogue name or a file to a `RobotDescription`."""
+
+from pathlib import Path
+from typing import Literal
+
+from wbc_suite.catalogue import Catalogue
+from wbc_suite.errors import ConfigError
+from wbc_suite.robot.assembly import Choice, assemble, describe_component
+from wbc_suite.robot.component import Component, read_robot_file
+from wbc_suite.robot.description import RobotDescription
+
+__all__ = ["load_robot"]
+
+FOLDERS = ("gripper", "base", "arm", "body")
+
+
+def load_robot(
+    name: str | Path,
+    *,
+    gripper: Choice = None,
+    base: Choice = None,
+    root: Literal["fixed", "planar", "free"] | None = None,
+    catalogue: Catalogue | None = None,
+) -> RobotDescription:
+    """Load a robot by its catalogue name, or from a TOML, URDF or MJCF file.
+
+    Args:
+        name: Catalogue name without regard to case (`Panda`, `gr1`), a component with
+            its folder (`gripper/panda_hand`), or a path that ends in .toml, .urdf, .xml.
+        gripper: Another gripper for every side, or one for each: `{"right": ...}`;
+            "none" leaves it out.
+        base: Another base; "none" leaves it out.
+        root: Another root: `fixed`, `planar` or `free`.
+        catalogue: Where to look; our own catalogue by default.
+
+    Raises:
+        UnknownNameError: If the catalogue has no such robot, gripper or base.
+        DescriptionError: If the description contradicts itself or physics.
+        ConfigError: If the file cannot be read.
+    """
+    catalogue = catalogue or Catalogue()
+    path = _locate(str(name), catalogue)
+    robot = _read(path, catalogue, gripper=gripper, base=base)
+    return robot if root in (None, robot.root.kind) else robot.with_root(root)
+
+
+def _locate(name: str, catalogue: Catalogue) -> Path:
+    path = Path(name)
+    if path.suffix in (".toml", ".urdf", ".xml", ".mjcf"):
+        if not path.is_file():
+            raise ConfigError(f"{path}: no such file.")
+        return path
+    folder, _, stem = name.rpartition("/")
+    if folder:
+        return catalogue.find(f"robots/{folder}", stem, kind=folder)
+    return catalogue.find("robots", stem, kind="robot")
+
+
+def _read(
+    path: Path, catalogue: Catalogue, *, gripper: Choice, base: Choice
+) -> RobotDescription:
+    if path.suffix == ".toml":
+        content = read_robot_file(path)
+        if not isinstance(content, Component):
+            return assemble(path, catalogue=catalogue, gripper=gripper, base=base)
+        robot = describe_component(content, source=str(path))
+    elif path.suffix == ".urdf":
+        from wbc_suite.robot.urdf_import import read_urdf
+
+        robot = read_urdf(path)
+    else:
+        from wbc_suite.robot.mjcf_import import read_mjcf
+
+        robot = read_mjcf(path)
+    if gripper is not None or base is not None:
+        raise ConfigError(f"{path}: 'gripper' and 'base' need an assembly file.")
+    return robot

@@ -1,0 +1,270 @@
+"""`[mirror]`: write the other side of a robot by reflection in a plane.
+
+With `S` the reflection (for the plane xz: diag(1, -1, 1)), a link frame goes to
+`S p`, `S R S`. Within a link, points go to `D p`, tensors to `D I D^T`, the axis of a slide
+to `D a` and that of a hinge (a pseudovector) to `-D a`, where `D` is `S` unless the file
+gives the other side's link frame by hand: then `D = R_target^T S R_source`, with both
+orientations taken at zero joint angles. Where an axis only turns round, it is kept and
+the joint's range is negated instead, as vendors write their robots. Whatever the file
+gives for the other side by hand wins over the reflection.
+"""
+
+import re
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from wbc_suite.errors import DescriptionError
+from wbc_suite.robot.parts import Joint, Link, Name
+from wbc_suite.robot.shapes import Posed
+from wbc_suite.robot.validation import inertia_matrix
+from wbc_suite.tomlfile import FrozenModel
+from wbc_suite.typing import Matrix, Vector
+
+if TYPE_CHECKING:
+    from wbc_suite.robot.component import Component
+
+__all__ = ["Mirror", "reflect_component"]
+
+
+class Mirror(FrozenModel):
+    """Which side is written, and which one follows.
+
+    Attributes:
+        source: Word in a name (between underscores) that marks the written side.
+        target: The word that stands there on the other side.
+        plane: Plane of reflection in the axes of the component's first link.
+    """
+
+    source: Name = "left"
+    target: Name = "right"
+    plane: Literal["xz", "yz", "xy"] = "xz"
+
+
+def reflect_component(component: "Component", *, source: str) -> "Component":
+    """Return the component with the other side written out."""
+    mirror = component.mirror
+    if mirror is None:
+        return component
+    reflection = _Reflection(mirror, component)
+    if not any(reflection.matches(link.name) for link in component.links):
+        raise DescriptionError(
+            f"{source}: key 'mirror.source' = '{mirror.source}': no link has this word "
+            "in its name."
+        )
+    return component.model_copy(update=reflection.changes() | {"mirror": None})
+
+
+class _Reflection:
+    """The reflection of one component."""
+
+    def __init__(self, mirror: Mirror, component: "Component") -> None:
+        self._mirror = mirror
+        self._word = re.compile(rf"(?<![^_]){re.escape(mirror.source)}(?![^_])")
+        self._component = component
+        missing = {"xz": 1, "yz": 0, "xy": 2}[mirror.plane]
+        self._s = np.eye(3)
+        self._s[missing, missing] = -1.0
+        self._signs: dict[str, float] = {}
+        self._world: dict[str, Matrix] = {}
+        self._inside: dict[str, Matrix] = {}
+
+    def changes(self) -> dict[str, Any]:
+        """Return every field of the component with the mirrored items added."""
+        c = self._component
+        links = self._links()
+        return {
+            "links": links,
+            "frames": self._posed(c.frames),
+            "mounts": self._posed(c.mounts),
+            "cameras": self._posed(c.cameras),
+            "sensors": self._renamed(c.sensors),
+            "actuators": self._renamed(c.actuators),
+            "connects": self._renamed(c.connects),
+            "groups": self._groups(c.groups),
+            "keyframes": {k: self._values(v) for k, v in c.keyframes.items()},
+            "contacts": c.contacts.model_copy(
+                update={"exclude": self._pairs(c.contacts.exclude)}
+            ),
+        }
+
+    def matches(self, name: str) -> bool:
+        """Whether a name belongs to the written side."""
+        return self._word.search(name) is not None
+
+    def name(self, name: str) -> str:
+        """Return the name on the other side; names of neither side stay."""
+        return self._word.sub(self._mirror.target, name, count=1)
+
+    def _links(self) -> tuple[Link, ...]:
+        own = {link.name: link for link in self._component.links}
+        made: list[Link] = []
+        for link in self._component.links:
+            if not self.matches(link.name):
+                self._turn(link)
+                continue
+            self._turn(link)
+            given = own.get(self.name(link.name))
+            if given is not None:
+                own[given.name] = self._link(link, given)
+            else:
+                made.append(self._link(link, None))
+        return (*own.values(), *made)
+
+    def _turn(self, link: Link) -> None:
+        """Remember the orientation of a link at zero joint angles."""
+        parent = self._world.get(link.parent or "", np.eye(3))
+        self._world[link.name] = parent @ _matrix(link)
+
+    def _link(self, link: Link, given: Link | None) -> Link:
+        update = self._moved(link, self._s) | {
+            "name": self.name(link.name),
+            "parent": self.name(link.parent) if link.parent else None,
+        }
+        hand = {k: getattr(given, k) for k in given.model_fields_set} if given else {}
+        placed = link.model_copy(update=update | hand)
+        self._turn(placed)
+        d = self._world[placed.name].T @ self._s @ self._world[link.name]
+        self._inside[link.name] = d = np.where(abs(d) < 1e-12, 0.0, d)
+        update |= {
+            "com": _rounded(d @ np.asarray(link.com)),
+            "inertia": _tensor(d @ inertia_matrix(link.inertia) @ d.T),
+            "visual": tuple(self._shape(s, d) for s in link.visual),
+            "collision": tuple(self._shape(s, d) for s in link.collision),
+        }
+        if link.joint is not None:
+            update["joint"] = self._joint(link.joint, d, placed.joint if hand else None)
+        return link.model_copy(update=update | hand)
+
+    def _moved(self, posed: Posed, d: Matrix) -> dict[str, Any]:
+        """Pose `D p`, `D R S` of something that is itself reflected by S inside."""
+        quat = posed.quat
+        if np.array_equal(d, self._s):
+            axis = -np.diag(self._s)  # exact: a rotation's axis goes to -S a
+            turned = (quat[0], *_rounded(axis * np.asarray(quat[1:])))
+        else:
+            rotation = Rotation.from_matrix(d @ _matrix(posed) @ self._s)
+            turned = tuple(rotation.as_quat(scalar_first=True).tolist())
+        return {"pos": _rounded(d @ np.asarray(posed.pos)), "quat": turned}
+
+    def _joint(self, joint: Joint, d: Matrix, given: Joint | None) -> Joint:
+        axis = np.asarray(joint.axis)
+        reflected = d @ axis * (-1.0 if joint.type == "hinge" else 1.0)
+        written = axis if given is None else np.asarray(given.axis)
+        sign = -1.0 if np.allclose(reflected, -written, atol=1e-9) else 1.0
+        self._signs[joint.name] = sign
+        update: dict[str, Any] = {"name": self.name(joint.name)}
+        if sign > 0:
+            update["axis"] = _rounded(reflected)
+        elif joint.range is not None:
+            update["range"] = (-joint.range[1], -joint.range[0])
+        if joint.mimic is not None:
+            leader = self._signs.get(joint.mimic.joint, 1.0)
+            update["mimic"] = joint.mimic.model_copy(
+                update={
+                    "joint": self.name(joint.mimic.joint),
+                    "ratio": joint.mimic.ratio * sign * leader,
+                    "offset": joint.mimic.offset * sign,
+                }
+            )
+        return joint.model_copy(update=update)
+
+    def _shape(self, shape: Any, d: Matrix) -> Any:  # any shape, and the same kind back
+        update = self._moved(shape, d)
+        inner = {
+            key: self._point(getattr(shape, key))
+            for key in ("start", "end")
+            if hasattr(shape, key)
+        }
+        if hasattr(shape, "spheres"):
+            update["spheres"] = tuple(
+                (*self._point(s[:3]), s[3]) for s in shape.spheres
+            )
+        if hasattr(shape, "sections"):
+            update["sections"] = self._sections(shape.axis, shape.sections)
+        return shape.model_copy(update=update | inner)
+
+    def _point(self, point: tuple[float, ...]) -> tuple[float, ...]:
+        return _rounded(self._s @ np.asarray(point))
+
+    def _sections(
+        self, axis: str, sections: tuple[tuple[float, ...], ...]
+    ) -> tuple[tuple[float, ...], ...]:
+        k = "xyz".index(axis)
+        u, v = (i for i in range(3) if i != k)
+        along, side_u, side_v = (float(self._s[i, i]) for i in (k, u, v))
+        rows = [
+            (along * p, side_u * a + 0.0, side_v * b + 0.0, hu, hv)
+            for p, a, b, hu, hv in sections
+        ]
+        return tuple(rows if along > 0 else rows[::-1])
+
+    def _posed(self, items: tuple[Any, ...]) -> tuple[Any, ...]:
+        return self._renamed(
+            items, extra=lambda i: self._moved(i, self._inside.get(i.link, self._s))
+        )
+
+    def _renamed(
+        self,
+        items: tuple[Any, ...],
+        extra: Callable[[Any], dict[str, Any]] | None = None,
+    ) -> tuple[Any, ...]:
+        """Copy items of the written side with every name in them changed."""
+        known = {getattr(item, "name", None) for item in items} - {None}
+        made: list[Any] = []
+        for item in items:
+            names = {
+                key: self.name(value)
+                for key, value in item
+                if isinstance(value, str) and self.matches(value)
+            }
+            if names and names.get("name") not in known:
+                made.append(
+                    item.model_copy(update=names | (extra(item) if extra else {}))
+                )
+        return (*items, *made)
+
+    def _groups(
+        self, groups: dict[Name, tuple[Name, ...]]
+    ) -> dict[Name, tuple[Name, ...]]:
+        made: dict[Name, tuple[Name, ...]] = {}
+        for group, joints in groups.items():
+            mirrored = tuple(self.name(j) for j in joints if self.matches(j))
+            name = self.name(group)
+            if name != group and name not in groups:
+                made[name] = mirrored
+            elif name == group:  # one group for both sides, such as `legs`
+                made[group] = (*joints, *(j for j in mirrored if j not in joints))
+        return groups | made
+
+    def _values(self, values: dict[Name, float]) -> dict[Name, float]:
+        made = {
+            self.name(joint): self._signs.get(joint, 1.0) * value
+            for joint, value in values.items()
+            if self.matches(joint)
+        }
+        return values | {k: v + 0.0 for k, v in made.items() if k not in values}
+
+    def _pairs(
+        self, pairs: tuple[tuple[Name, Name], ...]
+    ) -> tuple[tuple[Name, Name], ...]:
+        made = [(self.name(a), self.name(b)) for a, b in pairs]
+        known = {frozenset(pair) for pair in pairs}
+        return (*pairs, *(p for p in made if frozenset(p) not in known))
+
+
+def _matrix(posed: Posed) -> Matrix:
+    return Rotation.from_quat(posed.quat, scalar_first=True).as_matrix()
+
+
+def _rounded(vector: Vector) -> tuple[float, ...]:
+    """Return plain floats, without a negative zero."""
+    return tuple((vector + 0.0).tolist())
+
+
+def _tensor(matrix: Matrix) -> tuple[float, ...]:
+    """Return `xx yy zz xy xz yz`."""
+    rows, columns = (0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)
+    return _rounded(matrix[rows, columns])

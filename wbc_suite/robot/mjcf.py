@@ -1,0 +1,344 @@
+"""Build MuJoCo's model of a robot directly from its description."""
+
+from collections.abc import Iterable
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+
+from wbc_suite.robot.description import RobotDescription
+from wbc_suite.robot.parts import Actuator, Joint, Link
+from wbc_suite.robot.shapes import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
+from wbc_suite.robot.surfaces import mesh_of
+from wbc_suite.robot.validation import inertia_matrix, rigid_bodies
+
+__all__ = ["COLLISION_GROUP", "VISUAL_GROUP", "build_mjspec", "write_mjcf"]
+
+VISUAL_GROUP = 2
+"""Geom group of shapes that are only drawn."""
+COLLISION_GROUP = 3
+"""Geom group of shapes that only collide."""
+SITE_GROUP = 4
+"""Site group of frames: hidden unless asked for."""
+
+GREY = (0.5, 0.5, 0.52, 1.0)
+
+
+def build_mjspec(robot: RobotDescription) -> mujoco.MjSpec:
+    """Build the MuJoCo specification of a robot.
+
+    Links become bodies, frames become sites, and each joint with an effort gets a
+    torque motor of its own name unless the description gives another.
+    """
+    spec = mujoco.MjSpec()
+    spec.modelname = robot.name
+    spec.compiler.degree = False
+    spec.compiler.savecompiled = False
+    bodies = {"world": spec.worldbody}
+    inertias = _inertias(robot)
+    for link in robot.links:
+        parent = bodies[link.parent or "world"]
+        bodies[link.name] = body = _add_body(parent, robot, link)
+        _set_inertia(body, inertias[link.name])
+        _add_shapes(spec, body, robot, link)
+    for frame in robot.frames:
+        bodies[frame.link].add_site(
+            name=frame.name, pos=frame.pos, quat=frame.quat, group=SITE_GROUP
+        )
+    for camera in robot.cameras:
+        bodies[camera.link].add_camera(
+            name=camera.name,
+            pos=camera.pos,
+            quat=camera.quat,
+            fovy=camera.fovy,
+            resolution=camera.resolution,
+        )
+    _add_actuators(spec, robot)
+    _add_sensors(spec, robot)
+    _add_constraints(spec, robot)
+    _add_keyframes(spec, robot)
+    return spec
+
+
+def write_mjcf(robot: RobotDescription) -> str:
+    """Write the specification as MJCF text with all digits."""
+    spec = build_mjspec(robot)
+    spec.compile()
+    return spec.to_xml()
+
+
+def _add_body(parent: mujoco.MjsBody, robot: RobotDescription, link: Link):  # noqa: ANN202 - MuJoCo's own type
+    if link.parent is None:
+        body = parent.add_body(name=link.name, pos=robot.root.pos, quat=robot.root.quat)
+        _add_root_joints(body, robot)
+    else:
+        body = parent.add_body(name=link.name, pos=link.pos, quat=link.quat)
+    if link.joint is not None:
+        _add_joint(body, link.joint)
+    return body
+
+
+def _add_root_joints(body: mujoco.MjsBody, robot: RobotDescription) -> None:
+    if robot.root.kind == "free":
+        body.add_joint(name="root", type=mujoco.mjtJoint.mjJNT_FREE)
+    if robot.root.kind == "planar":
+        slide, hinge = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
+        kinds = ((slide, (1, 0, 0)), (slide, (0, 1, 0)), (hinge, (0, 0, 1)))
+        linear, angular = robot.root.damping
+        for name, (kind, axis), damping in zip(
+            robot.root_joint_names, kinds, (linear, linear, angular), strict=True
+        ):
+            joint = body.add_joint(name=name, type=kind, axis=axis)
+            joint.damping[0] = damping
+
+
+def _add_joint(body: mujoco.MjsBody, joint: Joint) -> None:
+    kinds = {
+        "hinge": mujoco.mjtJoint.mjJNT_HINGE,
+        "slide": mujoco.mjtJoint.mjJNT_SLIDE,
+    }
+    added = body.add_joint(
+        name=joint.name,
+        type=kinds[joint.type],
+        axis=joint.axis,
+        armature=joint.armature,
+        frictionloss=joint.frictionloss,
+    )
+    added.damping[0] = joint.damping
+    added.limited = mujoco.mjtLimited.mjLIMITED_FALSE
+    if joint.range is not None:
+        added.limited = mujoco.mjtLimited.mjLIMITED_TRUE
+        added.range = joint.range
+
+
+def _inertias(robot: RobotDescription) -> dict[str, pin.Inertia]:
+    """Collect link inertias in link axes.
+
+    MuJoCo wants mass on the very body that moves, so a moving link without mass takes
+    over the inertia of what is fixed to it; the dynamics stay the same.
+    """
+    inertias = {
+        link.name: pin.Inertia(
+            link.mass, np.asarray(link.com), inertia_matrix(link.inertia)
+        )
+        for link in robot.links
+    }
+    rigid = rigid_bodies(robot.links)
+    placement: dict[str, pin.SE3] = {}
+    for link in robot.links:
+        owner = rigid[link.name]
+        if owner == link.name:
+            placement[link.name] = pin.SE3.Identity()
+            continue
+        quat = pin.Quaternion(*link.quat)
+        local = pin.SE3(quat.matrix(), np.asarray(link.pos))
+        placement[link.name] = placement[str(link.parent)] * local
+        moves = owner != robot.links[0].name or robot.root.kind != "fixed"
+        if moves and robot.link(owner).mass == 0.0 and link.mass > 0.0:
+            inertias[owner] += placement[link.name].act(inertias[link.name])
+            inertias[link.name] = pin.Inertia.Zero()
+    return inertias
+
+
+def _set_inertia(body: mujoco.MjsBody, inertia: pin.Inertia) -> None:
+    if inertia.mass == 0.0:
+        return
+    about = inertia.inertia
+    body.explicitinertial = True
+    body.mass = inertia.mass
+    body.ipos = inertia.lever
+    body.fullinertia = [
+        about[0, 0], about[1, 1], about[2, 2], about[0, 1], about[0, 2], about[1, 2]
+    ]  # fmt: skip
+
+
+def _add_shapes(
+    spec: mujoco.MjSpec, body: mujoco.MjsBody, robot: RobotDescription, link: Link
+) -> None:
+    for shapes, kind in ((link.visual, "visual"), (link.collision, "collision")):
+        for index, shape in enumerate(shapes):
+            geom = _add_geom(spec, body, shape, f"{link.name}_{kind}{index}")
+            geom.mass = 0.0
+            geom.rgba = _rgba(robot, shape)
+            if kind == "visual":
+                geom.contype = geom.conaffinity = 0
+                geom.group = VISUAL_GROUP
+            else:
+                geom.group = COLLISION_GROUP
+                _set_contact(geom, shape)
+
+
+def _rgba(robot: RobotDescription, shape: Shape) -> tuple[float, float, float, float]:
+    color = shape.color
+    if isinstance(color, str):
+        return robot.materials.get(color, GREY)
+    return (color[0], color[1], color[2], color[3] if len(color) == 4 else 1.0)
+
+
+def _set_contact(geom: mujoco.MjsGeom, shape: Shape) -> None:
+    if shape.friction is not None:
+        geom.friction = shape.friction
+    if shape.condim is not None:
+        geom.condim = shape.condim
+    if shape.solref is not None:
+        geom.solref[:2] = shape.solref
+    if shape.margin is not None:
+        geom.margin = shape.margin
+
+
+def _add_geom(
+    spec: mujoco.MjSpec, body: mujoco.MjsBody, shape: Shape, name: str
+) -> mujoco.MjsGeom:
+    mesh = mesh_of(shape)
+    geom = body.add_geom(name=name, pos=shape.pos, quat=shape.quat)
+    kinds = mujoco.mjtGeom
+    if mesh is not None:
+        vertices, faces = mesh
+        spec.add_mesh(
+            name=name,
+            uservert=vertices.ravel(),
+            userface=faces.ravel().astype(np.int32),
+            inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
+        )
+        geom.type = kinds.mjGEOM_MESH
+        geom.meshname = name
+        return geom
+    match shape:
+        case Box(size=size):
+            geom.type, geom.size = kinds.mjGEOM_BOX, size
+        case Ellipsoid(size=size):
+            geom.type, geom.size = kinds.mjGEOM_ELLIPSOID, size
+        case Sphere(radius=radius):
+            geom.type, geom.size = kinds.mjGEOM_SPHERE, (radius, 0, 0)
+        case Capsule() | Cylinder():
+            capsule = isinstance(shape, Capsule)
+            geom.type = kinds.mjGEOM_CAPSULE if capsule else kinds.mjGEOM_CYLINDER
+            _place_segment(geom, shape)
+        case _:
+            raise AssertionError(f"no geom for shape {shape.shape}")
+    return geom
+
+
+def _place_segment(geom: mujoco.MjsGeom, shape: Capsule | Cylinder) -> None:
+    """Pose a capsule or cylinder, whose axis is z in MuJoCo, along its segment."""
+    start, end = np.asarray(shape.start), np.asarray(shape.end)
+    axis = (end - start) / np.linalg.norm(end - start)
+    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), axis)
+    own = pin.SE3(pin.Quaternion(*shape.quat).matrix(), np.asarray(shape.pos))
+    pose = own * pin.SE3(turn.matrix(), (start + end) / 2)
+    xyzw = pin.Quaternion(pose.rotation).coeffs()
+    geom.pos = pose.translation
+    geom.quat = xyzw[[3, 0, 1, 2]]
+    geom.size = (shape.radius, float(np.linalg.norm(end - start)) / 2, 0)
+
+
+def _add_actuators(spec: mujoco.MjSpec, robot: RobotDescription) -> None:
+    if robot.root.kind == "planar" and robot.root.actuated:
+        force, torque = robot.root.effort
+        for name, effort in zip(
+            robot.root_joint_names, (force, force, torque), strict=True
+        ):
+            _add_motor(spec, name, effort)
+    given = {actuator.joint: actuator for actuator in robot.actuators}
+    for joint in robot.joints:
+        actuator = given.get(joint.name)
+        if actuator is not None:
+            _add_actuator(spec, joint, actuator)
+        elif joint.effort and not joint.passive and joint.mimic is None:
+            _add_motor(spec, joint.name, joint.effort)
+
+
+def _add_motor(spec: mujoco.MjSpec, joint: str, effort: float) -> None:
+    motor = spec.add_actuator(
+        name=joint, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT
+    )
+    motor.set_to_motor()
+    motor.ctrllimited = motor.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
+    motor.ctrlrange = motor.forcerange = (-effort, effort)
+
+
+def _add_actuator(spec: mujoco.MjSpec, joint: Joint, actuator: Actuator) -> None:
+    added = spec.add_actuator(
+        name=joint.name, target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT
+    )
+    limits = (-1e10, 1e10)
+    if actuator.kind == "position":
+        added.set_to_position(kp=actuator.kp, kv=actuator.kd)
+        limits = joint.range or limits
+    elif actuator.kind == "velocity":
+        added.set_to_velocity(kv=actuator.kd)
+        limits = (-joint.velocity, joint.velocity) if joint.velocity else limits
+    else:
+        added.set_to_motor()
+    effort = actuator.effort or joint.effort
+    if effort is not None:
+        added.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
+        added.forcerange = (-effort, effort)
+        limits = (-effort, effort) if actuator.kind == "motor" else limits
+    if abs(limits[1]) < 1e10:
+        added.ctrllimited = mujoco.mjtLimited.mjLIMITED_TRUE
+        added.ctrlrange = limits
+
+
+def _add_sensors(spec: mujoco.MjSpec, robot: RobotDescription) -> None:
+    kinds = {
+        "force": mujoco.mjtSensor.mjSENS_FORCE,
+        "torque": mujoco.mjtSensor.mjSENS_TORQUE,
+        "gyro": mujoco.mjtSensor.mjSENS_GYRO,
+        "accelerometer": mujoco.mjtSensor.mjSENS_ACCELEROMETER,
+        "touch": mujoco.mjtSensor.mjSENS_TOUCH,
+    }
+    for sensor in robot.sensors:
+        spec.add_sensor(
+            name=sensor.name,
+            type=kinds[sensor.kind],
+            objtype=mujoco.mjtObj.mjOBJ_SITE,
+            objname=sensor.frame,
+            noise=sensor.noise,
+        )
+
+
+def _add_constraints(spec: mujoco.MjSpec, robot: RobotDescription) -> None:
+    for joint in robot.joints:
+        if joint.mimic is None:
+            continue
+        equality = spec.add_equality(
+            type=mujoco.mjtEq.mjEQ_JOINT,
+            objtype=mujoco.mjtObj.mjOBJ_JOINT,
+            name=f"{joint.name}_mimic",
+            name1=joint.name,
+            name2=joint.mimic.joint,
+        )
+        equality.data[:5] = (joint.mimic.offset, joint.mimic.ratio, 0, 0, 0)
+        equality.solref[:2] = (0.005, 1.0)
+    for index, connect in enumerate(robot.connects):
+        equality = spec.add_equality(
+            type=mujoco.mjtEq.mjEQ_CONNECT,
+            objtype=mujoco.mjtObj.mjOBJ_BODY,
+            name=f"connect{index}_{connect.link}_{connect.other}",
+            name1=connect.link,
+            name2=connect.other,
+        )
+        equality.data[:3] = connect.anchor
+    for first, second in robot.contacts.exclude:
+        spec.add_exclude(name=f"{first}_{second}", bodyname1=first, bodyname2=second)
+
+
+def _add_keyframes(spec: mujoco.MjSpec, robot: RobotDescription) -> None:
+    for name in robot.keyframes:
+        values = robot.keyframe(name)
+        spec.add_key(
+            name=name,
+            qpos=np.array([*_root_qpos(robot), *_ordered(robot, values)]),
+        )
+
+
+def _root_qpos(robot: RobotDescription) -> Iterable[float]:
+    """Root coordinates of the robot's own pose, in MuJoCo's order."""
+    if robot.root.kind == "free":
+        return (*robot.root.pos, *robot.root.quat)
+    return (0.0,) * len(robot.root_joint_names)
+
+
+def _ordered(robot: RobotDescription, values: dict[str, float]) -> Iterable[float]:
+    return (values[name] for name in robot.joint_names)

@@ -1,0 +1,166 @@
+"""Build Pinocchio's model of a robot directly from its description."""
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from wbc_suite.robot.description import RobotDescription
+from wbc_suite.robot.parts import Joint, Link
+from wbc_suite.robot.placing import se3_of
+from wbc_suite.robot.validation import inertia_matrix
+from wbc_suite.typing import Vector
+
+__all__ = ["build_pinocchio"]
+
+GRAVITY = np.array([0.0, 0.0, -9.81])
+"""m/s^2; MuJoCo's own default."""
+
+
+def build_pinocchio(robot: RobotDescription) -> Any:
+    """Build `pinocchio.Model`; see `RobotDescription.to_pinocchio`.
+
+    Each link is a BODY frame and each described frame an OP_FRAME. Unlimited joints
+    have infinite limits. Keyframes are reference configurations.
+    """
+    model = pin.Model()
+    model.name = robot.name
+    model.gravity.linear = GRAVITY
+    joint_of: dict[str, int] = {}
+    pose_in_joint: dict[str, Any] = {}
+    for link in robot.links:
+        if link.parent is None:
+            joint, pose = _add_root(model, robot)
+        else:
+            joint = joint_of[link.parent]
+            pose = pose_in_joint[link.parent] * se3_of(link)
+        if link.joint is not None:
+            joint = _add_joint(model, link.joint, joint, pose)
+            pose = pin.SE3.Identity()
+        joint_of[link.name], pose_in_joint[link.name] = joint, pose
+        _add_body(model, link, joint, pose)
+    for frame in robot.frames:
+        pose = pose_in_joint[frame.link] * se3_of(frame)
+        parent = model.getFrameId(frame.link, pin.FrameType.BODY)
+        joint = joint_of[frame.link]
+        model.addFrame(
+            pin.Frame(frame.name, joint, parent, pose, pin.FrameType.OP_FRAME)
+        )
+    for name in robot.keyframes:
+        model.referenceConfigurations[name] = _configuration(model, robot, name)
+    return model
+
+
+def _add_root(model: Any, robot: RobotDescription) -> tuple[int, Any]:
+    """Add the root's joints; return the joint that carries the first link, and where.
+
+    A planar root is a chain of three joints that ends in the first link: the same
+    equations as MuJoCo's three joints in one body.
+    """
+    pose = se3_of(robot.root)
+    linear, angular = robot.root.velocity
+    infinite = np.inf
+    if robot.root.kind == "fixed":
+        return 0, pose
+    if robot.root.kind == "free":
+        lower = np.array([-infinite] * 3 + [-1.01] * 4)
+        velocity = np.array([linear] * 3 + [angular] * 3)
+        free = pin.JointModelFreeFlyer()
+        effort = np.zeros(6)
+        name = robot.root_joint_names[0]
+        joint = model.addJoint(
+            0, free, pin.SE3.Identity(), name, effort, velocity, lower, -lower
+        )
+        model.addJointFrame(joint)
+        return joint, pin.SE3.Identity()
+    joint = 0
+    chain = (pin.JointModelPX(), pin.JointModelPY(), pin.JointModelRZ())
+    force, torque = robot.root.effort
+    for name, kind, speed, effort, damping in zip(
+        robot.root_joint_names,
+        chain,
+        (linear, linear, angular),
+        (force, force, torque),
+        (robot.root.damping[0],) * 2 + (robot.root.damping[1],),
+        strict=True,
+    ):
+        bound = np.array([infinite])
+        joint = model.addJoint(
+            joint,
+            kind,
+            pose,
+            name,
+            np.array([effort]),
+            np.array([speed]),
+            -bound,
+            bound,
+        )
+        model.damping[model.joints[joint].idx_v] = damping
+        model.addJointFrame(joint)
+        pose = pin.SE3.Identity()
+    return joint, pose
+
+
+def _add_joint(model: Any, joint: Joint, parent: int, pose: Any) -> int:
+    axis = np.asarray(joint.axis)
+    hinge = joint.type == "hinge"
+    kind = _aligned(axis, hinge) or (
+        pin.JointModelRevoluteUnaligned(axis)
+        if hinge
+        else pin.JointModelPrismaticUnaligned(axis)
+    )
+    low, high = joint.range or (-np.inf, np.inf)
+    index = model.addJoint(
+        parent,
+        kind,
+        pose,
+        joint.name,
+        np.array([joint.effort or np.inf]),
+        np.array([joint.velocity or np.inf]),
+        np.array([low]),
+        np.array([high]),
+    )
+    v = model.joints[index].idx_v
+    model.armature[v] = joint.armature
+    model.damping[v] = joint.damping
+    model.friction[v] = joint.frictionloss
+    model.addJointFrame(index)
+    return index
+
+
+def _aligned(axis: Vector, hinge: bool) -> Any:  # a pinocchio joint model, or None
+    """Return the faster joint model when the axis is exactly x, y or z."""
+    kinds = (
+        (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ)
+        if hinge
+        else (pin.JointModelPX, pin.JointModelPY, pin.JointModelPZ)
+    )
+    for k in range(3):
+        if np.array_equal(axis, np.eye(3)[k]):
+            return kinds[k]()
+    return None
+
+
+def _add_body(model: Any, link: Link, joint: int, pose: Any) -> None:
+    if link.mass > 0.0:
+        inertia = pin.Inertia(
+            link.mass, np.asarray(link.com), inertia_matrix(link.inertia)
+        )
+        model.appendBodyToJoint(joint, inertia, pose)
+    model.addBodyFrame(
+        link.name, joint, pose, -1 if joint == 0 else _frame(model, joint)
+    )
+
+
+def _frame(model: Any, joint: int) -> int:
+    return model.getFrameId(model.names[joint], pin.FrameType.JOINT)
+
+
+def _configuration(model: Any, robot: RobotDescription, name: str) -> Vector:
+    q = pin.neutral(model)
+    if robot.root.kind == "free":
+        w, x, y, z = robot.root.quat
+        q[:7] = (*robot.root.pos, x, y, z, w)
+    for joint, value in robot.keyframe(name).items():
+        q[model.joints[model.getJointId(joint)].idx_q] = value
+    return q

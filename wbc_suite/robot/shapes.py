@@ -1,0 +1,202 @@
+"""The primitive shapes that links are drawn with and collide with.
+
+Lengths are in metres, poses are in the link frame, quaternions are w x y z. A box has
+half sizes, as in MJCF. A hull is the convex hull of spheres, a loft a skin over rings.
+"""
+
+import math
+from typing import Annotated, Any, Literal, TypeAlias
+
+from pydantic import AfterValidator, Field, PositiveFloat, model_validator
+
+from wbc_suite.tomlfile import FrozenModel
+
+__all__ = [
+    "Box",
+    "Capsule",
+    "Cylinder",
+    "Ellipsoid",
+    "Hull",
+    "Loft",
+    "Posed",
+    "Quaternion",
+    "Shape",
+    "Sphere",
+    "Vector3",
+]
+
+Vector3: TypeAlias = tuple[float, float, float]
+
+
+def _unit(q: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
+    norm = math.sqrt(sum(c * c for c in q))
+    if abs(norm - 1.0) > 1e-6:
+        raise ValueError(
+            f"a quaternion w x y z must have length 1, this has {norm:.9g}"
+        )
+    w, x, y, z = (c / norm for c in q)
+    return (w, x, y, z)
+
+
+Quaternion: TypeAlias = Annotated[
+    tuple[float, float, float, float], AfterValidator(_unit)
+]
+"""Unit quaternion w x y z; normalised on reading (rounded files are off by 1e-10)."""
+
+Color: TypeAlias = str | tuple[float, float, float] | tuple[float, float, float, float]
+
+
+def quaternion_from_rpy(rpy: Vector3) -> tuple[float, float, float, float]:
+    """Convert fixed-axis roll, pitch, yaw (radians, as in URDF) to w x y z."""
+    (cr, sr), (cp, sp), (cy, sy) = ((math.cos(a / 2), math.sin(a / 2)) for a in rpy)
+    return (
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    )
+
+
+class Posed(FrozenModel):
+    """Something with a pose; `rpy` (radians) may be written instead of `quat`."""
+
+    pos: Vector3 = (0.0, 0.0, 0.0)
+    quat: Quaternion = (1.0, 0.0, 0.0, 0.0)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _accept_rpy(cls, data: Any) -> Any:
+        if isinstance(data, dict) and "rpy" in data:
+            data = dict(data)
+            rpy = data.pop("rpy")
+            if "quat" in data:
+                raise ValueError("give either 'quat' or 'rpy', not both")
+            if not (isinstance(rpy, list | tuple) and len(rpy) == 3):
+                raise ValueError("'rpy' needs three angles in radians")
+            data["quat"] = quaternion_from_rpy(tuple(float(a) for a in rpy))
+        return data
+
+
+class _Surface(Posed):
+    """What every shape has: a pose, a colour, and how it touches others.
+
+    Attributes:
+        color: Name in `[materials]`, or red green blue (alpha) from 0 to 1.
+        friction: Sliding, torsional and rolling friction; MuJoCo's default when absent.
+        condim: Contact dimension (1, 3, 4 or 6).
+        solref: Time constant in s and damping ratio of the contact.
+        margin: Distance in m at which a contact begins.
+    """
+
+    color: Color = "grey"
+    friction: Vector3 | None = None
+    condim: Literal[1, 3, 4, 6] | None = None
+    solref: tuple[float, float] | None = None
+    margin: float | None = None
+
+
+class Box(_Surface):
+    """A box with half sizes; `radius` rounds its edges inside these sizes."""
+
+    shape: Literal["box"]
+    size: tuple[PositiveFloat, PositiveFloat, PositiveFloat]
+    radius: float = Field(default=0.0, ge=0.0)
+
+    @model_validator(mode="after")
+    def _radius_fits(self) -> "Box":
+        if self.radius > min(self.size):
+            raise ValueError(
+                f"radius {self.radius} exceeds the smallest half size {min(self.size)}"
+            )
+        return self
+
+
+class Sphere(_Surface):
+    """A sphere."""
+
+    shape: Literal["sphere"]
+    radius: PositiveFloat
+
+
+class Ellipsoid(_Surface):
+    """An ellipsoid with half axes."""
+
+    shape: Literal["ellipsoid"]
+    size: tuple[PositiveFloat, PositiveFloat, PositiveFloat]
+
+
+class _Segment(_Surface):
+    """A round shape along the segment from one point to another."""
+
+    start: Vector3 = Field(alias="from")
+    end: Vector3 = Field(alias="to")
+    radius: PositiveFloat
+
+    @model_validator(mode="after")
+    def _has_length(self) -> "_Segment":
+        if math.dist(self.start, self.end) < 1e-6:
+            raise ValueError("'from' and 'to' are the same point: use a sphere")
+        return self
+
+
+class Capsule(_Segment):
+    """A cylinder with half spheres around its end points."""
+
+    shape: Literal["capsule"]
+
+
+class Cylinder(_Segment):
+    """A cylinder; `radius_to` gives the far end another radius (visuals only)."""
+
+    shape: Literal["cylinder"]
+    radius_to: PositiveFloat | None = None
+
+
+class Hull(_Surface):
+    """The convex hull of a few spheres `[x, y, z, radius]`: a smooth tapered shell."""
+
+    shape: Literal["hull"]
+    spheres: tuple[tuple[float, float, float, Annotated[float, Field(ge=0.0)]], ...] = (
+        Field(min_length=1, max_length=64)
+    )
+
+    @model_validator(mode="after")
+    def _has_volume(self) -> "Hull":
+        if max(s[3] for s in self.spheres) <= 0.0 and len(self.spheres) < 4:
+            raise ValueError("a hull needs a positive radius or at least four points")
+        return self
+
+
+class Loft(_Surface):
+    """A skin over rings along one axis (visuals only; need not be convex).
+
+    Attributes:
+        axis: Axis along which the rings stand.
+        sections: Rows `[position, centre_u, centre_v, half_u, half_v]`; u and v are the
+            two other axes in the order x, y, z.
+        exponent: Superellipse exponent of a ring: 2 ellipse, 4 squircle, 8 nearly box.
+        smooth: Pass a smooth curve through the rings instead of straight lines.
+    """
+
+    shape: Literal["loft"]
+    axis: Literal["x", "y", "z"] = "z"
+    sections: tuple[tuple[float, float, float, float, float], ...] = Field(
+        min_length=2, max_length=64
+    )
+    exponent: float = Field(default=2.0, ge=1.0, le=20.0)
+    smooth: bool = True
+
+    @model_validator(mode="after")
+    def _positions_rise(self) -> "Loft":
+        positions = [s[0] for s in self.sections]
+        if any(b - a < 1e-6 for a, b in zip(positions, positions[1:], strict=False)):
+            raise ValueError("the rings' positions must rise from each to the next")
+        if any(s[3] <= 0 or s[4] <= 0 for s in self.sections):
+            raise ValueError("half sizes of rings must be positive")
+        return self
+
+
+Shape: TypeAlias = Annotated[
+    Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | Loft,
+    Field(discriminator="shape"),
+]

@@ -1,0 +1,168 @@
+"""Turn hulls, rounded boxes, cones and lofts into triangle meshes.
+
+Everything here is computed at export: no mesh file is read or shipped.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+from scipy.spatial import ConvexHull, QhullError
+
+from wbc_suite.errors import DescriptionError
+from wbc_suite.robot.shapes import Box, Cylinder, Hull, Loft, Shape
+from wbc_suite.typing import Indices, Matrix, Vector
+
+__all__ = ["mesh_of", "support_points"]
+
+RING_POINTS = 32
+"""Points on one ring of a loft or a cone."""
+
+
+def mesh_of(shape: Shape) -> tuple[Matrix, Indices] | None:
+    """Compute the triangle mesh of a shape that is no primitive.
+
+    Returns:
+        Vertices, shape (n, 3), in the shape's own frame, and faces, shape (m, 3),
+        counter-clockwise from outside; None when the engine has a primitive for it.
+    """
+    match shape:
+        case Hull():
+            return _convex(support_points(shape))
+        case Box(radius=r) if r > 0.0:
+            return _convex(support_points(shape))
+        case Cylinder(radius_to=r) if r is not None:
+            return _convex(support_points(shape))
+        case Loft():
+            return _loft(shape)
+        case _:
+            return None
+
+
+def support_points(shape: Shape) -> Matrix:
+    """Compute points, shape (n, 3), whose convex hull is the shape, in its frame.
+
+    Raises:
+        DescriptionError: For shapes that are no hull of points.
+    """
+    match shape:
+        case Hull(spheres=spheres):
+            rows = np.asarray(spheres, dtype=np.float64)
+            return _sphere_points(rows[:, :3], rows[:, 3])
+        case Box(size=size, radius=radius):
+            half = np.asarray(size) - radius
+            signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
+            return _sphere_points(signs * half, np.full(8, radius))
+        case Cylinder(start=a, end=b, radius=r, radius_to=s):
+            return _cone_points(np.asarray(a), np.asarray(b), r, r if s is None else s)
+        case Loft():
+            return _loft(shape)[0]
+        case _:
+            raise DescriptionError(f"A {shape.shape} is not a hull of points.")
+
+
+@lru_cache(maxsize=4)
+def _icosphere(subdivisions: int) -> Matrix:
+    """Points of a subdivided icosahedron on the unit sphere, shape (n, 3)."""
+    phi = (1 + 5**0.5) / 2
+    points = [(0.0, s, t * phi) for s in (-1, 1) for t in (-1, 1)]
+    vertices = np.array([np.roll(p, k) for p in points for k in range(3)])
+    vertices /= np.linalg.norm(vertices, axis=1, keepdims=True)
+    for _ in range(subdivisions):
+        faces = ConvexHull(vertices).simplices
+        edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+        edges = np.unique(np.sort(edges, axis=1), axis=0)
+        middle = vertices[edges].sum(axis=1)
+        middle /= np.linalg.norm(middle, axis=1, keepdims=True)
+        vertices = np.concatenate([vertices, middle])
+    vertices.flags.writeable = False
+    return vertices
+
+
+def _sphere_points(centres: Matrix, radii: Vector) -> Matrix:
+    """Points on several spheres; a radius of zero gives the centre alone."""
+    unit = _icosphere(2 if len(centres) <= 12 else 1)
+    parts = [
+        c + r * unit if r > 0 else c[None] for c, r in zip(centres, radii, strict=True)
+    ]
+    return np.concatenate(parts)
+
+
+def _convex(points: Matrix) -> tuple[Matrix, Indices]:
+    """Convex hull with outward, counter-clockwise faces."""
+    try:
+        hull = ConvexHull(points)
+    except QhullError as error:
+        raise DescriptionError(
+            "A hull is flat or a single point: give its spheres a radius."
+        ) from error
+    used = np.unique(hull.simplices)
+    index = np.full(len(points), -1)
+    index[used] = np.arange(len(used))
+    faces = hull.simplices.astype(np.int64)
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
+    faces[inward] = faces[inward][:, [0, 2, 1]]
+    return points[used], index[faces]
+
+
+def _cone_points(a: Vector, b: Vector, radius_a: float, radius_b: float) -> Matrix:
+    axis = (b - a) / np.linalg.norm(b - a)
+    u = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
+    u /= np.linalg.norm(u)
+    v = np.cross(axis, u)
+    t = np.linspace(0, 2 * np.pi, RING_POINTS, endpoint=False)
+    ring = np.cos(t)[:, None] * u + np.sin(t)[:, None] * v
+    return np.concatenate([a + radius_a * ring, b + radius_b * ring])
+
+
+def _loft(shape: Loft) -> tuple[Matrix, Indices]:
+    sections = _smooth_sections(shape)
+    t = np.linspace(0, 2 * np.pi, RING_POINTS, endpoint=False)
+    power = 2.0 / shape.exponent
+    u = np.sign(np.cos(t)) * np.abs(np.cos(t)) ** power
+    v = np.sign(np.sin(t)) * np.abs(np.sin(t)) ** power
+    k = "xyz".index(shape.axis)
+    others = [i for i in range(3) if i != k]
+    vertices = np.empty((len(sections) * RING_POINTS + 2, 3))
+    rings = vertices[:-2].reshape(len(sections), RING_POINTS, 3)
+    rings[:, :, k] = sections[:, 0:1]
+    rings[:, :, others[0]] = sections[:, 1:2] + sections[:, 3:4] * u
+    rings[:, :, others[1]] = sections[:, 2:3] + sections[:, 4:5] * v
+    for row, section in zip((-2, -1), (sections[0], sections[-1]), strict=True):
+        vertices[row, k] = section[0]
+        vertices[row, others] = section[1:3]
+    faces = _loft_faces(len(sections))
+    # (x, z) is left-handed about y, so rings along y turn the other way round.
+    return vertices, faces[:, ::-1].copy() if shape.axis == "y" else faces
+
+
+def _smooth_sections(shape: Loft) -> Matrix:
+    """Insert rings on a monotone cubic through the given ones."""
+    given = np.asarray(shape.sections, dtype=np.float64)
+    if not shape.smooth or len(given) < 3:
+        return given
+    parts = [np.linspace(a, b, 4, endpoint=False) for a, b in _pairs(given[:, 0])]
+    x = np.concatenate([*parts, given[-1:, 0]])
+    curve = PchipInterpolator(given[:, 0], given[:, 1:])
+    return np.column_stack([x, curve(x)])
+
+
+def _pairs(values: Vector) -> list[tuple[float, float]]:
+    return [(float(a), float(b)) for a, b in zip(values[:-1], values[1:], strict=True)]
+
+
+def _loft_faces(rings: int) -> Indices:
+    n = RING_POINTS
+    i = np.arange(n)
+    j = (i + 1) % n
+    faces: list[Indices] = []
+    for ring in range(rings - 1):
+        a, b = ring * n, (ring + 1) * n
+        faces.append(np.column_stack([a + i, a + j, b + j]))
+        faces.append(np.column_stack([a + i, b + j, b + i]))
+    first, last = rings * n, rings * n + 1
+    faces.append(np.column_stack([np.full(n, first), j, i]))
+    top = (rings - 1) * n
+    faces.append(np.column_stack([np.full(n, last), top + i, top + j]))
+    return np.concatenate(faces).astype(np.int64)

@@ -1,0 +1,286 @@
+"""Check a robot description: names, tree, physics, references.
+
+MuJoCo and Pinocchio would find some of these faults too, but late and in their words.
+"""
+
+from collections.abc import Collection, Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from wbc_suite.errors import nearest_name
+from wbc_suite.robot.shapes import Shape
+from wbc_suite.typing import Matrix, Vector
+
+if TYPE_CHECKING:
+    from wbc_suite.robot.description import RobotDescription
+    from wbc_suite.robot.parts import Joint, Link
+
+__all__ = ["check_description", "inertia_matrix", "rigid_bodies", "shape_bounds"]
+
+INERTIA_SLACK = 1e-6
+"""Relative slack of the triangle inequality; vendors round their tensors."""
+GYRATION_RANGE = (0.08, 1.1)
+"""Plausible radius of gyration over half the diagonal of the link's shapes."""
+COM_SLACK = 0.10
+"""The centre of mass may leave the box of the link's shapes by this part of it."""
+
+RESERVED = ("root", "root_x", "root_y", "root_yaw", "world")
+
+
+def check_description(robot: "RobotDescription") -> None:
+    """Raise ValueError with every fault found, each as one sentence."""
+    faults = [
+        *_tree(robot),
+        *_moving(robot),
+        *_names(robot),
+        *(fault for link in robot.links for fault in _link(link)),
+        *_references(robot),
+        *_mimics(robot),
+        *_keyframes(robot),
+        *_groups(robot),
+    ]
+    if faults:
+        shown = "; ".join(faults[:6])
+        more = f"; ... and {len(faults) - 6} more" if len(faults) > 6 else ""
+        raise ValueError(shown + more)
+
+
+def inertia_matrix(inertia: tuple[float, ...]) -> Matrix:
+    """Return the symmetric (3, 3) matrix of `xx yy zz xy xz yz`."""
+    xx, yy, zz, xy, xz, yz = inertia
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def _unknown(kind: str, name: str, known: Collection[str], where: str) -> str:
+    close = nearest_name(name, known)
+    hint = f" Did you mean '{close}'?" if close else ""
+    return f"{where} names {kind} '{name}', which does not exist.{hint}"
+
+
+def _tree(robot: "RobotDescription") -> Iterator[str]:
+    names = {link.name for link in robot.links}
+    roots = [link.name for link in robot.links if link.parent is None]
+    if len(roots) != 1:
+        yield f"exactly one link has no parent, found {len(roots)}: {roots}"
+    seen: set[str] = set()
+    for link in robot.links:
+        if link.parent is not None and link.parent not in names:
+            yield _unknown("parent", link.parent, names, f"link '{link.name}'")
+        elif link.parent is not None and link.parent not in seen:
+            yield (
+                f"link '{link.name}' stands before its parent '{link.parent}', or the "
+                "two form a loop"
+            )
+        seen.add(link.name)
+    if robot.links and robot.links[0].joint is not None:
+        yield f"the first link '{robot.links[0].name}' has a joint; use [root] instead"
+
+
+def _moving(robot: "RobotDescription") -> Iterator[str]:
+    """Every set of links that moves as one rigid body needs mass somewhere."""
+    rigid = rigid_bodies(robot.links)
+    masses = dict.fromkeys(rigid.values(), 0.0)
+    for link in robot.links:
+        masses[rigid[link.name]] += link.mass
+    for link in robot.links:
+        first = link is robot.links[0] and robot.root.kind != "fixed"
+        if (first or link.joint is not None) and masses[link.name] == 0.0:
+            yield f"link '{link.name}' moves and so needs a mass"
+
+
+def rigid_bodies(links: "tuple[Link, ...]") -> dict[str, str]:
+    """Map each link to the moving (or first) link that it is rigidly fixed to."""
+    owner: dict[str, str] = {}
+    for link in links:
+        fixed = link.joint is None and link.parent in owner
+        owner[link.name] = owner[str(link.parent)] if fixed else link.name
+    return owner
+
+
+def _names(robot: "RobotDescription") -> Iterator[str]:
+    owner: dict[str, str] = dict.fromkeys(RESERVED, "reserved name")
+    items = [("link", link.name) for link in robot.links]
+    items += [("joint", name) for name in robot.joint_names]
+    items += [("frame", frame.name) for frame in robot.frames]
+    for kind, name in items:
+        if name in owner:
+            yield f"{kind} '{name}' repeats the name of a {owner[name]}"
+        owner.setdefault(name, kind)
+    for kind, names in (
+        ("camera", [c.name for c in robot.cameras]),
+        ("sensor", [s.name for s in robot.sensors]),
+        ("mount", [m.name for m in robot.mounts]),
+    ):
+        for name in sorted({n for n in names if names.count(n) > 1}):
+            yield f"{kind} '{name}' is given twice"
+
+
+def _link(link: "Link") -> Iterator[str]:
+    where = f"link '{link.name}'"
+    if link.mass == 0.0:
+        return
+    eigenvalues = np.linalg.eigvalsh(inertia_matrix(link.inertia))
+    if eigenvalues[0] <= 0.0:
+        yield (
+            f"{where}: the inertia {list(link.inertia)} is not positive definite "
+            f"(principal moments {_numbers(eigenvalues)})"
+        )
+        return
+    if eigenvalues[2] > (eigenvalues[0] + eigenvalues[1]) * (1 + INERTIA_SLACK):
+        yield (
+            f"{where}: the principal moments {_numbers(eigenvalues)} break the triangle "
+            "inequality: no body has them"
+        )
+    yield from _plausible(link, eigenvalues)
+
+
+def _numbers(values: Vector) -> str:
+    return "[" + ", ".join(f"{v:.4g}" for v in values) + "]"
+
+
+def _plausible(link: "Link", moments: Vector) -> Iterator[str]:
+    """Compare centre of mass and inertia with the size of the link's shapes."""
+    shapes = [*link.visual, *link.collision]
+    if not shapes:
+        return
+    bounds = [shape_bounds(shape) for shape in shapes]
+    low = np.min([b[0] for b in bounds], axis=0)
+    high = np.max([b[1] for b in bounds], axis=0)
+    slack = COM_SLACK * (high - low) + 0.005
+    com = np.asarray(link.com)
+    outside = float(np.max(np.maximum(low - slack - com, com - high - slack)))
+    if outside > 0.0 and "com" not in link.accept:
+        yield (
+            f"link '{link.name}': the centre of mass {_numbers(com)} lies "
+            f"{outside * 1000:.0f} mm outside the link's shapes, which span "
+            f"{_numbers(low)} to {_numbers(high)}"
+        )
+    gyration = float(np.sqrt(np.mean(moments) * 1.5 / link.mass))
+    ratio = gyration / float(np.linalg.norm(high - low) / 2)
+    lowest, highest = GYRATION_RANGE
+    if not lowest <= ratio <= highest and "inertia" not in link.accept:
+        yield (
+            f"link '{link.name}': a radius of gyration of {gyration:.3g} m does not fit "
+            f"shapes of half diagonal {gyration / ratio:.3g} m"
+        )
+
+
+def shape_bounds(shape: Shape) -> tuple[Vector, Vector]:
+    """Compute the corners of an axis-aligned box around a shape, in the link frame."""
+    from wbc_suite.robot.surfaces import support_points
+
+    match shape.shape:
+        case "sphere":
+            low, high = -np.full(3, shape.radius), np.full(3, shape.radius)
+        case "ellipsoid":
+            low, high = -np.asarray(shape.size), np.asarray(shape.size)
+        case "box":
+            low, high = -np.asarray(shape.size), np.asarray(shape.size)
+        case "capsule":
+            ends = np.array([shape.start, shape.end])
+            low, high = ends.min(axis=0) - shape.radius, ends.max(axis=0) + shape.radius
+        case _:
+            points = support_points(shape)
+            low, high = points.min(axis=0), points.max(axis=0)
+    centre, half = (low + high) / 2, (high - low) / 2
+    rotation = Rotation.from_quat(shape.quat, scalar_first=True).as_matrix()
+    middle = rotation @ centre + np.asarray(shape.pos)
+    reach = np.abs(rotation) @ half
+    return middle - reach, middle + reach
+
+
+def _references(robot: "RobotDescription") -> Iterator[str]:
+    links = {link.name for link in robot.links}
+    frames = {frame.name for frame in robot.frames}
+    joints = set(robot.joint_names)
+    placed = [("frame", f.name, f.link) for f in robot.frames]
+    placed += [("mount", m.name, m.link) for m in robot.mounts]
+    placed += [("camera", c.name, c.link) for c in robot.cameras]
+    for kind, name, link in placed:
+        if link not in links:
+            yield _unknown("link", link, links, f"{kind} '{name}'")
+    for sensor in robot.sensors:
+        if sensor.frame not in frames:
+            yield _unknown("frame", sensor.frame, frames, f"sensor '{sensor.name}'")
+    for actuator in robot.actuators:
+        if actuator.joint not in joints:
+            yield _unknown("joint", actuator.joint, joints, "an actuator")
+    for pair in robot.contacts.exclude:
+        for link in pair:
+            if link not in links:
+                yield _unknown("link", link, links, "contacts.exclude")
+    for connect in robot.connects:
+        for link in (connect.link, connect.other):
+            if link not in links:
+                yield _unknown("link", link, links, "a connect")
+    for gripper, synergies in robot.synergies.items():
+        for synergy in synergies:
+            for joint in synergy.open:
+                if joint not in joints:
+                    where = f"synergy '{synergy.name}' of '{gripper}'"
+                    yield _unknown("joint", joint, joints, where)
+    yield from _colors(robot)
+
+
+def _colors(robot: "RobotDescription") -> Iterator[str]:
+    known = {*robot.materials, "grey"}
+    for link in robot.links:
+        for shape in link.visual:
+            if isinstance(shape.color, str) and shape.color not in known:
+                yield _unknown("material", shape.color, known, f"link '{link.name}'")
+        for shape in link.collision:
+            if shape.shape == "loft":
+                yield (
+                    f"link '{link.name}': a loft cannot collide, it need not be convex; "
+                    "use a hull"
+                )
+
+
+def _mimics(robot: "RobotDescription") -> Iterator[str]:
+    joints = {joint.name: joint for joint in robot.joints}
+    for joint in robot.joints:
+        if joint.mimic is None:
+            continue
+        leader = joints.get(joint.mimic.joint)
+        where = f"joint '{joint.name}'"
+        if leader is None:
+            yield _unknown("leader", joint.mimic.joint, joints, where)
+        elif leader.mimic is not None:
+            yield f"{where} follows '{leader.name}', which itself follows another"
+
+
+def _keyframes(robot: "RobotDescription") -> Iterator[str]:
+    joints = {joint.name: joint for joint in robot.joints}
+    for name, values in robot.keyframes.items():
+        for joint_name, value in values.items():
+            joint = joints.get(joint_name)
+            if joint is None:
+                yield _unknown("joint", joint_name, joints, f"keyframe '{name}'")
+            elif not _inside(value, joint):
+                yield (
+                    f"keyframe '{name}': {joint_name} = {value} is outside "
+                    f"{list(joint.range or ())}"
+                )
+
+
+def _inside(value: float, joint: "Joint") -> bool:
+    return joint.range is None or joint.range[0] <= value <= joint.range[1]
+
+
+def _groups(robot: "RobotDescription") -> Iterator[str]:
+    """Groups partition the joints that have a motor."""
+    joints = {joint.name: joint for joint in robot.joints}
+    owner: dict[str, str] = {}
+    for group, members in robot.groups.items():
+        for name in members:
+            if name not in joints:
+                yield _unknown("joint", name, joints, f"group '{group}'")
+            elif name in owner:
+                yield f"joint '{name}' is in two groups, '{owner[name]}' and '{group}'"
+            owner[name] = group
+    for joint in robot.joints:
+        free = joint.passive or joint.mimic is not None
+        if robot.groups and not free and joint.name not in owner:
+            yield f"joint '{joint.name}' is in no group (or mark it passive)"
