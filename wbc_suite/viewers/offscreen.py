@@ -1,5 +1,6 @@
 """Pictures of a robot in a studio: neutral ground, soft light, a camera that fits."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
@@ -70,26 +71,27 @@ def render_robot(
         UnknownNameError: If the robot has no such keyframe, or the view is unknown.
         DeviceError: If nothing on this machine can draw.
     """
-    if keyframe not in robot.keyframes:
-        raise UnknownNameError(
-            f"keyframe of robot '{robot.name}'", keyframe, robot.keyframes
-        )
+    posture = robot.keyframe(keyframe)
     spec = robot.to_mjspec()
-    model = spec.compile()
-    data = mujoco.MjData(model)
-    for joint, value in robot.keyframes[keyframe].items():
-        data.joint(joint).qpos[:] = value
-    mujoco.mj_forward(model, data)
-    ground = float(_corners(model, data)[:, 2].min())
+    ground = float(_corners(*_pose(spec, posture))[:, 2].min())
     add_studio(spec, ground=ground)
-    studio = spec.compile()
-    staged = mujoco.MjData(studio)
-    staged.qpos[:] = data.qpos
-    mujoco.mj_forward(studio, staged)
+    model, data = _pose(spec, posture)
     width, height = size
     return render_model(
-        studio, staged, width=width, height=height, camera=view, preset=preset
+        model, data, width=width, height=height, camera=view, preset=preset
     )
+
+
+def _pose(
+    spec: mujoco.MjSpec, posture: Mapping[str, float]
+) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """Compile a robot and put its joints where the posture has them."""
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    for joint, value in posture.items():
+        data.joint(joint).qpos[:] = value
+    mujoco.mj_forward(model, data)
+    return model, data
 
 
 def render_model(
@@ -137,15 +139,15 @@ def add_studio(spec: mujoco.MjSpec, *, ground: float = 0.0) -> None:
         name="studio_sky",
         type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
         builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
-        rgb1=[0.93, 0.94, 0.95],
-        rgb2=[0.80, 0.82, 0.85],
+        rgb1=[0.73, 0.75, 0.78],
+        rgb2=[0.62, 0.65, 0.70],
         width=256,
         height=1536,
     )
     spec.add_material(
-        name="studio_ground", rgba=[0.90, 0.91, 0.92, 1], specular=0, shininess=0
+        name="studio_ground", rgba=[0.70, 0.72, 0.75, 1], specular=0, shininess=0
     )
-    spec.visual.rgba.haze = [0.93, 0.94, 0.95, 1]
+    spec.visual.rgba.haze = [0.73, 0.75, 0.78, 1]
     spec.visual.map.haze = 0.6
     spec.visual.headlight.ambient = [0.42, 0.42, 0.42]
     spec.visual.headlight.diffuse = [0.12, 0.12, 0.12]

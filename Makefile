@@ -1,0 +1,66 @@
+# Everything a newcomer or a build machine types. `make` alone lists it.
+.DEFAULT_GOAL := help
+.PHONY: help teleop demo test check format bench bench-peers wheel clean
+
+VENV := .venv
+PY := $(VENV)/bin/python
+PYTEST := $(PY) -m pytest
+FAST := -m "not slow and not browser and not peer"
+export PYTHON
+
+help: ## list the commands
+	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-12s %s\n", $$1, $$2}' Makefile
+
+teleop: $(VENV)/.installed ## move a humanoid's hands in a web page (ARGS="--robots Panda")
+	@$(PY) -m wbc_suite.cli teleop $(ARGS)
+
+demo: $(VENV)/.installed ## the same without a browser: prints figures, writes pictures
+	@$(PY) -m wbc_suite.cli demo $(ARGS)
+
+test: $(VENV)/.installed-dev ## run the whole test suite
+	$(PYTEST) -n auto --dist loadgroup $(ARGS)
+
+check: $(VENV)/.installed-dev ## format, lint, types, import direction, fast tests
+	$(PY) -m ruff format --check .
+	$(PY) -m ruff check .
+	$(PY) -m pyright
+	$(PYTEST) -q tests/test_imports.py
+	$(PYTEST) -n auto --dist loadgroup $(FAST) $(ARGS)
+
+format: $(VENV)/.installed-dev ## let ruff format and mend what it can
+	$(PY) -m ruff format .
+	$(PY) -m ruff check --fix .
+
+bench: $(VENV)/.installed-dev ## run every benchmark (ARGS=--quick for under a minute each)
+	@set -e; for script in benchmarks/*.py; do \
+	  echo "== $$script"; $(PY) "$$script" $(ARGS); done
+
+bench-peers: $(VENV)/.installed-dev ## install the peers that the benchmarks compare with
+	$(PY) -m pip install --group peers
+	@test -x .venv-placo/bin/python || $(PY) -m venv .venv-placo
+	.venv-placo/bin/python -m pip install placo
+
+wheel: $(VENV)/.installed ## build the wheel into dist/
+	$(PY) -m pip wheel --quiet --no-deps --wheel-dir dist .
+
+clean: ## remove what was built here
+	rm -rf $(VENV) .venv-* dist build artifacts
+
+# The environment is made anew when its Python is gone or too old, and completed
+# when pyproject.toml is newer than the stamp, which is written last.
+$(VENV)/.python: .ci/find-python
+	@python=$$(.ci/find-python) || exit 1; \
+	if $(PY) -c 'import sys, pip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then :; \
+	else echo "Making $(VENV) with $$python"; "$$python" -m venv --clear $(VENV); fi
+	@$(PY) -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"
+	@touch $@
+
+$(VENV)/.installed: $(VENV)/.python pyproject.toml
+	@echo "Installing wbc-suite into $(VENV); the first time downloads some 300 MB"
+	@$(PY) -m pip install --disable-pip-version-check --editable .
+	@touch $@
+
+$(VENV)/.installed-dev: $(VENV)/.python pyproject.toml
+	@echo "Installing wbc-suite and its tools into $(VENV); the first time downloads some 400 MB"
+	@$(PY) -m pip install --disable-pip-version-check --editable . --group dev
+	@touch $(VENV)/.installed $@
