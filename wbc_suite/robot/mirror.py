@@ -1,9 +1,9 @@
 """`[mirror]`: write the other side of a robot by reflection in a plane.
 
 With `S` the reflection (for the plane xz: diag(1, -1, 1)), a link frame goes to
-`S p`, `S R S`. Within a link, points go to `D p`, tensors to `D I D^T`, the axis of a slide
-to `D a` and that of a hinge (a pseudovector) to `-D a`, where `D` is `S` unless the file
-gives the other side's link frame by hand: then `D = R_target^T S R_source`, with both
+`S p`, `S R S`. Within a link, points go to `D p`, tensors to `D I D^T`, the axis of a
+slide to `D a` and that of a hinge (a pseudovector) to `-D a`, where `D` is `S` unless
+the file gives the other side's link by hand: then `D = R_target^T S R_source`, with both
 orientations taken at zero joint angles. Where an axis only turns round, it is kept and
 the joint's range is negated instead, as vendors write their robots. Whatever the file
 gives for the other side by hand wins over the reflection.

@@ -4,6 +4,7 @@ Lengths are in metres, poses are in the link frame, quaternions are w x y z. A b
 half sizes, as in MJCF. A hull is the convex hull of spheres, a loft a skin over rings.
 """
 
+import itertools
 import math
 from typing import Annotated, Any, Literal, TypeAlias
 
@@ -189,7 +190,7 @@ class Loft(_Surface):
     @model_validator(mode="after")
     def _positions_rise(self) -> "Loft":
         positions = [s[0] for s in self.sections]
-        if any(b - a < 1e-6 for a, b in zip(positions, positions[1:], strict=False)):
+        if any(b - a < 1e-6 for a, b in itertools.pairwise(positions)):
             raise ValueError("the rings' positions must rise from each to the next")
         if any(s[3] <= 0 or s[4] <= 0 for s in self.sections):
             raise ValueError("half sizes of rings must be positive")

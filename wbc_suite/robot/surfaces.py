@@ -3,6 +3,7 @@
 Everything here is computed at export: no mesh file is read or shipped.
 """
 
+import itertools
 from functools import lru_cache
 
 import numpy as np
@@ -142,14 +143,12 @@ def _smooth_sections(shape: Loft) -> Matrix:
     given = np.asarray(shape.sections, dtype=np.float64)
     if not shape.smooth or len(given) < 3:
         return given
-    parts = [np.linspace(a, b, 4, endpoint=False) for a, b in _pairs(given[:, 0])]
+    parts = [
+        np.linspace(a, b, 4, endpoint=False) for a, b in itertools.pairwise(given[:, 0])
+    ]
     x = np.concatenate([*parts, given[-1:, 0]])
     curve = PchipInterpolator(given[:, 0], given[:, 1:])
     return np.column_stack([x, curve(x)])
-
-
-def _pairs(values: Vector) -> list[tuple[float, float]]:
-    return [(float(a), float(b)) for a, b in zip(values[:-1], values[1:], strict=True)]
 
 
 def _loft_faces(rings: int) -> Indices:
