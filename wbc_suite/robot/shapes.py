@@ -6,7 +6,7 @@ half sizes, as in MJCF. A hull is the convex hull of spheres, a loft a skin over
 
 import itertools
 import math
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias, cast
 
 from pydantic import AfterValidator, Field, PositiveFloat, model_validator
 
@@ -24,6 +24,7 @@ __all__ = [
     "Shape",
     "Sphere",
     "Vector3",
+    "as_table",
 ]
 
 Vector3: TypeAlias = tuple[float, float, float]
@@ -67,15 +68,21 @@ class Posed(FrozenModel):
     @model_validator(mode="before")
     @classmethod
     def _accept_rpy(cls, data: Any) -> Any:
-        if isinstance(data, dict) and "rpy" in data:
-            data = dict(data)
-            rpy = data.pop("rpy")
-            if "quat" in data:
-                raise ValueError("give either 'quat' or 'rpy', not both")
-            if not (isinstance(rpy, list | tuple) and len(rpy) == 3):
+        fields = as_table(data)
+        if "rpy" not in fields:
+            return data
+        if "quat" in fields:
+            raise ValueError("give either 'quat' or 'rpy', not both")
+        match fields.pop("rpy"):
+            case [float() | int() as r, float() | int() as p, float() | int() as y]:
+                return fields | {"quat": quaternion_from_rpy((r, p, y))}
+            case _:
                 raise ValueError("'rpy' needs three angles in radians")
-            data["quat"] = quaternion_from_rpy(tuple(float(a) for a in rpy))
-        return data
+
+
+def as_table(data: Any) -> dict[str, Any]:
+    """Return a copy of a table that is still plain data; empty for anything else."""
+    return dict(cast("dict[str, Any]", data)) if isinstance(data, dict) else {}
 
 
 class _Surface(Posed):
