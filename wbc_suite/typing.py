@@ -1,18 +1,17 @@
 """Shared array types.
 
-Shapes are told in docstrings: NumPy's types cannot carry them. Values are float64; the
-aliases say `floating`, since NumPy's own stubs lose the width in ordinary arithmetic.
+Shapes are told in docstrings: NumPy's types cannot carry them.
 """
 
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-Vector: TypeAlias = NDArray[np.floating[Any]]
+Vector: TypeAlias = NDArray[np.float64]
 """One-dimensional float64 array."""
 
-Matrix: TypeAlias = NDArray[np.floating[Any]]
+Matrix: TypeAlias = NDArray[np.float64]
 """Two-dimensional float64 array."""
 
 Indices: TypeAlias = NDArray[np.int64]

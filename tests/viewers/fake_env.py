@@ -1,0 +1,109 @@
+"""A tiny stand-in for an environment: two hands that float, with a bounded reach."""
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+
+import gymnasium
+import mujoco
+import numpy as np
+import pinocchio as pin
+
+MJCF = """
+<mujoco>
+  <visual><headlight active="0"/></visual>
+  <worldbody>
+    <light pos="0 0 3"/>
+    <geom name="floor" type="plane" size="5 5 0.1" rgba="0.8 0.8 0.8 1"/>
+    <body name="robot0_trunk" pos="0 0 0.9">
+      <geom type="box" size="0.1 0.15 0.3" rgba="0.9 0.9 0.92 1"/>
+      <geom type="capsule" size="0.12 0.2" group="3" rgba="0.9 0.3 0.3 1"/>
+    </body>
+    <body name="robot0_right_palm" pos="0.4 -0.2 1.0">
+      <freejoint/>
+      <geom type="ellipsoid" size="0.06 0.03 0.09" rgba="0.3 0.3 0.35 1"/>
+      <site name="robot0_right_hand" pos="0 0 0"/>
+    </body>
+    <body name="robot0_left_palm" pos="0.4 0.2 1.0">
+      <freejoint/>
+      <geom type="capsule" size="0.04 0.05" rgba="0.3 0.3 0.35 1"/>
+      <site name="robot0_left_hand" pos="0 0 0"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+REACH = 0.8  # m, from the trunk
+STRIDE = 0.02  # m, furthest that a hand moves in a step
+
+
+@dataclass(frozen=True)
+class Slice:
+    name: str
+    kind: str
+    start: int
+    stop: int
+    low: np.ndarray
+    high: np.ndarray
+    labels: tuple[str, ...] = ()
+
+
+class Layout:
+    def __init__(self):
+        bound = np.full(6, 10.0)
+        self.slices = (
+            Slice("right_hand", "pose", 0, 6, -bound, bound),
+            Slice("left_hand", "pose", 6, 12, -bound, bound),
+            Slice("right_gripper", "gripper", 12, 14, -np.ones(2), np.ones(2)),
+        )
+
+    def pack(self, values):
+        return np.concatenate([values[s.name] for s in self.slices])
+
+    def unpack(self, action):
+        return {s.name: action[s.start : s.stop] for s in self.slices}
+
+
+class FakeEnv(gymnasium.Env):
+    def __init__(self):
+        self.model = mujoco.MjModel.from_xml_string(MJCF)
+        self.data = mujoco.MjData(self.model)
+        self.simulation = SimpleNamespace(model=self.model, data=self.data)
+        self.action_layout = Layout()
+        self.actions = []
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        mujoco.mj_resetData(self.model, self.data)
+        mujoco.mj_forward(self.model, self.data)
+        return {}, {}
+
+    def step(self, action):
+        self.actions.append(np.array(action))
+        values = self.action_layout.unpack(action)
+        frames = {
+            name: self._follow(name, values[name], 7 * i)
+            for i, name in enumerate(("right_hand", "left_hand"))
+        }
+        self.data.time += 0.02
+        mujoco.mj_forward(self.model, self.data)
+        reached = all(f["reached"] for f in frames.values())
+        ik = {"reached": reached, "solve_time": 1e-3, "frames": frames}
+        return {}, 0.0, False, False, {"ik": ik, "success": False}
+
+    def _follow(self, name, command, address):
+        trunk = np.array([0.0, 0.0, 0.9])
+        goal = command[:3] - trunk
+        distance = np.linalg.norm(goal)
+        goal = trunk + goal * min(1.0, REACH / max(distance, 1e-9))
+        here = self.data.qpos[address : address + 3]
+        here += np.clip(goal - here, -STRIDE, STRIDE)
+        quat = pin.Quaternion(pin.exp3(command[3:6])).coeffs()
+        self.data.qpos[address + 3 : address + 7] = np.roll(quat, 1)
+        side = name.split("_")[0]
+        return {
+            "reached": bool(distance <= REACH),
+            "position_error": float(np.linalg.norm(command[:3] - here)),
+            "orientation_error": 0.0,
+            "reasons": []
+            if distance <= REACH
+            else [f"joint limit: {side}_elbow_pitch_joint (upper)"],
+        }

@@ -1,0 +1,41 @@
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from wbc_suite.devices import Clutch
+from wbc_suite.viewers.limb import Limb, LimbKind, Ownership
+
+
+def test_first_client_keeps_it_until_release():
+    ownership = Ownership(timeout=10)
+    assert ownership.take(1, now=0.0)
+    assert not ownership.take(2, now=1.0)
+    assert not ownership.release(2)
+    assert ownership.holder(2.0) == 1
+    assert ownership.release(1)
+    assert ownership.take(2, now=3.0)
+
+
+def test_silent_holder_loses_it_after_the_timeout():
+    ownership = Ownership(timeout=10)
+    ownership.take(1, now=0.0)
+    ownership.take(1, now=9.0)  # a sign of life
+    assert not ownership.take(2, now=18.0)
+    assert ownership.take(2, now=19.5)
+    assert not ownership.take(1, now=20.0)
+
+
+@pytest.mark.parametrize(
+    ("kind", "expected"),
+    [
+        (LimbKind.POSE, [1, 2, 3, 0, 0, 0.5]),
+        (LimbKind.POSITION, [1, 2, 3]),
+        (LimbKind.ORIENTATION, [0, 0, 0.5]),
+        (LimbKind.PLANAR, [1, 2, 0.5]),
+    ],
+)
+def test_command_holds_what_the_kind_commands(kind, expected):
+    T = pin.SE3(pin.exp3(np.array([0, 0, 0.5])), np.array([1.0, 2.0, 3.0]))
+    limb = Limb("right_hand", kind, Clutch(T), Ownership())
+    np.testing.assert_allclose(limb.command(), expected, atol=1e-12)
+    assert limb.title == "Right hand"

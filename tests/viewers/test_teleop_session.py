@@ -1,0 +1,162 @@
+import threading
+import time
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from fake_env import REACH, FakeEnv
+
+from wbc_suite.errors import UnknownNameError
+from wbc_suite.viewers.teleop_session import TeleopSession
+
+ALICE, BOB = 1, 2
+
+
+@pytest.fixture
+def session():
+    return TeleopSession(FakeEnv(), period=0.02)
+
+
+def shifted(pose, *offset):
+    return pin.SE3(pose.rotation, pose.translation + np.array(offset))
+
+
+def ticks(session, n):
+    for _ in range(n):
+        session.tick()
+
+
+def error(session, name="right_hand"):
+    return session.snapshot.limbs[name].position_error
+
+
+def test_hands_stay_where_they_are_until_somebody_moves_them(session):
+    before = session.snapshot.limbs["right_hand"].measured
+    ticks(session, 5)
+    np.testing.assert_allclose(
+        session.snapshot.limbs["right_hand"].measured.translation, before.translation
+    )
+
+
+def test_hand_follows_the_drag(session):
+    start = session.snapshot.limbs["right_hand"].measured
+    gizmo = shifted(start, 0.5, 0.5, 0.5)  # a gizmo need not be at the hand
+    assert session.grab("right_hand", ALICE, gizmo)
+    assert session.drag("right_hand", ALICE, shifted(gizmo, 0.0, -0.1, 0.15))
+    ticks(session, 20)
+    moved = session.snapshot.limbs["right_hand"].measured.translation
+    np.testing.assert_allclose(moved - start.translation, [0, -0.1, 0.15], atol=1e-9)
+    other = session.snapshot.limbs["left_hand"]
+    assert other.position_error < 1e-9
+
+
+def test_target_does_not_jump_when_the_clutch_comes_in_again(session):
+    hand = session.snapshot.limbs["right_hand"].target
+    session.grab("right_hand", ALICE, hand)
+    session.drag("right_hand", ALICE, shifted(hand, 0, 0, 0.1))
+    session.release("right_hand", ALICE)
+    ticks(session, 20)
+    before = session.snapshot.limbs["right_hand"].target
+    session.enable("right_hand", False)
+    elsewhere = shifted(hand, 0.3, -0.2, 0.1)
+    session.grab("right_hand", ALICE, hand)
+    session.drag("right_hand", ALICE, elsewhere)  # out: the gizmo moves alone
+    session.tick()
+    session.enable("right_hand", True)
+    session.drag("right_hand", ALICE, elsewhere)  # in, in the middle of a drag
+    session.tick()
+    after = session.snapshot.limbs["right_hand"].target
+    assert np.linalg.norm(after.translation - before.translation) < 1e-3
+    session.drag("right_hand", ALICE, shifted(elsewhere, 0, 0.05, 0))
+    session.tick()
+    moved = session.snapshot.limbs["right_hand"].target.translation
+    np.testing.assert_allclose(moved - after.translation, [0, 0.05, 0], atol=1e-9)
+
+
+def test_unreachable_target_is_explained_and_does_not_wind_up(session):
+    hand = session.snapshot.limbs["right_hand"].target
+    session.grab("right_hand", ALICE, hand)
+    session.drag("right_hand", ALICE, shifted(hand, 2.0, 0, 0))
+    ticks(session, 80)
+    status = session.snapshot.limbs["right_hand"]
+    assert not status.reached
+    assert status.reasons == ("joint limit: right_elbow_pitch_joint (upper)",)
+    session.release("right_hand", ALICE)
+    ticks(session, 2)
+    status = session.snapshot.limbs["right_hand"]
+    assert status.position_error < 1e-6
+    assert np.linalg.norm(status.target.translation - [0, 0, 0.9]) < REACH + 1e-6
+
+
+def test_clients_cannot_fight_over_a_limb(session):
+    hand = session.snapshot.limbs["right_hand"].target
+    assert session.grab("right_hand", ALICE, hand)
+    assert not session.grab("right_hand", BOB, hand)
+    assert not session.drag("right_hand", BOB, shifted(hand, 0, 0, -0.4))
+    session.release("right_hand", BOB)
+    session.tick()
+    assert session.snapshot.limbs["right_hand"].holder == ALICE
+    assert error(session) < 1e-9
+    session.leave(ALICE)
+    assert session.grab("right_hand", BOB, hand)
+
+
+def test_gripper_value_reaches_the_action(session):
+    session.tick()
+    assert session.env.actions[-1][12:].tolist() == [-1, -1]
+    session.set_gripper("right_gripper", 1, 0.25)
+    session.tick()
+    assert session.env.actions[-1][12:].tolist() == [-1, 0.25]
+
+
+def test_reset_brings_hands_and_targets_back(session):
+    hand = session.snapshot.limbs["right_hand"].target
+    session.grab("right_hand", ALICE, hand)
+    session.drag("right_hand", ALICE, shifted(hand, 0, 0, 0.3))
+    ticks(session, 10)
+    session.reset()
+    session.tick()
+    status = session.snapshot.limbs["right_hand"]
+    np.testing.assert_allclose(status.target.translation, hand.translation, atol=1e-9)
+    assert session.snapshot.epoch == 1
+    assert error(session) < 1e-9
+
+
+def test_nothing_moves_while_paused(session):
+    session.pause(True)
+    ticks(session, 3)
+    assert session.env.actions == []
+    assert session.snapshot.paused
+    session.pause(False)
+    session.tick()
+    assert len(session.env.actions) == 1
+
+
+def test_latency_counts_from_input_to_the_step_that_used_it():
+    now = [0.0]
+    session = TeleopSession(FakeEnv(), period=0.02, clock=lambda: now[0])
+    hand = session.snapshot.limbs["right_hand"].target
+    session.grab("right_hand", ALICE, hand)
+    session.drag("right_hand", ALICE, hand)
+    now[0] = 0.007
+    session.drag("right_hand", ALICE, hand)
+    now[0] = 0.012
+    session.tick()
+    np.testing.assert_allclose(session.latencies(), [0.012, 0.005])
+    session.tick()
+    assert len(session.latencies()) == 2
+
+
+def test_loop_runs_in_its_own_thread_and_stops(session):
+    session.start()
+    deadline = time.monotonic() + 10
+    while session.snapshot.tick < 5 and time.monotonic() < deadline:
+        time.sleep(0.01)
+    session.stop()
+    assert session.snapshot.tick >= 5
+    assert "teleop" not in [t.name for t in threading.enumerate()]
+
+
+def test_unknown_limb_is_named_with_the_nearest_one(session):
+    with pytest.raises(UnknownNameError, match="Did you mean 'right_hand'"):
+        session.grab("right_hnd", ALICE, pin.SE3.Identity())

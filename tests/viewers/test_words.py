@@ -1,0 +1,51 @@
+import pinocchio as pin
+import pytest
+
+from wbc_suite.viewers.teleop_session import LimbStatus
+from wbc_suite.viewers.words import describe_reason, explain
+
+
+def status(**changes):
+    values = {
+        "measured": pin.SE3.Identity(),
+        "target": pin.SE3.Identity(),
+        "position_error": 0.062,
+        "orientation_error": 0.0,
+        "reached": False,
+        "reasons": (),
+        "holder": None,
+        "enabled": True,
+    }
+    return LimbStatus(**(values | changes))
+
+
+@pytest.mark.parametrize(
+    ("reason", "words"),
+    [
+        (
+            "joint limit: right_elbow_pitch_joint (upper)",
+            "right elbow pitch is at its upper limit",
+        ),
+        ("joint limit: arm_1_joint", "arm 1 is at its limit"),
+        ("velocity limit: waist_yaw_joint (lower)", "waist yaw is at its top speed"),
+        ("self-collision: right_forearm - torso", "right forearm would touch torso"),
+        ("conflict: left_hand", "it pulls against left hand"),
+        ("something new", "something new"),
+    ],
+)
+def test_reasons_read_as_sentences(reason, words):
+    assert describe_reason(reason) == words
+
+
+def test_explanation_says_how_far_and_why():
+    why = explain(status(reasons=("conflict: left_hand",)))
+    assert why == "6 cm short: it pulls against left hand"
+
+
+def test_turn_that_is_missing_is_told_in_degrees():
+    why = explain(status(position_error=0.0, orientation_error=0.5))
+    assert why == "29° short: out of reach"
+
+
+def test_nothing_is_explained_when_all_is_well():
+    assert explain(status(reached=True, reasons=("velocity limit: x",))) == ""

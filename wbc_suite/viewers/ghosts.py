@@ -1,0 +1,155 @@
+"""Ghosts: where each target is, and what stands between it and the robot."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+
+from wbc_suite.viewers.scene_mirror import COLLISION_GROUP
+from wbc_suite.viewers.shapes import TriangleMesh, geom_mesh, merge
+from wbc_suite.viewers.teleop_session import LimbStatus, Snapshot
+
+if TYPE_CHECKING:
+    import viser
+
+__all__ = ["Ghosts"]
+
+NEAR = 0.012  # m; a ghost nearer than this to its limb would only tint it
+TURNED = 0.12  # rad
+NOWHERE = (0.0, 0.0, -100.0)
+
+
+class Ghosts:
+    """A translucent copy of each limb at its target, with a line to the limb.
+
+    Args:
+        server: Server whose scene is drawn on.
+        model: Model that the limbs belong to.
+        bodies: Body of each limb, by limb name; -1 for a limb without one.
+        snapshot: State at the start; copies are taken in this posture.
+        colours: Colour of each limb.
+    """
+
+    def __init__(
+        self,
+        server: "viser.ViserServer",
+        model: mujoco.MjModel,
+        bodies: Mapping[str, int],
+        snapshot: Snapshot,
+        colours: Mapping[str, tuple[int, int, int]],
+    ) -> None:
+        self._nodes: dict[str, viser.SceneNodeHandle] = {}
+        self._lines: dict[str, viser.LineSegmentsHandle] = {}
+        self._labels: dict[str, viser.LabelHandle] = {}
+        for name, status in snapshot.limbs.items():
+            mesh = _copy(model, name, bodies, snapshot, status)
+            self._nodes[name] = server.scene.add_mesh_simple(
+                f"/targets/{name}",
+                mesh.vertices,
+                mesh.faces,
+                color=colours[name],
+                opacity=0.38,
+                cast_shadow=False,
+                receive_shadow=False,
+                visible=False,
+            )
+            self._lines[name] = server.scene.add_line_segments(
+                f"/target_lines/{name}",
+                np.zeros((1, 2, 3), dtype=np.float32),
+                colors=colours[name],
+                thickness=0.006,
+                visible=False,
+            )
+            self._labels[name] = server.scene.add_label(
+                f"/target_labels/{name}", "", anchor="bottom-center", visible=False
+            )
+
+    def update(self, snapshot: Snapshot, notes: Mapping[str, str]) -> None:
+        """Move the ghosts; `notes` says what is written over each limb, if anything."""
+        for name, status in snapshot.limbs.items():
+            apart = status.position_error > NEAR or status.orientation_error > TURNED
+            node, line = self._nodes[name], self._lines[name]
+            node.visible = apart
+            line.visible = status.position_error > NEAR
+            if apart:
+                place(node, status.target)
+            if line.visible:
+                line.points = np.array(
+                    [[status.measured.translation, status.target.translation]],
+                    dtype=np.float32,
+                )
+            self._note(name, status, notes.get(name, ""))
+
+    def _note(self, name: str, status: LimbStatus, text: str) -> None:
+        label = self._labels[name]
+        if text != label.text and text:
+            label.text = text
+        label.visible = bool(text)
+        if text:
+            label.position = status.target.translation + np.array([0.0, 0.0, 0.12])
+
+
+def place(node: "viser.SceneNodeHandle", T_world_node: pin.SE3) -> None:
+    """Put a scene node of the world's frame at a pose."""
+    position_xyzw = pin.SE3ToXYZQUAT(T_world_node)
+    node.position = position_xyzw[:3]
+    node.wxyz = np.roll(position_xyzw[3:], 1)
+
+
+def _copy(
+    model: mujoco.MjModel,
+    name: str,
+    bodies: Mapping[str, int],
+    snapshot: Snapshot,
+    status: LimbStatus,
+) -> TriangleMesh:
+    """Return what the limb looks like, in the frame that it is controlled by."""
+    others = {body for other, body in bodies.items() if other != name}
+    chosen = _own_bodies(model, bodies[name], others)
+    parts = [
+        part
+        for geom in range(model.ngeom)
+        if model.geom_bodyid[geom] in chosen
+        and model.geom_group[geom] < COLLISION_GROUP
+        and (part := _in_frame(model, geom, snapshot, status)) is not None
+    ]
+    return merge(parts) if parts else _ball()
+
+
+def _own_bodies(model: mujoco.MjModel, root: int, others: set[int]) -> set[int]:
+    """Return a limb's bodies: with all it carries, unless it carries another limb."""
+    if root < 0:
+        return set()
+    carried = {root}
+    for body in range(root + 1, model.nbody):
+        if model.body_parentid[body] in carried:
+            carried.add(body)
+    return {root} if carried & others else carried
+
+
+def _in_frame(
+    model: mujoco.MjModel, geom: int, snapshot: Snapshot, status: LimbStatus
+) -> TriangleMesh | None:
+    mesh = geom_mesh(model, geom)
+    if mesh is None:
+        return None
+    body = model.geom_bodyid[geom]
+    T_body_geom = _pose(model.geom_pos[geom], model.geom_quat[geom])
+    T_world_body = _pose(snapshot.body_positions[body], snapshot.body_quaternions[body])
+    T = status.measured.inverse() * T_world_body * T_body_geom
+    return mesh.moved(T.translation, T.rotation)
+
+
+def _pose(position: np.ndarray, wxyz: np.ndarray) -> pin.SE3:
+    return pin.XYZQUATToSE3(np.concatenate([position, np.roll(wxyz, -1)]))
+
+
+def _ball() -> TriangleMesh:
+    model = mujoco.MjModel.from_xml_string(
+        "<mujoco><worldbody><geom size='0.04'/></worldbody></mujoco>"
+    )
+    mesh = geom_mesh(model, 0)
+    assert mesh is not None
+    return mesh

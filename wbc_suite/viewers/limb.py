@@ -1,0 +1,101 @@
+"""One thing that a person can hold: a hand, a foot, the head, the base."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+import pinocchio as pin
+
+from wbc_suite.devices import Clutch
+from wbc_suite.typing import Vector
+
+__all__ = ["Limb", "LimbKind", "Ownership"]
+
+HOLD_TIMEOUT = 20.0  # s; a frozen tab may keep a limb for this long, not longer
+
+
+class LimbKind(StrEnum):
+    """Which part of a pose a limb's target commands."""
+
+    POSE = "pose"
+    POSITION = "position"
+    ORIENTATION = "orientation"
+    PLANAR = "planar"
+
+
+class Ownership:
+    """Who holds something that only one client may move at a time.
+
+    The first to take it holds it until they release it, or until they have been
+    silent for `timeout` seconds.
+    """
+
+    def __init__(self, timeout: float = HOLD_TIMEOUT) -> None:
+        self.timeout = timeout
+        self._holder: int | None = None
+        self._last_sign = 0.0
+
+    def holder(self, now: float) -> int | None:
+        """Return the client that holds it at time `now`, or None."""
+        if self._holder is not None and now - self._last_sign > self.timeout:
+            self._holder = None
+        return self._holder
+
+    def take(self, client: int, now: float) -> bool:
+        """Take or keep it; False when another client holds it."""
+        if self.holder(now) not in (None, client):
+            return False
+        self._holder, self._last_sign = client, now
+        return True
+
+    def release(self, client: int) -> bool:
+        """Give it back; False when this client was not the holder."""
+        if self._holder != client:
+            return False
+        self._holder = None
+        return True
+
+
+@dataclass(slots=True)
+class Limb:
+    """A controlled frame with the target that people move.
+
+    Attributes:
+        name: Name of the controlled frame, which is also its slice of the action.
+        kind: Which part of the pose is commanded.
+        clutch: Couples the holder's input to the target.
+        ownership: Which client holds the limb.
+        enabled: Whether the limb listens to anybody at all.
+    """
+
+    name: str
+    kind: LimbKind
+    clutch: Clutch
+    ownership: Ownership
+    enabled: bool = True
+
+    @property
+    def title(self) -> str:
+        """The name as a person writes it: `right_hand` becomes `Right hand`."""
+        return self.name.replace("_", " ").capitalize()
+
+    def command(self) -> Vector:
+        """Return the target as the action expects it.
+
+        Returns:
+            Position (3) and rotation vector (3), either of the two, or x, y and yaw.
+        """
+        T_world_target = self.clutch.target
+        position = T_world_target.translation
+        rotation = pin.log3(T_world_target.rotation)
+        match self.kind:
+            case LimbKind.POSE:
+                return np.concatenate([position, rotation])
+            case LimbKind.POSITION:
+                return position
+            case LimbKind.ORIENTATION:
+                return rotation
+            case LimbKind.PLANAR:
+                x_axis = T_world_target.rotation[:, 0]
+                yaw = np.arctan2(x_axis[1], x_axis[0])
+                return np.array([position[0], position[1], yaw])

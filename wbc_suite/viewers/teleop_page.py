@@ -1,0 +1,110 @@
+"""The teleoperation page: a session, shown and driven in browsers."""
+
+import threading
+import time
+from typing import TYPE_CHECKING
+
+import mujoco
+
+from wbc_suite.viewers.ghosts import Ghosts
+from wbc_suite.viewers.gizmos import Gizmos
+from wbc_suite.viewers.limb import LimbKind
+from wbc_suite.viewers.palette import limb_colours
+from wbc_suite.viewers.scene_mirror import SceneMirror, robot_box
+from wbc_suite.viewers.site import Site
+from wbc_suite.viewers.stage import set_camera, set_stage
+from wbc_suite.viewers.teleop_panel import TeleopPanel
+from wbc_suite.viewers.teleop_session import TeleopSession
+from wbc_suite.viewers.words import explain
+
+if TYPE_CHECKING:
+    import viser
+
+__all__ = ["TeleopPage"]
+
+PUSH_RATE = 25.0  # Hz; the eye wants no more, and every push costs the loop's processor
+PANEL_EVERY = 5  # pushes
+PLOT_EVERY = 7  # pushes; not a multiple, so that both seldom fall together
+HAND_SCALE, OTHER_SCALE, BASE_SCALE = 0.22, 0.16, 0.4  # m
+
+
+class TeleopPage:
+    """Serve a session; everything that is sent is sent from a thread of its own.
+
+    Args:
+        session: Session to show; it need not run yet.
+        model: Model that it simulates.
+        label: What the panel is called.
+        site: Where the page is served; the page closes it when it stops.
+    """
+
+    def __init__(
+        self, session: TeleopSession, model: mujoco.MjModel, site: Site, *, label: str
+    ) -> None:
+        self.session, self.site = session, site
+        self.server = site.server
+        set_stage(self.server, label=label)
+        snapshot = session.snapshot
+        colours = limb_colours(session.limbs)
+        self.mirror = SceneMirror(self.server, model)
+        self.mirror.update(snapshot.body_positions, snapshot.body_quaternions)
+        self.gizmos = Gizmos(
+            session, {n: _scale(n, limb.kind) for n, limb in session.limbs.items()}
+        )
+        self.ghosts = Ghosts(self.server, model, session.bodies, snapshot, colours)
+        self.panel = TeleopPanel(self.server, session, self.gizmos, colours)
+        set_camera(
+            self.server,
+            *robot_box(model, snapshot.body_positions, snapshot.body_quaternions),
+        )
+        self.push_times: list[float] = []
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="scene", daemon=True)
+        self.server.on_client_connect(self._connect)
+        self.server.on_client_disconnect(self._disconnect)
+
+    def start(self) -> None:
+        """Begin to send what moves."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Stop sending, and close the server."""
+        self._stopping.set()
+        if self._thread.is_alive():
+            self._thread.join()
+        self.site.stop()
+
+    def push(self, count: int = 0) -> None:
+        """Send what changed; panel and plots only at some counts."""
+        snapshot = self.session.snapshot
+        self.mirror.update(snapshot.body_positions, snapshot.body_quaternions)
+        with self.server.atomic():
+            notes = {name: explain(s) for name, s in snapshot.limbs.items()}
+            self.ghosts.update(snapshot, notes)
+        self.gizmos.update(snapshot)
+        if count % PANEL_EVERY == 0:
+            self.panel.update(snapshot)
+        if count % PLOT_EVERY == 0:
+            self.panel.update_plots()
+
+    def _run(self) -> None:
+        count = 0
+        while not self._stopping.wait(1.0 / PUSH_RATE):
+            begun = time.thread_time()
+            self.push(count)
+            self.push_times.append(time.thread_time() - begun)
+            del self.push_times[:-1000]
+            count += 1
+
+    def _connect(self, client: "viser.ClientHandle") -> None:
+        self.gizmos.add_client(client)
+        self.panel.add_client(client)
+
+    def _disconnect(self, client: "viser.ClientHandle") -> None:
+        self.gizmos.remove_client(client.client_id)
+
+
+def _scale(name: str, kind: LimbKind) -> float:
+    if kind is LimbKind.PLANAR:
+        return BASE_SCALE
+    return HAND_SCALE if "hand" in name or "gripper" in name else OTHER_SCALE

@@ -1,0 +1,292 @@
+"""The panel beside the scene: how things stand, and everything that is pressed."""
+
+import html
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from wbc_suite.viewers.gizmos import GizmoMode, Gizmos
+from wbc_suite.viewers.palette import css
+from wbc_suite.viewers.teleop_session import LimbStatus, Snapshot, TeleopSession
+from wbc_suite.viewers.words import explain
+
+if TYPE_CHECKING:
+    import viser
+
+__all__ = ["TeleopPanel"]
+
+PLOT_SECONDS = 10.0
+PLOT_POINTS = 150
+RECORD_NOTE = (
+    "Recording is not part of this version yet. "
+    "It comes with demonstrations: episodes, replay and datasets."
+)
+
+
+class TeleopPanel:
+    """Status, buttons, limbs, grippers and plots.
+
+    What all clients share is made once; what each has for itself (how its handles look)
+    is made as it connects.
+    """
+
+    def __init__(
+        self,
+        server: "viser.ViserServer",
+        session: TeleopSession,
+        gizmos: Gizmos,
+        colours: Mapping[str, tuple[int, int, int]],
+    ) -> None:
+        self._server, self._session, self._gizmos = server, session, gizmos
+        self._colours = colours
+        self._status = server.gui.add_html("")
+        self._shown = ""
+        self._add_buttons()
+        with server.gui.add_folder("Limbs"):
+            self._limbs = server.gui.add_html("")
+        self._handles = server.gui.add_folder("Handles")
+        with server.gui.add_folder("Clutches", expand_by_default=False):
+            for name, limb in session.limbs.items():
+                self._add_clutch(name, limb.title)
+        if session.grippers:
+            with server.gui.add_folder("Grippers"):
+                for name in session.grippers:
+                    self._add_gripper(name)
+        with server.gui.add_folder("Tracking and timing"):
+            self._error_plot = self._add_error_plot()
+            self._time_plot = self._add_time_plot()
+        self._limbs_shown = ""
+
+    def add_client(self, client: "viser.ClientHandle") -> None:
+        """Add the controls that a client has for itself."""
+        number = client.client_id
+        with self._handles:
+            mode = client.gui.add_button_group(
+                "Drag to",
+                _marked(GizmoMode.MOVE),
+                hint="Arrows move, arcs turn. Key: T",
+            )
+            recall = client.gui.add_button(
+                "Bring handles to the limbs",
+                icon="arrows-minimize",
+                color="gray",
+                hint="After a handle was moved alone, with its clutch out. Key: H",
+            )
+            with client.gui.add_folder("Show", expand_by_default=False):
+                for name, limb in self._session.limbs.items():
+                    self._add_show(client, name, limb.title)
+
+        def set_mode(chosen: GizmoMode) -> None:
+            self._gizmos.set_mode(number, chosen)
+            mode.options = _marked(chosen)
+
+        mode.on_click(lambda _: set_mode(_unmarked(mode.value)))
+        recall.on_click(lambda _: self._gizmos.recall(number))
+        client.gui.add_command("Move or turn", hotkey="T").on_trigger(
+            lambda _: set_mode(self._gizmos.mode(number).next())
+        )
+        client.gui.add_command("Bring handles to the limbs", hotkey="H").on_trigger(
+            lambda _: self._gizmos.recall(number)
+        )
+
+    def update(self, snapshot: Snapshot) -> None:
+        """Write down how things stand."""
+        text = _status_html(snapshot, self._session.limbs, self._colours)
+        if text != self._shown:
+            self._status.content = self._shown = text
+        limbs = _limbs_html(snapshot, self._session.limbs, self._colours)
+        if limbs != self._limbs_shown:
+            self._limbs.content = self._limbs_shown = limbs
+        self._buttons.options = _buttons(snapshot.paused)
+
+    def update_plots(self) -> None:
+        """Draw the last seconds of errors and solve times."""
+        rows = self._session.history.rows()
+        if len(rows) < 2:
+            return
+        ago = rows[:, 0] - rows[-1, 0]
+        rows, ago = rows[ago > -PLOT_SECONDS], ago[ago > -PLOT_SECONDS]
+        step = max(1, len(rows) // PLOT_POINTS)
+        rows, ago = rows[::-step][::-1], ago[::-step][::-1]
+        self._error_plot.data = (ago, *(1e3 * rows[:, 2:]).T.copy())
+        self._time_plot.data = (ago, 1e3 * rows[:, 1])
+
+    def _add_buttons(self) -> None:
+        gui = self._server.gui
+        self._buttons = gui.add_button_group(
+            "Session", _buttons(False), hint="Keys: P to pause, R to reset"
+        )
+
+        @self._buttons.on_click
+        def _(event: "viser.GuiEvent[viser.GuiButtonGroupHandle]") -> None:
+            match event.target.value:
+                case "Reset":
+                    self._session.reset()
+                case "Record":
+                    _announce_recording(event.client)
+                case _:
+                    self._toggle()
+
+        gui.add_command("Pause or go on", hotkey="P").on_trigger(
+            lambda _: self._toggle()
+        )
+        gui.add_command("Reset", hotkey="R").on_trigger(lambda _: self._session.reset())
+
+    def _toggle(self) -> None:
+        self._session.pause(not self._session.snapshot.paused)
+
+    def _add_clutch(self, name: str, title: str) -> None:
+        box = self._server.gui.add_checkbox(
+            title,
+            initial_value=True,
+            hint="In: the limb follows its handle. Out: the handle moves alone.",
+        )
+        box.on_update(lambda _: self._session.enable(name, box.value))
+
+    def _add_show(self, client: "viser.ClientHandle", name: str, title: str) -> None:
+        box = client.gui.add_checkbox(title, initial_value=True)
+        box.on_update(
+            lambda _: self._gizmos.show(client.client_id, name, shown=box.value)
+        )
+
+    def _add_gripper(self, name: str) -> None:
+        labels = self._session.gripper_labels[name]
+        for index, label in enumerate(labels):
+            slider = self._server.gui.add_slider(
+                label,
+                min=-1.0,
+                max=1.0,
+                step=0.02,
+                initial_value=float(self._session.grippers[name][index]),
+                hint="-1 is open, 1 is closed",
+            )
+
+            def move(
+                _: object, index: int = index, slider: "viser.GuiSliderHandle" = slider
+            ) -> None:
+                self._session.set_gripper(name, index, slider.value)
+
+            slider.on_update(move)
+
+    def _add_error_plot(self) -> "viser.GuiUplotHandle":
+        limbs = self._session.limbs
+        return self._server.gui.add_uplot(
+            data=tuple(np.zeros(2) for _ in range(1 + len(limbs))),
+            series=(
+                {"label": "s"},
+                *(
+                    {"label": limb.title, "stroke": css(self._colours[n]), "width": 2}
+                    for n, limb in limbs.items()
+                ),
+            ),
+            title="Distance to target [mm]",
+            scales={"x": {"time": False}},
+            legend={"show": False},
+            height=150,
+        )
+
+    def _add_time_plot(self) -> "viser.GuiUplotHandle":
+        return self._server.gui.add_uplot(
+            data=(np.zeros(2), np.zeros(2)),
+            series=(
+                {"label": "s"},
+                {"label": "solve", "stroke": "#4a6fa5", "width": 2},
+            ),
+            title="Solve time [ms]",
+            scales={"x": {"time": False}},
+            legend={"show": False},
+            height=120,
+        )
+
+
+def _buttons(paused: bool) -> tuple[str, ...]:
+    return ("Go on" if paused else "Pause", "Reset", "Record")
+
+
+def _marked(chosen: GizmoMode) -> tuple[str, ...]:
+    """Return the modes' labels with the chosen one marked."""
+    return tuple(f"• {mode} •" if mode is chosen else mode.value for mode in GizmoMode)
+
+
+def _unmarked(label: str) -> GizmoMode:
+    return GizmoMode(label.strip("• "))
+
+
+def _announce_recording(client: "viser.ClientHandle | None") -> None:
+    if client is not None:
+        client.add_notification("Record", RECORD_NOTE, auto_close_seconds=8.0)
+
+
+def _status_html(
+    snapshot: Snapshot, limbs: Mapping, colours: Mapping[str, tuple[int, int, int]]
+) -> str:
+    state, dot = _state(snapshot)
+    latency = _or_dash(1e3 * snapshot.latency, "ms")
+    solve = _or_dash(1e3 * snapshot.solve_time, "ms", digits=1)
+    speed = _or_dash(snapshot.speed, "x", digits=2)
+    figures = (
+        ("input to joint target", latency),
+        ("solve", solve),
+        ("of real time", speed),
+    )
+    cells = "".join(
+        "<div style='flex:1'><div style='font-size:1.05em;font-weight:600'>"
+        f"{value}</div><div style='opacity:.6;font-size:.78em'>{label}</div></div>"
+        for label, value in figures
+    )
+    return (
+        "<div style='padding:.5em .7em 0'>"
+        "<div style='font-weight:600;margin-bottom:.5em'>"
+        f"<span style='color:{dot}'>&#9679;</span> {html.escape(state)}</div>"
+        f"<div style='display:flex;gap:.4em'>{cells}</div>"
+        f"{_why_html(snapshot, limbs, colours)}</div>"
+    )
+
+
+def _state(snapshot: Snapshot) -> tuple[str, str]:
+    if snapshot.message:
+        return snapshot.message, "#c8553d"
+    if snapshot.paused:
+        return "Paused", "#b08a2e"
+    if snapshot.success:
+        return "Solved", "#3f8f5b"
+    return f"Running, {snapshot.time:.0f} s", "#3f8f5b"
+
+
+def _why_html(
+    snapshot: Snapshot, limbs: Mapping, colours: Mapping[str, tuple[int, int, int]]
+) -> str:
+    lines = [
+        "<div style='margin-top:.6em;padding:.4em .6em;border-radius:.3em;"
+        f"border-left:.25em solid {css(colours[name])};"
+        "background:rgba(200,120,60,.10);font-size:.88em'>"
+        f"<b>{html.escape(limbs[name].title)}</b>: {html.escape(why)}</div>"
+        for name, status in snapshot.limbs.items()
+        if (why := explain(status))
+    ]
+    return "".join(lines)
+
+
+def _limbs_html(
+    snapshot: Snapshot, limbs: Mapping, colours: Mapping[str, tuple[int, int, int]]
+) -> str:
+    rows = "".join(
+        _limb_row(limbs[name].title, css(colours[name]), status)
+        for name, status in snapshot.limbs.items()
+    )
+    return f"<table style='width:100%;padding:.2em .7em;font-size:.88em'>{rows}</table>"
+
+
+def _limb_row(title: str, colour: str, status: LimbStatus) -> str:
+    held = "" if status.holder is None else f"held by viewer {status.holder + 1}"
+    error = f"{1e3 * status.position_error:.0f} mm"
+    return (
+        f"<tr><td><span style='color:{colour}'>&#9632;</span> {html.escape(title)}</td>"
+        f"<td style='opacity:.65'>{held}</td>"
+        f"<td style='text-align:right'>{error}</td></tr>"
+    )
+
+
+def _or_dash(value: float, unit: str, *, digits: int = 0) -> str:
+    return "&ndash;" if np.isnan(value) else f"{value:.{digits}f} {unit}"
