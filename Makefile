@@ -41,6 +41,7 @@ bench-peers: $(VENV)/.installed-dev ## install the peers that the benchmarks com
 	.venv-placo/bin/python -m pip install placo
 
 wheel: $(VENV)/.installed ## build the wheel into dist/
+	@rm -rf dist
 	$(PY) -m pip wheel --quiet --no-deps --wheel-dir dist .
 
 clean: ## remove what was built here
@@ -56,11 +57,11 @@ $(VENV)/.python: .ci/find-python
 	@touch $@
 
 $(VENV)/.installed: $(VENV)/.python pyproject.toml
-	@echo "Installing wbc-suite into $(VENV); the first time downloads some 300 MB"
+	@echo "Installing wbc-suite into $(VENV): a minute or two and 1 GB of disk"
 	@$(PY) -m pip install --disable-pip-version-check --editable .
 	@touch $@
 
 $(VENV)/.installed-dev: $(VENV)/.python pyproject.toml
-	@echo "Installing wbc-suite and its tools into $(VENV); the first time downloads some 400 MB"
+	@echo "Installing wbc-suite and its tools into $(VENV): two minutes and 1.3 GB of disk"
 	@$(PY) -m pip install --disable-pip-version-check --editable . --group dev
 	@touch $(VENV)/.installed $@
