@@ -1,17 +1,18 @@
 """Shared array types.
 
-Shapes are told in docstrings: NumPy's types cannot carry them.
+Shapes are told in docstrings: NumPy's types cannot carry them. Values are float64; the
+aliases say `floating`, since NumPy's own stubs lose the width in ordinary arithmetic.
 """
 
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-Vector: TypeAlias = NDArray[np.float64]
+Vector: TypeAlias = NDArray[np.floating[Any]]
 """One-dimensional float64 array."""
 
-Matrix: TypeAlias = NDArray[np.float64]
+Matrix: TypeAlias = NDArray[np.floating[Any]]
 """Two-dimensional float64 array."""
 
 Indices: TypeAlias = NDArray[np.int64]

@@ -1,4 +1,4 @@
-"""Robots described once: files, validation, assembly, and the exports to each engine."""
+"""Robots described once: files, validation, assembly, and exports to each engine."""
 
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.loading import load_robot

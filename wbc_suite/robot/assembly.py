@@ -89,36 +89,39 @@ def _extended(path: Path, catalogue: Catalogue, depth: int = 0) -> Assembly:
 def _choose(
     assembly: Assembly, choices: dict[str, Choice], *, source: str
 ) -> tuple[Part, ...]:
-    """Replace the components that the caller wants otherwise."""
+    """Replace, or leave out, the components that the caller wants otherwise."""
+    for kind, choice in choices.items():
+        _check_choice(assembly, kind, choice, source=source)
     parts: list[Part] = []
-    used: set[str] = set()
     for part in assembly.parts:
         choice = choices.get(part.choice or "")
-        name = choice
         if isinstance(choice, Mapping):
-            name = choice.get(part.side or "") or choice.get(part.name)
-        if name is not None:
-            used.add(str(part.choice))
-            if _key(str(name)) in ("none", "null"):
-                continue
-            folder = "" if _is_path(str(name)) else f"{part.choice}/"
-            part = part.model_copy(update={"component": f"{folder}{name}"})  # noqa: PLW2901 - the replaced part takes its place
-        parts.append(part)
-    for kind, choice in choices.items():
-        if choice is not None and kind not in used:
-            raise DescriptionError(
-                f"{source}: {assembly.assembly.name} has no place for a {kind}."
-            )
-        if isinstance(choice, Mapping):
-            sides = {p.side or p.name for p in assembly.parts if p.choice == kind}
-            for side in choice:
-                if side not in sides:
-                    raise UnknownNameError(f"side with a {kind}", side, sides)
+            choice = choice.get(part.side or part.name)
+        if choice is None:
+            parts.append(part)
+        elif not _is_none(choice):
+            name = choice if _is_path(choice) else f"{part.choice}/{choice}"
+            parts.append(part.model_copy(update={"component": name}))
     return tuple(parts)
 
 
-def _key(name: str) -> str:
-    return name.casefold().removesuffix("gripper").removesuffix("mount")
+def _check_choice(
+    assembly: Assembly, kind: str, choice: Choice, *, source: str
+) -> None:
+    sides = {p.side or p.name for p in assembly.parts if p.choice == kind}
+    if isinstance(choice, Mapping):
+        for side in choice:
+            if side not in sides:
+                raise UnknownNameError(f"side with a {kind}", side, sides)
+    elif choice is not None and not sides and not _is_none(choice):
+        raise DescriptionError(
+            f"{source}: {assembly.assembly.name} has no place for a {kind}."
+        )
+
+
+def _is_none(name: str) -> bool:
+    """Whether a name stands for "leave it out" (`NullMount` and the like are names)."""
+    return name.casefold() == "none"
 
 
 def _is_path(name: str) -> bool:

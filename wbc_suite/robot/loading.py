@@ -26,7 +26,7 @@ def load_robot(
 
     Args:
         name: Catalogue name without regard to case (`Panda`, `gr1`), a component with
-            its folder (`gripper/panda_hand`), or a path that ends in .toml, .urdf, .xml.
+            its folder (`gripper/panda_gripper`), or a path to a .toml, .urdf or .xml.
         gripper: Another gripper for every side, or one for each: `{"right": ...}`;
             "none" leaves it out.
         base: Another base; "none" leaves it out.

@@ -1,10 +1,10 @@
 """`[mirror]`: write the other side of a robot by reflection in a plane.
 
 With `S` the reflection (for the plane xz: diag(1, -1, 1)), a link frame goes to
-`S p`, `S R S`. Within a link, points go to `D p`, tensors to `D I D^T`, the axis of a slide
-to `D a` and that of a hinge (a pseudovector) to `-D a`, where `D` is `S` unless the file
-gives the other side's link frame by hand: then `D = R_target^T S R_source`, with both
-orientations taken at zero joint angles. Where an axis only turns round, it is kept and
+`S p`, `S R S`. Within a link, points go to `D p`, tensors to `D I D^T`, the axis of a
+slide to `D a` and that of a hinge (pseudovector) to `-D a`, where `D` is `S` unless
+the file gives the other side's link by hand: then `D = R_target^T S R_source`, both
+taken at zero joint angles. Where an axis only turns round, it is kept and
 the joint's range is negated instead, as vendors write their robots. Whatever the file
 gives for the other side by hand wins over the reflection.
 """
@@ -102,10 +102,10 @@ class _Reflection:
         own = {link.name: link for link in self._component.links}
         made: list[Link] = []
         for link in self._component.links:
-            if not self.matches(link.name):
-                self._turn(link)
-                continue
             self._turn(link)
+            if not self.matches(link.name):
+                self._set_d(link.name, link.name)
+                continue
             given = own.get(self.name(link.name))
             if given is not None:
                 own[given.name] = self._link(link, given)
@@ -119,15 +119,14 @@ class _Reflection:
         self._world[link.name] = parent @ _matrix(link)
 
     def _link(self, link: Link, given: Link | None) -> Link:
-        update = self._moved(link, self._s) | {
+        update = self._moved(link, self._d(link.parent)) | {
             "name": self.name(link.name),
             "parent": self.name(link.parent) if link.parent else None,
         }
         hand = {k: getattr(given, k) for k in given.model_fields_set} if given else {}
         placed = link.model_copy(update=update | hand)
         self._turn(placed)
-        d = self._world[placed.name].T @ self._s @ self._world[link.name]
-        self._inside[link.name] = d = np.where(abs(d) < 1e-12, 0.0, d)
+        d = self._set_d(link.name, placed.name)
         update |= {
             "com": _rounded(d @ np.asarray(link.com)),
             "inertia": _tensor(d @ inertia_matrix(link.inertia) @ d.T),
@@ -137,6 +136,15 @@ class _Reflection:
         if link.joint is not None:
             update["joint"] = self._joint(link.joint, d, placed.joint if hand else None)
         return link.model_copy(update=update | hand)
+
+    def _set_d(self, source: str, target: str) -> Matrix:
+        """Compute and keep D between a link and its image (itself on the plane)."""
+        d = self._world[target].T @ self._s @ self._world[source]
+        self._inside[source] = np.where(abs(d) < 1e-12, 0.0, d)
+        return self._inside[source]
+
+    def _d(self, link: str | None) -> Matrix:
+        return self._inside.get(link or "", self._s)
 
     def _moved(self, posed: Posed, d: Matrix) -> dict[str, Any]:
         """Pose `D p`, `D R S` of something that is itself reflected by S inside."""
@@ -202,9 +210,7 @@ class _Reflection:
         return tuple(rows if along > 0 else rows[::-1])
 
     def _posed(self, items: tuple[Any, ...]) -> tuple[Any, ...]:
-        return self._renamed(
-            items, extra=lambda i: self._moved(i, self._inside.get(i.link, self._s))
-        )
+        return self._renamed(items, extra=lambda i: self._moved(i, self._d(i.link)))
 
     def _renamed(
         self,

@@ -5,10 +5,16 @@ the format is `docs/robots.md`. SI units, radians, quaternions w x y z. A link's
 sits at its joint.
 """
 
-from typing import Annotated, Any, Literal, TypeAlias
+import math
+from typing import Annotated, Literal, TypeAlias
 
-import numpy as np
-from pydantic import AfterValidator, Field, PositiveFloat, model_validator
+from pydantic import (
+    AfterValidator,
+    Field,
+    PositiveFloat,
+    field_validator,
+    model_validator,
+)
 
 from wbc_suite.robot.shapes import Posed, Shape, Vector3
 from wbc_suite.tomlfile import FrozenModel
@@ -83,22 +89,14 @@ class Joint(FrozenModel):
     mimic: Mimic | None = None
     passive: bool = False
 
-    @model_validator(mode="before")
+    @field_validator("axis")
     @classmethod
-    def _normalise_axis(cls, data: Any) -> Any:
-        axis = data.get("axis") if isinstance(data, dict) else None
-        if isinstance(axis, list | tuple) and len(axis) == 3:
-            try:
-                vector = np.asarray(axis, dtype=np.float64)
-            except (TypeError, ValueError):
-                return data
-            norm = float(np.linalg.norm(vector))
-            if abs(norm - 1.0) > 1e-3:
-                raise ValueError(
-                    f"axis {list(axis)} must have length 1, not {norm:.6g}"
-                )
-            data = {**data, "axis": tuple((vector / norm).tolist())}
-        return data
+    def _normalise_axis(cls, axis: Vector3) -> Vector3:
+        norm = math.hypot(*axis)
+        if abs(norm - 1.0) > 1e-3:
+            raise ValueError(f"an axis must have length 1, this has {norm:.6g}")
+        x, y, z = (component / norm for component in axis)
+        return (x, y, z)
 
 
 class Link(Posed):

@@ -4,8 +4,9 @@ Lengths are in metres, poses are in the link frame, quaternions are w x y z. A b
 half sizes, as in MJCF. A hull is the convex hull of spheres, a loft a skin over rings.
 """
 
+import itertools
 import math
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias, cast
 
 from pydantic import AfterValidator, Field, PositiveFloat, model_validator
 
@@ -23,6 +24,7 @@ __all__ = [
     "Shape",
     "Sphere",
     "Vector3",
+    "as_table",
 ]
 
 Vector3: TypeAlias = tuple[float, float, float]
@@ -66,15 +68,21 @@ class Posed(FrozenModel):
     @model_validator(mode="before")
     @classmethod
     def _accept_rpy(cls, data: Any) -> Any:
-        if isinstance(data, dict) and "rpy" in data:
-            data = dict(data)
-            rpy = data.pop("rpy")
-            if "quat" in data:
-                raise ValueError("give either 'quat' or 'rpy', not both")
-            if not (isinstance(rpy, list | tuple) and len(rpy) == 3):
+        fields = as_table(data)
+        if "rpy" not in fields:
+            return data
+        if "quat" in fields:
+            raise ValueError("give either 'quat' or 'rpy', not both")
+        match fields.pop("rpy"):
+            case [float() | int() as r, float() | int() as p, float() | int() as y]:
+                return fields | {"quat": quaternion_from_rpy((r, p, y))}
+            case _:
                 raise ValueError("'rpy' needs three angles in radians")
-            data["quat"] = quaternion_from_rpy(tuple(float(a) for a in rpy))
-        return data
+
+
+def as_table(data: Any) -> dict[str, Any]:
+    """Return a copy of a table that is still plain data; empty for anything else."""
+    return dict(cast("dict[str, Any]", data)) if isinstance(data, dict) else {}
 
 
 class _Surface(Posed):
@@ -189,7 +197,7 @@ class Loft(_Surface):
     @model_validator(mode="after")
     def _positions_rise(self) -> "Loft":
         positions = [s[0] for s in self.sections]
-        if any(b - a < 1e-6 for a, b in zip(positions, positions[1:], strict=False)):
+        if any(b - a < 1e-6 for a, b in itertools.pairwise(positions)):
             raise ValueError("the rings' positions must rise from each to the next")
         if any(s[3] <= 0 or s[4] <= 0 for s in self.sections):
             raise ValueError("half sizes of rings must be positive")

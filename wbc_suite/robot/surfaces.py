@@ -3,6 +3,7 @@
 Everything here is computed at export: no mesh file is read or shipped.
 """
 
+import math
 from functools import lru_cache
 
 import numpy as np
@@ -64,9 +65,9 @@ def support_points(shape: Shape) -> Matrix:
 @lru_cache(maxsize=4)
 def _icosphere(subdivisions: int) -> Matrix:
     """Points of a subdivided icosahedron on the unit sphere, shape (n, 3)."""
-    phi = (1 + 5**0.5) / 2
+    phi = (1 + math.sqrt(5)) / 2
     points = [(0.0, s, t * phi) for s in (-1, 1) for t in (-1, 1)]
-    vertices = np.array([np.roll(p, k) for p in points for k in range(3)])
+    vertices: Matrix = np.array([np.roll(p, k) for p in points for k in range(3)])
     vertices /= np.linalg.norm(vertices, axis=1, keepdims=True)
     for _ in range(subdivisions):
         faces = ConvexHull(vertices).simplices
@@ -108,9 +109,10 @@ def _convex(points: Matrix) -> tuple[Matrix, Indices]:
 
 def _cone_points(a: Vector, b: Vector, radius_a: float, radius_b: float) -> Matrix:
     axis = (b - a) / np.linalg.norm(b - a)
-    u = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
+    other = np.eye(3)[int(np.argmin(np.abs(axis)))]
+    u: Vector = np.asarray(np.cross(axis, other), dtype=np.float64)
     u /= np.linalg.norm(u)
-    v = np.cross(axis, u)
+    v: Vector = np.asarray(np.cross(axis, u), dtype=np.float64)
     t = np.linspace(0, 2 * np.pi, RING_POINTS, endpoint=False)
     ring = np.cos(t)[:, None] * u + np.sin(t)[:, None] * v
     return np.concatenate([a + radius_a * ring, b + radius_b * ring])
@@ -142,14 +144,15 @@ def _smooth_sections(shape: Loft) -> Matrix:
     given = np.asarray(shape.sections, dtype=np.float64)
     if not shape.smooth or len(given) < 3:
         return given
-    parts = [np.linspace(a, b, 4, endpoint=False) for a, b in _pairs(given[:, 0])]
-    x = np.concatenate([*parts, given[-1:, 0]])
+    knots: list[float] = given[:, 0].tolist()
+    between = 4  # rings from one given ring to the next
+    x = np.interp(
+        np.arange(between * (len(knots) - 1) + 1) / between,
+        np.arange(len(knots)),
+        knots,
+    )
     curve = PchipInterpolator(given[:, 0], given[:, 1:])
     return np.column_stack([x, curve(x)])
-
-
-def _pairs(values: Vector) -> list[tuple[float, float]]:
-    return [(float(a), float(b)) for a, b in zip(values[:-1], values[1:], strict=True)]
 
 
 def _loft_faces(rings: int) -> Indices:

@@ -3,6 +3,7 @@
 MuJoCo and Pinocchio would find some of these faults too, but late and in their words.
 """
 
+import itertools
 from collections.abc import Collection, Iterator
 from typing import TYPE_CHECKING
 
@@ -121,7 +122,9 @@ def _link(link: "Link") -> Iterator[str]:
     where = f"link '{link.name}'"
     if link.mass == 0.0:
         return
-    eigenvalues = np.linalg.eigvalsh(inertia_matrix(link.inertia))
+    eigenvalues: Vector = np.asarray(
+        np.linalg.eigvalsh(inertia_matrix(link.inertia)), dtype=np.float64
+    )
     if eigenvalues[0] <= 0.0:
         yield (
             f"{where}: the inertia {list(link.inertia)} is not positive definite "
@@ -130,8 +133,8 @@ def _link(link: "Link") -> Iterator[str]:
         return
     if eigenvalues[2] > (eigenvalues[0] + eigenvalues[1]) * (1 + INERTIA_SLACK):
         yield (
-            f"{where}: the principal moments {_numbers(eigenvalues)} break the triangle "
-            "inequality: no body has them"
+            f"{where}: the principal moments {_numbers(eigenvalues)} break the "
+            "triangle inequality: no body has them"
         )
     yield from _plausible(link, eigenvalues)
 
@@ -162,8 +165,8 @@ def _plausible(link: "Link", moments: Vector) -> Iterator[str]:
     lowest, highest = GYRATION_RANGE
     if not lowest <= ratio <= highest and "inertia" not in link.accept:
         yield (
-            f"link '{link.name}': a radius of gyration of {gyration:.3g} m does not fit "
-            f"shapes of half diagonal {gyration / ratio:.3g} m"
+            f"link '{link.name}': a radius of gyration of {gyration:.3g} m does not "
+            f"fit shapes of half diagonal {gyration / ratio:.3g} m"
         )
 
 
@@ -192,36 +195,33 @@ def shape_bounds(shape: Shape) -> tuple[Vector, Vector]:
 
 
 def _references(robot: "RobotDescription") -> Iterator[str]:
-    links = {link.name for link in robot.links}
-    frames = {frame.name for frame in robot.frames}
-    joints = set(robot.joint_names)
-    placed = [("frame", f.name, f.link) for f in robot.frames]
-    placed += [("mount", m.name, m.link) for m in robot.mounts]
-    placed += [("camera", c.name, c.link) for c in robot.cameras]
-    for kind, name, link in placed:
-        if link not in links:
-            yield _unknown("link", link, links, f"{kind} '{name}'")
+    known = {
+        "link": [link.name for link in robot.links],
+        "frame": [frame.name for frame in robot.frames],
+        "joint": list(robot.joint_names),
+    }
+    for where, kind, name in _references_made(robot):
+        if name not in known[kind]:
+            yield _unknown(kind, name, known[kind], where)
+    yield from _colors(robot)
+
+
+def _references_made(robot: "RobotDescription") -> Iterator[tuple[str, str, str]]:
+    """List who names what: (where, kind, name)."""
+    for item in (*robot.frames, *robot.mounts, *robot.cameras):
+        yield f"{type(item).__name__.lower()} '{item.name}'", "link", item.link
     for sensor in robot.sensors:
-        if sensor.frame not in frames:
-            yield _unknown("frame", sensor.frame, frames, f"sensor '{sensor.name}'")
+        yield f"sensor '{sensor.name}'", "frame", sensor.frame
     for actuator in robot.actuators:
-        if actuator.joint not in joints:
-            yield _unknown("joint", actuator.joint, joints, "an actuator")
-    for pair in robot.contacts.exclude:
-        for link in pair:
-            if link not in links:
-                yield _unknown("link", link, links, "contacts.exclude")
-    for connect in robot.connects:
-        for link in (connect.link, connect.other):
-            if link not in links:
-                yield _unknown("link", link, links, "a connect")
+        yield "an actuator", "joint", actuator.joint
+    for name in itertools.chain(*robot.contacts.exclude):
+        yield "contacts.exclude", "link", name
+    for name in itertools.chain(*((c.link, c.other) for c in robot.connects)):
+        yield "a connect", "link", name
     for gripper, synergies in robot.synergies.items():
         for synergy in synergies:
             for joint in synergy.open:
-                if joint not in joints:
-                    where = f"synergy '{synergy.name}' of '{gripper}'"
-                    yield _unknown("joint", joint, joints, where)
-    yield from _colors(robot)
+                yield f"synergy '{synergy.name}' of '{gripper}'", "joint", joint
 
 
 def _colors(robot: "RobotDescription") -> Iterator[str]:
@@ -233,8 +233,8 @@ def _colors(robot: "RobotDescription") -> Iterator[str]:
         for shape in link.collision:
             if shape.shape == "loft":
                 yield (
-                    f"link '{link.name}': a loft cannot collide, it need not be convex; "
-                    "use a hull"
+                    f"link '{link.name}': a loft cannot collide, it need not be "
+                    "convex; use a hull"
                 )
 
 

@@ -1,1 +1,1 @@
-"""How people see and drive a simulation: pages in a browser, pictures, windows."""
+"""How people see a simulation: pictures, pages, windows."""

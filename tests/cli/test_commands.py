@@ -1,0 +1,127 @@
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from PIL import Image
+
+from wbc_suite.catalogue import ENVIRONMENT_VARIABLE, Catalogue
+from wbc_suite.cli import main
+
+ROBOT_FILES = sorted((Catalogue().root / "robots").rglob("*.toml"))
+
+
+@pytest.fixture
+def wbc_suite_command(monkeypatch, capsys):
+    """Run a command as the shell would; give its exit code, output and errors."""
+    monkeypatch.setenv(ENVIRONMENT_VARIABLE, "")
+
+    def run(*arguments: str | Path) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["wbc-suite", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        out, err = capsys.readouterr()
+        return int(ended.value.code or 0), out, err
+
+    return run
+
+
+def test_help_imports_nothing_heavy():
+    heavy = ["mujoco", "numpy", "pinocchio", "mink", "scipy", "viser", "numba", "PIL"]
+    code = f"""
+import sys
+from wbc_suite.cli import main
+sys.argv = ["wbc-suite", "--help"]
+try:
+    main()
+except SystemExit:
+    pass
+print([name for name in {heavy} if name in sys.modules], file=sys.stderr)
+"""
+    result = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert result.stderr.strip() == "[]"
+    assert "doctor" in result.stdout
+
+
+def test_importing_the_package_imports_nothing_heavy():
+    code = "import sys, wbc_suite; print('numpy' in sys.modules, len(sys.modules))"
+    output = subprocess.check_output([sys.executable, "-c", code], text=True)
+    assert output.startswith("False")
+
+
+def test_version_is_printed(wbc_suite_command):
+    assert wbc_suite_command("--version")[:2] == (0, "wbc-suite 0.1.0\n")
+
+
+def test_list_names_every_robot_and_component(wbc_suite_command):
+    code, out, _ = wbc_suite_command("list")
+    assert code == 0
+    for name in ("Panda", "GR1", "Tiago", "SpotWithArm", "rethink_mount"):
+        assert name in out
+
+
+def test_list_of_one_kind_leaves_the_others_out(wbc_suite_command):
+    _, out, _ = wbc_suite_command("list", "bases")
+    assert "rethink_mount" in out
+    assert "Panda" not in out
+
+
+@pytest.mark.parametrize("path", ROBOT_FILES, ids=lambda p: f"{p.parent.name}-{p.stem}")
+def test_every_file_of_the_catalogue_passes_its_check(wbc_suite_command, path):
+    code, out, err = wbc_suite_command("check", path)
+    assert (code, err) == (0, "")
+    assert "fine" in out
+
+
+def test_the_export_as_mjcf_compiles_elsewhere(wbc_suite_command, tmp_path):
+    file = tmp_path / "panda.xml"
+    assert wbc_suite_command("export", "Panda", "--to", "mjcf", "-o", file)[0] == 0
+    assert mujoco.MjModel.from_xml_path(str(file)).nv == 9
+
+
+def test_a_folder_of_ones_own_is_seen(wbc_suite_command, tmp_path):
+    robots = tmp_path / "robots"
+    robots.mkdir()
+    text = (Catalogue().root / "robots/panda.toml").read_text()
+    (robots / "mine.toml").write_text(text.replace('"Panda"', '"Mine"'))
+    code, out, _ = wbc_suite_command("list", "robots", "--catalogue", tmp_path)
+    assert code == 0
+    assert "Mine" in out
+    assert str(tmp_path) in os.environ[ENVIRONMENT_VARIABLE]
+
+
+def test_render_writes_a_picture_of_the_size_asked_for(wbc_suite_command, tmp_path):
+    file = tmp_path / "panda.png"
+    size = ("--width", 120, "--height", 80)
+    assert wbc_suite_command("render", "Panda", "-o", file, *size)[0] == 0
+    picture = np.asarray(Image.open(file))
+    assert picture.shape == (80, 120, 3)
+    assert picture.std() > 10
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["check", "nowhere/robot.toml"], ["nowhere/robot.toml", "no such file"]),
+        (["export", "Pandda", "--to", "mjcf"], ["Pandda", "Did you mean 'panda'"]),
+        (["list", "--catalogue", "nowhere"], ["nowhere", "does not exist"]),
+        (["render", "Panda", "-o", "nowhere/a.png"], ["nowhere/a.png", "written"]),
+        (["render", "Panda", "-o", "a.nonsense"], ["a.nonsense", "written"]),
+        (
+            ["render", "Panda", "-o", "a.png", "--keyframe", "redy"],
+            ["redy", "Did you mean 'ready'"],
+        ),
+    ],
+)
+def test_a_mistake_gets_one_line_and_exit_code_2(wbc_suite_command, arguments, words):
+    code, out, err = wbc_suite_command(*arguments)
+    assert (code, out) == (2, "")
+    assert err.startswith("wbc-suite: ")
+    assert err.count("\n") == 1
+    for word in words:
+        assert word in err

@@ -1,0 +1,100 @@
+"""Configuration: what it reads off Pinocchio, against finite differences."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from wbc_suite.errors import ConfigError, UnknownNameError
+from wbc_suite.kinematics import Configuration
+
+STEP = 1e-6
+HAND = "rarm_wrist2_joint"
+
+
+@pytest.fixture
+def humanoid() -> Configuration:
+    model = pin.buildSampleModelHumanoid()
+    q = pin.neutral(model)
+    q[7:] = np.random.default_rng(1).uniform(-0.8, 0.8, model.nq - 7)
+    return Configuration(model, q)
+
+
+def test_placements_follow_updates_without_copies(humanoid):
+    view = humanoid.placements
+    humanoid.update(humanoid.integrate(np.full(humanoid.nv, 0.1)))
+    for k, pose in enumerate(humanoid.data.oMi):
+        np.testing.assert_array_equal(view[k, :9].reshape(3, 3).T, pose.rotation)
+        np.testing.assert_array_equal(view[k, 9:], pose.translation)
+
+
+def test_placements_outlive_their_configuration():
+    model = pin.buildSampleModelHumanoid()
+    view = Configuration(model).placements
+    expected = view.copy()
+    for _ in range(50):  # reuse the memory if it had been freed
+        Configuration(model, pin.randomConfiguration(model, -np.ones(35), np.ones(35)))
+    np.testing.assert_array_equal(view, expected)
+
+
+@pytest.mark.parametrize("axes", ["local", "aligned", "world"])
+def test_frame_jacobian_agrees_with_finite_differences(humanoid, axes):
+    q = humanoid.q.copy()
+    J = humanoid.frame_jacobian(HAND, axes).copy()
+    pose = humanoid.frame_pose(HAND)
+    numeric = np.empty_like(J)
+    for i in range(humanoid.nv):
+        dq = np.zeros(humanoid.nv)
+        dq[i] = STEP
+        humanoid.update(pin.integrate(humanoid.model, q, dq))
+        ahead = humanoid.frame_pose(HAND)
+        humanoid.update(pin.integrate(humanoid.model, q, -dq))
+        twist = pin.log6(humanoid.frame_pose(HAND).actInv(ahead)) / (2 * STEP)
+        if axes == "world":
+            twist = pose.act(twist)
+        elif axes == "aligned":
+            twist = pin.SE3(pose.rotation, np.zeros(3)).act(twist)
+        numeric[:, i] = twist.vector
+    np.testing.assert_allclose(J, numeric, atol=1e-8)
+
+
+def test_com_and_its_jacobian(humanoid):
+    q = humanoid.q.copy()
+    J = humanoid.com_jacobian.copy()
+    numeric = np.empty_like(J)
+    for i in range(humanoid.nv):
+        dq = np.zeros(humanoid.nv)
+        dq[i] = STEP
+        humanoid.update(pin.integrate(humanoid.model, q, dq))
+        ahead = humanoid.com.copy()
+        humanoid.update(pin.integrate(humanoid.model, q, -dq))
+        numeric[:, i] = (ahead - humanoid.com) / (2 * STEP)
+    np.testing.assert_allclose(J, numeric, atol=1e-8)
+
+
+def test_integrate_undoes_difference(humanoid):
+    rng = np.random.default_rng(2)
+    dq = rng.normal(size=humanoid.nv) * 0.3
+    q = humanoid.integrate(dq)
+    np.testing.assert_allclose(humanoid.difference(q), dq, atol=1e-12)
+
+
+def test_support_is_where_the_jacobian_is_not_zero(humanoid):
+    J = humanoid.frame_jacobian(HAND, "world")
+    columns = np.flatnonzero(np.abs(J).max(axis=0) > 0)
+    np.testing.assert_array_equal(humanoid.support(HAND), columns)
+
+
+def test_root_indices_of_a_free_root(humanoid):
+    np.testing.assert_array_equal(humanoid.root_linear, [0, 1, 2])
+    np.testing.assert_array_equal(humanoid.root_angular, [3, 4, 5])
+    assert len(humanoid.velocity_names()) == humanoid.nv
+    assert humanoid.velocity_names()[6] == "rleg_shoulder1_joint"
+
+
+def test_wrong_names_and_shapes_are_refused(humanoid):
+    with pytest.raises(UnknownNameError, match="Did you mean 'rarm_wrist2_joint'"):
+        humanoid.frame_id("rarm_wrist_joint")
+    with pytest.raises(UnknownNameError, match="No joint named"):
+        humanoid.joint_id("nose")
+    with pytest.raises(ConfigError, match="nq 35"):
+        humanoid.update(np.zeros(3))

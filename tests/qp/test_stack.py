@@ -1,0 +1,89 @@
+"""Solutions of whole stacks: optimality and limits."""
+
+import numpy as np
+
+from wbc_suite.qp import ComTask, FrameTask, LimitKind, PostureTask, TaskStack
+
+DT = 5e-3
+FEET = ("rleg_wrist2_joint", "lleg_wrist2_joint")
+HANDS = ("rarm_wrist2_joint", "larm_wrist2_joint")
+
+
+def humanoid_stack(configuration, **options):
+    tasks = [*(FrameTask(f) for f in (*FEET, *HANDS)), ComTask(), PostureTask(1e-2)]
+    return TaskStack(configuration, tasks, **options)
+
+
+def move_target(task, offset):
+    target = task.target
+    target.translation = target.translation + np.asarray(offset)
+    task.set_target(target)
+
+
+def run(stack, seconds, dt=DT):
+    for _ in range(round(seconds / dt)):
+        solution = stack.solve(dt)
+        q = stack.configuration.integrate(solution.dq)
+        stack.configuration.update(q)
+    return solution
+
+
+def test_hand_reaches_its_target_and_feet_stay(humanoid):
+    stack = humanoid_stack(humanoid)
+    move_target(stack.tasks[2], [-0.1, 0.0, 0.1])
+    solution = run(stack, 3.0)
+    assert solution.ok
+    assert np.linalg.norm(stack.tasks[2].error(humanoid)) < 5e-4
+    assert np.linalg.norm(stack.tasks[0].error(humanoid)) < 5e-4
+
+
+def test_solution_meets_its_kkt_conditions(humanoid, rng):
+    stack = humanoid_stack(humanoid)
+    for _ in range(100):
+        task = stack.tasks[int(rng.integers(4))]
+        move_target(task, rng.normal(size=3) * 0.3)
+        problem = stack._problem
+        solution = stack.solve(DT)
+        x, multipliers = stack._solver.solve(problem)
+        np.testing.assert_allclose(x, solution.dq, atol=1e-10)
+        gradient = problem.H @ x + problem.c + multipliers[: problem.nv]
+        np.testing.assert_allclose(gradient, 0.0, atol=1e-10)
+        at_upper, at_lower = multipliers > 0, multipliers < 0
+        np.testing.assert_allclose(x[at_upper], problem.ub[at_upper], atol=1e-10)
+        np.testing.assert_allclose(x[at_lower], problem.lb[at_lower], atol=1e-10)
+        assert (x <= problem.ub + 1e-12).all()
+        assert (x >= problem.lb - 1e-12).all()
+        humanoid.update(humanoid.integrate(solution.dq))
+
+
+def test_active_limit_is_named(arm):
+    task = FrameTask("hand")
+    stack = TaskStack(arm, [task, PostureTask(1e-3)])
+    move_target(task, [3.0, 0.0, 0.5])
+    solution = run(stack, 3.0)
+    upper = [a for a in solution.active if a.kind is LimitKind.POSITION]
+    assert all(
+        abs(
+            arm.q[int(a.name[-1]) - 1]
+            - arm.model.upperPositionLimit[int(a.name[-1]) - 1]
+        )
+        < 1e-6
+        for a in upper
+        if a.side == "upper"
+    )
+
+
+def test_commands_keep_all_limits(arm, rng):
+    task = FrameTask("hand")
+    stack = TaskStack(arm, [task, PostureTask(1e-3)])
+    model, v = arm.model, np.zeros(7)
+    for k in range(2000):
+        if k % 100 == 0:
+            move_target(task, rng.normal(size=3))
+        solution = stack.solve(DT)
+        assert (np.abs(solution.v) <= model.velocityLimit + 1e-9).all()
+        assert (np.abs(solution.v - v) <= 50.0 * DT + 1e-9).all()
+        v = solution.v
+        arm.update(arm.integrate(solution.dq))
+        assert (arm.q <= model.upperPositionLimit + 1e-9).all()
+        assert (arm.q >= model.lowerPositionLimit - 1e-9).all()

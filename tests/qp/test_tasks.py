@@ -1,0 +1,128 @@
+"""Every Jacobian against finite differences of its own error."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from wbc_suite.errors import ConfigError, UnknownNameError
+from wbc_suite.kinematics import Configuration
+from wbc_suite.qp import ComTask, FrameTask, PostureTask, TaskStack
+
+STEP = 1e-6  # central differences of smooth maps: error about 1e-9
+
+
+def random_pose(rng: np.random.Generator) -> pin.SE3:
+    return pin.exp6(rng.normal(size=6))
+
+
+def tasks_with_jacobian(rng):
+    return [
+        FrameTask("rarm_wrist2_joint", target=random_pose(rng)),
+        FrameTask("lleg_wrist2_joint", target=random_pose(rng)),
+        ComTask(target=rng.normal(size=3)),
+    ]
+
+
+@pytest.mark.parametrize("index", range(3))
+def test_jacobian_is_minus_the_derivative_of_the_error(humanoid, rng, index):
+    task = tasks_with_jacobian(rng)[index]
+    task.bind(humanoid)
+    for _ in range(5):
+        dq0 = rng.normal(size=humanoid.nv) * 0.3
+        q = humanoid.integrate(dq0)
+        humanoid.update(q)
+        J = np.array(task.jacobian(humanoid))
+        numeric = np.empty_like(J)
+        for i in range(humanoid.nv):
+            dq = np.zeros(humanoid.nv)
+            dq[i] = STEP
+            humanoid.update(pin.integrate(humanoid.model, q, dq))
+            ahead = task.error(humanoid)
+            humanoid.update(pin.integrate(humanoid.model, q, -dq))
+            numeric[:, i] = -(ahead - task.error(humanoid)) / (2 * STEP)
+        humanoid.update(q)
+        np.testing.assert_allclose(J, numeric, atol=2e-8)
+
+
+def test_frame_kernel_agrees_with_readable_rows(humanoid, rng):
+    tasks = [
+        FrameTask(
+            name,
+            position_cost=rng.uniform(0, 3, 3),
+            orientation_cost=rng.uniform(0, 3, 3),
+            gain=0.7,
+            target=random_pose(rng),
+        )
+        for name in ("rarm_wrist2_joint", "lleg_wrist2_joint", "chest2_joint")
+    ]
+    stack = TaskStack(humanoid, [tasks[0], ComTask(), *tasks[1:]])
+    level = stack._levels[0]
+    for angle in (1e-9, 1e-3, 1.0, np.pi - 1e-6, np.pi):
+        turn = pin.SE3(pin.exp3(angle * np.array([0.6, 0.0, 0.8])), rng.normal(size=3))
+        tasks[0].set_target(humanoid.frame_pose(tasks[0].frame) * turn)
+        stack.solve(5e-3)
+        for task, rows in zip(level.row_tasks, level.slices, strict=True):
+            W, e = np.zeros((task.dim, humanoid.nv)), np.zeros(task.dim)
+            task.rows(humanoid, 5e-3, W, e)
+            if angle == np.pi:  # either sign of the axis is right
+                W, e = np.abs(W), np.abs(e)
+                level.W[rows], level.e[rows] = (
+                    np.abs(level.W[rows]),
+                    np.abs(level.e[rows]),
+                )
+            np.testing.assert_allclose(
+                level.W[rows], W, atol=1e-8 if angle > 3 else 1e-10
+            )
+            np.testing.assert_allclose(level.e[rows], e, atol=1e-10)
+
+
+def test_normal_equations_agree_with_matrix_product(humanoid, rng):
+    stack = TaskStack(
+        humanoid,
+        [FrameTask(n, target=random_pose(rng)) for n in ("chest2_joint",)]
+        + [ComTask(target=rng.normal(size=3)), PostureTask(0.3)],
+        damping=1e-2,
+    )
+    humanoid.update(humanoid.integrate(rng.normal(size=humanoid.nv) * 0.2))
+    stack.solve(5e-3)
+    level, problem = stack._levels[0], stack._problem
+    H = level.W.T @ level.W + np.diag(level.diagonal[0] + 1e-2)
+    c = -level.W.T @ level.e - level.diagonal[1]
+    np.testing.assert_allclose(problem.H, H, atol=1e-12)
+    np.testing.assert_allclose(problem.c, c, atol=1e-12)
+
+
+def test_posture_error_is_zero_at_target_and_ignores_root(humanoid):
+    task = PostureTask(1.0)
+    task.bind(humanoid)
+    weights, steps = np.zeros(humanoid.nv), np.zeros(humanoid.nv)
+    assert task.diagonal(humanoid, 1e-2, weights, steps)
+    np.testing.assert_array_equal(steps, 0.0)
+    np.testing.assert_array_equal(weights[:6], 0.0)
+    np.testing.assert_array_equal(weights[6:], 1.0)
+
+
+def test_steps_are_saturated(arm):
+    far = arm.frame_pose("hand")
+    far.translation = far.translation + np.array([9.0, 0.0, 0.0])
+    task = FrameTask("hand", target=far, position_cost=2.0)
+    task.bind(arm)
+    W, e = np.zeros((6, 7)), np.zeros(6)
+    task.rows(arm, 0.01, W, e)
+    np.testing.assert_allclose(e, [2.0 * 0.01, 0, 0, 0, 0, 0], atol=1e-12)
+
+
+def test_unknown_frame_names_the_nearest(arm):
+    with pytest.raises(UnknownNameError, match="Did you mean 'hand'"):
+        TaskStack(arm, [FrameTask("hnad")])
+
+
+def test_wrong_arguments_are_refused(arm: Configuration):
+    with pytest.raises(ConfigError, match="gain"):
+        FrameTask("hand", gain=0.0)
+    with pytest.raises(ConfigError, match="not negative"):
+        FrameTask("hand", position_cost=-1.0)
+    with pytest.raises(ConfigError, match="not a rotation"):
+        FrameTask("hand", target=np.diag([2.0, 1.0, 1.0, 1.0]))
+    with pytest.raises(ConfigError, match="not a positive time"):
+        TaskStack(arm, [FrameTask("hand")]).solve(0.0)

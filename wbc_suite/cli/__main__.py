@@ -1,0 +1,5 @@
+"""`python -m wbc_suite.cli` does what `wbc-suite` does."""
+
+from wbc_suite.cli import main
+
+main()

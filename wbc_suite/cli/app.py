@@ -1,0 +1,57 @@
+"""All commands put together.
+
+Command modules import what is heavy inside their functions, so that help is instant.
+"""
+
+import sys
+from typing import Annotated
+
+import typer
+
+from wbc_suite import __version__
+from wbc_suite.cli import check, doctor, export, listing, render
+from wbc_suite.errors import WbcError
+
+__all__ = ["app", "run"]
+
+app = typer.Typer(
+    name="wbc-suite",
+    help="Whole-body control of robots: describe, look at, teleoperate, benchmark.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+app.command("list")(listing.list_catalogue)
+app.command("check")(check.check_file)
+app.command("export")(export.export_robot)
+app.command("render")(render.render)
+app.command("doctor")(doctor.doctor)
+
+
+def _show_version(asked: bool) -> None:
+    if asked:
+        print(f"wbc-suite {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    *,
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", help="Show the version.", is_eager=True, callback=_show_version
+        ),
+    ] = False,
+) -> None:
+    del version  # its callback has answered
+
+
+def run() -> None:
+    """Run the command that the arguments name."""
+    try:
+        app()
+    except WbcError as error:
+        print(f"wbc-suite: {error}", file=sys.stderr)
+        sys.exit(2)

@@ -1,0 +1,99 @@
+"""`wbc-suite list`: what the catalogue holds."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from wbc_suite.cli.options import CatalogueOption
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from wbc_suite.catalogue import Catalogue
+
+__all__ = ["list_catalogue"]
+
+
+class Kind(StrEnum):
+    """What can be listed."""
+
+    ROBOTS = "robots"
+    GRIPPERS = "grippers"
+    BASES = "bases"
+    BENCHMARKS = "benchmarks"
+    CONTROLLERS = "controllers"
+
+
+_FOLDERS = {
+    Kind.GRIPPERS: "robots/gripper",
+    Kind.BASES: "robots/base",
+    Kind.BENCHMARKS: "tasks",
+    Kind.CONTROLLERS: "controllers",
+}
+
+
+def list_catalogue(
+    kind: Annotated[
+        Kind | None, typer.Argument(help="Everything when left out.")
+    ] = None,
+    catalogue: CatalogueOption = None,
+) -> None:
+    """Show the robots, grippers, bases, benchmarks and controllers there are."""
+    from rich.console import Console
+
+    from wbc_suite.catalogue import Catalogue
+
+    console = Console(soft_wrap=True)
+    known = Catalogue()
+    for chosen in [kind] if kind else Kind:
+        if chosen is Kind.ROBOTS:
+            console.print(_robots(known))
+        else:
+            console.print(_files(known, chosen))
+
+
+def _robots(catalogue: "Catalogue") -> "Table":
+    from wbc_suite.robot import load_robot
+
+    table = _table("Robots", "name", "", "dof", "kg", "root", "postures", "limbs")
+    for name in catalogue.names("robots"):
+        robot = load_robot(name, catalogue=catalogue)
+        table.add_row(
+            robot.name,
+            robot.title,
+            str(robot.dof),
+            f"{robot.mass:.1f}",
+            robot.root.kind,
+            ", ".join(robot.keyframes),
+            ", ".join(robot.groups),
+        )
+    return table
+
+
+def _files(catalogue: "Catalogue", kind: Kind) -> "Table":
+    table = _table(kind.capitalize(), "name", "")
+    for path in catalogue.files(_FOLDERS[kind]):
+        table.add_row(*_name_and_title(path))
+    return table
+
+
+def _name_and_title(path: Path) -> tuple[str, str]:
+    """Return what a file calls itself, in its first table or at its top."""
+    from wbc_suite.tomlfile import read_toml
+
+    content = read_toml(path)
+    tables = [content, *(t for t in content.values() if isinstance(t, dict))]
+    titles = (t.get("title") or t.get("description") for t in tables)
+    return path.stem, next((title for title in titles if isinstance(title, str)), "")
+
+
+def _table(title: str, *columns: str) -> "Table":
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left", title_style="bold", box=None)
+    for column in columns:
+        right = column in ("dof", "kg")
+        table.add_column(column, justify="right" if right else "left")
+    return table

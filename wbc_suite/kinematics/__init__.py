@@ -1,0 +1,6 @@
+"""Kinematics over Pinocchio, and the one place where engines' conventions meet."""
+
+from wbc_suite.kinematics.configuration import Axes, Configuration
+from wbc_suite.kinematics.conversions import Conversion
+
+__all__ = ["Axes", "Configuration", "Conversion"]

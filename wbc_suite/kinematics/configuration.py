@@ -1,0 +1,193 @@
+"""A robot's configuration with its forward kinematics and Jacobians."""
+
+import ctypes
+from typing import Literal
+
+import numpy as np
+import pinocchio as pin
+
+from wbc_suite.errors import ConfigError, UnknownNameError
+from wbc_suite.typing import Indices, Matrix, Vector
+
+__all__ = ["Axes", "Configuration"]
+
+Axes = Literal["local", "aligned", "world"]
+"""Axes of a Jacobian: the frame's own, world axes at the frame, world at its origin."""
+
+_REFERENCE = {
+    "local": pin.ReferenceFrame.LOCAL,
+    "aligned": pin.ReferenceFrame.LOCAL_WORLD_ALIGNED,
+    "world": pin.ReferenceFrame.WORLD,
+}
+_ROOT_NAMES = ("root_x", "root_y", "root_yaw")
+
+
+class Configuration:
+    """Joint positions q with everything that follows from them.
+
+    `update` runs forward kinematics and the joint Jacobians once; poses and frame
+    Jacobians are then read off. Twists are linear first, then angular.
+
+    Args:
+        model: The Pinocchio model; shared, not copied.
+        q: Joint positions, shape (nq,); the neutral ones when absent.
+
+    Attributes:
+        placements: View of all joint poses in the world, shape (njoints, 12): the
+            rotation column by column, then the position. Follows each `update`.
+        joint_jacobians: View of the joint Jacobians, transposed, shape (nv, 6), world
+            axes at the world's origin. Follows each `update`.
+        root_linear: Velocity indices that translate a free or planar root.
+        root_angular: Velocity indices that turn a free or planar root.
+    """
+
+    def __init__(self, model: pin.Model, q: Vector | None = None) -> None:
+        self.model = model
+        self.data: pin.Data = model.createData()
+        self.nq, self.nv = int(model.nq), int(model.nv)
+        self.q: Vector = pin.neutral(model)
+        self.placements = _view_placements(self.data, int(model.njoints))
+        self.joint_jacobians: Matrix = self.data.J.T
+        self.root_linear, self.root_angular = _root_indices(model)
+        self._frame_ids = {f.name: i for i, f in enumerate(model.frames)}
+        self._joint_ids = {n: i for i, n in enumerate(model.names)}
+        self._com_is_current = False
+        self.update(self.q if q is None else q)
+
+    def update(self, q: Vector) -> None:
+        """Move to q and compute joint poses and Jacobians, about 5 us for 50 joints.
+
+        Args:
+            q: Joint positions, shape (nq,). Values are taken as they are; the task
+                stack answers positions that are not finite by holding still.
+
+        Raises:
+            ConfigError: If the shape is wrong.
+        """
+        if len(q) != self.nq:
+            raise ConfigError(
+                f"q has {len(q)} values; model '{self.model.name}' has nq {self.nq}."
+            )
+        self.q[:] = q
+        pin.computeJointJacobians(self.model, self.data, self.q)
+        self._com_is_current = False
+
+    def integrate(self, dq: Vector) -> Vector:
+        """Return `q (+) dq`: the configuration reached by the tangent step dq (nv,)."""
+        return pin.integrate(self.model, self.q, dq)
+
+    def difference(self, q: Vector) -> Vector:
+        """Return `q (-) self.q`, shape (nv,): the tangent step from here to q."""
+        return pin.difference(self.model, self.q, q)
+
+    def frame_id(self, name: str) -> int:
+        """Return the index of a frame.
+
+        Raises:
+            UnknownNameError: If the model has no such frame.
+        """
+        try:
+            return self._frame_ids[name]
+        except KeyError:
+            raise UnknownNameError("frame", name, self._frame_ids) from None
+
+    def joint_id(self, name: str) -> int:
+        """Return the index of a joint.
+
+        Raises:
+            UnknownNameError: If the model has no such joint.
+        """
+        try:
+            return self._joint_ids[name]
+        except KeyError:
+            raise UnknownNameError("joint", name, self._joint_ids) from None
+
+    def velocity_names(self) -> tuple[str, ...]:
+        """Return one name for each velocity; "root[3]" for joints with several."""
+        names: list[str] = []
+        for name, joint in named_joints(self.model):
+            many = [f"{name}[{k}]" for k in range(joint.nv)]
+            names += [name] if joint.nv == 1 else many
+        return tuple(names)
+
+    def support(self, frame: str | int) -> Indices:
+        """Return the velocity indices that move a frame, ascending."""
+        joint = self.model.frames[self._resolve(frame)].parentJoint
+        return joint_support(self.model, joint)
+
+    def frame_pose(self, frame: str | int) -> pin.SE3:
+        """Return the pose T_wf of a frame in the world, a copy."""
+        k = self._resolve(frame)
+        return pin.updateFramePlacement(self.model, self.data, k).copy()
+
+    def frame_jacobian(self, frame: str | int, axes: Axes = "local") -> Matrix:
+        """Return a frame's Jacobian, shape (6, nv), linear rows first.
+
+        `J v` is the frame's twist: in its own axes ("local"), in world axes at the
+        frame's origin ("aligned"), or the spatial twist ("world").
+        """
+        k = self._resolve(frame)
+        pin.updateFramePlacement(self.model, self.data, k)
+        return pin.getFrameJacobian(self.model, self.data, k, _REFERENCE[axes])
+
+    @property
+    def com(self) -> Vector:
+        """Centre of mass in the world, m, shape (3,). A view."""
+        self._update_com()
+        return self.data.com[0]
+
+    @property
+    def com_jacobian(self) -> Matrix:
+        """Jacobian of the centre of mass, shape (3, nv). A view."""
+        self._update_com()
+        return self.data.Jcom
+
+    def _update_com(self) -> None:
+        if not self._com_is_current:
+            pin.jacobianCenterOfMass(self.model, self.data, False)
+            self._com_is_current = True
+
+    def _resolve(self, frame: str | int) -> int:
+        return self.frame_id(frame) if isinstance(frame, str) else frame
+
+
+def named_joints(model: pin.Model) -> list[tuple[str, pin.JointModel]]:
+    """Return names and joints without Pinocchio's joint 0, the universe."""
+    return list(zip(model.names, model.joints, strict=True))[1:]
+
+
+def joint_support(model: pin.Model, joint: int) -> Indices:
+    """Return the velocity indices between the root and a joint, ascending."""
+    indices: list[int] = []
+    for j in list(model.supports[joint])[1:]:  # without the universe
+        first = int(model.joints[j].idx_v)
+        indices += range(first, first + int(model.joints[j].nv))
+    return np.array(indices, dtype=np.int64)
+
+
+def _root_indices(model: pin.Model) -> tuple[Indices, Indices]:
+    """Return the linear and the angular velocity indices of the root."""
+    linear: list[int] = []
+    angular: list[int] = []
+    for name, joint in named_joints(model):
+        if joint.nv == 6:
+            linear += range(joint.idx_v, joint.idx_v + 3)
+            angular += range(joint.idx_v + 3, joint.idx_v + 6)
+        elif name in _ROOT_NAMES:
+            (angular if name == "root_yaw" else linear).append(joint.idx_v)
+    return np.array(linear, dtype=np.int64), np.array(angular, dtype=np.int64)
+
+
+def _view_placements(data: pin.Data, count: int) -> Matrix:
+    """View Pinocchio's vector of joint poses as one array, shape (count, 12).
+
+    Pinocchio keeps it as contiguous SE3, each 9 doubles of rotation (by columns) and
+    3 of position. The binding offers no array over it, so the first element's address
+    is used; the layout is checked, and the view keeps `data` alive.
+    """
+    first = data.oMi[0].rotation.ctypes.data
+    if data.oMi[count - 1].translation.ctypes.data != first + (count - 1) * 96 + 72:
+        raise RuntimeError("Pinocchio's SE3 layout is not the one this package knows.")
+    buffer = (ctypes.c_double * (12 * count)).from_address(first)
+    buffer._owner = data  # type: ignore[attr-defined]  # keeps the memory alive
+    return np.frombuffer(buffer, dtype=np.float64).reshape(count, 12)

@@ -1,0 +1,197 @@
+"""Conversions of q, v, a, tau, M and J between MuJoCo and Pinocchio.
+
+The engines agree on one-parameter joints and differ on free and ball joints:
+
+=================  ==========================  ==========================
+free joint         MuJoCo                      Pinocchio
+=================  ==========================  ==========================
+position           x y z, quaternion w x y z   x y z, quaternion x y z w
+linear velocity    world axes                  body axes
+angular velocity   body axes                   body axes
+=================  ==========================  ==========================
+
+so that `v_pin = B v_mj` with `B = blkdiag(R^T, I)` for each free joint (R is its
+rotation) and `B = I` elsewhere. Power is the same on both sides, hence
+`tau_mj = B^T tau_pin`, `M_mj = B^T M_pin B`, `J_mj = J_pin B`. Differentiating
+`v_pin = B v_mj` adds a term to accelerations: `R^T a_world - w x v_body`.
+
+The two engines' `integrate` and `difference` are different maps: convert, then use one.
+
+Sources: MuJoCo documentation, "Computation: floating objects"; Pinocchio's
+`JointModelFreeFlyer`. Each statement is tested numerically against both engines.
+"""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+
+from wbc_suite.errors import DescriptionError, UnknownNameError
+from wbc_suite.kinematics.configuration import named_joints
+from wbc_suite.typing import Indices, Matrix, Vector
+
+__all__ = ["Conversion"]
+
+_FREE_Q = [0, 1, 2, 4, 5, 6, 3]  # where x y z qx qy qz qw stand in MuJoCo's qpos
+_BALL_Q = [1, 2, 3, 0]
+
+
+@dataclass(frozen=True, slots=True)
+class _FreeJoint:
+    """Where one free joint sits: first indices in qpos and both velocities."""
+
+    quaternion: Indices  # of w x y z in qpos, shape (4,)
+    mujoco: slice  # linear part of qvel
+    pinocchio: slice  # linear part of v
+    angular: slice  # angular part of v
+
+
+class Conversion:
+    """Conversion between a MuJoCo model and a Pinocchio model of one robot.
+
+    Joints are matched by name. The MuJoCo model may hold more than the robot (objects,
+    a second robot): on its side arrays have the full size, and entries that belong to
+    no Pinocchio joint are left at zero, or untouched when `out` is given.
+
+    Args:
+        mujoco_model: The compiled MuJoCo model.
+        pinocchio_model: The Pinocchio model.
+        prefix: Text before each joint name on the MuJoCo side ("robot0_").
+
+    Raises:
+        UnknownNameError: A Pinocchio joint has no namesake in the MuJoCo model.
+        DescriptionError: Two namesakes have different numbers of parameters.
+    """
+
+    def __init__(
+        self,
+        mujoco_model: mujoco.MjModel,
+        pinocchio_model: pin.Model,
+        *,
+        prefix: str = "",
+    ) -> None:
+        self.nq_mujoco, self.nv_mujoco = int(mujoco_model.nq), int(mujoco_model.nv)
+        names = {mujoco_model.joint(i).name: i for i in range(int(mujoco_model.njnt))}
+        q_index: list[int] = []
+        v_index: list[int] = []
+        free: list[_FreeJoint] = []
+        for name, joint in named_joints(pinocchio_model):
+            if prefix + name not in names:
+                raise UnknownNameError("MuJoCo joint", prefix + name, names)
+            k = names[prefix + name]
+            q0 = int(mujoco_model.jnt_qposadr[k])
+            v0 = int(mujoco_model.jnt_dofadr[k])
+            order = _q_order(int(mujoco_model.jnt_type[k]))
+            if (joint.nq, joint.nv) != (len(order), max(1, len(order) - 1)):
+                raise DescriptionError(
+                    f"Joint '{name}' has {joint.nq} parameters and {joint.nv} "
+                    f"velocities in Pinocchio but {len(order)} parameters in MuJoCo. "
+                    "Build continuous joints as one-parameter revolute joints."
+                )
+            if len(order) == 7:
+                iv = joint.idx_v
+                free.append(
+                    _FreeJoint(
+                        quaternion=np.arange(q0 + 3, q0 + 7),
+                        mujoco=slice(v0, v0 + 3),
+                        pinocchio=slice(iv, iv + 3),
+                        angular=slice(iv + 3, iv + 6),
+                    )
+                )
+            q_index += [q0 + i for i in order]
+            v_index += [v0 + i for i in range(joint.nv)]
+        self.q_index: Indices = np.array(q_index, dtype=np.int64)
+        self.v_index: Indices = np.array(v_index, dtype=np.int64)
+        self._free = tuple(free)
+
+    def q_to_pinocchio(self, qpos: Vector) -> Vector:
+        """Return q, shape (nq,), quaternions x y z w, from MuJoCo's qpos."""
+        return qpos[self.q_index]
+
+    def q_to_mujoco(self, q: Vector, out: Vector | None = None) -> Vector:
+        """Return qpos, quaternions w x y z, from Pinocchio's q, shape (nq,)."""
+        qpos = np.zeros(self.nq_mujoco) if out is None else out
+        qpos[self.q_index] = q
+        return qpos
+
+    def v_to_pinocchio(self, qpos: Vector, qvel: Vector) -> Vector:
+        """Return `v_pin = B v_mj`, shape (nv,)."""
+        v = qvel[self.v_index]
+        for free in self._free:
+            v[free.pinocchio] = _rotation(qpos, free).T @ v[free.pinocchio]
+        return v
+
+    def v_to_mujoco(self, qpos: Vector, v: Vector, out: Vector | None = None) -> Vector:
+        """Return `v_mj = B^-1 v_pin`, full MuJoCo size."""
+        qvel = np.zeros(self.nv_mujoco) if out is None else out
+        qvel[self.v_index] = v
+        for free in self._free:
+            qvel[free.mujoco] = _rotation(qpos, free) @ v[free.pinocchio]
+        return qvel
+
+    def a_to_pinocchio(self, qpos: Vector, qvel: Vector, qacc: Vector) -> Vector:
+        """Return Pinocchio's acceleration: `a_lin = R^T a_world - w x v_body`.
+
+        With `qacc = 0` and `pin.rnea(model, data, q, v, a)` it also yields the bias
+        force: `bias_mj = B^T rnea(q, v, a)`.
+        """
+        v = self.v_to_pinocchio(qpos, qvel)
+        a = self.v_to_pinocchio(qpos, qacc)
+        for free in self._free:
+            a[free.pinocchio] -= np.cross(v[free.angular], v[free.pinocchio])
+        return a
+
+    def a_to_mujoco(self, qpos: Vector, qvel: Vector, a: Vector) -> Vector:
+        """Return MuJoCo's acceleration: `a_world = R (a_lin + w x v_body)`."""
+        v = self.v_to_pinocchio(qpos, qvel)
+        classical = np.array(a, dtype=np.float64)
+        for free in self._free:
+            classical[free.pinocchio] += np.cross(v[free.angular], v[free.pinocchio])
+        return self.v_to_mujoco(qpos, classical)
+
+    def tau_to_pinocchio(self, qpos: Vector, tau: Vector) -> Vector:
+        """Return generalised forces `tau_pin = B^-T tau_mj`, shape (nv,).
+
+        B is orthogonal, so forces turn as velocities do.
+        """
+        return self.v_to_pinocchio(qpos, tau)
+
+    def tau_to_mujoco(
+        self, qpos: Vector, tau: Vector, out: Vector | None = None
+    ) -> Vector:
+        """Return generalised forces `tau_mj = B^T tau_pin`, full MuJoCo size."""
+        return self.v_to_mujoco(qpos, tau, out)
+
+    def mass_matrix_to_mujoco(self, qpos: Vector, mass_matrix: Matrix) -> Matrix:
+        """Return `M_mj = B^T M_pin B`, full MuJoCo size (nv, nv)."""
+        half = self.jacobian_to_mujoco(qpos, mass_matrix)
+        return self.jacobian_to_mujoco(qpos, half[:, :].T.copy()).T
+
+    def jacobian_to_mujoco(self, qpos: Vector, jacobian: Matrix) -> Matrix:
+        """Return `J_mj = J_pin B`, shape (m, nv of MuJoCo).
+
+        MuJoCo's `mj_jac*` functions give world axes at the point: compare them with
+        Pinocchio's LOCAL_WORLD_ALIGNED.
+        """
+        out = np.zeros((jacobian.shape[0], self.nv_mujoco))
+        out[:, self.v_index] = jacobian
+        for free in self._free:
+            out[:, free.mujoco] = jacobian[:, free.pinocchio] @ _rotation(qpos, free).T
+        return out
+
+
+def _q_order(joint_type: int) -> list[int]:
+    """Return where Pinocchio's parameters stand among MuJoCo's, one joint."""
+    if joint_type == mujoco.mjtJoint.mjJNT_FREE:
+        return _FREE_Q
+    if joint_type == mujoco.mjtJoint.mjJNT_BALL:
+        return _BALL_Q
+    return [0]
+
+
+def _rotation(qpos: Vector, free: _FreeJoint) -> Matrix:
+    """Return the rotation matrix of a free joint, body to world, shape (3, 3)."""
+    out = np.empty(9)
+    mujoco.mju_quat2Mat(out, qpos[free.quaternion])
+    return out.reshape(3, 3)

@@ -1,0 +1,46 @@
+"""Stacks of QP tasks: what a robot should do, under limits, solved once per tick.
+
+stack = TaskStack(configuration, [FrameTask("right_hand"), PostureTask(1e-2)])
+solution = stack.solve(dt)
+configuration.update(configuration.integrate(solution.dq))
+"""
+
+from wbc_suite.qp.acceleration_limit import AccelerationLimit
+from wbc_suite.qp.bounds import LimitKind
+from wbc_suite.qp.com_task import ComTask
+from wbc_suite.qp.damping_task import DampingTask
+from wbc_suite.qp.equality import Equality, FrameEquality, LinearEquality
+from wbc_suite.qp.frame_task import FrameTask
+from wbc_suite.qp.limit import BoxLimit, Limit, RowLimit
+from wbc_suite.qp.position_limit import PositionLimit
+from wbc_suite.qp.posture_task import PostureTask
+from wbc_suite.qp.problem import Problem
+from wbc_suite.qp.solution import ActiveLimit, Fallback, Solution
+from wbc_suite.qp.stack import TaskStack
+from wbc_suite.qp.task import DiagonalTask, RowTask, Task
+from wbc_suite.qp.velocity_limit import VelocityLimit
+
+__all__ = [
+    "AccelerationLimit",
+    "ActiveLimit",
+    "BoxLimit",
+    "ComTask",
+    "DampingTask",
+    "DiagonalTask",
+    "Equality",
+    "Fallback",
+    "FrameEquality",
+    "FrameTask",
+    "Limit",
+    "LimitKind",
+    "LinearEquality",
+    "PositionLimit",
+    "PostureTask",
+    "Problem",
+    "RowLimit",
+    "RowTask",
+    "Solution",
+    "Task",
+    "TaskStack",
+    "VelocityLimit",
+]

@@ -1,0 +1,111 @@
+"""What a tick does when its problem has no solution.
+
+The ladder, mildest first: drop acceleration limits; relax equality and inequality rows
+with slack; damped least squares within the joints' bounds; stand still. The bounds of
+position and velocity are kept on every rung.
+"""
+
+import numba
+import numpy as np
+
+from wbc_suite.qp.problem import UNBOUNDED, Problem
+from wbc_suite.qp.solution import Fallback
+from wbc_suite.qp.solver import QpSolver
+from wbc_suite.typing import Matrix, Vector
+
+__all__ = ["box_least_squares", "checked_solve", "retreat"]
+
+_TOLERANCE = 1e-7  # greatest broken row or bound of an accepted solution, m or rad
+_SLACK_WEIGHT = 1e4  # of a relaxed row against the largest entry of the cost
+_SWEEPS = 100
+
+
+def checked_solve(solver: QpSolver, problem: Problem) -> tuple[Vector, Vector] | None:
+    """Solve, and pass on only what is finite and keeps the constraints.
+
+    The step is clipped to the bounds, which it may have missed by rounding.
+    """
+    result = solver.solve(problem)
+    if result is None:
+        return None
+    x, multipliers = result
+    # NaN compares false, so it is refused here too.
+    if not problem.violation(x) <= _TOLERANCE:
+        return None
+    np.minimum(x, problem.ub, out=x)
+    np.maximum(x, problem.lb, out=x)
+    return x, multipliers
+
+
+def retreat(
+    solver: QpSolver, problem: Problem, *, lb: Vector, ub: Vector
+) -> tuple[Vector, Vector, Fallback]:
+    """Find a step for a problem that has no solution.
+
+    Args:
+        solver: Tried first, without acceleration limits.
+        problem: The problem; its bounds are replaced.
+        lb: Lower bounds of position and velocity alone.
+        ub: Upper bounds of the same.
+
+    Returns:
+        The step, multipliers, and the rung that was reached.
+    """
+    problem.lb[:], problem.ub[:] = lb, ub
+    result = checked_solve(solver, problem)
+    if result is not None:
+        return *result, Fallback.ACCELERATION
+    result = _solve_with_slack(solver, problem)
+    if result is not None:
+        return *result, Fallback.SLACK
+    nothing = np.zeros(len(problem.upper))
+    x = box_least_squares(problem.H, problem.c, problem.lb, problem.ub, _SWEEPS)
+    if np.isfinite(x).all():
+        return x, nothing, Fallback.BOX
+    return np.clip(np.zeros(problem.nv), lb, ub), nothing, Fallback.HOLD
+
+
+def _solve_with_slack(
+    solver: QpSolver, problem: Problem
+) -> tuple[Vector, Vector] | None:
+    """Solve with equality rows as heavy tasks and slack s >= 0 on `G dq <= h + s`."""
+    nv, rows = problem.nv, len(problem.G)
+    weight = _SLACK_WEIGHT * max(1.0, float(np.abs(problem.H).max()))
+    relaxed = Problem(nv + rows, rows)
+    A, b = problem.A, problem.b
+    relaxed.H[:nv, :nv] = problem.H + weight * (A.T @ A)
+    relaxed.H[nv:, nv:] = weight * np.eye(rows)
+    relaxed.c[:nv] = problem.c - weight * (A.T @ b)
+    relaxed.lb[:nv], relaxed.ub[:nv] = problem.lb, problem.ub
+    relaxed.lb[nv:] = 0.0
+    relaxed.G[:, :nv] = problem.G
+    relaxed.G[:, nv:] = -np.eye(rows)
+    relaxed.h[:] = np.minimum(problem.h, UNBOUNDED)
+    result = checked_solve(solver.fresh(), relaxed)
+    if result is None:
+        return None
+    x, multipliers = result
+    out = np.zeros(len(problem.upper))
+    out[:nv] = multipliers[:nv]
+    out[nv : nv + rows] = multipliers[nv + rows :]
+    return x[:nv].copy(), out
+
+
+@numba.njit(cache=True, nogil=True)
+def box_least_squares(
+    H: Matrix, c: Vector, lb: Vector, ub: Vector, sweeps: int
+) -> Vector:
+    """Minimise `0.5 x^T H x + c^T x` within `lb <= x <= ub` by coordinate descent.
+
+    Needs no factorisation and cannot fail: every sweep lowers the cost and stays in the
+    box. Source: projected Gauss-Seidel, Bertsekas (1999), "Nonlinear Programming", 2.7.
+    """
+    n = c.shape[0]
+    x = np.minimum(np.maximum(np.zeros(n), lb), ub)
+    for _ in range(sweeps):
+        for i in range(n):
+            gradient = c[i]
+            for j in range(n):
+                gradient += H[i, j] * x[j]
+            x[i] = min(max(x[i] - gradient / H[i, i], lb[i]), ub[i])
+    return x

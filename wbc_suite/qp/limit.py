@@ -1,0 +1,86 @@
+"""What limits have in common: a box per joint, or inequality rows."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+
+from wbc_suite.kinematics import Configuration
+from wbc_suite.kinematics.configuration import named_joints
+from wbc_suite.typing import Indices, Matrix, Vector
+
+__all__ = ["BoxLimit", "JointBounds", "Limit", "RowLimit"]
+
+
+@dataclass(slots=True)
+class JointBounds:
+    """The box that limits fill in at binding time, one entry per velocity.
+
+    Attributes:
+        q_index: Position index of each velocity, -1 where positions are no vector.
+        q_lower: Lower position limits, -inf where there is none.
+        q_upper: Upper position limits.
+        position_gain: Fraction of the distance to a limit that one step may cover.
+        v_max: Speed limits, inf where there is none.
+        a_max: Acceleration limits, inf where there is none.
+    """
+
+    q_index: Indices
+    q_lower: Vector
+    q_upper: Vector
+    position_gain: float
+    v_max: Vector
+    a_max: Vector
+
+    @classmethod
+    def unlimited(cls, configuration: Configuration) -> "JointBounds":
+        """Return bounds that bind nothing."""
+        nv = configuration.nv
+        q_index = np.full(nv, -1, dtype=np.int64)
+        for _, joint in named_joints(configuration.model):
+            if joint.nq == 1 and joint.nv == 1:
+                q_index[joint.idx_v] = joint.idx_q
+        return cls(
+            q_index=q_index,
+            q_lower=np.full(nv, -np.inf),
+            q_upper=np.full(nv, np.inf),
+            position_gain=1.0,
+            v_max=np.full(nv, np.inf),
+            a_max=np.full(nv, np.inf),
+        )
+
+
+class Limit(ABC):  # noqa: B024, what a stack takes is either of the two below
+    """A constraint that a solution never breaks as long as one exists."""
+
+
+class BoxLimit(Limit):
+    """A limit on single joints."""
+
+    @abstractmethod
+    def apply(self, configuration: Configuration, bounds: JointBounds) -> None:
+        """Tighten the bounds; called once, when a stack is built."""
+
+
+class RowLimit(Limit):
+    """A limit `G dq <= h` of a fixed number of rows.
+
+    Attributes:
+        dim: Number of rows.
+    """
+
+    dim: int
+
+    @abstractmethod
+    def bind(self, configuration: Configuration) -> None:
+        """Resolve names in a model."""
+
+    @abstractmethod
+    def rows(
+        self, configuration: Configuration, dt: float, G: Matrix, h: Vector
+    ) -> None:
+        """Write G, shape (dim, nv), and h, shape (dim,); unused rows are 0 <= inf."""
+
+    @abstractmethod
+    def label(self, row: int) -> str:
+        """Return in words what a row of the last tick limits."""

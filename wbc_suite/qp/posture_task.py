@@ -1,0 +1,93 @@
+"""Pull joints to a posture."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from wbc_suite.errors import ConfigError
+from wbc_suite.kinematics import Configuration
+from wbc_suite.qp.task import DiagonalTask, cost_vector, joint_costs
+from wbc_suite.typing import Vector
+
+__all__ = ["PostureTask"]
+
+
+class PostureTask(DiagonalTask):
+    """Pull joints to a posture q*: `e = q* (-) q`, `J = I`.
+
+    Free and planar roots have cost zero unless named in `costs`. Each joint's wanted
+    step is shortened to `max_speed dt`.
+
+    Args:
+        cost: [cost]/rad or [cost]/m, the same for all joints.
+        costs: Costs of single joints by name, in place of `cost`.
+        target: Posture q*, shape (nq,); without one the posture at binding time.
+        gain: See `Task`.
+        level: See `Task`.
+        max_speed: Greatest speed asked for, rad/s or m/s.
+        name: How reports call the task.
+    """
+
+    def __init__(
+        self,
+        cost: float = 1e-2,
+        *,
+        costs: Mapping[str, float] | None = None,
+        target: Vector | None = None,
+        gain: float = 1.0,
+        level: int = 0,
+        max_speed: float = 3.0,
+        name: str = "posture",
+    ) -> None:
+        super().__init__(name, gain=gain, level=level)
+        self.cost, self.costs = cost, dict(costs or {})
+        for value in (cost, *self.costs.values()):
+            cost_vector(name, value, 1)
+        self.max_speed = max_speed
+        self.target = None if target is None else np.array(target, dtype=np.float64)
+
+    def set_target(self, target: Vector) -> None:
+        """Set the posture q*, shape (nq,).
+
+        Raises:
+            ConfigError: If the shape is wrong.
+        """
+        q = np.array(target, dtype=np.float64)
+        if self.target is not None and q.shape != self.target.shape:
+            raise ConfigError(
+                f"Task '{self.name}': a posture has shape {self.target.shape}, "
+                f"not {q.shape}."
+            )
+        self.target = q
+
+    def bind(self, configuration: Configuration) -> None:
+        """Resolve joint names; without a target, take the present posture."""
+        self._weights = joint_costs(configuration, self.cost, self.costs) ** 2
+        if self.target is None:
+            self.target = configuration.q.copy()
+        if self.target.shape != (configuration.nq,):
+            raise ConfigError(
+                f"Task '{self.name}': the posture has shape {self.target.shape}; "
+                f"the model has nq {configuration.nq}."
+            )
+
+    def error(self, configuration: Configuration) -> Vector:
+        """Return `q* (-) q`, rad or m, shape (nv,)."""
+        assert self.target is not None
+        return configuration.difference(self.target)
+
+    def diagonal(
+        self, configuration: Configuration, dt: float, weights: Vector, steps: Vector
+    ) -> bool:
+        """Add squared costs and weighted steps."""
+        error = self.error(configuration)
+        limit = self.max_speed * dt
+        error *= self.gain
+        np.clip(error, -limit, limit, out=error)
+        finite = bool(np.isfinite(error).all())
+        if not finite:
+            error[:] = 0.0
+        weights += self._weights
+        error *= self._weights
+        steps += error
+        return finite

@@ -1,0 +1,83 @@
+"""The quadratic program of one tick."""
+
+import numpy as np
+
+from wbc_suite.typing import Matrix, Vector
+
+__all__ = ["Problem"]
+
+UNBOUNDED = 1e30
+"""A bound at or beyond it binds nothing (the convention of most solvers)."""
+
+
+class Problem:
+    """Minimise `0.5 x^T H x + c^T x` subject to `G x <= h`, `A x = b`, `lb <= x <= ub`.
+
+    Owns its arrays, and keeps all bounds in two vectors in the order x, G, A. The
+    attributes below are views: write into them.
+
+    Args:
+        nv: Number of variables.
+        inequalities: Rows of G.
+        equalities: Rows of A.
+
+    Attributes:
+        H: Cost matrix, shape (nv, nv).
+        c: Cost vector, shape (nv,).
+        G: Inequality rows, shape (inequalities, nv).
+        h: Their upper bounds.
+        A: Equality rows, shape (equalities, nv).
+        lb: Lower bounds of x.
+        ub: Upper bounds of x.
+        rows: G above A.
+        lower: Lower bounds of x, G x, A x in this order.
+        upper: Upper bounds of the same.
+    """
+
+    def __init__(self, nv: int, inequalities: int = 0, equalities: int = 0) -> None:
+        rows = inequalities + equalities
+        self.H: Matrix = np.eye(nv)
+        self.c: Vector = np.zeros(nv)
+        self.rows: Matrix = np.zeros((rows, nv))
+        self.lower: Vector = np.full(nv + rows, -UNBOUNDED)
+        self.upper: Vector = np.full(nv + rows, UNBOUNDED)
+        self.lb, self.ub = self.lower[:nv], self.upper[:nv]
+        self.G, self.A = self.rows[:inequalities], self.rows[inequalities:]
+        self.h = self.upper[nv : nv + inequalities]
+        self.set_equalities(np.zeros(equalities))
+
+    @property
+    def nv(self) -> int:
+        """Number of variables."""
+        return len(self.c)
+
+    @property
+    def equalities(self) -> int:
+        """Number of equality rows."""
+        return len(self.A)
+
+    @property
+    def b(self) -> Vector:
+        """Right-hand side of `A x = b`; write it with `set_equalities`."""
+        return self.upper[len(self.upper) - len(self.A) :]
+
+    def set_equalities(self, b: Vector) -> None:
+        """Set b, shape (equalities,), in both bound vectors."""
+        if len(b):
+            self.lower[-len(b) :] = b
+            self.upper[-len(b) :] = b
+
+    def violation(self, x: Vector) -> float:
+        """Return by how much x breaks its worst bound, in the bound's unit."""
+        nv = self.nv
+        worst = max(
+            float((x - self.ub).max(initial=0.0)), float((self.lb - x).max(initial=0.0))
+        )
+        if len(self.rows):
+            y = self.rows @ x
+            worst = max(
+                worst,
+                float((y - self.upper[nv:]).max(initial=0.0)),
+                float((self.lower[nv:] - y).max(initial=0.0)),
+            )
+        return worst

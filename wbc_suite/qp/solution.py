@@ -1,0 +1,79 @@
+"""What one tick of a stack answers."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Literal
+
+from wbc_suite.qp.bounds import LimitKind
+from wbc_suite.typing import Vector
+
+__all__ = ["ActiveLimit", "Fallback", "Solution"]
+
+
+class Fallback(IntEnum):
+    """How far a tick had to retreat from the problem as stated, mildest first."""
+
+    NONE = 0
+    """Solved as stated."""
+    LEVEL = 1
+    """A lower level could not be solved and was left out."""
+    ACCELERATION = 2
+    """Acceleration limits were dropped for this tick."""
+    SLACK = 3
+    """Equality and inequality rows were relaxed; bounds of joints are kept."""
+    BOX = 4
+    """Damped least squares within the bounds of joints, rows left out."""
+    HOLD = 5
+    """Nothing usable came in or out: the robot stands still."""
+
+
+@dataclass(frozen=True, slots=True)
+class ActiveLimit:
+    """A limit that holds a joint back.
+
+    Attributes:
+        name: The joint's name, or a row limit's own words ("forearm - torso").
+        side: Which bound is met.
+        kind: What set it.
+        multiplier: How hard the tasks push against it, [cost]^2 rad or m.
+    """
+
+    name: str
+    side: Literal["lower", "upper"]
+    kind: LimitKind
+    multiplier: float
+
+    def __str__(self) -> str:
+        words = self.kind.name.lower().replace("_", "-")
+        if self.kind is LimitKind.SELF_COLLISION:
+            return f"{words}: {self.name}"
+        words = "joint" if self.kind is LimitKind.POSITION else words
+        return f"{words} limit: {self.name} ({self.side})"
+
+
+@dataclass(frozen=True, slots=True)
+class Solution:
+    """The step of one tick.
+
+    Attributes:
+        dq: Step in the tangent space, shape (nv,); integrate it, never add it to q.
+        v: Velocity `dq / dt`, shape (nv,).
+        fallback: How far the tick had to retreat.
+        residual: By how much the worst kept constraint is broken, in its own unit.
+        held: Tasks whose target was not finite; what they watch stands still.
+        conflicts: Names of the equality rows that could not be kept.
+        active: Limits that hold joints back, hardest pressed first.
+    """
+
+    dq: Vector
+    v: Vector
+    fallback: Fallback
+    residual: float
+    held: tuple[str, ...]
+    conflicts: tuple[str, ...]
+    active: tuple[ActiveLimit, ...]
+
+    @property
+    def ok(self) -> bool:
+        """Whether the problem was solved as stated."""
+        return self.fallback is Fallback.NONE and not self.held

@@ -1,0 +1,160 @@
+"""QP solvers behind one small interface."""
+
+from typing import ClassVar, Protocol
+
+import daqp
+import numpy as np
+
+from wbc_suite.errors import SolverError, UnknownNameError
+from wbc_suite.qp.problem import UNBOUNDED, Problem
+from wbc_suite.typing import Vector
+
+__all__ = ["DaqpSolver", "QpSolver", "QpsolversSolver", "make_solver"]
+
+_EQUALITY = 5  # daqp's sense: active and immutable
+_TIME_LIMIT = 0.02  # s, one solve; a humanoid's takes 1e-4
+
+
+class QpSolver(Protocol):
+    """Solves one `Problem` after another."""
+
+    def solve(self, problem: Problem) -> tuple[Vector, Vector] | None:
+        """Return x, shape (nv,), and the multipliers of x, G, A in this order.
+
+        Multipliers are positive at upper bounds and negative at lower ones:
+        `H x + c + lam_x + [G; A]^T lam_rows = 0`. None means not solved.
+        """
+        ...
+
+    def fresh(self) -> "QpSolver":
+        """Return a solver of the same kind without memory of earlier problems."""
+        ...
+
+
+class DaqpSolver:
+    """daqp with a workspace that is kept: bounds as a box, warm active set.
+
+    Primal tolerance 1e-10; the default of 1e-6 would let joints out of their limits by
+    as much. Written for problems of one size; another size sets up a new workspace.
+
+    Source: Arnstrom, Bemporad, Axehill (2022), "A Dual Active-Set Solver for Embedded
+    Quadratic Programming Using Recursive LDL^T Updates", IEEE TAC 67(8).
+    """
+
+    def __init__(self, *, time_limit: float = _TIME_LIMIT) -> None:
+        self._settings = {"primal_tol": 1e-10, "time_limit": time_limit}
+        self._size: tuple[int, int, int] | None = None
+        self._model = daqp.Model()
+
+    def fresh(self) -> "DaqpSolver":
+        """Return another workspace."""
+        return DaqpSolver(time_limit=self._settings["time_limit"])
+
+    def solve(self, problem: Problem) -> tuple[Vector, Vector] | None:
+        """Solve; see `QpSolver`."""
+        size = (problem.nv, len(problem.rows), problem.equalities)
+        if size != self._size:
+            flag = self._set_up(problem)
+            self._size = size if flag >= 0 else None
+        else:
+            flag = self._model.update(
+                H=problem.H,
+                f=problem.c,
+                A=problem.rows if len(problem.rows) else None,
+                bupper=problem.upper,
+                blower=problem.lower,
+            )
+        if flag < 0:
+            self._size = None
+            return None
+        x, _, flag, info = self._model.solve()
+        if flag <= 0:
+            self._size = None  # a failed active set is no warm start
+            return None
+        return x, info["lam"]
+
+    def _set_up(self, problem: Problem) -> int:
+        self._model = daqp.Model()
+        self._model.settings = self._settings
+        sense = np.zeros(len(problem.upper), dtype=np.intc)
+        if problem.equalities:
+            sense[-problem.equalities :] = _EQUALITY
+        flag, _ = self._model.setup(
+            problem.H, problem.c, problem.rows, problem.upper, problem.lower, sense
+        )
+        return int(flag)
+
+
+class QpsolversSolver:
+    """Any solver that qpsolvers knows, for comparison and for users' own choice.
+
+    proxqp runs at 1e-9: at its default it reports success with x off by 0.2 in flat
+    directions when warm-started.
+    """
+
+    _OPTIONS: ClassVar[dict[str, dict[str, float]]] = {
+        "proxqp": {"eps_abs": 1e-9, "eps_rel": 0.0},
+        "osqp": {"eps_abs": 1e-8, "eps_rel": 0.0, "max_iter": 20000},
+        "piqp": {"eps_abs": 1e-9, "eps_rel": 0.0},
+    }
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def fresh(self) -> "QpsolversSolver":
+        """Return itself: it keeps no memory."""
+        return self
+
+    def solve(self, problem: Problem) -> tuple[Vector, Vector] | None:
+        """Solve; see `QpSolver`."""
+        import qpsolvers
+
+        used = problem.h < UNBOUNDED
+        qp = qpsolvers.Problem(
+            problem.H.copy(),
+            problem.c,
+            problem.G[used] if used.any() else None,
+            problem.h[used] if used.any() else None,
+            problem.A if problem.equalities else None,
+            problem.b if problem.equalities else None,
+            problem.lb,
+            problem.ub,
+        )
+        try:
+            solution = qpsolvers.solve_problem(
+                qp, self.name, **self._OPTIONS.get(self.name, {})
+            )
+        except (qpsolvers.exceptions.QPError, ValueError, ArithmeticError):
+            return None
+        if not solution.found or solution.x is None or solution.z_box is None:
+            return None
+        multipliers = np.zeros(len(problem.upper))
+        nv, rows = problem.nv, len(problem.G)
+        multipliers[:nv] = solution.z_box
+        if used.any():
+            multipliers[nv : nv + rows][used] = solution.z
+        if problem.equalities:
+            multipliers[nv + rows :] = solution.y
+        return solution.x, multipliers
+
+
+def make_solver(name: str) -> QpSolver:
+    """Return the solver of a name: "daqp", or any that qpsolvers finds installed.
+
+    Raises:
+        SolverError: The solver is known but not installed.
+        UnknownNameError: No solver has this name.
+    """
+    if name == "daqp":
+        return DaqpSolver()
+    import qpsolvers
+
+    if name in qpsolvers.available_solvers:
+        return QpsolversSolver(name)
+    known = ("daqp", "proxqp", "osqp", "quadprog", "piqp", "clarabel")
+    if name in known:
+        raise SolverError(
+            f"QP solver '{name}' is not installed. "
+            "Install it with: pip install 'wbc-suite[solvers]'"
+        )
+    raise UnknownNameError("QP solver", name, {*known, *qpsolvers.available_solvers})

@@ -1,0 +1,266 @@
+"""A stack of QP tasks under limits, solved once per tick."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from wbc_suite.errors import ConfigError
+from wbc_suite.kinematics import Configuration
+from wbc_suite.qp.acceleration_limit import AccelerationLimit
+from wbc_suite.qp.bounds import LimitKind, merge_bounds
+from wbc_suite.qp.equality import Equality
+from wbc_suite.qp.fallback import checked_solve, retreat
+from wbc_suite.qp.level import Level
+from wbc_suite.qp.limit import BoxLimit, JointBounds, Limit, RowLimit
+from wbc_suite.qp.position_limit import PositionLimit
+from wbc_suite.qp.problem import Problem
+from wbc_suite.qp.rows import row_space
+from wbc_suite.qp.solution import ActiveLimit, Fallback, Solution
+from wbc_suite.qp.solver import QpSolver, make_solver
+from wbc_suite.qp.task import Task
+from wbc_suite.qp.velocity_limit import VelocityLimit
+from wbc_suite.typing import Vector
+
+__all__ = ["TaskStack"]
+
+_TOLERANCE = 1e-7  # a row broken by more is reported as a conflict, m or rad
+_RANK_TOLERANCE = 1e-6  # rows of an upper level shorter than this bind nothing
+
+
+class TaskStack:
+    """Tasks, limits and equality rows over one configuration.
+
+    `solve` finds the step dq that minimises, level after level,
+
+        sum_i || W_i (J_i dq - gain_i e_i) ||^2 + damping || dq ||^2
+        subject to  A dq = b,  G dq <= h,  lb <= dq <= ub,
+
+    each level within what leaves the rows of the levels above as they are. It never
+    raises on what a robot or an operator may do: targets that are not finite hold what
+    they watch, rows that contradict each other are relaxed, and the `Solution` says so.
+
+    Args:
+        configuration: The robot; `solve` reads it, the caller moves it.
+        tasks: Tasks, see `Task.level` for priorities. The stack binds them: frames are
+            resolved, and targets that were not set hold the present pose.
+        limits: Limits; position, velocity and acceleration limits with their defaults
+            when absent.
+        equalities: Rows that are kept exactly, before all tasks.
+        solver: "daqp", or a name that qpsolvers knows.
+        damping: Tikhonov term, [cost]^2/rad^2. 1e-3 removes the flutter at singular
+            postures and does not move the point of rest.
+
+    Raises:
+        ConfigError: If an argument is out of range.
+        UnknownNameError: If a frame, a joint or the solver is unknown.
+        SolverError: If the solver is not installed.
+    """
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        tasks: Sequence[Task],
+        *,
+        limits: Sequence[Limit] | None = None,
+        equalities: Sequence[Equality] = (),
+        solver: str = "daqp",
+        damping: float = 1e-3,
+    ) -> None:
+        if not damping > 0.0:
+            raise ConfigError(f"TaskStack: damping {damping} is not positive.")
+        if limits is None:
+            limits = (PositionLimit(), VelocityLimit(), AccelerationLimit())
+        self.configuration = configuration
+        self.tasks, self.equalities = tuple(tasks), tuple(equalities)
+        self.solver, self.damping = solver, damping
+        self._names = configuration.velocity_names()
+        self._bounds = JointBounds.unlimited(configuration)
+        self._row_limits = [x for x in limits if isinstance(x, RowLimit)]
+        for limit in limits:
+            if isinstance(limit, BoxLimit):
+                limit.apply(configuration, self._bounds)
+        for bound in (*self._row_limits, *self.equalities):
+            bound.bind(configuration)
+        numbers = sorted({t.level for t in tasks}) or [0]
+        self._levels = [
+            Level(configuration, [t for t in tasks if t.level == k]) for k in numbers
+        ]
+        self._inequalities = sum(x.dim for x in self._row_limits)
+        self._problem = Problem(
+            configuration.nv, self._inequalities, sum(x.dim for x in self.equalities)
+        )
+        self._b: Vector = np.zeros(self._problem.equalities)
+        self._solver = make_solver(solver)
+        self._lower: dict[tuple[int, int], tuple[Problem, QpSolver]] = {}
+        nv = configuration.nv
+        self._kinds = np.zeros((2, nv), dtype=np.int64)
+        self._no_window: Vector = np.full(nv, np.inf)
+        self.v_previous: Vector = np.zeros(nv)
+
+    def reset(self, v: Vector | None = None) -> None:
+        """Forget the previous velocity, or set it, shape (nv,)."""
+        self.v_previous[:] = 0.0 if v is None else v
+
+    def solve(self, dt: float) -> Solution:
+        """Return the step from the present configuration.
+
+        Args:
+            dt: Duration of the step, s.
+
+        Raises:
+            ConfigError: If dt is not positive and finite.
+        """
+        if not 0.0 < dt < np.inf:
+            raise ConfigError(f"TaskStack.solve: dt {dt} is not a positive time.")
+        if not np.isfinite(self.configuration.q).all():
+            still = np.zeros(self.configuration.nv)
+            return self._answer(still, [], Fallback.HOLD, dt, 0.0)
+        self._write_constraints(dt)
+        x, multipliers, fallback = self._solve_first(dt)
+        pressures = [multipliers]
+        for k in range(1, len(self._levels)):
+            if fallback >= Fallback.BOX:
+                break
+            result = self._solve_lower(k, x, dt)
+            if result is None:
+                fallback = max(fallback, Fallback.LEVEL)
+                break
+            x = result[0]
+            pressures.append(result[1])
+        residual = self._problem.violation(x)
+        return self._answer(x, pressures, fallback, dt, residual)
+
+    def _write_constraints(self, dt: float) -> None:
+        """Fill bounds and rows of the first problem."""
+        problem, row = self._problem, 0
+        self._write_box(self._bounds.a_max, dt, problem.lb, problem.ub)
+        for limit in self._row_limits:
+            rows = slice(row, row + limit.dim)
+            limit.rows(self.configuration, dt, problem.G[rows], problem.h[rows])
+            row = rows.stop
+        if self.equalities:
+            b, row = self._b, 0
+            for equality in self.equalities:
+                rows = slice(row, row + equality.dim)
+                equality.rows(self.configuration, dt, problem.A[rows], b[rows])
+                row = rows.stop
+            problem.set_equalities(b)
+
+    def _write_box(self, a_max: Vector, dt: float, lb: Vector, ub: Vector) -> None:
+        bounds = self._bounds
+        merge_bounds(
+            self.configuration.q,
+            bounds.q_index,
+            bounds.q_lower,
+            bounds.q_upper,
+            bounds.position_gain,
+            bounds.v_max,
+            a_max,
+            self.v_previous,
+            dt,
+            lb,
+            ub,
+            *self._kinds,
+        )
+
+    def _solve_first(self, dt: float) -> tuple[Vector, Vector, Fallback]:
+        """Solve the first level under all constraints, or retreat."""
+        problem = self._problem
+        finite = self._levels[0].assemble(self.configuration, dt, self.damping, problem)
+        result = checked_solve(self._solver, problem) if finite else None
+        if result is not None:
+            return *result, Fallback.NONE
+        lb, ub = np.empty(problem.nv), np.empty(problem.nv)
+        self._write_box(self._no_window, dt, lb, ub)
+        if not finite:
+            still = np.clip(np.zeros(problem.nv), lb, ub)
+            return still, np.zeros(len(problem.upper)), Fallback.HOLD
+        return retreat(self._solver, problem, lb=lb, ub=ub)
+
+    def _solve_lower(
+        self, k: int, x: Vector, dt: float
+    ) -> tuple[Vector, Vector] | None:
+        """Solve level k among the steps that all levels above rate like x.
+
+        Those are `V dq = V x`, where V is an orthonormal basis of the equality rows and
+        of all rows above. x itself is one of them, so the problem has a solution.
+        """
+        first = self._problem
+        above = np.concatenate([first.A, *(level.W for level in self._levels[:k])])
+        V = np.empty((min(above.shape), first.nv))
+        rank = row_space(above, _RANK_TOLERANCE, V)
+        if (k, rank) not in self._lower:
+            problem = Problem(first.nv, len(first.G), rank)
+            self._lower[k, rank] = problem, self._solver.fresh()
+        problem, solver = self._lower[k, rank]
+        problem.lb[:], problem.ub[:] = first.lb, first.ub
+        problem.G[:], problem.h[:] = first.G, np.maximum(first.h, first.G @ x)
+        problem.A[:] = V[:rank]
+        problem.set_equalities(V[:rank] @ x)
+        if not self._levels[k].assemble(self.configuration, dt, self.damping, problem):
+            return None
+        return checked_solve(solver, problem)
+
+    def _answer(
+        self,
+        x: Vector,
+        pressures: list[Vector],
+        fallback: Fallback,
+        dt: float,
+        residual: float,
+    ) -> Solution:
+        """Remember the velocity and tell what happened."""
+        v = x / dt
+        self.v_previous[:] = v
+        return Solution(
+            dq=x,
+            v=v,
+            fallback=fallback,
+            residual=residual,
+            held=tuple(name for level in self._levels for name in level.held),
+            conflicts=self._conflicts(x) if fallback >= Fallback.SLACK else (),
+            active=self._active(pressures),
+        )
+
+    def _conflicts(self, x: Vector) -> tuple[str, ...]:
+        """Return the names of the rows that x does not keep."""
+        problem, names, row = self._problem, list[str](), 0
+        broken = np.abs(problem.A @ x - problem.b) > _TOLERANCE
+        for equality in self.equalities:
+            if broken[row : row + equality.dim].any():
+                names.append(equality.name)
+            row += equality.dim
+        over = problem.G @ x - problem.h > _TOLERANCE
+        return (*names, *(self._row_label(int(i)) for i in np.flatnonzero(over)))
+
+    def _row_label(self, row: int) -> str:
+        for limit in self._row_limits:
+            if row < limit.dim:
+                return limit.label(row)
+            row -= limit.dim
+        raise IndexError(row)
+
+    def _active(self, pressures: list[Vector]) -> tuple[ActiveLimit, ...]:
+        """List the limits that some level presses against, hardest first."""
+        nv, found = self._problem.nv, dict[int, float]()
+        for multipliers in pressures:
+            for i in multipliers[: nv + self._inequalities].nonzero()[0].tolist():
+                value = float(multipliers[i])
+                if abs(value) > abs(found.get(i, 0.0)):
+                    found[i] = value
+        order = sorted(found, key=lambda i: -abs(found[i]))
+        return tuple(self._active_limit(i, found[i]) for i in order)
+
+    def _active_limit(self, i: int, multiplier: float) -> ActiveLimit:
+        nv, upper = self._problem.nv, multiplier > 0.0
+        if i < nv:
+            kind = LimitKind(int(self._kinds[int(upper), i]))
+            name = self._names[i]
+        else:
+            kind, name = LimitKind.SELF_COLLISION, self._row_label(i - nv)
+        return ActiveLimit(
+            name=name,
+            side="upper" if upper else "lower",
+            kind=kind,
+            multiplier=abs(multiplier),
+        )
