@@ -11,10 +11,13 @@ from wbc_suite.qp.com_task import ComTask
 from wbc_suite.qp.damping_task import DampingTask
 from wbc_suite.qp.equality import Equality, FrameEquality, LinearEquality
 from wbc_suite.qp.frame_task import FrameTask
+from wbc_suite.qp.joint_coupling_task import JointCouplingTask
 from wbc_suite.qp.limit import BoxLimit, Limit, RowLimit
+from wbc_suite.qp.look_at_task import LookAtTask
 from wbc_suite.qp.position_limit import PositionLimit
 from wbc_suite.qp.posture_task import PostureTask
 from wbc_suite.qp.problem import Problem
+from wbc_suite.qp.relative_frame_task import RelativeFrameTask
 from wbc_suite.qp.solution import ActiveLimit, Fallback, Solution
 from wbc_suite.qp.stack import TaskStack
 from wbc_suite.qp.task import DiagonalTask, RowTask, Task
@@ -31,12 +34,15 @@ __all__ = [
     "Fallback",
     "FrameEquality",
     "FrameTask",
+    "JointCouplingTask",
     "Limit",
     "LimitKind",
     "LinearEquality",
+    "LookAtTask",
     "PositionLimit",
     "PostureTask",
     "Problem",
+    "RelativeFrameTask",
     "RowLimit",
     "RowTask",
     "Solution",

@@ -72,9 +72,15 @@ class Level:
         self.frame_errors: Matrix = np.zeros((len(frames), 2))
 
     def assemble(
-        self, configuration: Configuration, dt: float, damping: float, problem: Problem
-    ) -> bool:
-        """Fill the cost of a problem; return whether it is finite."""
+        self,
+        configuration: Configuration,
+        dt: float,
+        problem: Problem,
+        *,
+        damping: float,
+        curvature: float,
+    ) -> float:
+        """Fill the cost of a problem; return mu of `normal_equations`."""
         self.held.clear()
         if self._frames:
             self._write_frames(configuration, dt)
@@ -94,6 +100,7 @@ class Level:
             *self._support,
             self.diagonal,
             damping,
+            curvature,
             problem.H,
             problem.c,
         )

@@ -193,10 +193,17 @@ def normal_equations(
     support: Indices,
     diagonal: Matrix,
     damping: float,
+    curvature: float,
     H: Matrix,
     c: Vector,
-) -> bool:
-    """Write `H = W^T W + diag`, `c = -W^T e - ...` and tell whether both are finite.
+) -> float:
+    """Write `H = W^T W + D + mu I` and `c = -W^T e - d`.
+
+    `mu = damping + curvature sum_rows |e| max|W|`. Its second part bounds what the
+    rows' linearisation leaves out, `sum_rows W-weighted e * d2f/dq2`: a second
+    derivative is no larger than the longest lever arm, which is the row's largest
+    entry. It vanishes with the error, and makes the step a descent where a target
+    cannot be reached (Levenberg-Marquardt with a bound in place of a guess).
 
     Args:
         W: Weighted rows, shape (m, nv).
@@ -206,39 +213,45 @@ def normal_equations(
         support: Columns of each block that are not zero, ascending within a block.
         diagonal: Squared weights and weighted steps of diagonal tasks, shape (2, nv):
             they add `diagonal[0]` to H's diagonal and `-diagonal[1]` to c.
-        damping: Tikhonov term added to H's diagonal.
+        damping: Constant part of mu, [cost]^2/rad^2.
+        curvature: Factor of the part that follows the error; 1 bounds, 0 is without.
         H: Output, shape (nv, nv), both triangles.
         c: Output, shape (nv,).
+
+    Returns:
+        mu; not finite if an entry of H or c is not.
     """
     n = c.shape[0]
     H[:, :] = 0.0
-    for i in range(n):
-        H[i, i] = diagonal[0, i] + damping
-        c[i] = -diagonal[1, i]
+    c[:] = -diagonal[1]
+    mu = damping
     for block in range(row_start.shape[0] - 1):
         first, last = support_start[block], support_start[block + 1]
         for row in range(row_start[block], row_start[block + 1]):
-            weights, step = W[row], e[row]
+            weights, step, longest = W[row], e[row], 0.0
             for i in range(first, last):
                 a = support[i]
                 w = weights[a]
                 if w != 0.0:
+                    longest = max(longest, abs(w))
                     c[a] -= w * step
                     target = H[a]
                     for j in range(first, i + 1):
                         target[support[j]] += w * weights[support[j]]
+            mu += curvature * abs(step) * longest
     total = 0.0
     for i in range(n):
+        H[i, i] += diagonal[0, i] + mu
         total += c[i]
         for j in range(i + 1):
             total += H[i, j]
             H[j, i] = H[i, j]
-    return np.isfinite(total)
+    return mu if np.isfinite(total) else np.nan
 
 
 @numba.njit(cache=True, nogil=True)
 def row_space(  # noqa: C901, one flat loop is what compiles well
-    W: Matrix, tolerance: float, V: Matrix
+    W: Matrix, tolerance: float, V: Matrix, lengths: Vector
 ) -> int:
     """Write an orthonormal basis of the rows of W, largest first; return its size.
 
@@ -249,13 +262,14 @@ def row_space(  # noqa: C901, one flat loop is what compiles well
         W: Rows, shape (m, n); destroyed.
         tolerance: Absolute length under which a row counts as dependent.
         V: Output, shape (at least min(m, n), n).
+        lengths: Output, what was left of each chosen row, descending.
 
     Returns:
         The rank r; V[:r] holds the basis.
     """
     m, n = W.shape
     rank = 0
-    for _ in range(min(m, n)):
+    for _ in range(min(m, V.shape[0])):
         best, pivot = 0.0, -1
         for i in range(m):
             length = 0.0
@@ -266,6 +280,7 @@ def row_space(  # noqa: C901, one flat loop is what compiles well
         if best <= tolerance * tolerance:
             break
         row, v = W[pivot], V[rank]
+        lengths[rank] = np.sqrt(best)
         scale = 1.0 / np.sqrt(best)
         for j in range(n):
             v[j] = row[j] * scale

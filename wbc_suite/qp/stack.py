@@ -19,11 +19,13 @@ from wbc_suite.qp.solution import ActiveLimit, Fallback, Solution
 from wbc_suite.qp.solver import QpSolver, make_solver
 from wbc_suite.qp.task import Task
 from wbc_suite.qp.velocity_limit import VelocityLimit
-from wbc_suite.typing import Vector
+from wbc_suite.typing import Matrix, Vector
 
 __all__ = ["TaskStack"]
 
 _TOLERANCE = 1e-7  # a row broken by more is reported as a conflict, m or rad
+_LOST_DIRECTION = 0.05  # share of a unit vector outside the present basis
+_SINGULAR = 2e-2  # shortest over longest row, under which a singularity is near
 _RANK_TOLERANCE = 1e-6  # rows of an upper level shorter than this bind nothing
 
 
@@ -49,6 +51,9 @@ class TaskStack:
         solver: "daqp", or a name that qpsolvers knows.
         damping: Tikhonov term, [cost]^2/rad^2. 1e-3 removes the flutter at singular
             postures and does not move the point of rest.
+        curvature_damping: Factor of a damping that follows the tasks' errors, see
+            `rows.normal_equations`: it keeps targets that cannot be reached from making
+            the robot flutter, and vanishes at targets that can. 0 is without.
 
     Raises:
         ConfigError: If an argument is out of range.
@@ -65,6 +70,7 @@ class TaskStack:
         equalities: Sequence[Equality] = (),
         solver: str = "daqp",
         damping: float = 1e-3,
+        curvature_damping: float = 1.0,
     ) -> None:
         if not damping > 0.0:
             raise ConfigError(f"TaskStack: damping {damping} is not positive.")
@@ -73,6 +79,7 @@ class TaskStack:
         self.configuration = configuration
         self.tasks, self.equalities = tuple(tasks), tuple(equalities)
         self.solver, self.damping = solver, damping
+        self.curvature_damping = curvature_damping
         self._names = configuration.velocity_names()
         self._bounds = JointBounds.unlimited(configuration)
         self._row_limits = [x for x in limits if isinstance(x, RowLimit)]
@@ -85,6 +92,7 @@ class TaskStack:
         self._levels = [
             Level(configuration, [t for t in tasks if t.level == k]) for k in numbers
         ]
+        self._damping: Vector = np.zeros(len(numbers))
         self._inequalities = sum(x.dim for x in self._row_limits)
         self._problem = Problem(
             configuration.nv, self._inequalities, sum(x.dim for x in self.equalities)
@@ -92,6 +100,7 @@ class TaskStack:
         self._b: Vector = np.zeros(self._problem.equalities)
         self._solver = make_solver(solver)
         self._lower: dict[tuple[int, int], tuple[Problem, QpSolver]] = {}
+        self._decided: dict[int, tuple[Matrix, int]] = {}
         nv = configuration.nv
         self._kinds = np.zeros((2, nv), dtype=np.int64)
         self._no_window: Vector = np.full(nv, np.inf)
@@ -100,6 +109,7 @@ class TaskStack:
     def reset(self, v: Vector | None = None) -> None:
         """Forget the previous velocity, or set it, shape (nv,)."""
         self.v_previous[:] = 0.0 if v is None else v
+        self._decided.clear()
 
     def solve(self, dt: float) -> Solution:
         """Return the step from the present configuration.
@@ -163,10 +173,22 @@ class TaskStack:
             *self._kinds,
         )
 
+    def _assemble(self, k: int, dt: float, problem: Problem) -> bool:
+        """Fill the cost of level k; what damps a level damps those below it too."""
+        above = self._damping[k - 1] if k else self.damping
+        self._damping[k] = self._levels[k].assemble(
+            self.configuration,
+            dt,
+            problem,
+            damping=above,
+            curvature=self.curvature_damping,
+        )
+        return bool(np.isfinite(self._damping[k]))
+
     def _solve_first(self, dt: float) -> tuple[Vector, Vector, Fallback]:
         """Solve the first level under all constraints, or retreat."""
         problem = self._problem
-        finite = self._levels[0].assemble(self.configuration, dt, self.damping, problem)
+        finite = self._assemble(0, dt, problem)
         result = checked_solve(self._solver, problem) if finite else None
         if result is not None:
             return *result, Fallback.NONE
@@ -186,9 +208,7 @@ class TaskStack:
         of all rows above. x itself is one of them, so the problem has a solution.
         """
         first = self._problem
-        above = np.concatenate([first.A, *(level.W for level in self._levels[:k])])
-        V = np.empty((min(above.shape), first.nv))
-        rank = row_space(above, _RANK_TOLERANCE, V)
+        V, rank = self._directions_above(k)
         if (k, rank) not in self._lower:
             problem = Problem(first.nv, len(first.G), rank)
             self._lower[k, rank] = problem, self._solver.fresh()
@@ -197,9 +217,32 @@ class TaskStack:
         problem.G[:], problem.h[:] = first.G, np.maximum(first.h, first.G @ x)
         problem.A[:] = V[:rank]
         problem.set_equalities(V[:rank] @ x)
-        if not self._levels[k].assemble(self.configuration, dt, self.damping, problem):
+        if not self._assemble(k, dt, problem):
             return None
         return checked_solve(solver, problem)
+
+    def _directions_above(self, k: int) -> tuple[Matrix, int]:
+        """Return a basis of what the levels above k decide, in its first rows.
+
+        Near a singularity the direction that they are losing turns quickly. Were it
+        handed over meanwhile, the lower level would bend a stretched arm and the upper
+        stretch it again, at full acceleration. So until the singularity is left, what
+        was theirs at the last tick stays theirs.
+        """
+        above = np.concatenate(
+            [self._problem.A, *(level.W for level in self._levels[:k])]
+        )
+        nv = self._problem.nv
+        V, lengths = np.zeros((nv, nv)), np.zeros(nv)
+        rank = row_space(above, _RANK_TOLERANCE, V, lengths)
+        kept, full_rank = self._decided.get(k, (V[:0], rank))
+        full_rank = max(full_rank, rank)
+        clear = rank == full_rank and lengths[rank - 1] > _SINGULAR * lengths[0]
+        if not clear and len(kept):
+            lost = kept - kept @ V[:rank].T @ V[:rank]
+            rank += row_space(lost, _LOST_DIRECTION, V[rank:], lengths)
+        self._decided[k] = V[:rank].copy(), full_rank
+        return V, rank
 
     def _answer(
         self,

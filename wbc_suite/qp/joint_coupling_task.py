@@ -1,0 +1,90 @@
+"""Let one joint follow another."""
+
+import numpy as np
+
+from wbc_suite.errors import ConfigError
+from wbc_suite.kinematics import Configuration
+from wbc_suite.qp.task import RowTask, cost_vector
+from wbc_suite.typing import Indices, Matrix, Vector
+
+__all__ = ["JointCouplingTask"]
+
+
+class JointCouplingTask(RowTask):
+    """Let a joint follow another: `e = ratio q_leader + offset - q_follower`.
+
+    `J = d(q_follower) - ratio d(q_leader)`: finger synergies, gears, a waist that
+    shares the bending of a hip.
+
+    Args:
+        follower: Name of the joint that follows.
+        leader: Name of the joint that leads.
+        ratio: Radians (or metres) of the follower per radian (or metre) of the leader.
+        offset: The follower's position when the leader is at zero, rad or m.
+        cost: [cost]/rad or [cost]/m.
+        gain: See `Task`.
+        level: See `Task`.
+        max_speed: Greatest speed asked for, rad/s or m/s.
+        name: How reports call the task; "follower - leader" when absent.
+    """
+
+    dim = 1
+
+    def __init__(
+        self,
+        follower: str,
+        leader: str,
+        *,
+        ratio: float = 1.0,
+        offset: float = 0.0,
+        cost: float = 10.0,
+        gain: float = 1.0,
+        level: int = 0,
+        max_speed: float = 3.0,
+        name: str | None = None,
+    ) -> None:
+        super().__init__(name or f"{follower} - {leader}", gain=gain, level=level)
+        self.follower, self.leader = follower, leader
+        self.ratio, self.offset, self.max_speed = ratio, offset, max_speed
+        self._cost = float(cost_vector(self.name, cost, 1)[0])
+
+    def bind(self, configuration: Configuration) -> None:
+        """Resolve both joints.
+
+        Raises:
+            ConfigError: If one has not exactly one parameter.
+        """
+        joints = [
+            configuration.model.joints[configuration.joint_id(name)]
+            for name in (self.follower, self.leader)
+        ]
+        if any(joint.nq != 1 for joint in joints):
+            raise ConfigError(f"Task '{self.name}': joints need one parameter each.")
+        self._q: Indices = np.array([joint.idx_q for joint in joints])
+        self._v: Indices = np.array([joint.idx_v for joint in joints])
+
+    def support(self, configuration: Configuration) -> Indices:
+        """Return the two velocity indices."""
+        return np.sort(self._v)
+
+    def error(self, configuration: Configuration) -> Vector:
+        """Return the deviation, rad or m, shape (1,)."""
+        follower, leader = configuration.q[self._q]
+        return np.array([self.ratio * leader + self.offset - follower])
+
+    def jacobian(self, configuration: Configuration) -> Matrix:
+        """Return the derivative J of the error, `d(e) = -J dq`, shape (1, nv)."""
+        J = np.zeros((1, configuration.nv))
+        J[0, self._v] = 1.0, -self.ratio
+        return J
+
+    def rows(
+        self, configuration: Configuration, dt: float, W: Matrix, e: Vector
+    ) -> Vector:
+        """Write the weighted row."""
+        error = self.error(configuration)
+        limit = self.max_speed * dt
+        W[0, self._v] = self._cost, -self.ratio * self._cost
+        step = float(np.clip(self.gain * error[0], -limit, limit))
+        e[0] = self._cost * step if np.isfinite(step) else 0.0
+        return error

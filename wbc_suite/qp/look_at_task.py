@@ -1,0 +1,124 @@
+"""Point an axis of a frame at a point."""
+
+import numpy as np
+import pinocchio as pin
+
+from wbc_suite.errors import ConfigError
+from wbc_suite.kinematics import Configuration
+from wbc_suite.qp.rows import saturate
+from wbc_suite.qp.task import RowTask, cost_vector
+from wbc_suite.typing import Matrix, Vector
+
+__all__ = ["LookAtTask"]
+
+_LEAST_DISTANCE = 1e-3  # m; nearer points have no direction worth the name
+
+
+class LookAtTask(RowTask):
+    """Point an axis a of a frame at a point p of the world: gaze, a lamp, a nozzle.
+
+    With the direction `d = (p - p_wf) / r`, `r = |p - p_wf|`, and the same in the
+    frame's axes, `u = R_wf^T d`:
+
+        e = u - a                                           chord, ~ rad
+        J = -[u]x J_w_local + R_wf^T (I - d d^T) J_v / r    J_v: linear, aligned
+
+    The rotation about the axis stays free. Opposite to the point the gradient
+    vanishes, but any motion leaves that place.
+
+    Args:
+        frame: Name of the frame.
+        axis: The axis a in the frame, shape (3,); normalised.
+        target: Point p, m, world axes, shape (3,); without one, 1 m along the axis at
+            binding time.
+        cost: [cost]/rad.
+        gain: See `Task`.
+        level: See `Task`.
+        max_angular_speed: Greatest speed asked for, rad/s.
+        name: How reports call the task; "frame looks" when absent.
+
+    Raises:
+        ConfigError: If the axis has no length.
+    """
+
+    dim = 3
+
+    def __init__(
+        self,
+        frame: str,
+        *,
+        axis: Vector | tuple[float, float, float] = (1.0, 0.0, 0.0),
+        target: Vector | None = None,
+        cost: float = 1.0,
+        gain: float = 1.0,
+        level: int = 0,
+        max_angular_speed: float = 3.0,
+        name: str | None = None,
+    ) -> None:
+        super().__init__(name or f"{frame} looks", gain=gain, level=level)
+        self.frame = frame
+        self._cost = float(cost_vector(self.name, cost, 1)[0])
+        self._speed = max_angular_speed
+        direction = np.array(axis, dtype=np.float64)
+        length = float(np.linalg.norm(direction))
+        if direction.shape != (3,) or not length > 0.0:
+            raise ConfigError(f"Task '{self.name}': the axis {axis} has no direction.")
+        self._axis = direction / length
+        self.target: Vector | None = None
+        if target is not None:
+            self.set_target(target)
+
+    def set_target(self, target: Vector) -> None:
+        """Set the point p, m, shape (3,).
+
+        Raises:
+            ConfigError: If the shape is wrong.
+        """
+        point = np.array(target, dtype=np.float64)
+        if point.shape != (3,):
+            raise ConfigError(
+                f"Task '{self.name}': a point has shape (3,), not {point.shape}."
+            )
+        self.target = point
+
+    def bind(self, configuration: Configuration) -> None:
+        """Resolve the frame; without a target, look where the axis points now."""
+        self._f = configuration.frame_id(self.frame)
+        if self.target is None:
+            pose = configuration.frame_pose(self._f)
+            self.target = pose.translation + pose.rotation @ self._axis
+
+    def error(self, configuration: Configuration) -> Vector:
+        """Return `u - a`, shape (3,)."""
+        direction, _ = self._direction(configuration)
+        R = configuration.frame_pose(self._f).rotation
+        return R.T @ direction - self._axis
+
+    def jacobian(self, configuration: Configuration) -> Matrix:
+        """Return the derivative J of the error, `d(e) = -J dq`, shape (3, nv)."""
+        d, distance = self._direction(configuration)
+        R = configuration.frame_pose(self._f).rotation
+        J = configuration.frame_jacobian(self._f, "aligned")
+        turn = -pin.skew(R.T @ d) @ R.T @ J[3:]
+        return turn + R.T @ (J[:3] - np.outer(d, d @ J[:3])) / distance
+
+    def rows(
+        self, configuration: Configuration, dt: float, W: Matrix, e: Vector
+    ) -> Vector:
+        """Write the weighted rows."""
+        error = self.error(configuration)
+        if not np.isfinite(error).all():
+            W[:], e[:] = 0.0, 0.0
+            return error
+        np.multiply(self._cost, self.jacobian(configuration), out=W)
+        np.multiply(self.gain, error, out=e)
+        saturate(e, self._speed * dt)
+        e *= self._cost
+        return error
+
+    def _direction(self, configuration: Configuration) -> tuple[Vector, float]:
+        """Return the unit vector from the frame to the point, and the distance."""
+        assert self.target is not None
+        offset = self.target - configuration.frame_pose(self._f).translation
+        distance = max(float(np.linalg.norm(offset)), _LEAST_DISTANCE)
+        return offset / distance, distance
