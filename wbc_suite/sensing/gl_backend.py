@@ -5,6 +5,7 @@ a backend that fails poisons the process. So candidates are tried in a subproces
 first that draws wins, and the verdict is kept in the user's cache folder.
 """
 
+import contextlib
 import ctypes
 import functools
 import hashlib
@@ -30,6 +31,9 @@ logger = logging.getLogger(__name__)
 
 APT_COMMAND = "sudo apt-get install libegl1 libegl-mesa0 libgl1-mesa-dri libgles2"
 """What mends a Debian or Ubuntu machine that cannot draw."""
+
+PIP_COMMAND = "pip install --no-deps --only-binary :all: lavavu-osmesa"
+"""What mends a Linux machine without root: a wheel that carries OSMesa."""
 
 _CANDIDATES = {"Linux": ("egl", "osmesa", "wheel"), "Darwin": ("cgl",)}
 _SOFTWARE = ("llvmpipe", "softpipe", "swiftshader", "swrast")
@@ -112,14 +116,29 @@ def _load_osmesa_from_wheel() -> None:
     PyOpenGL looks for system libraries only; so its platform object gets this one.
     """
     folders = (Path(entry) / "lavavu_osmesa.libs" for entry in sys.path)
-    libraries = [file for folder in folders for file in folder.glob("libOSMesa-*")]
-    if not libraries:
+    folder = next((folder for folder in folders if folder.is_dir()), None)
+    if folder is None:
         raise ImportError("the wheel lavavu-osmesa is not installed")
+    loaded = _load_all(sorted(folder.glob("*.so*")))
+    library = next(lib for name, lib in loaded.items() if "OSMesa" in name)
     os.environ["PYOPENGL_PLATFORM"] = "osmesa"  # what mujoco.osmesa does too
     opengl: Any = importlib.import_module("OpenGL.platform")
-    library = ctypes.CDLL(str(libraries[0]), mode=ctypes.RTLD_GLOBAL)
     opengl.PLATFORM.GL = opengl.PLATFORM.OSMesa = library
     opengl.PLATFORM.install(vars(opengl))
+
+
+def _load_all(files: list[Path]) -> dict[str, ctypes.CDLL]:
+    """Load libraries that need one another, in whatever order works."""
+    loaded: dict[str, ctypes.CDLL] = {}
+    for _ in files:
+        for file in files:
+            if file.name not in loaded:
+                with contextlib.suppress(OSError):  # what it needs comes first
+                    library = ctypes.CDLL(str(file), mode=ctypes.RTLD_GLOBAL)
+                    loaded[file.name] = library
+    if len(loaded) < len(files):
+        raise ImportError("the libraries of the wheel lavavu-osmesa do not load")
+    return loaded
 
 
 def _from_environment(wanted: str) -> GlBackend:
@@ -137,9 +156,8 @@ def _first_found() -> GlBackend:
             return backend
     raise DeviceError(
         "Nothing on this machine can draw a picture without a display: EGL and OSMesa "
-        f"are both missing. Install one: {APT_COMMAND}   (no root? "
-        'pip install "wbc-suite[software-gl]"). Everything but camera images works '
-        "without it."
+        f"are both missing. Install one: {APT_COMMAND}   (no root? {PIP_COMMAND}). "
+        "Everything but pictures works without it."
     )
 
 
