@@ -320,8 +320,28 @@ def _add_constraints(spec: mujoco.MjSpec, robot: RobotDescription) -> None:
             name2=connect.other,
         )
         equality.data[:3] = connect.anchor
-    for first, second in robot.contacts.exclude:
+    pairs = {*robot.contacts.exclude, *_welded_neighbours(robot)}
+    for first, second in sorted(pairs):
         spec.add_exclude(name=f"{first}_{second}", bodyname1=first, bodyname2=second)
+
+
+def _welded_neighbours(robot: RobotDescription) -> Iterable[tuple[str, str]]:
+    """Pair the static links of a fixed robot with the links that move on them.
+
+    MuJoCo lets neighbours over a joint pass through each other, but not where one of
+    them is welded to the world.
+    """
+    if robot.root.kind != "fixed":
+        return
+    rigid = rigid_bodies(robot.links)
+    static = robot.links[0].name
+    moving = {a.name for a in robot.links if rigid.get(a.parent or "") == static}
+    shaped = [link.name for link in robot.links if link.collision]
+    given = {frozenset(pair) for pair in robot.contacts.exclude}
+    for first in (name for name in shaped if rigid[name] == static):
+        for second in (n for n in shaped if rigid[n] != static and rigid[n] in moving):
+            if frozenset((first, second)) not in given:
+                yield first, second
 
 
 def _add_keyframes(spec: mujoco.MjSpec, robot: RobotDescription) -> None:

@@ -1,0 +1,163 @@
+"""Enclose collision shapes in capsules, for the QP's self-collision rows.
+
+A capsule needs six multiplications for a distance where a mesh needs a search, so the
+controller avoids these and the simulator collides with the exact shapes. Each capsule
+encloses its shape: what keeps the capsules apart keeps the shapes apart.
+"""
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from wbc_suite.robot.description import RobotDescription
+from wbc_suite.robot.shapes import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
+from wbc_suite.robot.surfaces import support_points
+from wbc_suite.robot.validation import rigid_bodies
+from wbc_suite.typing import Matrix, Vector
+
+__all__ = ["EnclosingCapsule", "collision_pairs", "enclosing_capsules"]
+
+MAX_STRIPS = 4
+"""A flat box becomes at most this many parallel capsules."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class EnclosingCapsule:
+    """All points within `radius` of a segment.
+
+    Attributes:
+        link: Link that carries it.
+        start: One end of the segment in the link's frame, m, shape (3,).
+        end: The other end; a sphere has both ends in one point.
+        radius: Radius, m.
+    """
+
+    link: str
+    start: Vector
+    end: Vector
+    radius: float
+
+
+def enclosing_capsules(robot: RobotDescription) -> tuple[EnclosingCapsule, ...]:
+    """Compute the capsules around all collision shapes, in the order of the links."""
+    capsules: list[EnclosingCapsule] = []
+    for link in robot.links:
+        for shape in link.collision:
+            rotation = Rotation.from_quat(shape.quat, scalar_first=True).as_matrix()
+            offset = np.asarray(shape.pos)
+            for start, end, radius in _capsules(shape):
+                capsules.append(
+                    EnclosingCapsule(
+                        link=link.name,
+                        start=offset + rotation @ start,
+                        end=offset + rotation @ end,
+                        radius=radius,
+                    )
+                )
+    return tuple(capsules)
+
+
+def collision_pairs(robot: RobotDescription) -> frozenset[frozenset[str]]:
+    """Return the pairs of links that can collide with each other.
+
+    Left out are pairs that move as one body, neighbours over a joint, excluded pairs
+    and two links of the same gripper: the very rules of the simulator, but for the
+    last.
+    """
+    rigid = rigid_bodies(robot.links)
+    parent = {link.name: rigid[link.parent] for link in robot.links if link.parent}
+    grippers = _gripper_links(robot)
+    excluded = {frozenset(pair) for pair in robot.contacts.exclude}
+    shaped = [link.name for link in robot.links if link.collision]
+    pairs: set[frozenset[str]] = set()
+    for a, b in itertools.combinations(shaped, 2):
+        body_a, body_b = rigid[a], rigid[b]
+        neighbours = parent.get(body_a) == body_b or parent.get(body_b) == body_a
+        same_hand = grippers.get(a) is not None and grippers.get(a) == grippers.get(b)
+        pair = frozenset((a, b))
+        if (
+            body_a != body_b
+            and not neighbours
+            and not same_hand
+            and pair not in excluded
+        ):
+            pairs.add(pair)
+    return frozenset(pairs)
+
+
+def _gripper_links(robot: RobotDescription) -> dict[str, str]:
+    """Map the moving links of grippers to their gripper."""
+    owner = {
+        joint: group
+        for group in robot.synergies
+        for joint in robot.groups.get(group, ())
+    }
+    links: dict[str, str] = {}
+    for link in robot.links:
+        joint = link.joint
+        name = joint and (joint.mimic.joint if joint.mimic else joint.name)
+        group = owner.get(name or "") or links.get(link.parent or "")
+        if group is not None:
+            links[link.name] = group
+    return links
+
+
+Segment = tuple[Vector, Vector, float]
+
+
+def _capsules(shape: Shape) -> list[Segment]:
+    match shape:
+        case Sphere(radius=radius):
+            return [(np.zeros(3), np.zeros(3), radius)]
+        case Capsule(start=start, end=end, radius=radius):
+            return [(np.asarray(start), np.asarray(end), radius)]
+        case Cylinder(start=start, end=end, radius=radius):
+            wide = max(radius, shape.radius_to or 0.0)
+            return [(np.asarray(start), np.asarray(end), wide)]
+        case Ellipsoid(size=size):
+            return [_around_ellipsoid(np.asarray(size))]
+        case Box(size=size):
+            return _around_box(np.asarray(size))
+        case _:
+            return [_around_points(support_points(shape))]
+
+
+def _around_ellipsoid(size: Vector) -> Segment:
+    """For half axes a >= b the half segment a - b is just long enough."""
+    axis = int(np.argmax(size))
+    radius = float(np.max(np.delete(size, axis)))
+    half = np.zeros(3)
+    half[axis] = size[axis] - radius
+    return -half, half, radius
+
+
+def _around_box(size: Vector) -> list[Segment]:
+    """Lay parallel capsules along the longest axis, side by side over a flat box."""
+    thin, middle, long = np.argsort(size)
+    strips = int(np.clip(np.round(size[middle] / size[thin]), 1, MAX_STRIPS))
+    width = size[middle] / strips
+    radius = float(np.hypot(width, size[thin]))
+    half = np.zeros(3)
+    half[long] = size[long]
+    found: list[Segment] = []
+    for k in range(strips):
+        centre = np.zeros(3)
+        centre[middle] = -size[middle] + (2 * k + 1) * width
+        found.append((centre - half, centre + half, radius))
+    return found
+
+
+def _around_points(points: Matrix) -> Segment:
+    """Lay a capsule along the longest principal axis of a cloud of points."""
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    axis = np.linalg.svd(points - middle, full_matrices=False)[2][0]
+    along = (points - middle) @ axis
+    across = np.linalg.norm(points - middle - np.outer(along, axis), axis=1)
+    radius = float(across.max())
+    reach = np.sqrt(np.maximum(radius**2 - across**2, 0.0))
+    low, high = float((along + reach).min()), float((along - reach).max())
+    if low > high:
+        low = high = (low + high) / 2
+    return middle + low * axis, middle + high * axis, radius
