@@ -22,6 +22,9 @@ __all__ = [
     "nearest_name",
 ]
 
+MAX_NAMES = 25
+"""Names that a message lists at most."""
+
 
 def nearest_name(name: str, known: Collection[str]) -> str | None:
     """Return the known name closest in spelling, or None when none is near.
@@ -51,8 +54,16 @@ class UnknownNameError(WbcError, LookupError):
     def __init__(self, kind: str, name: str, known: Collection[str]) -> None:
         close = nearest_name(name, known)
         hint = f" Did you mean '{close}'?" if close else ""
-        names = ", ".join(sorted(known)) or "none"
-        super().__init__(f"No {kind} named '{name}'.{hint} Known: {names}.")
+        super().__init__(
+            f"No {kind} named '{name}'.{hint} Known: {_list_names(known)}."
+        )
+
+
+def _list_names(names: Collection[str]) -> str:
+    """List names for a message; a humanoid's hundred frames are cut short."""
+    shown = sorted(names)[:MAX_NAMES]
+    hidden = len(names) - len(shown)
+    return (", ".join(shown) or "none") + (f" and {hidden} more" if hidden else "")
 
 
 class ActionError(WbcError, ValueError):

@@ -1,0 +1,33 @@
+"""A stack of QP tasks moves a humanoid's hand while everything else stays in place."""
+
+import numpy as np
+
+import wbc_suite
+from wbc_suite.kinematics import Configuration
+from wbc_suite.qp import FrameTask, PositionLimit, PostureTask, TaskStack, VelocityLimit
+
+DT = 0.01  # s
+
+robot = wbc_suite.load_robot("GR1")
+model = robot.to_pinocchio()
+configuration = Configuration(model, model.referenceConfigurations["ready"])
+
+right, left = FrameTask("right_eef"), FrameTask("left_eef")
+stack = TaskStack(
+    configuration,
+    tasks=[right, left, PostureTask(1e-2)],
+    limits=[PositionLimit(), VelocityLimit()],
+)
+
+target = configuration.frame_pose("right_eef")
+target.translation += np.array([0.05, -0.05, 0.20])
+right.set_target(target)
+
+for _ in range(300):
+    solution = stack.solve(DT)
+    configuration.update(configuration.integrate(solution.dq))
+
+for task in (right, left):
+    error = np.linalg.norm(task.error(configuration)[:3])
+    print(f"{task.frame}: {1e3 * error:.3f} mm from its target")
+print("limits met on the way:", ", ".join(map(str, solution.active)) or "none")
