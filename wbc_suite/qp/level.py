@@ -26,6 +26,7 @@ class Level:
         W: Weighted rows, shape (m, nv).
         e: Weighted steps, shape (m,).
         slices: Where each row task's rows are.
+        errors: Error before saturation of row tasks that are not plain frame tasks.
         held: Names of the tasks whose target was not finite at the last tick.
     """
 
@@ -43,6 +44,7 @@ class Level:
         self.e: Vector = np.zeros(len(self.W))
         self.diagonal: Matrix = np.zeros((2, configuration.nv))
         self.held: list[str] = []
+        self.errors: dict[str, Vector] = {}
         self._support = _concatenate([t.support(configuration) for t in self.row_tasks])
         self._others = [
             (t, self.W[s], self.e[s])
@@ -79,20 +81,27 @@ class Level:
         *,
         damping: float,
         curvature: float,
+        bias: Matrix | None = None,
     ) -> float:
-        """Fill the cost of a problem; return mu of `normal_equations`."""
+        """Fill the cost of a problem; return mu of `normal_equations`.
+
+        A bias, shape (2, nv), adds squared costs and weighted steps on single joints.
+        """
         self.held.clear()
+        self.errors.clear()
         if self._frames:
             self._write_frames(configuration, dt)
         for task, W, e in self._others:
             error = task.rows(configuration, dt, W, e)
+            self.errors[task.name] = error
             if not np.isfinite(error).all():
                 self.held.append(task.name)
-        if self.diagonal_tasks:
-            self.diagonal[:] = 0.0
+        self.diagonal[:] = 0.0
         for task in self.diagonal_tasks:
             if not task.diagonal(configuration, dt, *self.diagonal):
                 self.held.append(task.name)
+        if bias is not None:
+            self.diagonal += bias
         return normal_equations(
             self.W,
             self.e,
@@ -104,6 +113,17 @@ class Level:
             problem.H,
             problem.c,
         )
+
+    def error_of(self, task: RowTask) -> tuple[float, float]:
+        """Return position (m) and orientation error (rad) of a task at the last tick.
+
+        Tasks with fewer than six rows have one error, in their own unit.
+        """
+        if type(task) is FrameTask:
+            position, angle = self.frame_errors[self._frames.index(task)]
+            return float(position), float(angle)
+        error = self.errors[task.name]
+        return float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:]))
 
     def _write_frames(self, configuration: Configuration, dt: float) -> None:
         for packed, task in zip(self._packed, self._frames, strict=True):

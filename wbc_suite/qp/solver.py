@@ -108,14 +108,17 @@ class QpsolversSolver:
     def solve(self, problem: Problem) -> tuple[Vector, Vector] | None:
         """Solve; see `QpSolver`."""
         import qpsolvers
+        from scipy.sparse import csc_matrix
 
         used = problem.h < UNBOUNDED
+        dense = self.name in qpsolvers.dense_solvers
+        matrix = np.array if dense else csc_matrix
         qp = qpsolvers.Problem(
-            problem.H.copy(),
+            matrix(problem.H),
             problem.c,
-            problem.G[used] if used.any() else None,
+            matrix(problem.G[used]) if used.any() else None,
             problem.h[used] if used.any() else None,
-            problem.A if problem.equalities else None,
+            matrix(problem.A) if problem.equalities else None,
             problem.b if problem.equalities else None,
             problem.lb,
             problem.ub,
@@ -135,7 +138,7 @@ class QpsolversSolver:
             multipliers[nv : nv + rows][used] = solution.z
         if problem.equalities:
             multipliers[nv + rows :] = solution.y
-        return solution.x, multipliers
+        return np.array(solution.x), multipliers
 
 
 def make_solver(name: str) -> QpSolver:

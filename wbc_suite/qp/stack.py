@@ -1,6 +1,6 @@
 """A stack of QP tasks under limits, solved once per tick."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -9,17 +9,20 @@ from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.acceleration_limit import AccelerationLimit
 from wbc_suite.qp.bounds import LimitKind, merge_bounds
 from wbc_suite.qp.equality import Equality
+from wbc_suite.qp.escape import Escape
 from wbc_suite.qp.fallback import checked_solve, retreat
+from wbc_suite.qp.frame_task import FrameTask
 from wbc_suite.qp.level import Level
 from wbc_suite.qp.limit import BoxLimit, JointBounds, Limit, RowLimit
 from wbc_suite.qp.position_limit import PositionLimit
 from wbc_suite.qp.problem import Problem
+from wbc_suite.qp.report import TaskReport, reasons
 from wbc_suite.qp.rows import row_space
 from wbc_suite.qp.solution import ActiveLimit, Fallback, Solution
 from wbc_suite.qp.solver import QpSolver, make_solver
 from wbc_suite.qp.task import Task
 from wbc_suite.qp.velocity_limit import VelocityLimit
-from wbc_suite.typing import Matrix, Vector
+from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["TaskStack"]
 
@@ -54,6 +57,8 @@ class TaskStack:
         curvature_damping: Factor of a damping that follows the tasks' errors, see
             `rows.normal_equations`: it keeps targets that cannot be reached from making
             the robot flutter, and vanishes at targets that can. 0 is without.
+        escape: Whether the stack may lead the robot out of postures from which no small
+            step leads nearer to a frame's target; see `escape`.
 
     Raises:
         ConfigError: If an argument is out of range.
@@ -71,6 +76,7 @@ class TaskStack:
         solver: str = "daqp",
         damping: float = 1e-3,
         curvature_damping: float = 1.0,
+        escape: bool = True,
     ) -> None:
         if not damping > 0.0:
             raise ConfigError(f"TaskStack: damping {damping} is not positive.")
@@ -100,16 +106,27 @@ class TaskStack:
         self._b: Vector = np.zeros(self._problem.equalities)
         self._solver = make_solver(solver)
         self._lower: dict[tuple[int, int], tuple[Problem, QpSolver]] = {}
+        self._solved: list[tuple[Problem, Vector, Vector]] = []
         self._decided: dict[int, tuple[Matrix, int]] = {}
         nv = configuration.nv
         self._kinds = np.zeros((2, nv), dtype=np.int64)
         self._no_window: Vector = np.full(nv, np.inf)
         self.v_previous: Vector = np.zeros(nv)
+        self._limits = tuple(limits)
+        self._bias: Matrix | None = None
+        frames = [t for t in tasks if isinstance(t, FrameTask)]
+        self._escape = (
+            Escape(configuration, frames, self._bounds, self._shadow)
+            if escape and frames
+            else None
+        )
 
     def reset(self, v: Vector | None = None) -> None:
         """Forget the previous velocity, or set it, shape (nv,)."""
         self.v_previous[:] = 0.0 if v is None else v
         self._decided.clear()
+        if self._escape is not None:
+            self._escape.reset()
 
     def solve(self, dt: float) -> Solution:
         """Return the step from the present configuration.
@@ -124,10 +141,13 @@ class TaskStack:
             raise ConfigError(f"TaskStack.solve: dt {dt} is not a positive time.")
         if not np.isfinite(self.configuration.q).all():
             still = np.zeros(self.configuration.nv)
-            return self._answer(still, [], Fallback.HOLD, dt, 0.0)
+            self._solved.clear()
+            return self._answer(still, Fallback.HOLD, dt, 0.0)
+        if self._escape is not None:
+            self._bias = self._escape.bias(dt, self.v_previous, self._pressed())
         self._write_constraints(dt)
         x, multipliers, fallback = self._solve_first(dt)
-        pressures = [multipliers]
+        self._solved = [(self._problem, x, multipliers)]
         for k in range(1, len(self._levels)):
             if fallback >= Fallback.BOX:
                 break
@@ -135,10 +155,87 @@ class TaskStack:
             if result is None:
                 fallback = max(fallback, Fallback.LEVEL)
                 break
-            x = result[0]
-            pressures.append(result[1])
-        residual = self._problem.violation(x)
-        return self._answer(x, pressures, fallback, dt, residual)
+            x = result[1]
+            self._solved.append(result)
+        return self._answer(x, fallback, dt, self._problem.violation(x))
+
+    def step(self, dt: float, bias: Matrix | None) -> None:
+        """Solve and move the configuration one step, with a bias on single joints."""
+        self._bias = bias
+        self.configuration.update(self.configuration.integrate(self.solve(dt).dq))
+
+    def _shadow(self) -> "TaskStack":
+        """Return a copy of the stack on a copy of the robot, where it is now."""
+        return TaskStack(
+            Configuration(self.configuration.model, self.configuration.q),
+            self.tasks,
+            limits=self._limits,
+            equalities=self.equalities,
+            solver=self.solver,
+            damping=self.damping,
+            curvature_damping=self.curvature_damping,
+            escape=False,
+        )
+
+    def _pressed(self) -> Indices:
+        """Return the velocity indices pressed against position limits last tick."""
+        if not self._solved:
+            return np.zeros(0, dtype=np.int64)
+        multipliers = self._solved[0][2][: self._problem.nv]
+        kinds = np.where(multipliers > 0.0, self._kinds[1], self._kinds[0])
+        return np.flatnonzero((multipliers != 0.0) & (kinds == LimitKind.POSITION))
+
+    def explain(
+        self, *, position_tolerance: float = 1e-3, orientation_tolerance: float = 5e-3
+    ) -> dict[str, TaskReport]:
+        """Tell how each task with rows stood at the last tick, and why.
+
+        Costs some 50 us a task: meant for reports, not for every tick of a fast loop.
+
+        Args:
+            position_tolerance: Distance that counts as reached, m.
+            orientation_tolerance: Angle that counts as reached, rad.
+        """
+        reports: dict[str, TaskReport] = {}
+        for level, (problem, x, multipliers) in zip(
+            self._levels, self._solved, strict=False
+        ):
+            opponents = list(self._opponents(problem, multipliers))
+            for n, task in enumerate(level.row_tasks):
+                position, angle = level.error_of(task)
+                near = position <= position_tolerance and angle <= orientation_tolerance
+                why: tuple[str, ...] = ()
+                if task.name in level.held:
+                    why = ("target not finite: held",)
+                elif not near:
+                    why = reasons(level, n, x, opponents)
+                reports[task.name] = TaskReport(
+                    name=task.name,
+                    position_error=position,
+                    orientation_error=angle,
+                    reached=near,
+                    reasons=why,
+                )
+        return reports
+
+    def _opponents(
+        self, problem: Problem, multipliers: Vector
+    ) -> Iterator[tuple[str, Vector]]:
+        """Yield words and the force on the joints of each pressed limit or row."""
+        nv = problem.nv
+        for i in multipliers[: nv + self._inequalities].nonzero()[0].tolist():
+            limit = self._active_limit(i, float(multipliers[i]))
+            row = np.eye(nv)[i] if i < nv else problem.G[i - nv]
+            yield str(limit), multipliers[i] * row
+        forces = multipliers[nv + self._inequalities :, None] * problem.A
+        if problem is not self._problem:
+            yield "conflict: tasks of a higher level", forces.sum(axis=0)
+            return
+        row = 0
+        for equality in self.equalities:
+            force = forces[row : row + equality.dim].sum(axis=0)
+            yield f"conflict: {equality.name}", force
+            row += equality.dim
 
     def _write_constraints(self, dt: float) -> None:
         """Fill bounds and rows of the first problem."""
@@ -182,6 +279,7 @@ class TaskStack:
             problem,
             damping=above,
             curvature=self.curvature_damping,
+            bias=None if k else self._bias,
         )
         return bool(np.isfinite(self._damping[k]))
 
@@ -201,7 +299,7 @@ class TaskStack:
 
     def _solve_lower(
         self, k: int, x: Vector, dt: float
-    ) -> tuple[Vector, Vector] | None:
+    ) -> tuple[Problem, Vector, Vector] | None:
         """Solve level k among the steps that all levels above rate like x.
 
         Those are `V dq = V x`, where V is an orthonormal basis of the equality rows and
@@ -219,7 +317,8 @@ class TaskStack:
         problem.set_equalities(V[:rank] @ x)
         if not self._assemble(k, dt, problem):
             return None
-        return checked_solve(solver, problem)
+        result = checked_solve(solver, problem)
+        return None if result is None else (problem, *result)
 
     def _directions_above(self, k: int) -> tuple[Matrix, int]:
         """Return a basis of what the levels above k decide, in its first rows.
@@ -245,12 +344,7 @@ class TaskStack:
         return V, rank
 
     def _answer(
-        self,
-        x: Vector,
-        pressures: list[Vector],
-        fallback: Fallback,
-        dt: float,
-        residual: float,
+        self, x: Vector, fallback: Fallback, dt: float, residual: float
     ) -> Solution:
         """Remember the velocity and tell what happened."""
         v = x / dt
@@ -262,7 +356,7 @@ class TaskStack:
             residual=residual,
             held=tuple(name for level in self._levels for name in level.held),
             conflicts=self._conflicts(x) if fallback >= Fallback.SLACK else (),
-            active=self._active(pressures),
+            active=self._active(),
         )
 
     def _conflicts(self, x: Vector) -> tuple[str, ...]:
@@ -283,10 +377,10 @@ class TaskStack:
             row -= limit.dim
         raise IndexError(row)
 
-    def _active(self, pressures: list[Vector]) -> tuple[ActiveLimit, ...]:
+    def _active(self) -> tuple[ActiveLimit, ...]:
         """List the limits that some level presses against, hardest first."""
         nv, found = self._problem.nv, dict[int, float]()
-        for multipliers in pressures:
+        for _, _, multipliers in self._solved:
             for i in multipliers[: nv + self._inequalities].nonzero()[0].tolist():
                 value = float(multipliers[i])
                 if abs(value) > abs(found.get(i, 0.0)):

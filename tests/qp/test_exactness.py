@@ -1,0 +1,142 @@
+"""The optimum of random stacks against an exact solver, and all solvers' agreement."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+import quadprog
+
+from wbc_suite.errors import SolverError, UnknownNameError
+from wbc_suite.kinematics import Configuration
+from wbc_suite.qp import (
+    ComTask,
+    DampingTask,
+    FrameEquality,
+    FrameTask,
+    LookAtTask,
+    PostureTask,
+    Problem,
+    RelativeFrameTask,
+    TaskStack,
+)
+from wbc_suite.qp.fallback import box_least_squares, checked_solve
+from wbc_suite.qp.solver import make_solver
+
+FRAMES = ("rarm_wrist2_joint", "larm_wrist2_joint", "lleg_wrist2_joint", "head2_joint")
+FOOT = "rleg_wrist2_joint"
+
+
+def exact(problem: Problem) -> np.ndarray:
+    """Solve with quadprog (Goldfarb and Idnani 1983), bounds written as rows."""
+    n = problem.nv
+    rows = np.vstack([problem.A, -problem.G, np.eye(n), -np.eye(n)])
+    least = np.concatenate([problem.b, -problem.h, problem.lb, -problem.ub])
+    kept = np.isfinite(least) & (np.abs(least) < 1e20)
+    return quadprog.solve_qp(
+        problem.H, -problem.c, rows[kept].T, least[kept], problem.equalities
+    )[0]
+
+
+def random_pose(rng, robot, frame):
+    step = pin.exp6(rng.normal(size=6) * rng.choice([0.01, 0.3]))
+    return robot.frame_pose(frame) * step
+
+
+def random_stack(robot: Configuration, rng: np.random.Generator) -> TaskStack:
+    """Return a stack of random tasks, costs and targets, at a random configuration."""
+    q = pin.neutral(robot.model)
+    dq = rng.normal(size=robot.nv) * 0.5
+    dq[6:] = np.clip(dq[6:], -1.99, 1.99)
+    robot.update(pin.integrate(robot.model, q, dq))
+
+    def cost():
+        return float(rng.choice([0.1, 1.0, 10.0]))
+
+    tasks = [
+        FrameTask(
+            frame,
+            target=random_pose(rng, robot, frame),
+            position_cost=cost(),
+            orientation_cost=cost(),
+            gain=rng.uniform(0.1, 1.0),
+        )
+        for frame in rng.permutation(FRAMES)[: rng.integers(1, 5)]
+    ]
+    extra = [
+        ComTask(cost(), target=rng.normal(size=3)),
+        DampingTask(0.1 * cost()),
+        LookAtTask("head1_joint", target=rng.normal(size=3), cost=cost()),
+        RelativeFrameTask(FRAMES[0], FRAMES[1], position_cost=cost()),
+    ]
+    tasks += [task for task in extra if rng.random() < 0.5]
+    tasks.append(PostureTask(0.01 * cost(), target=q))
+    feet = [FrameEquality(FOOT)] if rng.random() < 0.5 else []
+    stack = TaskStack(robot, tasks, equalities=feet, escape=False)
+    stack.reset(np.clip(rng.normal(size=robot.nv) * 0.2, -1.0, 1.0))
+    return stack
+
+
+def worst_deviation(robot, count, seed) -> tuple[float, int]:
+    rng = np.random.default_rng(seed)
+    worst, compared = 0.0, 0
+    for _ in range(count):
+        stack = random_stack(robot, rng)
+        solution = stack.solve(float(rng.choice([1e-3, 5e-3, 2e-2])))
+        if not solution.ok:  # held feet against a random velocity: see robustness
+            continue
+        compared += 1
+        worst = max(worst, np.abs(solution.dq - exact(stack._problem)).max())
+    return worst, compared
+
+
+def test_optimum_is_exact_on_random_stacks(humanoid):
+    worst, compared = worst_deviation(humanoid, 200, seed=1)
+    assert worst <= 1e-8
+    assert compared >= 100
+
+
+@pytest.mark.slow
+def test_optimum_is_exact_on_ten_thousand_random_stacks(humanoid):
+    worst, compared = worst_deviation(humanoid, 14_000, seed=2)
+    assert worst <= 1e-8
+    assert compared >= 10_000
+
+
+@pytest.mark.parametrize(
+    ("name", "tolerance"),
+    # Interior-point and first-order solvers stop at their own accuracy.
+    [("quadprog", 1e-8), ("proxqp", 1e-6), ("piqp", 1e-4), ("clarabel", 1e-4)],
+)
+def test_solvers_by_name_agree(humanoid, name, tolerance):
+    if name not in __import__("qpsolvers").available_solvers:
+        pytest.skip(f"{name} is not installed")
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        stack = random_stack(humanoid, rng)
+        if not stack.solve(5e-3).ok:
+            continue
+        result = checked_solve(make_solver(name), stack._problem)
+        assert result is not None
+        x, multipliers = result
+        problem = stack._problem
+        np.testing.assert_allclose(x, exact(problem), atol=tolerance)
+        pull = multipliers[: problem.nv] + problem.rows.T @ multipliers[problem.nv :]
+        gradient = problem.H @ x + problem.c + pull
+        np.testing.assert_allclose(gradient, 0.0, atol=100 * tolerance)
+
+
+def test_box_least_squares_converges_to_the_exact_optimum(rng):
+    for _ in range(20):
+        W = rng.normal(size=(12, 8))
+        problem = Problem(8)
+        problem.H[:], problem.c[:] = W.T @ W + 0.1 * np.eye(8), rng.normal(size=8)
+        problem.lb[:], problem.ub[:] = -0.05, 0.1
+        x = box_least_squares(problem.H, problem.c, problem.lb, problem.ub, 500)
+        np.testing.assert_allclose(x, exact(problem), atol=1e-9)
+
+
+def test_unknown_and_missing_solvers_are_told_apart(arm, monkeypatch):
+    with pytest.raises(UnknownNameError, match="Did you mean 'daqp'"):
+        TaskStack(arm, [], solver="dapq")
+    monkeypatch.setattr("qpsolvers.available_solvers", ["daqp"])
+    with pytest.raises(SolverError, match=r"wbc-suite\[solvers\]"):
+        TaskStack(arm, [], solver="quadprog")

@@ -1,0 +1,193 @@
+"""A way out of postures from which no small step leads nearer to a target.
+
+Differential inverse kinematics walks downhill, and can end where every small step
+leads away: an arm stretched against its elbow's limit, with its target between hand and
+shoulder, would have to reach out further before it can fold. Such a posture is left by
+driving the joints concerned towards the middle of their ranges for a moment. Whether
+that helps is found out beforehand on a copy of the robot, a few steps per tick, so that
+a robot whose target is simply out of reach stands still.
+"""
+
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from wbc_suite.kinematics import Configuration
+from wbc_suite.qp.frame_task import FrameTask
+from wbc_suite.qp.limit import JointBounds
+from wbc_suite.typing import Indices, Matrix, Vector
+
+__all__ = ["Escape", "Shadow"]
+
+_STILL = 0.02  # rad/s or m/s; a slower robot stands
+_PATIENCE = 0.25  # s of standing before a look ahead
+_FAR = 5e-3  # m (and rad / _ARM); a smaller error is no reason to look
+_ARM = 0.3  # m; weighs angles against distances
+_LOOK_STEP = 0.02  # s, step of the look ahead
+_LOOKS_PER_SECOND = 400.0  # steps of the look ahead per second of the robot's time
+_DRIVE_TIME = 2.5  # s, longest drive towards the middle
+_SETTLE_TIME = 2.0  # s given to the tasks afterwards
+_ARRIVED = 0.1  # of the range; this near to the middle the drive ends
+_BETTER = 0.5  # of the error; what a drive must come under to be worth it
+_DRIVE_COST = 3.0  # against the greatest cost of a watched task
+_DRIVE_SPEED = 0.5  # of the velocity limit
+
+
+class Shadow(Protocol):
+    """A copy of a stack on a copy of its robot, to look ahead with."""
+
+    configuration: Configuration
+
+    def step(self, dt: float, bias: Matrix | None) -> None:
+        """Solve and move one step, with a bias on single joints."""
+        ...
+
+
+@dataclass(slots=True)
+class _Drive:
+    """Joints on their way to the middle of their ranges."""
+
+    joints: Indices  # velocity indices
+    time: float = 0.0
+
+
+class Escape:
+    """Watches frame tasks, and answers the bias of each tick.
+
+    Args:
+        configuration: The robot.
+        tasks: The frame tasks to watch.
+        bounds: The joints' limits; only joints with two position limits are driven.
+        make_shadow: Makes the copy to look ahead with, at the present configuration.
+    """
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        tasks: Sequence[FrameTask],
+        bounds: JointBounds,
+        make_shadow: Callable[[], Shadow],
+    ) -> None:
+        self._configuration, self._tasks = configuration, tuple(tasks)
+        self._bounds, self._make_shadow = bounds, make_shadow
+        self._range = bounds.q_upper - bounds.q_lower
+        limited = np.isfinite(self._range) & (bounds.q_index >= 0)
+        self._limited = np.flatnonzero(limited)
+        self._middle: Vector = np.zeros(configuration.nv)
+        at = self._limited
+        self._middle[at] = 0.5 * (bounds.q_upper[at] + bounds.q_lower[at])
+        self._supports = [t.support(configuration) for t in self._tasks]
+        self._bias: Matrix = np.zeros((2, configuration.nv))
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything."""
+        self._still = 0.0
+        self._drive: _Drive | None = None
+        self._search: Generator[None, None, _Drive | None] | None = None
+        self._targets: Vector | None = None  # of the search or drive
+        self._answered: Vector | None = None  # targets that need no second look
+
+    def bias(self, dt: float, v: Vector, pressed: Indices) -> Matrix | None:
+        """Return squared costs and weighted steps, shape (2, nv), or None.
+
+        Args:
+            dt: Step, s.
+            v: Velocity of the previous tick, shape (nv,).
+            pressed: Velocity indices of the joints pressed against position limits.
+        """
+        self._still = self._still + dt if np.abs(v).max() < _STILL else 0.0
+        if self._drive is None and self._search is None:
+            if self._still < _PATIENCE or not self._is_stuck():
+                return None
+            self._targets = self._present_targets()
+            self._search = self._look_ahead(pressed)
+        if self._targets_moved(self._targets, 1e-2):
+            self._drive, self._search = None, None
+            return None
+        if self._search is not None:
+            self._advance(max(1, round(_LOOKS_PER_SECOND * dt)))
+        if self._drive is None:
+            return None
+        if self._is_over(self._drive, self._configuration.q):
+            self._drive = None
+            return None
+        self._drive.time += dt
+        return self._bias_of(self._drive, self._configuration.q, dt)
+
+    def _advance(self, steps: int) -> None:
+        """Look some steps further ahead; begin the drive that was found."""
+        assert self._search is not None
+        try:
+            for _ in range(steps):
+                next(self._search)
+        except StopIteration as end:
+            self._search, self._drive = None, end.value
+            self._answered = self._present_targets()
+
+    def _look_ahead(self, pressed: Indices) -> Generator[None, None, _Drive | None]:
+        """Try drives on a copy of the robot; return the first that helps."""
+        far = [e > _FAR for e in self._errors(self._configuration)]
+        chains = [s for s, is_far in zip(self._supports, far, strict=True) if is_far]
+        chain = np.intersect1d(np.unique(np.concatenate(chains)), self._limited)
+        before = np.linalg.norm(self._errors(self._configuration))
+        for joints in (np.intersect1d(pressed, chain), chain):
+            if not len(joints):
+                continue
+            shadow, drive = self._make_shadow(), _Drive(joints)
+            robot = shadow.configuration
+            while not self._is_over(drive, robot.q):
+                shadow.step(_LOOK_STEP, self._bias_of(drive, robot.q, _LOOK_STEP))
+                drive.time += _LOOK_STEP
+                yield
+            for _ in range(round(_SETTLE_TIME / _LOOK_STEP)):
+                shadow.step(_LOOK_STEP, None)
+                yield
+            if np.linalg.norm(self._errors(robot)) < _BETTER * before:
+                return _Drive(joints)
+        return None
+
+    def _is_over(self, drive: _Drive, q: Vector) -> bool:
+        joints = drive.joints
+        left = np.abs(self._middle[joints] - q[self._bounds.q_index[joints]])
+        arrived = bool((left < _ARRIVED * self._range[joints]).all())
+        return arrived or drive.time > _DRIVE_TIME
+
+    def _bias_of(self, drive: _Drive, q: Vector, dt: float) -> Matrix:
+        joints = drive.joints
+        cost = _DRIVE_COST * max(float(t.packed[12:18].max()) for t in self._tasks)
+        speed = np.minimum(self._bounds.v_max[joints], 3.0) * _DRIVE_SPEED * dt
+        step = self._middle[joints] - q[self._bounds.q_index[joints]]
+        self._bias[:] = 0.0
+        self._bias[0, joints] = cost**2
+        self._bias[1, joints] = cost**2 * np.clip(step, -speed, speed)
+        return self._bias
+
+    def _is_stuck(self) -> bool:
+        if self._answered is not None and not self._targets_moved(self._answered, 1e-3):
+            return False
+        return any(e > _FAR for e in self._errors(self._configuration))
+
+    def _errors(self, configuration: Configuration) -> list[float]:
+        """Return each task's weighted distance; 0 for what it does not ask for."""
+        errors: list[float] = []
+        for task in self._tasks:
+            error = task.error(configuration)
+            costs = task.packed[12:18]
+            if not np.isfinite(error).all():
+                error = np.zeros(6)
+            kept = np.where(costs > 0.0, error, 0.0)
+            kept[3:] *= _ARM
+            errors.append(float(np.linalg.norm(kept)))
+        return errors
+
+    def _present_targets(self) -> Vector:
+        return np.concatenate([t.packed[:12] for t in self._tasks])
+
+    def _targets_moved(self, since: Vector | None, tolerance: float) -> bool:
+        if since is None:
+            return True
+        # A target that is not finite compares false, and counts as moved.
+        return not np.abs(self._present_targets() - since).max() <= tolerance

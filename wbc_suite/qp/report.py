@@ -1,0 +1,75 @@
+"""Why a task is not where it should be."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from wbc_suite.qp.level import Level
+from wbc_suite.typing import Vector
+
+__all__ = ["TaskReport", "reasons"]
+
+_SHARE = 0.1  # part of a task's pull that something must oppose to be named
+_STRETCHED = 0.05  # pull over its greatest possible value; below, no joint can help
+
+
+@dataclass(frozen=True, slots=True)
+class TaskReport:
+    """How one task stands after a tick.
+
+    Attributes:
+        name: The task's name.
+        position_error: Distance to the target before saturation, m.
+        orientation_error: Angle to the target, rad; 0 for tasks without one.
+        reached: Whether both are within the tolerances asked for.
+        reasons: What keeps the task from its target, weightiest first, in words;
+            empty when it is reached or simply on its way.
+    """
+
+    name: str
+    position_error: float
+    orientation_error: float
+    reached: bool
+    reasons: tuple[str, ...]
+
+
+def reasons(
+    level: Level, task: int, x: Vector, opponents: Iterable[tuple[str, Vector]]
+) -> tuple[str, ...]:
+    """Return what opposes the pull of a task, weightiest first.
+
+    At the optimum the forces on the joints balance: the pulls
+    `g_i = W_i^T (e_i - W_i dq)` of all tasks against the multipliers of limits and
+    equality rows. The share of an opponent with force f in stopping task i is
+    `f . g_i / (g_i . g_i)`. A task that is not met though it hardly pulls has its limb
+    stretched: no joint moves it nearer.
+
+    Args:
+        level: The level of the task.
+        task: Its number among the level's row tasks.
+        x: The step that was found, shape (nv,).
+        opponents: Words and force, shape (nv,), of each active limit and equality.
+    """
+    pulls = [
+        level.W[rows].T @ (level.e[rows] - level.W[rows] @ x) for rows in level.slices
+    ]
+    pull, rows = pulls[task], level.slices[task]
+    rest = level.e[rows] - level.W[rows] @ x
+    greatest = float(np.linalg.norm(level.W[rows]) * np.linalg.norm(rest))
+    square = float(pull @ pull)
+    found = [(words, float(force @ pull)) for words, force in opponents]
+    found += [
+        (f"conflict: {other.name}", float(-other_pull @ pull))
+        for k, (other, other_pull) in enumerate(
+            zip(level.row_tasks, pulls, strict=True)
+        )
+        if k != task
+    ]
+    joints = level.diagonal[1] - level.diagonal[0] * x
+    found.append(("conflict: posture", float(-joints @ pull)))
+    named = [(words, part) for words, part in found if part > _SHARE * square]
+    words = tuple(words for words, _ in sorted(named, key=lambda w: -w[1]))
+    if np.sqrt(square) < _STRETCHED * greatest:
+        return ("out of reach: no joint moves it nearer", *words)
+    return words
