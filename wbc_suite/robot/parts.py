@@ -11,12 +11,12 @@ from typing import Annotated, Literal, TypeAlias
 from pydantic import (
     AfterValidator,
     Field,
-    PositiveFloat,
+    PositiveInt,
     field_validator,
     model_validator,
 )
 
-from wbc_suite.robot.shapes import Posed, Shape, Vector3
+from wbc_suite.robot.shapes import Posed, Real, Shape, Vector3
 from wbc_suite.tomlfile import FrozenModel
 
 __all__ = [
@@ -38,7 +38,10 @@ __all__ = [
 Name: TypeAlias = Annotated[
     str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=80)
 ]
-Range: TypeAlias = tuple[float, float]
+Range: TypeAlias = tuple[Real, Real]
+Positive: TypeAlias = Annotated[float, Field(gt=0.0, le=1e9)]
+NotNegative: TypeAlias = Annotated[float, Field(ge=0.0, le=1e9)]
+Moment: TypeAlias = Annotated[float, Field(ge=-1e6, le=1e6)]
 
 
 def _rising(limits: Range) -> Range:
@@ -54,8 +57,8 @@ class Mimic(FrozenModel):
     """A joint that follows another: `q = ratio * q_joint + offset`."""
 
     joint: Name
-    ratio: float = 1.0
-    offset: float = 0.0
+    ratio: Real = 1.0
+    offset: Real = 0.0
 
 
 class Joint(FrozenModel):
@@ -80,12 +83,12 @@ class Joint(FrozenModel):
     type: Literal["hinge", "slide"] = "hinge"
     axis: Vector3 = (0.0, 0.0, 1.0)
     range: Limits | None = None
-    velocity: PositiveFloat | None = None
-    acceleration: PositiveFloat | None = None
-    effort: PositiveFloat | None = None
-    armature: float = Field(default=0.0, ge=0.0)
-    damping: float = Field(default=0.0, ge=0.0)
-    frictionloss: float = Field(default=0.0, ge=0.0)
+    velocity: Positive | None = None
+    acceleration: Positive | None = None
+    effort: Positive | None = None
+    armature: NotNegative = 0.0
+    damping: NotNegative = 0.0
+    frictionloss: NotNegative = 0.0
     mimic: Mimic | None = None
     passive: bool = False
 
@@ -118,9 +121,9 @@ class Link(Posed):
 
     name: Name
     parent: Name | None = None
-    mass: float = Field(default=0.0, ge=0.0)
+    mass: NotNegative = 0.0
     com: Vector3 = (0.0, 0.0, 0.0)
-    inertia: tuple[float, float, float, float, float, float] = (0, 0, 0, 0, 0, 0)
+    inertia: tuple[Moment, Moment, Moment, Moment, Moment, Moment] = (0, 0, 0, 0, 0, 0)
     joint: Joint | None = None
     visual: tuple[Shape, ...] = ()
     collision: tuple[Shape, ...] = ()
@@ -157,7 +160,7 @@ class Camera(Posed):
     name: Name
     link: Name
     fovy: float = Field(default=45.0, gt=1.0, lt=175.0)
-    resolution: tuple[int, int] = (640, 480)
+    resolution: tuple[PositiveInt, PositiveInt] = (640, 480)
 
 
 class Actuator(FrozenModel):
@@ -174,9 +177,9 @@ class Actuator(FrozenModel):
 
     joint: Name
     kind: Literal["motor", "position", "velocity"]
-    kp: float = Field(default=0.0, ge=0.0)
-    kd: float = Field(default=0.0, ge=0.0)
-    effort: PositiveFloat | None = None
+    kp: NotNegative = 0.0
+    kd: NotNegative = 0.0
+    effort: Positive | None = None
 
 
 class Sensor(FrozenModel):
@@ -185,15 +188,15 @@ class Sensor(FrozenModel):
     name: Name
     kind: Literal["force", "torque", "gyro", "accelerometer", "touch"]
     frame: Name
-    noise: float = Field(default=0.0, ge=0.0)
+    noise: NotNegative = 0.0
 
 
 class Synergy(FrozenModel):
     """One command of a gripper that moves joints together from open to closed."""
 
     name: Name
-    open: dict[Name, float]
-    closed: dict[Name, float]
+    open: dict[Name, Real]
+    closed: dict[Name, Real]
 
     @model_validator(mode="after")
     def _same_joints(self) -> "Synergy":
@@ -232,6 +235,6 @@ class Root(Posed):
     kind: Literal["fixed", "planar", "free"] = "fixed"
     drive: Literal["holonomic", "differential"] = "holonomic"
     actuated: bool = True
-    velocity: tuple[PositiveFloat, PositiveFloat] = (1.0, 1.5)
-    effort: tuple[PositiveFloat, PositiveFloat] = (2000.0, 1000.0)
-    damping: tuple[float, float] = (0.0, 0.0)
+    velocity: tuple[Positive, Positive] = (1.0, 1.5)
+    effort: tuple[Positive, Positive] = (2000.0, 1000.0)
+    damping: tuple[NotNegative, NotNegative] = (0.0, 0.0)

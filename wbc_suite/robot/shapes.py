@@ -8,7 +8,7 @@ import itertools
 import math
 from typing import Annotated, Any, Literal, TypeAlias, cast
 
-from pydantic import AfterValidator, Field, PositiveFloat, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from wbc_suite.tomlfile import FrozenModel
 
@@ -21,13 +21,18 @@ __all__ = [
     "Loft",
     "Posed",
     "Quaternion",
+    "Real",
     "Shape",
     "Sphere",
     "Vector3",
     "as_table",
 ]
 
-Vector3: TypeAlias = tuple[float, float, float]
+Real: TypeAlias = Annotated[float, Field(ge=-1e4, le=1e4)]
+"""A length in m, an angle in rad or the like: what no robot exceeds is a mistake."""
+Size: TypeAlias = Annotated[float, Field(ge=1e-6, le=1e4)]
+"""A positive length in m; an engine cannot draw less than a micrometre."""
+Vector3: TypeAlias = tuple[Real, Real, Real]
 
 
 def _unit(q: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
@@ -40,9 +45,7 @@ def _unit(q: tuple[float, float, float, float]) -> tuple[float, float, float, fl
     return (w, x, y, z)
 
 
-Quaternion: TypeAlias = Annotated[
-    tuple[float, float, float, float], AfterValidator(_unit)
-]
+Quaternion: TypeAlias = Annotated[tuple[Real, Real, Real, Real], AfterValidator(_unit)]
 """Unit quaternion w x y z; normalised on reading (rounded files are off by 1e-10)."""
 
 Color: TypeAlias = str | tuple[float, float, float] | tuple[float, float, float, float]
@@ -99,15 +102,15 @@ class _Surface(Posed):
     color: Color = "grey"
     friction: Vector3 | None = None
     condim: Literal[1, 3, 4, 6] | None = None
-    solref: tuple[float, float] | None = None
-    margin: float | None = None
+    solref: tuple[Real, Real] | None = None
+    margin: Real | None = None
 
 
 class Box(_Surface):
     """A box with half sizes; `radius` rounds its edges inside these sizes."""
 
     shape: Literal["box"]
-    size: tuple[PositiveFloat, PositiveFloat, PositiveFloat]
+    size: tuple[Size, Size, Size]
     radius: float = Field(default=0.0, ge=0.0)
 
     @model_validator(mode="after")
@@ -123,14 +126,14 @@ class Sphere(_Surface):
     """A sphere."""
 
     shape: Literal["sphere"]
-    radius: PositiveFloat
+    radius: Size
 
 
 class Ellipsoid(_Surface):
     """An ellipsoid with half axes."""
 
     shape: Literal["ellipsoid"]
-    size: tuple[PositiveFloat, PositiveFloat, PositiveFloat]
+    size: tuple[Size, Size, Size]
 
 
 class _Segment(_Surface):
@@ -138,7 +141,7 @@ class _Segment(_Surface):
 
     start: Vector3 = Field(alias="from")
     end: Vector3 = Field(alias="to")
-    radius: PositiveFloat
+    radius: Size
 
     @model_validator(mode="after")
     def _has_length(self) -> "_Segment":
@@ -157,16 +160,16 @@ class Cylinder(_Segment):
     """A cylinder; `radius_to` gives the far end another radius (visuals only)."""
 
     shape: Literal["cylinder"]
-    radius_to: PositiveFloat | None = None
+    radius_to: Size | None = None
 
 
 class Hull(_Surface):
     """The convex hull of a few spheres `[x, y, z, radius]`: a smooth tapered shell."""
 
     shape: Literal["hull"]
-    spheres: tuple[tuple[float, float, float, Annotated[float, Field(ge=0.0)]], ...] = (
-        Field(min_length=1, max_length=64)
-    )
+    spheres: tuple[
+        tuple[Real, Real, Real, Annotated[float, Field(ge=0.0, le=1e4)]], ...
+    ] = Field(min_length=1, max_length=64)
 
     @model_validator(mode="after")
     def _has_volume(self) -> "Hull":
@@ -188,7 +191,7 @@ class Loft(_Surface):
 
     shape: Literal["loft"]
     axis: Literal["x", "y", "z"] = "z"
-    sections: tuple[tuple[float, float, float, float, float], ...] = Field(
+    sections: tuple[tuple[Real, Real, Real, Real, Real], ...] = Field(
         min_length=2, max_length=64
     )
     exponent: float = Field(default=2.0, ge=1.0, le=20.0)
@@ -199,7 +202,7 @@ class Loft(_Surface):
         positions = [s[0] for s in self.sections]
         if any(b - a < 1e-6 for a, b in itertools.pairwise(positions)):
             raise ValueError("the rings' positions must rise from each to the next")
-        if any(s[3] <= 0 or s[4] <= 0 for s in self.sections):
+        if any(s[3] < 1e-6 or s[4] < 1e-6 for s in self.sections):
             raise ValueError("half sizes of rings must be positive")
         return self
 

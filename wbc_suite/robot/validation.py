@@ -24,6 +24,10 @@ INERTIA_SLACK = 1e-6
 """Relative slack of the triangle inequality; vendors round their tensors."""
 GYRATION_RANGE = (0.08, 1.1)
 """Plausible radius of gyration over half the diagonal of the link's shapes."""
+SMALLEST_MASS = 1e-9
+"""A mass below is a mistake, kg; MuJoCo refuses from 1e-15 on."""
+SMALLEST_MOMENT = 1e-14
+"""Principal moments below count as not positive, kg m^2."""
 COM_SLACK = 0.10
 """The centre of mass may leave the box of the link's shapes by this part of it."""
 
@@ -122,10 +126,13 @@ def _link(link: "Link") -> Iterator[str]:
     where = f"link '{link.name}'"
     if link.mass == 0.0:
         return
+    if link.mass < SMALLEST_MASS:
+        yield f"{where}: a mass of {link.mass:.3g} kg is no mass; leave it out"
+        return
     eigenvalues: Vector = np.asarray(
         np.linalg.eigvalsh(inertia_matrix(link.inertia)), dtype=np.float64
     )
-    if eigenvalues[0] <= 0.0:
+    if eigenvalues[0] <= SMALLEST_MOMENT:
         yield (
             f"{where}: the inertia {list(link.inertia)} is not positive definite "
             f"(principal moments {_numbers(eigenvalues)})"
