@@ -6,6 +6,8 @@ from wbc_suite.errors import UnknownNameError
 from wbc_suite.robot import load_robot
 from wbc_suite.viewers.offscreen import (
     VIEWS,
+    Camera,
+    Mark,
     View,
     add_studio,
     render_model,
@@ -83,3 +85,31 @@ def test_a_robot_stands_on_the_ground_in_its_ready_posture():
 def test_an_unknown_posture_is_refused():
     with pytest.raises(UnknownNameError, match="keyframe"):
         render_robot(load_robot("Panda"), keyframe="sleeping")
+
+
+def test_a_camera_stays_where_it_is_and_shows_marks():
+    model, data = _studio()
+    mark = Mark(position=np.array([0.0, 0.0, 0.9]), rgba=(0, 1, 0, 1), radius=0.1)
+    with Camera(model, data, width=96, height=96, preset="fast") as camera:
+        plain = camera.take(data)
+        marked = camera.take(data, [mark])
+        again = camera.take(data)
+    green = marked[..., 1].astype(int) > marked[..., 0].astype(int) + 60
+    assert green.sum() > 50
+    assert np.array_equal(plain, again)
+
+
+def test_a_camera_fits_the_subject_only():
+    spec = mujoco.MjSpec.from_string(POLE)
+    spec.worldbody.add_geom(size=[0.1] * 3, pos=[0, 3, 0], rgba=[0, 0, 1, 1])
+    spec.bodies[1].name = "robot0_pole"
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    tall = {}
+    for subject in ("", "robot0_"):
+        with Camera(
+            model, data, view="front", width=96, height=96, subject=subject
+        ) as camera:
+            tall[subject] = _red(camera.take(data)).any(axis=1).sum()
+    assert tall["robot0_"] > 2 * tall[""]

@@ -1,8 +1,8 @@
 """Pictures of a robot in a studio: neutral ground, soft light, a camera that fits."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING, Self, TypeAlias
 
 import mujoco
 import numpy as np
@@ -10,44 +10,46 @@ from numpy.typing import NDArray
 
 from wbc_suite.errors import UnknownNameError
 from wbc_suite.sensing.renderer import RenderPreset, make_renderer
-from wbc_suite.typing import Matrix, Vector
+from wbc_suite.typing import Vector
+from wbc_suite.viewers.framing import (
+    VIEWS,
+    View,
+    ViewName,
+    fit_camera,
+    subject_corners,
+)
 
 if TYPE_CHECKING:
     from wbc_suite.robot import RobotDescription
 
-__all__ = ["VIEWS", "Image", "View", "add_studio", "render_model", "render_robot"]
+__all__ = [
+    "VIEWS",
+    "Camera",
+    "Image",
+    "Mark",
+    "View",
+    "add_studio",
+    "render_model",
+    "render_robot",
+]
 
 Image: TypeAlias = NDArray[np.uint8]
 """Picture, shape (height, width, 3), RGB."""
 
-ViewName: TypeAlias = Literal["three_quarter", "front", "side", "back"]
-
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class View:
-    """A direction to look along; the distance follows from what is to be seen.
+class Mark:
+    """A sphere that is drawn and not simulated.
 
     Attributes:
-        azimuth: Degrees about the world's z axis, of the direction in which the camera
-            looks: 180 looks back along -x, into the face of a robot that faces +x.
-        elevation: Degrees above the horizon of the direction in which the camera
-            looks; negative looks down.
-        fov: Vertical field of view in degrees.
-        margin: How many times larger than the subject the picture is.
+        position: Centre in the world, m, shape (3,).
+        rgba: Colour and opacity.
+        radius: In m.
     """
 
-    azimuth: float
-    elevation: float
-    fov: float = 28.0
-    margin: float = 1.08
-
-
-VIEWS: dict[ViewName, View] = {
-    "three_quarter": View(azimuth=145.0, elevation=-14.0),
-    "front": View(azimuth=180.0, elevation=-6.0),
-    "side": View(azimuth=90.0, elevation=-6.0),
-    "back": View(azimuth=0.0, elevation=-6.0),
-}
+    position: Vector
+    rgba: tuple[float, float, float, float] = (0.10, 0.55, 0.95, 0.6)
+    radius: float = 0.025
 
 
 def render_robot(
@@ -73,7 +75,7 @@ def render_robot(
     """
     posture = robot.keyframe(keyframe)
     spec = robot.to_mjspec()
-    ground = float(_corners(*_pose(spec, posture))[:, 2].min())
+    ground = float(subject_corners(*_pose(spec, posture))[:, 2].min())
     add_studio(spec, ground=ground)
     model, data = _pose(spec, posture)
     width, height = size
@@ -117,15 +119,86 @@ def render_model(
         UnknownNameError: If neither a view nor a camera has this name.
         DeviceError: If nothing on this machine can draw.
     """
-    with make_renderer(model, width=width, height=height, preset=preset) as renderer:
-        view = _find_view(model, camera)
-        if isinstance(view, str):
-            renderer.update_scene(data, view)
-        else:
-            free = fit_camera(view, _corners(model, data), aspect=width / height)
-            renderer.update_scene(data, free)
-            _set_field_of_view(renderer.scene, model.vis.global_.fovy, view.fov)
-        return renderer.render()
+    with Camera(
+        model, data, view=camera, width=width, height=height, preset=preset
+    ) as shot:
+        return shot.take(data)
+
+
+class Camera:
+    """A camera that stays where it is and takes one picture after another.
+
+    Args:
+        model: What to draw.
+        data: The state at which the camera is placed so that all is seen.
+        view: A `View`, a name out of `VIEWS`, or the name of a camera of the model.
+        width: Of the picture, in pixels.
+        height: Of the picture, in pixels.
+        preset: See `make_renderer`.
+        subject: Prefix of the bodies that have to fit into the picture; all by default.
+
+    Raises:
+        UnknownNameError: If neither a view nor a camera has this name.
+        DeviceError: If nothing on this machine can draw.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        *,
+        view: View | str = "three_quarter",
+        width: int = 800,
+        height: int = 800,
+        preset: RenderPreset | str | None = None,
+        subject: str = "",
+    ) -> None:
+        found = _find_view(model, view)
+        self._view = found if isinstance(found, View) else None
+        self._camera: mujoco.MjvCamera | str = (
+            found
+            if isinstance(found, str)
+            else (
+                fit_camera(
+                    found, subject_corners(model, data, subject), aspect=width / height
+                )
+            )
+        )
+        self._fov = float(model.vis.global_.fovy)
+        self._renderer = make_renderer(model, width=width, height=height, preset=preset)
+
+    def take(self, data: mujoco.MjData, marks: Sequence[Mark] = ()) -> Image:
+        """Take a picture, with marks that are not in the simulation.
+
+        Args:
+            data: The state; positions are those of the last `mujoco.mj_forward`.
+            marks: Spheres to add.
+        """
+        self._renderer.update_scene(data, self._camera)
+        scene = self._renderer.scene
+        if self._view is not None:
+            _set_field_of_view(scene, self._fov, self._view.fov)
+        for mark in marks:
+            mujoco.mjv_initGeom(
+                scene.geoms[scene.ngeom],
+                mujoco.mjtGeom.mjGEOM_SPHERE,
+                np.full(3, mark.radius),
+                np.asarray(mark.position, dtype=np.float64),
+                np.eye(3).ravel(),
+                np.asarray(mark.rgba, dtype=np.float32),
+            )
+            scene.ngeom += 1
+        return self._renderer.render()
+
+    def close(self) -> None:
+        """Free the renderer."""
+        self._renderer.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
 
 def add_studio(spec: mujoco.MjSpec, *, ground: float = 0.0) -> None:
@@ -186,57 +259,6 @@ def _add_sun(
         specular=[0.25 * diffuse] * 3,
         castshadow=shadow,
     )
-
-
-def fit_camera(view: View, points: Matrix, *, aspect: float) -> mujoco.MjvCamera:
-    """Place a free camera so that all points fit into the picture.
-
-    In camera axes a point at offset (r, u, f) to the right, up and forward of the
-    look-at point is inside when ``|u| <= (d + f) tan(fov / 2)`` and ``|r| <= aspect
-    (d + f) tan(fov / 2)``; d is the smallest distance at which all are.
-
-    Args:
-        view: The direction.
-        points: What has to be seen, shape (n, 3), m, world axes.
-        aspect: Width over height of the picture.
-    """
-    right, up, forward = _camera_axes(view)
-    local = points @ np.column_stack([right, up, forward])
-    middle = (local.min(axis=0) + local.max(axis=0)) / 2.0
-    offset = local - middle
-    tangent = np.tan(np.radians(view.fov) / 2.0) / view.margin
-    reach = np.maximum(np.abs(offset[:, 1]), np.abs(offset[:, 0]) / aspect)
-    camera = mujoco.MjvCamera()
-    camera.type = mujoco.mjtCamera.mjCAMERA_FREE
-    camera.lookat[:] = middle @ np.vstack([right, up, forward])
-    camera.azimuth, camera.elevation = view.azimuth, view.elevation
-    camera.distance = float(np.max(reach / tangent - offset[:, 2]))
-    return camera
-
-
-def _camera_axes(view: View) -> tuple[Vector, Vector, Vector]:
-    azimuth, elevation = np.radians([view.azimuth, view.elevation])
-    forward = np.array(
-        [
-            np.cos(elevation) * np.cos(azimuth),
-            np.cos(elevation) * np.sin(azimuth),
-            np.sin(elevation),
-        ]
-    )
-    right = np.array([np.sin(azimuth), -np.cos(azimuth), 0.0])
-    return right, np.cross(right, forward), forward
-
-
-def _corners(model: mujoco.MjModel, data: mujoco.MjData) -> Matrix:
-    """Return the corners of all geoms' boxes in the world, shape (n, 3); no planes."""
-    signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8).T
-    seen = model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE
-    seen &= model.geom_group < 3  # what MuJoCo's viewers hide by default
-    centre, half = model.geom_aabb[seen, :3], model.geom_aabb[seen, 3:]
-    local = centre[:, None] + signs * half[:, None]
-    rotation = data.geom_xmat[seen].reshape(-1, 3, 3)
-    world = data.geom_xpos[seen, None] + local @ rotation.transpose(0, 2, 1)
-    return world.reshape(-1, 3)
 
 
 def _find_view(model: mujoco.MjModel, camera: View | str) -> View | str:

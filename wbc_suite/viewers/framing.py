@@ -1,0 +1,98 @@
+"""Where a camera has to stand so that all of the subject is in the picture."""
+
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+import mujoco
+import numpy as np
+
+from wbc_suite.typing import Matrix, Vector
+
+__all__ = ["VIEWS", "View", "ViewName", "fit_camera", "subject_corners"]
+
+ViewName: TypeAlias = Literal["three_quarter", "front", "side", "back"]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class View:
+    """A direction to look along; the distance follows from what is to be seen.
+
+    Attributes:
+        azimuth: Degrees about the world's z axis, of the direction in which the camera
+            looks: 180 looks back along -x, into the face of a robot that faces +x.
+        elevation: Degrees above the horizon of the direction in which the camera
+            looks; negative looks down.
+        fov: Vertical field of view in degrees.
+        margin: How many times larger than the subject the picture is.
+    """
+
+    azimuth: float
+    elevation: float
+    fov: float = 28.0
+    margin: float = 1.08
+
+
+VIEWS: dict[ViewName, View] = {
+    "three_quarter": View(azimuth=145.0, elevation=-14.0),
+    "front": View(azimuth=180.0, elevation=-6.0),
+    "side": View(azimuth=90.0, elevation=-6.0),
+    "back": View(azimuth=0.0, elevation=-6.0),
+}
+
+
+def fit_camera(view: View, points: Matrix, *, aspect: float) -> mujoco.MjvCamera:
+    """Place a free camera so that all points fit into the picture.
+
+    In camera axes a point at offset (r, u, f) to the right, up and forward of the
+    look-at point is inside when ``|u| <= (d + f) tan(fov / 2)`` and ``|r| <= aspect
+    (d + f) tan(fov / 2)``; d is the smallest distance at which all are.
+
+    Args:
+        view: The direction.
+        points: What has to be seen, shape (n, 3), m, world axes.
+        aspect: Width over height of the picture.
+    """
+    right, up, forward = _camera_axes(view)
+    local = points @ np.column_stack([right, up, forward])
+    middle = (local.min(axis=0) + local.max(axis=0)) / 2.0
+    offset = local - middle
+    tangent = np.tan(np.radians(view.fov) / 2.0) / view.margin
+    reach = np.maximum(np.abs(offset[:, 1]), np.abs(offset[:, 0]) / aspect)
+    camera = mujoco.MjvCamera()
+    camera.type = mujoco.mjtCamera.mjCAMERA_FREE
+    camera.lookat[:] = middle @ np.vstack([right, up, forward])
+    camera.azimuth, camera.elevation = view.azimuth, view.elevation
+    camera.distance = float(np.max(reach / tangent - offset[:, 2]))
+    return camera
+
+
+def _camera_axes(view: View) -> tuple[Vector, Vector, Vector]:
+    azimuth, elevation = np.radians([view.azimuth, view.elevation])
+    forward = np.array(
+        [
+            np.cos(elevation) * np.cos(azimuth),
+            np.cos(elevation) * np.sin(azimuth),
+            np.sin(elevation),
+        ]
+    )
+    right = np.array([np.sin(azimuth), -np.cos(azimuth), 0.0])
+    return right, np.cross(right, forward), forward
+
+
+def subject_corners(
+    model: mujoco.MjModel, data: mujoco.MjData, subject: str = ""
+) -> Matrix:
+    """Return the corners of all geoms' boxes in the world, shape (n, 3); no planes.
+
+    Only bodies whose names start with the subject count.
+    """
+    signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8).T
+    seen = model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE
+    seen &= model.geom_group < 3  # what MuJoCo's viewers hide by default
+    names = (model.body(body).name for body in model.geom_bodyid)
+    seen &= np.array([name.startswith(subject) for name in names])
+    centre, half = model.geom_aabb[seen, :3], model.geom_aabb[seen, 3:]
+    local = centre[:, None] + signs * half[:, None]
+    rotation = data.geom_xmat[seen].reshape(-1, 3, 3)
+    world = data.geom_xpos[seen, None] + local @ rotation.transpose(0, 2, 1)
+    return world.reshape(-1, 3)
