@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from wbc_suite import __version__
-from wbc_suite.cli import check, doctor, export, listing, render
+from wbc_suite.cli import check, doctor, export, listing, render, teleop, view
 from wbc_suite.errors import WbcError
 
 __all__ = ["app", "run"]
@@ -26,6 +26,8 @@ app.command("list")(listing.list_catalogue)
 app.command("check")(check.check_file)
 app.command("export")(export.export_robot)
 app.command("render")(render.render)
+app.command("view")(view.view)
+app.command("teleop")(teleop.teleop)
 app.command("doctor")(doctor.doctor)
 
 

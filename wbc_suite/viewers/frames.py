@@ -29,7 +29,7 @@ class FrameReader:
 
 
 def frame_readers(
-    layout: Any,  # noqa: ANN401  an ActionLayout, which this module does not import
+    layout: Any,
     model: mujoco.MjModel,
 ) -> dict[str, FrameReader]:
     """Return a reader for every slice of the action that commands a pose."""

@@ -4,8 +4,6 @@ import threading
 import time
 from typing import TYPE_CHECKING
 
-import mujoco
-
 from wbc_suite.viewers.ghosts import Ghosts
 from wbc_suite.viewers.gizmos import Gizmos
 from wbc_suite.viewers.limb import LimbKind
@@ -38,10 +36,9 @@ class TeleopPage:
         site: Where the page is served; the page closes it when it stops.
     """
 
-    def __init__(
-        self, session: TeleopSession, model: mujoco.MjModel, site: Site, *, label: str
-    ) -> None:
+    def __init__(self, session: TeleopSession, site: Site, *, label: str) -> None:
         self.session, self.site = session, site
+        model = session.model
         self.server = site.server
         set_stage(self.server, label=label)
         snapshot = session.snapshot

@@ -60,6 +60,8 @@ class TeleopPanel:
 
     def add_client(self, client: "viser.ClientHandle") -> None:
         """Add the controls that a client has for itself."""
+        from viser import Icon
+
         number = client.client_id
         with self._handles:
             mode = client.gui.add_button_group(
@@ -69,7 +71,7 @@ class TeleopPanel:
             )
             recall = client.gui.add_button(
                 "Bring handles to the limbs",
-                icon="arrows-minimize",
+                icon=Icon.ARROWS_MINIMIZE,
                 color="gray",
                 hint="After a handle was moved alone, with its clutch out. Key: H",
             )

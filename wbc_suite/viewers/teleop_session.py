@@ -14,6 +14,7 @@ from types import MappingProxyType
 from typing import Any
 
 import gymnasium
+import mujoco
 import numpy as np
 import pinocchio as pin
 
@@ -123,6 +124,7 @@ class TeleopSession:
         self._clock = clock
         self._layout = env.unwrapped.action_layout  # type: ignore[attr-defined]
         self._simulation = env.unwrapped.simulation  # type: ignore[attr-defined]
+        self.model: mujoco.MjModel = self._simulation.model
         self._lock = threading.Lock()
         self._inbox = _Inbox()
         self._paused = False
@@ -135,7 +137,7 @@ class TeleopSession:
         self._begun = self._spent = float("nan")  # wall time of a tick, smoothed
 
         env.reset(seed=seed)
-        self._readers = frame_readers(self._layout, self._simulation.model)
+        self._readers = frame_readers(self._layout, self.model)
         self.limbs = {
             name: Limb(name, reader.kind, Clutch(self._measure(reader)), Ownership())
             for name, reader in self._readers.items()

@@ -1,0 +1,41 @@
+"""What the commands that serve a page share."""
+
+import signal
+import threading
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from wbc_suite.viewers.site import Site
+
+__all__ = ["HostOption", "PortOption", "serve_until_interrupted"]
+
+HostOption = Annotated[
+    str,
+    typer.Option(
+        help="Address to listen on. Other than 127.0.0.1, the page asks for a token."
+    ),
+]
+
+PortOption = Annotated[
+    int | None,
+    typer.Option(
+        help="Port to listen on, 0 for any free one; the first free from 8080 on "
+        "when left out.",
+        min=0,
+        max=65535,
+    ),
+]
+
+
+def serve_until_interrupted(site: "Site", title: str) -> None:
+    """Print where the page is, and wait for Ctrl-C or a request to terminate."""
+    print(f"{title}\n\n    {site.url}\n", flush=True)
+    if site.token is not None:
+        print("Anybody with this address may use the page.", flush=True)
+    print("Ctrl-C ends it.", flush=True)
+    interrupted = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: interrupted.set())
+    interrupted.wait()

@@ -1,0 +1,29 @@
+"""`wbc-suite view`: a robot in the browser, with its joints to turn."""
+
+from typing import Annotated
+
+import typer
+
+from wbc_suite.cli.options import CatalogueOption, RobotArgument
+from wbc_suite.cli.serving import HostOption, PortOption, serve_until_interrupted
+
+__all__ = ["view"]
+
+
+def view(
+    robot: RobotArgument,
+    gripper: Annotated[str | None, typer.Option(help="Another gripper.")] = None,
+    base: Annotated[str | None, typer.Option(help="Another base.")] = None,
+    host: HostOption = "127.0.0.1",
+    port: PortOption = None,
+    catalogue: CatalogueOption = None,
+) -> None:
+    """Look at a robot: joints, frames, collision shapes, centre of mass, inertia."""
+    from wbc_suite.robot import load_robot
+    from wbc_suite.viewers.robot_page import RobotPage
+    from wbc_suite.viewers.site import Site
+
+    description = load_robot(robot, gripper=gripper, base=base)
+    page = RobotPage(description, Site(host, port))
+    serve_until_interrupted(page.site, description.title or description.name)
+    page.stop()
