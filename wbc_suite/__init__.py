@@ -6,9 +6,13 @@ Importing the package is light: each public name is loaded when it is first used
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from wbc_suite.registration import register_environments
+
 if TYPE_CHECKING:
     from wbc_suite import errors, kinematics, qp
     from wbc_suite.catalogue import Catalogue
+    from wbc_suite.control import load_composite_controller_config
+    from wbc_suite.envs import make
     from wbc_suite.robot import RobotDescription, load_robot
 
 __version__ = "0.1.0"
@@ -16,7 +20,9 @@ __version__ = "0.1.0"
 _HOME = {
     "Catalogue": "wbc_suite.catalogue",
     "RobotDescription": "wbc_suite.robot",
+    "load_composite_controller_config": "wbc_suite.control",
     "load_robot": "wbc_suite.robot",
+    "make": "wbc_suite.envs",
 }
 _MODULES = ("errors", "kinematics", "qp")
 
@@ -25,9 +31,13 @@ __all__ = [
     "RobotDescription",
     "errors",
     "kinematics",
+    "load_composite_controller_config",
     "load_robot",
+    "make",
     "qp",
 ]
+
+register_environments()
 
 
 def __getattr__(name: str) -> Any:

@@ -122,8 +122,13 @@ class TaskStack:
         )
 
     def reset(self, v: Vector | None = None) -> None:
-        """Forget the previous velocity, or set it, shape (nv,)."""
+        """Forget the past, warm starts too; set the previous velocity, shape (nv,).
+
+        After it the same inputs give bit-equal answers.
+        """
         self.v_previous[:] = 0.0 if v is None else v
+        self._solver = self._solver.fresh()
+        self._lower.clear()
         self._decided.clear()
         if self._escape is not None:
             self._escape.reset()

@@ -1,0 +1,169 @@
+import subprocess
+import sys
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import wbc_suite
+from wbc_suite.errors import ActionError, ConfigError, PhysicsError, UnknownNameError
+
+
+@pytest.fixture(scope="module")
+def env():
+    return wbc_suite.make("Lift", robots="Panda", controller_configs="WHOLE_BODY_IK")
+
+
+def state_of(env):
+    data = env.unwrapped.simulation.data
+    return np.concatenate([[data.time], data.qpos, data.qvel, data.act])
+
+
+def test_the_hand_goes_where_the_action_says(env):
+    env.reset(seed=0)
+    layout = env.action_layout
+    target = layout.unpack(env.hold_action)["right_hand"]
+    target[:3] += 0.05, -0.05, 0.05
+    action = layout.pack({"right_hand": target}, base=env.hold_action)
+    for _ in range(30):
+        observation, _, _, _, info = env.step(action)
+    error = np.linalg.norm(observation["robot0_eef_pos"] - target[:3])
+    assert error < 1e-3
+    assert info["ik"]["frames"]["right_hand"]["position_error"] == pytest.approx(
+        error, abs=1e-4
+    )
+
+
+def test_same_seed_and_actions_give_bit_equal_states(env):
+    trajectories = []
+    for _ in range(2):
+        env.reset(seed=5)
+        action = env.hold_action
+        action[0] += 0.1
+        states = []
+        for _ in range(20):
+            env.step(action)
+            states.append(state_of(env))
+        trajectories.append(np.array(states))
+        env.reset(seed=99)
+    np.testing.assert_array_equal(trajectories[0], trajectories[1])
+
+
+def test_seeds_place_the_cube(env):
+    first, _ = env.reset(seed=1)
+    again, _ = env.reset(seed=1)
+    other, _ = env.reset(seed=2)
+    np.testing.assert_array_equal(first["cube_pos"], again["cube_pos"])
+    assert np.abs(first["cube_pos"] - other["cube_pos"]).max() > 1e-4
+    assert np.abs(first["cube_pos"][:2]).max() <= 0.03
+
+
+def test_a_bad_action_changes_nothing(env):
+    env.reset(seed=3)
+    action = env.hold_action
+    env.step(action)
+    before = state_of(env)
+    bad = action.copy()
+    bad[2] = np.nan
+    with pytest.raises(ActionError, match=r"index 2 \(right_hand: z\)"):
+        env.step(bad)
+    with pytest.raises(ActionError, match="shape"):
+        env.step(action[:-1])
+    np.testing.assert_array_equal(state_of(env), before)
+    env.step(action)
+    after = state_of(env)
+    env.reset(seed=3)
+    env.step(action)
+    env.step(action)
+    np.testing.assert_array_equal(state_of(env), after)
+
+
+def test_values_out_of_range_are_clipped_and_counted(env):
+    env.reset(seed=0)
+    action = env.hold_action
+    action[env.action_layout["right_gripper"].start] = 7.0
+    action[0] = 1e6
+    *_, info = env.step(action)
+    assert info["clipped"] == 2
+
+
+def test_physics_that_diverges_ends_the_episode_with_a_name(env):
+    env.reset(seed=0)
+    action = env.hold_action
+    env.step(action)
+    env.simulation.data.qvel[3] = 1e12
+    observation, reward, terminated, _, info = env.step(action)
+    assert terminated
+    assert "BADQVEL" in info["physics_error"]
+    assert reward == 0.0
+    assert all(np.isfinite(value).all() for value in observation.values())
+    with pytest.raises(PhysicsError, match="reset"):
+        env.step(action)
+    env.reset(seed=0)
+    *_, info = env.step(action)
+    assert "physics_error" not in info
+
+
+def test_no_log_file_is_left_behind(env, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    env.reset(seed=0)
+    env.simulation.data.qvel[0] = 1e12
+    env.step(env.hold_action)
+    env.reset(seed=0)
+    env.simulation.data.qvel[0] = np.nan
+    *_, info = env.step(env.hold_action)
+    assert "QVEL" in info["physics_error"]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_horizon_truncates():
+    env = wbc_suite.make("Lift", robots="Panda", horizon=3)
+    env.reset(seed=0)
+    flags = [env.step(env.hold_action)[2:4] for _ in range(3)]
+    assert flags == [(False, False), (False, False), (False, True)]
+
+
+def test_wrong_arguments_say_what_is_legal():
+    with pytest.raises(ConfigError, match="Did you mean 'robots'"):
+        wbc_suite.make("Lift", robot="Panda")
+    with pytest.raises(UnknownNameError, match="Did you mean 'Lift'"):
+        wbc_suite.make("Lft")
+    with pytest.raises(UnknownNameError, match="Did you mean 'panda'"):
+        wbc_suite.make("Lift", robots="Pandda")
+    with pytest.raises(UnknownNameError, match="Did you mean 'WHOLE_BODY_IK'"):
+        wbc_suite.make("Lift", controller_configs="WHOLE_BODY_KI")
+    with pytest.raises(ConfigError, match="must divide 500"):
+        wbc_suite.make("Lift", control_freq=30)
+    with pytest.raises(ConfigError, match="a place for 1"):
+        wbc_suite.make("Lift", robots=["Panda", "Panda"])
+
+
+def test_gymnasium_accepts_the_environment(recwarn):
+    env = gymnasium.make("wbc_suite/Lift-v0", robots="Panda")
+    check_env(env.unwrapped, skip_render_check=True)
+    # Actions are metres and radians here, which Gymnasium would rather see scaled.
+    warnings = [str(w.message) for w in recwarn if "normalized space" not in str(w)]
+    assert warnings == []
+
+
+@pytest.mark.parametrize(
+    "imports", ["import wbc_suite, gymnasium", "import gymnasium, wbc_suite"]
+)
+def test_environments_are_registered_in_either_order_of_imports(imports):
+    code = f"{imports}; print(gymnasium.spec('wbc_suite/Lift-v0').id)"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "wbc_suite/Lift-v0"
+
+
+def test_importing_the_package_imports_nothing_heavy():
+    code = (
+        "import sys, wbc_suite; "
+        "print([m for m in ('numpy', 'mujoco', 'gymnasium') if m in sys.modules])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "[]"

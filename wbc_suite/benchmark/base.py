@@ -1,0 +1,93 @@
+"""What a benchmark is: a scene, a way to start, a reward and a success."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Protocol
+
+import mujoco
+import numpy as np
+
+from wbc_suite.catalogue import Catalogue
+from wbc_suite.control import RobotState
+from wbc_suite.errors import UnknownNameError
+from wbc_suite.robot import RobotDescription
+from wbc_suite.typing import Vector
+
+__all__ = [
+    "Benchmark",
+    "benchmark_names",
+    "load_benchmark",
+    "register_benchmark",
+]
+
+
+class Benchmark(Protocol):
+    """A benchmark; it knows robots and objects, and no controller.
+
+    Attributes:
+        name: Its name.
+        horizon: Actions in an episode, unless the user says otherwise.
+        max_robots: How many robots it has a place for.
+    """
+
+    name: str
+    horizon: int
+    max_robots: int
+
+    def place(self, robot: RobotDescription, index: int) -> RobotDescription:
+        """Return the robot standing where this benchmark wants it."""
+        ...
+
+    def build(self, spec: mujoco.MjSpec) -> None:
+        """Add furniture, objects and cameras to an empty arena."""
+        ...
+
+    def bind(
+        self, model: mujoco.MjModel, data: mujoco.MjData, robots: Sequence[RobotState]
+    ) -> None:
+        """Look up in the compiled scene what the other methods need."""
+        ...
+
+    def reset(self, rng: np.random.Generator) -> None:
+        """Place the objects; positions and sizes are written into model and data."""
+        ...
+
+    def observe(self) -> dict[str, Vector]:
+        """Return the objects' observations."""
+        ...
+
+    def success(self) -> bool:
+        """Whether the benchmark is solved now."""
+        ...
+
+    def reward(self, *, shaped: bool) -> float:
+        """Return a reward in [0, 1]; 1 on success."""
+        ...
+
+
+_BUILDERS: dict[str, Callable[[Path], Benchmark]] = {}
+
+
+def register_benchmark(name: str, build: Callable[[Path], Benchmark]) -> None:
+    """Make a benchmark known; `build` gets the path of `tasks/{name}.toml`."""
+    _BUILDERS[name] = build
+
+
+def benchmark_names() -> tuple[str, ...]:
+    """Return the names of all benchmarks."""
+    return tuple(sorted(_BUILDERS))
+
+
+def load_benchmark(name: str, catalogue: Catalogue | None = None) -> Benchmark:
+    """Make a benchmark by its name, without regard to case.
+
+    Raises:
+        UnknownNameError: If there is no such benchmark.
+        ConfigError: If its file is wrong.
+    """
+    found = {known.casefold(): known for known in _BUILDERS}
+    known = found.get(name.casefold())
+    if known is None:
+        raise UnknownNameError("benchmark", name, _BUILDERS)
+    path = (catalogue or Catalogue()).find("tasks", known, kind="benchmark file")
+    return _BUILDERS[known](path)

@@ -1,0 +1,47 @@
+"""Composite controllers, by name."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from wbc_suite.control.composite.base import (
+    CompositeController,
+    build_composite_controller,
+    composite_names,
+    load_composite_controller_config,
+    register_composite,
+)
+from wbc_suite.control.composite.config import default_whole_body_config
+from wbc_suite.control.state import RobotState
+
+__all__ = [
+    "CompositeController",
+    "build_composite_controller",
+    "composite_names",
+    "load_composite_controller_config",
+    "register_composite",
+]
+
+
+def _whole_body_ik(config: Mapping[str, Any], state: RobotState) -> CompositeController:
+    from wbc_suite.control.composite.stack_backend import StackBackend
+    from wbc_suite.control.composite.whole_body import WholeBodyIK
+
+    return WholeBodyIK(config, state, StackBackend)
+
+
+def _whole_body_mink_ik(
+    config: Mapping[str, Any], state: RobotState
+) -> CompositeController:
+    from wbc_suite.control.composite.mink_backend import MinkBackend
+    from wbc_suite.control.composite.whole_body import WholeBodyIK
+
+    return WholeBodyIK(config, state, MinkBackend)
+
+
+for _name, _build in (
+    ("WHOLE_BODY_IK", _whole_body_ik),
+    ("WHOLE_BODY_MINK_IK", _whole_body_mink_ik),
+):
+    register_composite(
+        _name, _build, family="whole_body_ik", default=default_whole_body_config
+    )

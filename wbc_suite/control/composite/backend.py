@@ -1,0 +1,51 @@
+"""What a whole-body composite asks of an inverse-kinematics solver."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import pinocchio as pin
+
+from wbc_suite.typing import Vector
+
+__all__ = ["IkBackend", "IkStep"]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class IkStep:
+    """The answer to one solve.
+
+    Attributes:
+        v: Velocity, Pinocchio's conventions, shape (nv,).
+        limits: Limits that hold joints back: joint name or None, and words.
+        ok: Whether the problem was solved as stated.
+    """
+
+    v: Vector
+    limits: tuple[tuple[str | None, str], ...] = ()
+    ok: bool = True
+
+
+class IkBackend(Protocol):
+    """Differential inverse kinematics of one robot.
+
+    Configurations and velocities are Pinocchio's, of the reduced robot.
+    """
+
+    def reset(self, q: Vector) -> None:
+        """Forget the past; held frames are held where q puts them."""
+        ...
+
+    def set_target(self, index: int, target: pin.SE3) -> None:
+        """Set the target of the index-th controlled frame.
+
+        Only the translation counts for the centre of mass.
+        """
+        ...
+
+    def set_posture(self, q: Vector) -> None:
+        """Set the posture to prefer."""
+        ...
+
+    def solve(self, q: Vector, dt: float) -> IkStep:
+        """Return the velocity to move with for dt seconds; never raises."""
+        ...

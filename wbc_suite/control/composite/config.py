@@ -1,0 +1,182 @@
+"""Config of the whole-body composites: `controllers/{robot}_whole_body_ik.toml`."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
+
+from wbc_suite.control.part.joint_position import JointLawConfig
+from wbc_suite.robot import RobotDescription
+from wbc_suite.robot.parts import Name
+from wbc_suite.tomlfile import FrozenModel
+
+__all__ = [
+    "ControlledFrame",
+    "HeldFrame",
+    "InputFrame",
+    "InputType",
+    "LimitsConfig",
+    "PostureConfig",
+    "WholeBodyIKConfig",
+    "default_whole_body_config",
+]
+
+InputType = Literal["absolute", "delta"]
+InputFrame = Literal["world", "base", "eef"]
+
+
+class ControlledFrame(FrozenModel):
+    """A frame that an action slice moves.
+
+    Attributes:
+        name: Name of the slice.
+        frame: Frame or link of the robot; absent for the centre of mass.
+        kind: `pose`, `position`, `orientation`, `com` (the centre of mass), or `base`
+            (x, y and yaw).
+        position_cost: [cost]/m.
+        orientation_cost: [cost]/rad.
+        gain: Fraction of the error that one solve removes, (0, 1].
+        level: Strict priority, 0 first.
+        max_linear_speed: Greatest speed asked for, m/s.
+        max_angular_speed: Greatest angular speed asked for, rad/s.
+    """
+
+    name: Name
+    frame: Name | None = None
+    kind: Literal["pose", "position", "orientation", "com", "base"] = "pose"
+    position_cost: NonNegativeFloat = 1.0
+    orientation_cost: NonNegativeFloat = 1.0
+    gain: float = Field(default=0.5, gt=0.0, le=1.0)
+    level: int = Field(default=0, ge=0, le=3)
+    max_linear_speed: PositiveFloat = 2.0
+    max_angular_speed: PositiveFloat = 6.0
+
+    @model_validator(mode="after")
+    def _frame_given(self) -> "ControlledFrame":
+        if (self.frame is None) != (self.kind == "com"):
+            raise ValueError("'frame' is needed for every kind but 'com'")
+        return self
+
+
+class HeldFrame(FrozenModel):
+    """A frame in contact that must not move, such as a foot.
+
+    Attributes:
+        frame: Frame or link of the robot.
+        contact: `point` resists forces, `surface` torques as well.
+    """
+
+    frame: Name
+    contact: Literal["point", "surface"] = "point"
+
+
+class PostureConfig(FrozenModel):
+    """Pull to a posture, on the last level.
+
+    Attributes:
+        keyframe: The posture.
+        cost: [cost]/rad or [cost]/m for all joints.
+        costs: Costs of single joints, in place of `cost`.
+        level: Strict priority.
+    """
+
+    keyframe: Name = "ready"
+    cost: PositiveFloat = 0.1
+    costs: dict[Name, NonNegativeFloat] = {}
+    level: int = Field(default=1, ge=0, le=3)
+
+
+class LimitsConfig(FrozenModel):
+    """Limits of the command.
+
+    Attributes:
+        position_margin: Distance kept from joint limits, rad or m.
+        velocity_scale: Factor on the robot's own velocity limits.
+        acceleration: Greatest joint acceleration, rad/s^2 or m/s^2.
+        base_acceleration: Greatest acceleration of a moving root, m/s^2 and rad/s^2.
+        self_collision: Whether links are kept apart.
+        collision_pairs: How many of the nearest pairs of links are watched.
+        collision_distance: Distance kept between links, m.
+    """
+
+    position_margin: NonNegativeFloat = 1e-3
+    velocity_scale: float = Field(default=1.0, gt=0.0, le=1.0)
+    acceleration: PositiveFloat = 50.0
+    base_acceleration: tuple[PositiveFloat, PositiveFloat] = (5.0, 10.0)
+    self_collision: bool = True
+    collision_pairs: int = Field(default=20, ge=1, le=200)
+    collision_distance: PositiveFloat = 0.01
+
+
+class WholeBodyIKConfig(FrozenModel):
+    """Everything a whole-body IK controller is told.
+
+    Attributes:
+        format: Version of the format, 1.
+        type: Registered name.
+        frames: Controlled frames, in the order of the action.
+        held: Frames in contact.
+        locked: Groups of joints that are kept at the posture.
+        posture: Pull to a posture.
+        limits: Limits of the command.
+        input_type: `absolute` targets, or `delta` steps from the last target.
+        input_ref_frame: Axes of targets and steps: `world`, the robot's `base`, or the
+            controlled frame's own (`eef`, deltas only).
+        delta_position: Largest step of a delta action, m.
+        delta_rotation: Largest step of a delta action, rad.
+        solve_hz: Solves per second.
+        joint_law: Gains of the joint-position law.
+        tolerance: Errors below which a frame counts as reached, m and rad.
+    """
+
+    format: Literal[1] = 1
+    type: str = "WHOLE_BODY_IK"
+    frames: tuple[ControlledFrame, ...] = Field(alias="frame", min_length=1)
+    held: tuple[HeldFrame, ...] = ()
+    locked: tuple[Name, ...] = ()
+    posture: PostureConfig = PostureConfig()
+    limits: LimitsConfig = LimitsConfig()
+    input_type: InputType = "absolute"
+    input_ref_frame: InputFrame = "world"
+    delta_position: PositiveFloat = 0.05
+    delta_rotation: PositiveFloat = 0.5
+    solve_hz: Annotated[float, Field(ge=10.0, le=1000.0)] = 100.0
+    joint_law: JointLawConfig = JointLawConfig()
+    tolerance: tuple[PositiveFloat, PositiveFloat] = (1e-3, 3.5e-3)
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "WholeBodyIKConfig":
+        names = [frame.name for frame in self.frames]
+        if len(set(names)) != len(names):
+            raise ValueError(f"controlled frames share a name: {names}")
+        if self.input_type == "absolute" and self.input_ref_frame == "eef":
+            raise ValueError(
+                "input_ref_frame 'eef' needs input_type 'delta': a frame is always at "
+                "the origin of its own axes"
+            )
+        return self
+
+
+def default_whole_body_config(robot: RobotDescription) -> dict[str, Any]:
+    """Return a config for a robot without a file: hands as poses, feet held."""
+    hands = [f.name for f in robot.frames if f.role == "tcp"]
+    hands = hands or [f.name for f in robot.frames if f.role == "eef"]
+    hands = hands or [robot.links[-1].name]
+    frames = [
+        {"name": _hand_name(hand, len(hands)), "frame": hand, "kind": "pose"}
+        for hand in hands
+    ]
+    feet = [f.name for f in robot.frames if f.role == "foot"]
+    held = feet if robot.root.kind == "free" else []
+    keyframe = "ready" if "ready" in robot.keyframes else ""
+    config: dict[str, Any] = {"format": 1, "frame": frames}
+    config["held"] = [{"frame": name} for name in held]
+    if keyframe:
+        config["posture"] = {"keyframe": keyframe}
+    return config
+
+
+def _hand_name(frame: str, count: int) -> str:
+    for side in ("right", "left"):
+        if frame.startswith(side) or count == 1:
+            return f"{side}_hand"
+    return frame

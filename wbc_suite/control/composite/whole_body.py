@@ -1,0 +1,281 @@
+"""Whole-body inverse kinematics over joint-position control, for any robot."""
+
+import time
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from wbc_suite.control.action import ActionLayout
+from wbc_suite.control.composite.backend import IkBackend, IkStep
+from wbc_suite.control.composite.config import WholeBodyIKConfig
+from wbc_suite.control.composite.goals import (
+    action_of_pose,
+    action_part,
+    pose_of_action,
+    shift_pose,
+)
+from wbc_suite.control.composite.reduced import lock_groups
+from wbc_suite.control.composite.report import FrameReport, IkReport, WallTime
+from wbc_suite.control.part.gripper import GripperController
+from wbc_suite.control.part.joint_position import JointPositionLaw, JointTarget
+from wbc_suite.control.part.stance import StanceContact, StanceLaw
+from wbc_suite.control.state import RobotState
+from wbc_suite.kinematics import Configuration, Conversion
+from wbc_suite.robot import RobotDescription
+from wbc_suite.tomlfile import parse_model
+from wbc_suite.typing import Indices, Vector
+
+__all__ = ["WholeBodyIK"]
+
+BackendFactory = Callable[[RobotDescription, WholeBodyIKConfig], IkBackend]
+
+
+class WholeBodyIK:
+    """Moves controlled frames to their goals by solving a stack of QP tasks.
+
+    Solves at `solve_hz` on the commanded configuration, which it integrates; the joint
+    law tracks it, interpolated to the physics step. A free root is commanded too, and
+    goals are corrected by how far the measured root is from the commanded one, so that
+    hands arrive although legs give way.
+
+    Args:
+        config: Plain data of a `WholeBodyIKConfig`.
+        state: The robot in the simulation.
+        backend: Makes the solver.
+
+    Attributes:
+        layout: Slices of the action: controlled frames, then grippers.
+        robot: The robot that is solved for: grippers and locked groups are rigid.
+        q: Commanded configuration, Pinocchio's conventions, shape (nq,).
+        goals: Goal of each controlled frame, in the input's reference frame.
+    """
+
+    def __init__(
+        self, config: Mapping[str, Any], state: RobotState, backend: BackendFactory
+    ) -> None:
+        name = str(config.get("type"))
+        self.config = parse_model(WholeBodyIKConfig, config, source=name)
+        self.robot = lock_groups(state.robot, self.config.locked)
+        self._backend = backend(self.robot, self.config)
+        self._configuration = Configuration(self.robot.to_pinocchio())
+        model = self._configuration.model
+        self._conversion = Conversion(state.model, model, prefix=state.prefix)
+        self._grippers = [
+            GripperController(gripper, synergies, state)
+            for gripper, synergies in state.robot.synergies.items()
+        ]
+        self.layout = ActionLayout(
+            [
+                *(action_part(frame, self.config) for frame in self.config.frames),
+                *(gripper.part for gripper in self._grippers),
+            ]
+        )
+        moved = _moved_joints(self.robot, state)
+        rigid = _rigid_joints(state, {*moved, *self._gripper_joints()})
+        self._law = _make_law((*moved, *rigid), self.config, state)
+        self._rigid: Vector = np.zeros(len(rigid))
+        self._rigid_index = state.joint_addresses(rigid)[0]
+        self._q_index, self._v_index = _joint_indices(model, moved)
+        period = 1.0 / (self.config.solve_hz * state.model.opt.timestep)
+        self._steps_per_solve = max(1, round(period))
+        self._dt = self._steps_per_solve * float(state.model.opt.timestep)
+        self._tau = np.zeros(len(state.actuators))
+        self._report = IkReport(self.config, self._configuration)
+        self.reset(state)
+
+    def reset(self, state: RobotState) -> None:
+        """Hold the robot where it is."""
+        self._step, self.solve_time = 0, 0.0
+        self.q: Vector = self._conversion.q_to_pinocchio(state.data.qpos)
+        self._v: Vector = np.zeros(self._configuration.nv)
+        self._start = self.q
+        self._answer = IkStep(v=self._v)
+        self._rigid = state.data.qpos[self._rigid_index]
+        self._base = self._root_pose()
+        self.goals = [self._to_input(self._frame_pose(k)) for k in self._frames()]
+        self._backend.reset(self.q)
+        self._backend.set_posture(self._posture())
+        for gripper in self._grippers:
+            gripper.reset(state)
+
+    def set_goal(self, action: Vector) -> None:
+        """Move the goals; see `layout`."""
+        for k in self._frames():
+            frame = self.config.frames[k]
+            part = self.layout.slices[k]
+            values = action[part.start : part.stop]
+            if self.config.input_type == "absolute":
+                now = self.goals[k]
+                self.goals[k] = pose_of_action(frame.kind, values, now)
+            else:
+                self.goals[k] = shift_pose(
+                    frame.kind, values, self.goals[k], self._delta_axes(k)
+                )
+        for gripper in self._grippers:
+            part = self.layout[gripper.name]
+            gripper.set_goal(action[part.start : part.stop])
+
+    def compute(self, state: RobotState) -> Vector:
+        """Solve when it is time to, and return actuator commands. A buffer."""
+        if self._step % self._steps_per_solve == 0:
+            self._solve(state)
+        self._step += 1
+        phase = self._step % self._steps_per_solve or self._steps_per_solve
+        ahead = phase * float(state.model.opt.timestep)
+        q = pin.integrate(self._configuration.model, self._start, ahead * self._v)
+        self._tau[self._law.outputs] = self._law.torque(state, self._target(q))
+        for gripper in self._grippers:
+            self._tau[gripper.outputs] = gripper.set_points()
+        return self._tau
+
+    @property
+    def hold_action(self) -> Vector:
+        """The action that keeps the present goals."""
+        action = np.zeros(self.layout.size)
+        if self.config.input_type == "absolute":
+            for k in self._frames():
+                part = self.layout.slices[k]
+                kind = self.config.frames[k].kind
+                action[part.start : part.stop] = action_of_pose(kind, self.goals[k])
+        for gripper in self._grippers:
+            part = self.layout[gripper.name]
+            action[part.start : part.stop] = gripper.goal
+        return action
+
+    @property
+    def goals_in_world(self) -> dict[str, pin.SE3]:
+        """Goal poses in the world by controlled frame."""
+        return {
+            frame.name: self._to_world(goal)
+            for frame, goal in zip(self.config.frames, self.goals, strict=True)
+        }
+
+    @property
+    def joint_targets(self) -> dict[str, float]:
+        """Commanded position of each driven joint, rad or m."""
+        positions = np.concatenate([self.q[self._q_index], self._rigid]).tolist()
+        return dict(zip(self._law.joints, positions, strict=True))
+
+    def info(self, state: RobotState) -> dict[str, Any]:
+        """Return `{"ik": ...}`: what is reached, by how much it is missed, and why."""
+        q = self._conversion.q_to_pinocchio(state.data.qpos)
+        goals = list(self.goals_in_world.values())
+        frames = self._report.frames(q, goals, self._answer)
+        return {"ik": _as_info(frames, self.solve_time)}
+
+    def _solve(self, state: RobotState) -> None:
+        began = time.perf_counter()
+        self._base = self._root_pose()
+        correction = self._root_correction(state)
+        for k in self._frames():
+            self._backend.set_target(k, correction * self._to_world(self.goals[k]))
+        self._answer = self._backend.solve(self.q, self._dt)
+        self._start, self._v = self.q, self._answer.v
+        model = self._configuration.model
+        self.q = pin.integrate(model, self.q, self._dt * self._v)
+        self.solve_time = time.perf_counter() - began
+
+    def _root_correction(self, state: RobotState) -> pin.SE3:
+        """Return what takes world poses into the world of the commanded root."""
+        if self.robot.root.kind != "free":
+            return pin.SE3.Identity()
+        measured = self._conversion.q_to_pinocchio(state.data.qpos)[:7]
+        return self._base * pin.XYZQUATToSE3(measured).inverse()
+
+    def _root_pose(self) -> pin.SE3:
+        """Return the pose of the first link at the commanded configuration."""
+        self._configuration.update(self.q)
+        return self._configuration.frame_pose(self.robot.links[0].name)
+
+    def _target(self, q: Vector) -> JointTarget:
+        position = np.concatenate([q[self._q_index], self._rigid])
+        velocity = np.concatenate([self._v[self._v_index], 0.0 * self._rigid])
+        if self.robot.root.kind != "free":
+            return JointTarget(position=position, velocity=velocity)
+        root = pin.XYZQUATToSE3(q[:7])
+        twist = np.concatenate([root.rotation @ self._v[:3], self._v[3:6]])
+        return JointTarget(
+            position=position, velocity=velocity, root=root, root_twist=twist
+        )
+
+    def _gripper_joints(self) -> set[str]:
+        return {joint for gripper in self._grippers for joint in gripper.joints}
+
+    def _frames(self) -> range:
+        return range(len(self.config.frames))
+
+    def _frame_pose(self, k: int) -> pin.SE3:
+        frame = self.config.frames[k].frame
+        if frame is None:
+            return pin.SE3(np.eye(3), self._configuration.com.copy())
+        return self._configuration.frame_pose(frame)
+
+    def _to_input(self, pose: pin.SE3) -> pin.SE3:
+        return self._base.actInv(pose) if self._in_base() else pose
+
+    def _to_world(self, pose: pin.SE3) -> pin.SE3:
+        return self._base * pose if self._in_base() else pose
+
+    def _in_base(self) -> bool:
+        return self.config.input_ref_frame == "base"
+
+    def _delta_axes(self, k: int) -> np.ndarray:
+        if self.config.input_ref_frame == "eef":
+            return self.goals[k].rotation
+        return np.eye(3)
+
+    def _posture(self) -> Vector:
+        """Return the preferred posture; the root stays where it is."""
+        model, q = self._configuration.model, self.q.copy()
+        if self.config.posture.keyframe in self.robot.keyframes:
+            for joint, value in self.robot.keyframe(
+                self.config.posture.keyframe
+            ).items():
+                q[model.joints[model.getJointId(joint)].idx_q] = value
+        return q
+
+
+def _moved_joints(robot: RobotDescription, state: RobotState) -> tuple[str, ...]:
+    """Return the joints that the IK moves and a motor drives."""
+    candidates = robot.joint_names
+    if robot.root.kind == "planar":
+        candidates = (*robot.root_joint_names, *candidates)
+    return tuple(name for name in candidates if name in state.actuators)
+
+
+def _rigid_joints(state: RobotState, driven: set[str]) -> tuple[str, ...]:
+    """Return the joints with a motor that nothing else drives: they are held."""
+    return tuple(name for name in state.actuators if name not in driven)
+
+
+def _make_law(
+    joints: tuple[str, ...], config: WholeBodyIKConfig, state: RobotState
+) -> JointPositionLaw | StanceLaw:
+    if state.robot.root.kind != "free":
+        return JointPositionLaw(state, joints, config.joint_law)
+    contacts = [
+        StanceContact(
+            site=state.model.site(state.prefix + held.frame).id, kind=held.contact
+        )
+        for held in config.held
+    ]
+    return StanceLaw(state, joints, contacts, config.joint_law)
+
+
+def _joint_indices(
+    model: pin.Model, joints: tuple[str, ...]
+) -> tuple[Indices, Indices]:
+    found = [model.joints[model.getJointId(name)] for name in joints]
+    q = np.array([joint.idx_q for joint in found], dtype=np.int64)
+    v = np.array([joint.idx_v for joint in found], dtype=np.int64)
+    return q, v
+
+
+def _as_info(frames: Mapping[str, FrameReport], solve_time: float) -> dict[str, Any]:
+    return {
+        "reached": all(report.reached for report in frames.values()),
+        "solve_time": WallTime(solve_time),
+        "frames": {name: report.as_dict() for name, report in frames.items()},
+    }

@@ -1,0 +1,1 @@
+"""Controllers of parts of a robot: joints, grippers, stance."""

@@ -1,0 +1,150 @@
+"""Arenas: the room, the light and the furniture that robots work in."""
+
+import mujoco
+
+from wbc_suite.robot.shapes import Vector3
+from wbc_suite.scene.textures import wood_pixels
+from wbc_suite.tomlfile import FrozenModel
+
+__all__ = ["TableConfig", "add_table", "empty_arena"]
+
+FRICTION = (1.0, 0.005, 0.0001)
+"""Sliding, torsional, rolling; the default of this field's table-top benchmarks."""
+
+
+WOOD_SIZE = 512
+"""Pixels along each side of the table's texture."""
+
+
+class TableConfig(FrozenModel):
+    """A table.
+
+    Attributes:
+        size: Length along x, width along y, thickness of the top, m.
+        center: Middle of the top's upper face, m.
+        friction: Sliding, torsional, rolling.
+    """
+
+    size: Vector3 = (0.8, 0.8, 0.05)
+    center: Vector3 = (0.0, 0.0, 0.8)
+    friction: Vector3 = FRICTION
+
+
+def empty_arena(*, timestep: float = 0.002) -> mujoco.MjSpec:
+    """Return a calm room: floor, sky and soft light, with the physics options set.
+
+    Implicit integration keeps stiff servos and damping stable; dense Jacobians avoid a
+    fault of the sparse Newton path in MuJoCo 4.0.0.
+    """
+    spec = mujoco.MjSpec()
+    spec.modelname = "scene"
+    spec.compiler.degree = False
+    spec.compiler.savecompiled = False
+    option = spec.option
+    option.timestep = timestep
+    option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    option.impratio = 10.0
+    spec.memory = 64 * 2**20
+    _add_looks(spec)
+    spec.worldbody.add_geom(
+        name="floor",
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        size=(0, 0, 0.05),
+        material="floor",
+        friction=FRICTION,
+    )
+    _add_lights(spec)
+    return spec
+
+
+def add_table(spec: mujoco.MjSpec, table: TableConfig) -> None:
+    """Add a table on four legs; the top is the geom `table`."""
+    length, width, thickness = table.size
+    height = table.center[2] - thickness
+    body = spec.worldbody.add_body(name="table", pos=table.center)
+    body.add_geom(
+        name="table",
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        pos=(0, 0, -thickness / 2),
+        size=(length / 2, width / 2, thickness / 2),
+        material="wood",
+        friction=table.friction,
+    )
+    inset = 0.06
+    for i, (side, end) in enumerate(((-1, -1), (-1, 1), (1, -1), (1, 1))):
+        body.add_geom(
+            name=f"table_leg{i}",
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            pos=(
+                side * (length / 2 - inset),
+                end * (width / 2 - inset),
+                -thickness - height / 2,
+            ),
+            size=(0.025, 0.025, height / 2),
+            material="table_leg",
+        )
+
+
+def _add_looks(spec: mujoco.MjSpec) -> None:
+    flat, gradient = (
+        mujoco.mjtBuiltin.mjBUILTIN_FLAT,
+        mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+    )
+    spec.add_texture(
+        name="sky",
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        builtin=gradient,
+        rgb1=(0.93, 0.95, 0.97),
+        rgb2=(0.62, 0.68, 0.75),
+        width=256,
+        height=1536,
+    )
+    spec.add_texture(
+        name="floor",
+        type=mujoco.mjtTexture.mjTEXTURE_2D,
+        builtin=flat,
+        rgb1=(0.79, 0.80, 0.80),
+        rgb2=(0.79, 0.80, 0.80),
+        mark=mujoco.mjtMark.mjMARK_EDGE,
+        markrgb=(0.71, 0.72, 0.73),
+        width=512,
+        height=512,
+    )
+    floor = spec.add_material(name="floor", reflectance=0.04, specular=0.1)
+    floor.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "floor"
+    floor.texrepeat = (1, 1)
+    floor.texuniform = True
+    planks = spec.add_texture(
+        name="wood",
+        type=mujoco.mjtTexture.mjTEXTURE_2D,
+        nchannel=3,
+        width=WOOD_SIZE,
+        height=WOOD_SIZE,
+    )
+    planks.data = wood_pixels(WOOD_SIZE).tobytes()
+    wood = spec.add_material(name="wood", specular=0.2, shininess=0.3)
+    wood.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "wood"
+    wood.texrepeat = (1, 1)
+    spec.add_material(name="table_leg", rgba=(0.32, 0.33, 0.35, 1), specular=0.4)
+
+
+def _add_lights(spec: mujoco.MjSpec) -> None:
+    spec.visual.headlight.ambient = (0.34, 0.34, 0.35)
+    spec.visual.headlight.diffuse = (0.28, 0.28, 0.28)
+    spec.visual.headlight.specular = (0.05, 0.05, 0.05)
+    spec.visual.map.znear = 0.005
+    for name, pos, diffuse, shadow in (
+        ("key_light", (-1.5, -2.0, 4.0), 0.5, True),
+        ("fill_light", (2.0, 2.0, 3.0), 0.2, False),
+    ):
+        spec.worldbody.add_light(
+            name=name,
+            type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
+            pos=pos,
+            dir=tuple(-p for p in pos),
+            diffuse=(diffuse,) * 3,
+            specular=(0.2,) * 3,
+            castshadow=shadow,
+        )

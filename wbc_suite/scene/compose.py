@@ -1,0 +1,61 @@
+"""Put robots and things into one MuJoCo specification."""
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+
+from wbc_suite.robot import RobotDescription
+from wbc_suite.robot.shapes import Vector3
+
+__all__ = ["add_camera", "attach_robot", "place_robot", "robot_prefix"]
+
+
+def robot_prefix(index: int) -> str:
+    """Return the text before every name of the i-th robot in a scene."""
+    return f"robot{index}_"
+
+
+def place_robot(
+    robot: RobotDescription, position: tuple[float, float], yaw: float
+) -> RobotDescription:
+    """Return the robot standing at x, y on the floor, turned about z; z stays.
+
+    The place is part of the description, so that every engine's model of it measures
+    from the same world.
+    """
+    old = robot.root
+    turn = pin.Quaternion(np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2))
+    x, y, z, w = (turn * pin.Quaternion(*old.quat)).normalized().coeffs().tolist()
+    pos = (position[0], position[1], old.pos[2])
+    return robot.with_root(old.kind, pos=pos, quat=(w, x, y, z))
+
+
+def attach_robot(spec: mujoco.MjSpec, robot: RobotDescription, prefix: str) -> None:
+    """Add a robot at its own root pose; every name of it gets the prefix."""
+    own = robot.to_mjspec()
+    for key in list(own.keys):
+        own.delete(key)
+    spec.attach(own, prefix=prefix, frame=spec.worldbody.add_frame())
+
+
+def add_camera(
+    spec: mujoco.MjSpec, name: str, eye: Vector3, target: Vector3, fovy: float = 45.0
+) -> None:
+    """Add a fixed camera at `eye` that looks at `target`; x of its picture is level.
+
+    Args:
+        spec: The scene.
+        name: Name of the camera.
+        eye: Position, m.
+        target: Point in the middle of the picture, m.
+        fovy: Vertical field of view, degrees.
+    """
+    back = np.asarray(eye, dtype=np.float64) - np.asarray(target)
+    back /= np.linalg.norm(back)
+    up = np.array([0.0, 0.0, 1.0]) if abs(back[2]) < 0.99 else np.array([1.0, 0.0, 0.0])
+    right = np.cross(up, back)
+    right /= np.linalg.norm(right)
+    x, y, z, w = pin.Quaternion(
+        np.column_stack([right, np.cross(back, right), back])
+    ).coeffs()
+    spec.worldbody.add_camera(name=name, pos=eye, quat=(w, x, y, z), fovy=fovy)
