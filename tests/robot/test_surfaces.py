@@ -39,13 +39,13 @@ SHAPES = {
             shape="cylinder", start=(0, 0, 0), end=(0, 1, 0), radius=0.2, radius_to=0.1
         ),
         np.pi / 3 * (0.04 + 0.02 + 0.01),
-        0.01,
+        0.012,  # a ring of 24 points holds 98.9 % of its circle
     ),
-    "loft along z": (Loft(shape="loft", sections=RINGS), np.pi * 0.01 * 0.5, 0.01),
+    "loft along z": (Loft(shape="loft", sections=RINGS), np.pi * 0.01 * 0.5, 0.012),
     "loft along y": (
         Loft(shape="loft", axis="y", sections=RINGS),
         np.pi * 0.01 * 0.5,
-        0.01,
+        0.012,
     ),
     "loft along x, boxy": (
         Loft(shape="loft", axis="x", sections=RINGS, exponent=20),
@@ -109,3 +109,10 @@ visual = [
     np.testing.assert_allclose(read.mesh_vert, direct.mesh_vert, atol=1e-7)
     np.testing.assert_array_equal(read.body_mass, direct.body_mass)
     np.testing.assert_allclose(read.body_inertia, direct.body_inertia, rtol=1e-14)
+
+
+def test_small_shapes_cost_fewer_triangles():
+    finger = Hull(shape="hull", spheres=((0, 0, 0, 0.01), (0.04, 0, 0, 0.008)))
+    limb = Hull(shape="hull", spheres=((0, 0, 0, 0.1), (0.4, 0, 0, 0.08)))
+    (_, few), (_, many) = mesh_of(finger), mesh_of(limb)
+    assert 2 * len(few) < len(many)

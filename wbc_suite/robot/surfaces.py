@@ -16,8 +16,10 @@ from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["mesh_of", "support_points"]
 
-RING_POINTS = 32
-"""Points on one ring of a loft or a cone."""
+RING_POINTS = 24
+"""Points on one ring of a loft or a cone; half as many on a small one."""
+SMALL = 0.02
+"""Radius in m up to which coarser rings and spheres do: fingers, knobs, edges."""
 
 
 def mesh_of(shape: Shape) -> tuple[Matrix, Indices] | None:
@@ -82,11 +84,17 @@ def _icosphere(subdivisions: int) -> Matrix:
 
 def _sphere_points(centres: Matrix, radii: Vector) -> Matrix:
     """Points on several spheres; a radius of zero gives the centre alone."""
-    unit = _icosphere(2 if len(centres) <= 12 else 1)
+    finest = 2 if len(centres) <= 12 else 1
     parts = [
-        c + r * unit if r > 0 else c[None] for c, r in zip(centres, radii, strict=True)
+        c + r * _icosphere(finest if r > SMALL else 1) if r > 0 else c[None]
+        for c, r in zip(centres, radii, strict=True)
     ]
     return np.concatenate(parts)
+
+
+def _ring_angles(size: float) -> Vector:
+    n = RING_POINTS if size > SMALL else RING_POINTS // 2
+    return np.linspace(0, 2 * np.pi, n, endpoint=False)
 
 
 def _convex(points: Matrix) -> tuple[Matrix, Indices]:
@@ -113,28 +121,28 @@ def _cone_points(a: Vector, b: Vector, radius_a: float, radius_b: float) -> Matr
     u: Vector = np.asarray(np.cross(axis, other), dtype=np.float64)
     u /= np.linalg.norm(u)
     v: Vector = np.asarray(np.cross(axis, u), dtype=np.float64)
-    t = np.linspace(0, 2 * np.pi, RING_POINTS, endpoint=False)
+    t = _ring_angles(max(radius_a, radius_b))
     ring = np.cos(t)[:, None] * u + np.sin(t)[:, None] * v
     return np.concatenate([a + radius_a * ring, b + radius_b * ring])
 
 
 def _loft(shape: Loft) -> tuple[Matrix, Indices]:
     sections = _smooth_sections(shape)
-    t = np.linspace(0, 2 * np.pi, RING_POINTS, endpoint=False)
+    t = _ring_angles(float(sections[:, 3:].max()))
     power = 2.0 / shape.exponent
     u = np.sign(np.cos(t)) * np.abs(np.cos(t)) ** power
     v = np.sign(np.sin(t)) * np.abs(np.sin(t)) ** power
     k = "xyz".index(shape.axis)
     others = [i for i in range(3) if i != k]
-    vertices = np.empty((len(sections) * RING_POINTS + 2, 3))
-    rings = vertices[:-2].reshape(len(sections), RING_POINTS, 3)
+    vertices = np.empty((len(sections) * len(t) + 2, 3))
+    rings = vertices[:-2].reshape(len(sections), len(t), 3)
     rings[:, :, k] = sections[:, 0:1]
     rings[:, :, others[0]] = sections[:, 1:2] + sections[:, 3:4] * u
     rings[:, :, others[1]] = sections[:, 2:3] + sections[:, 4:5] * v
     for row, section in zip((-2, -1), (sections[0], sections[-1]), strict=True):
         vertices[row, k] = section[0]
         vertices[row, others] = section[1:3]
-    faces = _loft_faces(len(sections))
+    faces = _loft_faces(len(sections), len(t))
     # (x, z) is left-handed about y, so rings along y turn the other way round.
     return vertices, faces[:, ::-1].copy() if shape.axis == "y" else faces
 
@@ -155,8 +163,7 @@ def _smooth_sections(shape: Loft) -> Matrix:
     return np.column_stack([x, curve(x)])
 
 
-def _loft_faces(rings: int) -> Indices:
-    n = RING_POINTS
+def _loft_faces(rings: int, n: int) -> Indices:
     i = np.arange(n)
     j = (i + 1) % n
     faces: list[Indices] = []
