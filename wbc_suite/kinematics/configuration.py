@@ -113,7 +113,15 @@ class Configuration:
     def support(self, frame: str | int) -> Indices:
         """Return the velocity indices that move a frame, ascending."""
         joint = self.model.frames[self._resolve(frame)].parentJoint
-        return joint_support(self.model, joint)
+        return self.joint_support(joint)
+
+    def joint_support(self, joint: int) -> Indices:
+        """Return the velocity indices that move a joint, its own included, ascending."""
+        indices: list[int] = []
+        for j in list(self.model.supports[joint])[1:]:  # without the universe
+            first = int(self.model.joints[j].idx_v)
+            indices += range(first, first + int(self.model.joints[j].nv))
+        return np.array(indices, dtype=np.int64)
 
     def frame_pose(self, frame: str | int) -> pin.SE3:
         """Return the pose T_wf of a frame in the world, a copy."""
@@ -154,15 +162,6 @@ class Configuration:
 def named_joints(model: pin.Model) -> list[tuple[str, pin.JointModel]]:
     """Return names and joints without Pinocchio's joint 0, the universe."""
     return list(zip(model.names, model.joints, strict=True))[1:]
-
-
-def joint_support(model: pin.Model, joint: int) -> Indices:
-    """Return the velocity indices between the root and a joint, ascending."""
-    indices: list[int] = []
-    for j in list(model.supports[joint])[1:]:  # without the universe
-        first = int(model.joints[j].idx_v)
-        indices += range(first, first + int(model.joints[j].nv))
-    return np.array(indices, dtype=np.int64)
 
 
 def _root_indices(model: pin.Model) -> tuple[Indices, Indices]:

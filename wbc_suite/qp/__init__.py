@@ -19,6 +19,7 @@ from wbc_suite.qp.posture_task import PostureTask
 from wbc_suite.qp.problem import Problem
 from wbc_suite.qp.relative_frame_task import RelativeFrameTask
 from wbc_suite.qp.report import TaskReport
+from wbc_suite.qp.self_collision_limit import SelfCollisionLimit
 from wbc_suite.qp.solution import ActiveLimit, Fallback, Solution
 from wbc_suite.qp.stack import TaskStack
 from wbc_suite.qp.task import DiagonalTask, RowTask, Task
@@ -46,6 +47,7 @@ __all__ = [
     "RelativeFrameTask",
     "RowLimit",
     "RowTask",
+    "SelfCollisionLimit",
     "Solution",
     "Task",
     "TaskReport",

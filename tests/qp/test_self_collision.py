@@ -1,0 +1,160 @@
+"""Distances and their derivative against brute force; no penetration under attack."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from wbc_suite.errors import ConfigError
+from wbc_suite.kinematics import Configuration
+from wbc_suite.qp import (
+    FrameTask,
+    LimitKind,
+    PostureTask,
+    SelfCollisionLimit,
+    TaskStack,
+)
+from wbc_suite.qp.capsule_distance import segment_parameters
+from wbc_suite.robot import load_robot
+from wbc_suite.robot.capsules import collision_pairs, enclosing_capsules
+
+DT = 5e-3
+
+
+def gr1() -> tuple:
+    """Return GR1 and its configuration in the posture that it is ready in."""
+    robot = load_robot("GR1", root="fixed")
+    model = robot.to_pinocchio()
+    q = pin.neutral(model)
+    for joint, value in robot.keyframes["ready"].items():
+        q[model.joints[model.getJointId(joint)].idx_q] = value
+    return robot, Configuration(model, q)
+
+
+def all_distances(robot, configuration) -> np.ndarray:
+    """Return the distance of every allowed capsule pair, one by one."""
+    capsules, pairs = enclosing_capsules(robot), collision_pairs(robot)
+    ends = []
+    for c in capsules:
+        pose = configuration.frame_pose(c.link)
+        ends.append((pose.act(np.asarray(c.start)), pose.act(np.asarray(c.end))))
+    out = []
+    for i, a in enumerate(capsules):
+        for j, b in enumerate(capsules[:i]):
+            if frozenset((a.link, b.link)) in pairs:
+                s, t = segment_parameters(*ends[i], *ends[j])
+                p = ends[i][0] + s * (ends[i][1] - ends[i][0])
+                q = ends[j][0] + t * (ends[j][1] - ends[j][0])
+                out.append(np.linalg.norm(p - q) - a.radius - b.radius)
+    return np.sort(out)
+
+
+def test_nearest_points_beat_a_grid(rng):
+    grid = np.linspace(0, 1, 101)
+    for k in range(200):
+        p0, p1, q0, q1 = rng.normal(size=(4, 3))
+        if k % 4 == 1:
+            q1 = q0 + (p1 - p0) * rng.normal()  # parallel
+        if k % 4 == 2:
+            p1 = p0.copy()  # a point
+        if k % 8 == 6:
+            q1 = q0.copy()
+        s, t = segment_parameters(p0, p1, q0, q1)
+        assert 0 <= s <= 1
+        assert 0 <= t <= 1
+        ours = np.linalg.norm(p0 + s * (p1 - p0) - q0 - t * (q1 - q0))
+        P = p0 + grid[:, None] * (p1 - p0)
+        Q = q0 + grid[:, None] * (q1 - q0)
+        best = np.linalg.norm(P[:, None] - Q[None], axis=2).min()
+        assert ours <= best + 1e-12
+
+
+def test_rows_are_the_nearest_pairs_and_the_derivative_of_their_distance(rng):
+    robot, configuration = gr1()
+    capsules, pairs = enclosing_capsules(robot), collision_pairs(robot)
+    limit = SelfCollisionLimit(capsules, pairs)
+    limit.bind(configuration)
+    model = configuration.model
+    for _ in range(5):
+        q = rng.uniform(model.lowerPositionLimit, model.upperPositionLimit) * 0.7
+        configuration.update(q)
+        G, h = np.zeros((20, model.nv)), np.zeros(20)
+        limit.rows(configuration, DT, G, h)
+        used = limit.found >= 0
+        expected = all_distances(robot, configuration)
+        expected = expected[expected < limit.influence][:20]
+        np.testing.assert_allclose(limit.distances[used], expected, atol=1e-12)
+        found, before = limit.found.copy(), limit.distances.copy()
+        for i in rng.permutation(model.nv)[:10]:
+            dq = np.zeros(model.nv)
+            dq[i] = 1e-7
+            configuration.update(q + dq)
+            limit.rows(configuration, DT, np.zeros_like(G), h.copy())
+            for row in np.flatnonzero(used):
+                at = np.flatnonzero(limit.found == found[row])
+                if len(at):
+                    slope = (limit.distances[at[0]] - before[row]) / 1e-7
+                    assert slope == pytest.approx(-G[row, i], abs=1e-5)
+        configuration.update(q)
+
+
+def test_pairs_that_overlap_in_a_keyframe_are_left_out():
+    robot, configuration = gr1()
+    limit = SelfCollisionLimit.of_robot(robot)
+    limit.bind(configuration)
+    G, h = np.zeros((20, configuration.nv)), np.zeros(20)
+    limit.rows(configuration, DT, G, h)
+    assert limit.distances[0] >= limit.margin
+    assert all_distances(robot, configuration)[0] < 0.0
+
+
+def attack(seconds: float, seed: int) -> tuple[float, set]:
+    """Throw random targets at GR1's hands; return the least distance and the kinds."""
+    robot, configuration = gr1()
+    rng = np.random.default_rng(seed)
+    hands = [FrameTask("right_eef"), FrameTask("left_eef")]
+    limit = SelfCollisionLimit.of_robot(robot)
+    stack = TaskStack(
+        configuration,
+        [*hands, PostureTask(1e-2)],
+        limits=[*default_limits(), limit],
+    )
+    least, kinds = np.inf, set()
+    start = [hand.target for hand in hands]
+    for k in range(round(seconds / DT)):
+        if k % 100 == 0:
+            for hand, home in zip(hands, start, strict=True):
+                place = home.translation + rng.uniform(-0.5, 0.5, 3)
+                place[0], place[1] = rng.uniform(-0.3, 0.4), rng.uniform(-0.4, 0.4)
+                hand.set_target(pin.SE3(pin.exp3(rng.normal(size=3)), place))
+        solution = stack.solve(DT)
+        assert np.isfinite(solution.dq).all()
+        kinds |= {a.kind for a in solution.active}
+        configuration.update(configuration.integrate(solution.dq))
+        G, h = np.zeros((20, configuration.nv)), np.zeros(20)
+        limit.rows(configuration, DT, G, h)
+        least = min(least, limit.distances[0])
+    return least, kinds
+
+
+def default_limits():
+    from wbc_suite.qp import AccelerationLimit, PositionLimit, VelocityLimit
+
+    return [PositionLimit(), VelocityLimit(), AccelerationLimit()]
+
+
+def test_hands_never_touch_the_body():
+    least, kinds = attack(6.0, seed=1)
+    assert least > 0.0
+    assert LimitKind.SELF_COLLISION in kinds
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [2, 3])
+def test_hands_never_touch_the_body_in_a_minute(seed):
+    least, _ = attack(60.0, seed=seed)
+    assert least > 0.0
+
+
+def test_wrong_numbers_are_refused():
+    with pytest.raises(ConfigError, match="margin < influence"):
+        SelfCollisionLimit((), (), margin=0.2, influence=0.1)

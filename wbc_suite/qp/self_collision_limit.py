@@ -1,0 +1,180 @@
+"""Keep the robot's links apart from each other."""
+
+from collections.abc import Collection, Iterable, Sequence
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from wbc_suite.errors import ConfigError
+from wbc_suite.kinematics import Configuration
+from wbc_suite.qp.capsule_distance import nearest_pairs
+from wbc_suite.qp.limit import RowLimit
+from wbc_suite.qp.problem import UNBOUNDED
+from wbc_suite.robot.capsules import EnclosingCapsule
+from wbc_suite.typing import Indices, Matrix, Vector
+
+if TYPE_CHECKING:
+    from wbc_suite.robot import RobotDescription
+
+__all__ = ["SelfCollisionLimit"]
+
+
+class SelfCollisionLimit(RowLimit):
+    """Slow the approach of links, and never let them touch.
+
+    For the nearest capsule pairs, with d their distance and n the unit vector from the
+    one's nearest point to the other's, the rows are velocity dampers,
+
+        d' = n . (v_a - v_b) >= -rate (d - margin),
+
+    and where d has fallen under the margin, separation at no more than 0.2 m/s. One
+    compiled kernel places all capsules, discards pairs by their bounding spheres, and
+    measures the rest; the rows follow from the joint Jacobians.
+
+    Args:
+        capsules: Capsules on the robot's links; link names are frames of the model.
+        pairs: Pairs of links that must stay apart.
+        nearest: Number of rows: how many capsule pairs a tick considers.
+        margin: Distance that is kept, m.
+        influence: Pairs further apart than this are left out, m.
+        rate: Approach speed per distance left, 1/s.
+
+    Raises:
+        ConfigError: If a number is out of range.
+
+    Source: Faverjon and Tournassoud (1987), "A Local Based Approach for Path Planning
+    of Manipulators With a High Number of Degrees of Freedom", ICRA.
+    """
+
+    def __init__(
+        self,
+        capsules: Sequence[EnclosingCapsule],
+        pairs: Iterable[Collection[str]],
+        *,
+        nearest: int = 20,
+        margin: float = 0.005,
+        influence: float = 0.1,
+        rate: float = 10.0,
+    ) -> None:
+        if nearest < 1 or not 0.0 <= margin < influence or not rate > 0.0:
+            raise ConfigError(
+                "SelfCollisionLimit needs nearest >= 1, 0 <= margin < influence and "
+                f"rate > 0, not {nearest}, {margin}, {influence}, {rate}."
+            )
+        self.dim = nearest
+        self.margin, self.influence, self.rate = margin, influence, rate
+        self._capsules = tuple(capsules)
+        self._pairs = _capsule_pairs(self._capsules, pairs)
+        self.found: Indices = np.full(nearest, -1, dtype=np.int64)
+        self.distances: Vector = np.full(nearest, np.inf)
+
+    @classmethod
+    def of_robot(
+        cls, robot: "RobotDescription", *, nearest: int = 20, margin: float = 0.005
+    ) -> "SelfCollisionLimit":
+        """Return the limit for a robot's own collision shapes and pairs.
+
+        Capsules enclose generously. Those that overlap in one of the robot's own
+        keyframes (without any, in its neutral posture) say nothing about contact, and
+        are not kept apart.
+        """
+        from wbc_suite.robot.capsules import collision_pairs, enclosing_capsules
+
+        limit = cls(
+            enclosing_capsules(robot),
+            collision_pairs(robot),
+            nearest=nearest,
+            margin=margin,
+        )
+        configuration = Configuration(robot.to_pinocchio())
+        limit.bind(configuration)
+        rest = configuration.q.copy()
+        for keyframe in robot.keyframes.values() or ({},):
+            q = rest.copy()
+            for joint, value in keyframe.items():
+                q[configuration.model.joints[configuration.joint_id(joint)].idx_q] = (
+                    value
+                )
+            configuration.update(q)
+            limit.drop_touching(configuration)
+        return limit
+
+    def drop_touching(self, configuration: Configuration) -> None:
+        """Leave out the capsule pairs that are nearer than the margin right now."""
+        count = len(self._pairs)
+        found = np.full(count, -1, dtype=np.int64)
+        touching = nearest_pairs(
+            configuration.placements,
+            configuration.joint_jacobians,
+            self._joints,
+            self._ends,
+            self._radii,
+            self._pairs,
+            self._moves,
+            self.margin,
+            found,
+            np.full(count, np.inf),
+            np.zeros((count, configuration.nv)),
+        )
+        self._pairs = np.delete(self._pairs, found[:touching], axis=0)
+
+    def bind(self, configuration: Configuration) -> None:
+        """Resolve links to joints.
+
+        Raises:
+            UnknownNameError: If a link is no frame of the model.
+        """
+        model = configuration.model
+        joints: list[int] = []
+        ends = np.empty((len(self._capsules), 2, 3))
+        for k, capsule in enumerate(self._capsules):
+            frame = model.frames[configuration.frame_id(capsule.link)]
+            joints.append(frame.parentJoint)
+            ends[k, 0] = frame.placement.act(np.asarray(capsule.start))
+            ends[k, 1] = frame.placement.act(np.asarray(capsule.end))
+        self._joints: Indices = np.array(joints, dtype=np.int64)
+        self._ends: Matrix = ends
+        self._radii: Vector = np.array([c.radius for c in self._capsules])
+        self._moves: Matrix = np.zeros((len(model.joints), configuration.nv))
+        for joint in set(joints):
+            self._moves[joint, configuration.joint_support(joint)] = 1.0
+
+    def rows(
+        self, configuration: Configuration, dt: float, G: Matrix, h: Vector
+    ) -> None:
+        """Write the dampers of the nearest pairs, `-n . (J_a - J_b) dq <= ...`."""
+        nearest_pairs(
+            configuration.placements,
+            configuration.joint_jacobians,
+            self._joints,
+            self._ends,
+            self._radii,
+            self._pairs,
+            self._moves,
+            self.influence,
+            self.found,
+            self.distances,
+            G,
+        )
+        np.subtract(self.distances, self.margin, out=h)
+        h *= self.rate * dt
+        np.clip(h, -0.2 * dt, UNBOUNDED, out=h)
+
+    def label(self, row: int) -> str:
+        """Return the two links of a row of the last tick."""
+        a, b = self._pairs[self.found[row]]
+        return f"{self._capsules[a].link} - {self._capsules[b].link}"
+
+
+def _capsule_pairs(
+    capsules: Sequence[EnclosingCapsule], pairs: Iterable[Collection[str]]
+) -> Indices:
+    """Return the index pairs of capsules whose links are a pair, shape (n, 2)."""
+    of_link: dict[str, list[int]] = {}
+    for k, capsule in enumerate(capsules):
+        of_link.setdefault(capsule.link, []).append(k)
+    found: list[tuple[int, int]] = []
+    for a, b in sorted(tuple(sorted(pair)) for pair in pairs):
+        found += product(of_link.get(a, ()), of_link.get(b, ()))
+    return np.array(found, dtype=np.int64).reshape(len(found), 2)
