@@ -1,0 +1,160 @@
+"""Inverse kinematics by mink, on the MuJoCo model of the robot alone."""
+
+import mink
+import numpy as np
+import pinocchio as pin
+
+from wbc_suite.control.composite.backend import IkStep
+from wbc_suite.control.composite.config import ControlledFrame, WholeBodyIKConfig
+from wbc_suite.kinematics import Conversion
+from wbc_suite.robot import RobotDescription
+from wbc_suite.typing import Vector
+
+__all__ = ["MinkBackend"]
+
+LEVEL_FACTOR = 0.03
+"""mink has weights only: each level counts this much of the one above."""
+
+POSTURE_FACTOR = 0.1
+"""Further factor on the posture, which would pull frames off their targets."""
+
+
+class MinkBackend:
+    """`IkBackend` over mink's weighted tasks and limits, solved by daqp.
+
+    Args:
+        robot: The reduced robot.
+        config: Tasks, limits and contacts; levels become weights, and there is no
+            acceleration limit.
+    """
+
+    def __init__(self, robot: RobotDescription, config: WholeBodyIKConfig) -> None:
+        self._config = config
+        self._model = robot.to_mjspec().compile()
+        self._conversion = Conversion(self._model, robot.to_pinocchio())
+        self._configuration = mink.Configuration(self._model)
+        self._sites = {self._model.site(i).name for i in range(self._model.nsite)}
+        self._tasks = [self._task(frame) for frame in config.frames]
+        self._posture = mink.PostureTask(self._model, self._posture_costs())
+        self._held = [self._hold(held.frame, held.contact) for held in config.held]
+        self._limits = self._make_limits(robot)
+
+    def reset(self, q: Vector) -> None:
+        """Hold feet where q puts them."""
+        self._configuration.update(self._conversion.q_to_mujoco(q))
+        for task in self._held:
+            task.set_target_from_configuration(self._configuration)
+
+    def set_target(self, index: int, target: pin.SE3) -> None:
+        """Set a controlled frame's target."""
+        task = self._tasks[index]
+        if isinstance(task, mink.ComTask):
+            task.set_target(target.translation)
+            return
+        task.set_target(mink.SE3.from_matrix(target.homogeneous))
+
+    def set_posture(self, q: Vector) -> None:
+        """Set the posture to prefer."""
+        self._posture.set_target(self._conversion.q_to_mujoco(q))
+
+    def solve(self, q: Vector, dt: float) -> IkStep:
+        """Solve one tick; hold still where mink finds no solution."""
+        self._configuration.update(self._conversion.q_to_mujoco(q))
+        try:
+            v = mink.solve_ik(
+                self._configuration,
+                [*self._tasks, self._posture],
+                dt,
+                "daqp",
+                damping=1e-6,
+                limits=self._limits,
+                constraints=self._held or None,
+            )
+        except mink.MinkError:
+            v = np.full(self._model.nv, np.nan)
+        if not np.isfinite(v).all():
+            still = np.zeros(len(self._conversion.v_index))
+            return IkStep(v=still, limits=((None, "no solution"),), ok=False)
+        qpos = self._configuration.q
+        return IkStep(
+            v=self._conversion.v_to_pinocchio(qpos, v), limits=self._active(v, dt)
+        )
+
+    def _task(self, frame: ControlledFrame) -> mink.FrameTask | mink.ComTask:
+        weight = LEVEL_FACTOR**frame.level
+        if frame.frame is None:
+            return mink.ComTask(weight * frame.position_cost, gain=frame.gain)
+        position = np.full(3, weight * frame.position_cost)
+        orientation = np.full(3, weight * frame.orientation_cost)
+        if frame.kind == "orientation":
+            position[:] = 0.0
+        if frame.kind == "position":
+            orientation[:] = 0.0
+        if frame.kind == "base":
+            position[2] = orientation[0] = orientation[1] = 0.0
+        return mink.FrameTask(
+            frame.frame,
+            self._frame_type(frame.frame),
+            position_cost=position,
+            orientation_cost=orientation,
+            gain=frame.gain,
+            lm_damping=1e-3,
+        )
+
+    def _frame_type(self, frame: str) -> str:
+        return "site" if frame in self._sites else "body"
+
+    def _posture_costs(self) -> Vector:
+        posture = self._config.posture
+        factor = POSTURE_FACTOR * LEVEL_FACTOR**posture.level
+        costs = np.full(self._model.nv, factor * posture.cost)
+        for k in range(self._model.njnt):
+            joint = self._model.joint(k)
+            first = joint.dofadr[0]
+            if joint.name in posture.costs:
+                costs[first] = factor * posture.costs[joint.name]
+            if joint.name.startswith("root"):
+                costs[first : first + (6 if joint.type[0] == 0 else 1)] = 0.0
+        return costs
+
+    def _hold(self, frame: str, contact: str) -> mink.FrameTask:
+        return mink.FrameTask(
+            frame,
+            self._frame_type(frame),
+            position_cost=1.0,
+            orientation_cost=1.0 if contact == "surface" else 0.0,
+            gain=self._config.frames[0].gain,
+        )
+
+    def _make_limits(self, robot: RobotDescription) -> list[mink.Limit]:
+        limits = self._config.limits
+        speeds = {
+            joint.name: joint.velocity * limits.velocity_scale
+            for joint in robot.joints
+            if joint.velocity is not None
+        }
+        linear, angular = robot.root.velocity
+        if robot.root.kind == "planar":
+            speeds |= {"root_x": linear, "root_y": linear, "root_yaw": angular}
+        position = mink.ConfigurationLimit(
+            self._model, min_distance_from_limits=limits.position_margin
+        )
+        return [position, mink.VelocityLimit(self._model, speeds)]
+
+    def _active(self, v: Vector, dt: float) -> tuple[tuple[str | None, str], ...]:
+        """Return joints that the step brings to a position limit."""
+        found: list[tuple[str | None, str]] = []
+        margin = self._config.limits.position_margin + 1e-6
+        for k in range(self._model.njnt):
+            if not self._model.jnt_limited[k]:
+                continue
+            name = self._model.joint(k).name
+            dof, place = self._model.jnt_dofadr[k], self._model.jnt_qposadr[k]
+            reached = self._configuration.q[place] + dt * v[dof]
+            low, high = self._model.jnt_range[k]
+            if reached <= low + margin:
+                found.append((name, f"joint limit: {name} (lower)"))
+            elif reached >= high - margin:
+                found.append((name, f"joint limit: {name} (upper)"))
+        return tuple(found)
+
