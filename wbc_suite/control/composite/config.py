@@ -38,6 +38,8 @@ class ControlledFrame(FrozenModel):
         level: Strict priority, 0 first.
         max_linear_speed: Greatest speed asked for, m/s.
         max_angular_speed: Greatest angular speed asked for, rad/s.
+        linear_braking: Deceleration towards the goal, m/s^2.
+        angular_braking: Deceleration towards the goal, rad/s^2.
     """
 
     name: Name
@@ -49,6 +51,8 @@ class ControlledFrame(FrozenModel):
     level: int = Field(default=0, ge=0, le=3)
     max_linear_speed: PositiveFloat = 2.0
     max_angular_speed: PositiveFloat = 6.0
+    linear_braking: PositiveFloat = 4.0
+    angular_braking: PositiveFloat = 12.0
 
     @model_validator(mode="after")
     def _frame_given(self) -> "ControlledFrame":
@@ -77,12 +81,18 @@ class PostureConfig(FrozenModel):
         cost: [cost]/rad or [cost]/m for all joints.
         costs: Costs of single joints, in place of `cost`.
         level: Strict priority.
+        gain: Fraction of the difference that one solve removes, (0, 1].
+        speed: Greatest joint speed asked for, rad/s or m/s.
+        braking: Deceleration towards the posture, as a part of the joints' limits.
     """
 
     keyframe: Name = "ready"
     cost: PositiveFloat = 0.1
     costs: dict[Name, NonNegativeFloat] = {}
     level: int = Field(default=1, ge=0, le=3)
+    gain: float = Field(default=0.1, gt=0.0, le=1.0)
+    speed: PositiveFloat = 3.0
+    braking: float = Field(default=0.5, gt=0.0, le=1.0)
 
 
 class LimitsConfig(FrozenModel):

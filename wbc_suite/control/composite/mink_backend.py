@@ -35,7 +35,9 @@ class MinkBackend:
         self._configuration = mink.Configuration(self._model)
         self._sites = {self._model.site(i).name for i in range(self._model.nsite)}
         self._tasks = [self._task(frame) for frame in config.frames]
-        self._posture = mink.PostureTask(self._model, self._posture_costs())
+        self._posture = mink.PostureTask(
+            self._model, self._posture_costs(), gain=config.posture.gain
+        )
         self._held = [self._hold(held.frame, held.contact) for held in config.held]
         self._limits = self._make_limits(robot)
 
@@ -157,4 +159,3 @@ class MinkBackend:
             elif reached >= high - margin:
                 found.append((name, f"joint limit: {name} (upper)"))
         return tuple(found)
-

@@ -44,6 +44,7 @@ class StackBackend:
         self._posture = PostureTask(
             config.posture.cost,
             costs=config.posture.costs,
+            gain=config.posture.gain,
             level=config.posture.level,
         )
         self._tasks = [_task_of(frame) for frame in config.frames]

@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.control.action import ActionLayout
+from wbc_suite.control.composite.approach import approach_pose, approach_posture
 from wbc_suite.control.composite.backend import IkBackend, IkStep
 from wbc_suite.control.composite.config import WholeBodyIKConfig
 from wbc_suite.control.composite.goals import (
@@ -81,6 +82,9 @@ class WholeBodyIK:
         period = 1.0 / (self.config.solve_hz * state.model.opt.timestep)
         self._steps_per_solve = max(1, round(period))
         self._dt = self._steps_per_solve * float(state.model.opt.timestep)
+        self._braking = self.config.posture.braking * _accelerations(
+            self.robot, self.config, model
+        )
         self._tau = np.zeros(len(state.actuators))
         self._report = IkReport(self.config, self._configuration)
         self.reset(state)
@@ -96,7 +100,7 @@ class WholeBodyIK:
         self._base = self._root_pose()
         self.goals = [self._to_input(self._frame_pose(k)) for k in self._frames()]
         self._backend.reset(self.q)
-        self._backend.set_posture(self._posture())
+        self._posture = self._preferred_posture()
         for gripper in self._grippers:
             gripper.reset(state)
 
@@ -170,12 +174,36 @@ class WholeBodyIK:
         self._base = self._root_pose()
         correction = self._root_correction(state)
         for k in self._frames():
-            self._backend.set_target(k, correction * self._to_world(self.goals[k]))
+            goal = correction * self._to_world(self.goals[k])
+            self._backend.set_target(k, self._on_the_way(k, goal))
+        self._backend.set_posture(self._posture_on_the_way())
         self._answer = self._backend.solve(self.q, self._dt)
         self._start, self._v = self.q, self._answer.v
         model = self._configuration.model
         self.q = pin.integrate(model, self.q, self._dt * self._v)
         self.solve_time = time.perf_counter() - began
+
+    def _on_the_way(self, k: int, goal: pin.SE3) -> pin.SE3:
+        frame = self.config.frames[k]
+        return approach_pose(
+            self._frame_pose(k),
+            goal,
+            dt=self._dt,
+            gain=frame.gain,
+            speed=(frame.max_linear_speed, frame.max_angular_speed),
+            acceleration=(frame.linear_braking, frame.angular_braking),
+        )
+
+    def _posture_on_the_way(self) -> Vector:
+        posture = self.config.posture
+        step = approach_posture(
+            self._configuration.difference(self._posture),
+            dt=self._dt,
+            gain=posture.gain,
+            speed=posture.speed,
+            acceleration=self._braking,
+        )
+        return self._configuration.integrate(step)
 
     def _root_correction(self, state: RobotState) -> pin.SE3:
         """Return what takes world poses into the world of the commanded root."""
@@ -226,7 +254,7 @@ class WholeBodyIK:
             return self.goals[k].rotation
         return np.eye(3)
 
-    def _posture(self) -> Vector:
+    def _preferred_posture(self) -> Vector:
         """Return the preferred posture; the root stays where it is."""
         model, q = self._configuration.model, self.q.copy()
         if self.config.posture.keyframe in self.robot.keyframes:
@@ -271,6 +299,18 @@ def _joint_indices(
     q = np.array([joint.idx_q for joint in found], dtype=np.int64)
     v = np.array([joint.idx_v for joint in found], dtype=np.int64)
     return q, v
+
+
+def _accelerations(
+    robot: RobotDescription, config: WholeBodyIKConfig, model: pin.Model
+) -> Vector:
+    """Return the acceleration limit of each velocity."""
+    limits = np.full(model.nv, config.limits.acceleration)
+    for joint in robot.joints:
+        if joint.acceleration is not None:
+            index = model.joints[model.getJointId(joint.name)].idx_v
+            limits[index] = min(limits[index], joint.acceleration)
+    return limits
 
 
 def _as_info(frames: Mapping[str, FrameReport], solve_time: float) -> dict[str, Any]:
