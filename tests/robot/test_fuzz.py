@@ -89,7 +89,7 @@ def outcome(data):
 
 
 @settings(
-    max_examples=300,
+    max_examples=100,
     deadline=None,
     suppress_health_check=list(HealthCheck),
     database=None,
@@ -106,7 +106,7 @@ def test_undamaged_components_build():
 
 @pytest.mark.slow
 @settings(
-    max_examples=3000,
+    max_examples=1000,
     deadline=None,
     suppress_health_check=list(HealthCheck),
     database=None,
