@@ -9,7 +9,17 @@ from typing import Annotated
 import typer
 
 from wbc_suite import __version__
-from wbc_suite.cli import check, doctor, export, listing, render, teleop, view
+from wbc_suite.cli import (
+    check,
+    demo,
+    describe_action,
+    doctor,
+    export,
+    listing,
+    render,
+    teleop,
+    view,
+)
 from wbc_suite.errors import WbcError
 
 __all__ = ["app", "run"]
@@ -22,12 +32,14 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+app.command("teleop")(teleop.teleop)
+app.command("view")(view.view)
+app.command("demo")(demo.demo)
 app.command("list")(listing.list_catalogue)
+app.command("render")(render.render)
 app.command("check")(check.check_file)
 app.command("export")(export.export_robot)
-app.command("render")(render.render)
-app.command("view")(view.view)
-app.command("teleop")(teleop.teleop)
+app.command("describe-action")(describe_action.describe_action)
 app.command("doctor")(doctor.doctor)
 
 

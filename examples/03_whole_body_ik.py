@@ -1,0 +1,31 @@
+"""A mobile manipulator follows two targets; what it cannot reach it says in words."""
+
+import numpy as np
+
+import wbc_suite
+
+env = wbc_suite.make(
+    "Lift", robots="Tiago", controller_configs="WHOLE_BODY_IK", horizon=1000
+)
+env.reset(seed=0)
+layout = env.action_layout
+print(layout)
+
+start = layout.unpack(env.hold_action)
+
+
+def move(offset: list[float], seconds: float) -> dict:
+    """Move the right hand from where it started and return what the robot says."""
+    hand = start["right_hand"] + np.array([*offset, 0.0, 0.0, 0.0])
+    action = layout.pack({"right_hand": hand}, base=env.hold_action)
+    info = {}
+    for _ in range(round(seconds * 20)):
+        *_, info = env.step(action)
+    return info["ik"]["frames"]["right_hand"]
+
+
+near = move([0.10, 0.05, 0.10], seconds=3.0)
+print(f"within reach: {1e3 * near['position_error']:.2f} mm away")
+
+far = move([0.0, 0.0, 3.0], seconds=3.0)
+print(f"3 m up: {far['position_error']:.2f} m away, because of", *far["reasons"][:2])

@@ -1,0 +1,74 @@
+"""What the README and the docs show is run, and what they point to exists."""
+
+import contextlib
+import io
+import re
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from wbc_suite.cli.app import app
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(ROOT.glob("docs/*.md"))]
+
+
+def blocks(text: str, language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
+
+
+SNIPPETS = [
+    pytest.param(snippet, id=f"{page.stem}-{k}")
+    for page in PAGES
+    for k, snippet in enumerate(blocks(page.read_text(encoding="utf-8"), "python"))
+]
+
+
+@pytest.mark.parametrize("snippet", SNIPPETS)
+def test_python_snippets_run(snippet):
+    exec(compile(snippet, "snippet", "exec"), {"__name__": "__main__"})
+
+
+def test_the_first_snippet_is_short_and_what_it_prints_is_true():
+    snippet = blocks(README, "python")[0]
+    lines = [line for line in snippet.splitlines() if line.strip()]
+    assert len(lines) <= 15
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        exec(snippet, {})
+    missed = [float(x) for x in re.findall(r"is ([\d.]+) mm", printed.getvalue())]
+    assert len(missed) == 2
+    assert max(missed) < 1.0  # mm: the hands have arrived
+
+
+def test_the_first_screen_has_a_picture_that_shows_something():
+    path = re.search(r"!\[.*?\]\((.*?)\)", README[:800])
+    assert path is not None
+    picture = np.asarray(Image.open(ROOT / path[1]).convert("L"))
+    assert picture.shape[1] >= 600
+    assert picture.std() > 20
+
+
+def test_every_make_command_exists():
+    targets = re.findall(r"^([a-z-]+):.*##", (ROOT / "Makefile").read_text(), re.M)
+    shown = {c for page in PAGES for c in re.findall(r"\bmake ([a-z-]+)", page.read_text())}
+    assert shown <= set(targets)
+
+
+def test_every_console_command_exists_with_its_options():
+    commands = {command.name: command for command in app.registered_commands}
+    for line in "".join(blocks(README, "sh")).splitlines():
+        words = shlex.split(line, comments=True)
+        if words and words[0] == "wbc-suite":
+            assert words[1] in commands, line
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_somewhere(page):
+    for link in re.findall(r"\]\(([^)#]+)", page.read_text(encoding="utf-8")):
+        if not link.startswith("http"):
+            assert (page.parent / link).exists(), link

@@ -1,0 +1,117 @@
+"""`wbc-suite demo`: a humanoid reaches with both hands, without a browser."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from wbc_suite.cli.options import writing
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from wbc_suite.typing import Matrix, Vector
+    from wbc_suite.viewers.offscreen import Image
+
+__all__ = ["demo"]
+
+HANDS = ("right_hand", "left_hand")
+RATE = 50  # Hz, of actions
+PERIOD = 4.0  # s, of one figure
+FRAMES_PER_SECOND = 10
+SIZE = (480, 480)  # pixels
+
+
+def demo(
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="Folder for the pictures.")
+    ] = Path("artifacts/demo"),
+    seconds: Annotated[float, typer.Option(min=1.0, help="Simulated time.")] = 8.0,
+    controller: Annotated[
+        str, typer.Option(help="WHOLE_BODY_IK or WHOLE_BODY_MINK_IK.")
+    ] = "WHOLE_BODY_IK",
+) -> None:
+    """Let GR1 draw figures with both hands; print figures, write pictures."""
+    import wbc_suite
+
+    env = wbc_suite.make(
+        "Lift",
+        robots="GR1",
+        controller_configs=controller,
+        control_freq=RATE,
+        horizon=round(seconds * RATE) + 1,
+    )
+    errors, solve_times, pictures = _reach(env.unwrapped, seconds)
+    _report(controller, errors, solve_times)
+    _write(output, pictures)
+
+
+def _reach(env: Any, seconds: float) -> "tuple[Matrix, Vector, list[Image]]":
+    """Move both hands along figures; return errors (n, 2) m, times (n,) s, pictures."""
+    import numpy as np
+
+    from wbc_suite.viewers.offscreen import Camera, Mark
+
+    env.reset(seed=0)
+    layout = env.action_layout
+    start = layout.unpack(env.hold_action)
+    data = env.simulation.data
+    errors, solve_times, pictures = [], [], []
+    with Camera(
+        env.simulation.model, data, width=SIZE[0], height=SIZE[1], subject="robot0_"
+    ) as camera:
+        for step in range(round(seconds * RATE)):
+            goals = {
+                hand: np.concatenate([start[hand][:3] + offset, start[hand][3:]])
+                for hand, offset in _figure(step / RATE).items()
+            }
+            *_, info = env.step(layout.pack(goals, base=env.hold_action))
+            frames = info["ik"]["frames"]
+            errors.append([frames[hand]["position_error"] for hand in HANDS])
+            solve_times.append(info["ik"]["solve_time"])
+            if step % (RATE // FRAMES_PER_SECOND) == 0:
+                marks = [Mark(position=goals[hand][:3]) for hand in HANDS]
+                pictures.append(camera.take(data, marks))
+    return np.array(errors), np.array(solve_times), pictures
+
+
+def _figure(time: float) -> "dict[str, np.ndarray]":
+    """Return each hand's way from where it started, m: a Lissajous figure, mirrored."""
+    import numpy as np
+
+    phase = 2.0 * np.pi * time / PERIOD
+    forward, side = 0.06 * (1.0 - np.cos(phase)), 0.10 * np.sin(phase)
+    up = 0.10 * (1.0 - np.cos(2.0 * phase))
+    return {
+        "right_hand": np.array([forward, side, up]),
+        "left_hand": np.array([forward, -side, up]),
+    }
+
+
+def _report(controller: str, errors: "Matrix", solve_times: "Vector") -> None:
+    import numpy as np
+
+    print(f"GR1 reaches with both hands by {controller}, simulated by MuJoCo:")
+    for hand, column in zip(HANDS, 1e3 * errors.T, strict=True):
+        median, worst = np.median(column), column.max()
+        print(f"  {hand:<11} median error {median:5.2f} mm, worst {worst:5.2f} mm")
+    median, slowest = np.percentile(1e3 * solve_times, [50, 99])
+    print(f"  solve time  median {median:5.2f} ms, 99 % under {slowest:.2f} ms")
+
+
+def _write(folder: Path, pictures: "list[Image]") -> None:
+    from PIL import Image
+
+    images = [Image.fromarray(picture) for picture in pictures]
+    still, film = folder / "reach.png", folder / "reach.gif"
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        images[len(images) // 4].save(still)
+        images[0].save(
+            film,
+            save_all=True,
+            append_images=images[1:],
+            duration=1000 // FRAMES_PER_SECOND,
+            loop=0,
+        )
+    print(f"Wrote {still} and {film}.")
