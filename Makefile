@@ -1,6 +1,6 @@
 # Everything a newcomer or a build machine types. `make` alone lists it.
 .DEFAULT_GOAL := help
-.PHONY: help teleop demo test check format bench bench-peers wheel clean
+.PHONY: help teleop demo test check format bench bench-peers pictures wheel clean
 
 VENV := .venv
 PY := $(VENV)/bin/python
@@ -39,6 +39,9 @@ bench-peers: $(VENV)/.installed-dev ## install the peers that the benchmarks com
 	$(PY) -m pip install --group peers
 	@test -x .venv-placo/bin/python || $(PY) -m venv .venv-placo
 	.venv-placo/bin/python -m pip install placo
+
+pictures: $(VENV)/.installed ## draw the pictures of the README anew
+	$(PY) docs/draw_pictures.py
 
 wheel: $(VENV)/.installed ## build the wheel into dist/
 	@rm -rf dist

@@ -16,4 +16,6 @@ while not over and steps < 100:
 env.close()
 
 print("observed:", ", ".join(sorted(observation)))
-print(f"random actions for {steps} steps: return {total:.2f}, lifted: {info['success']}")
+print(
+    f"random actions for {steps} steps: return {total:.2f}, lifted: {info['success']}"
+)

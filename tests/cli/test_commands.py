@@ -1,4 +1,5 @@
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -11,7 +12,11 @@ from PIL import Image
 from wbc_suite.catalogue import ENVIRONMENT_VARIABLE, Catalogue
 from wbc_suite.cli import main
 
-ROBOT_FILES = sorted((Catalogue().root / "robots").rglob("*.toml"))
+FILES = [
+    path
+    for folder in ("robots", "tasks", "controllers")
+    for path in sorted((Catalogue().root / folder).rglob("*.toml"))
+]
 
 
 @pytest.fixture
@@ -71,7 +76,7 @@ def test_list_of_one_kind_leaves_the_others_out(wbc_suite_command):
     assert "Panda" not in out
 
 
-@pytest.mark.parametrize("path", ROBOT_FILES, ids=lambda p: f"{p.parent.name}-{p.stem}")
+@pytest.mark.parametrize("path", FILES, ids=lambda p: f"{p.parent.name}-{p.stem}")
 def test_every_file_of_the_catalogue_passes_its_check(wbc_suite_command, path):
     code, out, err = wbc_suite_command("check", path)
     assert (code, err) == (0, "")
@@ -104,10 +109,68 @@ def test_render_writes_a_picture_of_the_size_asked_for(wbc_suite_command, tmp_pa
     assert picture.std() > 10
 
 
+DAMAGES = {
+    "typo in a robot": ("robots/panda.toml", "[assembly]", "[asembly]", "assembly"),
+    "typo in a component": ("robots/arm/panda.toml", "mass =", "mas =", "'mass'"),
+    "typo in a benchmark": ("tasks/lift.toml", "horizon", "horizn", "'horizon'"),
+    "typo in a controller": (
+        "controllers/gr1_whole_body_ik.toml",
+        "locked",
+        "lockd",
+        "'locked'",
+    ),
+    "wrong value": ("tasks/lift.toml", "horizon = 500", "horizon = -5", "-5"),
+    "not TOML": ("tasks/lift.toml", "horizon = 500", "horizon =", "TOML"),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_typo_in_any_file_is_told_in_one_line(wbc_suite_command, tmp_path, damage):
+    file, old, new, word = DAMAGES[damage]
+    text = (Catalogue().root / file).read_text()
+    assert old in text
+    damaged = tmp_path / Path(file).name
+    damaged.write_text(text.replace(old, new, 1))
+    code, out, err = wbc_suite_command("check", damaged)
+    assert (code, out) == (2, "")
+    assert err.count("\n") == 1
+    assert damaged.name in err
+    assert word in err
+
+
+def test_describe_action_shows_every_slice_with_its_unit(wbc_suite_command):
+    code, out, _ = wbc_suite_command("describe-action", "Panda")
+    assert code == 0
+    for word in ("right_hand", "0:6", "m rad", "right_gripper", "-1 open .. 1 closed"):
+        assert word in out
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("controller", ["WHOLE_BODY_IK"])
+def test_the_demo_tracks_and_writes_its_pictures(
+    wbc_suite_command, tmp_path, controller
+):
+    arguments = ("--seconds", 4, "-o", tmp_path, "--controller", controller)
+    code, out, _ = wbc_suite_command("demo", *arguments)
+    assert code == 0
+    worst = [float(x) for x in re.findall(r"worst +([\d.]+) mm", out)]
+    assert len(worst) == 2
+    assert max(worst) < 15.0  # mm behind targets that move at up to 0.4 m/s
+    film = Image.open(tmp_path / "reach.gif")
+    assert film.n_frames == 40
+    first, later = (np.asarray(_frame(film, k), dtype=float) for k in (0, 10))
+    assert np.abs(first - later).max() > 100  # something moved
+
+
+def _frame(film: Image.Image, number: int) -> Image.Image:
+    film.seek(number)
+    return film.convert("RGB")
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["check", "nowhere/robot.toml"], ["nowhere/robot.toml", "no such file"]),
+        (["check", "nowhere/robot.toml"], ["nowhere/robot.toml", "No such file"]),
         (["export", "Pandda", "--to", "mjcf"], ["Pandda", "Did you mean 'panda'"]),
         (["list", "--catalogue", "nowhere"], ["nowhere", "does not exist"]),
         (["render", "Panda", "-o", "nowhere/a.png"], ["nowhere/a.png", "written"]),

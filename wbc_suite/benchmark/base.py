@@ -11,6 +11,7 @@ from wbc_suite.catalogue import Catalogue
 from wbc_suite.control import RobotState
 from wbc_suite.errors import UnknownNameError
 from wbc_suite.robot import RobotDescription
+from wbc_suite.tomlfile import read_toml
 from wbc_suite.typing import Vector
 
 __all__ = [
@@ -78,16 +79,23 @@ def benchmark_names() -> tuple[str, ...]:
     return tuple(sorted(_BUILDERS))
 
 
-def load_benchmark(name: str, catalogue: Catalogue | None = None) -> Benchmark:
-    """Make a benchmark by its name, without regard to case.
+def load_benchmark(name: str | Path, catalogue: Catalogue | None = None) -> Benchmark:
+    """Make a benchmark by its name, without regard to case, or from its file.
 
     Raises:
         UnknownNameError: If there is no such benchmark.
         ConfigError: If its file is wrong.
     """
-    found = {known.casefold(): known for known in _BUILDERS}
-    known = found.get(name.casefold())
-    if known is None:
-        raise UnknownNameError("benchmark", name, _BUILDERS)
+    if str(name).endswith(".toml"):
+        path = Path(name)
+        return _BUILDERS[_find(str(read_toml(path).get("name")))](path)
+    known = _find(str(name))
     path = (catalogue or Catalogue()).find("tasks", known, kind="benchmark file")
     return _BUILDERS[known](path)
+
+
+def _find(name: str) -> str:
+    for known in _BUILDERS:
+        if known.casefold() == name.casefold():
+            return known
+    raise UnknownNameError("benchmark", name, _BUILDERS)

@@ -16,17 +16,46 @@ def check_file(
     ],
     catalogue: CatalogueOption = None,
 ) -> None:
-    """Check a file as loading would, build both engines' models, and say what it is.
+    """Check a robot, benchmark or controller file, and say what it is.
 
-    The first fault ends it with the file, the key, the value and the rule.
+    It is read as loading would read it, and a robot's models are built for both
+    engines. The first fault ends it with the file, the key, the value and the rule.
     """
+    from wbc_suite.tomlfile import read_toml
+
+    content = read_toml(file) if file.suffix == ".toml" else {"component": None}
+    if "name" in content:
+        print(f"{file}: fine. {_benchmark(file)}")
+    elif "frame" in content and "component" not in content:
+        print(f"{file}: fine. {_controller(file)}")
+    else:
+        print(f"{file}: fine. {_robot(file)}")
+
+
+def _robot(file: Path) -> str:
     from wbc_suite.robot import load_robot
 
-    robot = load_robot(f"{file}")
+    robot = load_robot(file)
     simulated = robot.to_mjspec().compile()
     computed = robot.to_pinocchio()
-    print(
-        f"{file}: fine. Robot '{robot.name}': {len(robot.links)} links, "
-        f"{robot.dof} dof, {robot.mass:.1f} kg, {robot.root.kind} root; "
-        f"MuJoCo and Pinocchio models with nv = {simulated.nv} and {computed.nv}."
+    return (
+        f"Robot '{robot.name}': {len(robot.links)} links, {robot.dof} dof, "
+        f"{robot.mass:.1f} kg, {robot.root.kind} root; MuJoCo and Pinocchio models "
+        f"with nv = {simulated.nv} and {computed.nv}."
     )
+
+
+def _benchmark(file: Path) -> str:
+    from wbc_suite.benchmark import load_benchmark
+
+    benchmark = load_benchmark(file)
+    return f"Benchmark '{benchmark.name}': {benchmark.horizon} actions an episode."
+
+
+def _controller(file: Path) -> str:
+    from wbc_suite.control.composite.config import WholeBodyIKConfig
+    from wbc_suite.tomlfile import load_model
+
+    config = load_model(WholeBodyIKConfig, file)
+    frames = ", ".join(frame.name for frame in config.frames)
+    return f"Whole-body controller of {frames}; {config.solve_hz:g} solves a second."

@@ -74,6 +74,11 @@ def _robots(catalogue: "Catalogue") -> "Table":
 
 def _files(catalogue: "Catalogue", kind: Kind) -> "Table":
     table = _table(kind.capitalize(), "name", "")
+    if kind is Kind.CONTROLLERS:
+        from wbc_suite.control.composite import composite_names
+
+        for name in composite_names():
+            table.add_row(name, "for any robot, with its file below when there is one")
     for path in catalogue.files(_FOLDERS[kind]):
         table.add_row(*_name_and_title(path))
     return table
