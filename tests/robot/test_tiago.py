@@ -104,3 +104,15 @@ def test_fingers_open_and_close_in_half_a_second(robot, model, data):
             for finger in ("left", "right"):
                 joint = f"{side}_gripper_{finger}_finger_joint"
                 assert data.joint(joint).qpos[0] == pytest.approx(width, abs=0.004)
+
+
+def test_no_pair_of_links_collides_in_every_posture(robot, model):
+    rng = np.random.default_rng(3)
+    data = mujoco.MjData(model)
+    always = None
+    for _ in range(100):
+        for joint in robot.joints:
+            data.joint(joint.name).qpos[0] = rng.uniform(*joint.range)
+        found = {frozenset(pair) for pair in penetrations(model, data)}
+        always = found if always is None else always & found
+    assert always == set()
