@@ -57,7 +57,7 @@ def list_catalogue(
 def _robots(catalogue: "Catalogue") -> "Table":
     from wbc_suite.robot import load_robot
 
-    table = _table("Robots", "name", "", "dof", "kg", "root", "postures", "limbs")
+    table = _table("Robots", "name", "", "dof", "kg", "root")
     for name in catalogue.names("robots"):
         robot = load_robot(name, catalogue=catalogue)
         table.add_row(
@@ -66,8 +66,6 @@ def _robots(catalogue: "Catalogue") -> "Table":
             str(robot.dof),
             f"{robot.mass:.1f}",
             robot.root.kind,
-            ", ".join(robot.keyframes),
-            ", ".join(robot.groups),
         )
     return table
 
@@ -100,5 +98,7 @@ def _table(title: str, *columns: str) -> "Table":
     table = Table(title=title, title_justify="left", title_style="bold", box=None)
     for column in columns:
         right = column in ("dof", "kg")
-        table.add_column(column, justify="right" if right else "left")
+        table.add_column(
+            column, justify="right" if right else "left", no_wrap=column == "name"
+        )
     return table
