@@ -94,7 +94,7 @@ class Bench:
             self.controller._conversion.q_to_mujoco(q, self.free.qpos)
             if self._touching(self.free.qpos) <= resting:
                 self.controller._configuration.update(q)
-                return [self.controller._frame_pose(k) for k in self.hands]
+                return [self.controller._planner.frame_pose(k) for k in self.hands]
         raise RuntimeError("no configuration free of collision in 1000 draws")
 
     def _touching(self, qpos):
@@ -140,7 +140,7 @@ class Bench:
         self.controller._configuration.update(q)
         worst = np.zeros(2)
         for k, goal in zip(self.hands, poses, strict=True):
-            pose = self.controller._frame_pose(k)
+            pose = self.controller._planner.frame_pose(k)
             error = (
                 np.linalg.norm(goal.translation - pose.translation),
                 np.linalg.norm(pin.log3(pose.rotation.T @ goal.rotation)),

@@ -14,7 +14,11 @@ __all__ = ["approach_pose", "approach_posture", "approach_speed"]
 
 
 def approach_speed(
-    distance: float | Vector, *, rate: float, speed: float, acceleration: float | Vector
+    distance: float | Vector,
+    *,
+    rate: float,
+    speed: float | Vector,
+    acceleration: float | Vector,
 ) -> Vector:
     """Return the speed to approach with.
 
@@ -63,14 +67,20 @@ def approach_pose(
 
 
 def approach_posture(
-    difference: Vector, *, dt: float, gain: float, speed: float, acceleration: Vector
+    difference: Vector, *, dt: float, speed: float | Vector, acceleration: Vector
 ) -> Vector:
-    """Return the part of a joint difference to ask for now, joint by joint."""
-    distance = np.abs(difference)
+    """Return joint velocities that take a joint difference away, joint by joint.
+
+    Args:
+        difference: From here to there, shape (nv,).
+        dt: The time constant of the last, exponential part, s.
+        speed: Greatest speeds.
+        acceleration: Decelerations, shape (nv,).
+    """
     wanted = approach_speed(
-        distance, rate=gain / dt, speed=speed, acceleration=acceleration
+        np.abs(difference), rate=1.0 / dt, speed=speed, acceleration=acceleration
     )
-    return np.sign(difference) * np.minimum(wanted * dt / gain, distance)
+    return np.sign(difference) * wanted
 
 
 def _part(

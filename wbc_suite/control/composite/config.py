@@ -103,6 +103,8 @@ class LimitsConfig(FrozenModel):
         velocity_scale: Factor on the robot's own velocity limits.
         acceleration: Greatest joint acceleration, rad/s^2 or m/s^2.
         base_acceleration: Greatest acceleration of a moving root, m/s^2 and rad/s^2.
+        effort_share: Part of a motor's effort that acceleration may take; it bounds
+            the joint's acceleration through the inertia at the posture.
         self_collision: Whether links are kept apart.
         collision_pairs: How many of the nearest pairs of links are watched.
         collision_distance: Distance kept between links, m.
@@ -112,9 +114,10 @@ class LimitsConfig(FrozenModel):
     velocity_scale: float = Field(default=1.0, gt=0.0, le=1.0)
     acceleration: PositiveFloat = 50.0
     base_acceleration: tuple[PositiveFloat, PositiveFloat] = (5.0, 10.0)
+    effort_share: float = Field(default=0.6, gt=0.0, le=1.0)
     self_collision: bool = True
     collision_pairs: int = Field(default=20, ge=1, le=200)
-    collision_distance: PositiveFloat = 0.01
+    collision_distance: PositiveFloat = 0.005
 
 
 class WholeBodyIKConfig(FrozenModel):
@@ -135,6 +138,9 @@ class WholeBodyIKConfig(FrozenModel):
         delta_rotation: Largest step of a delta action, rad.
         solve_hz: Solves per second.
         joint_law: Gains of the joint-position law.
+        far: Distances of a goal, m and rad, from which on a configuration that meets it
+            is searched first, and then approached joint by joint.
+        search_iterations: Iterations of that search in one solve.
         tolerance: Errors below which a frame counts as reached, m and rad.
     """
 
@@ -151,6 +157,8 @@ class WholeBodyIKConfig(FrozenModel):
     delta_rotation: PositiveFloat = 0.5
     solve_hz: Annotated[float, Field(ge=10.0, le=1000.0)] = 100.0
     joint_law: JointLawConfig = JointLawConfig()
+    far: tuple[PositiveFloat, PositiveFloat] = (0.15, 0.6)
+    search_iterations: int = Field(default=10, ge=0)
     tolerance: tuple[PositiveFloat, PositiveFloat] = (1e-3, 3.5e-3)
 
     @model_validator(mode="after")

@@ -6,6 +6,7 @@ import pinocchio as pin
 
 from wbc_suite.control.composite.backend import IkStep
 from wbc_suite.control.composite.config import ControlledFrame, WholeBodyIKConfig
+from wbc_suite.control.composite.tasks import frame_costs
 from wbc_suite.kinematics import Conversion
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Vector
@@ -86,19 +87,12 @@ class MinkBackend:
         weight = LEVEL_FACTOR**frame.level
         if frame.frame is None:
             return mink.ComTask(weight * frame.position_cost, gain=frame.gain)
-        position = np.full(3, weight * frame.position_cost)
-        orientation = np.full(3, weight * frame.orientation_cost)
-        if frame.kind == "orientation":
-            position[:] = 0.0
-        if frame.kind == "position":
-            orientation[:] = 0.0
-        if frame.kind == "base":
-            position[2] = orientation[0] = orientation[1] = 0.0
+        position, orientation = frame_costs(frame)
         return mink.FrameTask(
             frame.frame,
             self._frame_type(frame.frame),
-            position_cost=position,
-            orientation_cost=orientation,
+            position_cost=weight * position,
+            orientation_cost=weight * orientation,
             gain=frame.gain,
             lm_damping=1e-3,
         )

@@ -1,28 +1,19 @@
 """Inverse kinematics by this package's own QP task stack."""
 
-import numpy as np
 import pinocchio as pin
 
 from wbc_suite.control.composite.backend import IkStep
-from wbc_suite.control.composite.config import (
-    ControlledFrame,
-    HeldFrame,
-    WholeBodyIKConfig,
-)
+from wbc_suite.control.composite.config import WholeBodyIKConfig
+from wbc_suite.control.composite.tasks import held_equality, make_limits, make_task
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp import (
-    AccelerationLimit,
-    ComTask,
     Equality,
     FrameEquality,
     FrameTask,
-    Limit,
     LimitKind,
-    PositionLimit,
     PostureTask,
     Solution,
     TaskStack,
-    VelocityLimit,
 )
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Vector
@@ -47,8 +38,8 @@ class StackBackend:
             gain=config.posture.gain,
             level=config.posture.level,
         )
-        self._tasks = [_task_of(frame) for frame in config.frames]
-        self._held = [_held(held) for held in config.held]
+        self._tasks = [make_task(frame) for frame in config.frames]
+        self._held = [held_equality(held) for held in config.held]
         equalities: list[Equality] = list(self._held)
         if robot.root.kind == "planar" and robot.root.drive == "differential":
             base = robot.links[0].name
@@ -57,8 +48,9 @@ class StackBackend:
         self._stack = TaskStack(
             self.configuration,
             [*self._tasks, self._posture],
-            limits=_limits(robot, config),
+            limits=make_limits(robot, config),
             equalities=equalities,
+            escape=False,
         )
 
     def reset(self, q: Vector) -> None:
@@ -85,64 +77,6 @@ class StackBackend:
         self.configuration.update(q)
         solution = self._stack.solve(dt)
         return IkStep(v=solution.v, limits=_words(solution), ok=solution.ok)
-
-
-def _task_of(frame: ControlledFrame) -> FrameTask | ComTask:
-    if frame.kind == "com":
-        return ComTask(
-            frame.position_cost,
-            gain=frame.gain,
-            level=frame.level,
-            max_speed=frame.max_linear_speed,
-            name=frame.name,
-        )
-    linear, angular = frame.position_cost, frame.orientation_cost
-    position, orientation = np.full(3, linear), np.full(3, angular)
-    if frame.kind == "orientation":
-        position[:] = 0.0
-    if frame.kind == "position":
-        orientation[:] = 0.0
-    if frame.kind == "base":
-        position[2] = orientation[0] = orientation[1] = 0.0
-    return FrameTask(
-        str(frame.frame),
-        position_cost=position,
-        orientation_cost=orientation,
-        gain=frame.gain,
-        level=frame.level,
-        max_linear_speed=frame.max_linear_speed,
-        max_angular_speed=frame.max_angular_speed,
-        name=frame.name,
-    )
-
-
-def _held(held: HeldFrame) -> FrameEquality:
-    if held.contact == "surface":
-        return FrameEquality(held.frame)
-    return FrameEquality(held.frame, directions=("x", "y", "z"))
-
-
-def _limits(robot: RobotDescription, config: WholeBodyIKConfig) -> list[Limit]:
-    limits = config.limits
-    linear, angular = robot.root.velocity
-    base_linear, base_angular = limits.base_acceleration
-    own = {
-        j.name: min(j.acceleration, limits.acceleration)
-        for j in robot.joints
-        if j.acceleration is not None
-    }
-    return [
-        PositionLimit(margin=limits.position_margin),
-        VelocityLimit(
-            base_linear=linear, base_angular=angular, scale=limits.velocity_scale
-        ),
-        AccelerationLimit(
-            limits.acceleration,
-            joints=own,
-            base_linear=base_linear,
-            base_angular=base_angular,
-        ),
-    ]
 
 
 def _words(solution: Solution) -> tuple[tuple[str | None, str], ...]:

@@ -36,6 +36,7 @@ def computed_torque(
     *,
     mass_matrix: Matrix,
     bias: Vector,
+    acceleration: Vector,
     position_error: Vector,
     velocity_error: Vector,
     kp: float,
@@ -43,14 +44,15 @@ def computed_torque(
 ) -> Vector:
     """Return torques that make the tracking error obey e'' + kd e' + kp e = 0.
 
-        tau = M (kp e + kd e') + h
+        tau = M (a + kp e + kd e') + h
 
-    It is the minimiser of `|| M^-1 (tau - h) - (kp e + kd e') ||^2`, and every error
+    It is the minimiser of `|| M^-1 (tau - h) - (a + kp e + kd e') ||^2`, and every error
     decays alike, whatever the inertia, as long as no torque saturates.
 
     Args:
         mass_matrix: M of the driven joints, shape (n, n).
         bias: h, Coriolis, centrifugal, gravity less passive forces, shape (n,).
+        acceleration: a, of the target, shape (n,).
         position_error: e, target less measured, shape (n,).
         velocity_error: e', shape (n,).
         kp: Stiffness, 1/s^2.
@@ -61,7 +63,8 @@ def computed_torque(
 
     Source: Siciliano et al. (2009), "Robotics", section 8.5.2.
     """
-    return mass_matrix @ (kp * position_error + kd * velocity_error) + bias
+    wanted = acceleration + kp * position_error + kd * velocity_error
+    return mass_matrix @ wanted + bias
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -71,15 +74,19 @@ class JointTarget:
     Attributes:
         position: Of the driven joints, rad or m.
         velocity: Of the driven joints, rad/s or m/s.
+        acceleration: Of the driven joints, rad/s^2 or m/s^2.
         root: Pose of a free root; None for the others.
         root_twist: Velocity of a free root, linear in world axes and angular in its
             own, shape (6,).
+        root_acceleration: Its derivative, in the same axes, shape (6,).
     """
 
     position: Vector
     velocity: Vector
+    acceleration: Vector
     root: pin.SE3 | None = None
     root_twist: Vector | None = None
+    root_acceleration: Vector | None = None
 
 
 class JointPositionLaw:
@@ -117,6 +124,7 @@ class JointPositionLaw:
         tau = computed_torque(
             mass_matrix=state.mass_matrix()[self._block],
             bias=(data.qfrc_bias - data.qfrc_passive)[self.v_index],
+            acceleration=target.acceleration,
             position_error=target.position - data.qpos[self.q_index],
             velocity_error=target.velocity - data.qvel[self.v_index],
             kp=self.config.kp,

@@ -53,7 +53,7 @@ def contact_forces(root_jacobian: Matrix, wrench: Vector, weights: Vector) -> Ve
 class StanceLaw:
     """Inverse dynamics through contacts, on a robot with a free root.
 
-        a     = kp e + kd e'                     root and joints alike
+        a     = a* + kp e + kd e'                root and joints alike
         f     = contact forces with  J_r^T f = M_r a + h_r
         tau   = M_j a + h_j - J_j^T f
 
@@ -105,7 +105,9 @@ class StanceLaw:
     def torque(self, state: RobotState, target: JointTarget) -> Vector:
         """Return torques within the motors' limits; see `JointPositionLaw.torque`."""
         position_error, velocity_error = self._errors(state, target)
-        wanted = self.config.kp * position_error + self.config.kd * velocity_error
+        assert target.root_acceleration is not None
+        wanted = np.concatenate([target.root_acceleration, target.acceleration])
+        wanted += self.config.kp * position_error + self.config.kd * velocity_error
         data = state.data
         bias = (data.qfrc_bias - data.qfrc_passive)[self._dofs]
         force = state.mass_matrix()[self._block] @ wanted + bias

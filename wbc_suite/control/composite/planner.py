@@ -1,0 +1,207 @@
+"""Where to go next: straight to the goals, or joint by joint to a known posture."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from wbc_suite.control.composite.approach import approach_pose, approach_posture
+from wbc_suite.control.composite.config import ControlledFrame, WholeBodyIKConfig
+from wbc_suite.control.composite.search import GoalSearch
+from wbc_suite.control.composite.tasks import joint_accelerations
+from wbc_suite.kinematics import Configuration
+from wbc_suite.robot import RobotDescription
+from wbc_suite.typing import Vector
+
+__all__ = ["Planner", "Waypoint"]
+
+STANDING = 0.02  # rad/s or m/s
+STUCK_AFTER = 0.1  # s of standing
+ARRIVED = 5e-3  # rad or m; from here on goals are approached straight
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Waypoint:
+    """What the IK is asked for in one solve."""
+
+    targets: list[pin.SE3]
+    posture: Vector
+
+
+class Planner:
+    """Turns goals into targets nearby that one can brake for.
+
+    Near goals are approached on a straight line. For far ones, and where the straight
+    line ends in a trap, a configuration that meets all of level 0 is searched; joints
+    then go there each at its own speed, and frames are asked for what follows from it.
+    A goal that no configuration meets is approached straight, as near as one gets.
+
+    Args:
+        robot: The reduced robot.
+        config: Controlled frames.
+        configuration: The commanded configuration; read, and moved by the owner.
+        accept: Tells whether a configuration found will do.
+        dt: Time between solves, s.
+    """
+
+    def __init__(
+        self,
+        robot: RobotDescription,
+        config: WholeBodyIKConfig,
+        configuration: Configuration,
+        *,
+        accept: Callable[[Vector], bool],
+        dt: float,
+    ) -> None:
+        self._config, self._dt = config, dt
+        self._configuration = configuration
+        self._ahead = Configuration(configuration.model)
+        self._search = GoalSearch(robot, config, accept)
+        self._first = [k for k, f in enumerate(config.frames) if f.level == 0]
+        self._braking = config.posture.braking * _braking(robot, config, configuration)
+        self._speed = _speeds(robot, configuration)
+        self.reset(configuration.q)
+
+    def reset(self, posture: Vector) -> None:
+        """Forget the past.
+
+        Args:
+            posture: Configuration to prefer.
+        """
+        self._posture = posture
+        self._plan: Vector | None = None
+        self._search.stop()
+        self._still, self._is_new, self._answered = 0.0, False, False
+
+    def renew(self) -> None:
+        """Say that goals have changed."""
+        self._is_new = True
+
+    def next(self, goals: Sequence[pin.SE3], v: Vector) -> Waypoint:
+        """Return what to ask for now.
+
+        Args:
+            goals: Goals in the world of the commanded robot.
+            v: Velocity of the last solve, shape (nv,).
+        """
+        self._watch(goals, v)
+        if self._search.is_running:
+            found = self._search.advance(self._config.search_iterations)
+            self._plan = self._plan if found is None else found
+        if self._plan is not None:
+            return self._joint_by_joint(self._plan, goals)
+        return self._straight(goals)
+
+    def _watch(self, goals: Sequence[pin.SE3], v: Vector) -> None:
+        """Begin a search, or give a plan up, when it is time to."""
+        standing = float(np.abs(v).max(initial=0.0)) < STANDING
+        self._still = self._still + self._dt if standing else 0.0
+        if self._is_new:
+            self._is_new = self._answered = False
+            self._still, self._plan = 0.0, None
+            self._search.stop()
+            if self._is_far(goals, self._config.far):
+                self._begin(goals)
+        elif self._still > STUCK_AFTER and not self._search.is_running:
+            if self._plan is not None:
+                self._plan = None
+            elif not self._answered and self._is_far(goals, self._config.tolerance):
+                self._begin(goals)
+
+    def _begin(self, goals: Sequence[pin.SE3]) -> None:
+        self._answered = True
+        q = self._configuration.q
+        self._search.start(goals, [q, self._posture], q)
+
+    def _is_far(self, goals: Sequence[pin.SE3], far: tuple[float, float]) -> bool:
+        for k in self._first:
+            linear, angular = _distances(
+                self._config.frames[k], self.frame_pose(k), goals[k]
+            )
+            if linear > far[0] or angular > far[1]:
+                return True
+        return False
+
+    def _joint_by_joint(self, plan: Vector, goals: Sequence[pin.SE3]) -> Waypoint:
+        difference = self._configuration.difference(plan)
+        if float(np.abs(difference).max()) < ARRIVED:
+            self._plan = None
+        step = self._dt * approach_posture(
+            difference, dt=self._dt, speed=self._speed, acceleration=self._braking
+        )
+        targets = self._straight(goals).targets
+        for k in self._first:
+            gain = self._config.frames[k].gain
+            self._ahead.update(self._configuration.integrate(step / gain))
+            targets[k] = _frame_pose(self._ahead, self._config.frames[k])
+        posture = self._configuration.integrate(step / self._config.posture.gain)
+        return Waypoint(targets=targets, posture=posture)
+
+    def _straight(self, goals: Sequence[pin.SE3]) -> Waypoint:
+        targets = [
+            approach_pose(
+                self.frame_pose(k),
+                goals[k],
+                dt=self._dt,
+                gain=frame.gain,
+                speed=(frame.max_linear_speed, frame.max_angular_speed),
+                acceleration=(frame.linear_braking, frame.angular_braking),
+            )
+            for k, frame in enumerate(self._config.frames)
+        ]
+        posture = self._config.posture
+        speed = approach_posture(
+            self._configuration.difference(self._posture),
+            dt=self._dt / posture.gain,
+            speed=posture.speed,
+            acceleration=self._braking,
+        )
+        return Waypoint(
+            targets=targets,
+            posture=self._configuration.integrate(self._dt / posture.gain * speed),
+        )
+
+    def frame_pose(self, k: int) -> pin.SE3:
+        """Return the pose of a controlled frame at the commanded configuration."""
+        return _frame_pose(self._configuration, self._config.frames[k])
+
+
+def _frame_pose(configuration: Configuration, frame: ControlledFrame) -> pin.SE3:
+    if frame.frame is None:
+        return pin.SE3(np.eye(3), configuration.com.copy())
+    return configuration.frame_pose(frame.frame)
+
+
+def _distances(
+    frame: ControlledFrame, now: pin.SE3, goal: pin.SE3
+) -> tuple[float, float]:
+    """Return distances that count for the frame's kind, m and rad."""
+    offset = goal.translation - now.translation
+    turn = pin.log3(now.rotation.T @ goal.rotation)
+    if frame.kind == "base":
+        offset, turn = offset[:2], turn[2:]
+    linear = 0.0 if frame.kind == "orientation" else float(np.linalg.norm(offset))
+    still = frame.kind in ("position", "com")
+    return linear, 0.0 if still else float(np.linalg.norm(turn))
+
+
+def _braking(
+    robot: RobotDescription, config: WholeBodyIKConfig, configuration: Configuration
+) -> Vector:
+    """Return the acceleration limit of each velocity."""
+    limits = np.full(configuration.nv, config.limits.acceleration)
+    limits[configuration.root_linear] = config.limits.base_acceleration[0]
+    limits[configuration.root_angular] = config.limits.base_acceleration[1]
+    for name, value in joint_accelerations(robot, config).items():
+        limits[configuration.model.joints[configuration.joint_id(name)].idx_v] = value
+    return limits
+
+
+def _speeds(robot: RobotDescription, configuration: Configuration) -> Vector:
+    """Return the speed limit of each velocity."""
+    known = np.array(configuration.model.velocityLimit)
+    speeds = np.where((known > 0.0) & (known < 1e10), known, 10.0)
+    speeds[configuration.root_linear] = robot.root.velocity[0]
+    speeds[configuration.root_angular] = robot.root.velocity[1]
+    return speeds

@@ -1,0 +1,157 @@
+"""Find a configuration that meets far targets, before moving towards them.
+
+Differential inverse kinematics goes downhill from where the robot is, and far targets
+have valleys in between. The search lets the same QP run ahead on a copy of the robot,
+from several starts, a few iterations per solve of the controller.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+import pinocchio as pin
+
+from wbc_suite.control.composite.config import WholeBodyIKConfig
+from wbc_suite.control.composite.tasks import held_equality, make_task
+from wbc_suite.kinematics import Configuration
+from wbc_suite.qp import ComTask, FrameTask, PositionLimit, TaskStack, VelocityLimit
+from wbc_suite.robot import RobotDescription
+from wbc_suite.typing import Vector
+
+__all__ = ["GoalSearch"]
+
+STEP = 0.1  # s; one iteration goes as far as joints can in this time
+ITERATIONS = 40  # of one start
+STARTS = 12
+PATIENCE = 8  # iterations without progress end a start
+MET = 1e-7  # m and rad
+
+
+class GoalSearch:
+    """Searches a configuration at which all frames of level 0 meet their targets.
+
+    Starts from where the robot is, from its posture, and from random configurations,
+    always the same ones. Joint limits and held frames are kept.
+
+    Args:
+        robot: The reduced robot.
+        config: Controlled and held frames.
+        accept: Tells whether a configuration will do, such as free of collision.
+    """
+
+    def __init__(
+        self,
+        robot: RobotDescription,
+        config: WholeBodyIKConfig,
+        accept: Callable[[Vector], bool],
+    ) -> None:
+        self._accept = accept
+        self._configuration = Configuration(robot.to_pinocchio())
+        first = [(k, f) for k, f in enumerate(config.frames) if f.level == 0]
+        self._frames = [k for k, _ in first]
+        self._tasks = [make_task(frame, unhurried=False) for _, frame in first]
+        self._held = [held_equality(held) for held in config.held]
+        linear, angular = robot.root.velocity
+        self._stack = TaskStack(
+            self._configuration,
+            self._tasks,
+            limits=[
+                PositionLimit(margin=2.0 * config.limits.position_margin),
+                VelocityLimit(base_linear=linear, base_angular=angular),
+            ],
+            equalities=self._held,
+            damping=1e-6,
+            escape=False,
+        )
+        self._run: Iterator[Vector | None] | None = None
+
+    @property
+    def is_running(self) -> bool:
+        """Whether there are starts left to try."""
+        return self._run is not None
+
+    def stop(self) -> None:
+        """Give up."""
+        self._run = None
+
+    def start(
+        self, goals: Sequence[pin.SE3], starts: Sequence[Vector], held: Vector
+    ) -> None:
+        """Begin.
+
+        Args:
+            goals: Goals of all controlled frames in the world.
+            starts: Configurations to start from, best first.
+            held: Configuration that tells where held frames are.
+        """
+        self._configuration.update(held)
+        for equality in self._held:
+            equality.set_target(self._configuration.frame_pose(equality.frame))
+        for k, task in zip(self._frames, self._tasks, strict=True):
+            _aim(task, goals[k])
+        self._run = self._search([q.copy() for q in starts])
+
+    def advance(self, iterations: int) -> Vector | None:
+        """Run some iterations; return a configuration once one is found."""
+        for _ in range(iterations):
+            if self._run is None:
+                return None
+            found = next(self._run, self)
+            if isinstance(found, GoalSearch):
+                self._run = None
+            elif found is not None:
+                self._run = None
+                return found
+        return None
+
+    def _search(self, starts: list[Vector]) -> Iterator[Vector | None]:
+        """Yield None after each iteration, and what was found."""
+        rng = np.random.default_rng(0)
+        for trial in range(STARTS):
+            q = starts[trial] if trial < len(starts) else self._random(starts[0], rng)
+            yield from self._descend(q)
+
+    def _descend(self, q: Vector) -> Iterator[Vector | None]:
+        self._stack.reset()
+        best, waited = np.inf, 0
+        for _ in range(ITERATIONS):
+            self._configuration.update(q)
+            error = self._error()
+            if error < MET:
+                yield q if self._accept(q) else None
+                return
+            waited = 0 if error < 0.95 * best else waited + 1
+            best = min(best, error)
+            if waited > PATIENCE:
+                return
+            q = self._configuration.integrate(self._stack.solve(STEP).dq)
+            yield None
+
+    def _error(self) -> float:
+        """Return the largest error of all frames, m or rad."""
+        worst = 0.0
+        for task in self._tasks:
+            error = task.error(self._configuration)
+            if isinstance(task, FrameTask):
+                error = error * (task.packed[12:18] > 0.0)
+            worst = max(worst, float(np.abs(error).max()))
+        return worst
+
+    def _random(self, q: Vector, rng: np.random.Generator) -> Vector:
+        """Return random joints within their limits; the root stays."""
+        model, drawn = self._configuration.model, q.copy()
+        low, high = model.lowerPositionLimit, model.upperPositionLimit
+        draw = rng.uniform(size=model.nq)
+        root = {*self._configuration.root_linear, *self._configuration.root_angular}
+        for joint in list(model.joints)[1:]:
+            k = joint.idx_q
+            if joint.nq > 1 or joint.idx_v in root or not low[k] < high[k] < 1e6:
+                continue
+            drawn[k] = low[k] + draw[k] * (high[k] - low[k])
+        return drawn
+
+
+def _aim(task: FrameTask | ComTask, goal: pin.SE3) -> None:
+    if isinstance(task, FrameTask):
+        task.set_target(goal)
+    else:
+        task.set_target(goal.translation)

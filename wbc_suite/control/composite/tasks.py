@@ -1,0 +1,138 @@
+"""QP tasks, equality rows and limits out of a whole-body config."""
+
+import numpy as np
+import pinocchio as pin
+
+from wbc_suite.control.composite.config import (
+    ControlledFrame,
+    HeldFrame,
+    WholeBodyIKConfig,
+)
+from wbc_suite.qp import (
+    AccelerationLimit,
+    ComTask,
+    FrameEquality,
+    FrameTask,
+    Limit,
+    PositionLimit,
+    SelfCollisionLimit,
+    VelocityLimit,
+)
+from wbc_suite.robot import RobotDescription
+from wbc_suite.typing import Vector
+
+__all__ = [
+    "frame_costs",
+    "held_equality",
+    "joint_accelerations",
+    "make_limits",
+    "make_task",
+]
+
+HURRY = 1e3
+"""Speed limit, m/s and rad/s, of tasks that something else slows."""
+
+
+def frame_costs(frame: ControlledFrame) -> tuple[Vector, Vector]:
+    """Return costs of position (world axes) and orientation (the frame's axes)."""
+    position = np.full(3, frame.position_cost)
+    orientation = np.full(3, frame.orientation_cost)
+    match frame.kind:
+        case "orientation":
+            position[:] = 0.0
+        case "position":
+            orientation[:] = 0.0
+        case "base":
+            position[2] = orientation[0] = orientation[1] = 0.0
+    return position, orientation
+
+
+def make_task(frame: ControlledFrame, *, unhurried: bool = True) -> FrameTask | ComTask:
+    """Return the QP task of a controlled frame.
+
+    Args:
+        frame: The frame.
+        unhurried: False asks for the whole error in one step.
+    """
+    gain = frame.gain if unhurried else 1.0
+    level = frame.level if unhurried else 0
+    if frame.frame is None:
+        return ComTask(
+            frame.position_cost,
+            gain=gain,
+            level=level,
+            max_speed=HURRY,
+            name=frame.name,
+        )
+    position, orientation = frame_costs(frame)
+    return FrameTask(
+        frame.frame,
+        position_cost=position,
+        orientation_cost=orientation,
+        gain=gain,
+        level=level,
+        max_linear_speed=HURRY,
+        max_angular_speed=HURRY,
+        name=frame.name,
+    )
+
+
+def held_equality(held: HeldFrame) -> FrameEquality:
+    """Return the rows that hold a frame."""
+    if held.contact == "surface":
+        return FrameEquality(held.frame)
+    return FrameEquality(held.frame, directions=("x", "y", "z"))
+
+
+def make_limits(robot: RobotDescription, config: WholeBodyIKConfig) -> list[Limit]:
+    """Return the limits of the command."""
+    limits = config.limits
+    linear, angular = robot.root.velocity
+    base_linear, base_angular = limits.base_acceleration
+    made: list[Limit] = [
+        PositionLimit(margin=limits.position_margin),
+        VelocityLimit(
+            base_linear=linear, base_angular=angular, scale=limits.velocity_scale
+        ),
+        AccelerationLimit(
+            limits.acceleration,
+            joints=joint_accelerations(robot, config),
+            base_linear=base_linear,
+            base_angular=base_angular,
+        ),
+    ]
+    if limits.self_collision:
+        made.append(
+            SelfCollisionLimit.of_robot(
+                robot, nearest=limits.collision_pairs, margin=limits.collision_distance
+            )
+        )
+    return made
+
+
+def joint_accelerations(
+    robot: RobotDescription, config: WholeBodyIKConfig
+) -> dict[str, float]:
+    """Return what each joint can accelerate, rad/s^2 or m/s^2.
+
+    The least of the config's limit, the robot's own, and what a part of the motor's
+    effort gives against the inertia M_ii at the posture.
+    """
+    model = robot.to_pinocchio()
+    data = model.createData()
+    q = pin.neutral(model)
+    name = config.posture.keyframe
+    if name in robot.keyframes:
+        q = model.referenceConfigurations[name]
+    inertia = np.diag(pin.crba(model, data, q))
+    found: dict[str, float] = {}
+    for joint in robot.joints:
+        limit = config.limits.acceleration
+        if joint.acceleration is not None:
+            limit = min(limit, joint.acceleration)
+        if joint.effort is not None:
+            index = model.joints[model.getJointId(joint.name)].idx_v
+            force = config.limits.effort_share * joint.effort
+            limit = min(limit, max(force / float(inertia[index]), 1.0))
+        found[joint.name] = limit
+    return found
