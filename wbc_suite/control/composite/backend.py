@@ -47,5 +47,12 @@ class IkBackend(Protocol):
         ...
 
     def solve(self, q: Vector, dt: float) -> IkStep:
-        """Return the velocity to move with for dt seconds; never raises."""
+        """Return the velocity towards the targets for dt seconds; never raises."""
+        ...
+
+    def solve_posture(self, q: Vector, posture: Vector, dt: float) -> IkStep:
+        """Return the velocity that takes joints to a configuration within dt.
+
+        Limits and held frames are kept, controlled frames are left out.
+        """
         ...

@@ -91,7 +91,7 @@ class PostureConfig(FrozenModel):
     costs: dict[Name, NonNegativeFloat] = {}
     level: int = Field(default=1, ge=0, le=3)
     gain: float = Field(default=0.1, gt=0.0, le=1.0)
-    speed: PositiveFloat = 3.0
+    speed: PositiveFloat = 1.0
     braking: float = Field(default=0.5, gt=0.0, le=1.0)
 
 
@@ -158,7 +158,7 @@ class WholeBodyIKConfig(FrozenModel):
     solve_hz: Annotated[float, Field(ge=10.0, le=1000.0)] = 100.0
     joint_law: JointLawConfig = JointLawConfig()
     far: tuple[PositiveFloat, PositiveFloat] = (0.15, 0.6)
-    search_iterations: int = Field(default=10, ge=0)
+    search_iterations: int = Field(default=25, ge=0)
     tolerance: tuple[PositiveFloat, PositiveFloat] = (1e-3, 3.5e-3)
 
     @model_validator(mode="after")

@@ -39,6 +39,7 @@ class MinkBackend:
         self._posture = mink.PostureTask(
             self._model, self._posture_costs(), gain=config.posture.gain
         )
+        self._joints = mink.PostureTask(self._model, self._joint_costs(robot))
         self._held = [self._hold(held.frame, held.contact) for held in config.held]
         self._limits = self._make_limits(robot)
 
@@ -62,11 +63,19 @@ class MinkBackend:
 
     def solve(self, q: Vector, dt: float) -> IkStep:
         """Solve one tick; hold still where mink finds no solution."""
+        return self._solve(q, [*self._tasks, self._posture], dt)
+
+    def solve_posture(self, q: Vector, posture: Vector, dt: float) -> IkStep:
+        """Solve one tick without frames."""
+        self._joints.set_target(self._conversion.q_to_mujoco(posture))
+        return self._solve(q, [self._joints], dt)
+
+    def _solve(self, q: Vector, tasks: list[mink.Task], dt: float) -> IkStep:
         self._configuration.update(self._conversion.q_to_mujoco(q))
         try:
             v = mink.solve_ik(
                 self._configuration,
-                [*self._tasks, self._posture],
+                tasks,
                 dt,
                 "daqp",
                 damping=1e-6,
@@ -111,6 +120,12 @@ class MinkBackend:
                 costs[first] = factor * posture.costs[joint.name]
             if joint.name.startswith("root"):
                 costs[first : first + (6 if joint.type[0] == 0 else 1)] = 0.0
+        return costs
+
+    def _joint_costs(self, robot: RobotDescription) -> Vector:
+        costs = np.ones(self._model.nv)
+        if robot.root.kind == "free":
+            costs[:6] = 0.0
         return costs
 
     def _hold(self, frame: str, contact: str) -> mink.FrameTask:

@@ -23,10 +23,15 @@ ARRIVED = 5e-3  # rad or m; from here on goals are approached straight
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Waypoint:
-    """What the IK is asked for in one solve."""
+    """What the IK is asked for in one solve.
 
-    targets: list[pin.SE3]
+    Attributes:
+        posture: Configuration to prefer; without targets, to go to at once.
+        targets: Poses of the controlled frames, or None to move joint by joint.
+    """
+
     posture: Vector
+    targets: list[pin.SE3] | None = None
 
 
 class Planner:
@@ -34,7 +39,7 @@ class Planner:
 
     Near goals are approached on a straight line. For far ones, and where the straight
     line ends in a trap, a configuration that meets all of level 0 is searched; joints
-    then go there each at its own speed, and frames are asked for what follows from it.
+    then go there each at its own speed.
     A goal that no configuration meets is approached straight, as near as one gets.
 
     Args:
@@ -56,7 +61,6 @@ class Planner:
     ) -> None:
         self._config, self._dt = config, dt
         self._configuration = configuration
-        self._ahead = Configuration(configuration.model)
         self._search = GoalSearch(robot, config, accept)
         self._first = [k for k, f in enumerate(config.frames) if f.level == 0]
         self._braking = config.posture.braking * _braking(robot, config, configuration)
@@ -67,9 +71,9 @@ class Planner:
         """Forget the past.
 
         Args:
-            posture: Configuration to prefer.
+            posture: Configuration to prefer, until a search has found another.
         """
-        self._posture = posture
+        self._posture = self._rest = posture
         self._plan: Vector | None = None
         self._search.stop()
         self._still, self._is_new, self._answered = 0.0, False, False
@@ -90,7 +94,7 @@ class Planner:
             found = self._search.advance(self._config.search_iterations)
             self._plan = self._plan if found is None else found
         if self._plan is not None:
-            return self._joint_by_joint(self._plan, goals)
+            return self._joint_by_joint(self._plan)
         return self._straight(goals)
 
     def _watch(self, goals: Sequence[pin.SE3], v: Vector) -> None:
@@ -102,6 +106,7 @@ class Planner:
             self._still, self._plan = 0.0, None
             self._search.stop()
             if self._is_far(goals, self._config.far):
+                self._rest = self._posture
                 self._begin(goals)
         elif self._still > STUCK_AFTER and not self._search.is_running:
             if self._plan is not None:
@@ -123,20 +128,14 @@ class Planner:
                 return True
         return False
 
-    def _joint_by_joint(self, plan: Vector, goals: Sequence[pin.SE3]) -> Waypoint:
+    def _joint_by_joint(self, plan: Vector) -> Waypoint:
         difference = self._configuration.difference(plan)
         if float(np.abs(difference).max()) < ARRIVED:
-            self._plan = None
-        step = self._dt * approach_posture(
+            self._rest, self._plan = plan, None
+        speed = approach_posture(
             difference, dt=self._dt, speed=self._speed, acceleration=self._braking
         )
-        targets = self._straight(goals).targets
-        for k in self._first:
-            gain = self._config.frames[k].gain
-            self._ahead.update(self._configuration.integrate(step / gain))
-            targets[k] = _frame_pose(self._ahead, self._config.frames[k])
-        posture = self._configuration.integrate(step / self._config.posture.gain)
-        return Waypoint(targets=targets, posture=posture)
+        return Waypoint(posture=self._configuration.integrate(self._dt * speed))
 
     def _straight(self, goals: Sequence[pin.SE3]) -> Waypoint:
         targets = [
@@ -152,7 +151,7 @@ class Planner:
         ]
         posture = self._config.posture
         speed = approach_posture(
-            self._configuration.difference(self._posture),
+            self._configuration.difference(self._rest),
             dt=self._dt / posture.gain,
             speed=posture.speed,
             acceleration=self._braking,

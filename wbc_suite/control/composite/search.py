@@ -11,9 +11,21 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.control.composite.config import WholeBodyIKConfig
-from wbc_suite.control.composite.tasks import held_equality, make_task
+from wbc_suite.control.composite.tasks import (
+    HURRY,
+    held_equality,
+    make_task,
+    planar_joints,
+)
 from wbc_suite.kinematics import Configuration
-from wbc_suite.qp import ComTask, FrameTask, PositionLimit, TaskStack, VelocityLimit
+from wbc_suite.qp import (
+    ComTask,
+    FrameTask,
+    PositionLimit,
+    PostureTask,
+    TaskStack,
+    VelocityLimit,
+)
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Vector
 
@@ -22,7 +34,9 @@ __all__ = ["GoalSearch"]
 STEP = 0.1  # s; one iteration goes as far as joints can in this time
 ITERATIONS = 40  # of one start
 STARTS = 12
-PATIENCE = 8  # iterations without progress end a start
+PATIENCE = 5  # iterations without progress end a start
+NEARBY = 0.05  # [cost] s; how dear it is to be a second away from the start
+CLOSE = 0.02  # m and rad; from here on only the targets count
 MET = 1e-7  # m and rad
 
 
@@ -51,16 +65,23 @@ class GoalSearch:
         self._tasks = [make_task(frame, unhurried=False) for _, frame in first]
         self._held = [held_equality(held) for held in config.held]
         linear, angular = robot.root.velocity
-        self._stack = TaskStack(
-            self._configuration,
-            self._tasks,
-            limits=[
-                PositionLimit(margin=2.0 * config.limits.position_margin),
-                VelocityLimit(base_linear=linear, base_angular=angular),
-            ],
-            equalities=self._held,
-            damping=1e-6,
-            escape=False,
+        limits = [
+            PositionLimit(margin=2.0 * config.limits.position_margin),
+            VelocityLimit(base_linear=linear, base_angular=angular),
+        ]
+        self._start = PostureTask(
+            NEARBY, costs=_costs(robot), max_speed=HURRY, name="start"
+        )
+        self._near, self._exact = (
+            TaskStack(
+                self._configuration,
+                [*self._tasks, *more],
+                limits=limits,
+                equalities=self._held,
+                damping=1e-6,
+                escape=False,
+            )
+            for more in ((self._start,), ())
         )
         self._run: Iterator[Vector | None] | None = None
 
@@ -111,8 +132,10 @@ class GoalSearch:
             yield from self._descend(q)
 
     def _descend(self, q: Vector) -> Iterator[Vector | None]:
-        self._stack.reset()
-        best, waited = np.inf, 0
+        self._near.reset()
+        self._exact.reset()
+        self._start.set_target(q)
+        stack, best, waited = self._near, np.inf, 0
         for _ in range(ITERATIONS):
             self._configuration.update(q)
             error = self._error()
@@ -121,9 +144,11 @@ class GoalSearch:
                 return
             waited = 0 if error < 0.95 * best else waited + 1
             best = min(best, error)
-            if waited > PATIENCE:
+            if waited > PATIENCE and stack is self._exact:
                 return
-            q = self._configuration.integrate(self._stack.solve(STEP).dq)
+            if error < CLOSE or waited > 2:
+                stack = self._exact
+            q = self._configuration.integrate(stack.solve(STEP).dq)
             yield None
 
     def _error(self) -> float:
@@ -148,6 +173,16 @@ class GoalSearch:
                 continue
             drawn[k] = low[k] + draw[k] * (high[k] - low[k])
         return drawn
+
+
+def _costs(robot: RobotDescription) -> dict[str, float]:
+    """Return costs that measure joint distances in seconds at full speed."""
+    costs = {j.name: NEARBY / (j.velocity or 10.0) for j in robot.joints}
+    linear, angular = robot.root.velocity
+    speeds = (linear, linear, angular)
+    for name, speed in zip(planar_joints(robot), speeds, strict=False):
+        costs[name] = NEARBY / speed
+    return costs
 
 
 def _aim(task: FrameTask | ComTask, goal: pin.SE3) -> None:

@@ -4,7 +4,13 @@ import pinocchio as pin
 
 from wbc_suite.control.composite.backend import IkStep
 from wbc_suite.control.composite.config import WholeBodyIKConfig
-from wbc_suite.control.composite.tasks import held_equality, make_limits, make_task
+from wbc_suite.control.composite.tasks import (
+    HURRY,
+    held_equality,
+    make_limits,
+    make_task,
+    planar_joints,
+)
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp import (
     Equality,
@@ -45,10 +51,24 @@ class StackBackend:
             base = robot.links[0].name
             sideways = FrameEquality(base, directions=("y",), hold_pose=False)
             equalities.append(sideways)
+        limits = make_limits(robot, config)
         self._stack = TaskStack(
             self.configuration,
             [*self._tasks, self._posture],
-            limits=make_limits(robot, config),
+            limits=limits,
+            equalities=equalities,
+            escape=False,
+        )
+        self._joints = PostureTask(
+            1.0,
+            costs=dict.fromkeys(planar_joints(robot), 1.0),
+            max_speed=HURRY,
+            name="configuration",
+        )
+        self._joint_stack = TaskStack(
+            self.configuration,
+            [self._joints],
+            limits=limits,
             equalities=equalities,
             escape=False,
         )
@@ -59,6 +79,7 @@ class StackBackend:
         for held in self._held:
             held.set_target(self.configuration.frame_pose(held.frame))
         self._stack.reset()
+        self._joint_stack.reset()
 
     def set_target(self, index: int, target: pin.SE3) -> None:
         """Set a controlled frame's target."""
@@ -75,7 +96,18 @@ class StackBackend:
     def solve(self, q: Vector, dt: float) -> IkStep:
         """Solve one tick of the stack."""
         self.configuration.update(q)
-        solution = self._stack.solve(dt)
+        return self._step(self._stack, self._joint_stack, dt)
+
+    def solve_posture(self, q: Vector, posture: Vector, dt: float) -> IkStep:
+        """Solve one tick of the stack without frames."""
+        self.configuration.update(q)
+        self._joints.set_target(posture)
+        return self._step(self._joint_stack, self._stack, dt)
+
+    @staticmethod
+    def _step(stack: TaskStack, other: TaskStack, dt: float) -> IkStep:
+        solution = stack.solve(dt)
+        other.v_previous[:] = solution.v
         return IkStep(v=solution.v, limits=_words(solution), ok=solution.ok)
 
 

@@ -22,11 +22,13 @@ from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Vector
 
 __all__ = [
+    "HURRY",
     "frame_costs",
     "held_equality",
     "joint_accelerations",
     "make_limits",
     "make_task",
+    "planar_joints",
 ]
 
 HURRY = 1e3
@@ -108,6 +110,11 @@ def make_limits(robot: RobotDescription, config: WholeBodyIKConfig) -> list[Limi
             )
         )
     return made
+
+
+def planar_joints(robot: RobotDescription) -> tuple[str, ...]:
+    """Return the joints of a planar root."""
+    return robot.root_joint_names if robot.root.kind == "planar" else ()
 
 
 def joint_accelerations(

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.control.action import ActionLayout
-from wbc_suite.control.composite.approach import approach_pose, approach_posture
+from wbc_suite.control.collision_check import CollisionCheck
 from wbc_suite.control.composite.backend import IkBackend, IkStep
 from wbc_suite.control.composite.config import WholeBodyIKConfig
 from wbc_suite.control.composite.goals import (
@@ -17,10 +17,12 @@ from wbc_suite.control.composite.goals import (
     pose_of_action,
     shift_pose,
 )
+from wbc_suite.control.composite.planner import Planner, Waypoint
 from wbc_suite.control.composite.reduced import lock_groups
+from wbc_suite.control.composite.reference import Reference
 from wbc_suite.control.composite.report import FrameReport, IkReport, WallTime
 from wbc_suite.control.part.gripper import GripperController
-from wbc_suite.control.part.joint_position import JointPositionLaw, JointTarget
+from wbc_suite.control.part.joint_position import JointPositionLaw
 from wbc_suite.control.part.stance import StanceContact, StanceLaw
 from wbc_suite.control.state import RobotState
 from wbc_suite.kinematics import Configuration, Conversion
@@ -82,30 +84,38 @@ class WholeBodyIK:
         period = 1.0 / (self.config.solve_hz * state.model.opt.timestep)
         self._steps_per_solve = max(1, round(period))
         self._dt = self._steps_per_solve * float(state.model.opt.timestep)
-        self._braking = self.config.posture.braking * _accelerations(
-            self.robot, self.config, model
+        self._reference = Reference(model, self._q_index, self._v_index, self._dt)
+        check = CollisionCheck(state, self._conversion)
+        self._planner = Planner(
+            self.robot,
+            self.config,
+            self._configuration,
+            accept=check.is_free,
+            dt=self._dt,
         )
         self._tau = np.zeros(len(state.actuators))
-        self._report = IkReport(self.config, self._configuration)
+        self._report = IkReport(self.config, Configuration(model))
         self.reset(state)
 
     def reset(self, state: RobotState) -> None:
         """Hold the robot where it is."""
         self._step, self.solve_time = 0, 0.0
         self.q: Vector = self._conversion.q_to_pinocchio(state.data.qpos)
-        self._v: Vector = np.zeros(self._configuration.nv)
-        self._start = self.q
-        self._answer = IkStep(v=self._v)
+        self._reference.reset(self.q)
+        self._answer = IkStep(v=self._reference.v)
         self._rigid = state.data.qpos[self._rigid_index]
         self._base = self._root_pose()
-        self.goals = [self._to_input(self._frame_pose(k)) for k in self._frames()]
+        self.goals = [
+            self._to_input(self._planner.frame_pose(k)) for k in self._frames()
+        ]
         self._backend.reset(self.q)
-        self._posture = self._preferred_posture()
+        self._planner.reset(self._preferred_posture())
         for gripper in self._grippers:
             gripper.reset(state)
 
     def set_goal(self, action: Vector) -> None:
         """Move the goals; see `layout`."""
+        before = list(self.goals)
         for k in self._frames():
             frame = self.config.frames[k]
             part = self.layout.slices[k]
@@ -117,6 +127,10 @@ class WholeBodyIK:
                 self.goals[k] = shift_pose(
                     frame.kind, values, self.goals[k], self._delta_axes(k)
                 )
+        if not all(
+            a.isApprox(b, 1e-9) for a, b in zip(before, self.goals, strict=True)
+        ):
+            self._planner.renew()
         for gripper in self._grippers:
             part = self.layout[gripper.name]
             gripper.set_goal(action[part.start : part.stop])
@@ -128,8 +142,8 @@ class WholeBodyIK:
         self._step += 1
         phase = self._step % self._steps_per_solve or self._steps_per_solve
         ahead = phase * float(state.model.opt.timestep)
-        q = pin.integrate(self._configuration.model, self._start, ahead * self._v)
-        self._tau[self._law.outputs] = self._law.torque(state, self._target(q))
+        target = self._reference.sample(ahead, self._rigid)
+        self._tau[self._law.outputs] = self._law.torque(state, target)
         for gripper in self._grippers:
             self._tau[gripper.outputs] = gripper.set_points()
         return self._tau
@@ -173,37 +187,18 @@ class WholeBodyIK:
         began = time.perf_counter()
         self._base = self._root_pose()
         correction = self._root_correction(state)
-        for k in self._frames():
-            goal = correction * self._to_world(self.goals[k])
-            self._backend.set_target(k, self._on_the_way(k, goal))
-        self._backend.set_posture(self._posture_on_the_way())
-        self._answer = self._backend.solve(self.q, self._dt)
-        self._start, self._v = self.q, self._answer.v
-        model = self._configuration.model
-        self.q = pin.integrate(model, self.q, self._dt * self._v)
+        goals = [correction * self._to_world(goal) for goal in self.goals]
+        self._answer = self._step_towards(self._planner.next(goals, self._answer.v))
+        self.q = self._reference.extend(self._answer.v)
         self.solve_time = time.perf_counter() - began
 
-    def _on_the_way(self, k: int, goal: pin.SE3) -> pin.SE3:
-        frame = self.config.frames[k]
-        return approach_pose(
-            self._frame_pose(k),
-            goal,
-            dt=self._dt,
-            gain=frame.gain,
-            speed=(frame.max_linear_speed, frame.max_angular_speed),
-            acceleration=(frame.linear_braking, frame.angular_braking),
-        )
-
-    def _posture_on_the_way(self) -> Vector:
-        posture = self.config.posture
-        step = approach_posture(
-            self._configuration.difference(self._posture),
-            dt=self._dt,
-            gain=posture.gain,
-            speed=posture.speed,
-            acceleration=self._braking,
-        )
-        return self._configuration.integrate(step)
+    def _step_towards(self, waypoint: Waypoint) -> IkStep:
+        if waypoint.targets is None:
+            return self._backend.solve_posture(self.q, waypoint.posture, self._dt)
+        for k, target in enumerate(waypoint.targets):
+            self._backend.set_target(k, target)
+        self._backend.set_posture(waypoint.posture)
+        return self._backend.solve(self.q, self._dt)
 
     def _root_correction(self, state: RobotState) -> pin.SE3:
         """Return what takes world poses into the world of the commanded root."""
@@ -217,28 +212,11 @@ class WholeBodyIK:
         self._configuration.update(self.q)
         return self._configuration.frame_pose(self.robot.links[0].name)
 
-    def _target(self, q: Vector) -> JointTarget:
-        position = np.concatenate([q[self._q_index], self._rigid])
-        velocity = np.concatenate([self._v[self._v_index], 0.0 * self._rigid])
-        if self.robot.root.kind != "free":
-            return JointTarget(position=position, velocity=velocity)
-        root = pin.XYZQUATToSE3(q[:7])
-        twist = np.concatenate([root.rotation @ self._v[:3], self._v[3:6]])
-        return JointTarget(
-            position=position, velocity=velocity, root=root, root_twist=twist
-        )
-
     def _gripper_joints(self) -> set[str]:
         return {joint for gripper in self._grippers for joint in gripper.joints}
 
     def _frames(self) -> range:
         return range(len(self.config.frames))
-
-    def _frame_pose(self, k: int) -> pin.SE3:
-        frame = self.config.frames[k].frame
-        if frame is None:
-            return pin.SE3(np.eye(3), self._configuration.com.copy())
-        return self._configuration.frame_pose(frame)
 
     def _to_input(self, pose: pin.SE3) -> pin.SE3:
         return self._base.actInv(pose) if self._in_base() else pose
@@ -299,18 +277,6 @@ def _joint_indices(
     q = np.array([joint.idx_q for joint in found], dtype=np.int64)
     v = np.array([joint.idx_v for joint in found], dtype=np.int64)
     return q, v
-
-
-def _accelerations(
-    robot: RobotDescription, config: WholeBodyIKConfig, model: pin.Model
-) -> Vector:
-    """Return the acceleration limit of each velocity."""
-    limits = np.full(model.nv, config.limits.acceleration)
-    for joint in robot.joints:
-        if joint.acceleration is not None:
-            index = model.joints[model.getJointId(joint.name)].idx_v
-            limits[index] = min(limits[index], joint.acceleration)
-    return limits
 
 
 def _as_info(frames: Mapping[str, FrameReport], solve_time: float) -> dict[str, Any]:

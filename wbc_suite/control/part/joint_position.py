@@ -46,8 +46,8 @@ def computed_torque(
 
         tau = M (a + kp e + kd e') + h
 
-    It is the minimiser of `|| M^-1 (tau - h) - (a + kp e + kd e') ||^2`, and every error
-    decays alike, whatever the inertia, as long as no torque saturates.
+    It is the minimiser of `|| M^-1 (tau - h) - (a + kp e + kd e') ||^2`; errors
+    decay alike, whatever the inertia, as long as no torque saturates.
 
     Args:
         mass_matrix: M of the driven joints, shape (n, n).
