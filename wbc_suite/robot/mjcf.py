@@ -147,6 +147,9 @@ def _set_inertia(body: mujoco.MjsBody, inertia: pin.Inertia) -> None:
     body.explicitinertial = True
     body.mass = inertia.mass
     body.ipos = inertia.lever
+    if not about.any():  # a point mass; MuJoCo refuses it as a full tensor
+        body.inertia = np.zeros(3)
+        return
     body.fullinertia = [
         about[0, 0], about[1, 1], about[2, 2], about[0, 1], about[0, 2], about[1, 2]
     ]  # fmt: skip

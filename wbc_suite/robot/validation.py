@@ -5,20 +5,36 @@ MuJoCo and Pinocchio would find some of these faults too, but late and in their 
 
 import itertools
 from collections.abc import Collection, Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from wbc_suite.errors import nearest_name
-from wbc_suite.robot.shapes import Shape
+from wbc_suite.robot.shapes import (
+    Box,
+    Capsule,
+    Cylinder,
+    Ellipsoid,
+    Hull,
+    Shape,
+    Sphere,
+)
 from wbc_suite.typing import Matrix, Vector
 
 if TYPE_CHECKING:
     from wbc_suite.robot.description import RobotDescription
     from wbc_suite.robot.parts import Joint, Link
 
-__all__ = ["check_description", "inertia_matrix", "rigid_bodies", "shape_bounds"]
+__all__ = [
+    "RESERVED",
+    "check_description",
+    "implausible",
+    "inertia_matrix",
+    "rigid_bodies",
+    "shape_bounds",
+    "unphysical",
+]
 
 INERTIA_SLACK = 1e-6
 """Relative slack of the triangle inequality; vendors round their tensors."""
@@ -124,36 +140,44 @@ def _names(robot: "RobotDescription") -> Iterator[str]:
 
 def _link(link: "Link") -> Iterator[str]:
     where = f"link '{link.name}'"
-    if link.mass == 0.0:
+    fault = unphysical(link)
+    if fault is not None:
+        yield f"{where}: {fault}"
         return
-    if link.mass < SMALLEST_MASS:
-        yield f"{where}: a mass of {link.mass:.3g} kg is no mass; leave it out"
-        return
-    eigenvalues: Vector = np.asarray(
-        np.linalg.eigvalsh(inertia_matrix(link.inertia)), dtype=np.float64
-    )
-    if eigenvalues[0] <= SMALLEST_MOMENT:
-        yield (
-            f"{where}: the inertia {list(link.inertia)} is not positive definite "
-            f"(principal moments {_numbers(eigenvalues)})"
+    for rule, text in implausible(link):
+        if rule not in link.accept:
+            yield f"{where}: {text}"
+
+
+def unphysical(link: "Link") -> str | None:
+    """Say what is wrong with an inertia that no body has; None when it is right."""
+    if 0.0 < link.mass < SMALLEST_MASS:
+        return f"a mass of {link.mass:.3g} kg is no mass; leave it out"
+    point = link.joint is None and not any(link.inertia)
+    if link.mass == 0.0 or point:
+        return None  # a point mass is rigid with a body that has a tensor
+    moments: Vector = np.linalg.eigvalsh(inertia_matrix(link.inertia))
+    if moments[0] <= SMALLEST_MOMENT:
+        return (
+            f"the inertia {list(link.inertia)} is not positive definite (principal "
+            f"moments {_numbers(moments)})"
         )
-        return
-    if eigenvalues[2] > (eigenvalues[0] + eigenvalues[1]) * (1 + INERTIA_SLACK):
-        yield (
-            f"{where}: the principal moments {_numbers(eigenvalues)} break the "
-            "triangle inequality: no body has them"
+    if moments[2] > (moments[0] + moments[1]) * (1 + INERTIA_SLACK):
+        return (
+            f"the principal moments {_numbers(moments)} break the triangle inequality: "
+            "no body has them"
         )
-    yield from _plausible(link, eigenvalues)
+    return None
 
 
 def _numbers(values: Vector) -> str:
     return "[" + ", ".join(f"{v:.4g}" for v in values) + "]"
 
 
-def _plausible(link: "Link", moments: Vector) -> Iterator[str]:
+def implausible(link: "Link") -> Iterator[tuple[Literal["com", "inertia"], str]]:
     """Compare centre of mass and inertia with the size of the link's shapes."""
     shapes = [*link.visual, *link.collision]
-    if not shapes:
+    if not shapes or link.mass == 0.0:
         return
     bounds = [shape_bounds(shape) for shape in shapes]
     low = np.min([b[0] for b in bounds], axis=0)
@@ -161,44 +185,56 @@ def _plausible(link: "Link", moments: Vector) -> Iterator[str]:
     slack = COM_SLACK * (high - low) + 0.005
     com = np.asarray(link.com)
     outside = float(np.max(np.maximum(low - slack - com, com - high - slack)))
-    if outside > 0.0 and "com" not in link.accept:
+    if outside > 0.0:
         yield (
-            f"link '{link.name}': the centre of mass {_numbers(com)} lies "
-            f"{outside * 1000:.0f} mm outside the link's shapes, which span "
-            f"{_numbers(low)} to {_numbers(high)}"
+            "com",
+            f"the centre of mass {_numbers(com)} lies {outside * 1000:.0f} mm outside "
+            f"the link's shapes, which span {_numbers(low)} to {_numbers(high)}",
         )
-    gyration = float(np.sqrt(np.mean(moments) * 1.5 / link.mass))
-    ratio = gyration / float(np.linalg.norm(high - low) / 2)
+    half_diagonal = float(np.linalg.norm(high - low)) / 2
+    trace = float(np.trace(inertia_matrix(link.inertia)))
+    gyration = np.sqrt(trace / 2 / link.mass)
     lowest, highest = GYRATION_RANGE
-    if not lowest <= ratio <= highest and "inertia" not in link.accept:
+    if not lowest <= gyration / half_diagonal <= highest:
         yield (
-            f"link '{link.name}': a radius of gyration of {gyration:.3g} m does not "
-            f"fit shapes of half diagonal {gyration / ratio:.3g} m"
+            "inertia",
+            f"a radius of gyration of {gyration:.3g} m does not fit shapes of half "
+            f"diagonal {half_diagonal:.3g} m",
         )
 
 
 def shape_bounds(shape: Shape) -> tuple[Vector, Vector]:
     """Compute the corners of an axis-aligned box around a shape, in the link frame."""
+    low, high = _own_bounds(shape)
+    if shape.quat != (1.0, 0.0, 0.0, 0.0):
+        rotation = Rotation.from_quat(shape.quat, scalar_first=True).as_matrix()
+        centre, reach = rotation @ (low + high) / 2, np.abs(rotation) @ (high - low) / 2
+        low, high = centre - reach, centre + reach
+    return low + shape.pos, high + shape.pos
+
+
+def _own_bounds(shape: Shape) -> tuple[Vector, Vector]:
+    """Compute the bounds in the shape's own frame: of spheres, or of discs."""
     from wbc_suite.robot.surfaces import support_points
 
-    match shape.shape:
-        case "sphere":
-            low, high = -np.full(3, shape.radius), np.full(3, shape.radius)
-        case "ellipsoid":
-            low, high = -np.asarray(shape.size), np.asarray(shape.size)
-        case "box":
-            low, high = -np.asarray(shape.size), np.asarray(shape.size)
-        case "capsule":
-            ends = np.array([shape.start, shape.end])
-            low, high = ends.min(axis=0) - shape.radius, ends.max(axis=0) + shape.radius
+    match shape:
+        case Box(size=size) | Ellipsoid(size=size):
+            return -np.asarray(size), np.asarray(size)
+        case Sphere(radius=radius):
+            centres, reach = np.zeros((1, 3)), np.array([[radius]])
+        case Capsule(start=start, end=end, radius=radius):
+            centres, reach = np.array([start, end]), np.array([[radius]])
+        case Hull(spheres=spheres):
+            rows = np.asarray(spheres, dtype=np.float64)
+            centres, reach = rows[:, :3], rows[:, 3:]
+        case Cylinder(start=start, end=end, radius=radius, radius_to=far):
+            centres = np.array([start, end])
+            axis = (centres[1] - centres[0]) / np.linalg.norm(centres[1] - centres[0])
+            radii = np.array([[radius], [far or radius]])
+            reach = radii * np.sqrt(np.maximum(0.0, 1.0 - axis**2))
         case _:
-            points = support_points(shape)
-            low, high = points.min(axis=0), points.max(axis=0)
-    centre, half = (low + high) / 2, (high - low) / 2
-    rotation = Rotation.from_quat(shape.quat, scalar_first=True).as_matrix()
-    middle = rotation @ centre + np.asarray(shape.pos)
-    reach = np.abs(rotation) @ half
-    return middle - reach, middle + reach
+            centres, reach = support_points(shape), np.zeros((1, 1))
+    return (centres - reach).min(axis=0), (centres + reach).max(axis=0)
 
 
 def _references(robot: "RobotDescription") -> Iterator[str]:

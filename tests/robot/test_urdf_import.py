@@ -1,0 +1,483 @@
+"""URDF files read into descriptions, against Pinocchio's own reader and ours back."""
+
+import logging
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wbc_suite
+from wbc_suite.catalogue import Catalogue
+from wbc_suite.errors import ConfigError
+from wbc_suite.robot.mesh_files import write_stl
+from wbc_suite.robot.shapes import Box, Cylinder, Hull
+from wbc_suite.robot.surfaces import support_points
+from wbc_suite.robot.urdf_import import read_urdf
+
+ROBOTS = Catalogue().names("robots")
+CASES = [(name, None) for name in ROBOTS] + [
+    ("spot", root) for root in ("fixed", "planar", "free")
+]
+TOLERANCE = 1e-9
+
+FEATURES = """<?xml version="1.0"?>
+<robot name="all features" xmlns:x="urn:x">
+  <material name="light blue"><color rgba="0.2 0.4 1 1"/></material>
+  <link name="world"/>
+  <joint name="to_world" type="fixed">
+    <parent link="world"/><child link="pelvis"/><origin xyz="0 0 1" rpy="0 0 0.5"/>
+  </joint>
+  <link name="pelvis">
+    <inertial><origin xyz="0.01 0 0" rpy="0.3 0.2 0.1"/><mass value="7"/>
+      <inertia ixx="0.05" ixy="0.001" ixz="0.002" iyy="0.06" iyz="0.003" izz="0.07"/>
+    </inertial>
+    <visual><geometry><box size="0.3 0.2 0.4"/></geometry>
+      <material name="light blue"/></visual>
+    <collision><origin xyz="0 0 0.1" rpy="1.57 0 0"/>
+      <geometry><cylinder radius="0.1" length="0.3"/></geometry></collision>
+  </link>
+  <joint name="left.shoulder-1" type="revolute">
+    <origin xyz="0.1 0.2 0.3" rpy="0.1 1.5707963267948966 -0.4"/>
+    <parent link="pelvis"/><child link="left.upper arm"/>
+    <axis xyz="0 0.6 0.8"/>
+    <limit lower="-1" upper="2" effort="40" velocity="3"/>
+    <dynamics damping="0.7" friction="0.2"/>
+    <mimic joint="left_elbow" multiplier="-1.5" offset="0.25"/>
+  </joint>
+  <link name="left.upper arm">
+    <inertial><origin xyz="0 0 0.1" rpy="1 0.5 -0.7"/><mass value="2"/>
+      <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.012" iyz="0" izz="0.005"/></inertial>
+    <visual><geometry><sphere radius="0.15"/></geometry>
+      <material name="inline"><color rgba="1 0 0 0.5"/></material></visual>
+  </link>
+  <joint name="left_elbow" type="continuous">
+    <origin xyz="0 0 0.3"/><parent link="left.upper arm"/><child link="left_elbow"/>
+  </joint>
+  <link name="left_elbow">
+    <inertial><mass value="1"/>
+      <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial>
+  </link>
+  <joint name="left_wrist_slide" type="prismatic">
+    <origin xyz="0 0 0.1"/><parent link="left_elbow"/><child link="left_hand"/>
+    <axis xyz="0 0 2"/><limit lower="0.1" upper="0.3" effort="0" velocity="1e7"/>
+  </joint>
+  <link name="left_hand">
+    <inertial><mass value="0.5"/>
+      <inertia ixx="0.001" ixy="0" ixz="0" iyy="0.001" iyz="0" izz="0.001"/></inertial>
+  </link>
+  <joint name="sensor_fixed" type="fixed">
+    <origin xyz="0.02 0 0" rpy="0 0 1"/><parent link="left_hand"/><child link="ft"/>
+  </joint>
+  <link name="ft"><inertial><mass value="0.1"/>
+    <inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/></inertial></link>
+  <joint name="tool_mount" type="fixed">
+    <origin xyz="0 0 0.05"/><parent link="ft"/><child link="tool0"/></joint>
+  <link name="tool0"/>
+  <joint name="optical_joint" type="fixed">
+    <origin rpy="0.3 0 0"/><parent link="tool0"/><child link="optical"/></joint>
+  <link name="optical"/>
+  <x:gazebo reference="ft"/>
+</robot>
+"""
+
+
+def write(folder: Path, text: str, name: str = "robot.urdf") -> Path:
+    path = folder / name
+    path.write_text(text)
+    return path
+
+
+def one_arm(links: str, joints: str = "") -> str:
+    return f'<robot name="r"><link name="base"/>{links}{joints}</robot>'
+
+
+BODY = (
+    '<inertial><mass value="1"/><inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0"'
+    ' izz="0.1"/></inertial>'
+)
+
+
+def joint(name: str, parent: str, child: str, *, kind="continuous", inner="") -> str:
+    return (
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/>'
+        f'<child link="{child}"/>{inner}</joint>'
+    )
+
+
+@pytest.fixture
+def features(tmp_path):
+    return write(tmp_path, FEATURES)
+
+
+def positions(model, values):
+    q = pin.neutral(model)
+    for name, value in values.items():
+        entry = model.joints[model.getJointId(name)]
+        if entry.nq == 2:
+            q[entry.idx_q : entry.idx_q + 2] = np.cos(value), np.sin(value)
+        else:
+            q[entry.idx_q] = value
+    return q
+
+
+OURS = {  # what is called otherwise here, because names are unique and plain
+    "left.shoulder-1": "left_shoulder_1",
+    "left_elbow": "left_elbow_joint",
+    "left_wrist_slide": "left_wrist_slide",
+}
+
+
+def test_every_feature_agrees_with_pinocchios_reader(features):
+    robot = wbc_suite.load_robot(features)
+    ours, theirs = robot.to_pinocchio(), pin.buildModelFromUrdf(str(features))
+    data, other = ours.createData(), theirs.createData()
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        values = {name: rng.uniform(-3, 3) for name in OURS}
+        q = positions(ours, {OURS[n]: v for n, v in values.items()})
+        p = positions(theirs, values)
+        pin.framesForwardKinematics(ours, data, q)
+        pin.framesForwardKinematics(theirs, other, p)
+        for mine, its in (
+            (ours.getFrameId("left_upper_arm"), "left.upper arm"),
+            (ours.getFrameId("ft"), "ft"),
+            (ours.getFrameId("tool0"), "tool0"),
+            (ours.getFrameId("optical"), "optical"),
+        ):
+            frame = theirs.getFrameId(its, pin.FrameType.BODY)
+            np.testing.assert_allclose(
+                data.oMf[mine].homogeneous, other.oMf[frame].homogeneous, atol=1e-12
+            )
+        rows = [theirs.joints[theirs.getJointId(n)].idx_v for n in OURS]
+        M = pin.crba(theirs, other, p)
+        M = (np.triu(M) + np.triu(M, 1).T)[np.ix_(rows, rows)]
+        N = pin.crba(ours, data, q)
+        np.testing.assert_allclose(np.triu(N) + np.triu(N, 1).T, M, atol=1e-12)
+        np.testing.assert_allclose(
+            pin.computeGeneralizedGravity(ours, data, q),
+            pin.computeGeneralizedGravity(theirs, other, p)[rows],
+            atol=1e-12,
+        )
+
+
+def test_limits_couplings_and_colours_are_read(features):
+    robot = wbc_suite.load_robot(features)
+    shoulder = robot.joint("left_shoulder_1")
+    assert shoulder.range == (-1.0, 2.0)
+    assert (shoulder.effort, shoulder.velocity) == (40.0, 3.0)
+    assert (shoulder.damping, shoulder.frictionloss) == (0.7, 0.2)
+    assert shoulder.mimic is not None
+    assert shoulder.mimic.joint == "left_elbow_joint"
+    assert (shoulder.mimic.ratio, shoulder.mimic.offset) == (-1.5, 0.25)
+    elbow, slide = robot.joint("left_elbow_joint"), robot.joint("left_wrist_slide")
+    assert elbow.range is None
+    assert elbow.axis == (1.0, 0.0, 0.0)  # URDF's default
+    assert (slide.effort, slide.velocity) == (None, None)
+    assert slide.axis == (0.0, 0.0, 1.0)
+    assert robot.root.kind == "fixed"
+    assert robot.root.pos == (0.0, 0.0, 1.0)
+    box = robot.link("pelvis").visual[0]
+    assert isinstance(box, Box)
+    assert box.size == (0.15, 0.1, 0.2)
+    assert robot.materials[str(box.color)] == (0.2, 0.4, 1.0, 1.0)
+    assert robot.materials["inline"] == (1.0, 0.0, 0.0, 0.5)
+    cylinder = robot.link("pelvis").collision[0]
+    assert isinstance(cylinder, Cylinder)
+    assert (cylinder.end, cylinder.radius) == ((0.0, 0.0, 0.15), 0.1)
+
+
+def test_mujocos_reader_sees_the_same_masses_and_gravity(features):
+    robot = wbc_suite.load_robot(features)
+    spec = mujoco.MjSpec.from_string(robot.to_urdf())
+    ours, theirs = robot.to_mjspec().compile(), spec.compile()
+    d, e = mujoco.MjData(ours), mujoco.MjData(theirs)
+    d.qpos[:] = e.qpos[:] = [0.3, -0.7, 0.2]
+    mujoco.mj_forward(ours, d)
+    mujoco.mj_forward(theirs, e)
+    np.testing.assert_allclose(e.qfrc_bias, d.qfrc_bias, atol=1e-11)
+
+
+def test_groups_end_effector_and_ready_are_guessed(features):
+    robot = wbc_suite.load_robot(features)
+    assert robot.groups == {"left_arm": ("left_elbow_joint", "left_wrist_slide")}
+    eef = robot.frame("left_eef")
+    tool = robot.frame("tool0")
+    assert (eef.link, eef.pos, eef.role) == (tool.link, tool.pos, "eef")
+    assert robot.keyframe("ready")["left_wrist_slide"] == 0.1  # zero is out of range
+    assert robot.keyframe("ready")["left_shoulder_1"] == 0.25  # follows the elbow
+
+
+@pytest.mark.parametrize(("name", "root"), CASES)
+def test_our_own_robots_come_back(name, root, tmp_path):
+    robot = wbc_suite.load_robot(name, root=root)
+    # Without visuals: their meshes cost time and prove nothing here.
+    links = [link.model_copy(update={"visual": ()}) for link in robot.links]
+    robot = robot.model_copy(update={"links": tuple(links)})
+    again = wbc_suite.load_robot(write(tmp_path, robot.to_urdf()))
+    assert again.root.kind == robot.root.kind
+    assert again.joint_names == robot.joint_names
+    assert {link.name for link in again.links} | {f.name for f in again.frames} >= {
+        link.name for link in robot.links
+    } | {f.name for f in robot.frames}
+    for joint in robot.joints:
+        back = again.joint(joint.name)
+        for key in ("range", "effort", "velocity", "damping", "mimic", "type"):
+            assert getattr(back, key) == getattr(joint, key)
+    first, second = robot.to_mjspec().compile(), again.to_mjspec().compile()
+    d, e = mujoco.MjData(first), mujoco.MjData(second)
+    rng = np.random.default_rng(2)
+    for _ in range(5):
+        d.qpos[:] = e.qpos[:] = rng.normal(size=first.nq)
+        d.qvel[:] = e.qvel[:] = rng.normal(size=first.nv)
+        mujoco.mj_forward(first, d)
+        mujoco.mj_forward(second, e)
+        for link in again.links:
+            np.testing.assert_allclose(
+                e.body(link.name).xpos, d.body(link.name).xpos, atol=TOLERANCE
+            )
+        for frame in robot.frames:
+            np.testing.assert_allclose(
+                e.site(frame.name).xmat, d.site(frame.name).xmat, atol=TOLERANCE
+            )
+        scale = max(1.0, float(np.abs(d.qfrc_bias).max()))
+        np.testing.assert_allclose(e.qfrc_bias, d.qfrc_bias, atol=TOLERANCE * scale)
+
+
+def test_an_imported_robot_takes_another_root(features):
+    robot = wbc_suite.load_robot(features, root="free")
+    model = robot.to_mjspec().compile()
+    assert (model.nq, model.nv) == (10, 9)
+    assert robot.to_pinocchio().nv == 9
+
+
+def tetrahedron() -> tuple:
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
+    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    return vertices, faces
+
+
+def mesh_robot(filename: str, scale: str = "0.1 0.1 0.1") -> str:
+    mesh = f'<geometry><mesh filename="{filename}" scale="{scale}"/></geometry>'
+    return (
+        f'<robot name="r"><link name="base">{BODY}<visual><origin xyz="1 0 0"/>{mesh}'
+        f"</visual><collision>{mesh}</collision></link></robot>"
+    )
+
+
+@pytest.mark.parametrize(
+    ("filename", "place"),
+    [
+        ("part.stl", "part.stl"),
+        ("meshes/part.stl", "meshes/part.stl"),
+        ("package://my_robot/meshes/part.stl", "my_robot/meshes/part.stl"),
+        ("package://my_robot/meshes/part.stl", "meshes/part.stl"),
+    ],
+)
+def test_meshes_become_hulls(tmp_path, filename, place, caplog):
+    write_stl(tmp_path / place, *tetrahedron())
+    robot = read_urdf(write(tmp_path, mesh_robot(filename)))
+    link = robot.links[0]
+    assert link.visual[0].pos == (1.0, 0.0, 0.0)
+    for shape in (*link.visual, *link.collision):
+        vertices = support_points(shape)
+        np.testing.assert_allclose(vertices.min(0), 0.0, atol=1e-7)
+        np.testing.assert_allclose(vertices.max(0), 0.1, atol=1e-7)
+
+
+def test_text_stl_and_obj_are_read(tmp_path):
+    vertices, faces = tetrahedron()
+    facets = "".join(
+        "facet normal 0 0 0\nouter loop\n"
+        + "".join(f"vertex {x} {y} {z}\n" for x, y, z in vertices[face])
+        + "endloop\nendfacet\n"
+        for face in faces
+    )
+    (tmp_path / "a.stl").write_text(f"solid a\n{facets}endsolid a\n")
+    (tmp_path / "b.obj").write_text("".join(f"v {x} {y} {z}\n" for x, y, z in vertices))
+    for name in ("a.stl", "b.obj"):
+        robot = read_urdf(write(tmp_path, mesh_robot(name, "1 1 1")))
+        hull = robot.links[0].collision[0]
+        assert isinstance(hull, Hull)
+        assert sorted(s[:3] for s in hull.spheres) == sorted(map(tuple, vertices))
+
+
+def test_large_meshes_keep_their_extent(tmp_path):
+    rng = np.random.default_rng(0)
+    points = rng.normal(size=(3000, 3))
+    points *= np.array([0.5, 0.1, 0.02]) / np.linalg.norm(points, axis=1, keepdims=True)
+    text = "".join(f"v {x} {y} {z}\n" for x, y, z in points)
+    (tmp_path / "egg.obj").write_text(text)
+    hull = read_urdf(write(tmp_path, mesh_robot("egg.obj"))).links[0].collision[0]
+    assert isinstance(hull, Hull)
+    vertices = support_points(hull)
+    assert len(hull.spheres) <= 64
+    extent = vertices.max(0) - vertices.min(0)
+    np.testing.assert_allclose(extent, [0.1, 0.02, 0.004], rtol=0.02)
+
+
+def test_missing_meshes_are_one_warning(tmp_path, caplog):
+    text = mesh_robot("gone.stl").replace("gone.stl", "gone.dae", 1)
+    with caplog.at_level(logging.WARNING):
+        robot = read_urdf(write(tmp_path, text))
+    assert len(caplog.records) == 1
+    message = caplog.records[0].getMessage()
+    assert "gone.dae, gone.stl" in message
+    assert robot.links[0].visual == ()
+
+
+def test_a_visual_that_cannot_be_read_is_drawn_as_it_collides(tmp_path):
+    write_stl(tmp_path / "part.stl", *tetrahedron())
+    text = mesh_robot("part.stl").replace("part.stl", "part.dae", 1)
+    link = read_urdf(write(tmp_path, text)).links[0]
+    assert link.visual[0].model_dump(exclude={"color"}) == link.collision[0].model_dump(
+        exclude={"color"}
+    )
+
+
+@pytest.mark.parametrize("name", ["../secret.stl", "/etc/passwd", "file:///etc/hosts"])
+def test_meshes_outside_the_folder_are_refused(tmp_path, name):
+    folder = tmp_path / "robot"
+    folder.mkdir()
+    write_stl(tmp_path / "secret.stl", *tetrahedron())
+    with pytest.raises(ConfigError, match="lies outside the folder"):
+        read_urdf(write(folder, mesh_robot(name)))
+
+
+def test_a_link_out_of_the_folder_is_refused(tmp_path):
+    folder = tmp_path / "robot"
+    folder.mkdir()
+    write_stl(tmp_path / "secret.stl", *tetrahedron())
+    (folder / "part.stl").symlink_to(tmp_path / "secret.stl")
+    with pytest.raises(ConfigError, match="lies outside the folder"):
+        read_urdf(write(folder, mesh_robot("part.stl")))
+
+
+def test_chains_of_followers_follow_the_first(tmp_path):
+    links = "".join(f'<link name="l{i}">{BODY}</link>' for i in range(3))
+    joints = joint("a", "base", "l0")
+    joints += joint(
+        "b", "l0", "l1", inner='<mimic joint="a" multiplier="2" offset="1"/>'
+    )
+    joints += joint(
+        "c", "l1", "l2", inner='<mimic joint="b" multiplier="3" offset="4"/>'
+    )
+    robot = read_urdf(write(tmp_path, one_arm(links, joints)))
+    mimic = robot.joint("c").mimic
+    assert mimic is not None
+    assert (mimic.joint, mimic.ratio, mimic.offset) == ("a", 6.0, 7.0)
+
+
+TWO = f'<link name="l0">{BODY}</link><link name="l1">{BODY}</link>'
+BAD = BODY.replace('izz="0.1"', 'izz="0.3"')
+FAULTS = {
+    "loop": (
+        one_arm(TWO, joint("a", "l0", "l1") + joint("b", "l1", "l0")),
+        "'l0', 'l1' hang on each other in a loop",
+    ),
+    "missing parent": (
+        one_arm(TWO, joint("a", "bse", "l0")),
+        "parent link 'bse' does not exist. Did you mean 'base'",
+    ),
+    "two parents": (
+        one_arm(TWO, joint("a", "base", "l0") + joint("b", "l1", "l0")),
+        "'l0' hangs on two joints, 'a' and 'b'",
+    ),
+    "two roots": (one_arm(TWO, joint("a", "base", "l0")), "2 links hang on nothing"),
+    "duplicated link": (one_arm(TWO + TWO), "two links are called 'l0'"),
+    "duplicated joint": (
+        one_arm(TWO, joint("a", "base", "l0") + joint("a", "l0", "l1")),
+        "two joints are called 'a'",
+    ),
+    "unphysical inertia": (
+        one_arm(f'<link name="l0">{BAD}</link>', joint("a", "base", "l0")),
+        "link 'l0': the principal moments .* break the triangle inequality",
+    ),
+    "no mass": (
+        one_arm('<link name="l0"/>', joint("a", "base", "l0")),
+        "the links 'l0' move but weigh nothing",
+    ),
+    "revolute without limit": (
+        one_arm(
+            f'<link name="l0">{BODY}</link>', joint("a", "base", "l0", kind="revolute")
+        ),
+        "joint 'a': a revolute joint needs <limit>",
+    ),
+    "floating in the middle": (
+        one_arm(
+            TWO, joint("a", "base", "l0") + joint("b", "l0", "l1", kind="floating")
+        ),
+        "joint 'b' is floating: only the joint",
+    ),
+    "unknown type": (
+        one_arm(
+            f'<link name="l0">{BODY}</link>', joint("a", "base", "l0", kind="spherical")
+        ),
+        "joint 'a': unknown type 'spherical'",
+    ),
+    "mimic circle": (
+        one_arm(
+            TWO,
+            joint("a", "base", "l0", inner='<mimic joint="b"/>')
+            + joint("b", "l0", "l1", inner='<mimic joint="a"/>'),
+        ),
+        "follows itself in a circle",
+    ),
+    "not a number": (
+        one_arm(
+            f'<link name="l0">{BODY}</link>',
+            joint("a", "base", "l0", inner='<origin xyz="0 nan 0"/>'),
+        ),
+        "joint 'a': <origin xyz=\"0 nan 0\"> must be 3 finite numbers",
+    ),
+    "no URDF": ("<mujoco/>", "begins with <robot>, not <mujoco>.* name it .xml"),
+    "xacro": ('<robot name="r"><xacro:include/></robot>', "expand it first"),
+    "entities": (
+        '<!DOCTYPE r [<!ENTITY a SYSTEM "file:///etc/passwd">]><robot>&a;</robot>',
+        "document type declaration",
+    ),
+    "not XML": ("<robot><link></robot>", "not well-formed XML"),
+    "deep": ("<robot>" + "<a>" * 500 + "</a>" * 500 + "</robot>", "nested more than"),
+    "huge": ("<robot>" + " " * 9_000_000 + "</robot>", "9000015 bytes, more than"),
+    "no links": ('<robot name="r"/>', "0 links"),
+}
+
+
+@pytest.mark.parametrize(("text", "message"), FAULTS.values(), ids=FAULTS.keys())
+def test_a_faulty_file_gets_one_clear_error(tmp_path, text, message):
+    path = write(tmp_path, text)
+    with pytest.raises(ConfigError, match=message) as caught:
+        read_urdf(path)
+    assert str(caught.value).count(str(path)) == 1
+
+
+def test_unphysical_inertias_can_be_mended(tmp_path, caplog):
+    text, _ = FAULTS["unphysical inertia"]
+    robot = read_urdf(write(tmp_path, text), mend_inertias=True)
+    xx, yy, zz, *_ = robot.link("l0").inertia
+    # The nearest moments without negative mass along z: 0.15 + 0.15 >= 0.3 (+ 1 mm).
+    np.testing.assert_allclose([xx, yy, zz], [0.15, 0.15, 0.3], atol=3e-6)
+    assert "link 'l0'" in caplog.text
+    assert "mended" in caplog.text
+
+
+def test_implausible_inertias_are_taken_with_a_warning(tmp_path, caplog):
+    text = mesh_robot("part.stl").replace('mass value="1"', 'mass value="0.001"')
+    write_stl(tmp_path / "part.stl", *tetrahedron())
+    robot = read_urdf(write(tmp_path, text))
+    assert set(robot.links[0].accept) == {"inertia"}
+    assert caplog.text.count("radius of gyration") == 1
+
+
+def test_names_are_given_once_and_the_same_each_time(tmp_path):
+    bodies = f'<link name="root">{BODY}</link><link name="1 a">{BODY}</link>'
+    bodies += f'<link name="1-a">{BODY}</link>'
+    joints = joint("1 a", "base", "1 a") + joint("x", "1 a", "root")
+    joints += joint("1_a", "root", "1-a")
+    path = write(tmp_path, one_arm(bodies, joints))
+    robot = read_urdf(path)
+    links = [link.name for link in robot.links]
+    assert links == ["base", "link_1_a", "root_link", "link_1_a_link"]
+    assert robot.joint_names == ("joint_1_a", "x", "joint_1_a_joint")
+    assert robot == read_urdf(path)
