@@ -187,7 +187,8 @@ def default_whole_body_config(robot: RobotDescription) -> dict[str, Any]:
     held = feet if robot.root.kind == "free" else []
     keyframe = "ready" if "ready" in robot.keyframes else ""
     config: dict[str, Any] = {"format": 1, "frame": frames}
-    config["held"] = [{"frame": name} for name in held]
+    contact = "surface" if len(held) < 3 else "point"  # a biped balances on its soles
+    config["held"] = [{"frame": name, "contact": contact} for name in held]
     if keyframe:
         config["posture"] = {"keyframe": keyframe}
     return config
