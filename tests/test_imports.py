@@ -11,7 +11,7 @@ import wbc_suite
 PACKAGE = Path(wbc_suite.__file__).parent
 MODULES = sorted(p for p in PACKAGE.rglob("*.py") if "_catalogue" not in p.parts)
 
-BASE = ("errors", "typing", "tomlfile", "catalogue", "registration")
+BASE = ("errors", "typing", "arguments", "tomlfile", "catalogue", "registration")
 ORDER = (
     "robot",
     "kinematics",

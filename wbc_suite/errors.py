@@ -24,6 +24,8 @@ __all__ = [
 
 MAX_NAMES = 25
 """Names that a message lists at most."""
+MAX_LENGTH = 80
+"""Characters of a name that a message shows at most."""
 
 
 def nearest_name(name: str, known: Collection[str]) -> str | None:
@@ -49,14 +51,27 @@ class DescriptionError(ConfigError):
 
 
 class UnknownNameError(WbcError, LookupError):
-    """A name is missing from the collection it was looked up in."""
+    """A name is missing from the collection it was looked up in.
 
-    def __init__(self, kind: str, name: str, known: Collection[str]) -> None:
-        close = nearest_name(name, known)
+    Attributes:
+        kind: What the name should be the name of.
+        name: What was asked for.
+        known: The names there are.
+    """
+
+    def __init__(self, kind: str, name: object, known: Collection[str]) -> None:
+        asked = name if isinstance(name, str) else repr(name)
+        close = nearest_name(asked, known) if isinstance(name, str) else None
         hint = f" Did you mean '{close}'?" if close else ""
+        shown = asked if len(asked) <= MAX_LENGTH else asked[:MAX_LENGTH] + "..."
         super().__init__(
-            f"No {kind} named '{name}'.{hint} Known: {_list_names(known)}."
+            f"No {kind} named '{shown}'.{hint} Known: {_list_names(known)}."
         )
+        self.kind, self.name, self.known = kind, name, tuple(known)
+
+    def __reduce__(self) -> tuple[type, tuple[object, ...]]:
+        """Let it pass between processes, as errors of vector environments do."""
+        return type(self), (self.kind, self.name, self.known)
 
 
 def _list_names(names: Collection[str]) -> str:

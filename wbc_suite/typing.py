@@ -9,6 +9,9 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+Array: TypeAlias = NDArray[np.floating[Any]]
+"""Float64 array of any number of dimensions."""
+
 Vector: TypeAlias = NDArray[np.floating[Any]]
 """One-dimensional float64 array."""
 

@@ -156,5 +156,5 @@ def test_hands_never_touch_the_body_in_a_minute(seed):
 
 
 def test_wrong_numbers_are_refused():
-    with pytest.raises(ConfigError, match="margin < influence"):
+    with pytest.raises(ConfigError, match="more than the margin"):
         SelfCollisionLimit((), (), margin=0.2, influence=0.1)

@@ -170,5 +170,5 @@ def test_wrong_arguments_are_refused(arm: Configuration):
         FrameTask("hand", position_cost=-1.0)
     with pytest.raises(ConfigError, match="not a rotation"):
         FrameTask("hand", target=np.diag([2.0, 1.0, 1.0, 1.0]))
-    with pytest.raises(ConfigError, match="not a positive time"):
+    with pytest.raises(ConfigError, match="dt, a time, is .* greater than 0"):
         TaskStack(arm, [FrameTask("hand")]).solve(0.0)

@@ -6,6 +6,7 @@ from typing import Literal
 import numpy as np
 import pinocchio as pin
 
+from wbc_suite.arguments import check_array
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.typing import Indices, Matrix, Vector
 
@@ -42,6 +43,11 @@ class Configuration:
     """
 
     def __init__(self, model: pin.Model, q: Vector | None = None) -> None:
+        if not isinstance(model, pin.Model):
+            raise ConfigError(
+                "Configuration needs a pinocchio.Model, such as robot.to_pinocchio(), "
+                f"not {type(model).__name__}."
+            )
         self.model = model
         self.data: pin.Data = model.createData()
         self.nq, self.nv = int(model.nq), int(model.nv)
@@ -50,6 +56,7 @@ class Configuration:
         self.joint_jacobians: Matrix = self.data.J.T
         self.root_linear, self.root_angular = _root_indices(model)
         self._frame_ids = {f.name: i for i, f in enumerate(model.frames)}
+        self._nframes = len(model.frames)
         self._joint_ids = {n: i for i, n in enumerate(model.names)}
         self._com_is_current = False
         self.update(self.q if q is None else q)
@@ -64,21 +71,18 @@ class Configuration:
         Raises:
             ConfigError: If the shape is wrong.
         """
-        if len(q) != self.nq:
-            raise ConfigError(
-                f"q has {len(q)} values; model '{self.model.name}' has nq {self.nq}."
-            )
-        self.q[:] = q
+        self.q[:] = self._checked("q", q, self.nq)
         pin.computeJointJacobians(self.model, self.data, self.q)
         self._com_is_current = False
 
     def integrate(self, dq: Vector) -> Vector:
         """Return `q (+) dq`: the configuration reached by the tangent step dq (nv,)."""
+        dq = self._checked("dq", dq, self.nv)
         return pin.integrate(self.model, self.q, dq)
 
     def difference(self, q: Vector) -> Vector:
         """Return `q (-) self.q`, shape (nv,): the tangent step from here to q."""
-        return pin.difference(self.model, self.q, q)
+        return pin.difference(self.model, self.q, self._checked("q", q, self.nq))
 
     def frame_id(self, name: str) -> int:
         """Return the index of a frame.
@@ -88,7 +92,7 @@ class Configuration:
         """
         try:
             return self._frame_ids[name]
-        except KeyError:
+        except (KeyError, TypeError):
             raise UnknownNameError("frame", name, self._frame_ids) from None
 
     def joint_id(self, name: str) -> int:
@@ -99,7 +103,7 @@ class Configuration:
         """
         try:
             return self._joint_ids[name]
-        except KeyError:
+        except (KeyError, TypeError):
             raise UnknownNameError("joint", name, self._joint_ids) from None
 
     def velocity_names(self) -> tuple[str, ...]:
@@ -136,6 +140,8 @@ class Configuration:
         """
         k = self._resolve(frame)
         pin.updateFramePlacement(self.model, self.data, k)
+        if axes not in tuple(_REFERENCE):
+            raise UnknownNameError("axes", axes, _REFERENCE)
         return pin.getFrameJacobian(self.model, self.data, k, _REFERENCE[axes])
 
     @property
@@ -156,7 +162,15 @@ class Configuration:
             self._com_is_current = True
 
     def _resolve(self, frame: str | int) -> int:
-        return self.frame_id(frame) if isinstance(frame, str) else frame
+        """Return a frame's index; Pinocchio would read past its own memory."""
+        if isinstance(frame, int) and 0 <= frame < self._nframes:
+            return frame
+        return self.frame_id(frame)  # type: ignore[arg-type]  # or raise
+
+    def _checked(self, name: str, values: Vector, size: int) -> Vector:
+        if type(values) is np.ndarray and values.shape == (size,):
+            return values
+        return check_array(f"{name} of model '{self.model.name}'", values, (size,))
 
 
 def named_joints(model: pin.Model) -> list[tuple[str, pin.JointModel]]:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from wbc_suite.errors import ConfigError
+from wbc_suite.arguments import check_number
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.limit import BoxLimit, JointBounds
 
@@ -39,8 +39,7 @@ class AccelerationLimit(BoxLimit):
         self.default, self.joints = default, dict(joints or {})
         self.base_linear, self.base_angular = base_linear, base_angular
         for value in (*self.joints.values(), default, base_linear, base_angular):
-            if not value > 0.0:
-                raise ConfigError(f"AccelerationLimit: {value} is not positive.")
+            check_number("AccelerationLimit: a limit", value, above=0.0, endless=True)
 
     def apply(self, configuration: Configuration, bounds: JointBounds) -> None:
         """Set the window of every velocity."""

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from wbc_suite.errors import ConfigError
+from wbc_suite.arguments import check_array
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.rows import saturate
-from wbc_suite.qp.task import RowTask, cost_vector
+from wbc_suite.qp.task import RowTask, check_speed, cost_vector
 from wbc_suite.typing import Matrix, Vector
 
 __all__ = ["ComTask"]
@@ -37,7 +37,7 @@ class ComTask(RowTask):
     ) -> None:
         super().__init__(name, gain=gain, level=level)
         self._costs = cost_vector(name, cost, 3)[:, None]
-        self.max_speed = max_speed
+        self.max_speed = check_speed(name, max_speed)
         self.target: Vector | None = None
         if target is not None:
             self.set_target(target)
@@ -48,12 +48,8 @@ class ComTask(RowTask):
         Raises:
             ConfigError: If the shape is wrong.
         """
-        point = np.array(target, dtype=np.float64)
-        if point.shape != (3,):
-            raise ConfigError(
-                f"Task '{self.name}': a point has shape (3,), not {point.shape}."
-            )
-        self.target = point
+        what = f"Task '{self.name}': the target"
+        self.target = check_array(what, target, (3,)).copy()
 
     def bind(self, configuration: Configuration) -> None:
         """Without a target, hold the present point."""

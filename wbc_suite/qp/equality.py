@@ -7,11 +7,12 @@ from typing import Literal
 import numpy as np
 import pinocchio as pin
 
+from wbc_suite.arguments import check_array, check_number
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.frame_task import pose_matrix
 from wbc_suite.qp.rows import saturate
-from wbc_suite.typing import Matrix, Vector
+from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["Equality", "FrameEquality", "LinearEquality"]
 
@@ -72,14 +73,17 @@ class FrameEquality(Equality):
         gain: float = 0.5,
         name: str | None = None,
     ) -> None:
-        if not 0.0 < gain <= 1.0:
-            raise ConfigError(f"FrameEquality '{frame}': gain {gain} is not in (0, 1].")
+        if not isinstance(directions, Sequence):  # type: ignore[reportUnnecessaryIsInstance]
+            raise ConfigError(f"FrameEquality '{frame}': directions are a list.")
         for direction in directions:
             if direction not in _DIRECTIONS:
                 raise UnknownNameError("direction", direction, _DIRECTIONS)
-        self.name, self.frame, self.gain = name or frame, frame, gain
+        what = f"FrameEquality '{frame}': gain"
+        self.gain = check_number(what, gain, above=0.0, most=1.0)
+        self.name, self.frame = name or frame, frame
         self.hold_pose = hold_pose
-        self._kept = np.array([_DIRECTIONS.index(d) for d in directions])
+        kept = [_DIRECTIONS.index(direction) for direction in directions]
+        self._kept: Indices = np.array(kept, dtype=np.int64)
         self.dim = len(self._kept)
         self.target: pin.SE3 | None = None
         if target is not None:
@@ -135,14 +139,16 @@ class LinearEquality(Equality):
         self, matrix: Matrix, *, rate: Vector | None = None, name: str = "equality"
     ) -> None:
         self.name = name
-        self.matrix = np.atleast_2d(np.array(matrix, dtype=np.float64))
+        owner = f"LinearEquality '{name}'"
+        self.matrix: Matrix = np.atleast_2d(
+            check_array(f"{owner}: the matrix", matrix, None).copy()
+        )
+        if self.matrix.ndim != 2:
+            raise ConfigError(f"{owner}: a matrix, not shape {self.matrix.shape}.")
         self.dim = len(self.matrix)
-        self.rate = np.zeros(self.dim) if rate is None else np.array(rate, dtype=float)
-        if self.rate.shape != (self.dim,):
-            raise ConfigError(
-                f"LinearEquality '{name}': {self.dim} rows need a rate of shape "
-                f"({self.dim},), not {self.rate.shape}."
-            )
+        self.rate: Vector = np.zeros(self.dim)
+        if rate is not None:
+            self.rate[:] = check_array(f"{owner}: the rate", rate, (self.dim,))
         if not (np.isfinite(self.matrix).all() and np.isfinite(self.rate).all()):
             raise ConfigError(f"LinearEquality '{name}': a value is not finite.")
 

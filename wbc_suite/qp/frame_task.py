@@ -3,10 +3,11 @@
 import numpy as np
 import pinocchio as pin
 
+from wbc_suite.arguments import check_array
 from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.rows import saturate
-from wbc_suite.qp.task import RowTask, cost_vector
+from wbc_suite.qp.task import RowTask, check_speed, cost_vector
 from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["FrameTask", "pose_matrix"]
@@ -59,7 +60,9 @@ class FrameTask(RowTask):
         super().__init__(name or frame, gain=gain, level=level)
         self.frame = frame
         self.packed: Vector = np.zeros(21)
-        self.packed[18:] = gain, max_linear_speed, max_angular_speed
+        self.packed[18] = self.gain
+        self.packed[19] = check_speed(self.name, max_linear_speed)
+        self.packed[20] = check_speed(self.name, max_angular_speed)
         self.set_costs(position=position_cost, orientation=orientation_cost)
         self.has_target = target is not None
         if target is not None:
@@ -154,11 +157,7 @@ def pose_matrix(owner: str, pose: pin.SE3 | Matrix) -> tuple[Matrix, Vector]:
     """
     if isinstance(pose, pin.SE3):
         return pose.rotation, pose.translation
-    matrix = np.asarray(pose, dtype=np.float64)
-    if matrix.shape != (4, 4):
-        raise ConfigError(
-            f"{owner}: a pose is an SE3 or a (4, 4) matrix, not shape {matrix.shape}."
-        )
+    matrix = check_array(f"{owner}: the pose, an SE3 or a matrix,", pose, (4, 4))
     rotation = matrix[:3, :3]
     if np.isfinite(rotation).all() and (
         np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-6

@@ -2,9 +2,10 @@
 
 import numpy as np
 
+from wbc_suite.arguments import check_number
 from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Configuration
-from wbc_suite.qp.task import RowTask, cost_vector
+from wbc_suite.qp.task import RowTask, check_speed, cost_vector
 from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["JointCouplingTask"]
@@ -45,7 +46,9 @@ class JointCouplingTask(RowTask):
     ) -> None:
         super().__init__(name or f"{follower} - {leader}", gain=gain, level=level)
         self.follower, self.leader = follower, leader
-        self.ratio, self.offset, self.max_speed = ratio, offset, max_speed
+        self.ratio = check_number(f"Task '{self.name}': the ratio", ratio)
+        self.offset = check_number(f"Task '{self.name}': the offset", offset)
+        self.max_speed = check_speed(self.name, max_speed)
         self._cost = float(cost_vector(self.name, cost, 1)[0])
 
     def bind(self, configuration: Configuration) -> None:

@@ -3,10 +3,11 @@
 import numpy as np
 import pinocchio as pin
 
+from wbc_suite.arguments import check_array
 from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.rows import saturate
-from wbc_suite.qp.task import RowTask, cost_vector
+from wbc_suite.qp.task import RowTask, check_speed, cost_vector
 from wbc_suite.typing import Matrix, Vector
 
 __all__ = ["LookAtTask"]
@@ -58,10 +59,10 @@ class LookAtTask(RowTask):
         super().__init__(name or f"{frame} looks", gain=gain, level=level)
         self.frame = frame
         self._cost = float(cost_vector(self.name, cost, 1)[0])
-        self._speed = max_angular_speed
-        direction = np.array(axis, dtype=np.float64)
+        self._speed = check_speed(self.name, max_angular_speed)
+        direction = check_array(f"Task '{self.name}': the axis", axis, (3,))
         length = float(np.linalg.norm(direction))
-        if direction.shape != (3,) or not length > 0.0:
+        if not 0.0 < length < np.inf:
             raise ConfigError(f"Task '{self.name}': the axis {axis} has no direction.")
         self._axis = direction / length
         self.target: Vector | None = None
@@ -74,12 +75,8 @@ class LookAtTask(RowTask):
         Raises:
             ConfigError: If the shape is wrong.
         """
-        point = np.array(target, dtype=np.float64)
-        if point.shape != (3,):
-            raise ConfigError(
-                f"Task '{self.name}': a point has shape (3,), not {point.shape}."
-            )
-        self.target = point
+        what = f"Task '{self.name}': the target"
+        self.target = check_array(what, target, (3,)).copy()
 
     def bind(self, configuration: Configuration) -> None:
         """Resolve the frame; without a target, look where the axis points now."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wbc_suite.errors import ConfigError
+from wbc_suite.arguments import check_number
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.limit import BoxLimit, JointBounds
 
@@ -23,11 +23,8 @@ class PositionLimit(BoxLimit):
     """
 
     def __init__(self, *, gain: float = 1.0, margin: float = 0.0) -> None:
-        if not 0.0 < gain <= 1.0 or margin < 0.0:
-            raise ConfigError(
-                f"PositionLimit: gain {gain} must be in (0, 1], margin {margin} >= 0."
-            )
-        self.gain, self.margin = gain, margin
+        self.gain = check_number("PositionLimit: gain", gain, above=0.0, most=1.0)
+        self.margin = check_number("PositionLimit: margin", margin, least=0.0)
 
     def apply(self, configuration: Configuration, bounds: JointBounds) -> None:
         """Take the limits from the model, less the margin."""

@@ -4,9 +4,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from wbc_suite.arguments import check_array
 from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Configuration
-from wbc_suite.qp.task import DiagonalTask, cost_vector, joint_costs
+from wbc_suite.qp.task import DiagonalTask, check_speed, cost_vector, joint_costs
 from wbc_suite.typing import Vector
 
 __all__ = ["PostureTask"]
@@ -43,8 +44,10 @@ class PostureTask(DiagonalTask):
         self.cost, self.costs = cost, dict(costs or {})
         for value in (cost, *self.costs.values()):
             cost_vector(name, value, 1)
-        self.max_speed = max_speed
-        self.target = None if target is None else np.array(target, dtype=np.float64)
+        self.max_speed = check_speed(name, max_speed)
+        self.target: Vector | None = None
+        if target is not None:
+            self.set_target(target)
 
     def set_target(self, target: Vector) -> None:
         """Set the posture q*, shape (nq,).
@@ -52,13 +55,9 @@ class PostureTask(DiagonalTask):
         Raises:
             ConfigError: If the shape is wrong.
         """
-        q = np.array(target, dtype=np.float64)
-        if self.target is not None and q.shape != self.target.shape:
-            raise ConfigError(
-                f"Task '{self.name}': a posture has shape {self.target.shape}, "
-                f"not {q.shape}."
-            )
-        self.target = q
+        what = f"Task '{self.name}': the posture"
+        shape = None if self.target is None else self.target.shape
+        self.target = check_array(what, target, shape).copy()
 
     def bind(self, configuration: Configuration) -> None:
         """Resolve joint names; without a target, take the present posture."""

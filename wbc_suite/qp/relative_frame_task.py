@@ -6,7 +6,7 @@ import pinocchio as pin
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.frame_task import pose_matrix
 from wbc_suite.qp.rows import saturate
-from wbc_suite.qp.task import RowTask, cost_vector
+from wbc_suite.qp.task import RowTask, check_speed, cost_vector
 from wbc_suite.typing import Matrix, Vector
 
 __all__ = ["RelativeFrameTask"]
@@ -60,7 +60,10 @@ class RelativeFrameTask(RowTask):
                 cost_vector(self.name, orientation_cost, 3),
             ]
         )
-        self._speeds = max_linear_speed, max_angular_speed
+        self._speeds = (
+            check_speed(self.name, max_linear_speed),
+            check_speed(self.name, max_angular_speed),
+        )
         self.target: pin.SE3 | None = None
         if target is not None:
             self.set_target(target)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from wbc_suite.errors import ConfigError
+from wbc_suite.arguments import check_count, check_number
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.capsule_distance import nearest_pairs
 from wbc_suite.qp.limit import RowLimit
@@ -57,17 +57,16 @@ class SelfCollisionLimit(RowLimit):
         influence: float = 0.1,
         rate: float = 10.0,
     ) -> None:
-        if nearest < 1 or not 0.0 <= margin < influence or not rate > 0.0:
-            raise ConfigError(
-                "SelfCollisionLimit needs nearest >= 1, 0 <= margin < influence and "
-                f"rate > 0, not {nearest}, {margin}, {influence}, {rate}."
-            )
-        self.dim = nearest
-        self.margin, self.influence, self.rate = margin, influence, rate
+        name = "SelfCollisionLimit"
+        self.dim = check_count(f"{name}: nearest", nearest, least=1)
+        self.margin = check_number(f"{name}: margin", margin, least=0.0)
+        what = f"{name}: influence, more than the margin,"
+        self.influence = check_number(what, influence, above=self.margin)
+        self.rate = check_number(f"{name}: rate", rate, above=0.0)
         self._capsules = tuple(capsules)
         self._pairs = _capsule_pairs(self._capsules, pairs)
-        self.found: Indices = np.full(nearest, -1, dtype=np.int64)
-        self.distances: Vector = np.full(nearest, np.inf)
+        self.found: Indices = np.full(self.dim, -1, dtype=np.int64)
+        self.distances: Vector = np.full(self.dim, np.inf)
 
     @classmethod
     def of_robot(

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from wbc_suite.errors import ConfigError
+from wbc_suite.arguments import check_array, check_number
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.acceleration_limit import AccelerationLimit
 from wbc_suite.qp.bounds import LimitKind, merge_bounds
@@ -14,6 +14,7 @@ from wbc_suite.qp.fallback import checked_solve, retreat
 from wbc_suite.qp.frame_task import FrameTask
 from wbc_suite.qp.level import Level
 from wbc_suite.qp.limit import BoxLimit, JointBounds, Limit, RowLimit
+from wbc_suite.qp.parts import check_parts
 from wbc_suite.qp.position_limit import PositionLimit
 from wbc_suite.qp.problem import Problem
 from wbc_suite.qp.report import TaskReport, reasons
@@ -78,14 +79,16 @@ class TaskStack:
         curvature_damping: float = 1.0,
         escape: bool = True,
     ) -> None:
-        if not damping > 0.0:
-            raise ConfigError(f"TaskStack: damping {damping} is not positive.")
+        check_parts(configuration, tasks, limits, equalities)
         if limits is None:
             limits = (PositionLimit(), VelocityLimit(), AccelerationLimit())
         self.configuration = configuration
         self.tasks, self.equalities = tuple(tasks), tuple(equalities)
-        self.solver, self.damping = solver, damping
-        self.curvature_damping = curvature_damping
+        self.solver = solver
+        self.damping = check_number("TaskStack: damping", damping, above=0.0)
+        self.curvature_damping = check_number(
+            "TaskStack: curvature_damping", curvature_damping, least=0.0
+        )
         self._names = configuration.velocity_names()
         self._bounds = JointBounds.unlimited(configuration)
         self._row_limits = [x for x in limits if isinstance(x, RowLimit)]
@@ -126,7 +129,11 @@ class TaskStack:
 
         After it the same inputs give bit-equal answers.
         """
-        self.v_previous[:] = 0.0 if v is None else v
+        if v is None:
+            self.v_previous[:] = 0.0
+        else:
+            shape = (self.configuration.nv,)
+            self.v_previous[:] = check_array("TaskStack.reset: v", v, shape)
         self._solver = self._solver.fresh()
         self._lower.clear()
         self._decided.clear()
@@ -142,8 +149,8 @@ class TaskStack:
         Raises:
             ConfigError: If dt is not positive and finite.
         """
-        if not 0.0 < dt < np.inf:
-            raise ConfigError(f"TaskStack.solve: dt {dt} is not a positive time.")
+        if not isinstance(dt, float) or not 0.0 < dt < np.inf:
+            dt = check_number("TaskStack.solve: dt, a time,", dt, above=0.0)
         if not np.isfinite(self.configuration.q).all():
             still = np.zeros(self.configuration.nv)
             self._solved.clear()

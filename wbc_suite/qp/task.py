@@ -5,11 +5,19 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from wbc_suite.arguments import check_array, check_count, check_number
 from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Configuration
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["DiagonalTask", "RowTask", "Task", "cost_vector", "joint_costs"]
+__all__ = [
+    "DiagonalTask",
+    "RowTask",
+    "Task",
+    "check_speed",
+    "cost_vector",
+    "joint_costs",
+]
 
 
 class Task(ABC):
@@ -30,11 +38,9 @@ class Task(ABC):
     """
 
     def __init__(self, name: str, *, gain: float = 1.0, level: int = 0) -> None:
-        if not 0.0 < gain <= 1.0:
-            raise ConfigError(f"Task '{name}': gain {gain} is not in (0, 1].")
-        if level < 0:
-            raise ConfigError(f"Task '{name}': level {level} is negative.")
-        self.name, self.gain, self.level = name, float(gain), int(level)
+        self.name = str(name)
+        self.gain = check_number(f"Task '{name}': gain", gain, above=0.0, most=1.0)
+        self.level = check_count(f"Task '{name}': level", level)
 
     @abstractmethod
     def bind(self, configuration: Configuration) -> None:
@@ -102,7 +108,7 @@ def cost_vector(owner: str, cost: float | Vector, size: int) -> Vector:
     Raises:
         ConfigError: If a cost is negative or not finite, or the shape is wrong.
     """
-    vector = np.asarray(cost, dtype=np.float64)
+    vector = check_array(f"{owner}: the cost", cost, None)
     if vector.shape not in ((), (size,)):
         raise ConfigError(
             f"{owner}: a cost is one number or {size}, not shape {vector.shape}."
@@ -110,6 +116,17 @@ def cost_vector(owner: str, cost: float | Vector, size: int) -> Vector:
     if not (np.isfinite(vector).all() and (vector >= 0.0).all()):
         raise ConfigError(f"{owner}: costs must be finite and not negative: {cost}.")
     return np.broadcast_to(vector, (size,)).copy()
+
+
+def check_speed(owner: str, speed: object) -> float:
+    """Return the greatest speed a task asks for; infinity is no limit.
+
+    Raises:
+        ConfigError: If it is not positive.
+    """
+    return check_number(
+        f"Task '{owner}': the greatest speed", speed, above=0.0, endless=True
+    )
 
 
 def joint_costs(

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from wbc_suite.errors import ConfigError
+from wbc_suite.arguments import check_number
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.limit import BoxLimit, JointBounds
 
@@ -24,7 +24,7 @@ class VelocityLimit(BoxLimit):
         scale: Factor on all of the model's limits, (0, 1].
 
     Raises:
-        ConfigError: If a limit is not positive.
+        ConfigError: If a limit is not positive, or the scale is out of range.
     """
 
     def __init__(
@@ -38,9 +38,9 @@ class VelocityLimit(BoxLimit):
         self.joints = dict(joints or {})
         self.base_linear, self.base_angular = base_linear, base_angular
         self.scale = scale
-        for value in (*self.joints.values(), base_linear, base_angular, scale):
-            if not value > 0.0:
-                raise ConfigError(f"VelocityLimit: {value} is not positive.")
+        for value in (*self.joints.values(), base_linear, base_angular):
+            check_number("VelocityLimit: a limit", value, above=0.0, endless=True)
+        check_number("VelocityLimit: scale", scale, above=0.0, most=1.0)
 
     def apply(self, configuration: Configuration, bounds: JointBounds) -> None:
         """Take the limits from the model, the root's from the options."""
