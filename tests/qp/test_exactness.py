@@ -18,6 +18,7 @@ from wbc_suite.qp import (
     RelativeFrameTask,
     TaskStack,
 )
+from wbc_suite.qp.active_set import solve_warm
 from wbc_suite.qp.fallback import box_least_squares, checked_solve
 from wbc_suite.qp.solver import make_solver
 
@@ -84,7 +85,7 @@ def worst_deviation(robot, count, seed) -> tuple[float, int]:
         if not solution.ok:  # held feet against a random velocity: see robustness
             continue
         compared += 1
-        worst = max(worst, np.abs(solution.dq - exact(stack._problem)).max())
+        worst = max(worst, np.abs(solution.dq - exact(stack.problem())).max())
     return worst, compared
 
 
@@ -114,14 +115,41 @@ def test_solvers_by_name_agree(humanoid, name, tolerance):
         stack = random_stack(humanoid, rng)
         if not stack.solve(5e-3).ok:
             continue
-        result = checked_solve(make_solver(name), stack._problem)
+        result = checked_solve(make_solver(name), stack.problem())
         assert result is not None
         x, multipliers = result
-        problem = stack._problem
+        problem = stack.problem()
         np.testing.assert_allclose(x, exact(problem), atol=tolerance)
         pull = multipliers[: problem.nv] + problem.rows.T @ multipliers[problem.nv :]
         gradient = problem.H @ x + problem.c + pull
         np.testing.assert_allclose(gradient, 0.0, atol=100 * tolerance)
+
+
+def test_warm_active_set_answers_exactly_or_not_at_all(rng):
+    answers = 0
+    for _ in range(300):
+        n, m, k = int(rng.integers(6, 40)), int(rng.integers(1, 20)), rng.integers(0, 3)
+        W, A = rng.normal(size=(m, n)), rng.normal(size=(k, n))
+        problem = Problem(n, 0, k)
+        diagonal = np.abs(rng.normal(size=(2, n)))
+        mu, e = 10 ** rng.uniform(-3, 0), rng.normal(size=m)
+        problem.H[:] = W.T @ W + np.diag(diagonal[0] + mu)
+        problem.c[:] = -W.T @ e - diagonal[1]
+        problem.lb[:], problem.ub[:] = -rng.random(n), rng.random(n)
+        problem.A[:] = A
+        problem.set_equalities(0.1 * rng.normal(size=k))
+        x, side = np.empty(n), np.zeros(n, dtype=np.int64)
+        bounds, rows = np.empty(n), np.empty(k)
+        b, lb, ub = problem.b, problem.lb, problem.ub
+        # The second call starts from the set that the first has found.
+        for _ in range(2):
+            if solve_warm(W, e, A, b, diagonal, mu, lb, ub, side, x, bounds, rows):
+                answers += 1
+                np.testing.assert_allclose(x, exact(problem), atol=1e-9)
+                gradient = problem.H @ x + problem.c + bounds + A.T @ rows
+                np.testing.assert_allclose(gradient, 0.0, atol=1e-9)
+                assert (bounds * side >= 0).all()
+    assert answers > 300
 
 
 def test_box_least_squares_converges_to_the_exact_optimum(rng):

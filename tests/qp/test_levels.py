@@ -3,7 +3,7 @@
 import numpy as np
 
 from wbc_suite.qp import ComTask, FrameTask, PostureTask, TaskStack
-from wbc_suite.qp.rows import row_space
+from wbc_suite.qp.row_space import row_space
 
 DT = 5e-3
 
@@ -37,7 +37,7 @@ def test_a_level_is_optimal_among_what_the_upper_leave(humanoid):
     q[7:] += 0.1
     posture.set_target(q)
     solution = stack.solve(DT)
-    W, mu = stack._levels[0].W, stack._damping[1]
+    W, mu = stack._levels[0].W, stack._levels[1].mu
     _, s, Vt = np.linalg.svd(W)
     N = Vt[(s > 1e-9).sum() :].T
     weights, steps = stack._levels[1].diagonal

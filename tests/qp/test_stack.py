@@ -42,10 +42,9 @@ def test_solution_meets_its_kkt_conditions(humanoid, rng):
     for _ in range(100):
         task = stack.tasks[int(rng.integers(4))]
         move_target(task, rng.normal(size=3) * 0.3)
-        problem = stack._problem
         solution = stack.solve(DT)
-        x, multipliers = stack._solver.solve(problem)
-        np.testing.assert_allclose(x, solution.dq, atol=1e-10)
+        problem, x = stack.problem(), solution.dq
+        multipliers = solution.pressure.multipliers
         gradient = problem.H @ x + problem.c + multipliers[: problem.nv]
         np.testing.assert_allclose(gradient, 0.0, atol=1e-10)
         at_upper, at_lower = multipliers > 0, multipliers < 0
@@ -53,6 +52,8 @@ def test_solution_meets_its_kkt_conditions(humanoid, rng):
         np.testing.assert_allclose(x[at_lower], problem.lb[at_lower], atol=1e-10)
         assert (x <= problem.ub + 1e-12).all()
         assert (x >= problem.lb - 1e-12).all()
+        by_daqp, _ = stack._solver.solve(problem)
+        np.testing.assert_allclose(x, by_daqp, atol=1e-10)
         humanoid.update(humanoid.integrate(solution.dq))
 
 

@@ -102,7 +102,7 @@ def test_normal_equations_agree_with_matrix_product(humanoid, rng):
     )
     humanoid.update(humanoid.integrate(rng.normal(size=humanoid.nv) * 0.2))
     stack.solve(5e-3)
-    level, problem = stack._levels[0], stack._problem
+    level, problem = stack._levels[0], stack.problem()
     mu = 1e-2 + np.abs(level.e) @ np.abs(level.W).max(axis=1)
     H = level.W.T @ level.W + np.diag(level.diagonal[0] + mu)
     c = -level.W.T @ level.e - level.diagonal[1]
@@ -170,5 +170,5 @@ def test_wrong_arguments_are_refused(arm: Configuration):
         FrameTask("hand", position_cost=-1.0)
     with pytest.raises(ConfigError, match="not a rotation"):
         FrameTask("hand", target=np.diag([2.0, 1.0, 1.0, 1.0]))
-    with pytest.raises(ConfigError, match="dt, a time, is .* greater than 0"):
+    with pytest.raises(ConfigError, match=r"dt, a time, is .* greater than 0"):
         TaskStack(arm, [FrameTask("hand")]).solve(0.0)

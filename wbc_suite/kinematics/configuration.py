@@ -58,6 +58,8 @@ class Configuration:
         self._frame_ids = {f.name: i for i, f in enumerate(model.frames)}
         self._nframes = len(model.frames)
         self._joint_ids = {n: i for i, n in enumerate(model.names)}
+        self._com: Vector = self.data.com[0]
+        self._com_jacobian: Matrix = self.data.Jcom
         self._com_is_current = False
         self.update(self.q if q is None else q)
 
@@ -120,7 +122,7 @@ class Configuration:
         return self.joint_support(joint)
 
     def joint_support(self, joint: int) -> Indices:
-        """Return the velocity indices that move a joint, its own included, ascending."""
+        """Return the velocity indices that move a joint, with its own, ascending."""
         indices: list[int] = []
         for j in list(self.model.supports[joint])[1:]:  # without the universe
             first = int(self.model.joints[j].idx_v)
@@ -147,16 +149,17 @@ class Configuration:
     @property
     def com(self) -> Vector:
         """Centre of mass in the world, m, shape (3,). A view."""
-        self._update_com()
-        return self.data.com[0]
+        self.update_com()
+        return self._com
 
     @property
     def com_jacobian(self) -> Matrix:
         """Jacobian of the centre of mass, shape (3, nv). A view."""
-        self._update_com()
-        return self.data.Jcom
+        self.update_com()
+        return self._com_jacobian
 
-    def _update_com(self) -> None:
+    def update_com(self) -> None:
+        """Compute the centre of mass and its Jacobian, once after each `update`."""
         if not self._com_is_current:
             pin.jacobianCenterOfMass(self.model, self.data, False)
             self._com_is_current = True

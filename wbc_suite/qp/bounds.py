@@ -29,14 +29,14 @@ def merge_bounds(  # noqa: C901, one flat loop is what compiles well
     q_upper: Vector,
     position_gain: float,
     v_max: Vector,
-    a_max: Vector,
     v_previous: Vector,
+    a_max: Vector,
     dt: float,
     lower: Vector,
     upper: Vector,
     lower_kind: Indices,
     upper_kind: Indices,
-) -> None:
+) -> bool:
     """Write bounds of the step dq that are never empty.
 
     The acceleration window `v_previous dt -+ a dt^2` is clipped into the position
@@ -56,14 +56,22 @@ def merge_bounds(  # noqa: C901, one flat loop is what compiles well
         q_upper: Upper position limits.
         position_gain: Fraction of the distance that one step may cover, 0 to 1.
         v_max: Speed limits, inf where there is none, shape (nv,).
-        a_max: Acceleration limits, inf where there is none, shape (nv,).
         v_previous: Velocity of the previous step, shape (nv,).
+        a_max: Acceleration limits, inf where there is none, shape (nv,).
         dt: Step, s.
         lower: Output, least step, shape (nv,).
         upper: Output, greatest step, shape (nv,).
         lower_kind: Output, the `LimitKind` that set each lower bound.
         upper_kind: Output, the same for the upper bounds.
+
+    Returns:
+        Whether q is finite.
     """
+    total = 0.0
+    for i in range(q.shape[0]):
+        total += q[i]
+    if not np.isfinite(total):
+        return False
     for i in range(lower.shape[0]):
         window = a_max[i] * dt * dt
         lo = v_previous[i] * dt - window
@@ -102,6 +110,7 @@ def merge_bounds(  # noqa: C901, one flat loop is what compiles well
             hi, hi_kind = -step, 2
         lower[i], upper[i] = lo, hi
         lower_kind[i], upper_kind[i] = lo_kind, hi_kind
+    return True
 
 
 @numba.njit(cache=True, nogil=True)

@@ -4,7 +4,8 @@ import numpy as np
 
 from wbc_suite.arguments import check_array
 from wbc_suite.kinematics import Configuration
-from wbc_suite.qp.rows import saturate
+from wbc_suite.qp.lie import saturate
+from wbc_suite.qp.rows import PACKED_COM
 from wbc_suite.qp.task import RowTask, check_speed, cost_vector
 from wbc_suite.typing import Matrix, Vector
 
@@ -36,9 +37,10 @@ class ComTask(RowTask):
         name: str = "com",
     ) -> None:
         super().__init__(name, gain=gain, level=level)
-        self._costs = cost_vector(name, cost, 3)[:, None]
-        self.max_speed = check_speed(name, max_speed)
-        self.target: Vector | None = None
+        self.packed: Vector = np.zeros(PACKED_COM)
+        self.packed[3:6] = cost_vector(name, cost, 3)
+        self.packed[6:] = self.gain, check_speed(name, max_speed)
+        self.has_target = target is not None
         if target is not None:
             self.set_target(target)
 
@@ -49,17 +51,22 @@ class ComTask(RowTask):
             ConfigError: If the shape is wrong.
         """
         what = f"Task '{self.name}': the target"
-        self.target = check_array(what, target, (3,)).copy()
+        self.packed[:3] = check_array(what, target, (3,))
+        self.has_target = True
+
+    @property
+    def target(self) -> Vector:
+        """Point p*, m, a copy."""
+        return self.packed[:3].copy()
 
     def bind(self, configuration: Configuration) -> None:
         """Without a target, hold the present point."""
-        if self.target is None:
-            self.target = configuration.com.copy()
+        if not self.has_target:
+            self.set_target(configuration.com)
 
     def error(self, configuration: Configuration) -> Vector:
         """Return `p* - p_com`, m, shape (3,)."""
-        assert self.target is not None
-        return self.target - configuration.com
+        return self.packed[:3] - configuration.com
 
     def jacobian(self, configuration: Configuration) -> Matrix:
         """Return the derivative J of the error, `d(e) = -J dq`, shape (3, nv)."""
@@ -68,13 +75,11 @@ class ComTask(RowTask):
     def rows(
         self, configuration: Configuration, dt: float, W: Matrix, e: Vector
     ) -> Vector:
-        """Write the weighted rows."""
+        """Write the weighted rows; the readable form of the kernel `com_rows`."""
         error = self.error(configuration)
-        np.multiply(self._costs, configuration.com_jacobian, out=W)
-        if np.isfinite(error).all():
-            np.multiply(error, self.gain, out=e)
-            saturate(e, self.max_speed * dt)
-            e *= self._costs[:, 0]
-        else:
-            e[:] = 0.0
+        costs, gain, speed = self.packed[3:6], self.packed[6], self.packed[7]
+        step = gain * error if np.isfinite(error).all() else np.zeros(3)
+        saturate(step, speed * dt)
+        W[:] = costs[:, None] * configuration.com_jacobian
+        e[:] = costs * step
         return error

@@ -35,11 +35,11 @@ class DampingTask(DiagonalTask):
 
     def bind(self, configuration: Configuration) -> None:
         """Resolve joint names."""
-        self._weights = joint_costs(configuration, self.cost, self.costs) ** 2
+        self.squared_costs = joint_costs(configuration, self.cost, self.costs) ** 2
 
     def diagonal(
         self, configuration: Configuration, dt: float, weights: Vector, steps: Vector
     ) -> bool:
         """Add squared costs."""
-        weights += self._weights
+        weights += self.squared_costs
         return True

@@ -11,7 +11,7 @@ from wbc_suite.arguments import check_array, check_number
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.frame_task import pose_matrix
-from wbc_suite.qp.rows import saturate
+from wbc_suite.qp.lie import saturate
 from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["Equality", "FrameEquality", "LinearEquality"]

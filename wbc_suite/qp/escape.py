@@ -90,20 +90,23 @@ class Escape:
         self._targets: Vector | None = None  # of the search or drive
         self._answered: Vector | None = None  # targets that need no second look
 
-    def bias(self, dt: float, v: Vector, pressed: Indices) -> Matrix | None:
+    def bias(
+        self, dt: float, v: Vector, pressed: Callable[[], Indices]
+    ) -> Matrix | None:
         """Return squared costs and weighted steps, shape (2, nv), or None.
 
         Args:
             dt: Step, s.
             v: Velocity of the previous tick, shape (nv,).
-            pressed: Velocity indices of the joints pressed against position limits.
+            pressed: Tells the velocity indices of the joints that were pressed against
+                position limits.
         """
-        self._still = self._still + dt if np.abs(v).max() < _STILL else 0.0
+        self._still = self._still + dt if max(v.max(), -v.min()) < _STILL else 0.0
         if self._drive is None and self._search is None:
             if self._still < _PATIENCE or not self._is_stuck():
                 return None
             self._targets = self._present_targets()
-            self._search = self._look_ahead(pressed)
+            self._search = self._look_ahead(pressed())
         if self._targets_moved(self._targets, 1e-2):
             self._drive, self._search = None, None
             return None

@@ -29,8 +29,7 @@ def checked_solve(solver: QpSolver, problem: Problem) -> tuple[Vector, Vector] |
     if result is None:
         return None
     x, multipliers = result
-    # NaN compares false, so it is refused here too.
-    if not problem.violation(x) <= _TOLERANCE:
+    if problem.violation(x) > _TOLERANCE:  # infinite for what is not finite
         return None
     np.minimum(x, problem.ub, out=x)
     np.maximum(x, problem.lb, out=x)

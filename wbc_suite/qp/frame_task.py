@@ -6,7 +6,8 @@ import pinocchio as pin
 from wbc_suite.arguments import check_array
 from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Configuration
-from wbc_suite.qp.rows import saturate
+from wbc_suite.qp.lie import saturate
+from wbc_suite.qp.rows import PACKED_FRAME
 from wbc_suite.qp.task import RowTask, check_speed, cost_vector
 from wbc_suite.typing import Indices, Matrix, Vector
 
@@ -59,7 +60,7 @@ class FrameTask(RowTask):
     ) -> None:
         super().__init__(name or frame, gain=gain, level=level)
         self.frame = frame
-        self.packed: Vector = np.zeros(21)
+        self.packed: Vector = np.zeros(PACKED_FRAME)
         self.packed[18] = self.gain
         self.packed[19] = check_speed(self.name, max_linear_speed)
         self.packed[20] = check_speed(self.name, max_angular_speed)

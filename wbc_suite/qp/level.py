@@ -1,32 +1,45 @@
 """The rows of all tasks that share one strict level."""
 
+import math
 from collections.abc import Sequence
+from typing import TypeVar
 
 import numpy as np
 
 from wbc_suite.kinematics import Configuration
+from wbc_suite.qp.com_task import ComTask
+from wbc_suite.qp.damping_task import DampingTask
 from wbc_suite.qp.frame_task import FrameTask
+from wbc_suite.qp.limit import JointBounds
+from wbc_suite.qp.posture_task import PostureTask
 from wbc_suite.qp.problem import Problem
-from wbc_suite.qp.rows import PACKED, frame_rows, normal_equations
+from wbc_suite.qp.rows import PACKED_COM, PACKED_FRAME, normal_equations, write_rows
 from wbc_suite.qp.task import DiagonalTask, RowTask, Task
 from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["Level"]
 
+AnyTask = TypeVar("AnyTask", bound=Task)
+
 
 class Level:
-    """Buffers and row layout of one level: `H = W^T W + D`, `c = -W^T e - d`.
+    """Buffers and row layout of one level: `H = W^T W + D + mu I`, `c = -W^T e - d`.
 
-    Frame tasks are written together by one compiled kernel, other row tasks by their
-    own `rows`, and diagonal tasks never become rows at all.
+    Frame, centre-of-mass and posture tasks are written by one compiled kernel, other
+    tasks by their own `rows` and `diagonal` before it. A subclass of a compiled task
+    counts as another: its methods are called.
+
+    Args:
+        configuration: The robot.
+        tasks: Tasks of this level; they are bound here.
 
     Attributes:
         row_tasks: Tasks with rows, in the order of the rows.
-        diagonal_tasks: Tasks on single joints.
+        slices: Where each row task's rows are.
         W: Weighted rows, shape (m, nv).
         e: Weighted steps, shape (m,).
-        slices: Where each row task's rows are.
-        errors: Error before saturation of row tasks that are not plain frame tasks.
+        diagonal: Squared weights and weighted steps of joints, shape (2, nv).
+        mu: Damping of every joint at the last tick, see `rows.damping_of_rows`.
         held: Names of the tasks whose target was not finite at the last tick.
     """
 
@@ -34,7 +47,6 @@ class Level:
         for task in tasks:
             task.bind(configuration)
         self.row_tasks = [t for t in tasks if isinstance(t, RowTask)]
-        self.diagonal_tasks = [t for t in tasks if isinstance(t, DiagonalTask)]
         self._starts = np.cumsum([0] + [t.dim for t in self.row_tasks])
         self.slices = [
             slice(a, b)
@@ -42,108 +54,189 @@ class Level:
         ]
         self.W: Matrix = np.zeros((int(self._starts[-1]), configuration.nv))
         self.e: Vector = np.zeros(len(self.W))
-        self.diagonal: Matrix = np.zeros((2, configuration.nv))
         self.held: list[str] = []
-        self.errors: dict[str, Vector] = {}
         self._support = _concatenate([t.support(configuration) for t in self.row_tasks])
+        self._bind_frames(configuration)
+        self._bind_coms()
+        self._bind_joints(configuration, tasks)
+        compiled = (*self._frames, *self._coms)
         self._others = [
             (t, self.W[s], self.e[s])
             for t, s in zip(self.row_tasks, self.slices, strict=True)
-            if type(t) is not FrameTask
+            if t not in compiled
         ]
-        self._bind_frames(configuration)
+        self._errors: dict[RowTask, Vector] = {}
+        self.mu = 0.0
+        self._bind_kernel(configuration)
 
-    def _bind_frames(self, configuration: Configuration) -> None:
-        model = configuration.model
-        pairs = [
+    def _rows_of(self, kind: type[AnyTask]) -> tuple[list[AnyTask], Indices]:
+        """Return the tasks of exactly one class, and the first row of each."""
+        found = [
             (t, s.start)
             for t, s in zip(self.row_tasks, self.slices, strict=True)
-            if type(t) is FrameTask
+            if type(t) is kind
         ]
-        self._frames = [t for t, _ in pairs]
-        frames = [model.frames[t.frame_index] for t in self._frames]
+        return [t for t, _ in found], np.array(
+            [row for _, row in found], dtype=np.int64
+        )
+
+    def _bind_frames(self, configuration: Configuration) -> None:
+        self._frames, self._frame_row = self._rows_of(FrameTask)
+        frames = [configuration.model.frames[t.frame_index] for t in self._frames]
+        count = len(frames)
         self._joints = np.array([f.parentJoint for f in frames], dtype=np.int64)
-        self._offsets = np.array(
+        self._offsets: Matrix = np.array(
             [[*f.placement.rotation.ravel(), *f.placement.translation] for f in frames]
-        ).reshape(len(frames), 12)
-        self._first_row = np.array([row for _, row in pairs], dtype=np.int64)
+        ).reshape(count, 12)
         self._frame_support = _concatenate(
             [t.support(configuration) for t in self._frames]
         )
-        self._packed: Matrix = np.zeros((len(frames), PACKED))
-        self.frame_errors: Matrix = np.zeros((len(frames), 2))
+        self._frame_targets: Matrix = np.zeros((count, PACKED_FRAME))
+        self._frame_errors: Matrix = np.zeros((count, 2))
 
-    def assemble(
+    def _bind_coms(self) -> None:
+        self._coms, self._com_row = self._rows_of(ComTask)
+        self._com_targets: Matrix = np.zeros((len(self._coms), PACKED_COM))
+        self._com_errors: Vector = np.zeros(len(self._coms))
+
+    def _bind_joints(self, configuration: Configuration, tasks: Sequence[Task]) -> None:
+        nv = configuration.nv
+        self._q_index = JointBounds.unlimited(configuration).q_index
+        many = self._q_index < 0  # joints with several parameters
+        self._postures = [
+            t
+            for t in tasks
+            if type(t) is PostureTask and not t.squared_costs[many].any()
+        ]
+        count = len(self._postures)
+        self._posture_costs: Matrix = np.zeros((count, nv))
+        self._posture_targets: Matrix = np.zeros((count, configuration.nq))
+        self._posture_gains: Matrix = np.zeros((count, 2))
+        for k, task in enumerate(self._postures):
+            self._posture_costs[k] = task.squared_costs
+            self._posture_gains[k] = task.gain, task.max_speed
+        self._constant: Matrix = np.zeros((2, nv))
+        self._diagonals: list[DiagonalTask] = []
+        for task in tasks:
+            if type(task) is DampingTask:
+                self._constant[0] += task.squared_costs
+            elif isinstance(task, DiagonalTask) and task not in self._postures:
+                self._diagonals.append(task)
+        self.diagonal: Matrix = np.zeros((2, nv))
+
+    def _bind_kernel(self, configuration: Configuration) -> None:
+        """Gather the kernel's arguments; every array lives as long as the level."""
+        self._arguments = (
+            configuration.q,
+            configuration.placements,
+            configuration.joint_jacobians,
+            self._joints,
+            self._offsets,
+            self._frame_targets,
+            self._frame_row,
+            *self._frame_support,
+            self._frame_errors,
+            configuration.com,
+            configuration.com_jacobian,
+            self._com_targets,
+            self._com_row,
+            self._com_errors,
+            self._q_index,
+            self._posture_costs,
+            self._posture_targets,
+            self._posture_gains,
+            self._starts,
+            *self._support,
+            self.W,
+            self.e,
+            self.diagonal,
+        )
+        self._frame_pairs = list(zip(self._frame_targets, self._frames, strict=True))
+        self._com_pairs = list(zip(self._com_targets, self._coms, strict=True))
+        self._posture_pairs = list(
+            zip(self._posture_targets, self._postures, strict=True)
+        )
+
+    def write(
         self,
         configuration: Configuration,
         dt: float,
-        problem: Problem,
         *,
         damping: float,
         curvature: float,
         bias: Matrix | None = None,
-    ) -> float:
-        """Fill the cost of a problem; return mu of `normal_equations`.
+    ) -> bool:
+        """Fill rows, diagonal and mu; return whether they are finite.
 
         A bias, shape (2, nv), adds squared costs and weighted steps on single joints.
         """
-        self.held.clear()
-        self.errors.clear()
-        if self._frames:
-            self._write_frames(configuration, dt)
-        for task, W, e in self._others:
-            error = task.rows(configuration, dt, W, e)
-            self.errors[task.name] = error
-            if not np.isfinite(error).all():
-                self.held.append(task.name)
-        self.diagonal[:] = 0.0
-        for task in self.diagonal_tasks:
-            if not task.diagonal(configuration, dt, *self.diagonal):
-                self.held.append(task.name)
+        if self.held:
+            self.held.clear()
+        for packed, frame in self._frame_pairs:  # callers may have moved the targets
+            packed[:] = frame.packed
+        for packed, com in self._com_pairs:
+            packed[:] = com.packed
+            configuration.update_com()
+        for target, posture in self._posture_pairs:
+            target[:] = posture.target
+        self.diagonal[:] = self._constant
         if bias is not None:
             self.diagonal += bias
-        return normal_equations(
+        if self._diagonals or self._others:
+            self._write_others(configuration, dt)
+        self.mu, finite = write_rows(*self._arguments, dt, damping, curvature)
+        if not finite:
+            self._name_held()
+        return math.isfinite(self.mu)
+
+    def form(self, problem: Problem) -> None:
+        """Fill H and c of a problem from the rows of the last `write`."""
+        normal_equations(
             self.W,
             self.e,
             self._starts,
             *self._support,
             self.diagonal,
-            damping,
-            curvature,
+            self.mu,
             problem.H,
             problem.c,
         )
+
+    def _write_others(self, configuration: Configuration, dt: float) -> None:
+        """Run the tasks outside the kernel."""
+        for task in self._diagonals:
+            if not task.diagonal(configuration, dt, *self.diagonal):
+                self.held.append(task.name)
+        for task, W, e in self._others:
+            error = task.rows(configuration, dt, W, e)
+            self._errors[task] = error
+            if not np.isfinite(error).all():
+                self.held.append(task.name)
+
+    def _name_held(self) -> None:
+        for task, error in zip(self._frames, self._frame_errors, strict=True):
+            if not np.isfinite(error[0]):
+                self.held.append(task.name)
+        for task, error in zip(self._coms, self._com_errors, strict=True):
+            if not np.isfinite(error):
+                self.held.append(task.name)
+        for task, costs in zip(self._postures, self._posture_costs, strict=True):
+            used = self._q_index[costs > 0.0]
+            if not np.isfinite(self._posture_targets[:, used]).all():
+                self.held.append(task.name)
 
     def error_of(self, task: RowTask) -> tuple[float, float]:
         """Return position (m) and orientation error (rad) of a task at the last tick.
 
         Tasks with fewer than six rows have one error, in their own unit.
         """
-        if type(task) is FrameTask:
-            position, angle = self.frame_errors[self._frames.index(task)]
+        if task in self._frames:
+            position, angle = self._frame_errors[self._frames.index(task)]
             return float(position), float(angle)
-        error = self.errors[task.name]
+        if task in self._coms:
+            return float(self._com_errors[self._coms.index(task)]), 0.0
+        error = self._errors[task]
         return float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:]))
-
-    def _write_frames(self, configuration: Configuration, dt: float) -> None:
-        for packed, task in zip(self._packed, self._frames, strict=True):
-            packed[:] = task.packed
-        finite = frame_rows(
-            configuration.placements,
-            configuration.joint_jacobians,
-            self._joints,
-            self._offsets,
-            self._packed,
-            self._first_row,
-            *self._frame_support,
-            dt,
-            self.W,
-            self.e,
-            self.frame_errors,
-        )
-        if not finite:
-            bad = ~np.isfinite(self.frame_errors[:, 0])
-            self.held += [t.name for t, b in zip(self._frames, bad, strict=True) if b]
 
 
 def _concatenate(lists: Sequence[Indices]) -> tuple[Indices, Indices]:

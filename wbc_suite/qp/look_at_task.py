@@ -6,7 +6,7 @@ import pinocchio as pin
 from wbc_suite.arguments import check_array
 from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Configuration
-from wbc_suite.qp.rows import saturate
+from wbc_suite.qp.lie import saturate
 from wbc_suite.qp.task import RowTask, check_speed, cost_vector
 from wbc_suite.typing import Matrix, Vector
 

@@ -61,7 +61,7 @@ class PostureTask(DiagonalTask):
 
     def bind(self, configuration: Configuration) -> None:
         """Resolve joint names; without a target, take the present posture."""
-        self._weights = joint_costs(configuration, self.cost, self.costs) ** 2
+        self.squared_costs = joint_costs(configuration, self.cost, self.costs) ** 2
         if self.target is None:
             self.target = configuration.q.copy()
         if self.target.shape != (configuration.nq,):
@@ -78,15 +78,11 @@ class PostureTask(DiagonalTask):
     def diagonal(
         self, configuration: Configuration, dt: float, weights: Vector, steps: Vector
     ) -> bool:
-        """Add squared costs and weighted steps."""
-        error = self.error(configuration)
+        """Add the terms; the readable form of the kernel `posture_terms`."""
+        weights += self.squared_costs
+        error = np.where(self.squared_costs > 0.0, self.error(configuration), 0.0)
+        if not np.isfinite(error).all():
+            return False
         limit = self.max_speed * dt
-        error *= self.gain
-        np.clip(error, -limit, limit, out=error)
-        finite = bool(np.isfinite(error).all())
-        if not finite:
-            error[:] = 0.0
-        weights += self._weights
-        error *= self._weights
-        steps += error
-        return finite
+        steps += self.squared_costs * np.clip(self.gain * error, -limit, limit)
+        return True

@@ -1,5 +1,6 @@
 """The quadratic program of one tick."""
 
+import numba
 import numpy as np
 
 from wbc_suite.typing import Matrix, Vector
@@ -69,15 +70,24 @@ class Problem:
 
     def violation(self, x: Vector) -> float:
         """Return by how much x breaks its worst bound, in the bound's unit."""
-        nv = self.nv
-        worst = max(
-            float((x - self.ub).max(initial=0.0)), float((self.lb - x).max(initial=0.0))
-        )
-        if len(self.rows):
-            y = self.rows @ x
-            worst = max(
-                worst,
-                float((y - self.upper[nv:]).max(initial=0.0)),
-                float((self.lower[nv:] - y).max(initial=0.0)),
-            )
-        return worst
+        return worst_violation(x, self.rows, self.lower, self.upper)
+
+
+@numba.njit(cache=True, nogil=True)
+def worst_violation(x: Vector, rows: Matrix, lower: Vector, upper: Vector) -> float:
+    """Return the largest of 0, `lower - y` and `y - upper`, where y is (x, rows x).
+
+    A value that is not finite makes the result infinite.
+    """
+    n, worst = x.shape[0], 0.0
+    for i in range(lower.shape[0]):
+        if i < n:
+            y = x[i]
+        else:
+            y = 0.0
+            for j in range(n):
+                y += rows[i - n, j] * x[j]
+        if not np.isfinite(y):
+            return np.inf
+        worst = max(worst, lower[i] - y, y - upper[i])
+    return worst

@@ -5,7 +5,7 @@ import pinocchio as pin
 
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.frame_task import pose_matrix
-from wbc_suite.qp.rows import saturate
+from wbc_suite.qp.lie import saturate
 from wbc_suite.qp.task import RowTask, check_speed, cost_vector
 from wbc_suite.typing import Matrix, Vector
 

@@ -1,94 +1,33 @@
-"""Compiled kernels that build the rows and the normal equations of a stack.
+"""Compiled kernels that build the rows and the normal equations of a level.
 
-Each kernel is a pure function over arrays. The readable form of `frame_rows` is
-`FrameTask.rows`, that of `normal_equations` is the formula `H = W^T W`, `c = -W^T e`;
-tests hold each pair together to 1e-10.
+Each kernel is a pure function over arrays, and has a readable form that a test holds it
+to at 1e-10: `FrameTask.rows`, `ComTask.rows`, `PostureTask.diagonal`, and for
+`normal_equations` the formula `H = W^T W`, `c = -W^T e`.
 """
 
 import numba
 import numpy as np
 
+from wbc_suite.qp.lie import inverse_left_jacobian, log3, saturate
 from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = [
-    "PACKED",
+    "PACKED_COM",
+    "PACKED_FRAME",
+    "com_rows",
+    "damping_of_rows",
     "frame_rows",
-    "log3",
     "normal_equations",
-    "row_space",
-    "saturate",
+    "posture_terms",
+    "write_rows",
 ]
 
-PACKED = 21
+PACKED_FRAME = 21
 """Length of a packed frame task: target rotation by columns (9), target position (3),
-costs (6), gain, maximal speeds in m/s and rad/s."""
+costs (6), gain, greatest speeds in m/s and rad/s."""
 
-_SMALL_ANGLE = 1e-4  # below it series are exact to 1e-16
-
-
-@numba.njit(cache=True, nogil=True)
-def log3(R: Matrix, out: Vector) -> float:
-    """Write the rotation vector of R, shape (3,), and return its angle in [0, pi].
-
-    Goes through the quaternion (largest component first), which stays accurate near
-    pi. Source: Shepperd (1978), "Quaternion from Rotation Matrix", JGC 1(3).
-    """
-    trace = R[0, 0] + R[1, 1] + R[2, 2]
-    if trace > R[0, 0] and trace > R[1, 1] and trace > R[2, 2]:
-        w = 0.5 * np.sqrt(max(1.0 + trace, 0.0))
-        scale = 0.25 / w
-        x = (R[2, 1] - R[1, 2]) * scale
-        y = (R[0, 2] - R[2, 0]) * scale
-        z = (R[1, 0] - R[0, 1]) * scale
-    else:
-        i = 0
-        if R[1, 1] > R[0, 0]:
-            i = 1
-        if R[2, 2] > R[i, i]:
-            i = 2
-        j, k = (i + 1) % 3, (i + 2) % 3
-        largest = 0.5 * np.sqrt(max(1.0 + R[i, i] - R[j, j] - R[k, k], 0.0))
-        scale = 0.25 / largest
-        out[i] = largest
-        out[j] = (R[j, i] + R[i, j]) * scale
-        out[k] = (R[k, i] + R[i, k]) * scale
-        w = (R[k, j] - R[j, k]) * scale
-        x, y, z = out[0], out[1], out[2]
-    if w < 0.0:
-        w, x, y, z = -w, -x, -y, -z
-    sine = np.sqrt(x * x + y * y + z * z)
-    angle = 2.0 * np.arctan2(sine, w)
-    factor = angle / sine if sine > 1e-9 else 2.0
-    out[0], out[1], out[2] = factor * x, factor * y, factor * z
-    return angle
-
-
-@numba.njit(cache=True, nogil=True)
-def saturate(step: Vector, limit: float) -> None:
-    """Shorten a step in place to the given length, keeping its direction."""
-    norm = 0.0
-    for i in range(step.shape[0]):
-        norm += step[i] * step[i]
-    norm = np.sqrt(norm)
-    if norm > limit:
-        for i in range(step.shape[0]):
-            step[i] *= limit / norm
-
-
-@numba.njit(cache=True, nogil=True)
-def _inverse_left_jacobian(r: Vector, angle: float, out: Matrix) -> None:
-    """Write `Jl^-1(r)`, the inverse left Jacobian of SO(3) at rotation vector r."""
-    if angle < _SMALL_ANGLE:
-        b = 1.0 / 12.0
-    else:
-        b = 1.0 / angle**2 - 0.5 / (angle * np.tan(0.5 * angle))
-    x, y, z = r[0], r[1], r[2]
-    out[0, 0] = 1.0 - b * (y * y + z * z)
-    out[1, 1] = 1.0 - b * (x * x + z * z)
-    out[2, 2] = 1.0 - b * (x * x + y * y)
-    out[0, 1], out[1, 0] = 0.5 * z + b * x * y, -0.5 * z + b * x * y
-    out[0, 2], out[2, 0] = -0.5 * y + b * x * z, 0.5 * y + b * x * z
-    out[1, 2], out[2, 1] = 0.5 * x + b * y * z, -0.5 * x + b * y * z
+PACKED_COM = 8
+"""Length of a packed centre-of-mass task: target (3), costs (3), gain, speed in m/s."""
 
 
 @numba.njit(cache=True, nogil=True)
@@ -113,7 +52,7 @@ def frame_rows(  # noqa: C901, one flat loop is what compiles well
         joint_jacobians: Joint Jacobians, transposed, shape (nv, 6).
         joints: Parent joint of each frame, shape (n,).
         offsets: Rotation (row by row) and position of each frame in its joint, (n, 12).
-        packed: Targets, costs, gain and speeds, shape (n, PACKED).
+        packed: Targets, costs, gain and speeds, shape (n, PACKED_FRAME).
         first_row: First of each task's six rows in W and e, shape (n,).
         support_start: Where each task's entries of `support` begin, shape (n + 1,).
         support: Velocity indices that move each frame.
@@ -158,7 +97,7 @@ def frame_rows(  # noqa: C901, one flat loop is what compiles well
             r[:] = 0.0
             errors[t, 0], errors[t, 1] = np.nan, np.nan
             all_finite = False
-        _inverse_left_jacobian(r, angle, L)
+        inverse_left_jacobian(r, angle, L)
         for i in range(3):
             for j in range(3):  # E becomes L R^T, the map from world rates
                 E[i, j] = L[i, 0] * R[j, 0] + L[i, 1] * R[j, 1] + L[i, 2] * R[j, 2]
@@ -185,6 +124,136 @@ def frame_rows(  # noqa: C901, one flat loop is what compiles well
 
 
 @numba.njit(cache=True, nogil=True)
+def com_rows(
+    com: Vector,
+    com_jacobian: Matrix,
+    packed: Matrix,
+    first_row: Indices,
+    dt: float,
+    W: Matrix,
+    e: Vector,
+    errors: Vector,
+) -> bool:
+    """Write the weighted rows of all centre-of-mass tasks; see `ComTask`.
+
+    Args:
+        com: Centre of mass, shape (3,).
+        com_jacobian: Its Jacobian, shape (3, nv).
+        packed: Targets, costs, gain and speed, shape (n, PACKED_COM).
+        first_row: First of each task's three rows, shape (n,).
+        dt: Step, s.
+        W: Output, weighted Jacobian rows.
+        e: Output, weighted steps.
+        errors: Output, distance of each task before saturation, m, shape (n,); NaN
+            for a target that is not finite.
+
+    Returns:
+        Whether all targets were finite.
+    """
+    all_finite = True
+    step = np.empty(3)
+    for t in range(packed.shape[0]):
+        X, row, square = packed[t], first_row[t], 0.0
+        for i in range(3):
+            step[i] = X[i] - com[i]
+            square += step[i] * step[i]
+        errors[t] = np.sqrt(square)
+        if not np.isfinite(square):
+            all_finite, errors[t] = False, np.nan
+            step[:] = 0.0
+        for i in range(3):
+            step[i] *= X[6]
+        saturate(step, X[7] * dt)
+        for i in range(3):
+            e[row + i] = X[3 + i] * step[i]
+            for col in range(W.shape[1]):
+                W[row + i, col] = X[3 + i] * com_jacobian[i, col]
+    return all_finite
+
+
+@numba.njit(cache=True, nogil=True)
+def posture_terms(
+    q: Vector,
+    q_index: Indices,
+    squared_costs: Matrix,
+    targets: Matrix,
+    gains: Matrix,
+    dt: float,
+    diagonal: Matrix,
+) -> bool:
+    """Add the terms of posture tasks on one-parameter joints; see `PostureTask`.
+
+    Args:
+        q: Joint positions, shape (nq,).
+        q_index: Position index of each velocity, shape (nv,).
+        squared_costs: Squared cost of each velocity, shape (n, nv).
+        targets: Postures, shape (n, nq).
+        gains: Gain and greatest speed of each task, shape (n, 2).
+        dt: Step, s.
+        diagonal: In and out, squared weights and weighted steps, shape (2, nv).
+
+    Returns:
+        Whether all targets were finite; the joints of one that is not are held.
+    """
+    all_finite = True
+    for t in range(squared_costs.shape[0]):
+        total = 0.0
+        for i in range(q_index.shape[0]):
+            if squared_costs[t, i] > 0.0:
+                total += targets[t, q_index[i]]
+        finite = np.isfinite(total)
+        all_finite &= finite
+        limit = gains[t, 1] * dt
+        for i in range(q_index.shape[0]):
+            weight = squared_costs[t, i]
+            if weight > 0.0:
+                diagonal[0, i] += weight
+                if finite:
+                    step = gains[t, 0] * (targets[t, q_index[i]] - q[q_index[i]])
+                    diagonal[1, i] += weight * min(max(step, -limit), limit)
+    return all_finite
+
+
+@numba.njit(cache=True, nogil=True)
+def damping_of_rows(
+    W: Matrix,
+    e: Vector,
+    row_start: Indices,
+    support_start: Indices,
+    support: Indices,
+    damping: float,
+    curvature: float,
+) -> float:
+    """Return `mu = damping + curvature sum_rows |e| max|W|`; NaN if not finite.
+
+    The second part bounds what the rows' linearisation leaves out: a second derivative
+    is no larger than the longest lever arm, which is the row's largest entry. It
+    vanishes with the error, and makes the step a descent where a target cannot be
+    reached (Levenberg-Marquardt with a bound in place of a guess).
+
+    Args:
+        W: Weighted rows, shape (m, nv).
+        e: Weighted steps, shape (m,).
+        row_start: First row of each block and the end, shape (blocks + 1,).
+        support_start: Where each block's entries of `support` begin, (blocks + 1,).
+        support: Columns of each block that are not zero.
+        damping: Constant part, [cost]^2/rad^2.
+        curvature: Factor of the part that follows the error; 1 bounds, 0 is without.
+    """
+    mu, total = damping, 0.0
+    for block in range(row_start.shape[0] - 1):
+        for row in range(row_start[block], row_start[block + 1]):
+            longest = 0.0
+            for k in range(support_start[block], support_start[block + 1]):
+                size = abs(W[row, support[k]])
+                total += size
+                longest = max(longest, size)
+            total += abs(e[row])
+            mu += curvature * abs(e[row]) * longest
+    return mu if np.isfinite(total) else np.nan
+
+
+@numba.njit(cache=True, nogil=True)
 def normal_equations(
     W: Matrix,
     e: Vector,
@@ -192,123 +261,98 @@ def normal_equations(
     support_start: Indices,
     support: Indices,
     diagonal: Matrix,
-    damping: float,
-    curvature: float,
+    mu: float,
     H: Matrix,
     c: Vector,
-) -> float:
+) -> None:
     """Write `H = W^T W + D + mu I` and `c = -W^T e - d`.
-
-    `mu = damping + curvature sum_rows |e| max|W|`. Its second part bounds what the
-    rows' linearisation leaves out, `sum_rows W-weighted e * d2f/dq2`: a second
-    derivative is no larger than the longest lever arm, which is the row's largest
-    entry. It vanishes with the error, and makes the step a descent where a target
-    cannot be reached (Levenberg-Marquardt with a bound in place of a guess).
 
     Args:
         W: Weighted rows, shape (m, nv).
         e: Weighted steps, shape (m,).
         row_start: First row of each block and the end, shape (blocks + 1,).
         support_start: Where each block's entries of `support` begin, (blocks + 1,).
-        support: Columns of each block that are not zero, ascending within a block.
-        diagonal: Squared weights and weighted steps of diagonal tasks, shape (2, nv):
-            they add `diagonal[0]` to H's diagonal and `-diagonal[1]` to c.
-        damping: Constant part of mu, [cost]^2/rad^2.
-        curvature: Factor of the part that follows the error; 1 bounds, 0 is without.
+        support: Columns of each block that are not zero.
+        diagonal: D, squared weights, and d, weighted steps of joints, shape (2, nv).
+        mu: See `damping_of_rows`.
         H: Output, shape (nv, nv), both triangles.
         c: Output, shape (nv,).
-
-    Returns:
-        mu; not finite if an entry of H or c is not.
     """
     n = c.shape[0]
     H[:, :] = 0.0
-    c[:] = -diagonal[1]
-    mu = damping
+    for i in range(n):
+        H[i, i] = diagonal[0, i] + mu
+        c[i] = -diagonal[1, i]
     for block in range(row_start.shape[0] - 1):
         first, last = support_start[block], support_start[block + 1]
         for row in range(row_start[block], row_start[block + 1]):
-            weights, step, longest = W[row], e[row], 0.0
+            weights = W[row]
             for i in range(first, last):
                 a = support[i]
-                w = weights[a]
-                if w != 0.0:
-                    longest = max(longest, abs(w))
-                    c[a] -= w * step
-                    target = H[a]
-                    for j in range(first, i + 1):
-                        target[support[j]] += w * weights[support[j]]
-            mu += curvature * abs(step) * longest
-    total = 0.0
+                c[a] -= weights[a] * e[row]
+                for j in range(first, i + 1):
+                    H[a, support[j]] += weights[a] * weights[support[j]]
     for i in range(n):
-        H[i, i] += diagonal[0, i] + mu
-        total += c[i]
-        for j in range(i + 1):
-            total += H[i, j]
+        for j in range(i):
             H[j, i] = H[i, j]
-    return mu if np.isfinite(total) else np.nan
 
 
 @numba.njit(cache=True, nogil=True)
-def row_space(  # noqa: C901, one flat loop is what compiles well
-    W: Matrix, tolerance: float, V: Matrix, lengths: Vector
-) -> int:
-    """Write an orthonormal basis of the rows of W, largest first; return its size.
+def write_rows(
+    q: Vector,
+    placements: Matrix,
+    joint_jacobians: Matrix,
+    joints: Indices,
+    offsets: Matrix,
+    frames: Matrix,
+    frame_row: Indices,
+    frame_support_start: Indices,
+    frame_support: Indices,
+    frame_errors: Matrix,
+    com: Vector,
+    com_jacobian: Matrix,
+    coms: Matrix,
+    com_row: Indices,
+    com_errors: Vector,
+    q_index: Indices,
+    postures: Matrix,
+    posture_targets: Matrix,
+    posture_gains: Matrix,
+    row_start: Indices,
+    support_start: Indices,
+    support: Indices,
+    W: Matrix,
+    e: Vector,
+    diagonal: Matrix,
+    dt: float,
+    damping: float,
+    curvature: float,
+) -> tuple[float, bool]:
+    """Write all compiled tasks of a level in one call.
 
-    Gram-Schmidt with pivoting, each vector orthogonalised twice ("twice is enough",
-    Giraud et al. 2005). Rows that are left shorter than the tolerance are dropped.
-
-    Args:
-        W: Rows, shape (m, n); destroyed.
-        tolerance: Absolute length under which a row counts as dependent.
-        V: Output, shape (at least min(m, n), n).
-        lengths: Output, what was left of each chosen row, descending.
+    The arguments are those of the kernels above; `diagonal` comes in with what tasks
+    outside the kernels have added.
 
     Returns:
-        The rank r; V[:r] holds the basis.
+        mu of `damping_of_rows`, and whether all targets were finite.
     """
-    m, n = W.shape
-    rank = 0
-    for _ in range(min(m, V.shape[0])):
-        best, pivot = 0.0, -1
-        for i in range(m):
-            length = 0.0
-            for j in range(n):
-                length += W[i, j] * W[i, j]
-            if length > best:
-                best, pivot = length, i
-        if best <= tolerance * tolerance:
-            break
-        row, v = W[pivot], V[rank]
-        lengths[rank] = np.sqrt(best)
-        scale = 1.0 / np.sqrt(best)
-        for j in range(n):
-            v[j] = row[j] * scale
-        _remove(V, rank, v)
-        norm = 0.0
-        for j in range(n):
-            norm += v[j] * v[j]
-        scale = 1.0 / np.sqrt(norm)
-        for j in range(n):
-            v[j] *= scale
-            row[j] = 0.0
-        rank += 1
-        for i in range(m):
-            dot = 0.0
-            for j in range(n):
-                dot += W[i, j] * v[j]
-            if dot != 0.0:
-                for j in range(n):
-                    W[i, j] -= dot * v[j]
-    return rank
-
-
-@numba.njit(cache=True, nogil=True)
-def _remove(V: Matrix, count: int, v: Vector) -> None:
-    """Take from v, in place, its components along the first rows of V."""
-    for i in range(count):
-        dot = 0.0
-        for j in range(v.shape[0]):
-            dot += V[i, j] * v[j]
-        for j in range(v.shape[0]):
-            v[j] -= dot * V[i, j]
+    finite = frame_rows(
+        placements,
+        joint_jacobians,
+        joints,
+        offsets,
+        frames,
+        frame_row,
+        frame_support_start,
+        frame_support,
+        dt,
+        W,
+        e,
+        frame_errors,
+    )
+    finite &= com_rows(com, com_jacobian, coms, com_row, dt, W, e, com_errors)
+    finite &= posture_terms(
+        q, q_index, postures, posture_targets, posture_gains, dt, diagonal
+    )
+    mu = damping_of_rows(W, e, row_start, support_start, support, damping, curvature)
+    return mu, finite

@@ -1,13 +1,16 @@
 """What one tick of a stack answers."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Literal
 
-from wbc_suite.qp.bounds import LimitKind
-from wbc_suite.typing import Vector
+import numpy as np
 
-__all__ = ["ActiveLimit", "Fallback", "Solution"]
+from wbc_suite.qp.bounds import LimitKind
+from wbc_suite.typing import Matrix, Vector
+
+__all__ = ["ActiveLimit", "Fallback", "Pressure", "Solution"]
 
 
 class Fallback(IntEnum):
@@ -52,6 +55,43 @@ class ActiveLimit:
 
 
 @dataclass(frozen=True, slots=True)
+class Pressure:
+    """How hard the tasks press against bounds and inequality rows.
+
+    Attributes:
+        multipliers: One per velocity, then one per row; positive at an upper bound.
+        kinds: The `LimitKind` of each lower and each upper bound, shape (2, nv).
+        names: Names of the velocities.
+        rows: Words for the rows that are pressed, by row.
+    """
+
+    multipliers: Vector
+    kinds: Matrix
+    names: tuple[str, ...]
+    rows: Mapping[int, str]
+
+    def limits(self) -> tuple[ActiveLimit, ...]:
+        """List the limits that are pressed, hardest first."""
+        pressed = self.multipliers.nonzero()[0]
+        order = np.argsort(-np.abs(self.multipliers[pressed]), kind="stable")
+        return tuple(self.limit(int(i)) for i in pressed[order])
+
+    def limit(self, i: int) -> ActiveLimit:
+        """Describe one limit by its place among the multipliers."""
+        value, nv = float(self.multipliers[i]), len(self.names)
+        if i < nv:
+            kind, name = LimitKind(int(self.kinds[int(value > 0.0), i])), self.names[i]
+        else:
+            kind, name = LimitKind.SELF_COLLISION, self.rows[i - nv]
+        return ActiveLimit(
+            name=name,
+            side="upper" if value > 0.0 else "lower",
+            kind=kind,
+            multiplier=abs(value),
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class Solution:
     """The step of one tick.
 
@@ -62,7 +102,7 @@ class Solution:
         residual: By how much the worst kept constraint is broken, in its own unit.
         held: Tasks whose target was not finite; what they watch stands still.
         conflicts: Names of the equality rows that could not be kept.
-        active: Limits that hold joints back, hardest pressed first.
+        pressure: What `active` is read off.
     """
 
     dq: Vector
@@ -71,7 +111,12 @@ class Solution:
     residual: float
     held: tuple[str, ...]
     conflicts: tuple[str, ...]
-    active: tuple[ActiveLimit, ...]
+    pressure: Pressure
+
+    @property
+    def active(self) -> tuple[ActiveLimit, ...]:
+        """Limits that hold joints back, hardest pressed first."""
+        return self.pressure.limits()
 
     @property
     def ok(self) -> bool:

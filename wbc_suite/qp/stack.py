@@ -7,6 +7,7 @@ import numpy as np
 from wbc_suite.arguments import check_array, check_number
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.acceleration_limit import AccelerationLimit
+from wbc_suite.qp.active_set import solve_warm
 from wbc_suite.qp.bounds import LimitKind, merge_bounds
 from wbc_suite.qp.equality import Equality
 from wbc_suite.qp.escape import Escape
@@ -18,8 +19,8 @@ from wbc_suite.qp.parts import check_parts
 from wbc_suite.qp.position_limit import PositionLimit
 from wbc_suite.qp.problem import Problem
 from wbc_suite.qp.report import TaskReport, reasons
-from wbc_suite.qp.rows import row_space
-from wbc_suite.qp.solution import ActiveLimit, Fallback, Solution
+from wbc_suite.qp.row_space import row_space
+from wbc_suite.qp.solution import Fallback, Pressure, Solution
 from wbc_suite.qp.solver import QpSolver, make_solver
 from wbc_suite.qp.task import Task
 from wbc_suite.qp.velocity_limit import VelocityLimit
@@ -60,6 +61,9 @@ class TaskStack:
             the robot flutter, and vanishes at targets that can. 0 is without.
         escape: Whether the stack may lead the robot out of postures from which no small
             step leads nearer to a frame's target; see `escape`.
+        warm: Whether the active set of the last tick is tried before the solver is
+            asked; it answers most ticks, exactly. By default with daqp, so that a
+            solver chosen by name is the one that runs.
 
     Raises:
         ConfigError: If an argument is out of range.
@@ -78,6 +82,7 @@ class TaskStack:
         damping: float = 1e-3,
         curvature_damping: float = 1.0,
         escape: bool = True,
+        warm: bool | None = None,
     ) -> None:
         check_parts(configuration, tasks, limits, equalities)
         if limits is None:
@@ -101,7 +106,8 @@ class TaskStack:
         self._levels = [
             Level(configuration, [t for t in tasks if t.level == k]) for k in numbers
         ]
-        self._damping: Vector = np.zeros(len(numbers))
+        self._sides = [np.zeros(configuration.nv, dtype=np.int64) for _ in numbers]
+        self._warm = solver == "daqp" if warm is None else warm
         self._inequalities = sum(x.dim for x in self._row_limits)
         self._problem = Problem(
             configuration.nv, self._inequalities, sum(x.dim for x in self.equalities)
@@ -115,6 +121,16 @@ class TaskStack:
         self._kinds = np.zeros((2, nv), dtype=np.int64)
         self._no_window: Vector = np.full(nv, np.inf)
         self.v_previous: Vector = np.zeros(nv)
+        bounds = self._bounds
+        self._box = (
+            configuration.q,
+            bounds.q_index,
+            bounds.q_lower,
+            bounds.q_upper,
+            bounds.position_gain,
+            bounds.v_max,
+            self.v_previous,
+        )
         self._limits = tuple(limits)
         self._bias: Matrix | None = None
         frames = [t for t in tasks if isinstance(t, FrameTask)]
@@ -151,13 +167,14 @@ class TaskStack:
         """
         if not isinstance(dt, float) or not 0.0 < dt < np.inf:
             dt = check_number("TaskStack.solve: dt, a time,", dt, above=0.0)
-        if not np.isfinite(self.configuration.q).all():
+        problem = self._problem
+        if not self._write_box(self._bounds.a_max, dt, problem.lb, problem.ub):
             still = np.zeros(self.configuration.nv)
             self._solved.clear()
             return self._answer(still, Fallback.HOLD, dt, 0.0)
         if self._escape is not None:
-            self._bias = self._escape.bias(dt, self.v_previous, self._pressed())
-        self._write_constraints(dt)
+            self._bias = self._escape.bias(dt, self.v_previous, self._pressed)
+        self._write_rows(dt)
         x, multipliers, fallback = self._solve_first(dt)
         self._solved = [(self._problem, x, multipliers)]
         for k in range(1, len(self._levels)):
@@ -170,6 +187,14 @@ class TaskStack:
             x = result[1]
             self._solved.append(result)
         return self._answer(x, fallback, dt, self._problem.violation(x))
+
+    def problem(self) -> Problem:
+        """Return the QP of the first level at the last tick: a view, valid until next.
+
+        After a retreat its bounds are those without acceleration limits.
+        """
+        self._levels[0].form(self._problem)
+        return self._problem
 
     def step(self, dt: float, bias: Matrix | None) -> None:
         """Solve and move the configuration one step, with a bias on single joints."""
@@ -187,6 +212,7 @@ class TaskStack:
             damping=self.damping,
             curvature_damping=self.curvature_damping,
             escape=False,
+            warm=self._warm,
         )
 
     def _pressed(self) -> Indices:
@@ -235,10 +261,10 @@ class TaskStack:
     ) -> Iterator[tuple[str, Vector]]:
         """Yield words and the force on the joints of each pressed limit or row."""
         nv = problem.nv
-        for i in multipliers[: nv + self._inequalities].nonzero()[0].tolist():
-            limit = self._active_limit(i, float(multipliers[i]))
+        pressure = self._pressure([multipliers])
+        for i in pressure.multipliers.nonzero()[0].tolist():
             row = np.eye(nv)[i] if i < nv else problem.G[i - nv]
-            yield str(limit), multipliers[i] * row
+            yield str(pressure.limit(i)), multipliers[i] * row
         forces = multipliers[nv + self._inequalities :, None] * problem.A
         if problem is not self._problem:
             yield "conflict: tasks of a higher level", forces.sum(axis=0)
@@ -249,10 +275,9 @@ class TaskStack:
             yield f"conflict: {equality.name}", force
             row += equality.dim
 
-    def _write_constraints(self, dt: float) -> None:
-        """Fill bounds and rows of the first problem."""
+    def _write_rows(self, dt: float) -> None:
+        """Fill the inequality and equality rows of the first problem."""
         problem, row = self._problem, 0
-        self._write_box(self._bounds.a_max, dt, problem.lb, problem.ub)
         for limit in self._row_limits:
             rows = slice(row, row + limit.dim)
             limit.rows(self.configuration, dt, problem.G[rows], problem.h[rows])
@@ -265,43 +290,53 @@ class TaskStack:
                 row = rows.stop
             problem.set_equalities(b)
 
-    def _write_box(self, a_max: Vector, dt: float, lb: Vector, ub: Vector) -> None:
-        bounds = self._bounds
-        merge_bounds(
-            self.configuration.q,
-            bounds.q_index,
-            bounds.q_lower,
-            bounds.q_upper,
-            bounds.position_gain,
-            bounds.v_max,
-            a_max,
-            self.v_previous,
-            dt,
-            lb,
-            ub,
-            *self._kinds,
-        )
+    def _write_box(self, a_max: Vector, dt: float, lb: Vector, ub: Vector) -> bool:
+        """Merge the joints' limits into bounds; False if q is not finite."""
+        return merge_bounds(*self._box, a_max, dt, lb, ub, *self._kinds)
 
-    def _assemble(self, k: int, dt: float, problem: Problem) -> bool:
-        """Fill the cost of level k; what damps a level damps those below it too."""
-        above = self._damping[k - 1] if k else self.damping
-        self._damping[k] = self._levels[k].assemble(
+    def _write(self, k: int, dt: float) -> bool:
+        """Write the rows of level k; what damps a level damps those below it too."""
+        return self._levels[k].write(
             self.configuration,
             dt,
-            problem,
-            damping=above,
+            damping=self._levels[k - 1].mu if k else self.damping,
             curvature=self.curvature_damping,
             bias=None if k else self._bias,
         )
-        return bool(np.isfinite(self._damping[k]))
+
+    def _optimum(
+        self, level: Level, problem: Problem, solver: QpSolver, side: Indices
+    ) -> tuple[Vector, Vector] | None:
+        """Solve a level: by the active set of the last tick, else by the solver."""
+        x = np.empty(problem.nv)
+        multipliers = np.zeros(len(problem.upper))
+        answered = self._warm and solve_warm(
+            level.W,
+            level.e,
+            problem.A,
+            problem.b,
+            level.diagonal,
+            level.mu,
+            problem.lb,
+            problem.ub,
+            side,
+            x,
+            multipliers[: problem.nv],
+            multipliers[len(multipliers) - problem.equalities :],
+        )
+        if answered and problem.violation(x) <= _TOLERANCE:
+            return x, multipliers
+        level.form(problem)
+        return checked_solve(solver, problem)
 
     def _solve_first(self, dt: float) -> tuple[Vector, Vector, Fallback]:
         """Solve the first level under all constraints, or retreat."""
-        problem = self._problem
-        finite = self._assemble(0, dt, problem)
-        result = checked_solve(self._solver, problem) if finite else None
-        if result is not None:
-            return *result, Fallback.NONE
+        problem, level = self._problem, self._levels[0]
+        finite = self._write(0, dt)
+        if finite:
+            result = self._optimum(level, problem, self._solver, self._sides[0])
+            if result is not None:
+                return *result, Fallback.NONE
         lb, ub = np.empty(problem.nv), np.empty(problem.nv)
         self._write_box(self._no_window, dt, lb, ub)
         if not finite:
@@ -327,9 +362,9 @@ class TaskStack:
         problem.G[:], problem.h[:] = first.G, np.maximum(first.h, first.G @ x)
         problem.A[:] = V[:rank]
         problem.set_equalities(V[:rank] @ x)
-        if not self._assemble(k, dt, problem):
+        if not self._write(k, dt):
             return None
-        result = checked_solve(solver, problem)
+        result = self._optimum(self._levels[k], problem, solver, self._sides[k])
         return None if result is None else (problem, *result)
 
     def _directions_above(self, k: int) -> tuple[Matrix, int]:
@@ -366,9 +401,9 @@ class TaskStack:
             v=v,
             fallback=fallback,
             residual=residual,
-            held=tuple(name for level in self._levels for name in level.held),
+            held=tuple([name for level in self._levels for name in level.held]),
             conflicts=self._conflicts(x) if fallback >= Fallback.SLACK else (),
-            active=self._active(),
+            pressure=self._pressure([m for _, _, m in self._solved]),
         )
 
     def _conflicts(self, x: Vector) -> tuple[str, ...]:
@@ -389,27 +424,15 @@ class TaskStack:
             row -= limit.dim
         raise IndexError(row)
 
-    def _active(self) -> tuple[ActiveLimit, ...]:
-        """List the limits that some level presses against, hardest first."""
-        nv, found = self._problem.nv, dict[int, float]()
-        for _, _, multipliers in self._solved:
-            for i in multipliers[: nv + self._inequalities].nonzero()[0].tolist():
-                value = float(multipliers[i])
-                if abs(value) > abs(found.get(i, 0.0)):
-                    found[i] = value
-        order = sorted(found, key=lambda i: -abs(found[i]))
-        return tuple(self._active_limit(i, found[i]) for i in order)
-
-    def _active_limit(self, i: int, multiplier: float) -> ActiveLimit:
-        nv, upper = self._problem.nv, multiplier > 0.0
-        if i < nv:
-            kind = LimitKind(int(self._kinds[int(upper), i]))
-            name = self._names[i]
-        else:
-            kind, name = LimitKind.SELF_COLLISION, self._row_label(i - nv)
-        return ActiveLimit(
-            name=name,
-            side="upper" if upper else "lower",
-            kind=kind,
-            multiplier=abs(multiplier),
-        )
+    def _pressure(self, levels: list[Vector]) -> Pressure:
+        """Merge the multipliers of levels, the greatest of each kept."""
+        rows = self._problem.nv + self._inequalities
+        merged: Vector = levels[0][:rows] if levels else np.zeros(rows)
+        for multipliers in levels[1:]:
+            greater = np.abs(multipliers[:rows]) > np.abs(merged)
+            merged = np.where(greater, multipliers[:rows], merged)
+        labels: dict[int, str] = {}
+        if self._inequalities:
+            pressed = merged[self._problem.nv :].nonzero()[0]
+            labels = {int(i): self._row_label(int(i)) for i in pressed}
+        return Pressure(merged, self._kinds.copy(), self._names, labels)

@@ -1,0 +1,443 @@
+"""Whole-body inverse kinematics, side by side with pink, mink and placo.
+
+Each robot has the tasks that fit it: hands, feet, centre of mass, posture; position and
+velocity limits; hands on Lissajous paths. Ours, pink and mink take turns tick by tick
+in one process: same model, tasks, costs, gain, damping, limits, and daqp as the solver.
+"ours" tries the last tick's active set before it asks daqp; "ours, daqp" always asks.
+placo runs in its own environment (.venv-placo), on our URDF; it has no gain and its own
+solver. Times are CPU times of the thread, in microseconds, so that other work on the
+machine counts less. A peer that is not installed is left out: `make bench-peers`.
+
+Usage: python benchmarks/whole_body_ik.py [--quick] [--json FILE] [--ticks N]
+"""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ.setdefault(variable, "1")  # two threads make a 50 x 50 product slower
+
+import numpy as np  # noqa: E402
+import pinocchio as pin  # noqa: E402
+
+import wbc_suite  # noqa: E402
+from wbc_suite.kinematics import Configuration, Conversion  # noqa: E402
+from wbc_suite.qp import (  # noqa: E402
+    ComTask,
+    FrameTask,
+    PositionLimit,
+    PostureTask,
+    TaskStack,
+    VelocityLimit,
+)
+
+DT = 5e-3  # s
+GAIN = 0.5  # of every task
+DAMPING = 1e-3  # [cost]^2/rad^2
+LIMIT_GAIN = 0.95  # share of the distance to a position limit in one tick
+POSTURE_COST = 1e-2
+clock = time.thread_time_ns
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """A robot with the frames it tracks and holds."""
+
+    robot: str
+    root: str | None = None
+    hands: tuple[str, ...]
+    feet: tuple[str, ...] = ()
+    com: bool = False
+    description: wbc_suite.robot.RobotDescription = field(init=False)
+    model: pin.Model = field(init=False)
+    q: np.ndarray = field(init=False)
+
+    def __post_init__(self):
+        robot = wbc_suite.load_robot(self.robot, root=self.root)
+        model = robot.to_pinocchio()
+        q = pin.neutral(model)
+        for joint, value in robot.keyframes["ready"].items():
+            q[model.joints[model.getJointId(joint)].idx_q] = value
+        bounded = model.upperPositionLimit < 1e10
+        lower, upper = model.lowerPositionLimit, model.upperPositionLimit
+        q[bounded] = np.clip(q, lower, upper)[bounded]
+        object.__setattr__(self, "description", robot)
+        object.__setattr__(self, "model", model)
+        object.__setattr__(self, "q", q)
+
+    @property
+    def frames(self):
+        return (*self.hands, *self.feet)
+
+    def targets(self, ticks: int) -> np.ndarray:
+        """Return homogeneous poses, shape (ticks, frames, 4, 4); feet stand."""
+        robot = Configuration(self.model, self.q)
+        start = np.array([robot.frame_pose(f).homogeneous for f in self.frames])
+        poses = np.tile(start, (ticks, 1, 1, 1))
+        t = np.arange(ticks) * DT
+        for k in range(len(self.hands)):
+            side = 1.0 if k == 0 else -1.0
+            poses[:, k, 0, 3] += 0.08 * np.sin(2 * np.pi * 0.23 * t)
+            poses[:, k, 1, 3] += side * 0.10 * np.sin(2 * np.pi * 0.17 * t)
+            poses[:, k, 2, 3] += 0.08 * np.sin(2 * np.pi * 0.31 * t)
+            angle = 0.3 * np.sin(2 * np.pi * 0.19 * t)
+            for n in range(ticks):
+                turn = pin.exp3(np.array([0.0, angle[n], side * angle[n]]))
+                poses[n, k, :3, :3] = turn @ start[k, :3, :3]
+        return poses
+
+
+CASES = (
+    Case(
+        robot="GR1",
+        root="free",
+        hands=("right_eef", "left_eef"),
+        feet=("right_foot", "left_foot"),
+        com=True,
+    ),
+    Case(robot="Tiago", hands=("right_eef", "left_eef"), com=True),
+    Case(robot="Panda", hands=("right_eef",)),
+)
+
+
+@dataclass
+class Record:
+    """Times in us and states of one side, one entry per tick."""
+
+    kinematics: list = field(default_factory=list)
+    rows: list = field(default_factory=list)
+    qp: list = field(default_factory=list)
+    total: list = field(default_factory=list)
+    q: list = field(default_factory=list)
+    v: list = field(default_factory=list)
+    failed: int = 0
+
+
+class Ours:
+    """This package: on the peers' problem, or with its own defaults."""
+
+    def __init__(self, case: Case, targets, *, defaults=False, warm=True):
+        self.robot = Configuration(case.model, case.q)
+        self.frames = [FrameTask(f, gain=GAIN) for f in case.frames]
+        tasks = [*self.frames, *([ComTask(gain=GAIN)] if case.com else [])]
+        root = {n: POSTURE_COST for n in case.model.names if n.startswith("root_")}
+        tasks.append(PostureTask(POSTURE_COST, gain=GAIN, costs=root, max_speed=1e3))
+        limits = [
+            PositionLimit(gain=LIMIT_GAIN),
+            VelocityLimit(base_linear=np.inf, base_angular=np.inf)
+            if case.root == "free"
+            else VelocityLimit(),
+        ]
+        options = {"limits": limits, "curvature_damping": 0.0, "escape": False}
+        self.stack = TaskStack(
+            self.robot,
+            tasks,
+            damping=DAMPING,
+            warm=warm,
+            **({} if defaults else options),
+        )
+        self.spent = 0
+        optimum = self.stack._optimum  # the one step that counts as QP
+
+        def timed(*arguments):
+            start = clock()
+            result = optimum(*arguments)
+            self.spent += clock() - start
+            return result
+
+        self.stack._optimum = timed
+        self.targets = [[pin.SE3(T) for T in tick] for tick in targets]
+        self.q = case.q.copy()
+
+    def tick(self, k: int, record: Record) -> None:
+        self.spent = 0
+        t0 = clock()
+        self.robot.update(self.q)
+        t1 = clock()
+        for task, target in zip(self.frames, self.targets[k], strict=True):
+            task.set_target(target)
+        solution = self.stack.solve(DT)
+        t2 = clock()
+        self.q = self.robot.integrate(solution.dq)
+        t3 = clock()
+        note(record, t0, t1, t2 - self.spent, t2, t3)
+        record.q.append(self.q)
+        record.v.append(solution.v)
+        record.failed += not solution.ok
+
+
+class Pink:
+    def __init__(self, case: Case, targets):
+        import pink
+        import qpsolvers
+
+        model = case.model.copy()
+        if case.root == "free":
+            model.names[1] = "root_joint"  # how pink knows a floating base
+            model.velocityLimit[:6] = np.inf
+        self.pink, self.solve = pink, qpsolvers.solve_problem
+        self.robot = pink.Configuration(model, model.createData(), case.q)
+        self.frames = [
+            pink.tasks.FrameTask(f, position_cost=1.0, orientation_cost=1.0, gain=GAIN)
+            for f in case.frames
+        ]
+        posture = pink.tasks.PostureTask(cost=POSTURE_COST, gain=GAIN)
+        posture.set_target(case.q)
+        self.tasks = [*self.frames, posture]
+        if case.com:
+            com = pink.tasks.ComTask(cost=1.0, gain=GAIN)
+            com.set_target_from_configuration(self.robot)
+            self.tasks.append(com)
+        self.limits = [
+            pink.limits.ConfigurationLimit(model, config_limit_gain=LIMIT_GAIN),
+            pink.limits.VelocityLimit(model),
+        ]
+        self.targets = [[pin.SE3(T) for T in tick] for tick in targets]
+        self.q = case.q.copy()
+
+    def tick(self, k: int, record: Record) -> None:
+        t0 = clock()
+        self.robot.update(self.q)
+        t1 = clock()
+        for task, target in zip(self.frames, self.targets[k], strict=True):
+            task.set_target(target)
+        problem = self.pink.build_ik(
+            self.robot, self.tasks, DT, damping=DAMPING, limits=self.limits
+        )
+        t2 = clock()
+        result = self.solve(problem, solver="daqp")
+        t3 = clock()
+        dq = result.x if result.found else np.zeros(self.robot.model.nv)
+        self.q = self.robot.integrate(dq / DT, DT)
+        t4 = clock()
+        note(record, t0, t1, t2, t3, t4)
+        record.q.append(self.q)
+        record.v.append(dq / DT)
+        record.failed += not result.found
+
+
+class Mink:
+    def __init__(self, case: Case, targets):
+        import mink
+        import qpsolvers
+
+        self.mink, self.solve = mink, qpsolvers.solve_problem
+        mj = case.description.to_mjspec().compile()
+        self.conversion = Conversion(mj, case.model)
+        self.robot = mink.Configuration(mj, self.conversion.q_to_mujoco(case.q))
+        self.frames = [
+            mink.FrameTask(
+                f, "site", position_cost=1.0, orientation_cost=1.0, gain=GAIN
+            )
+            for f in case.frames
+        ]
+        posture = mink.PostureTask(mj, cost=POSTURE_COST, gain=GAIN)
+        posture.set_target_from_configuration(self.robot)
+        self.tasks = [*self.frames, posture]
+        if case.com:
+            com = mink.ComTask(cost=1.0, gain=GAIN)
+            com.set_target_from_configuration(self.robot)
+            self.tasks.append(com)
+        joints = list(zip(case.model.names, case.model.joints, strict=True))[1:]
+        speeds = {
+            name: float(case.model.velocityLimit[j.idx_v])
+            for name, j in joints
+            if j.nv == 1
+        }
+        self.limits = [
+            mink.ConfigurationLimit(mj, gain=LIMIT_GAIN),
+            mink.VelocityLimit(mj, speeds),
+        ]
+        self.targets = [[mink.SE3.from_matrix(T) for T in tick] for tick in targets]
+        self.q = self.robot.q.copy()
+
+    def tick(self, k: int, record: Record) -> None:
+        t0 = clock()
+        self.robot.update(self.q)
+        t1 = clock()
+        for task, target in zip(self.frames, self.targets[k], strict=True):
+            task.set_target(target)
+        problem = self.mink.build_ik(
+            self.robot, self.tasks, DT, damping=DAMPING, limits=self.limits
+        )
+        t2 = clock()
+        result = self.solve(problem, solver="daqp")
+        t3 = clock()
+        dq = result.x if result.found else np.zeros(self.robot.nv)
+        before, self.q = self.q, self.robot.integrate(dq / DT, DT)
+        t4 = clock()
+        note(record, t0, t1, t2, t3, t4)
+        record.q.append(self.conversion.q_to_pinocchio(self.q))
+        record.v.append(self.conversion.v_to_pinocchio(before, dq / DT))
+        record.failed += not result.found
+
+
+def note(record: Record, t0, t1, t2, t3, t4) -> None:
+    """Book kinematics (update and integrate), rows, QP and total, us."""
+    record.kinematics.append((t1 - t0 + t4 - t3) / 1e3)
+    record.rows.append((t2 - t1) / 1e3)
+    record.qp.append((t3 - t2) / 1e3)
+    record.total.append((t4 - t0) / 1e3)
+
+
+def run_placo(case: Case, targets) -> Record | None:
+    """Run placo in its own environment on the exported URDF."""
+    python = Path(__file__).parent.parent / ".venv-placo" / "bin" / "python"
+    python = Path(os.environ.get("PLACO_PYTHON", python))
+    if not python.exists():
+        return None
+    script = Path(__file__).parent / "peers" / "placo_side.py"
+    names = [n for n, j in zip(case.model.names, case.model.joints, strict=True)][1:]
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder)
+        (path / "robot.urdf").write_text(case.description.to_urdf())
+        np.savez(path / "in.npz", targets=targets, q=case.q)
+        job = {
+            "dt": DT,
+            "frames": case.frames,
+            "com": case.com,
+            "free": case.root == "free",
+            "joints": names[1:] if case.root == "free" else names,
+            "posture_cost": POSTURE_COST,
+            "damping": DAMPING,
+        }
+        (path / "job.json").write_text(json.dumps(job))
+        done = subprocess.run(
+            [python, script, folder], capture_output=True, text=True, check=False
+        )
+        if done.returncode:
+            print(f"  placo failed: {done.stderr.strip()[-300:]}", file=sys.stderr)
+            return None
+        out = np.load(path / "out.npz")
+        record = Record(failed=int(out["failed"]))
+        record.kinematics, record.qp = list(out["kinematics"]), list(out["solve"])
+        record.rows = [0.0] * len(record.qp)  # inside its solve
+        record.total, record.q = list(out["total"]), list(out["q"])
+        record.v = [
+            pin.difference(case.model, a, b) / DT
+            for a, b in zip([case.q, *record.q[:-1]], record.q, strict=True)
+        ]
+        return record
+
+
+def run_case(case: Case, ticks: int) -> dict[str, Record]:
+    """Run all sides, tick by tick in turns; placo after them."""
+    targets = case.targets(ticks)
+    sides = {
+        "ours": Ours(case, targets),
+        "ours, daqp": Ours(case, targets, warm=False),
+    }
+    for name, side in (("pink", Pink), ("mink", Mink)):
+        try:
+            sides[name] = side(case, targets)
+        except ModuleNotFoundError as error:
+            print(f"  {name} is left out: {error}", file=sys.stderr)
+    sides["ours, defaults"] = Ours(case, targets, defaults=True)
+    records = {name: Record() for name in sides}
+    names = list(sides)
+    for k in range(ticks):
+        for name in names[k % len(names) :] + names[: k % len(names)]:
+            sides[name].tick(k, records[name])
+    placo = run_placo(case, targets)
+    if placo is not None:
+        records["placo"] = placo
+    return records
+
+
+def quality(case: Case, record: Record, ticks: int) -> dict[str, float]:
+    """Return tracking errors (mm) and the worst broken limits (rad, rad/s)."""
+    robot, model, errors = Configuration(case.model), case.model, []
+    targets = case.targets(ticks)
+    for q, poses in list(zip(record.q, targets, strict=True))[::5]:
+        robot.update(q)
+        for frame, T in zip(case.hands, poses, strict=False):
+            errors.append(
+                np.linalg.norm(robot.frame_pose(frame).translation - T[:3, 3])
+            )
+    bounded = model.upperPositionLimit < 1e10
+    q = np.array(record.q)[:, bounded]
+    over = np.maximum(
+        q - model.upperPositionLimit[bounded], model.lowerPositionLimit[bounded] - q
+    )
+    first = 6 if case.root == "free" else 0
+    speed = np.abs(np.array(record.v))[:, first:] - model.velocityLimit[first:]
+    return {
+        "error_median_mm": 1e3 * float(np.median(errors)),
+        "error_max_mm": 1e3 * float(np.max(errors)),
+        "position_violation": max(0.0, float(over.max())),
+        "velocity_violation": max(0.0, float(speed.max())),
+    }
+
+
+def summarise(case: Case, records: dict[str, Record], ticks: int) -> tuple[list, dict]:
+    """Print the table of a case; return its rows and ratios."""
+    print(f"\n{case.robot}: nv {case.model.nv}, {ticks} ticks, us of CPU time")
+    head = "side            median    p99    kin   rows     QP  failed"
+    print(head + "   error mm (max)   broken rad, rad/s")
+    rows = []
+    for name, record in records.items():
+        total = np.array(record.total)
+        row = {
+            "case": case.robot,
+            "side": name,
+            "median_us": float(np.median(total)),
+            "p99_us": float(np.percentile(total, 99)),
+            "n": len(total),
+            "kinematics_us": float(np.median(record.kinematics)),
+            "rows_us": float(np.median(record.rows)),
+            "qp_us": float(np.median(record.qp)),
+            "failed": record.failed,
+            **quality(case, record, ticks),
+        }
+        rows.append(row)
+        print(
+            f"{name:14} {row['median_us']:7.1f} {row['p99_us']:6.0f} "
+            f"{row['kinematics_us']:6.1f} {row['rows_us']:6.1f} {row['qp_us']:6.1f} "
+            f"{row['failed']:7d}   {row['error_median_mm']:6.2f} "
+            f"({row['error_max_mm']:.2f})   "
+            f"{row['position_violation']:.0e}, {row['velocity_violation']:.0e}"
+        )
+    ours = rows[0]
+    ratios = {
+        f"{case.robot}/{row['side']}": ours["median_us"] / row["median_us"]
+        for row in rows
+        if row["side"] in ("mink", "pink", "placo")
+    }
+    for row in rows:
+        if row["side"] in ("mink", "pink"):
+            time_ratio = rows[1]["median_us"] / row["median_us"]
+            ratios[f"{case.robot}/{row['side']}/daqp"] = time_ratio
+    for row in rows:
+        if row["side"] in ("mink", "pink"):
+            error = ours["error_median_mm"] / row["error_median_mm"]
+            ratios[f"{case.robot}/{row['side']}/error"] = error
+    print("  ".join(f"{name} {value:.3f}" for name, value in ratios.items()))
+    return rows, ratios
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--quick", action="store_true", help="500 ticks, under 50 s")
+    parser.add_argument("--ticks", type=int, default=5000)
+    parser.add_argument("--json", type=Path, help="write rows and ratios here")
+    arguments = parser.parse_args()
+    ticks = 500 if arguments.quick else arguments.ticks
+    rows, ratios = [], {}
+    for case in CASES:
+        case_rows, case_ratios = summarise(case, run_case(case, ticks), ticks)
+        rows += case_rows
+        ratios |= case_ratios
+    if arguments.json:
+        report = {"rows": rows, "ratios": ratios}
+        arguments.json.write_text(json.dumps(report, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,172 @@
+"""A warm active-set solver for the stack's own kind of problem, compiled.
+
+A level's cost has few rows and a positive diagonal, `0.5 |W x - e|^2 + 0.5 x^T D x -
+r^T x`, and mostly the joints that met a bound at the last tick meet it again. For a
+given set of joints at bounds the optimum follows from one small linear system of the
+size of the rows, not of the robot:
+
+    x_F = D_F^-1 (r_F - B_F^T y),   B = [W; A],   S = diag(1 for W, 0 for A)
+    (S + B_F D_F^-1 B_F^T) y = B_F D_F^-1 r_F + B_K x_K - [e; b]
+
+with F the free and K the kept joints. Joints that leave their bounds are kept, joints
+whose multiplier has the wrong sign are freed, until nothing changes: then the KKT
+conditions hold, and x is the one optimum. Where that takes too long nothing is
+answered, and a general solver takes over.
+
+Source: Hintermueller, Ito, Kunisch (2002), "The Primal-Dual Active Set Strategy as a
+Semismooth Newton Method", SIAM J. Optim. 13(3); the small system is the matrix
+inversion lemma.
+"""
+
+import numba
+import numpy as np
+
+from wbc_suite.typing import Indices, Matrix, Vector
+
+__all__ = ["solve_warm"]
+
+_ROUNDS = 12  # changes of the set before a general solver is asked
+_TOLERANCE = 1e-13  # m, rad: how far a free joint may pass its bound by rounding
+
+_SUMS = {"reassoc", "contract"}  # lets sums be vectorised; NaN stays NaN
+
+
+@numba.njit(cache=True, nogil=True)
+def solve_warm(  # noqa: C901, one flat loop is what compiles well
+    W: Matrix,
+    e: Vector,
+    A: Matrix,
+    b: Vector,
+    diagonal: Matrix,
+    mu: float,
+    lb: Vector,
+    ub: Vector,
+    side: Indices,
+    x: Vector,
+    multipliers: Vector,
+    row_multipliers: Vector,
+) -> bool:
+    """Minimise `0.5 |W x - e|^2 + 0.5 x^T D x - r^T x` with `A x = b`, `lb <= x <= ub`.
+
+    Args:
+        W: Weighted rows, shape (m, n).
+        e: Weighted steps, shape (m,).
+        A: Equality rows, shape (k, n), independent.
+        b: Their right-hand side, shape (k,).
+        diagonal: D without mu, and r, shape (2, n).
+        mu: Added to D; positive.
+        lb: Lower bounds, shape (n,).
+        ub: Upper bounds, shape (n,).
+        side: In and out, -1 or 1 where x is kept at its lower or upper bound, else 0.
+        x: Output, the optimum, shape (n,).
+        multipliers: Output, of the bounds, shape (n,); positive at upper ones.
+        row_multipliers: Output, of A, shape (k,).
+
+    Returns:
+        Whether x is the optimum.
+    """
+    m, k, n = W.shape[0], A.shape[0], x.shape[0]
+    scaled = np.empty((m + k, n))
+    system = np.empty((m + k, m + k))
+    y, root = np.empty(m + k), np.empty(n)
+    for i in range(n):
+        root[i] = 1.0 / np.sqrt(diagonal[0, i] + mu)
+    for _ in range(_ROUNDS):
+        for i in range(n):
+            if side[i] == 0:
+                x[i] = root[i] * diagonal[1, i]  # scaled right-hand side, for now
+            else:
+                x[i] = 0.0
+        for row in range(m + k):
+            of = W[row] if row < m else A[row - m]
+            kept = 0.0
+            for i in range(n):
+                if side[i] == 0:
+                    scaled[row, i] = of[i] * root[i]
+                else:
+                    scaled[row, i] = 0.0
+                    kept += of[i] * (ub[i] if side[i] > 0 else lb[i])
+            y[row] = kept - (e[row] if row < m else b[row - m])
+            y[row] += _dot(scaled[row], x)
+            for other in range(row + 1):
+                system[row, other] = _dot(scaled[row], scaled[other])
+            if row < m:
+                system[row, row] += 1.0
+        if not _solve_in_place(system, y):
+            break
+        for i in range(n):
+            x[i] = root[i] * diagonal[1, i]
+        for row in range(m + k):
+            for i in range(n):
+                x[i] -= scaled[row, i] * y[row]
+        if _settle(W, A, y, diagonal, mu, root, lb, ub, side, x, multipliers):
+            row_multipliers[:] = y[m:]
+            return True
+    side[:] = 0
+    return False
+
+
+@numba.njit(cache=True, nogil=True, fastmath=_SUMS)
+def _dot(a: Vector, b: Vector) -> float:
+    total = 0.0
+    for i in range(a.shape[0]):
+        total += a[i] * b[i]
+    return total
+
+
+@numba.njit(cache=True, nogil=True)
+def _solve_in_place(S: Matrix, y: Vector) -> bool:
+    """Solve `S y = y` by Cholesky, lower triangle; False if S is not positive."""
+    n = y.shape[0]
+    for i in range(n):
+        for j in range(i):
+            S[i, j] = (S[i, j] - _dot(S[i, :j], S[j, :j])) / S[j, j]
+        pivot = S[i, i] - _dot(S[i, :i], S[i, :i])
+        if not pivot > 1e-12 * S[i, i]:
+            return False
+        S[i, i] = np.sqrt(pivot)
+        y[i] = (y[i] - _dot(S[i, :i], y[:i])) / S[i, i]
+    for i in range(n - 1, -1, -1):
+        y[i] /= S[i, i]
+        for j in range(i):
+            y[j] -= S[i, j] * y[i]
+    return True
+
+
+@numba.njit(cache=True, nogil=True)
+def _settle(
+    W: Matrix,
+    A: Matrix,
+    y: Vector,
+    diagonal: Matrix,
+    mu: float,
+    root: Vector,
+    lb: Vector,
+    ub: Vector,
+    side: Indices,
+    x: Vector,
+    multipliers: Vector,
+) -> bool:
+    """Put kept joints on their bounds, change the set; True if nothing changed.
+
+    Comes in with `x = root^2 r` less the rows' part on free joints scaled by one root.
+    """
+    m, same = W.shape[0], True
+    for i in range(x.shape[0]):
+        multipliers[i] = 0.0
+        if side[i] == 0:
+            x[i] *= root[i]
+            if not x[i] <= ub[i] + _TOLERANCE:
+                side[i], same = 1, False
+            elif not x[i] >= lb[i] - _TOLERANCE:
+                side[i], same = -1, False
+            x[i] = min(max(x[i], lb[i]), ub[i])
+            continue
+        x[i] = ub[i] if side[i] > 0 else lb[i]
+        force = diagonal[1, i] - (diagonal[0, i] + mu) * x[i]
+        for row in range(y.shape[0]):
+            force -= (W[row, i] if row < m else A[row - m, i]) * y[row]
+        multipliers[i] = force
+        if force * side[i] < 0.0 and lb[i] < ub[i]:
+            side[i], same = 0, False
+    return same

@@ -1,0 +1,73 @@
+"""An orthonormal basis of rows, compiled."""
+
+import numba
+import numpy as np
+
+from wbc_suite.typing import Matrix, Vector
+
+__all__ = ["row_space"]
+
+
+@numba.njit(cache=True, nogil=True)
+def row_space(  # noqa: C901, one flat loop is what compiles well
+    W: Matrix, tolerance: float, V: Matrix, lengths: Vector
+) -> int:
+    """Write an orthonormal basis of the rows of W, largest first; return its size.
+
+    Gram-Schmidt with pivoting, each vector orthogonalised twice ("twice is enough",
+    Giraud et al. 2005). Rows that are left shorter than the tolerance are dropped.
+
+    Args:
+        W: Rows, shape (m, n); destroyed.
+        tolerance: Absolute length under which a row counts as dependent.
+        V: Output, shape (at least min(m, n), n).
+        lengths: Output, what was left of each chosen row, descending.
+
+    Returns:
+        The rank r; V[:r] holds the basis.
+    """
+    m, n = W.shape
+    rank = 0
+    for _ in range(min(m, V.shape[0])):
+        best, pivot = 0.0, -1
+        for i in range(m):
+            length = 0.0
+            for j in range(n):
+                length += W[i, j] * W[i, j]
+            if length > best:
+                best, pivot = length, i
+        if best <= tolerance * tolerance:
+            break
+        row, v = W[pivot], V[rank]
+        lengths[rank] = np.sqrt(best)
+        scale = 1.0 / np.sqrt(best)
+        for j in range(n):
+            v[j] = row[j] * scale
+        _remove(V, rank, v)
+        norm = 0.0
+        for j in range(n):
+            norm += v[j] * v[j]
+        scale = 1.0 / np.sqrt(norm)
+        for j in range(n):
+            v[j] *= scale
+            row[j] = 0.0
+        rank += 1
+        for i in range(m):
+            dot = 0.0
+            for j in range(n):
+                dot += W[i, j] * v[j]
+            if dot != 0.0:
+                for j in range(n):
+                    W[i, j] -= dot * v[j]
+    return rank
+
+
+@numba.njit(cache=True, nogil=True)
+def _remove(V: Matrix, count: int, v: Vector) -> None:
+    """Take from v, in place, its components along the first rows of V."""
+    for i in range(count):
+        dot = 0.0
+        for j in range(v.shape[0]):
+            dot += V[i, j] * v[j]
+        for j in range(v.shape[0]):
+            v[j] -= dot * V[i, j]
