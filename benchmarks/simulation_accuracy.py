@@ -29,6 +29,7 @@ from wbc_suite.control import (
     build_composite_controller,
     load_composite_controller_config,
 )
+from wbc_suite.control.composite.clearance import Clearance
 from wbc_suite.control.composite.whole_body import WholeBodyIK
 from wbc_suite.envs.simulation import Simulation
 from wbc_suite.robot import load_robot
@@ -64,6 +65,7 @@ class Bench:
             for k, frame in enumerate(self.controller.config.frames)
             if frame.level == 0 and frame.kind == "pose"
         ]
+        self.clearance = Clearance(self.controller.robot, self.controller.config)
         self.free = mujoco.MjData(self.model)
         self.limited = np.flatnonzero(self.model.jnt_limited)
 
@@ -92,7 +94,8 @@ class Bench:
             q = self._random_configuration(model, q0, rng)
             self.free.qpos[:] = self.data.qpos
             self.controller._conversion.q_to_mujoco(q, self.free.qpos)
-            if self._touching(self.free.qpos) <= resting:
+            apart = self.clearance.is_kept(q)
+            if apart and self._touching(self.free.qpos) <= resting:
                 self.controller._configuration.update(q)
                 return [self.controller._planner.frame_pose(k) for k in self.hands]
         raise RuntimeError("no configuration free of collision in 1000 draws")

@@ -9,7 +9,7 @@ import pinocchio as pin
 from wbc_suite.control.composite.approach import approach_pose, approach_posture
 from wbc_suite.control.composite.config import ControlledFrame, WholeBodyIKConfig
 from wbc_suite.control.composite.search import GoalSearch
-from wbc_suite.control.composite.tasks import joint_accelerations
+from wbc_suite.control.composite.tasks import joint_accelerations, joint_speeds
 from wbc_suite.kinematics import Configuration
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Vector
@@ -39,7 +39,7 @@ class Planner:
 
     Near goals are approached on a straight line. For far ones, and where the straight
     line ends in a trap, a configuration that meets all of level 0 is searched; joints
-    then go there each at its own speed.
+    then go there together, on a straight line of their own.
     A goal that no configuration meets is approached straight, as near as one gets.
 
     Args:
@@ -64,7 +64,7 @@ class Planner:
         self._search = GoalSearch(robot, config, accept)
         self._first = [k for k, f in enumerate(config.frames) if f.level == 0]
         self._braking = config.posture.braking * _braking(robot, config, configuration)
-        self._speed = _speeds(robot, configuration)
+        self._speed = joint_speeds(robot, configuration)
         self.reset(configuration.q)
 
     def reset(self, posture: Vector) -> None:
@@ -91,8 +91,7 @@ class Planner:
         """
         self._watch(goals, v)
         if self._search.is_running:
-            found = self._search.advance(self._config.search_iterations)
-            self._plan = self._plan if found is None else found
+            self._plan = self._search.advance(self._config.search_iterations)
         if self._plan is not None:
             return self._joint_by_joint(self._plan)
         return self._straight(goals)
@@ -135,7 +134,10 @@ class Planner:
         speed = approach_posture(
             difference, dt=self._dt, speed=self._speed, acceleration=self._braking
         )
-        return Waypoint(posture=self._configuration.integrate(self._dt * speed))
+        moved = np.abs(difference) > 1e-9
+        pace = float((speed[moved] / difference[moved]).min(initial=1.0 / self._dt))
+        step = self._dt * pace * difference
+        return Waypoint(posture=self._configuration.integrate(step))
 
     def _straight(self, goals: Sequence[pin.SE3]) -> Waypoint:
         targets = [
@@ -195,12 +197,3 @@ def _braking(
     for name, value in joint_accelerations(robot, config).items():
         limits[configuration.model.joints[configuration.joint_id(name)].idx_v] = value
     return limits
-
-
-def _speeds(robot: RobotDescription, configuration: Configuration) -> Vector:
-    """Return the speed limit of each velocity."""
-    known = np.array(configuration.model.velocityLimit)
-    speeds = np.where((known > 0.0) & (known < 1e10), known, 10.0)
-    speeds[configuration.root_linear] = robot.root.velocity[0]
-    speeds[configuration.root_angular] = robot.root.velocity[1]
-    return speeds

@@ -14,6 +14,7 @@ from wbc_suite.control.composite.config import WholeBodyIKConfig
 from wbc_suite.control.composite.tasks import (
     HURRY,
     held_equality,
+    joint_speeds,
     make_task,
     planar_joints,
 )
@@ -33,9 +34,13 @@ __all__ = ["GoalSearch"]
 
 STEP = 0.1  # s; one iteration goes as far as joints can in this time
 ITERATIONS = 40  # of one start
-STARTS = 12
+STARTS = 16
+QUICK = 0.8  # s; a configuration this near is taken at once, others are compared
+SAMPLES = 12  # configurations on the way that must be acceptable too
 PATIENCE = 5  # iterations without progress end a start
 NEARBY = 0.05  # [cost] s; how dear it is to be a second away from the start
+NEAR_TIME = 0.5  # s; every second random start lies within this time of the first
+BLOCKED = 2.0  # s; what it costs that something is in the way
 CLOSE = 0.02  # m and rad; from here on only the targets count
 MET = 1e-7  # m and rad
 
@@ -69,6 +74,7 @@ class GoalSearch:
             PositionLimit(margin=2.0 * config.limits.position_margin),
             VelocityLimit(base_linear=linear, base_angular=angular),
         ]
+        self._speeds = joint_speeds(robot, self._configuration)
         self._start = PostureTask(
             NEARBY, costs=_costs(robot), max_speed=HURRY, name="start"
         )
@@ -125,11 +131,37 @@ class GoalSearch:
         return None
 
     def _search(self, starts: list[Vector]) -> Iterator[Vector | None]:
-        """Yield None after each iteration, and what was found."""
+        """Yield None after each iteration, and the best that was found at last."""
         rng = np.random.default_rng(0)
+        best, least = None, np.inf
         for trial in range(STARTS):
             q = starts[trial] if trial < len(starts) else self._random(starts[0], rng)
-            yield from self._descend(q)
+            for found in self._descend(q):
+                time = np.inf if found is None else self._time(starts[0], found)
+                if found is not None and time < least:
+                    time += self._detour(starts[0], found)
+                    best, least = (found, time) if time < least else (best, least)
+                yield best if least < QUICK else None
+        yield best
+
+    def _time(self, start: Vector, end: Vector) -> float:
+        """Return how long joints need from one configuration to another, s."""
+        step = pin.difference(self._configuration.model, start, end)
+        return float((np.abs(step) / self._speeds).max())
+
+    def _detour(self, start: Vector, end: Vector) -> float:
+        """Return seconds to add when something is in the way; inf if it is at the end.
+
+        Something may be in the way at the start already: that does not count.
+        """
+        if not self._accept(end):
+            return np.inf
+        model = self._configuration.model
+        blocked = sum(
+            not self._accept(pin.interpolate(model, start, end, k / SAMPLES))
+            for k in range(2, SAMPLES)
+        )
+        return BLOCKED * (blocked > 0)
 
     def _descend(self, q: Vector) -> Iterator[Vector | None]:
         self._near.reset()
@@ -140,7 +172,7 @@ class GoalSearch:
             self._configuration.update(q)
             error = self._error()
             if error < MET:
-                yield q if self._accept(q) else None
+                yield q
                 return
             waited = 0 if error < 0.95 * best else waited + 1
             best = min(best, error)
@@ -162,16 +194,19 @@ class GoalSearch:
         return worst
 
     def _random(self, q: Vector, rng: np.random.Generator) -> Vector:
-        """Return random joints within their limits; the root stays."""
+        """Return random joints, within their limits or near q; the root stays."""
         model, drawn = self._configuration.model, q.copy()
         low, high = model.lowerPositionLimit, model.upperPositionLimit
         draw = rng.uniform(size=model.nq)
+        near = rng.uniform() < 0.5
         root = {*self._configuration.root_linear, *self._configuration.root_angular}
         for joint in list(model.joints)[1:]:
             k = joint.idx_q
             if joint.nq > 1 or joint.idx_v in root or not low[k] < high[k] < 1e6:
                 continue
-            drawn[k] = low[k] + draw[k] * (high[k] - low[k])
+            far = NEAR_TIME * self._speeds[joint.idx_v] if near else np.inf
+            least, most = max(low[k], q[k] - far), min(high[k], q[k] + far)
+            drawn[k] = least + draw[k] * (most - least)
         return drawn
 
 

@@ -3,11 +3,13 @@
 import numpy as np
 import pinocchio as pin
 
+from wbc_suite.control.composite.clearance import self_collision_limit
 from wbc_suite.control.composite.config import (
     ControlledFrame,
     HeldFrame,
     WholeBodyIKConfig,
 )
+from wbc_suite.kinematics import Configuration
 from wbc_suite.qp import (
     AccelerationLimit,
     ComTask,
@@ -15,7 +17,6 @@ from wbc_suite.qp import (
     FrameTask,
     Limit,
     PositionLimit,
-    SelfCollisionLimit,
     VelocityLimit,
 )
 from wbc_suite.robot import RobotDescription
@@ -26,6 +27,7 @@ __all__ = [
     "frame_costs",
     "held_equality",
     "joint_accelerations",
+    "joint_speeds",
     "make_limits",
     "make_task",
     "planar_joints",
@@ -104,11 +106,7 @@ def make_limits(robot: RobotDescription, config: WholeBodyIKConfig) -> list[Limi
         ),
     ]
     if limits.self_collision:
-        made.append(
-            SelfCollisionLimit.of_robot(
-                robot, nearest=limits.collision_pairs, margin=limits.collision_distance
-            )
-        )
+        made.append(self_collision_limit(robot, config))
     return made
 
 
@@ -143,3 +141,12 @@ def joint_accelerations(
             limit = min(limit, max(force / float(inertia[index]), 1.0))
         found[joint.name] = limit
     return found
+
+
+def joint_speeds(robot: RobotDescription, configuration: Configuration) -> Vector:
+    """Return the speed limit of each velocity."""
+    known = np.array(configuration.model.velocityLimit)
+    speeds = np.where((known > 0.0) & (known < 1e10), known, 10.0)
+    speeds[configuration.root_linear] = robot.root.velocity[0]
+    speeds[configuration.root_angular] = robot.root.velocity[1]
+    return speeds

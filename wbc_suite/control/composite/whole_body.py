@@ -10,6 +10,7 @@ import pinocchio as pin
 from wbc_suite.control.action import ActionLayout
 from wbc_suite.control.collision_check import CollisionCheck
 from wbc_suite.control.composite.backend import IkBackend, IkStep
+from wbc_suite.control.composite.clearance import Clearance
 from wbc_suite.control.composite.config import WholeBodyIKConfig
 from wbc_suite.control.composite.goals import (
     action_of_pose,
@@ -86,11 +87,12 @@ class WholeBodyIK:
         self._dt = self._steps_per_solve * float(state.model.opt.timestep)
         self._reference = Reference(model, self._q_index, self._v_index, self._dt)
         check = CollisionCheck(state, self._conversion)
+        clearance = Clearance(self.robot, self.config)
         self._planner = Planner(
             self.robot,
             self.config,
             self._configuration,
-            accept=check.is_free,
+            accept=lambda q: clearance.is_kept(q) and check.is_free(q),
             dt=self._dt,
         )
         self._tau = np.zeros(len(state.actuators))

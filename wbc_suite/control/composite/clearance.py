@@ -1,0 +1,74 @@
+"""Keep links apart: which pairs, and whether a configuration does."""
+
+import numpy as np
+
+from wbc_suite.control.composite.config import WholeBodyIKConfig
+from wbc_suite.kinematics import Configuration
+from wbc_suite.qp import SelfCollisionLimit
+from wbc_suite.robot import RobotDescription
+from wbc_suite.robot.capsules import collision_pairs, enclosing_capsules
+from wbc_suite.typing import Matrix, Vector
+
+__all__ = ["Clearance", "self_collision_limit"]
+
+NEIGHBOURS = 2
+"""Links with at most this many joints between them are kept apart by joint limits."""
+
+
+def self_collision_limit(
+    robot: RobotDescription, config: WholeBodyIKConfig
+) -> SelfCollisionLimit:
+    """Return the rows that keep a robot's links apart.
+
+    Capsules that touch at the posture enclose too generously, and are left out.
+    """
+    configuration = Configuration(robot.to_pinocchio())
+    pairs = [
+        pair
+        for pair in collision_pairs(robot)
+        if _joints_between(configuration, *pair) > NEIGHBOURS
+    ]
+    limit = SelfCollisionLimit(
+        enclosing_capsules(robot),
+        pairs,
+        nearest=config.limits.collision_pairs,
+        margin=config.limits.collision_distance,
+    )
+    limit.bind(configuration)
+    name = config.posture.keyframe
+    if name in robot.keyframes:
+        configuration.update(configuration.model.referenceConfigurations[name])
+    limit.drop_touching(configuration)
+    return limit
+
+
+def _joints_between(configuration: Configuration, first: str, second: str) -> int:
+    a = {int(i) for i in configuration.support(first)}
+    b = {int(i) for i in configuration.support(second)}
+    return len(a ^ b)
+
+
+class Clearance:
+    """Tells whether a configuration keeps the distance that the QP's rows keep.
+
+    Args:
+        robot: The reduced robot.
+        config: Limits.
+    """
+
+    def __init__(self, robot: RobotDescription, config: WholeBodyIKConfig) -> None:
+        self._configuration = Configuration(robot.to_pinocchio())
+        self._limit = self_collision_limit(robot, config)
+        self._limit.bind(self._configuration)
+        self._G: Matrix = np.zeros((self._limit.dim, self._configuration.nv))
+        self._h: Vector = np.zeros(self._limit.dim)
+
+    def distance(self, q: Vector) -> float:
+        """Return the least distance of links that are kept apart, m; inf when far."""
+        self._configuration.update(q)
+        self._limit.rows(self._configuration, 1.0, self._G, self._h)
+        return float(self._limit.distances.min())
+
+    def is_kept(self, q: Vector) -> bool:
+        """Whether all links are farther apart than the margin."""
+        return self.distance(q) > self._limit.margin
