@@ -29,13 +29,13 @@ class CollisionCheck:
     def is_free(self, q: Vector) -> bool:
         """Whether the robot could be at q without touching more than it does."""
         scene, data = self._state.data, self._data
-        present = _pairs(scene)
+        present = _pairs(scene, deeper_than=0.0)
         data.qpos[:] = scene.qpos
         self._conversion.q_to_mujoco(q, data.qpos)
         mujoco.mj_fwdPosition(self._state.model, data)
-        return _pairs(data) <= present
+        return _pairs(data, deeper_than=DEPTH) <= present
 
 
-def _pairs(data: mujoco.MjData) -> set[tuple[int, int]]:
-    deep = data.contact.dist < -DEPTH
+def _pairs(data: mujoco.MjData, *, deeper_than: float) -> set[tuple[int, int]]:
+    deep = data.contact.dist < -deeper_than
     return {(int(a), int(b)) for a, b in data.contact.geom[deep]}

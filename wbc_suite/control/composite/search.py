@@ -85,6 +85,7 @@ class GoalSearch:
                 limits=limits,
                 equalities=self._held,
                 damping=1e-6,
+                curvature_damping=0.02,
                 escape=False,
             )
             for more in ((self._start,), ())

@@ -56,10 +56,12 @@ def make_task(frame: ControlledFrame, *, unhurried: bool = True) -> FrameTask | 
 
     Args:
         frame: The frame.
-        unhurried: False asks for the whole error in one step.
+        unhurried: False asks for the whole error in one step, all frames alike.
     """
-    gain = frame.gain if unhurried else 1.0
-    level = frame.level if unhurried else 0
+    gain, level = frame.gain, frame.level
+    if not unhurried:
+        gain, level = 1.0, 0
+        frame = frame.model_copy(update={"position_cost": 1.0, "orientation_cost": 1.0})
     if frame.frame is None:
         return ComTask(
             frame.position_cost,
