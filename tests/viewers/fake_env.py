@@ -52,7 +52,15 @@ class Layout:
         self.slices = (
             Slice("right_hand", "pose", 0, 6, -bound, bound),
             Slice("left_hand", "pose", 6, 12, -bound, bound),
-            Slice("right_gripper", "gripper", 12, 14, -np.ones(2), np.ones(2)),
+            Slice(
+                "right_gripper",
+                "gripper",
+                12,
+                14,
+                -np.ones(2),
+                np.ones(2),
+                ("thumb", "fingers"),
+            ),
         )
 
     def pack(self, values):
@@ -68,6 +76,14 @@ class FakeEnv(gymnasium.Env):
         self.data = mujoco.MjData(self.model)
         self.simulation = SimpleNamespace(model=self.model, data=self.data)
         self.action_layout = Layout()
+        frames = [
+            SimpleNamespace(name=side + "_hand", frame=side + "_hand", kind="pose")
+            for side in ("right", "left")
+        ]
+        config = SimpleNamespace(
+            input_type="absolute", input_ref_frame="world", frames=frames
+        )
+        self.controllers = [SimpleNamespace(config=config)]
         self.actions = []
 
     def reset(self, *, seed=None, options=None):

@@ -39,3 +39,16 @@ def test_command_holds_what_the_kind_commands(kind, expected):
     limb = Limb("right_hand", kind, Clutch(T), Ownership())
     np.testing.assert_allclose(limb.command(), expected, atol=1e-12)
     assert limb.title == "Right hand"
+
+
+def test_seen_target_takes_what_is_not_commanded_from_the_measured_pose():
+    T = pin.SE3(pin.exp3(np.array([0, 0, 0.5])), np.array([1.0, 2.0, 3.0]))
+    measured = pin.SE3.Identity()
+    seen = {
+        kind: Limb("x", kind, Clutch(T), Ownership()).seen_target(measured)
+        for kind in LimbKind
+    }
+    assert seen[LimbKind.POSE] == T
+    assert seen[LimbKind.POSITION] == pin.SE3(np.eye(3), T.translation)
+    assert seen[LimbKind.ORIENTATION] == pin.SE3(T.rotation, np.zeros(3))
+    assert seen[LimbKind.PLANAR] == pin.SE3(T.rotation, np.array([1.0, 2.0, 0.0]))

@@ -6,7 +6,7 @@ import pinocchio as pin
 import pytest
 from fake_env import REACH, FakeEnv
 
-from wbc_suite.errors import UnknownNameError
+from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.viewers.teleop_session import TeleopSession
 
 ALICE, BOB = 1, 2
@@ -81,11 +81,24 @@ def test_unreachable_target_is_explained_and_does_not_wind_up(session):
     status = session.snapshot.limbs["right_hand"]
     assert not status.reached
     assert status.reasons == ("joint limit: right_elbow_pitch_joint (upper)",)
+    held = status.target.translation
     session.release("right_hand", ALICE)
-    ticks(session, 2)
+    session.tick()
+    kept = session.snapshot.limbs["right_hand"].target.translation
+    np.testing.assert_array_equal(kept, held)  # it might still be on its way
+    ticks(session, 30)
     status = session.snapshot.limbs["right_hand"]
     assert status.position_error < 1e-6
     assert np.linalg.norm(status.target.translation - [0, 0, 0.9]) < REACH + 1e-6
+
+
+def test_target_that_nobody_touched_stays_when_its_limb_is_dragged_off(session):
+    held = session.snapshot.limbs["left_hand"].target
+    session.tick()
+    session.env.data.qpos[7:10] += [2.0, 0, 0]  # far out, by no wish of anybody
+    ticks(session, 60)
+    status = session.snapshot.limbs["left_hand"]
+    np.testing.assert_array_equal(status.target.translation, held.translation)
 
 
 def test_clients_cannot_fight_over_a_limb(session):
@@ -132,15 +145,17 @@ def test_nothing_moves_while_paused(session):
     assert len(session.env.actions) == 1
 
 
-def test_latency_counts_from_input_to_the_step_that_used_it():
+def test_latency_counts_from_input_to_the_solve_that_used_it():
     now = [0.0]
-    session = TeleopSession(FakeEnv(), period=0.02, clock=lambda: now[0])
+    env = FakeEnv()
+    session = TeleopSession(env, period=0.02, clock=lambda: now[0])
     hand = session.snapshot.limbs["right_hand"].target
     session.grab("right_hand", ALICE, hand)
     session.drag("right_hand", ALICE, hand)
     now[0] = 0.007
     session.drag("right_hand", ALICE, hand)
-    now[0] = 0.012
+    env.controllers[0].solved_at = 0.012
+    now[0] = 0.030
     session.tick()
     np.testing.assert_allclose(session.latencies(), [0.012, 0.005])
     session.tick()
@@ -155,6 +170,13 @@ def test_loop_runs_in_its_own_thread_and_stops(session):
     session.stop()
     assert session.snapshot.tick >= 5
     assert "teleop" not in [t.name for t in threading.enumerate()]
+
+
+def test_controller_that_takes_no_world_targets_is_refused():
+    env = FakeEnv()
+    env.controllers[0].config.input_type = "delta"
+    with pytest.raises(ConfigError, match=r"absolute.*not .* with 'delta'"):
+        TeleopSession(env, period=0.02)
 
 
 def test_unknown_limb_is_named_with_the_nearest_one(session):

@@ -22,7 +22,7 @@ def teleop(
     ] = "WHOLE_BODY_IK",
     rate: Annotated[
         float, typer.Option(help="Targets taken per second, Hz.", min=5.0, max=200.0)
-    ] = 50.0,
+    ] = 100.0,
     seed: Annotated[int, typer.Option(help="Seed of the scene.")] = 0,
     host: HostOption = "127.0.0.1",
     port: PortOption = None,
@@ -44,6 +44,8 @@ def teleop(
         horizon=round(ONE_DAY * rate),
     )
     session = TeleopSession(env, period=1.0 / rate, seed=seed)
+    print("Compiling; this takes a few seconds the first time ...", flush=True)
+    session.tick()
     page = TeleopPage(session, Site(host, port), label=f"{robots} · {benchmark}")
     page.start()
     session.start()

@@ -198,7 +198,9 @@ class AccessGate:
     ) -> None:
         self._open += 1
         try:
-            with contextlib.suppress(OSError, EOFError, TimeoutError):
+            # Cancelled only by `stop`, and then there is nobody left to tell.
+            quiet = (OSError, EOFError, TimeoutError, asyncio.CancelledError)
+            with contextlib.suppress(*quiet):
                 await self._answer(reader, writer)
         finally:
             self._open -= 1

@@ -87,6 +87,11 @@ class Gizmos:
             self._hidden.pop(client, None)
         self._session.leave(client)
 
+    def handle(self, client: int, name: str) -> "viser.TransformControlsHandle":
+        """Return one client's handle of one limb."""
+        with self._lock:
+            return self._sets[client][name].handle
+
     def mode(self, client: int) -> GizmoMode:
         """Return what one client's handles offer."""
         with self._lock:

@@ -77,7 +77,24 @@ class Limb:
     @property
     def title(self) -> str:
         """The name as a person writes it: `right_hand` becomes `Right hand`."""
+        if self.name == "com":
+            return "Centre of mass"
         return self.name.replace("_", " ").capitalize()
+
+    def seen_target(self, measured: pin.SE3) -> pin.SE3:
+        """Return the target, with what it does not command as it is measured."""
+        target = self.clutch.target
+        match self.kind:
+            case LimbKind.POSE:
+                return target
+            case LimbKind.POSITION:
+                return pin.SE3(measured.rotation, target.translation)
+            case LimbKind.ORIENTATION:
+                return pin.SE3(target.rotation, measured.translation)
+            case LimbKind.PLANAR:
+                height = np.array([0.0, 0.0, measured.translation[2]])
+                height[:2] = target.translation[:2]
+                return pin.SE3(target.rotation, height)
 
     def command(self) -> Vector:
         """Return the target as the action expects it.

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import mujoco
 import numpy as np
 
-from wbc_suite.typing import Matrix, Vector
+from wbc_suite.typing import Vector
 from wbc_suite.viewers.scene_mirror import SceneMirror
 
 if TYPE_CHECKING:
@@ -127,17 +127,12 @@ def _inertia_box(
     )
 
 
-def _places(model: mujoco.MjModel) -> list[tuple[int, str, Vector, Matrix]]:
+def _places(model: mujoco.MjModel) -> list[tuple[int, str, Vector, Vector]]:
     """Return body, label, position and quaternion of every link's and site's frame."""
-    here, upright = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
-    bodies = [(body, "frame", here, upright) for body in range(1, model.nbody)]
-    sites = [
-        (
-            int(model.site_bodyid[site]),
-            f"frame_{model.site(site).name}",
-            model.site_pos[site],
-            model.site_quat[site],
-        )
-        for site in range(model.nsite)
-    ]
-    return bodies + sites
+    here: Vector = np.zeros(3)
+    upright: Vector = np.array([1.0, 0.0, 0.0, 0.0])
+    places = [(body, "frame", here, upright) for body in range(1, model.nbody)]
+    for site in range(model.nsite):
+        body, label = int(model.site_bodyid[site]), f"frame_{model.site(site).name}"
+        places.append((body, label, model.site_pos[site], model.site_quat[site]))
+    return places

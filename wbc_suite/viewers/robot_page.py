@@ -39,10 +39,10 @@ class RobotPage:
         self._sliders: dict[str, viser.GuiSliderHandle[float]] = {}
         self._setting = False
         set_stage(site.server, label=f"wbc_suite · {robot.name}")
-        self._mirror = SceneMirror(site.server, self.model)
+        self.mirror = SceneMirror(site.server, self.model)
         self._add_facts()
         self._add_postures()
-        self._overlays = Overlays(site.server, self.model, self.data, self._mirror)
+        self._overlays = Overlays(site.server, self.model, self.data, self.mirror)
         self._add_joints()
         self.set_keyframe(next(iter(robot.keyframes), None))
         set_camera(site.server, *robot_box(self.model, self.data.xpos, self.data.xquat))
@@ -70,7 +70,7 @@ class RobotPage:
             self._couple()
             mujoco.mj_kinematics(self.model, self.data)
             mujoco.mj_comPos(self.model, self.data)
-            self._mirror.update(self.data.xpos, self.data.xquat)
+            self.mirror.update(self.data.xpos, self.data.xquat)
             self._overlays.update()
 
     def position(self, joint: str) -> float:

@@ -49,11 +49,9 @@ class TeleopPage:
             session, {n: _scale(n, limb.kind) for n, limb in session.limbs.items()}
         )
         self.ghosts = Ghosts(self.server, model, session.bodies, snapshot, colours)
-        self.panel = TeleopPanel(self.server, session, self.gizmos, colours)
-        set_camera(
-            self.server,
-            *robot_box(model, snapshot.body_positions, snapshot.body_quaternions),
-        )
+        box = robot_box(model, snapshot.body_positions, snapshot.body_quaternions)
+        self.panel = TeleopPanel(self.server, session, self.gizmos, colours, box)
+        set_camera(self.server, *box)
         self.push_times: list[float] = []
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="scene", daemon=True)
@@ -76,7 +74,7 @@ class TeleopPage:
         snapshot = self.session.snapshot
         self.mirror.update(snapshot.body_positions, snapshot.body_quaternions)
         with self.server.atomic():
-            notes = {name: explain(s) for name, s in snapshot.limbs.items()}
+            notes = {name: explain(s, at_most=1) for name, s in snapshot.limbs.items()}
             self.ghosts.update(snapshot, notes)
         self.gizmos.update(snapshot)
         if count % PANEL_EVERY == 0:

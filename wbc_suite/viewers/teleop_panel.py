@@ -1,15 +1,17 @@
 """The panel beside the scene: how things stand, and everything that is pressed."""
 
 import html
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from wbc_suite.typing import Vector
 from wbc_suite.viewers.gizmos import GizmoMode, Gizmos
 from wbc_suite.viewers.palette import css
+from wbc_suite.viewers.stage import VIEWS, look_from
 from wbc_suite.viewers.teleop_session import LimbStatus, Snapshot, TeleopSession
-from wbc_suite.viewers.words import explain
+from wbc_suite.viewers.words import explain, plain
 
 if TYPE_CHECKING:
     import viser
@@ -29,6 +31,13 @@ class TeleopPanel:
 
     What all clients share is made once; what each has for itself (how its handles look)
     is made as it connects.
+
+    Args:
+        server: Server whose panel it is.
+        session: Session that it shows and commands.
+        gizmos: The clients' handles.
+        colours: Colour of each limb.
+        box: Two corners of the robot, which cameras look at.
     """
 
     def __init__(
@@ -37,8 +46,10 @@ class TeleopPanel:
         session: TeleopSession,
         gizmos: Gizmos,
         colours: Mapping[str, tuple[int, int, int]],
+        box: tuple[Vector, Vector],
     ) -> None:
         self._server, self._session, self._gizmos = server, session, gizmos
+        self._box = box
         self._colours = colours
         self._status = server.gui.add_html("")
         self._shown = ""
@@ -75,6 +86,7 @@ class TeleopPanel:
                 color="gray",
                 hint="After a handle was moved alone, with its clutch out. Key: H",
             )
+            view = client.gui.add_button_group("See from", tuple(VIEWS))
             with client.gui.add_folder("Show", expand_by_default=False):
                 for name, limb in self._session.limbs.items():
                     self._add_show(client, name, limb.title)
@@ -83,6 +95,7 @@ class TeleopPanel:
             self._gizmos.set_mode(number, chosen)
             mode.options = _marked(chosen)
 
+        view.on_click(lambda _: look_from(client, *self._box, VIEWS[view.value]))
         mode.on_click(lambda _: set_mode(_unmarked(mode.value)))
         recall.on_click(lambda _: self._gizmos.recall(number))
         client.gui.add_command("Move or turn", hotkey="T").on_trigger(
@@ -111,7 +124,8 @@ class TeleopPanel:
         rows, ago = rows[ago > -PLOT_SECONDS], ago[ago > -PLOT_SECONDS]
         step = max(1, len(rows) // PLOT_POINTS)
         rows, ago = rows[::-step][::-1], ago[::-step][::-1]
-        self._error_plot.data = (ago, *(1e3 * rows[:, 2:]).T.copy())
+        errors = [np.ascontiguousarray(column) for column in 1e3 * rows[:, 2:].T]
+        self._error_plot.data = (ago, *errors)
         self._time_plot.data = (ago, 1e3 * rows[:, 1])
 
     def _add_buttons(self) -> None:
@@ -153,23 +167,46 @@ class TeleopPanel:
         )
 
     def _add_gripper(self, name: str) -> None:
+        """Add a slider for the whole gripper and, below it, one per synergy."""
         labels = self._session.gripper_labels[name]
-        for index, label in enumerate(labels):
-            slider = self._server.gui.add_slider(
-                label,
-                min=-1.0,
-                max=1.0,
-                step=0.02,
-                initial_value=float(self._session.grippers[name][index]),
-                hint="-1 is open, 1 is closed",
-            )
+        start = self._session.grippers[name]
+        whole = self._add_closing(plain(name).capitalize(), float(np.mean(start)))
+        fingers: list[viser.GuiSliderHandle[float]] = []
+        if len(labels) > 1:
+            with self._server.gui.add_folder("Fingers", expand_by_default=False):
+                fingers = [
+                    self._add_closing(plain(label), float(value))
+                    for label, value in zip(labels, start, strict=True)
+                ]
 
-            def move(
-                _: object, index: int = index, slider: "viser.GuiSliderHandle" = slider
-            ) -> None:
+        def move_all(_: object) -> None:
+            for index in range(len(labels)):
+                self._session.set_gripper(name, index, whole.value)
+            for finger in fingers:
+                finger.value = whole.value
+
+        whole.on_update(move_all)
+        for index, finger in enumerate(fingers):
+            finger.on_update(self._mover(name, index, finger))
+
+    def _mover(
+        self, name: str, index: int, slider: "viser.GuiSliderHandle[float]"
+    ) -> "Callable[[viser.GuiEvent[viser.GuiSliderHandle[float]]], None]":
+        def move(event: "viser.GuiEvent[viser.GuiSliderHandle[float]]") -> None:
+            if event.client is not None:  # not when the whole gripper's slider moved it
                 self._session.set_gripper(name, index, slider.value)
 
-            slider.on_update(move)
+        return move
+
+    def _add_closing(self, label: str, value: float) -> "viser.GuiSliderHandle[float]":
+        return self._server.gui.add_slider(
+            label,
+            min=-1.0,
+            max=1.0,
+            step=0.02,
+            initial_value=float(np.clip(value, -1.0, 1.0)),
+            marks=((-1.0, "open"), (1.0, "closed")),
+        )
 
     def _add_error_plot(self) -> "viser.GuiUplotHandle":
         limbs = self._session.limbs
@@ -229,16 +266,16 @@ def _status_html(
     speed = _or_dash(snapshot.speed, "x", digits=2)
     figures = (
         ("input to joint target", latency),
-        ("solve", solve),
-        ("of real time", speed),
+        ("solve time", solve),
+        ("real time", speed),
     )
     cells = "".join(
-        "<div style='flex:1'><div style='font-size:1.05em;font-weight:600'>"
+        "<div style='flex:auto'><div style='font-size:1.05em;font-weight:600'>"
         f"{value}</div><div style='opacity:.6;font-size:.78em'>{label}</div></div>"
         for label, value in figures
     )
     return (
-        "<div style='padding:.5em .7em 0'>"
+        "<div style='padding:.5em .7em .6em'>"
         "<div style='font-weight:600;margin-bottom:.5em'>"
         f"<span style='color:{dot}'>&#9679;</span> {html.escape(state)}</div>"
         f"<div style='display:flex;gap:.4em'>{cells}</div>"

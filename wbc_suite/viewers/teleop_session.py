@@ -8,7 +8,7 @@ a short lock or read one reference, so that the loop never waits for a page.
 import logging
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
@@ -30,8 +30,10 @@ __all__ = ["LimbStatus", "Snapshot", "TeleopSession"]
 logger = logging.getLogger(__name__)
 
 WINDOW = 600  # rows of history: 12 s at 50 Hz
-LEAD_POSITION = 0.03  # m; a released target further than this from its frame ...
-LEAD_ORIENTATION = 0.2  # rad; ... or turned by more than this, goes back to it
+LEAD_POSITION = 0.03  # m; a released target that is further than this from its limb ...
+LEAD_ORIENTATION = 0.2  # rad; ... or turned by more than this, goes back to it ...
+REST_SPEED = 0.02  # m/s; ... when the limb has been slower than this ...
+REST_TIME = 0.4  # s; ... for so long
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,9 +42,11 @@ class LimbStatus:
 
     Attributes:
         measured: Pose of the simulated frame in the world.
-        target: Pose that was asked for, in the world.
-        position_error: Distance between the two, in m, as the controller reports it.
-        orientation_error: Angle between the two, in rad.
+        target: Pose that was asked for, in the world; what is not commanded of it is
+            as measured.
+        position_error: Distance that is commanded and missing, in m, as the controller
+            reports it.
+        orientation_error: Angle that is commanded and missing, in rad.
         reached: Whether the controller can bring the frame to its target.
         reasons: Why it cannot, in words.
         holder: Client that holds the limb, or None.
@@ -137,7 +141,9 @@ class TeleopSession:
         self._begun = self._spent = float("nan")  # wall time of a tick, smoothed
 
         env.reset(seed=seed)
-        self._readers = frame_readers(self._layout, self.model)
+        self._controller = env.unwrapped.controllers[0]  # type: ignore[attr-defined]
+        self._readers = frame_readers(self._controller, self.model)
+        self._let_go: dict[str, int] = {}  # ticks at rest, of limbs let go lately
         self.limbs = {
             name: Limb(name, reader.kind, Clutch(self._measure(reader)), Ownership())
             for name, reader in self._readers.items()
@@ -148,9 +154,7 @@ class TeleopSession:
             if s.kind == "gripper"
         }
         self.gripper_labels = {
-            s.name: _gripper_labels(s.name, s.labels, len(s.low))
-            for s in self._layout.slices
-            if s.kind == "gripper"
+            s.name: tuple(s.labels) for s in self._layout.slices if s.kind == "gripper"
         }
         self.bodies = {name: reader.body for name, reader in self._readers.items()}
         # Columns: wall time, solve time, then the position error of every limb.
@@ -183,23 +187,12 @@ class TeleopSession:
             return True
 
     def release(self, name: str, client: int) -> None:
-        """Let a limb go; a target that its frame cannot follow goes back to it.
-
-        Otherwise a target pulled far out of reach would have to be pulled all the way
-        back before the hand moves again.
-        """
+        """Let a limb go; its target stays, and the limb goes on towards it."""
         limb = self._limb(name)
-        status = self.snapshot.limbs[name]
-        far = (
-            status.position_error > LEAD_POSITION
-            or status.orientation_error > LEAD_ORIENTATION
-        )
         with self._lock:
-            if not limb.ownership.release(client):
-                return
-            limb.clutch.release()
-            if far and not status.reached:
-                limb.clutch.place(status.measured)
+            if limb.ownership.release(client):
+                limb.clutch.release()
+                self._let_go[name] = 0
 
     def leave(self, client: int) -> None:
         """Release everything that a client held, for instance when its tab closes."""
@@ -260,8 +253,7 @@ class TeleopSession:
         """Return the times from an input's arrival to its joint target, in s.
 
         The clock starts when this process receives the input and stops when the
-        environment's step that used it has returned: the control period that the
-        targets are simulated for is inside the figure.
+        controller has found the joint targets that follow from it.
         """
         return self._latencies.rows()[:, 0]
 
@@ -287,16 +279,40 @@ class TeleopSession:
             values = {name: limb.command() for name, limb in self.limbs.items()}
             values |= {name: value.copy() for name, value in self.grippers.items()}
         *_, info = self.env.step(self._layout.pack(values))
-        applied = self._clock()
+        now = self._clock()
+        found = getattr(self._controller, "solved_at", now)
         for stamp in stamps:
-            self._latencies.append(np.array([applied - stamp]))
+            self._latencies.append(np.array([max(found, stamp) - stamp]))
         self._ik = info.get("ik", {})
         self._success = bool(info.get("success", False))
         if "physics_error" in info:
             self._reset()
             self._message = f"Physics gave up ({info['physics_error']}): started again."
-        self._note_speed(applied)
+        self._note_speed(now)
+        with self._lock:
+            self._settle()
         self._tick += 1
+
+    def _settle(self) -> None:
+        """Bring a target that was let go back to its limb, which rests short of it.
+
+        Otherwise a target pulled far out of reach would have to be pulled all the way
+        back before the limb moves again. Targets of limbs that nobody touched stay,
+        however far others drag their limbs off.
+        """
+        for name in list(self._let_go):
+            status = self.snapshot.limbs[name]
+            measured = self._measure(self._readers[name])
+            step = measured.translation - status.measured.translation
+            rests = bool(np.linalg.norm(step) < REST_SPEED * self.period)
+            self._let_go[name] = self._let_go[name] + 1 if rests else 0
+            held = self.limbs[name].ownership.holder(self._clock()) is not None
+            if held or status.reached:
+                del self._let_go[name]
+            elif self._let_go[name] * self.period > REST_TIME:
+                del self._let_go[name]
+                if _is_far(status):
+                    self.limbs[name].clutch.place(measured)
 
     def _note_speed(self, now: float) -> None:
         if not np.isnan(self._begun):
@@ -341,15 +357,14 @@ class TeleopSession:
 
     def _status(self, name: str, now: float) -> LimbStatus:
         limb = self.limbs[name]
-        measured, target = self._measure(self._readers[name]), limb.clutch.target
+        measured = self._measure(self._readers[name])
+        target = limb.seen_target(measured)
         report = self._ik.get("frames", {}).get(name, {})
-        offset = target.translation - measured.translation
-        turn = pin.log3(measured.rotation.T @ target.rotation)
         return LimbStatus(
             measured=measured,
             target=target,
-            position_error=float(np.linalg.norm(offset)),
-            orientation_error=float(np.linalg.norm(turn)),
+            position_error=float(report.get("position_error", 0.0)),
+            orientation_error=float(report.get("orientation_error", 0.0)),
             reached=bool(report.get("reached", True)),
             reasons=tuple(report.get("reasons", ())),
             holder=limb.ownership.holder(now),
@@ -365,10 +380,8 @@ class TeleopSession:
         return self.limbs[name]
 
 
-def _gripper_labels(name: str, labels: Sequence[str], count: int) -> tuple[str, ...]:
-    """Name a gripper's sliders: the gripper alone when it has only one."""
-    title = name.replace("_", " ").capitalize()
-    if count == 1 or len(labels) != count:
-        return tuple(title if count == 1 else f"{title} {k + 1}" for k in range(count))
-    side = title.split()[0]
-    return tuple(f"{side}: {label.replace('_', ' ')}" for label in labels)
+def _is_far(status: LimbStatus) -> bool:
+    return (
+        status.position_error > LEAD_POSITION
+        or status.orientation_error > LEAD_ORIENTATION
+    )

@@ -2,12 +2,16 @@
 
 import re
 
+import numpy as np
+
 from wbc_suite.viewers.teleop_session import LimbStatus
 
 __all__ = ["describe_reason", "explain", "plain"]
 
+_ON_ITS_WAY = ("moving", "acceleration limit", "velocity limit")
+"""How reasons begin that time alone will mend."""
+
 _JOINT_LIMIT = re.compile(r"joint limit: (?P<joint>.+?)(?: \((?P<side>\w+)\))?$")
-_SPEED_LIMIT = re.compile(r"velocity limit: (?P<joint>.+?)(?: \(\w+\))?$")
 _COLLISION = re.compile(r"self-collision: (?P<one>.+?) - (?P<other>.+)$")
 _CONFLICT = re.compile(r"conflict: (?P<other>.+)$")
 
@@ -22,13 +26,17 @@ def describe_reason(reason: str) -> str:
     if match := _JOINT_LIMIT.match(reason):
         side = {"upper": " upper", "lower": " lower"}.get(match["side"] or "", "")
         return f"{plain(match['joint'])} is at its{side} limit"
-    if match := _SPEED_LIMIT.match(reason):
-        return f"{plain(match['joint'])} is at its top speed"
     if match := _COLLISION.match(reason):
         return f"{plain(match['one'])} would touch {plain(match['other'])}"
     if match := _CONFLICT.match(reason):
         return f"it pulls against {plain(match['other'])}"
     return reason
+
+
+def stands_still(status: LimbStatus) -> bool:
+    """Whether a limb will stay short of its target, if nothing changes."""
+    lasting = [r for r in status.reasons if not r.startswith(_ON_ITS_WAY)]
+    return not status.reached and (bool(lasting) or not status.reasons)
 
 
 def explain(status: LimbStatus, *, at_most: int = 3) -> str:
@@ -38,15 +46,18 @@ def explain(status: LimbStatus, *, at_most: int = 3) -> str:
         status: How the limb stands.
         at_most: How many reasons to name.
     """
-    if status.reached:
+    short = _shortfall(status)
+    if not short or not stands_still(status):
         return ""
-    parts = [describe_reason(reason) for reason in status.reasons[:at_most]]
-    return f"{_shortfall(status)}: {', '.join(parts) or 'out of reach'}"
+    lasting = [r for r in status.reasons if not r.startswith(_ON_ITS_WAY)]
+    parts = [describe_reason(reason) for reason in lasting[:at_most]]
+    return f"{short}: {', '.join(parts) or 'out of reach'}"
 
 
 def _shortfall(status: LimbStatus) -> str:
+    """Return what is missing, as people say it; nothing when it is hardly seen."""
     if status.position_error >= 0.005:
         return f"{100 * status.position_error:.0f} cm short"
-    if status.orientation_error >= 0.02:
-        return f"{57.2958 * status.orientation_error:.0f}° short"
-    return "held back"
+    if status.orientation_error >= 0.05:
+        return f"{np.rad2deg(status.orientation_error):.0f}° short"
+    return ""

@@ -54,6 +54,8 @@ class WholeBodyIK:
         robot: The robot that is solved for: grippers and locked groups are rigid.
         q: Commanded configuration, Pinocchio's conventions, shape (nq,).
         goals: Goal of each controlled frame, in the input's reference frame.
+        solved_at: When the present joint targets were found, on `time.perf_counter`'s
+            clock, s.
     """
 
     def __init__(
@@ -101,7 +103,7 @@ class WholeBodyIK:
 
     def reset(self, state: RobotState) -> None:
         """Hold the robot where it is."""
-        self._step, self.solve_time = 0, 0.0
+        self._step, self.solve_time, self.solved_at = 0, 0.0, 0.0
         self.q: Vector = self._conversion.q_to_pinocchio(state.data.qpos)
         self._reference.reset(self.q)
         self._answer = IkStep(v=self._reference.v)
@@ -192,7 +194,8 @@ class WholeBodyIK:
         goals = [correction * self._to_world(goal) for goal in self.goals]
         self._answer = self._step_towards(self._planner.next(goals, self._answer.v))
         self.q = self._reference.extend(self._answer.v)
-        self.solve_time = time.perf_counter() - began
+        self.solved_at = time.perf_counter()
+        self.solve_time = self.solved_at - began
 
     def _step_towards(self, waypoint: Waypoint) -> IkStep:
         if waypoint.targets is None:

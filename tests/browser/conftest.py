@@ -1,0 +1,181 @@
+"""A real Chromium, and a GR1 to drive in it."""
+
+import json
+import shutil
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wbc_suite
+from wbc_suite.viewers.site import Site
+from wbc_suite.viewers.teleop_page import TeleopPage
+from wbc_suite.viewers.teleop_session import TeleopSession
+
+ARTIFACTS = Path(__file__).resolve().parents[2] / "artifacts"
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+FLAGS = [
+    "--no-sandbox",
+    "--enable-unsafe-swiftshader",
+    "--use-angle=swiftshader",
+    "--ignore-gpu-blocklist",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--no-first-run",
+]
+PATIENCE = 120.0  # s; software WebGL draws 2 or 3 pictures a second
+RATE = 100.0  # Hz, what `wbc-suite teleop` uses
+
+
+def wait_until(condition, what, patience=PATIENCE):
+    deadline = time.monotonic() + patience
+    while time.monotonic() < deadline:
+        if value := condition():
+            return value
+        time.sleep(0.02)
+    raise AssertionError(f"waited {patience:g} s in vain: {what}")
+
+
+class Viewer:
+    """One browser page, and the client that it is for the server.
+
+    Args:
+        context: Browser context.
+        site: Site to open.
+        size: Of the page, in pixels.
+        dots: Drawn per pixel; fewer cost a browser without graphics card less.
+    """
+
+    def __init__(self, context, site, *, size=(960, 600), dots=0.4):
+        self.site = site
+        self.requests = []
+        before = set(site.server.get_clients())
+        self.page = context.new_page()
+        self.page.set_viewport_size({"width": size[0], "height": size[1]})
+        self.page.on("request", lambda request: self.requests.append(request.url))
+        began = time.monotonic()
+        self.page.goto(f"{site.url}{'&' if '?' in site.url else '?'}fixedDpr={dots}")
+        number = wait_until(
+            lambda: set(site.server.get_clients()) - before, "the page connects"
+        ).pop()
+        self.load_time = time.monotonic() - began
+        self.client = site.server.get_clients()[number]
+        wait_until(
+            lambda: self.client.camera.image_width > 0, "the page tells its camera"
+        )
+
+    def pixel(self, point):
+        """Where a point in the world is seen, in pixels of the page."""
+        camera = self.client.camera
+        R = pin.Quaternion(np.roll(camera.wxyz, -1)).toRotationMatrix()
+        x, y, z = R.T @ (point - camera.position)
+        focal = camera.image_height / 2 / np.tan(camera.fov / 2)
+        box = self.page.locator("canvas").first.bounding_box()
+        return np.array(
+            [
+                box["x"] + box["width"] / 2 + focal * x / z,
+                box["y"] + box["height"] / 2 + focal * y / z,
+            ]
+        )
+
+    def arrow(self, pose, scale):
+        """The arrow of a gizmo that is seen best: its axis, and a pixel to grab."""
+        origin = self.pixel(pose.translation)
+        tips = [
+            self.pixel(pose.translation + 0.9 * scale * axis)
+            for axis in pose.rotation.T
+        ]
+        best = int(np.argmax([np.linalg.norm(tip - origin) for tip in tips]))
+        along = tips[best] - origin
+        return pose.rotation[:, best], tips[best], along / np.linalg.norm(along)
+
+    def drag(self, start, direction, pixels, *, release=True, steps=6):
+        """Press at a pixel, move, and let go, as a hand on a mouse would."""
+        mouse = self.page.mouse
+        mouse.move(*start)
+        time.sleep(0.3)
+        mouse.down()
+        for k in range(1, steps + 1):
+            mouse.move(*(start + direction * pixels * k / steps))
+            time.sleep(0.05)
+        if release:
+            mouse.up()
+
+    def screenshot(self, name):
+        ARTIFACTS.mkdir(exist_ok=True)
+        self.page.screenshot(path=str(ARTIFACTS / f"{name}.png"))
+
+
+def note(**figures):
+    """Keep measured figures beside the screenshots, and print them."""
+    ARTIFACTS.mkdir(exist_ok=True)
+    file = ARTIFACTS / "teleop.json"
+    known = json.loads(file.read_text()) if file.exists() else {}
+    file.write_text(json.dumps(known | figures, indent=2) + "\n")
+    print(figures)
+
+
+@pytest.fixture(scope="session")
+def browser(tmp_path_factory):
+    """Chromium that draws in software, behind the simulation in the queue.
+
+    A person's browser draws on a graphics card; here it would take the processor that
+    the control loop needs.
+    """
+    api = pytest.importorskip("playwright.sync_api")
+    if CHROMIUM is None:
+        pytest.skip("There is no Chromium: apt-get install chromium")
+    with api.sync_playwright() as playwright:
+        gentle = tmp_path_factory.mktemp("chromium") / "gentle"
+        gentle.write_text(f'#!/bin/sh\nexec nice -n 4 {CHROMIUM} "$@"\n')
+        gentle.chmod(0o755)
+        browser = playwright.chromium.launch(executable_path=gentle, args=FLAGS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def context(browser):
+    context = browser.new_context()
+    yield context
+    context.close()
+
+
+def served(robot, controller="WHOLE_BODY_IK", host="127.0.0.1"):
+    env = wbc_suite.make(
+        "Lift",
+        robots=robot,
+        controller_configs=controller,
+        control_freq=RATE,
+        horizon=10**7,
+    )
+    session = TeleopSession(env, period=1 / RATE)
+    page = TeleopPage(session, Site(host, port=0), label=f"{robot} · Lift")
+    page.start()
+    session.start()
+    return session, page
+
+
+def running(robot):
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-3)  # as the command does
+    session, page = served(robot)
+    yield session, page
+    session.stop()
+    page.stop()
+    sys.setswitchinterval(interval)
+
+
+@pytest.fixture(scope="module")
+def gr1():
+    yield from running("GR1")
+
+
+@pytest.fixture(scope="module")
+def panda():
+    """A robot with few shapes, for what does not depend on the robot."""
+    yield from running("Panda")
