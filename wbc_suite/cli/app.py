@@ -17,6 +17,7 @@ from wbc_suite.cli import (
     export,
     listing,
     render,
+    schema,
     teleop,
     view,
 )
@@ -39,6 +40,7 @@ app.command("list")(listing.list_catalogue)
 app.command("render")(render.render)
 app.command("check")(check.check_file)
 app.command("export")(export.export_robot)
+app.command("schema")(schema.print_schema)
 app.command("describe-action")(describe_action.describe_action)
 app.command("doctor")(doctor.doctor)
 

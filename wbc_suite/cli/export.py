@@ -1,4 +1,4 @@
-"""`wbc-suite export`: a robot as MJCF or URDF text."""
+"""`wbc-suite export`: a robot as MJCF, URDF or our own TOML."""
 
 from enum import StrEnum
 from pathlib import Path
@@ -12,10 +12,11 @@ __all__ = ["export_robot"]
 
 
 class Format(StrEnum):
-    """Formats that other programs read."""
+    """Formats that other programs read, and our own for editing an imported robot."""
 
     MJCF = "mjcf"
     URDF = "urdf"
+    TOML = "toml"
 
 
 def export_robot(
@@ -26,13 +27,23 @@ def export_robot(
         Path | None,
         typer.Option("--output", "-o", help="File to write; otherwise it is printed."),
     ] = None,
+    mend_inertias: Annotated[
+        bool,
+        typer.Option(help="Replace inertias that no body has (of a URDF file)."),
+    ] = False,
     catalogue: CatalogueOption = None,
 ) -> None:
-    """Write a robot for other programs."""
+    """Write a robot for other programs, or a URDF or MJCF file as a TOML to edit."""
     from wbc_suite.robot import load_robot
+    from wbc_suite.robot.urdf_import import read_urdf
 
-    description = load_robot(robot)
-    text = description.to_mjcf() if to is Format.MJCF else description.to_urdf()
+    mending = mend_inertias and robot.endswith(".urdf")
+    description = read_urdf(robot, mend_inertias=True) if mending else load_robot(robot)
+    text = {
+        Format.MJCF: description.to_mjcf,
+        Format.URDF: description.to_urdf,
+        Format.TOML: description.to_toml,
+    }[to]()
     if output is None:
         print(text)
         return

@@ -10,7 +10,7 @@ from wbc_suite.catalogue import Catalogue
 from wbc_suite.errors import ConfigError, DescriptionError, UnknownNameError
 from wbc_suite.robot.component import Assembly, Component, Part, read_robot_file
 from wbc_suite.robot.description import RobotDescription
-from wbc_suite.robot.parts import Link, Mount, Root
+from wbc_suite.robot.parts import Link, Mount, Root, Synergy
 from wbc_suite.robot.placing import compose, depth_first, locked, renamed
 from wbc_suite.tomlfile import parse_model
 
@@ -31,9 +31,21 @@ def describe_component(component: Component, *, source: str) -> RobotDescription
         "deviations": header.deviations,
         "root": component.root,
         "links": depth_first(component.links),
-        "synergies": {"gripper": component.synergies} if component.synergies else {},
+        "synergies": _by_gripper(component.synergies),
     }
     return parse_model(RobotDescription, data, source=source, error=DescriptionError)
+
+
+def _by_gripper(
+    synergies: tuple[Synergy, ...], called: str = "gripper"
+) -> dict[str, tuple[Synergy, ...]]:
+    """Sort synergies by gripper; the one without a name of its own is `called` so."""
+    sorted_out: dict[str, tuple[Synergy, ...]] = {}
+    for synergy in synergies:
+        name = called if synergy.gripper == "gripper" else synergy.gripper
+        own = synergy.model_copy(update={"gripper": name})
+        sorted_out[name] = (*sorted_out.get(name, ()), own)
+    return sorted_out
 
 
 def assemble(
@@ -141,7 +153,7 @@ class _Builder:
         self._groups: dict[str, tuple[str, ...]] = {}
         self._keyframes: dict[str, dict[str, float]] = {}
         self._materials: dict[str, Any] = {}
-        self._synergies: dict[str, Any] = {}
+        self._synergies: dict[str, tuple[Synergy, ...]] = {}
         self._excludes: list[tuple[str, str]] = []
 
     def mount(self, part: Part, *, shared: bool) -> None:
@@ -166,8 +178,7 @@ class _Builder:
             self._keyframes[name] = self._keyframes.get(name, {}) | values
         self._materials |= data["materials"]
         self._excludes += component.contacts.exclude
-        if component.synergies:
-            self._synergies[part.name] = component.synergies
+        self._synergies |= _by_gripper(component.synergies, called=part.name)
         header = component.component
         self._headers.append((header.source, header.license, header.deviations))
 

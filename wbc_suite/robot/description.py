@@ -181,10 +181,16 @@ class RobotDescription(FrozenModel):
         return build_pinocchio(self)
 
     def to_urdf(self) -> str:
-        """Write the robot as URDF text."""
+        """Write the robot as URDF text; `write_urdf` says what is lost."""
         from wbc_suite.robot.urdf_export import write_urdf
 
         return write_urdf(self)
+
+    def to_toml(self) -> str:
+        """Write the robot as one component file in our own format; nothing is lost."""
+        from wbc_suite.robot.toml_export import write_toml
+
+        return write_toml(self)
 
     def with_root(
         self, kind: Literal["fixed", "planar", "free"], **changes: Any

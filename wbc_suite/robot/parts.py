@@ -16,7 +16,7 @@ from pydantic import (
     model_validator,
 )
 
-from wbc_suite.robot.shapes import Posed, Real, Shape, Vector3
+from wbc_suite.robot.shapes import ROUNDING, Posed, Real, Shape, Vector3
 from wbc_suite.tomlfile import FrozenModel
 
 __all__ = [
@@ -98,6 +98,8 @@ class Joint(FrozenModel):
         norm = math.hypot(*axis)
         if abs(norm - 1.0) > 1e-3:
             raise ValueError(f"an axis must have length 1, this has {norm:.6g}")
+        if abs(norm - 1.0) < ROUNDING:
+            return axis
         x, y, z = (component / norm for component in axis)
         return (x, y, z)
 
@@ -192,9 +194,18 @@ class Sensor(FrozenModel):
 
 
 class Synergy(FrozenModel):
-    """One command of a gripper that moves joints together from open to closed."""
+    """One command of a gripper that moves joints together from open to closed.
+
+    Attributes:
+        name: Unique name within the gripper.
+        gripper: The gripper; only a component with several needs to say. In an assembly
+            a gripper is called like its part.
+        open: Joint values when open.
+        closed: The same joints' values when closed.
+    """
 
     name: Name
+    gripper: Name = "gripper"
     open: dict[Name, Real]
     closed: dict[Name, Real]
 

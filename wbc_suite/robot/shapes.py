@@ -35,12 +35,18 @@ Size: TypeAlias = Annotated[float, Field(ge=1e-6, le=1e4)]
 Vector3: TypeAlias = tuple[Real, Real, Real]
 
 
+ROUNDING = 1e-14
+"""A length as near to 1 is left alone, so that a file written by us reads the same."""
+
+
 def _unit(q: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
     norm = math.sqrt(sum(c * c for c in q))
     if abs(norm - 1.0) > 1e-6:
         raise ValueError(
             f"a quaternion w x y z must have length 1, this has {norm:.9g}"
         )
+    if abs(norm - 1.0) < ROUNDING:
+        return q
     w, x, y, z = (c / norm for c in q)
     return (w, x, y, z)
 

@@ -23,6 +23,8 @@ __all__ = ["read_urdf"]
 LOG = logging.getLogger(__name__)
 Element = ElementTree.Element
 
+ENDLESS = 1e4
+"""A range as wide, in rad or m, means that there is none."""
 MOVING = {
     "revolute": "hinge",
     "continuous": "hinge",
@@ -243,7 +245,7 @@ def _limits(joint: Element, kind: str, where: str) -> dict[str, Any]:
             fields[ours] = value
     low = number(limit, "lower", where=where, default=0.0)
     high = number(limit, "upper", where=where, default=0.0)
-    if kind != "continuous" and max(-low, high) < UNLIMITED:
+    if kind != "continuous" and max(-low, high) < ENDLESS:
         if not low < high:
             raise DescriptionError(
                 f"{where}: it cannot move from {low} to {high}. Mend 'lower' and "

@@ -1,0 +1,111 @@
+"""Write a robot description as one component file, to be edited and kept."""
+
+import json
+from collections.abc import Iterator
+from typing import Any, TypeAlias, cast
+
+from wbc_suite.robot.component import Component, Header
+from wbc_suite.robot.description import RobotDescription
+
+__all__ = ["write_toml"]
+
+ROBOT_FIELDS = (
+    "root",
+    "materials",
+    "groups",
+    "contacts",
+    "links",
+    "frames",
+    "mounts",
+    "cameras",
+    "actuators",
+    "sensors",
+    "connects",
+    "keyframes",
+)
+"""Fields that a component and a robot share."""
+ONE_A_LINE = ("visual", "collision", "spheres", "sections", "exclude")
+"""Lists of which each entry gets a line of its own."""
+
+
+def write_toml(robot: RobotDescription) -> str:
+    """Write a robot as the text of one component file.
+
+    An assembly is written as the single robot that it builds; what equals a default is
+    left out. Numbers keep all digits: reading the text gives the same robot.
+    """
+    data: dict[str, Any] = {key: getattr(robot, key) for key in ROBOT_FIELDS}
+    data["synergies"] = tuple(s for own in robot.synergies.values() for s in own)
+    component = Component(
+        format=1,
+        component=Header(
+            name=robot.name,
+            kind="body",
+            title=robot.title,
+            source=robot.source,
+            license=robot.license,
+            deviations=robot.deviations,
+        ),
+        **data,
+    )
+    fields = component.model_dump(by_alias=True, exclude_defaults=True)
+    tables = [f"format = {fields.pop('format')}"]
+    for name, value in fields.items():
+        tables += _tables(name, value)
+    return "\n\n".join(tables) + "\n"
+
+
+Table: TypeAlias = dict[str, Any]
+"""A dumped model."""
+
+
+def _tables(name: str, value: Table | list[Table]) -> Iterator[str]:
+    if not isinstance(value, dict):
+        for item in value:
+            yield _table(f"[[{name}]]", item)
+    elif name == "keyframe":
+        for key, item in value.items():
+            yield _table(f"[{name}.{key}]", item)
+    else:
+        yield _table(f"[{name}]", value)
+
+
+def _table(head: str, items: Table) -> str:
+    rows = (f"{key} = {_pretty(key, value)}" for key, value in _sorted(items).items())
+    return "\n".join([head, *rows])
+
+
+def _sorted(items: Table) -> Table:
+    """Put first what tells what a table is."""
+    first = [key for key in ("name", "shape", "parent", "link") if key in items]
+    return {key: items[key] for key in dict.fromkeys([*first, *items])}
+
+
+def _pretty(key: str, value: Any) -> str:
+    if key in ONE_A_LINE:
+        rows = "".join(f"  {_inline(item)},\n" for item in value)
+        return f"[\n{rows}]"
+    return _inline(value)
+
+
+def _inline(value: Any) -> str:
+    match value:
+        case str():
+            return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+        case bool():
+            return str(value).lower()
+        case dict():
+            table = _sorted(cast(Table, value))
+            pairs = [f"{key} = {_inline(item)}" for key, item in table.items()]
+            return "{ " + ", ".join(pairs) + " }" if pairs else "{}"
+        case list() | tuple():
+            items = cast(list[Any], value)
+            return "[" + ", ".join(_inline(item) for item in items) + "]"
+        case _:
+            return _number(float(value))
+
+
+def _number(value: float) -> str:
+    """Write whole numbers without a point, all others with all digits."""
+    whole = value.is_integer() and abs(value) < 1e15
+    return str(int(value)) if whole else repr(value)
