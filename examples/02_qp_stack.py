@@ -23,11 +23,12 @@ target = configuration.frame_pose("right_eef")
 target.translation += np.array([0.05, -0.05, 0.20])
 right.set_target(target)
 
+solution = stack.solve(DT)
 for _ in range(300):
-    solution = stack.solve(DT)
     configuration.update(configuration.integrate(solution.dq))
+    solution = stack.solve(DT)
 
 for task in (right, left):
     error = np.linalg.norm(task.error(configuration)[:3])
     print(f"{task.frame}: {1e3 * error:.3f} mm from its target")
-print("limits met on the way:", ", ".join(map(str, solution.active)) or "none")
+print("limits that hold joints back:", ", ".join(map(str, solution.active)) or "none")
