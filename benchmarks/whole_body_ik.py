@@ -14,6 +14,7 @@ Usage: python benchmarks/whole_body_ik.py [--quick] [--json FILE] [--ticks N]
 import argparse
 import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -287,6 +288,28 @@ def note(record: Record, t0, t1, t2, t3, t4) -> None:
     record.total.append((t4 - t0) / 1e3)
 
 
+def placo_urdf(case: Case) -> str:
+    """Return the robot as URDF, a planar root as three joints of one parameter."""
+    text = case.description.to_urdf()
+    planar = re.search(r'<joint name="root" type="planar">.*?</joint>', text, re.DOTALL)
+    if planar is None:
+        return text
+    child = re.search(r'<child link="(.*?)"', planar.group())[1]
+    joints, parent = "", "world"
+    axes = {"root_x": "1 0 0", "root_y": "0 1 0", "root_yaw": "0 0 1"}
+    for k, (name, axis) in enumerate(axes.items()):
+        link = child if name == "root_yaw" else f"{name}_link"
+        joints += "" if link == child else f'<link name="{link}"/>'
+        joints += (
+            f'<joint name="{name}" type="{"revolute" if k == 2 else "prismatic"}">'
+            f'<parent link="{parent}"/><child link="{link}"/><axis xyz="{axis}"/>'
+            f'<limit lower="-100" upper="100" effort="1000"'
+            f' velocity="{case.model.velocityLimit[k]}"/></joint>'
+        )
+        parent = link
+    return text.replace(planar.group(), joints)
+
+
 def run_placo(case: Case, targets) -> Record | None:
     """Run placo in its own environment on the exported URDF."""
     python = Path(__file__).parent.parent / ".venv-placo" / "bin" / "python"
@@ -297,7 +320,7 @@ def run_placo(case: Case, targets) -> Record | None:
     names = [n for n, j in zip(case.model.names, case.model.joints, strict=True)][1:]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder)
-        (path / "robot.urdf").write_text(case.description.to_urdf())
+        (path / "robot.urdf").write_text(placo_urdf(case))
         np.savez(path / "in.npz", targets=targets, q=case.q)
         job = {
             "dt": DT,

@@ -43,7 +43,8 @@ class Configuration:
     """
 
     def __init__(self, model: pin.Model, q: Vector | None = None) -> None:
-        if not isinstance(model, pin.Model):
+        # A caller may pass a RobotDescription, which Pinocchio answers with a crash.
+        if not isinstance(model, pin.Model):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise ConfigError(
                 "Configuration needs a pinocchio.Model, such as robot.to_pinocchio(), "
                 f"not {type(model).__name__}."
@@ -206,4 +207,4 @@ def _view_placements(data: pin.Data, count: int) -> Matrix:
         raise RuntimeError("Pinocchio's SE3 layout is not the one this package knows.")
     buffer = (ctypes.c_double * (12 * count)).from_address(first)
     buffer._owner = data  # type: ignore[attr-defined]  # keeps the memory alive
-    return np.frombuffer(buffer, dtype=np.float64).reshape(count, 12)
+    return np.ctypeslib.as_array(buffer).reshape(count, 12)

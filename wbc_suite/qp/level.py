@@ -230,11 +230,14 @@ class Level:
 
         Tasks with fewer than six rows have one error, in their own unit.
         """
-        if task in self._frames:
-            position, angle = self._frame_errors[self._frames.index(task)]
-            return float(position), float(angle)
-        if task in self._coms:
-            return float(self._com_errors[self._coms.index(task)]), 0.0
+        for frame, (position, angle) in zip(
+            self._frames, self._frame_errors, strict=True
+        ):
+            if frame is task:
+                return float(position), float(angle)
+        for com, distance in zip(self._coms, self._com_errors, strict=True):
+            if com is task:
+                return float(distance), 0.0
         error = self._errors[task]
         return float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:]))
 

@@ -1,6 +1,7 @@
 """What a stack is made of: whether it was given that, and nothing else."""
 
 from collections.abc import Sequence
+from typing import cast
 
 from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Configuration
@@ -42,9 +43,10 @@ def check_parts(
 def _check_list(what: str, given: object, kind: type) -> Sequence[object]:
     if not isinstance(given, Sequence) or isinstance(given, str):
         raise ConfigError(f"TaskStack: {what} are a list, not {given!r:.60}.")
-    for item in given:
+    items = cast("Sequence[object]", given)
+    for item in items:
         if not isinstance(item, kind):
             raise ConfigError(
                 f"TaskStack: {what} hold {kind.__name__} objects, not {item!r:.60}."
             )
-    return given
+    return items

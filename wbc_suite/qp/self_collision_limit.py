@@ -160,9 +160,14 @@ class SelfCollisionLimit(RowLimit):
         h *= self.rate * dt
         np.clip(h, -0.2 * dt, UNBOUNDED, out=h)
 
+    @property
+    def pair_count(self) -> int:
+        """Number of capsule pairs that are kept apart."""
+        return len(self._pairs)
+
     def label(self, row: int) -> str:
         """Return the two links of a row of the last tick."""
-        a, b = self._pairs[self.found[row]]
+        a, b = (int(k) for k in self._pairs[self.found[row]])
         return f"{self._capsules[a].link} - {self._capsules[b].link}"
 
 

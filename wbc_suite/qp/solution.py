@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from wbc_suite.qp.bounds import LimitKind
-from wbc_suite.typing import Matrix, Vector
+from wbc_suite.typing import Indices, Vector
 
 __all__ = ["ActiveLimit", "Fallback", "Pressure", "Solution"]
 
@@ -66,7 +66,7 @@ class Pressure:
     """
 
     multipliers: Vector
-    kinds: Matrix
+    kinds: Indices
     names: tuple[str, ...]
     rows: Mapping[int, str]
 

@@ -1,6 +1,6 @@
 """QP solvers behind one small interface."""
 
-from typing import ClassVar, Protocol
+from typing import Any, ClassVar, Protocol
 
 import daqp
 import numpy as np
@@ -95,7 +95,7 @@ class QpsolversSolver:
 
     _SPARSE = ("proxqp", "osqp", "clarabel")
 
-    _OPTIONS: ClassVar[dict[str, dict[str, float | str]]] = {
+    _OPTIONS: ClassVar[dict[str, dict[str, Any]]] = {
         "proxqp": {"eps_abs": 1e-9, "eps_rel": 0.0, "backend": "sparse"},
         "osqp": {"eps_abs": 1e-8, "eps_rel": 0.0, "max_iter": 20000},
         "piqp": {"eps_abs": 1e-9, "eps_rel": 0.0},
@@ -126,7 +126,7 @@ class QpsolversSolver:
             problem.ub,
         )
         try:
-            solution = qpsolvers.solve_problem(
+            solution = qpsolvers.solve_problem(  # pyright: ignore[reportUnknownMemberType]
                 qp, self.name, **self._OPTIONS.get(self.name, {})
             )
         except (qpsolvers.exceptions.QPError, ValueError, ArithmeticError):

@@ -118,7 +118,7 @@ class TaskStack:
         self._solved: list[tuple[Problem, Vector, Vector]] = []
         self._decided: dict[int, tuple[Matrix, int]] = {}
         nv = configuration.nv
-        self._kinds = np.zeros((2, nv), dtype=np.int64)
+        self._kinds: Indices = np.zeros((2, nv), dtype=np.int64)
         self._no_window: Vector = np.full(nv, np.inf)
         self.v_previous: Vector = np.zeros(nv)
         bounds = self._bounds
@@ -220,8 +220,10 @@ class TaskStack:
         if not self._solved:
             return np.zeros(0, dtype=np.int64)
         multipliers = self._solved[0][2][: self._problem.nv]
-        kinds = np.where(multipliers > 0.0, self._kinds[1], self._kinds[0])
-        return np.flatnonzero((multipliers != 0.0) & (kinds == LimitKind.POSITION))
+        upper = multipliers > 0.0
+        at_position = self._kinds == LimitKind.POSITION
+        pressed = (upper & at_position[1]) | ((multipliers < 0.0) & at_position[0])
+        return pressed.nonzero()[0]
 
     def explain(
         self, *, position_tolerance: float = 1e-3, orientation_tolerance: float = 5e-3
