@@ -11,8 +11,12 @@ from wbc_suite.typing import Matrix, Vector
 
 __all__ = ["Clearance", "self_collision_limit"]
 
-NEIGHBOURS = 2
+NEIGHBOURS = 1
 """Links with at most this many joints between them are kept apart by joint limits."""
+
+SAMPLES = 100
+OFTEN = 0.4
+"""Pairs that touch in this part of random configurations enclose too generously."""
 
 
 def self_collision_limit(
@@ -24,13 +28,13 @@ def self_collision_limit(
     """
     configuration = Configuration(robot.to_pinocchio())
     pairs = [
-        pair
-        for pair in collision_pairs(robot)
-        if _joints_between(configuration, *pair) > NEIGHBOURS
+        (first, second)
+        for first, second in sorted(tuple(sorted(p)) for p in collision_pairs(robot))
+        if _joints_between(configuration, first, second) > NEIGHBOURS
     ]
     limit = SelfCollisionLimit(
         enclosing_capsules(robot),
-        pairs,
+        _seldom_touching(robot, pairs, configuration),
         nearest=config.limits.collision_pairs,
         margin=config.limits.collision_distance,
     )
@@ -40,6 +44,41 @@ def self_collision_limit(
         configuration.update(configuration.model.referenceConfigurations[name])
     limit.drop_touching(configuration)
     return limit
+
+
+def _seldom_touching(
+    robot: RobotDescription,
+    pairs: list[tuple[str, str]],
+    configuration: Configuration,
+) -> list[tuple[str, str]]:
+    """Return the pairs that touch in few random configurations."""
+    if not pairs:
+        return pairs
+    nearest = 4 * len(pairs)
+    limit = SelfCollisionLimit(
+        enclosing_capsules(robot), pairs, nearest=nearest, margin=0.0, influence=1e-4
+    )
+    limit.bind(configuration)
+    G, h = np.zeros((nearest, configuration.nv)), np.zeros(nearest)
+    touches = dict.fromkeys(pairs, 0)
+    rng = np.random.default_rng(0)
+    for _ in range(SAMPLES):
+        configuration.update(_random(configuration, rng))
+        limit.rows(configuration, 1.0, G, h)
+        rows = np.flatnonzero(limit.distances < 0.0).tolist()
+        for a, b in {tuple(sorted(limit.label(row).split(" - "))) for row in rows}:
+            touches[a, b] += 1
+    return [pair for pair in pairs if touches[pair] <= OFTEN * SAMPLES]
+
+
+def _random(configuration: Configuration, rng: np.random.Generator) -> Vector:
+    model, q = configuration.model, configuration.q.copy()
+    for joint in list(model.joints)[1:]:
+        low = model.lowerPositionLimit[joint.idx_q]
+        high = model.upperPositionLimit[joint.idx_q]
+        if joint.nq == 1 and low < high < 1e6:
+            q[joint.idx_q] = rng.uniform(low, high)
+    return q
 
 
 def _joints_between(configuration: Configuration, first: str, second: str) -> int:

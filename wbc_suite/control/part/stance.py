@@ -30,24 +30,40 @@ class StanceContact:
     kind: Literal["point", "surface"]
 
 
-def contact_forces(root_jacobian: Matrix, wrench: Vector, weights: Vector) -> Vector:
-    """Share a wrench on the root among contacts.
+def contact_forces(
+    root_jacobian: Matrix,
+    wrench: Vector,
+    *,
+    weights: Vector,
+    contacts: Sequence[slice],
+) -> Vector:
+    """Share a wrench on the root among contacts that can push but not pull.
 
         minimise f^T W f  subject to  J_root^T f = wrench,
 
-    whose solution is `f = W^-1 J_root (J_root^T W^-1 J_root)^+ wrench`.
+    whose solution is `f = W^-1 J_root (J_root^T W^-1 J_root)^+ wrench`. The contact
+    that would have to pull hardest is left out, and the rest is solved again.
 
     Args:
         root_jacobian: Columns of the contact Jacobian that belong to the root,
             shape (m, 6).
         wrench: What the contacts must give the root, shape (6,).
         weights: Diagonal of W, shape (m,).
+        contacts: Rows of each contact; the third is its vertical force.
 
     Returns:
         Contact forces, shape (m,), N and N m.
     """
-    scaled = root_jacobian / weights[:, None]
-    return scaled @ (np.linalg.pinv(root_jacobian.T @ scaled) @ wrench)
+    kept = np.ones(len(weights))
+    normal = np.array([rows.start + 2 for rows in contacts])
+    for _ in contacts:
+        scaled = root_jacobian * (kept / weights)[:, None]
+        f = scaled @ (np.linalg.pinv(root_jacobian.T @ scaled, rcond=1e-9) @ wrench)
+        worst = int(np.argmin(f[normal]))
+        if f[normal[worst]] >= 0.0:
+            break
+        kept[contacts[worst]] = 0.0
+    return f * kept
 
 
 class StanceLaw:
@@ -100,6 +116,8 @@ class StanceLaw:
                 for c in contacts
             ]
         )
+        ends = np.cumsum([6 if c.kind == "surface" else 3 for c in contacts]).tolist()
+        self._rows = [slice(a, b) for a, b in zip([0, *ends], ends, strict=False)]
         self._jacobian = np.zeros((6, state.model.nv))
 
     def torque(self, state: RobotState, target: JointTarget) -> Vector:
@@ -112,7 +130,9 @@ class StanceLaw:
         bias = (data.qfrc_bias - data.qfrc_passive)[self._dofs]
         force = state.mass_matrix()[self._block] @ wanted + bias
         J = self._contact_jacobian(state)
-        f = contact_forces(J[:, :6], force[:6], self._weights)
+        f = contact_forces(
+            J[:, :6], force[:6], weights=self._weights, contacts=self._rows
+        )
         return np.clip(force[6:] - J[:, 6:].T @ f, self._low, self._high)
 
     def _errors(self, state: RobotState, target: JointTarget) -> tuple[Vector, Vector]:
