@@ -63,7 +63,9 @@ def test_every_make_command_exists():
 
 def test_every_console_command_exists_with_its_options():
     commands = {command.name: command for command in app.registered_commands}
-    for line in "".join(blocks(README, "sh")).splitlines():
+    pages = [page.read_text(encoding="utf-8") for page in PAGES]
+    shown = "".join(block for page in pages for block in blocks(page, "sh"))
+    for line in shown.splitlines():
         words = shlex.split(line, comments=True)
         if words and words[0] == "wbc-suite":
             assert words[1] in commands, line

@@ -89,6 +89,15 @@ def test_the_export_as_mjcf_compiles_elsewhere(wbc_suite_command, tmp_path):
     assert mujoco.MjModel.from_xml_path(str(file)).nv == 9
 
 
+def test_a_urdf_comes_in_and_is_edited_as_toml(wbc_suite_command, tmp_path):
+    urdf, toml = tmp_path / "panda.urdf", tmp_path / "panda.toml"
+    assert wbc_suite_command("export", "Panda", "--to", "urdf", "-o", urdf)[0] == 0
+    assert wbc_suite_command("export", urdf, "--to", "toml", "-o", toml)[0] == 0
+    code, out, _ = wbc_suite_command("check", toml)
+    assert code == 0
+    assert "8 dof" in out
+
+
 def test_a_folder_of_ones_own_is_seen(wbc_suite_command, tmp_path):
     robots = tmp_path / "robots"
     robots.mkdir()
