@@ -55,6 +55,7 @@ class Viewer:
         self.requests = []
         before = set(site.server.get_clients())
         self.page = context.new_page()
+        self.page.set_default_timeout(1e3 * PATIENCE)
         self.page.set_viewport_size({"width": size[0], "height": size[1]})
         self.page.on("request", lambda request: self.requests.append(request.url))
         began = time.monotonic()
@@ -73,8 +74,8 @@ class Viewer:
         camera = self.client.camera
         R = pin.Quaternion(np.roll(camera.wxyz, -1)).toRotationMatrix()
         x, y, z = R.T @ (point - camera.position)
-        focal = camera.image_height / 2 / np.tan(camera.fov / 2)
         box = self.page.locator("canvas").first.bounding_box()
+        focal = box["height"] / 2 / np.tan(camera.fov / 2)
         return np.array(
             [
                 box["x"] + box["width"] / 2 + focal * x / z,

@@ -51,7 +51,7 @@ def drag_until(viewer, session, direction_sign=1.0, *, pixels=70, least=0.03):
 def test_humanoids_hand_follows_the_mouse_in_time(gr1, context):
     session, page = gr1
     viewer = Viewer(context, page.site, size=(1280, 800), dots=1.0)
-    viewer.page.get_by_text("input to joint target").wait_for(timeout=120_000)
+    viewer.page.get_by_text("input to joint target").wait_for()
     own = (page.site.url, f"blob:{page.site.url}", "data:")
     assert [url for url in viewer.requests if not url.startswith(own)] == []
     start = hand(session).copy()
@@ -108,7 +108,7 @@ def test_unreachable_target_is_explained_in_words(settled, context):
     pose = target(session)
     _, grip, along = viewer.arrow(pose, SCALE)
     viewer.drag(grip, along, 420, release=False, steps=8)
-    viewer.page.get_by_text("cm short").first.wait_for(timeout=120_000)
+    viewer.page.get_by_text("cm short").first.wait_for()
     viewer.screenshot("teleop_unreachable")
     viewer.page.mouse.up()
     words = " ".join(session.snapshot.limbs[HAND].reasons)
@@ -134,7 +134,7 @@ def test_four_clients_do_not_fight(settled, context):
     second.drag(other_grip, -other_along, 80)
     assert moved(session, held) < 1e-9
     text = f"held by viewer {first.client.client_id + 1}"
-    viewers[3].page.get_by_text(text).wait_for(timeout=120_000)
+    viewers[3].page.get_by_text(text).wait_for()
     first.page.bring_to_front()
     first.page.mouse.up()
     wait_until(lambda: session.snapshot.limbs[HAND].holder is None, "it is let go")
@@ -164,7 +164,7 @@ def test_buttons_pause_and_reset(settled, context):
     viewer.page.get_by_role("button", name="Reset").click()
     wait_until(lambda: session.snapshot.epoch == epoch + 1, "the reset")
     viewer.page.get_by_role("button", name="Record").click()
-    viewer.page.get_by_text("not part of this version yet").wait_for(timeout=60_000)
+    viewer.page.get_by_text("not part of this version yet").wait_for()
 
 
 @pytest.mark.parametrize("robot", ["Tiago", "SpotWithArm"])

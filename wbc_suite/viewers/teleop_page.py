@@ -74,7 +74,11 @@ class TeleopPage:
         snapshot = self.session.snapshot
         self.mirror.update(snapshot.body_positions, snapshot.body_quaternions)
         with self.server.atomic():
-            notes = {name: explain(s, at_most=1) for name, s in snapshot.limbs.items()}
+            notes = {
+                name: explain(status, at_most=1)
+                for name, status in snapshot.limbs.items()
+                if status.holder is not None
+            }
             self.ghosts.update(snapshot, notes)
         self.gizmos.update(snapshot)
         if count % PANEL_EVERY == 0:

@@ -113,7 +113,8 @@ class TeleopPanel:
         limbs = _limbs_html(snapshot, self._session.limbs, self._colours)
         if limbs != self._limbs_shown:
             self._limbs.content = self._limbs_shown = limbs
-        self._buttons.options = _buttons(snapshot.paused)
+        if self._buttons.options != _buttons(snapshot.paused):
+            self._buttons.options = _buttons(snapshot.paused)
 
     def update_plots(self) -> None:
         """Draw the last seconds of errors and solve times."""

@@ -1,0 +1,62 @@
+"""Draw the picture of the teleoperation page: needs Chromium and playwright."""
+
+import io
+import shutil
+import time
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+from PIL import Image
+from playwright.sync_api import sync_playwright
+
+import wbc_suite
+from wbc_suite.viewers.site import Site
+from wbc_suite.viewers.teleop_page import TeleopPage
+from wbc_suite.viewers.teleop_session import TeleopSession
+
+FILE = Path(__file__).parent / "images" / "teleop.jpg"
+RATE = 100.0  # Hz
+SIZE = {"width": 1280, "height": 800}
+FLAGS = ["--no-sandbox", "--enable-unsafe-swiftshader", "--use-angle=swiftshader"]
+MOVES = {"right_hand": (0.10, -0.06, 0.14), "left_hand": (0.04, 0.04, 0.08)}
+PULL = np.array([0.15, -0.55, 0.10])  # m, of the right hand: further than it reaches
+
+
+def main() -> None:
+    """Move GR1's hands, pull one out of reach, and keep what the browser shows."""
+    env = wbc_suite.make("Lift", robots="GR1", control_freq=RATE, horizon=10**7)
+    session = TeleopSession(env, period=1.0 / RATE)
+    page = TeleopPage(session, Site(port=0), label="GR1 · Lift")
+    page.start()
+    session.start()
+    for name, offset in MOVES.items():
+        _pull(session, name, np.array(offset))
+    time.sleep(2.0)
+    _pull(session, "right_hand", PULL)
+    time.sleep(2.0)
+    with sync_playwright() as playwright:
+        chromium = shutil.which("chromium")
+        browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
+        tab = browser.new_page(viewport=SIZE)
+        tab.goto(page.site.url)
+        time.sleep(20.0)  # the environment's light comes last
+        tab.get_by_text("Software WebGL").locator("xpath=../..").locator(
+            "button"
+        ).first.click()
+        time.sleep(5.0)
+        picture = Image.open(io.BytesIO(tab.screenshot(timeout=120_000)))
+        browser.close()
+    session.stop()
+    page.stop()
+    picture.convert("RGB").save(FILE, quality=82, optimize=True)
+
+
+def _pull(session: TeleopSession, name: str, offset: np.ndarray) -> None:
+    target = session.snapshot.limbs[name].target
+    session.grab(name, 0, target)
+    session.drag(name, 0, pin.SE3(target.rotation, target.translation + offset))
+
+
+if __name__ == "__main__":
+    main()
