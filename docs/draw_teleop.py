@@ -32,9 +32,7 @@ def main() -> None:
     session.start()
     for name, offset in MOVES.items():
         _pull(session, name, np.array(offset))
-    time.sleep(2.0)
     _pull(session, "right_hand", PULL)
-    time.sleep(2.0)
     with sync_playwright() as playwright:
         chromium = shutil.which("chromium")
         browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
@@ -53,9 +51,13 @@ def main() -> None:
 
 
 def _pull(session: TeleopSession, name: str, offset: np.ndarray) -> None:
+    """Drag a hand for two seconds, as fast as a browser sends."""
     target = session.snapshot.limbs[name].target
     session.grab(name, 0, target)
-    session.drag(name, 0, pin.SE3(target.rotation, target.translation + offset))
+    for part in np.linspace(0.0, 1.0, 40):
+        place = target.translation + part * offset
+        session.drag(name, 0, pin.SE3(target.rotation, place))
+        time.sleep(0.05)
 
 
 if __name__ == "__main__":

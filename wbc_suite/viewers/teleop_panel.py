@@ -8,6 +8,7 @@ import numpy as np
 
 from wbc_suite.typing import Vector
 from wbc_suite.viewers.gizmos import GizmoMode, Gizmos
+from wbc_suite.viewers.limb import Limb, LimbKind
 from wbc_suite.viewers.palette import css
 from wbc_suite.viewers.stage import VIEWS, look_from
 from wbc_suite.viewers.teleop_session import LimbStatus, Snapshot, TeleopSession
@@ -259,7 +260,9 @@ def _announce_recording(client: "viser.ClientHandle | None") -> None:
 
 
 def _status_html(
-    snapshot: Snapshot, limbs: Mapping, colours: Mapping[str, tuple[int, int, int]]
+    snapshot: Snapshot,
+    limbs: Mapping[str, Limb],
+    colours: Mapping[str, tuple[int, int, int]],
 ) -> str:
     state, dot = _state(snapshot)
     latency = _or_dash(1e3 * snapshot.latency, "ms")
@@ -295,7 +298,9 @@ def _state(snapshot: Snapshot) -> tuple[str, str]:
 
 
 def _why_html(
-    snapshot: Snapshot, limbs: Mapping, colours: Mapping[str, tuple[int, int, int]]
+    snapshot: Snapshot,
+    limbs: Mapping[str, Limb],
+    colours: Mapping[str, tuple[int, int, int]],
 ) -> str:
     lines = [
         "<div style='margin-top:.6em;padding:.4em .6em;border-radius:.3em;"
@@ -309,20 +314,26 @@ def _why_html(
 
 
 def _limbs_html(
-    snapshot: Snapshot, limbs: Mapping, colours: Mapping[str, tuple[int, int, int]]
+    snapshot: Snapshot,
+    limbs: Mapping[str, Limb],
+    colours: Mapping[str, tuple[int, int, int]],
 ) -> str:
     rows = "".join(
-        _limb_row(limbs[name].title, css(colours[name]), status)
+        _limb_row(limbs[name], css(colours[name]), status)
         for name, status in snapshot.limbs.items()
     )
     return f"<table style='width:100%;padding:.2em .7em;font-size:.88em'>{rows}</table>"
 
 
-def _limb_row(title: str, colour: str, status: LimbStatus) -> str:
+def _limb_row(limb: Limb, colour: str, status: LimbStatus) -> str:
     held = "" if status.holder is None else f"held by viewer {status.holder + 1}"
-    error = f"{1e3 * status.position_error:.0f} mm"
+    if limb.kind is LimbKind.ORIENTATION:
+        error = f"{np.rad2deg(status.orientation_error):.0f}°"
+    else:
+        error = f"{1e3 * status.position_error:.0f} mm"
     return (
-        f"<tr><td><span style='color:{colour}'>&#9632;</span> {html.escape(title)}</td>"
+        f"<tr><td><span style='color:{colour}'>&#9632;</span> "
+        f"{html.escape(limb.title)}</td>"
         f"<td style='opacity:.65'>{held}</td>"
         f"<td style='text-align:right'>{error}</td></tr>"
     )
