@@ -16,7 +16,9 @@ from wbc_suite.qp import (
     FrameEquality,
     FrameTask,
     LinearEquality,
+    LookAtTask,
     PostureTask,
+    RelativeFrameTask,
     TaskStack,
 )
 
@@ -228,6 +230,29 @@ def test_a_target_that_is_not_finite_holds_the_hand(arm, bad, entry):
     solution, _ = run(stack, 2.0)
     assert solution.ok
     assert np.linalg.norm(task.error(arm)[:3]) < 1e-4
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_other_targets_that_are_not_finite_hold_what_they_watch(humanoid, bad):
+    look = LookAtTask("head2_joint")
+    relative = RelativeFrameTask(*HANDS)
+    foot = FrameEquality(FEET[0])
+    stack = TaskStack(humanoid, [look, relative, PostureTask(1e-2)], equalities=[foot])
+    look.set_target(np.array([bad, 0.0, 0.0]))
+    pose = np.eye(4)
+    pose[0, 3] = bad
+    relative.set_target(pose)
+    foot.set_target(pose)
+    before = humanoid.frame_pose(FEET[0]).translation
+    solution, chatter = run(stack, 1.0)
+    assert set(solution.held) == {look.name, relative.name}
+    assert chatter <= CHATTER
+    moved = humanoid.frame_pose(FEET[0]).translation - before
+    assert np.linalg.norm(moved) < 1e-3
+    pose[0, 3] = 1e200
+    relative.set_target(pose)
+    look.set_target(pose[:3, 3])
+    run(stack, 0.1)
 
 
 def test_posture_and_com_that_are_not_finite_are_held(humanoid):

@@ -4,7 +4,7 @@ import numpy as np
 
 from wbc_suite.arguments import check_array
 from wbc_suite.kinematics import Configuration
-from wbc_suite.qp.lie import saturate
+from wbc_suite.qp.lie import is_usable, saturate
 from wbc_suite.qp.rows import PACKED_COM
 from wbc_suite.qp.task import RowTask, check_speed, cost_vector
 from wbc_suite.typing import Matrix, Vector
@@ -66,6 +66,8 @@ class ComTask(RowTask):
 
     def error(self, configuration: Configuration) -> Vector:
         """Return `p* - p_com`, m, shape (3,)."""
+        if not is_usable(self.packed[:3]):
+            return np.full(3, np.nan)
         return self.packed[:3] - configuration.com
 
     def jacobian(self, configuration: Configuration) -> Matrix:

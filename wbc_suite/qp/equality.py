@@ -11,7 +11,7 @@ from wbc_suite.arguments import check_array, check_number
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.frame_task import pose_matrix
-from wbc_suite.qp.lie import saturate
+from wbc_suite.qp.lie import is_usable, saturate
 from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["Equality", "FrameEquality", "LinearEquality"]
@@ -118,6 +118,8 @@ class FrameEquality(Equality):
     def error(self, configuration: Configuration) -> Vector:
         """Return the drift e, m and rad in the frame's axes, shape (6,)."""
         assert self.target is not None
+        if not is_usable(self.target.homogeneous):
+            return np.full(6, np.nan)
         pose = configuration.frame_pose(self.frame_index)
         drift = pose.actInv(self.target)
         return np.concatenate([drift.translation, pin.log3(drift.rotation)])

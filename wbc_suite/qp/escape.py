@@ -16,6 +16,7 @@ import numpy as np
 
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.frame_task import FrameTask
+from wbc_suite.qp.lie import is_usable
 from wbc_suite.qp.limit import JointBounds
 from wbc_suite.typing import Indices, Matrix, Vector
 
@@ -190,7 +191,7 @@ class Escape:
         return np.concatenate([t.packed[:12] for t in self._tasks])
 
     def _targets_moved(self, since: Vector | None, tolerance: float) -> bool:
-        if since is None:
+        present = self._present_targets()
+        if since is None or not (is_usable(present) and is_usable(since)):
             return True
-        # A target that is not finite compares false, and counts as moved.
-        return not np.abs(self._present_targets() - since).max() <= tolerance
+        return bool(np.abs(present - since).max() > tolerance)

@@ -6,7 +6,7 @@ import pinocchio as pin
 from wbc_suite.arguments import check_array
 from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Configuration
-from wbc_suite.qp.lie import saturate
+from wbc_suite.qp.lie import is_usable, saturate
 from wbc_suite.qp.rows import PACKED_FRAME
 from wbc_suite.qp.task import RowTask, check_speed, cost_vector
 from wbc_suite.typing import Indices, Matrix, Vector
@@ -128,11 +128,10 @@ class FrameTask(RowTask):
 
     def error(self, configuration: Configuration) -> Vector:
         """Return (e_p, e_r), m and rad, shape (6,)."""
-        pose = configuration.frame_pose(self.frame_index)
-        target = self.packed[:9].reshape(3, 3).T
-        rotation = pose.rotation.T @ target
-        if not np.isfinite(self.packed[:12]).all():
+        if not is_usable(self.packed[:12]):
             return np.full(6, np.nan)
+        pose = configuration.frame_pose(self.frame_index)
+        rotation = pose.rotation.T @ self.packed[:9].reshape(3, 3).T
         return np.concatenate(
             [self.packed[9:12] - pose.translation, pin.log3(rotation)]
         )

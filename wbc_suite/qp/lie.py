@@ -5,7 +5,11 @@ import numpy as np
 
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["inverse_left_jacobian", "log3", "saturate"]
+__all__ = ["FAR", "inverse_left_jacobian", "is_usable", "log3", "saturate"]
+
+FAR = 1e9
+"""m or rad; a target beyond it counts as not finite, since squares of errors may
+overflow."""
 
 _SMALL_ANGLE = 1e-4  # below it series are exact to 1e-16
 
@@ -45,6 +49,11 @@ def log3(R: Matrix, out: Vector) -> float:
     factor = angle / sine if sine > 1e-9 else 2.0
     out[0], out[1], out[2] = factor * x, factor * y, factor * z
     return angle
+
+
+def is_usable(target: Vector) -> bool:
+    """Return whether all values are finite and nearer than FAR."""
+    return bool((np.abs(target) < FAR).all())  # NaN compares false
 
 
 @numba.njit(cache=True, nogil=True)

@@ -6,7 +6,7 @@ import pinocchio as pin
 from wbc_suite.arguments import check_array
 from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Configuration
-from wbc_suite.qp.lie import saturate
+from wbc_suite.qp.lie import is_usable, saturate
 from wbc_suite.qp.task import RowTask, check_speed, cost_vector
 from wbc_suite.typing import Matrix, Vector
 
@@ -86,7 +86,9 @@ class LookAtTask(RowTask):
             self.target = pose.translation + pose.rotation @ self._axis
 
     def error(self, configuration: Configuration) -> Vector:
-        """Return `u - a`, shape (3,)."""
+        """Return `u - a`, shape (3,); NaN for a target that is not finite."""
+        if not is_usable(self._point()):
+            return np.full(3, np.nan)
         direction, _ = self._direction(configuration)
         R = configuration.frame_pose(self._f).rotation
         return R.T @ direction - self._axis
@@ -104,18 +106,24 @@ class LookAtTask(RowTask):
     ) -> Vector:
         """Write the weighted rows."""
         error = self.error(configuration)
-        if not np.isfinite(error).all():
-            W[:], e[:] = 0.0, 0.0
-            return error
+        step = self.gain * error if np.isfinite(error).all() else np.zeros(3)
+        saturate(step, self._speed * dt)
         np.multiply(self._cost, self.jacobian(configuration), out=W)
-        np.multiply(self.gain, error, out=e)
-        saturate(e, self._speed * dt)
-        e *= self._cost
+        np.multiply(self._cost, step, out=e)
         return error
 
-    def _direction(self, configuration: Configuration) -> tuple[Vector, float]:
-        """Return the unit vector from the frame to the point, and the distance."""
+    def _point(self) -> Vector:
         assert self.target is not None
-        offset = self.target - configuration.frame_pose(self._f).translation
+        return self.target
+
+    def _direction(self, configuration: Configuration) -> tuple[Vector, float]:
+        """Return the unit vector from the frame to the point, and the distance.
+
+        For a point that is not finite, where the axis points now and 1 m.
+        """
+        pose = configuration.frame_pose(self._f)
+        if not is_usable(self._point()):
+            return pose.rotation @ self._axis, 1.0
+        offset = self._point() - pose.translation
         distance = max(float(np.linalg.norm(offset)), _LEAST_DISTANCE)
         return offset / distance, distance

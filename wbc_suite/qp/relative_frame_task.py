@@ -5,7 +5,7 @@ import pinocchio as pin
 
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.frame_task import pose_matrix
-from wbc_suite.qp.lie import saturate
+from wbc_suite.qp.lie import is_usable, saturate
 from wbc_suite.qp.task import RowTask, check_speed, cost_vector
 from wbc_suite.typing import Matrix, Vector
 
@@ -90,9 +90,9 @@ class RelativeFrameTask(RowTask):
         assert self.target is not None
         root = configuration.frame_pose(self._r)
         pose = root.actInv(configuration.frame_pose(self._f))
-        rotation = pose.rotation.T @ self.target.rotation
-        if not np.isfinite(rotation).all():
+        if not is_usable(self.target.homogeneous):
             return np.full(6, np.nan)
+        rotation = pose.rotation.T @ self.target.rotation
         return np.concatenate(
             [self.target.translation - pose.translation, pin.log3(rotation)]
         )

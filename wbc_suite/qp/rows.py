@@ -8,7 +8,7 @@ to at 1e-10: `FrameTask.rows`, `ComTask.rows`, `PostureTask.diagonal`, and for
 import numba
 import numpy as np
 
-from wbc_suite.qp.lie import inverse_left_jacobian, log3, saturate
+from wbc_suite.qp.lie import FAR, inverse_left_jacobian, log3, saturate
 from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = [
@@ -78,7 +78,7 @@ def frame_rows(  # noqa: C901, one flat loop is what compiles well
                 R[i, j] = T[i] * F[j] + T[3 + i] * F[3 + j] + T[6 + i] * F[6 + j]
         finite = True
         for i in range(12):
-            finite &= np.isfinite(X[i])
+            finite &= abs(X[i]) < FAR
         angle, distance = 0.0, 0.0
         if finite:
             for i in range(3):
@@ -158,7 +158,7 @@ def com_rows(
             step[i] = X[i] - com[i]
             square += step[i] * step[i]
         errors[t] = np.sqrt(square)
-        if not np.isfinite(square):
+        if not square < FAR * FAR:
             all_finite, errors[t] = False, np.nan
             step[:] = 0.0
         for i in range(3):
