@@ -47,7 +47,8 @@ END_OF = {"arm": "eef", "leg": "foot", "head": "head", "torso": "torso"}
 
 ROLE_WORDS = {
     "imu": "imu gyro accelerometer",
-    "tcp": "tcp eef ee effector tool flange grasp grasping",
+    "eef": "eef ee effector",
+    "tcp": "tcp tool flange grasp grasping",
     "foot": "foot sole toe",
     "tip": "tip",
 }
@@ -147,6 +148,7 @@ def guess_frames(
 ) -> tuple[Frame, ...]:
     """Place `eef` at the end of arms, and `foot`, `head` and `torso` frames."""
     found: list[Frame] = []
+    known = {frame.name for frame in given}
     for limb in limbs:
         role = END_OF.get(limb.kind)
         for tip in _tips(links, limb) if role else ():
@@ -154,14 +156,26 @@ def guess_frames(
             if limb.kind == "leg":
                 side = _side(_words(tip.name), pairs=True)
                 name = "_".join(filter(None, (side, role)))
+            if name in known or _marked(links, tip, given, str(role)):
+                continue
             placed = _placed(links, limb, tip, given)
             fields = {"name": names.take(name, "frame"), "role": role, **placed}
             found.append(Frame.model_validate(fields))
     return tuple(found)
 
 
+def _marked(
+    links: Sequence[Link], tip: Link, given: Sequence[Frame], role: str
+) -> bool:
+    """Tell whether the file itself marks the end of this limb."""
+    rigid = rigid_bodies(tuple(links))
+    return any(rigid[f.link] == tip.name and f.role == role for f in given)
+
+
 def guess_role(name: str) -> str:
     """Return the role of a frame from the words in its name."""
+    if name in ("head", "torso", "base"):
+        return name
     words = set(_words(name))
     for role, telling in ROLE_WORDS.items():
         if words & set(telling.split()):
@@ -236,7 +250,7 @@ def _placed(
 ) -> dict[str, Any]:
     """Return where a guessed frame sits: at a telling frame or link, or at the tip."""
     rigid = rigid_bodies(tuple(links))
-    telling = {"arm": ("tcp",), "leg": ("foot",)}.get(limb.kind, ())
+    telling = {"arm": ("eef", "tcp"), "leg": ("foot",)}.get(limb.kind, ())
     for frame in given:
         if rigid[frame.link] == tip.name and frame.role in telling:
             return {"link": frame.link, "pos": frame.pos, "quat": frame.quat}

@@ -1,0 +1,281 @@
+"""MJCF files read into descriptions, against MuJoCo's own model of them."""
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+import wbc_suite
+from wbc_suite.catalogue import Catalogue
+from wbc_suite.errors import ConfigError
+from wbc_suite.robot.mesh_files import write_stl
+from wbc_suite.robot.mjcf_import import read_mjcf
+from wbc_suite.robot.shapes import Box, Hull
+
+CASES = [(name, None) for name in Catalogue().names("robots")] + [
+    ("spot", root) for root in ("fixed", "planar", "free")
+]
+TOLERANCE = 1e-9
+
+FEATURES = """
+<mujoco model="all features">
+  <compiler angle="degree" autolimits="true"/>
+  <option gravity="0 0 -9.81"/>
+  <default>
+    <joint damping="0.5" armature="0.02" frictionloss="0.1"/>
+    <default class="arm"><geom rgba="1 0 0 1" group="2"/></default>
+  </default>
+  <asset><material name="blue" rgba="0 0 1 1"/></asset>
+  <worldbody>
+    <geom name="floor" type="plane" size="1 1 0.1"/>
+    <body name="pedestal" pos="0.1 0.2 0.3" euler="0 0 30">
+      <inertial pos="0 0 0.1" mass="5" fullinertia="0.1 0.12 0.15 0.01 0.02 0.03"/>
+      <geom type="box" size="0.1 0.1 0.2" material="blue"/>
+      <body name="upper-arm" pos="0.1 0 0.4" quat="0.6 0.8 0 0" childclass="arm">
+        <joint name="swing" axis="0 0.6 0.8" pos="0.05 0.02 -0.1" range="-60 90"
+               ref="20"/>
+        <joint name="push" type="slide" axis="1 0 0" pos="0.01 0.02 0.03"
+               range="-0.1 0.3" ref="0.05"/>
+        <joint name="roll" axis="1 0 0" pos="0 0 0.2"/>
+        <geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.05" mass="2"
+              friction="0.7 0.01 0.001" condim="4"/>
+        <site name="elbow" pos="0.3 0 0" euler="10 20 30"/>
+        <camera name="eye" pos="0 0 0.1" fovy="60"/>
+        <body name="hand" pos="0.3 0 0" euler="0 40 0">
+          <joint name="grip" type="slide" axis="0 0 1" range="0 0.05"/>
+          <geom type="cylinder" size="0.02 0.1" mass="0.4"/>
+          <geom type="sphere" size="0.03" pos="0 0 0.1" contype="0" conaffinity="0"
+                mass="0.1"/>
+          <body name="tip" pos="0 0 0.1">
+            <geom type="ellipsoid" size="0.02 0.03 0.04" mass="0.2" group="3"/>
+          </body>
+        </body>
+      </body>
+    </body>
+  </worldbody>
+  <contact><exclude body1="pedestal" body2="hand"/></contact>
+  <equality><joint joint1="grip" joint2="push" polycoef="0.01 0.1 0 0 0"/></equality>
+  <actuator>
+    <motor name="m1" joint="swing" gear="50" ctrlrange="-2 2"/>
+    <position name="m2" joint="push" kp="300" kv="10" forcerange="-80 80"/>
+    <velocity name="m3" joint="roll" kv="7" forcerange="-9 9"/>
+  </actuator>
+  <sensor><force site="elbow" name="push back"/></sensor>
+  <keyframe><key name="home" qpos="0.3 0.1 0.2 0.011"/></keyframe>
+</mujoco>
+"""
+
+
+def write(folder: Path, text: str) -> Path:
+    path = folder / "robot.xml"
+    path.write_text(text)
+    return path
+
+
+def body(inner: str, more: str = "") -> str:
+    """A fixed base with one child; its inertia comes from a sphere."""
+    geom = '<geom size="0.1"/>'
+    return (
+        f'<mujoco><worldbody><body name="base">{geom}<body name="child">{geom}{inner}'
+        f"</body></body></worldbody>{more}</mujoco>"
+    )
+
+
+def dense(m, d):
+    full = np.zeros((m.nv, m.nv))
+    mujoco.mj_fullM(m, d, full)
+    return full
+
+
+def assert_same_mechanics(original, ours, *, rng, bodies, sites, atol=TOLERANCE):
+    d, e = mujoco.MjData(original), mujoco.MjData(ours)
+    assert (ours.nq, ours.nv) == (original.nq, original.nv)
+    for _ in range(10):
+        d.qpos[:] = e.qpos[:] = rng.normal(size=original.nq)
+        d.qvel[:] = e.qvel[:] = rng.normal(size=original.nv)
+        mujoco.mj_forward(original, d)
+        mujoco.mj_forward(ours, e)
+        for name in bodies:
+            np.testing.assert_allclose(
+                e.body(name).xipos, d.body(name).xipos, atol=TOLERANCE
+            )
+        for name in sites:
+            np.testing.assert_allclose(
+                e.site(name).xpos, d.site(name).xpos, atol=TOLERANCE
+            )
+            np.testing.assert_allclose(
+                e.site(name).xmat, d.site(name).xmat, atol=TOLERANCE
+            )
+        np.testing.assert_allclose(dense(ours, e), dense(original, d), atol=atol)
+        scale = max(1.0, float(np.abs(d.qfrc_bias).max()))
+        np.testing.assert_allclose(e.qfrc_bias, d.qfrc_bias, atol=atol * scale)
+        np.testing.assert_allclose(e.qfrc_passive, d.qfrc_passive, atol=atol)
+
+
+@pytest.mark.parametrize(("name", "root"), CASES)
+def test_our_own_robots_come_back(name, root, tmp_path):
+    robot = wbc_suite.load_robot(name, root=root)
+    # Without visuals: their meshes cost time and prove nothing here.
+    links = [link.model_copy(update={"visual": ()}) for link in robot.links]
+    robot = robot.model_copy(update={"links": tuple(links)})
+    again = wbc_suite.load_robot(write(tmp_path, robot.to_mjcf()))
+    assert again.root.kind == robot.root.kind
+    assert again.root_joint_names + again.joint_names == (
+        robot.root_joint_names + robot.joint_names
+    )
+    assert_same_mechanics(
+        robot.to_mjspec().compile(),
+        again.to_mjspec().compile(),
+        rng=np.random.default_rng(5),
+        bodies=[link.name for link in robot.links if link.mass > 0.0],
+        sites=[frame.name for frame in robot.frames],
+    )
+    for joint in robot.joints:
+        back = again.joint(joint.name)
+        assert (back.mimic is None) == (joint.mimic is None)
+        if joint.range is not None:
+            np.testing.assert_allclose(back.range, joint.range, atol=1e-15)
+
+
+@pytest.fixture
+def features(tmp_path):
+    return write(tmp_path, FEATURES)
+
+
+def test_every_feature_moves_as_in_mujoco(features):
+    original = mujoco.MjModel.from_xml_path(str(features))
+    ours = read_mjcf(features).to_mjspec().compile()
+    assert_same_mechanics(
+        original,
+        ours,
+        rng=np.random.default_rng(6),
+        bodies=["hand", "tip"],
+        sites=["elbow"],
+        atol=1e-7,  # two links of a microgram stand between the arm's three joints
+    )
+
+
+def test_joints_motors_and_followers_are_read(features):
+    robot = read_mjcf(features)
+    assert robot.name == "all_features"
+    assert robot.joint_names == ("swing", "push", "roll", "grip")
+    swing, push, roll = (robot.joint(n) for n in ("swing", "push", "roll"))
+    np.testing.assert_allclose(swing.range, np.deg2rad([-60, 90]))
+    assert roll.range is None
+    assert (swing.damping, swing.armature, swing.frictionloss) == (0.5, 0.02, 0.1)
+    assert (swing.effort, push.effort, roll.effort) == (100.0, 80.0, 9.0)
+    kinds = {a.joint: (a.kind, a.kp, a.kd) for a in robot.actuators}
+    assert kinds == {"push": ("position", 300.0, 10.0), "roll": ("velocity", 0.0, 7.0)}
+    mimic = robot.joint("grip").mimic
+    assert mimic is not None
+    assert mimic.joint == "push"
+    np.testing.assert_allclose((mimic.ratio, mimic.offset), (0.1, 0.01 - 0.1 * 0.05))
+    assert robot.contacts.exclude == (("pedestal", "hand"),)
+    assert robot.keyframe("ready")["swing"] == 0.3
+    assert [(s.kind, s.frame) for s in robot.sensors] == [("force", "elbow")]
+    assert robot.cameras[0].fovy == 60.0
+
+
+def test_shapes_are_sorted_into_seen_and_touched(features):
+    robot = read_mjcf(features)
+    base = robot.link("pedestal")
+    box = base.visual[0]
+    assert isinstance(box, Box)
+    assert box.size == (0.1, 0.1, 0.2)
+    assert box.color == (0.0, 0.0, 1.0, 1.0)
+    arm = robot.link("upper_arm")
+    assert arm.collision[0].condim == 4
+    np.testing.assert_allclose(arm.collision[0].friction, (0.7, 0.01, 0.001))
+    assert [s.shape for s in robot.link("hand").collision] == ["cylinder"]
+    assert [s.shape for s in robot.link("hand").visual] == ["cylinder", "sphere"]
+    assert robot.link("tip").visual == ()  # group 3 is hidden
+    assert all(link.name != "world" for link in robot.links)
+
+
+def test_roots_are_recognised(tmp_path):
+    free = '<mujoco><worldbody><body pos="0 0 1"><freejoint/><geom size="1"/></body>'
+    robot = read_mjcf(write(tmp_path, f"{free}</worldbody></mujoco>"))
+    assert (robot.root.kind, robot.root.pos) == ("free", (0.0, 0.0, 1.0))
+    hinge = '<mujoco><worldbody><body name="b"><joint/><geom size="1"/></body>'
+    robot = read_mjcf(write(tmp_path, f"{hinge}</worldbody></mujoco>"))
+    assert robot.root.kind == "fixed"
+    assert [link.name for link in robot.links] == ["base_link", "b"]
+
+
+def test_meshes_become_hulls(tmp_path):
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
+    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    write_stl(tmp_path / "parts" / "wedge.stl", vertices, faces)
+    text = (
+        '<mujoco><compiler meshdir="parts"/><asset><mesh file="wedge.stl"/></asset>'
+        '<worldbody><body name="b" ><geom type="mesh" mesh="wedge" pos="1 0 0"/></body>'
+        "</worldbody></mujoco>"
+    )
+    link = read_mjcf(write(tmp_path, text)).links[0]
+    hull = link.collision[0]
+    assert isinstance(hull, Hull)
+    R = wbc_suite.robot.placing.se3_of(hull)
+    points = np.array([R.act(np.array(s[:3])) for s in hull.spheres]) - [1, 0, 0]
+    found = points[np.lexsort(points.round(6).T)]
+    np.testing.assert_allclose(found, vertices[np.lexsort(vertices.T)], atol=1e-6)
+
+
+FAULTS = {
+    "ball": (body('<joint name="j" type="ball"/>'), "joint 'j' is a ball joint"),
+    "spring": (body('<joint name="j" stiffness="3"/>'), "joint 'j' has a spring"),
+    "two free trees": (
+        '<mujoco><worldbody><body><freejoint name="f"/><geom size="1"/></body>'
+        '<body><geom size="1"/></body></worldbody></mujoco>',
+        "joint 'f' is free and not the only tree",
+    ),
+    "weld": (
+        body("", '<equality><weld body1="child"/></equality>'),
+        "neither of joints nor of two bodies",
+    ),
+    "polynomial": (
+        body(
+            '<joint name="a"/><joint name="b" axis="1 0 0"/>',
+            '<equality><joint joint1="a" joint2="b" polycoef="0 0 1 0 0"/></equality>',
+        ),
+        "is not linear in another joint",
+    ),
+    "tendon": (
+        body(
+            '<joint name="a"/>',
+            '<tendon><fixed name="t" stiffness="1"><joint joint="a" coef="1"/></fixed>'
+            "</tendon>",
+        ),
+        "tendon 't' has forces of its own",
+    ),
+    "gravcomp": (body("").replace('"child"', '"child" gravcomp="1"'), "gravcomp"),
+    "nothing": ("<mujoco/>", "it has no body"),
+    "plugin": (
+        '<mujoco><extension><plugin plugin="x"/></extension></mujoco>',
+        "plugins run code",
+    ),
+    "urdf": ("<robot/>", "begins with <mujoco>, not <robot>.* name it .urdf"),
+    "mujoco refuses": (body('<joint type="wheel"/>'), "MuJoCo refuses it"),
+    "outside mesh": (
+        '<mujoco><asset><mesh file="../secret.stl"/></asset></mujoco>',
+        "lies outside the folder",
+    ),
+    "outside folder": (
+        '<mujoco><compiler meshdir="/etc"/><asset><mesh file="a.stl"/></asset>'
+        "</mujoco>",
+        "lies outside the folder",
+    ),
+    "outside include": (
+        '<mujoco><include file="../secret.xml"/></mujoco>',
+        "lies outside the folder",
+    ),
+    "entities": ("<!DOCTYPE m [<!ENTITY a 'b'>]><mujoco/>", "document type"),
+}
+
+
+@pytest.mark.parametrize(("text", "message"), FAULTS.values(), ids=FAULTS.keys())
+def test_what_does_not_fit_gets_one_clear_error(tmp_path, text, message):
+    path = write(tmp_path, text)
+    with pytest.raises(ConfigError, match=message) as caught:
+        read_mjcf(path)
+    assert str(path) in str(caught.value)
