@@ -1,5 +1,6 @@
 """QP solvers behind one small interface."""
 
+import warnings
 from typing import Any, ClassVar, Protocol
 
 import daqp
@@ -96,8 +97,18 @@ class QpsolversSolver:
     _SPARSE = ("proxqp", "osqp", "clarabel")
 
     _OPTIONS: ClassVar[dict[str, dict[str, Any]]] = {
-        "proxqp": {"eps_abs": 1e-9, "eps_rel": 0.0, "backend": "sparse"},
-        "osqp": {"eps_abs": 1e-8, "eps_rel": 0.0, "max_iter": 20000},
+        "proxqp": {
+            "eps_abs": 1e-9,
+            "eps_rel": 0.0,
+            "backend": "sparse",
+            "max_iter": 100,
+        },
+        "osqp": {
+            "eps_abs": 1e-8,
+            "eps_rel": 0.0,
+            "max_iter": 20000,
+            "time_limit": 1.0,  # s
+        },
         "piqp": {"eps_abs": 1e-9, "eps_rel": 0.0},
     }
 
@@ -126,9 +137,12 @@ class QpsolversSolver:
             problem.ub,
         )
         try:
-            solution = qpsolvers.solve_problem(  # pyright: ignore[reportUnknownMemberType]
-                qp, self.name, **self._OPTIONS.get(self.name, {})
-            )
+            with warnings.catch_warnings():
+                # How a solver ended is in what it returns; a tick prints nothing.
+                warnings.simplefilter("ignore", UserWarning)
+                solution = qpsolvers.solve_problem(  # pyright: ignore[reportUnknownMemberType]
+                    qp, self.name, **self._OPTIONS.get(self.name, {})
+                )
         except (qpsolvers.exceptions.QPError, ValueError, ArithmeticError):
             return None
         if not solution.found or solution.x is None or solution.z_box is None:
