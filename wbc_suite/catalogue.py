@@ -47,9 +47,13 @@ class Catalogue:
     extra: tuple[Path, ...] = field(default_factory=_default_extra)
 
     def __post_init__(self) -> None:
-        for folder in self.extra:
-            if not Path(folder).is_dir():
-                raise ConfigError(f"Catalogue folder '{folder}' does not exist.")
+        if isinstance(self.extra, str | Path) or not isinstance(self.extra, Iterable):
+            raise ConfigError(
+                f"Catalogue: extra is a list of folders, not {self.extra!r:.60}."
+            )
+        for folder in (self.root, *self.extra):
+            if not isinstance(folder, str | Path) or not Path(folder).is_dir():
+                raise ConfigError(f"Catalogue folder '{folder!s:.80}' does not exist.")
 
     def names(self, folder: str) -> tuple[str, ...]:
         """Return the sorted file stems under a folder such as `robots/gripper`."""
@@ -71,12 +75,14 @@ class Catalogue:
         Raises:
             UnknownNameError: If no root has such a file.
         """
+        if ".." in Path(str(folder)).parts:
+            raise ConfigError(f"'{folder}/{name}' leaves the catalogue.")
         found = {_key(p.stem): p for p in self._files(folder)}
-        path = found.get(_key(name))
+        path = found.get(_key(str(name)))
         if path is None:
             raise UnknownNameError(kind, name, self.names(folder))
         return path
 
     def _files(self, folder: str) -> Iterable[Path]:
         for root in (self.root, *self.extra):
-            yield from sorted((Path(root) / folder).glob("*.toml"))
+            yield from sorted((Path(root) / str(folder)).glob("*.toml"))

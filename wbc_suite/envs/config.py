@@ -2,14 +2,25 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import ConfigDict, Field, NonNegativeFloat, PositiveFloat, PositiveInt
+from pydantic import (
+    ConfigDict,
+    Field,
+    NonNegativeFloat,
+    PositiveFloat,
+    PositiveInt,
+    field_validator,
+    model_validator,
+)
 
 from wbc_suite.robot import RobotDescription
 from wbc_suite.tomlfile import FrozenModel, parse_model
 
 __all__ = ["EnvConfig", "NoiseConfig", "parse_env_config"]
+
+
+Pixels: TypeAlias = Annotated[int, Field(gt=0, le=8192)]
 
 
 class NoiseConfig(FrozenModel):
@@ -55,7 +66,27 @@ class EnvConfig(FrozenModel):
     use_object_obs: bool = True
     render_mode: Literal["rgb_array"] | None = None
     render_camera: str = "agentview"
-    render_size: tuple[PositiveInt, PositiveInt] = Field(default=(512, 512))
+    render_size: tuple[Pixels, Pixels] = (512, 512)
+
+    @field_validator("robots")
+    @classmethod
+    def _robots_are_robots(cls, robots: Any) -> Any:
+        given = robots if isinstance(robots, list | tuple) else [robots]
+        if not all(isinstance(r, str | Path | RobotDescription) for r in given):
+            raise ValueError(
+                "a robot is a name, a file or a RobotDescription; several are a list"
+            )
+        return robots
+
+    @model_validator(mode="after")
+    def _one_controller_each(self) -> "EnvConfig":
+        robots, controllers = len(self.robot_list), len(self.controller_list)
+        if robots != controllers:
+            raise ValueError(
+                f"controller_configs has {controllers} entries for {robots} robot(s); "
+                "give one for all, or one for each"
+            )
+        return self
 
     @property
     def robot_list(self) -> list[str | Path | RobotDescription]:

@@ -16,7 +16,7 @@ from wbc_suite.control import (
 )
 from wbc_suite.envs.config import EnvConfig, NoiseConfig, parse_env_config
 from wbc_suite.envs.simulation import Simulation
-from wbc_suite.errors import ConfigError, PhysicsError
+from wbc_suite.errors import ConfigError, PhysicsError, UnknownNameError
 from wbc_suite.robot import RobotDescription, load_robot
 from wbc_suite.scene import attach_robot, empty_arena, robot_prefix
 from wbc_suite.sensing.proprioception import Proprioception
@@ -66,6 +66,7 @@ class RobotEnv(gymnasium.Env[Observation, Vector]):
         self.action_space = gymnasium.spaces.Box(
             layout.low.copy(), layout.high.copy(), dtype=np.float64
         )
+        self._check_camera()
         self._senses = [Proprioception(state) for state in self.simulation.robots]
         self._substeps = self._count_substeps()
         self.metadata = {**self.metadata, "render_fps": round(self.config.control_freq)}
@@ -190,6 +191,12 @@ class RobotEnv(gymnasium.Env[Observation, Vector]):
             for state, given in zip(states, self.config.controller_list, strict=True)
         ]
         return Simulation(model, data, pairs)
+
+    def _check_camera(self) -> None:
+        model = self.simulation.model
+        known = [model.camera(i).name for i in range(model.ncam)]
+        if self.config.render_mode and self.config.render_camera not in known:
+            raise UnknownNameError("camera", self.config.render_camera, known)
 
     def _count_substeps(self) -> int:
         period = 1.0 / (self.config.control_freq * self.simulation.timestep)

@@ -1,8 +1,8 @@
 """What a tick does when its problem has no solution.
 
-The ladder, mildest first: drop acceleration limits; relax equality and inequality rows
-with slack; damped least squares within the joints' bounds; stand still. The bounds of
-position and velocity are kept on every rung.
+The ladder, mildest first: leave the acceleration window, as little as may be; keep it,
+and relax equality and inequality rows with slack; damped least squares within the
+joints' bounds; stand still. The bounds of position and velocity are kept on every rung.
 """
 
 import numba
@@ -43,15 +43,14 @@ def retreat(
 
     Args:
         solver: Tried first, without acceleration limits.
-        problem: The problem; its bounds are replaced.
+        problem: The problem; its bounds may be replaced.
         lb: Lower bounds of position and velocity alone.
         ub: Upper bounds of the same.
 
     Returns:
         The step, multipliers, and the rung that was reached.
     """
-    problem.lb[:], problem.ub[:] = lb, ub
-    result = checked_solve(solver, problem)
+    result = _solve_without_window(solver, problem, lb, ub)
     if result is not None:
         return *result, Fallback.ACCELERATION
     result = _solve_with_slack(solver, problem)
@@ -64,15 +63,51 @@ def retreat(
     return np.clip(np.zeros(problem.nv), lb, ub), nothing, Fallback.HOLD
 
 
+def _solve_without_window(
+    solver: QpSolver, problem: Problem, lb: Vector, ub: Vector
+) -> tuple[Vector, Vector] | None:
+    """Solve within wider bounds, leaving the acceleration window as little as may be.
+
+    The cost is joined by `w || dq - m ||^2`, m the middle of the window, w the largest
+    weight of a joint: without it the velocity is free, and the next tick's window is
+    around a wild one. On failure the problem is as it was.
+    """
+    window = problem.lb.copy(), problem.ub.copy()
+    middle = 0.5 * (np.maximum(window[0], lb) + np.minimum(window[1], ub))
+    finite = np.isfinite(middle)
+    w = np.where(finite, float(problem.H.diagonal().max()), 0.0)
+    calm = Problem(problem.nv, len(problem.G), problem.equalities)
+    calm.rows[:], calm.lower[:], calm.upper[:] = (
+        problem.rows,
+        problem.lower,
+        problem.upper,
+    )
+    calm.H[:] = problem.H + np.diag(w)
+    calm.c[:] = problem.c - w * np.where(finite, middle, 0.0)
+    calm.lb[:], calm.ub[:] = lb, ub
+    result = checked_solve(solver.fresh(), calm)
+    if result is not None:
+        problem.lb[:], problem.ub[:] = lb, ub
+    return result
+
+
 def _solve_with_slack(
     solver: QpSolver, problem: Problem
 ) -> tuple[Vector, Vector] | None:
-    """Solve with equality rows as heavy tasks and slack s >= 0 on `G dq <= h + s`."""
+    """Solve with equality rows as heavy tasks and slack s >= 0 on `G dq <= h + s`.
+
+    Rows that cannot be kept have a residual, so what damps unreachable tasks is needed
+    here too, see `rows.damping_of_rows`: without it a robot whose feet and links
+    contradict each other was measured to swing at full speed, 9.6 rad/s between ticks.
+    """
     nv, rows = problem.nv, len(problem.G)
     weight = _SLACK_WEIGHT * max(1.0, float(np.abs(problem.H).max()))
     relaxed = Problem(nv + rows, rows)
     A, b = problem.A, problem.b
-    relaxed.H[:nv, :nv] = problem.H + weight * (A.T @ A)
+    mu = np.abs(A).max(axis=1, initial=0.0) @ np.abs(b)
+    broken = np.maximum(0.0, -problem.h)
+    mu += np.abs(problem.G).max(axis=1, initial=0.0) @ broken
+    relaxed.H[:nv, :nv] = problem.H + weight * (A.T @ A + mu * np.eye(nv))
     relaxed.H[nv:, nv:] = weight * np.eye(rows)
     relaxed.c[:nv] = problem.c - weight * (A.T @ b)
     relaxed.lb[:nv], relaxed.ub[:nv] = problem.lb, problem.ub

@@ -103,6 +103,12 @@ def _choose(
 ) -> tuple[Part, ...]:
     """Replace, or leave out, the components that the caller wants otherwise."""
     for kind, choice in choices.items():
+        names = choice.values() if isinstance(choice, Mapping) else (choice,)
+        for name in names:
+            if not isinstance(name, str | None):
+                raise ConfigError(
+                    f"{kind}: a name, a file, or a name for each side, not {name!r}."
+                )
         _check_choice(assembly, kind, choice, source=source)
     parts: list[Part] = []
     for part in assembly.parts:

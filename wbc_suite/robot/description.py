@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import model_validator
 
-from wbc_suite.errors import UnknownNameError
+from wbc_suite.errors import DescriptionError, UnknownNameError
 from wbc_suite.robot.parts import (
     Actuator,
     Camera,
@@ -21,7 +21,7 @@ from wbc_suite.robot.parts import (
     Synergy,
 )
 from wbc_suite.robot.validation import check_description
-from wbc_suite.tomlfile import FrozenModel
+from wbc_suite.tomlfile import FrozenModel, parse_model
 
 if TYPE_CHECKING:
     import mujoco
@@ -121,7 +121,7 @@ class RobotDescription(FrozenModel):
         """Return a link by name; raises UnknownNameError."""
         try:
             return self._links_by_name[name]
-        except KeyError:
+        except (KeyError, TypeError):
             raise UnknownNameError("link", name, self._links_by_name) from None
 
     def joint(self, name: str) -> Joint:
@@ -140,13 +140,13 @@ class RobotDescription(FrozenModel):
 
     def group(self, name: str) -> tuple[str, ...]:
         """Return the joints of a group; raises UnknownNameError."""
-        if name not in self.groups:
+        if name not in tuple(self.groups):
             raise UnknownNameError("group", name, self.groups)
         return self.groups[name]
 
     def keyframe(self, name: str) -> dict[str, float]:
         """Return a posture with every joint filled in; followers are computed."""
-        if name not in self.keyframes:
+        if name not in tuple(self.keyframes):
             raise UnknownNameError("keyframe", name, self.keyframes)
         values = {j: 0.0 for j in self.joint_names} | self.keyframes[name]
         for joint in self.joints:
@@ -196,6 +196,10 @@ class RobotDescription(FrozenModel):
         self, kind: Literal["fixed", "planar", "free"], **changes: Any
     ) -> "RobotDescription":
         """Return the same robot on another root."""
-        root = Root.model_validate(self.root.model_dump() | {"kind": kind} | changes)
+        data = self.root.model_dump() | {"kind": kind} | changes
+        source = f"{self.name}: root"
+        root = parse_model(Root, data, source=source, error=DescriptionError)
         fields = {key: getattr(self, key) for key in type(self).model_fields}
-        return type(self).model_validate(fields | {"root": root})
+        return parse_model(
+            type(self), fields | {"root": root}, source=source, error=DescriptionError
+        )

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Literal
 
 from wbc_suite.catalogue import Catalogue
-from wbc_suite.errors import ConfigError
+from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.robot.assembly import Choice, assemble, describe_component
 from wbc_suite.robot.component import Component, read_robot_file
 from wbc_suite.robot.description import RobotDescription
@@ -39,6 +39,10 @@ def load_robot(
         ConfigError: If the file cannot be read.
     """
     catalogue = catalogue or Catalogue()
+    if not isinstance(catalogue, Catalogue):
+        raise ConfigError(f"load_robot: {catalogue!r:.60} is no Catalogue.")
+    if not isinstance(name, str | Path):
+        raise UnknownNameError("robot", name, catalogue.names("robots"))
     path = _locate(str(name), catalogue)
     robot = _read(path, catalogue, gripper=gripper, base=base)
     return robot if root in (None, robot.root.kind) else robot.with_root(root)
@@ -52,6 +56,8 @@ def _locate(name: str, catalogue: Catalogue) -> Path:
         return path
     folder, _, stem = name.rpartition("/")
     if folder:
+        if folder not in FOLDERS:
+            raise UnknownNameError("kind of component", folder, FOLDERS)
         return catalogue.find(f"robots/{folder}", stem, kind=folder)
     return catalogue.find("robots", stem, kind="robot")
 

@@ -11,6 +11,7 @@ from wbc_suite.control.composite.base import (
     register_composite,
 )
 from wbc_suite.control.composite.config import default_whole_body_config
+from wbc_suite.control.composite.names import check_whole_body
 from wbc_suite.control.state import RobotState
 
 __all__ = [
@@ -43,5 +44,9 @@ for _name, _build in (
     ("WHOLE_BODY_MINK_IK", _whole_body_mink_ik),
 ):
     register_composite(
-        _name, _build, family="whole_body_ik", default=default_whole_body_config
+        _name,
+        _build,
+        family="whole_body_ik",
+        default=default_whole_body_config,
+        check=check_whole_body,
     )

@@ -60,6 +60,7 @@ class CompositeController(Protocol):
 
 
 Builder = Callable[[Mapping[str, Any], RobotState], CompositeController]
+Check = Callable[[Mapping[str, Any], RobotDescription | None, str], None]
 DefaultConfig = Callable[[RobotDescription], dict[str, Any]]
 
 
@@ -70,17 +71,33 @@ class CompositeKind:
         build: Makes a controller out of a config and the robot in a simulation.
         family: Files `controllers/{robot}_{family}.toml` hold its configs.
         default: Makes a config for a robot that has no file.
+        check: Raises ConfigError for what is wrong in a config, for a robot or for
+            none, and names the source.
     """
 
-    def __init__(self, build: Builder, family: str, default: DefaultConfig) -> None:
+    def __init__(
+        self, build: Builder, family: str, default: DefaultConfig, check: Check
+    ) -> None:
         self.build, self.family, self.default = build, family, default
+        self.check = check
 
 
 _KINDS: dict[str, CompositeKind] = {}
 
 
+def _accept(
+    config: Mapping[str, Any], robot: RobotDescription | None, source: str
+) -> None:
+    """Check nothing: `build` will."""
+
+
 def register_composite(
-    name: str, build: Builder, *, family: str, default: DefaultConfig
+    name: str,
+    build: Builder,
+    *,
+    family: str,
+    default: DefaultConfig,
+    check: Check = _accept,
 ) -> None:
     """Make a kind of composite controller known under a name, case ignored.
 
@@ -89,7 +106,7 @@ def register_composite(
     """
     if name.upper() in _KINDS:
         raise ConfigError(f"A composite controller named '{name}' exists already.")
-    _KINDS[name.upper()] = CompositeKind(build, family, default)
+    _KINDS[name.upper()] = CompositeKind(build, family, default, check)
 
 
 def composite_names() -> tuple[str, ...]:
@@ -108,37 +125,45 @@ def load_composite_controller_config(
     Args:
         controller: A registered name such as `WHOLE_BODY_IK` (the default), a path to
             a TOML file, or a config, which is returned as a copy.
-        robot: The robot; needed with a name.
+        robot: The robot; needed with a name. Names in the config are checked against
+            it.
         catalogue: Where to look for the robot's file; ours by default.
 
     Raises:
         UnknownNameError: If the controller or robot is unknown.
         ConfigError: If the file cannot be read, or the robot is missing.
     """
+    catalogue = catalogue or Catalogue()
+    if robot is not None and not isinstance(robot, RobotDescription):
+        robot = load_robot(robot, catalogue=catalogue)
+    config, source = _read(controller, robot, catalogue)
+    _kind_of(config).check(config, robot, source)
+    return config
+
+
+def _read(
+    controller: object, robot: RobotDescription | None, catalogue: Catalogue
+) -> tuple[dict[str, Any], str]:
+    """Return a config, and what to call it in messages."""
     if isinstance(controller, Mapping):
         config = dict(controller)
-        _kind_of(config)
-        return config
+        return config, str(config.get("type"))
+    if not isinstance(controller, str | Path | None):
+        raise UnknownNameError("composite controller", controller, _KINDS)
     name = str(controller or "WHOLE_BODY_IK")
     if name.endswith(".toml"):
-        config = read_toml(Path(name))
-        _kind_of(config)
-        return config
+        return {"type": "WHOLE_BODY_IK"} | read_toml(Path(name)), name
     kind = _find(name)
     if robot is None:
         raise ConfigError(f"Controller '{name}' needs a robot to be configured for.")
-    catalogue = catalogue or Catalogue()
-    if not isinstance(robot, RobotDescription):
-        robot = load_robot(robot, catalogue=catalogue)
+    own_type = {"type": name.upper()}
     try:
         file = catalogue.find(
             "controllers", f"{robot.name}_{kind.family}", kind="controller file"
         )
     except UnknownNameError:
-        config = kind.default(robot)
-    else:
-        config = read_toml(file)
-    return config | {"type": name.upper()}
+        return kind.default(robot) | own_type, f"{name} for {robot.name}"
+    return read_toml(file) | own_type, str(file)
 
 
 def build_composite_controller(

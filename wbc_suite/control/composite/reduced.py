@@ -6,7 +6,7 @@ from typing import Any
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.placing import locked
 
-__all__ = ["lock_groups"]
+__all__ = ["gripper_groups", "lock_groups"]
 
 
 def lock_groups(robot: RobotDescription, groups: Sequence[str]) -> RobotDescription:
@@ -18,7 +18,7 @@ def lock_groups(robot: RobotDescription, groups: Sequence[str]) -> RobotDescript
     Raises:
         UnknownNameError: If the robot has no such group.
     """
-    fixed = tuple(dict.fromkeys((*groups, *_gripper_groups(robot))))
+    fixed = tuple(dict.fromkeys((*groups, *gripper_groups(robot))))
     fields: dict[str, Any] = {
         key: getattr(robot, key) for key in type(robot).model_fields
     }
@@ -26,7 +26,8 @@ def lock_groups(robot: RobotDescription, groups: Sequence[str]) -> RobotDescript
     return RobotDescription.model_validate(fields)
 
 
-def _gripper_groups(robot: RobotDescription) -> list[str]:
+def gripper_groups(robot: RobotDescription) -> list[str]:
+    """Return the names of the groups that grippers drive."""
     return [
         name
         for name in robot.groups

@@ -18,6 +18,7 @@ from wbc_suite.control.composite.goals import (
     pose_of_action,
     shift_pose,
 )
+from wbc_suite.control.composite.names import read_whole_body
 from wbc_suite.control.composite.planner import Planner, Waypoint
 from wbc_suite.control.composite.reduced import lock_groups
 from wbc_suite.control.composite.reference import Reference
@@ -28,7 +29,6 @@ from wbc_suite.control.part.stance import StanceContact, StanceLaw
 from wbc_suite.control.state import RobotState
 from wbc_suite.kinematics import Configuration, Conversion
 from wbc_suite.robot import RobotDescription
-from wbc_suite.tomlfile import parse_model
 from wbc_suite.typing import Indices, Vector
 
 __all__ = ["WholeBodyIK"]
@@ -62,7 +62,7 @@ class WholeBodyIK:
         self, config: Mapping[str, Any], state: RobotState, backend: BackendFactory
     ) -> None:
         name = str(config.get("type"))
-        self.config = parse_model(WholeBodyIKConfig, config, source=name)
+        self.config = read_whole_body(config, state.robot, name)
         self.robot = lock_groups(state.robot, self.config.locked)
         self._backend = backend(self.robot, self.config)
         self._configuration = Configuration(self.robot.to_pinocchio())
