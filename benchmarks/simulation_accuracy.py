@@ -64,13 +64,14 @@ class Bench:
         self.hands = [
             k
             for k, frame in enumerate(self.controller.config.frames)
-            if frame.level == 0 and frame.kind == "pose"
+            if frame.name.endswith("hand")
         ]
         self.clearance = Clearance(self.controller.robot, self.controller.config)
         self.accelerations = joint_accelerations(
             self.controller.robot, self.controller.config
         )
         self.free = mujoco.MjData(self.model)
+        self.worst = (0.0, "")
         self.limited = np.flatnonzero(self.model.jnt_limited)
 
     def start(self):
@@ -171,10 +172,15 @@ class Bench:
                 watch()
 
     def overshoot(self):
-        """Return how far the worst joint is outside its range, rad or m."""
+        """Return how far the worst joint is outside its range, rad or m; note it."""
         q = self.data.qpos[self.model.jnt_qposadr[self.limited]]
         low, high = self.model.jnt_range[self.limited].T
-        return float(np.max(np.maximum(low - q, q - high), initial=0.0))
+        outside = np.maximum(low - q, q - high)
+        worst = int(outside.argmax())
+        if outside[worst] > self.worst[0]:
+            name = self.model.joint(self.limited[worst]).name
+            self.worst = (float(outside[worst]), name.removeprefix("robot0_"))
+        return max(float(outside[worst]), 0.0)
 
 
 def reachable(bench, trials, seed, progress=print):
@@ -235,6 +241,7 @@ def ball(bench, trials, seed):
     return {
         "trials": trials,
         "worst_limit_overshoot_rad": max(overshoot),
+        "worst_limit_joint": bench.worst[1],
         "missed_in_silence": silent,
         "back_median_mm": 1e3 * float(np.median(back)),
         "back_worst_mm": 1e3 * max(back),

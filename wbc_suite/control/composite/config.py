@@ -40,6 +40,8 @@ class ControlledFrame(FrozenModel):
         max_angular_speed: Greatest angular speed asked for, rad/s.
         linear_braking: Deceleration towards the goal, m/s^2.
         angular_braking: Deceleration towards the goal, rad/s^2.
+        range: How far from its pose at reset the frame may be sent, m and rad; goals
+            beyond are brought back to there. Keeps a standing robot on its feet.
     """
 
     name: Name
@@ -53,6 +55,7 @@ class ControlledFrame(FrozenModel):
     max_angular_speed: PositiveFloat = 6.0
     linear_braking: PositiveFloat = 4.0
     angular_braking: PositiveFloat = 12.0
+    range: tuple[PositiveFloat, PositiveFloat] | None = None
 
     @model_validator(mode="after")
     def _frame_given(self) -> "ControlledFrame":

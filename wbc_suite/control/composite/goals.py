@@ -7,7 +7,14 @@ from wbc_suite.control.action import ActionPart, SliceKind
 from wbc_suite.control.composite.config import ControlledFrame, WholeBodyIKConfig
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["REACH", "action_of_pose", "action_part", "pose_of_action", "shift_pose"]
+__all__ = [
+    "REACH",
+    "action_of_pose",
+    "action_part",
+    "bounded_pose",
+    "pose_of_action",
+    "shift_pose",
+]
 
 REACH = 10.0
 """Bound of absolute positions, m: a typing error, not a place to reach for."""
@@ -82,6 +89,25 @@ def pose_of_action(kind: str, values: Vector, now: pin.SE3) -> pin.SE3:
             place = np.array([values[0], values[1], now.translation[2]])
             return pin.SE3(pin.exp3(np.array([0.0, 0.0, values[2]])), place)
     return pin.SE3(now.rotation.copy(), values.copy())
+
+
+def bounded_pose(
+    goal: pin.SE3, home: pin.SE3, limits: tuple[float, float] | None
+) -> pin.SE3:
+    """Return the goal, or the pose on the way from home to it that is within limits.
+
+    Args:
+        goal: Where to go.
+        home: Where distances are counted from.
+        limits: Greatest distances, m and rad.
+    """
+    if limits is None:
+        return goal
+    offset = goal.translation - home.translation
+    turn = pin.log3(home.rotation.T @ goal.rotation)
+    offset = offset * min(1.0, limits[0] / max(float(np.linalg.norm(offset)), 1e-12))
+    turn = turn * min(1.0, limits[1] / max(float(np.linalg.norm(turn)), 1e-12))
+    return pin.SE3(home.rotation @ pin.exp3(turn), home.translation + offset)
 
 
 def shift_pose(kind: str, values: Vector, goal: pin.SE3, axes: Matrix) -> pin.SE3:

@@ -15,6 +15,7 @@ from wbc_suite.control.composite.config import WholeBodyIKConfig
 from wbc_suite.control.composite.goals import (
     action_of_pose,
     action_part,
+    bounded_pose,
     pose_of_action,
     shift_pose,
 )
@@ -112,6 +113,7 @@ class WholeBodyIK:
         self.goals = [
             self._to_input(self._planner.frame_pose(k)) for k in self._frames()
         ]
+        self._homes = [self._to_world(goal) for goal in self.goals]
         self._backend.reset(self.q)
         self._planner.reset(self._preferred_posture())
         for gripper in self._grippers:
@@ -191,11 +193,20 @@ class WholeBodyIK:
         began = time.perf_counter()
         self._base = self._root_pose()
         correction = self._root_correction(state)
-        goals = [correction * self._to_world(goal) for goal in self.goals]
+        goals = [correction * goal for goal in self._bounded_goals()]
         self._answer = self._step_towards(self._planner.next(goals, self._answer.v))
         self.q = self._reference.extend(self._answer.v)
         self.solved_at = time.perf_counter()
         self.solve_time = self.solved_at - began
+
+    def _bounded_goals(self) -> list[pin.SE3]:
+        """Return where frames may be sent, in the world."""
+        return [
+            bounded_pose(self._to_world(goal), home, frame.range)
+            for goal, home, frame in zip(
+                self.goals, self._homes, self.config.frames, strict=True
+            )
+        ]
 
     def _step_towards(self, waypoint: Waypoint) -> IkStep:
         if waypoint.targets is None:
