@@ -3,6 +3,7 @@
 import numpy as np
 
 from wbc_suite.control.composite.config import WholeBodyIKConfig
+from wbc_suite.control.composite.postures import random_posture
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp import SelfCollisionLimit
 from wbc_suite.robot import RobotDescription
@@ -63,22 +64,13 @@ def _seldom_touching(
     touches = dict.fromkeys(pairs, 0)
     rng = np.random.default_rng(0)
     for _ in range(SAMPLES):
-        configuration.update(_random(configuration, rng))
+        q = random_posture(configuration.model, configuration.q, rng)
+        configuration.update(q)
         limit.rows(configuration, 1.0, G, h)
         rows = np.flatnonzero(limit.distances < 0.0).tolist()
         for a, b in {tuple(sorted(limit.label(row).split(" - "))) for row in rows}:
             touches[a, b] += 1
     return [pair for pair in pairs if touches[pair] <= OFTEN * SAMPLES]
-
-
-def _random(configuration: Configuration, rng: np.random.Generator) -> Vector:
-    model, q = configuration.model, configuration.q.copy()
-    for joint in list(model.joints)[1:]:
-        low = model.lowerPositionLimit[joint.idx_q]
-        high = model.upperPositionLimit[joint.idx_q]
-        if joint.nq == 1 and low < high < 1e6:
-            q[joint.idx_q] = rng.uniform(low, high)
-    return q
 
 
 def _joints_between(configuration: Configuration, first: str, second: str) -> int:

@@ -9,6 +9,7 @@ from wbc_suite.control.composite.config import (
     HeldFrame,
     WholeBodyIKConfig,
 )
+from wbc_suite.control.composite.postures import random_posture
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp import (
     AccelerationLimit,
@@ -32,6 +33,10 @@ __all__ = [
     "make_task",
     "planar_joints",
 ]
+
+LOAD_SAMPLES = 50
+LEAST_ACCELERATION = 2.0
+"""rad/s^2 or m/s^2; for motors that hardly carry their load."""
 
 HURRY = 1e3
 """Speed limit, m/s and rad/s, of tasks that something else slows."""
@@ -123,26 +128,36 @@ def joint_accelerations(
     """Return what each joint can accelerate, rad/s^2 or m/s^2.
 
     The least of the config's limit, the robot's own, and what a part of the motor's
-    effort gives against the inertia M_ii at the posture.
+    effort gives where it has most to move: the greatest inertia M_ii of random
+    configurations, after the greatest weight. Some acceleration is left in any case.
     """
     model = robot.to_pinocchio()
-    data = model.createData()
-    q = pin.neutral(model)
-    name = config.posture.keyframe
-    if name in robot.keyframes:
-        q = model.referenceConfigurations[name]
-    inertia = np.diag(pin.crba(model, data, q))
+    inertia, weight = _greatest_loads(model)
     found: dict[str, float] = {}
     for joint in robot.joints:
         limit = config.limits.acceleration
         if joint.acceleration is not None:
             limit = min(limit, joint.acceleration)
         if joint.effort is not None:
-            index = model.joints[model.getJointId(joint.name)].idx_v
-            force = config.limits.effort_share * joint.effort
-            limit = min(limit, max(force / float(inertia[index]), 1.0))
+            v = model.joints[model.getJointId(joint.name)].idx_v
+            left = max(joint.effort - float(weight[v]), 0.2 * joint.effort)
+            able = config.limits.effort_share * left / float(inertia[v])
+            limit = min(limit, max(able, LEAST_ACCELERATION))
         found[joint.name] = limit
     return found
+
+
+def _greatest_loads(model: pin.Model) -> tuple[Vector, Vector]:
+    """Return the greatest inertia and weight at each joint, over random postures."""
+    data = model.createData()
+    inertia, weight = np.zeros(model.nv), np.zeros(model.nv)
+    rng = np.random.default_rng(0)
+    for _ in range(LOAD_SAMPLES):
+        q = random_posture(model, pin.neutral(model), rng)
+        np.maximum(inertia, np.diag(pin.crba(model, data, q)), out=inertia)
+        gravity = pin.computeGeneralizedGravity(model, data, q)
+        np.maximum(weight, np.abs(gravity), out=weight)
+    return inertia, weight
 
 
 def joint_speeds(robot: RobotDescription, configuration: Configuration) -> Vector:

@@ -1,0 +1,195 @@
+import numpy as np
+import pytest
+
+from wbc_suite.catalogue import Catalogue
+from wbc_suite.control import (
+    build_composite_controller,
+    composite_names,
+    load_composite_controller_config,
+    register_composite,
+)
+from wbc_suite.control.composite.config import WholeBodyIKConfig
+from wbc_suite.errors import ConfigError, UnknownNameError
+from wbc_suite.robot import load_robot
+from wbc_suite.tomlfile import load_model
+
+ROBOTS = ("Panda", "GR1", "Tiago", "SpotWithArm")
+STEP = np.array([0.03, 0.04, -0.03, 0.0, 0.1, 0.1])
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize(
+    "controller",
+    ["WHOLE_BODY_IK", pytest.param("WHOLE_BODY_MINK_IK", marks=pytest.mark.slow)],
+)
+def test_the_hand_arrives_in_simulation(alone, robot, controller):
+    scene = alone(robot, controller)
+    before = scene.site("right_tcp")
+    report = scene.act({"right_hand": STEP}, 1.5)["frames"]["right_hand"]
+    # mink has no strict levels: what a lower level asks for costs a little.
+    bound = 1e-3 if robot == "SpotWithArm" or "MINK" in controller else 1e-4
+    assert report["position_error"] < bound
+    assert report["orientation_error"] < 2e-3
+    assert report["reached"]
+    assert report["reasons"] == []
+    moved = scene.site("right_tcp") - before
+    np.testing.assert_allclose(moved, STEP[:3], atol=bound)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_a_goal_out_of_reach_is_reported_and_forgotten(alone, robot):
+    scene = alone(robot)
+    report = scene.act({"right_hand": np.array([0, 4.0, 1.0, 0, 0, 0])}, 1.0)
+    assert not report["reached"]
+    hand = report["frames"]["right_hand"]
+    assert hand["position_error"] > 1.0
+    assert hand["reasons"]
+    limited = np.flatnonzero(scene.state.model.jnt_limited)
+    model, data = scene.state.model, scene.state.data
+    q = data.qpos[model.jnt_qposadr[limited]]
+    low, high = model.jnt_range[limited].T
+    assert (low - q).max() < 1e-3
+    assert (q - high).max() < 1e-3
+    back = scene.act({"right_hand": np.array([0, -4.0, -1.0, 0, 0, 0])}, 2.0)
+    assert back["frames"]["right_hand"]["position_error"] < 1e-3
+
+
+def test_reasons_say_what_is_in_the_way(alone):
+    scene = alone("Panda")
+    down = scene.act({"right_hand": np.array([-0.4, 0, 0.9, 0, 1.5, 0])}, 2.0)
+    words = " ".join(down["frames"]["right_hand"]["reasons"])
+    assert "limit: panda_joint" in words or "out of reach" in words
+
+
+@pytest.mark.parametrize("reference", ["world", "base", "eef"])
+def test_deltas_are_along_the_axes_of_their_reference(alone, reference):
+    scene = alone("Panda", input_type="delta", input_ref_frame=reference)
+    before = scene.site("right_tcp")
+    axes = {
+        "world": np.eye(3),
+        "base": np.eye(3),
+        "eef": scene.state.data.site("robot0_right_tcp").xmat.reshape(3, 3).copy(),
+    }[reference]
+    scene.act({"right_hand": np.array([0, 0, 0.04, 0, 0, 0])}, 1.5)
+    moved = scene.site("right_tcp") - before
+    np.testing.assert_allclose(moved, axes @ [0, 0, 0.04], atol=2e-4)
+
+
+def test_zero_deltas_never_move_the_hand(alone):
+    scene = alone("GR1", input_type="delta")
+    before = scene.site("left_tcp")
+    for _ in range(10):
+        scene.act({}, 0.2)
+    assert np.linalg.norm(scene.site("left_tcp") - before) < 1e-4
+
+
+def test_base_goals_of_tiago_move_the_base(alone):
+    scene = alone("Tiago")
+    before = scene.site("base")
+    hand = scene.site("right_tcp")
+    report = scene.act({"base": np.array([0.1, 0.05, 0.2])}, 3.0)
+    assert report["frames"]["right_hand"]["reached"]
+    np.testing.assert_allclose(
+        scene.site("base")[:2] - before[:2], [0.1, 0.05], atol=5e-3
+    )
+    np.testing.assert_allclose(scene.site("right_tcp"), hand, atol=2e-4)
+
+
+def test_spot_stands_and_keeps_its_feet_while_the_body_moves(alone):
+    scene = alone("SpotWithArm")
+    feet = [f.name for f in scene.robot.frames if f.role == "foot"]
+    before = {foot: scene.site(foot) for foot in feet}
+    body = scene.site("base")
+    scene.act({"torso": np.array([0.03, 0.0, -0.04, 0, 0, 0])}, 2.0)
+    np.testing.assert_allclose(scene.site("base") - body, [0.03, 0.0, -0.04], atol=5e-3)
+    for foot in feet:
+        assert np.linalg.norm(scene.site(foot) - before[foot]) < 5e-3
+
+
+def test_grippers_open_and_close(alone):
+    scene = alone("Panda")
+    part = scene.controller.layout["right_gripper"]
+    finger = scene.state.data.joint("robot0_panda_finger_joint1")
+    for goal, where in ((-1.0, 0.04), (1.0, 0.0)):
+        action = scene.controller.hold_action
+        action[part.start] = goal
+        scene.controller.set_goal(action)
+        scene.simulation.tick(500)
+        assert finger.qpos[0] == pytest.approx(where, abs=2e-3)
+
+
+def test_the_hold_action_holds(alone):
+    scene = alone("GR1")
+    before = scene.site("right_tcp")
+    scene.controller.set_goal(scene.controller.hold_action)
+    scene.simulation.tick(500)
+    assert np.linalg.norm(scene.site("right_tcp") - before) < 1e-4
+
+
+def test_every_shipped_file_is_valid_and_builds(alone):
+    files = Catalogue().files("controllers")
+    assert len(files) >= 4
+    for path in files:
+        load_model(WholeBodyIKConfig, path)
+        robot = path.stem.removesuffix("_whole_body_ik")
+        config = load_composite_controller_config("WHOLE_BODY_IK", robot)
+        assert config["type"] == "WHOLE_BODY_IK"
+        assert config["frame"]
+
+
+def test_a_robot_without_a_file_gets_hands_and_held_feet():
+    robot = load_robot("gr1_free_body")
+    config = load_composite_controller_config("WHOLE_BODY_IK", robot)
+    names = [frame["name"] for frame in config["frame"]]
+    assert {"right_hand", "left_hand"} <= set(names)
+    assert {held["frame"] for held in config["held"]} == {"right_foot", "left_foot"}
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"solve_hertz": 100}, "Did you mean 'solve_hz'"),
+        ({"frame": []}, "at least 1 item"),
+        ({"frame": [{"name": "a"}]}, "'frame' is needed"),
+        ({"frame": [{"name": "a", "frame": "eef", "kind": "poze"}]}, "'pose'"),
+        ({"input_ref_frame": "eef"}, "needs input_type 'delta'"),
+    ],
+)
+def test_faulty_configs_are_refused_in_words(alone, changes, message):
+    with pytest.raises(ConfigError, match=message):
+        alone("Panda", **changes)
+
+
+def test_unknown_names_get_suggestions(alone):
+    frame = {"name": "hand", "frame": "right_tpc", "kind": "pose"}
+    with pytest.raises(UnknownNameError, match="Did you mean 'right_tcp'"):
+        alone("Panda", frame=[frame])
+    with pytest.raises(UnknownNameError, match="Did you mean 'legs'"):
+        alone("GR1", locked=["leg"])
+    with pytest.raises(UnknownNameError, match="Did you mean 'WHOLE_BODY_IK'"):
+        load_composite_controller_config("WHOLE_BODY_IKK", "Panda")
+    with pytest.raises(ConfigError, match="needs a robot"):
+        load_composite_controller_config("WHOLE_BODY_IK")
+    with pytest.raises(ConfigError, match="needs a key 'type'"):
+        load_composite_controller_config({"frame": []})
+
+
+def test_a_composite_of_ones_own_can_be_registered(alone):
+    made = []
+
+    def build(config, state):
+        made.append(config["type"])
+        return build_composite_controller(config | {"type": "WHOLE_BODY_IK"}, state)
+
+    register_composite(
+        "MY_OWN",
+        build,
+        family="whole_body_ik",
+        default=lambda _: {},
+    )
+    assert "MY_OWN" in composite_names()
+    assert alone("Panda", "my_own").act({}, 0.1)["reached"]
+    assert made == ["MY_OWN"]
+    with pytest.raises(ConfigError, match="exists already"):
+        register_composite("my_own", build, family="x", default=lambda _: {})
