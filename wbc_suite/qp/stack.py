@@ -301,10 +301,23 @@ class TaskStack:
         return self._levels[k].write(
             self.configuration,
             dt,
-            damping=self._levels[k - 1].mu if k else self.damping,
+            damping=self._levels[k - 1].mu if k else self._first_damping(),
             curvature=self.curvature_damping,
             bias=None if k else self._bias,
         )
+
+    def _first_damping(self) -> float:
+        """Return the first level's damping without its tasks' part.
+
+        Rows that press bend as tasks do: the curvature of `nu . A(q)` is bounded by
+        the multipliers of the last tick times the longest arms.
+        """
+        problem = self._problem
+        if not len(problem.rows) or not self._solved:
+            return self.damping
+        pressed = np.abs(self._solved[0][2][problem.nv :])
+        longest = np.abs(problem.rows).max(axis=1)
+        return self.damping + self.curvature_damping * float(pressed @ longest)
 
     def _optimum(
         self, level: Level, problem: Problem, solver: QpSolver, side: Indices
