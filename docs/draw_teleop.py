@@ -17,7 +17,6 @@ from wbc_suite.viewers.teleop_session import TeleopSession
 
 FILE = Path(__file__).parent / "images" / "teleop.jpg"
 RATE = 100.0  # Hz
-SIZE = {"width": 1280, "height": 800}
 FLAGS = ["--no-sandbox", "--enable-unsafe-swiftshader", "--use-angle=swiftshader"]
 MOVES = {"right_hand": (0.10, -0.06, 0.14), "left_hand": (0.04, 0.04, 0.08)}
 PULL = np.array([0.15, -0.55, 0.10])  # m, of the right hand: further than it reaches
@@ -36,7 +35,7 @@ def main() -> None:
     with sync_playwright() as playwright:
         chromium = shutil.which("chromium")
         browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
-        tab = browser.new_page(viewport=SIZE)
+        tab = browser.new_page(viewport={"width": 1280, "height": 800})
         tab.goto(page.site.url)
         time.sleep(20.0)  # the environment's light comes last
         tab.get_by_text("Software WebGL").locator("xpath=../..").locator(

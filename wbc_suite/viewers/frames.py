@@ -52,11 +52,8 @@ def frame_readers(
         ConfigError: If the controller takes no absolute targets in the world.
     """
     config = getattr(controller, "config", None)
-    taken = (
-        getattr(config, "input_type", None),
-        getattr(config, "input_ref_frame", None),
-    )
-    if taken != ("absolute", "world"):
+    taken = [getattr(config, key, None) for key in ("input_type", "input_ref_frame")]
+    if config is None or taken != ["absolute", "world"]:
         raise ConfigError(
             "Teleoperation needs a whole-body controller with input_type 'absolute' "
             f"and input_ref_frame 'world', not {type(controller).__name__} with "

@@ -3,8 +3,9 @@
 import threading
 
 import numpy as np
+from numpy.typing import NDArray
 
-from wbc_suite.typing import Matrix, Vector
+from wbc_suite.typing import Vector
 
 __all__ = ["History"]
 
@@ -30,7 +31,7 @@ class History:
         """Forget everything."""
         self._count = 0
 
-    def rows(self) -> Matrix:
+    def rows(self) -> NDArray[np.float64]:
         """Return a copy of what is held, shape (length, columns), oldest first."""
         with self._lock:
             if self._count <= len(self._rows):

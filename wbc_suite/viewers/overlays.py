@@ -131,7 +131,9 @@ def _places(model: mujoco.MjModel) -> list[tuple[int, str, Vector, Vector]]:
     """Return body, label, position and quaternion of every link's and site's frame."""
     here: Vector = np.zeros(3)
     upright: Vector = np.array([1.0, 0.0, 0.0, 0.0])
-    places = [(body, "frame", here, upright) for body in range(1, model.nbody)]
+    places: list[tuple[int, str, Vector, Vector]] = [
+        (body, "frame", here, upright) for body in range(1, model.nbody)
+    ]
     for site in range(model.nsite):
         body, label = int(model.site_bodyid[site]), f"frame_{model.site(site).name}"
         places.append((body, label, model.site_pos[site], model.site_quat[site]))
