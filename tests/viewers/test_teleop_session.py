@@ -126,9 +126,11 @@ def test_reset_brings_hands_and_targets_back(session):
     hand = session.snapshot.limbs["right_hand"].target
     session.grab("right_hand", ALICE, hand)
     session.drag("right_hand", ALICE, shifted(hand, 0, 0, 0.3))
+    session.set_gripper("right_gripper", 0, 1.0)
     ticks(session, 10)
     session.reset()
     session.tick()
+    assert session.env.actions[-1][12:].tolist() == [-1, -1]
     status = session.snapshot.limbs["right_hand"]
     np.testing.assert_allclose(status.target.translation, hand.translation, atol=1e-9)
     assert session.snapshot.epoch == 1
@@ -170,6 +172,36 @@ def test_loop_runs_in_its_own_thread_and_stops(session):
     session.stop()
     assert session.snapshot.tick >= 5
     assert "teleop" not in [t.name for t in threading.enumerate()]
+
+
+def test_physics_that_gives_up_starts_again_and_says_so(session):
+    step = session.env.step
+
+    def broken(action):
+        *rest, _ = step(action)
+        return *rest, {"physics_error": "unstable"}
+
+    session.env.step = broken
+    session.tick()
+    session.env.step = step
+    assert session.snapshot.epoch == 1
+    assert "unstable" in session.snapshot.message
+    session.tick()
+    assert error(session) < 1e-9
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_error_in_the_loop_ends_it_and_says_so(session):
+    def broken(_):
+        raise RuntimeError("no more")
+
+    session.env.step = broken
+    session.start()
+    deadline = time.monotonic() + 10
+    while not session.snapshot.message and time.monotonic() < deadline:
+        time.sleep(0.01)
+    session.stop()
+    assert "Stopped by an error" in session.snapshot.message
 
 
 def test_controller_that_takes_no_world_targets_is_refused():

@@ -27,6 +27,7 @@ def status(**changes):
             "right elbow pitch is at its upper limit",
         ),
         ("joint limit: arm_1_joint", "arm 1 is at its limit"),
+        ("velocity limit: waist_yaw_joint (lower)", "waist yaw is at its top speed"),
         ("self-collision: right_forearm - torso", "right forearm would touch torso"),
         ("conflict: left_hand", "it pulls against left hand"),
         ("something new", "something new"),
@@ -47,7 +48,7 @@ def test_turn_that_is_missing_is_told_in_degrees():
 
 
 def test_nothing_is_explained_when_all_is_well():
-    on_its_way = ("velocity limit: a (upper)", "acceleration limit: b (lower)")
+    on_its_way = ("moving", "acceleration limit: b (lower)")
     assert explain(status(reasons=on_its_way)) == ""
     assert explain(status(reasons=("moving",))) == ""
     assert explain(status(position_error=0.002, reasons=("out of reach",))) == ""

@@ -52,6 +52,8 @@ class TeleopPanel:
         self._server, self._session, self._gizmos = server, session, gizmos
         self._box = box
         self._colours = colours
+        self._epoch = session.snapshot.epoch
+        self._closing: list[viser.GuiSliderHandle[float]] = []
         self._status = server.gui.add_html("")
         self._shown = ""
         self._add_buttons()
@@ -114,6 +116,10 @@ class TeleopPanel:
         limbs = _limbs_html(snapshot, self._session.limbs, self._colours)
         if limbs != self._limbs_shown:
             self._limbs.content = self._limbs_shown = limbs
+        if snapshot.epoch != self._epoch:  # a reset opens the grippers
+            self._epoch = snapshot.epoch
+            for slider in self._closing:
+                slider.value = -1.0
         if self._buttons.options != _buttons(snapshot.paused):
             self._buttons.options = _buttons(snapshot.paused)
 
@@ -181,13 +187,16 @@ class TeleopPanel:
                     for label, value in zip(labels, start, strict=True)
                 ]
 
-        def move_all(_: object) -> None:
+        def move_all(event: "viser.GuiEvent[viser.GuiSliderHandle[float]]") -> None:
+            if event.client is None:  # a reset moved it
+                return
             for index in range(len(labels)):
                 self._session.set_gripper(name, index, whole.value)
             for finger in fingers:
                 finger.value = whole.value
 
         whole.on_update(move_all)
+        self._closing.extend([whole, *fingers])
         for index, finger in enumerate(fingers):
             finger.on_update(self._mover(name, index, finger))
 

@@ -5,7 +5,6 @@ It knows nothing of browsers. Whoever has an input calls `grab`, `drag`, `releas
 a short lock or read one reference, so that the loop never waits for a page.
 """
 
-import logging
 import threading
 import time
 from collections.abc import Callable
@@ -19,15 +18,13 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.devices import Clutch
-from wbc_suite.errors import UnknownNameError, WbcError
+from wbc_suite.errors import UnknownNameError
 from wbc_suite.typing import Matrix, Vector
 from wbc_suite.viewers.frames import FrameReader, frame_readers
 from wbc_suite.viewers.history import History
 from wbc_suite.viewers.limb import Limb, Ownership
 
 __all__ = ["LimbStatus", "Snapshot", "TeleopSession"]
-
-logger = logging.getLogger(__name__)
 
 WINDOW = 600  # rows of history: 12 s at 50 Hz
 LEAD_POSITION = 0.03  # m; a released target that is further than this from its limb ...
@@ -148,11 +145,7 @@ class TeleopSession:
             name: Limb(name, reader.kind, Clutch(self._measure(reader)), Ownership())
             for name, reader in self._readers.items()
         }
-        self.grippers: dict[str, Vector] = {
-            s.name: np.array(s.low, dtype=np.float64)
-            for s in self._layout.slices
-            if s.kind == "gripper"
-        }
+        self.grippers = self._open_grippers()
         self.gripper_labels = {
             s.name: tuple(s.labels) for s in self._layout.slices if s.kind == "gripper"
         }
@@ -258,15 +251,18 @@ class TeleopSession:
         return self._latencies.rows()[:, 0]
 
     def _run(self) -> None:
-        due = self._clock()
-        while not self._stopping.is_set():
-            try:
-                self.tick()
-            except WbcError as error:
-                logger.exception("The teleoperation stopped.")
-                self._message = f"Stopped: {error}"
+        try:
+            self._tick_on_time()
+        finally:
+            if not self._stopping.is_set():  # an error ends the loop; people must know
+                self._message = "Stopped by an error: see the terminal."
                 self._paused = True
                 self._publish()
+
+    def _tick_on_time(self) -> None:
+        due = self._clock()
+        while not self._stopping.is_set():
+            self.tick()
             due += self.period
             wait = due - self._clock()
             if wait > 0:
@@ -326,9 +322,19 @@ class TeleopSession:
         with self._lock:
             for name, reader in self._readers.items():
                 self.limbs[name].clutch.place(self._measure(reader))
+            self.grippers = self._open_grippers()
+            self._let_go.clear()
         self._message, self._success, self._ik = "", False, {}
         self._begun = float("nan")
         self._epoch += 1
+
+    def _open_grippers(self) -> dict[str, Vector]:
+        """Return the least value, which is open, of every gripper's synergies."""
+        return {
+            s.name: np.array(s.low, dtype=np.float64)
+            for s in self._layout.slices
+            if s.kind == "gripper"
+        }
 
     # What is shown.
 

@@ -8,10 +8,11 @@ from wbc_suite.viewers.teleop_session import LimbStatus
 
 __all__ = ["describe_reason", "explain", "plain"]
 
-_ON_ITS_WAY = ("moving", "acceleration limit", "velocity limit")
-"""How reasons begin that time alone will mend."""
+_ON_ITS_WAY = ("moving", "acceleration limit")
+"""How reasons begin that are gone in a moment."""
 
 _JOINT_LIMIT = re.compile(r"joint limit: (?P<joint>.+?)(?: \((?P<side>\w+)\))?$")
+_SPEED_LIMIT = re.compile(r"velocity limit: (?P<joint>.+?)(?: \(\w+\))?$")
 _COLLISION = re.compile(r"self-collision: (?P<one>.+?) - (?P<other>.+)$")
 _CONFLICT = re.compile(r"conflict: (?P<other>.+)$")
 
@@ -26,17 +27,13 @@ def describe_reason(reason: str) -> str:
     if match := _JOINT_LIMIT.match(reason):
         side = {"upper": " upper", "lower": " lower"}.get(match["side"] or "", "")
         return f"{plain(match['joint'])} is at its{side} limit"
+    if match := _SPEED_LIMIT.match(reason):
+        return f"{plain(match['joint'])} is at its top speed"
     if match := _COLLISION.match(reason):
         return f"{plain(match['one'])} would touch {plain(match['other'])}"
     if match := _CONFLICT.match(reason):
         return f"it pulls against {plain(match['other'])}"
     return reason
-
-
-def stands_still(status: LimbStatus) -> bool:
-    """Whether a limb will stay short of its target, if nothing changes."""
-    lasting = [r for r in status.reasons if not r.startswith(_ON_ITS_WAY)]
-    return not status.reached and (bool(lasting) or not status.reasons)
 
 
 def explain(status: LimbStatus, *, at_most: int = 3) -> str:
@@ -47,10 +44,10 @@ def explain(status: LimbStatus, *, at_most: int = 3) -> str:
         at_most: How many reasons to name.
     """
     short = _shortfall(status)
-    if not short or not stands_still(status):
+    reasons = [r for r in status.reasons if not r.startswith(_ON_ITS_WAY)]
+    if status.reached or not short or (status.reasons and not reasons):
         return ""
-    lasting = [r for r in status.reasons if not r.startswith(_ON_ITS_WAY)]
-    parts = [describe_reason(reason) for reason in lasting[:at_most]]
+    parts = [describe_reason(reason) for reason in reasons[:at_most]]
     return f"{short}: {', '.join(parts) or 'out of reach'}"
 
 
