@@ -88,3 +88,28 @@ def test_commands_keep_all_limits(arm, rng):
         arm.update(arm.integrate(solution.dq))
         assert (arm.q <= model.upperPositionLimit + 1e-9).all()
         assert (arm.q >= model.lowerPositionLimit - 1e-9).all()
+
+
+def test_reset_makes_a_stack_as_good_as_new(humanoid, rng):
+    q, dt = humanoid.q.copy(), 2e-2
+    stack = humanoid_stack(humanoid)
+    start = [task.target for task in stack.tasks[:4]]
+
+    def answers():
+        humanoid.update(q)
+        for task, target in zip(stack.tasks[:4], start, strict=True):
+            task.set_target(target)
+        move_target(stack.tasks[2], [2.0, 1.0, 0.0])
+        found = []
+        for _ in range(50):
+            solution = stack.solve(dt)
+            humanoid.update(humanoid.integrate(solution.dq))
+            found.append(solution.v)
+        return np.array(found)
+
+    first = answers()
+    for _ in range(20):
+        move_target(stack.tasks[int(rng.integers(4))], rng.normal(size=3))
+        humanoid.update(humanoid.integrate(stack.solve(dt).dq))
+    stack.reset()
+    np.testing.assert_array_equal(answers(), first)

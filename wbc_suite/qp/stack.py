@@ -151,8 +151,10 @@ class TaskStack:
             shape = (self.configuration.nv,)
             self.v_previous[:] = check_array("TaskStack.reset: v", v, shape)
         self._solver = self._solver.fresh()
-        self._lower.clear()
-        self._decided.clear()
+        for memory in (self._lower, self._decided, self._solved):
+            memory.clear()
+        for side in self._sides:
+            side[:] = 0
         if self._escape is not None:
             self._escape.reset()
 
