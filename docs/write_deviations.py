@@ -23,6 +23,7 @@ def section(path: Path) -> str:
     if isinstance(component, Component):
         header, links = component.component, component.links
         title, source = header.title or header.name, header.source
+        source += f" ({header.license})" if source else ""
     else:
         header, links, source = component.assembly, (), ""
         title = header.title or header.name
@@ -34,7 +35,7 @@ def section(path: Path) -> str:
     ]
     if not lines:
         return ""
-    about = f"Source: {source} ({header.license}).\n\n" if source else ""
+    about = f"Source: {source}.\n\n" if source else ""
     return f"\n## {title} (`{path.stem}`)\n\n{about}" + "\n".join(lines) + "\n"
 
 

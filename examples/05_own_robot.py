@@ -50,15 +50,22 @@ env = wbc_suite.make("Lift", robots=robot, controller_configs="WHOLE_BODY_IK")
 env.reset(seed=0)
 print(env.action_layout)
 
+
+def move_for(seconds: float, goals: dict) -> dict:
+    """Keep the goals for a while; return what the robot says about its hand."""
+    action = env.action_layout.pack(goals)
+    info = {}
+    for _ in range(round(20 * seconds)):
+        *_, info = env.step(action)
+    return info["ik"]["frames"]["right_hand"]
+
+
 goals = env.action_layout.unpack(env.hold_action)
 goals["right_hand"][:3] += [0.10, 0.0, -0.15]  # m, within the plane it can move in
-for _ in range(60):
-    *_, info = env.step(env.action_layout.pack(goals))
-hand = info["ik"]["frames"]["right_hand"]
+hand = move_for(3.0, goals)
 print(f"the hand is {1e3 * hand['position_error']:.2f} mm from its goal")
-print("a step to the side:", end=" ")
-goals["right_hand"][1] += 0.10
-for _ in range(60):
-    *_, info = env.step(env.action_layout.pack(goals))
-hand = info["ik"]["frames"]["right_hand"]
-print(f"{1e3 * hand['position_error']:.0f} mm short;", "; ".join(hand["reasons"]))
+
+goals["right_hand"][1] += 0.10  # to the side, where it cannot go
+hand = move_for(3.0, goals)
+reasons = "; ".join(hand["reasons"])
+print(f"a step to the side: {1e3 * hand['position_error']:.0f} mm short; {reasons}")

@@ -75,7 +75,7 @@ class Lift:
         """Add table, cube and cameras."""
         add_table(spec, self.config.table)
         half = float(np.mean(self.config.cube.half_size))
-        add_box(spec, "cube", half_size=(half,) * 3, rgba=self.config.cube.color)
+        add_box(spec, "cube", half_size=(half, half, half), rgba=self.config.cube.color)
         x, y, z = self.config.table.center
         middle = (x - 0.15, y, z + 0.25)
         add_camera(spec, "frontview", (x + 1.9, y, z + 0.75), middle)

@@ -240,7 +240,7 @@ class RobotEnv(gymnasium.Env[Observation, Vector]):
             observation["object-state"] = np.concatenate(list(objects.values()))
         return observation
 
-    def _observation_space(self) -> gymnasium.spaces.Dict:
+    def _observation_space(self) -> gymnasium.Space[Any]:
         return gymnasium.spaces.Dict(
             {
                 key: gymnasium.spaces.Box(-bound, bound, value.shape, np.float64)

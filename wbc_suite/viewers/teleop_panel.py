@@ -125,7 +125,7 @@ class TeleopPanel:
 
     def update_plots(self) -> None:
         """Draw the last seconds of errors and solve times."""
-        rows = self._session.history.rows()
+        rows = np.asarray(self._session.history.rows(), dtype=np.float64)
         if len(rows) < 2:
             return
         ago = rows[:, 0] - rows[-1, 0]

@@ -54,6 +54,7 @@ def contact_forces(
     Returns:
         Contact forces, shape (m,), N and N m.
     """
+    f: Vector = np.zeros(len(weights))
     kept = np.ones(len(weights))
     normal = np.array([rows.start + 2 for rows in contacts])
     for _ in contacts:
