@@ -209,6 +209,41 @@ def test_groups_end_effector_and_ready_are_guessed(features):
     assert robot.keyframe("ready")["left_shoulder_1"] == 0.25  # follows the elbow
 
 
+EXAMPLE = Path(__file__).parents[2] / "examples" / "robots" / "six_axis_arm.urdf"
+
+
+def test_an_only_arm_is_the_right_one_and_its_tool_is_found():
+    robot = wbc_suite.load_robot(EXAMPLE)
+    assert set(robot.groups) == {"right_arm", "right_gripper"}
+    assert len(robot.groups["right_arm"]) == 6
+    assert robot.groups["right_gripper"] == ("left_finger_joint",)
+    roles = {frame.role: frame.name for frame in robot.frames}
+    assert roles == {"eef": "right_eef", "tcp": "right_tcp", "other": "tcp"}
+    tool, tcp = robot.frame("tcp"), robot.frame("right_tcp")
+    assert (tcp.link, tcp.pos, tcp.quat) == (tool.link, tool.pos, tool.quat)
+
+
+LIMBS = {
+    "LHipYaw RHipYaw LShoulderPitch RShoulderPitch HeadYaw": (
+        "legs left_arm right_arm head"
+    ),
+    "fl_haa fr_haa hl_haa hr_haa": "legs",
+    "torso_lift arm_left_1 arm_right_1": "torso left_arm right_arm",
+    "joint1": "right_arm",
+    "arm_1 arm_2": "arm_1 arm_2",
+    "front_left_wheel front_right_wheel": "base",
+}
+
+
+@pytest.mark.parametrize(("joints", "groups"), LIMBS.items())
+def test_limbs_are_guessed_from_words(tmp_path, joints, groups):
+    names = joints.split()
+    bodies = "".join(f'<link name="b{i}">{BODY}</link>' for i in range(len(names)))
+    hung = "".join(joint(name, "base", f"b{i}") for i, name in enumerate(names))
+    robot = read_urdf(write(tmp_path, one_arm(bodies, hung)))
+    assert set(robot.groups) == set(groups.split())
+
+
 @pytest.mark.parametrize(("name", "root"), CASES)
 def test_our_own_robots_come_back(name, root, tmp_path):
     robot = wbc_suite.load_robot(name, root=root)

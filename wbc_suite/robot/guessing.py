@@ -42,16 +42,21 @@ PAIR_OF = {
 """`fl` and `lf` are the front left leg of a quadruped."""
 ENDS = {"front": "front", "fore": "front", "rear": "rear", "hind": "rear"}
 
-END_OF = {"arm": "eef", "leg": "foot", "head": "head", "torso": "torso"}
+END_OF = {
+    "arm": "eef",
+    "gripper": "tcp",
+    "leg": "foot",
+    "head": "head",
+    "torso": "torso",
+}
 """Role of the frame at the end of a limb."""
 
-ROLE_WORDS = {
-    "imu": "imu gyro accelerometer",
-    "eef": "eef ee effector",
-    "tcp": "tcp tool flange grasp grasping",
-    "foot": "foot sole toe",
-    "tip": "tip",
+TELLING = {
+    "arm": {"eef", "ee", "effector", "tcp", "tool", "flange", "grasp", "grasping"},
+    "gripper": {"tcp", "grasp", "grasping", "tool"},
+    "leg": {"foot", "sole", "toe"},
 }
+"""Words of frames and links that mark the end of a limb."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -98,9 +103,10 @@ def guess_limbs(links: Sequence[Link]) -> tuple[Limb, ...]:
         kind = next((KIND_OF[w] for w in words if w in KIND_OF), None)
         kind = kind or _inherited_kind(inherited, branches=parent in branching)
         limb_goes_on = inherited in ("arm", "leg", "gripper")
-        sides[link.name] = _side(words, pairs=kind == "leg") or (
-            sides[str(parent)] if limb_goes_on else ""
-        )
+        side = sides[str(parent)] if limb_goes_on else ""
+        own = _side(words, pairs=kind == "leg")
+        fingers = kind == "gripper" and limb_goes_on  # "left finger" of a right hand
+        sides[link.name] = side if fingers else own or side
         kinds[link.name] = kind
         tops[link.name] = tops[str(parent)] if inherited == kind else link.name
     return tuple(_collect(links, kinds, sides, tops))
@@ -118,8 +124,14 @@ def _collect(
     sides: dict[str, str],
     tops: dict[str, str],
 ) -> Iterable[Limb]:
-    """Gather the links of each limb; arms without a side are numbered."""
-    arms = [top for name, top in tops.items() if kinds[name] == "arm"]
+    """Gather the links of each limb; several arms without a side are numbered.
+
+    An only arm is the right one, as everywhere in this package.
+    """
+    arms = {top for name, top in tops.items() if kinds[name] == "arm"}
+    grippers = [name for name, kind in kinds.items() if kind == "gripper"]
+    if len(arms) == 1 and not any(sides[name] for name in (*arms, *grippers)):
+        sides = dict.fromkeys(sides, "right")
     members: dict[str, list[Link]] = {}
     about: dict[str, tuple[str, str]] = {}
     for link in links:
@@ -129,7 +141,7 @@ def _collect(
         side = sides[link.name] if kind in ("arm", "gripper") else ""
         name = "legs" if kind == "leg" else "_".join(filter(None, (side, kind)))
         if kind == "arm" and not side:
-            several = list(dict.fromkeys(a for a in arms if not sides[a]))
+            several = [x.name for x in links if x.name in arms and not sides[x.name]]
             number = several.index(tops[link.name]) + 1 if len(several) > 1 else 0
             name += f"_{number}" if number else ""
         members.setdefault(name, []).append(link)
@@ -146,9 +158,13 @@ def guess_frames(
     given: Sequence[Frame],
     names: NameTable,
 ) -> tuple[Frame, ...]:
-    """Place `eef` at the end of arms, and `foot`, `head` and `torso` frames."""
-    found: list[Frame] = []
-    known = {frame.name for frame in given}
+    """Return the given frames, and `eef`, `foot`, `head`, `torso` at the limbs' ends.
+
+    There is one for each end: a given frame of the right name is taken, and a given
+    frame or link with a telling word says where it sits. A gripper has a `tcp` where a
+    given frame marks the grasp.
+    """
+    frames = {frame.name: frame for frame in given}
     for limb in limbs:
         role = END_OF.get(limb.kind)
         for tip in _tips(links, limb) if role else ():
@@ -156,31 +172,24 @@ def guess_frames(
             if limb.kind == "leg":
                 side = _side(_words(tip.name), pairs=True)
                 name = "_".join(filter(None, (side, role)))
-            if name in known or _marked(links, tip, given, str(role)):
-                continue
             placed = _placed(links, limb, tip, given)
-            fields = {"name": names.take(name, "frame"), "role": role, **placed}
-            found.append(Frame.model_validate(fields))
-    return tuple(found)
-
-
-def _marked(
-    links: Sequence[Link], tip: Link, given: Sequence[Frame], role: str
-) -> bool:
-    """Tell whether the file itself marks the end of this limb."""
-    rigid = rigid_bodies(tuple(links))
-    return any(rigid[f.link] == tip.name and f.role == role for f in given)
+            if name in frames:
+                frames[name] = frames[name].model_copy(update={"role": role})
+            elif placed is not None:
+                name = names.take(name, "frame")
+                fields = {"name": name, "role": role, **placed}
+                frames[name] = Frame.model_validate(fields)
+    return tuple(frames.values())
 
 
 def guess_role(name: str) -> str:
-    """Return the role of a frame from the words in its name."""
+    """Return the role of a frame in the file, when its name leaves no doubt."""
+    words = _words(name)
     if name in ("head", "torso", "base"):
         return name
-    words = set(_words(name))
-    for role, telling in ROLE_WORDS.items():
-        if words & set(telling.split()):
-            return role
-    return "other"
+    if words and words[-1] in ("tip", "foot"):
+        return words[-1]
+    return "imu" if "imu" in words else "other"
 
 
 def guess_ready(links: Sequence[Link]) -> dict[str, float]:
@@ -247,17 +256,25 @@ def _depth(name: str | None, above: dict[str, str | None]) -> int:
 
 def _placed(
     links: Sequence[Link], limb: Limb, tip: Link, given: Sequence[Frame]
-) -> dict[str, Any]:
-    """Return where a guessed frame sits: at a telling frame or link, or at the tip."""
+) -> dict[str, Any] | None:
+    """Return where a guessed frame sits: at a telling frame or link, or at the tip.
+
+    That of a gripper sits on its palm, and is left out where nothing tells.
+    """
     rigid = rigid_bodies(tuple(links))
-    telling = {"arm": ("eef", "tcp"), "leg": ("foot",)}.get(limb.kind, ())
+    if limb.kind == "gripper":
+        palm = rigid[str(limb.links[0].parent)]
+        tip = next(link for link in links if link.name == palm)
+    telling = TELLING.get(limb.kind, set[str]())
     for frame in given:
-        if rigid[frame.link] == tip.name and frame.role in telling:
+        if rigid[frame.link] == tip.name and telling.intersection(_words(frame.name)):
             return {"link": frame.link, "pos": frame.pos, "quat": frame.quat}
     fixed = [link for link in links if rigid[link.name] == tip.name]
     for link in fixed:
-        if guess_role(link.name) in telling:
+        if telling.intersection(_words(link.name)):
             return {"link": link.name}
+    if limb.kind == "gripper":
+        return None
     if limb.kind == "arm":
         carriers = {link.parent for link in links if link.joint is not None}
         palms = [link for link in fixed if link.name in carriers]

@@ -72,14 +72,13 @@ def describe_import(
         for frame in frames
     ]
     limbs = guess_limbs(checked)
-    guessed = guess_frames(checked, limbs, given, names)
     keyframes = others.pop("keyframes", {})
     data: dict[str, Any] = {
         "name": _robot_name(name),
         "source": f"imported from {source.name}",
         "root": root,
         "links": checked,
-        "frames": (*given, *guessed),
+        "frames": guess_frames(checked, limbs, given, names),
         "groups": {limb.name: limb.joints for limb in limbs if limb.joints},
         "keyframes": {"ready": guess_ready(checked)} | keyframes,
     }
