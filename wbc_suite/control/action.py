@@ -153,7 +153,12 @@ class ActionLayout:
             ActionError: If the shape or type is wrong or a value is not finite; names
                 the index and the slice.
         """
-        array = np.asarray(action)
+        try:
+            array = np.asarray(action)
+        except ValueError as error:  # rows of different lengths
+            raise ActionError(f"An action is a flat vector, not {action!r:.60}.") from (
+                error
+            )
         if array.dtype.kind not in "fiu":
             raise ActionError(
                 f"An action holds real numbers, not {array.dtype} ({action!r:.60})."

@@ -1,5 +1,6 @@
 """The environment: robots, controllers, a benchmark and physics behind Gymnasium."""
 
+import copy
 from typing import Any
 
 import gymnasium
@@ -56,6 +57,7 @@ class RobotEnv(gymnasium.Env[Observation, Vector]):
 
     def __init__(self, benchmark: str = "Lift", **arguments: Any) -> None:
         self.config: EnvConfig = parse_env_config(arguments)
+        self._given = benchmark, dict(arguments)
         self.benchmark = load_benchmark(benchmark)
         self.render_mode = self.config.render_mode
         self.robots = self._place_robots()
@@ -80,10 +82,15 @@ class RobotEnv(gymnasium.Env[Observation, Vector]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Start an episode; the same seed gives the same episode."""
-        super().reset(seed=seed)
+        """Start an episode; the same seed gives the same episode.
+
+        Raises:
+            ConfigError: If the seed is no whole number from 0 on, or there are options;
+                then nothing has changed.
+        """
         if options:
-            raise ConfigError(f"reset: there are no options, got {sorted(options)}.")
+            raise ConfigError(f"reset: there are no options, got {options!r:.60}.")
+        super().reset(seed=_checked_seed(seed))
         self._start(self.np_random)
         self._observation = self._observe()
         return _copied(self._observation), self._info(0)
@@ -121,6 +128,13 @@ class RobotEnv(gymnasium.Env[Observation, Vector]):
             self._steps >= self.horizon,
             info,
         )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copy by pickle and deepcopy: the same arguments and random numbers to come.
+
+        The copy stands at a start; call `reset`, as after `make`.
+        """
+        return _rebuild, (*self._given, self._np_random, self._np_random_seed)
 
     @property
     def hold_action(self) -> Vector:
@@ -306,6 +320,25 @@ def _noisy(
             value = moved[name] + noise.magnitude * draw
             moved[name] = float(np.clip(value, low, high))
     return moved
+
+
+def _rebuild(
+    benchmark: str,
+    arguments: dict[str, Any],
+    rng: np.random.Generator | None,
+    seed: int | None,
+) -> RobotEnv:
+    env = RobotEnv(benchmark, **arguments)
+    env._np_random, env._np_random_seed = copy.deepcopy(rng), seed
+    return env
+
+
+def _checked_seed(seed: object) -> int | None:
+    if seed is None:
+        return None
+    if not isinstance(seed, int | np.integer) or isinstance(seed, bool) or seed < 0:
+        raise ConfigError(f"reset: a seed is a whole number from 0 on, not {seed!r}.")
+    return int(seed)
 
 
 def _copied(observation: Observation) -> Observation:

@@ -111,6 +111,7 @@ class Simulation:
             ("QVEL", data.qvel),
             ("QFRC_APPLIED", data.qfrc_applied),
             ("XFRC_APPLIED", data.xfrc_applied),
+            ("TIME", data.time),
         ):
             if not np.isfinite(values).all():
                 raise PhysicsError(
