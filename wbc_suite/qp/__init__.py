@@ -22,6 +22,7 @@ from wbc_suite.qp.report import TaskReport
 from wbc_suite.qp.self_collision_limit import SelfCollisionLimit
 from wbc_suite.qp.solution import ActiveLimit, Fallback, Solution
 from wbc_suite.qp.stack import TaskStack
+from wbc_suite.qp.support_limit import Sole, SupportLimit
 from wbc_suite.qp.task import DiagonalTask, RowTask, Task
 from wbc_suite.qp.velocity_limit import VelocityLimit
 
@@ -48,7 +49,9 @@ __all__ = [
     "RowLimit",
     "RowTask",
     "SelfCollisionLimit",
+    "Sole",
     "Solution",
+    "SupportLimit",
     "Task",
     "TaskReport",
     "TaskStack",

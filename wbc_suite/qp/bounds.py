@@ -19,6 +19,7 @@ class LimitKind(IntEnum):
     ACCELERATION = 3
     SELF_COLLISION = 4
     EQUALITY = 5
+    BALANCE = 6
 
 
 @numba.njit(cache=True, nogil=True)

@@ -7,6 +7,7 @@ import numpy as np
 
 from wbc_suite.kinematics import Configuration
 from wbc_suite.kinematics.configuration import named_joints
+from wbc_suite.qp.bounds import LimitKind
 from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["BoxLimit", "JointBounds", "Limit", "RowLimit"]
@@ -67,9 +68,11 @@ class RowLimit(Limit):
 
     Attributes:
         dim: Number of rows.
+        kind: What its rows are called in reports.
     """
 
     dim: int
+    kind: LimitKind = LimitKind.SELF_COLLISION
 
     @abstractmethod
     def bind(self, configuration: Configuration) -> None:

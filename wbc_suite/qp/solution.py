@@ -48,7 +48,7 @@ class ActiveLimit:
 
     def __str__(self) -> str:
         words = self.kind.name.lower().replace("_", "-")
-        if self.kind is LimitKind.SELF_COLLISION:
+        if self.kind in (LimitKind.SELF_COLLISION, LimitKind.BALANCE):
             return f"{words}: {self.name}"
         words = "joint" if self.kind is LimitKind.POSITION else words
         return f"{words} limit: {self.name} ({self.side})"
@@ -62,13 +62,13 @@ class Pressure:
         multipliers: One per velocity, then one per row; positive at an upper bound.
         kinds: The `LimitKind` of each lower and each upper bound, shape (2, nv).
         names: Names of the velocities.
-        rows: Words for the rows that are pressed, by row.
+        rows: Kind and words of the rows that are pressed, by row.
     """
 
     multipliers: Vector
     kinds: Indices
     names: tuple[str, ...]
-    rows: Mapping[int, str]
+    rows: Mapping[int, tuple[LimitKind, str]]
 
     def limits(self) -> tuple[ActiveLimit, ...]:
         """List the limits that are pressed, hardest first."""
@@ -82,7 +82,7 @@ class Pressure:
         if i < nv:
             kind, name = LimitKind(int(self.kinds[int(value > 0.0), i])), self.names[i]
         else:
-            kind, name = LimitKind.SELF_COLLISION, self.rows[i - nv]
+            kind, name = self.rows[i - nv]
         return ActiveLimit(
             name=name,
             side="upper" if value > 0.0 else "lower",

@@ -432,12 +432,12 @@ class TaskStack:
                 names.append(equality.name)
             row += equality.dim
         over = problem.G @ x - problem.h > _TOLERANCE
-        return (*names, *(self._row_label(int(i)) for i in np.flatnonzero(over)))
+        return (*names, *(self._row_label(int(i))[1] for i in np.flatnonzero(over)))
 
-    def _row_label(self, row: int) -> str:
+    def _row_label(self, row: int) -> tuple[LimitKind, str]:
         for limit in self._row_limits:
             if row < limit.dim:
-                return limit.label(row)
+                return limit.kind, limit.label(row)
             row -= limit.dim
         raise IndexError(row)
 
@@ -448,7 +448,7 @@ class TaskStack:
         for multipliers in levels[1:]:
             greater = np.abs(multipliers[:rows]) > np.abs(merged)
             merged = np.where(greater, multipliers[:rows], merged)
-        labels: dict[int, str] = {}
+        labels: dict[int, tuple[LimitKind, str]] = {}
         if self._inequalities:
             pressed = merged[self._problem.nv :].nonzero()[0]
             labels = {int(i): self._row_label(int(i)) for i in pressed}

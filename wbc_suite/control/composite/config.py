@@ -70,10 +70,24 @@ class HeldFrame(FrozenModel):
     Attributes:
         frame: Frame or link of the robot.
         contact: `point` resists forces, `surface` torques as well.
+        sole: Edges of a surface in the frame's axes, m: heel, toes (along x), right,
+            left (along y). With all soles known the robot is kept from tipping over.
     """
 
     frame: Name
     contact: Literal["point", "surface"] = "point"
+    sole: tuple[float, float, float, float] | None = None
+
+    @model_validator(mode="after")
+    def _sole_is_a_rectangle(self) -> "HeldFrame":
+        if self.sole is not None:
+            heel, toes, right, left = self.sole
+            if self.contact != "surface" or not (heel < toes and right < left):
+                raise ValueError(
+                    "'sole' is [heel, toes, right, left] of a 'surface', with heel < "
+                    "toes and right < left"
+                )
+        return self
 
 
 class PostureConfig(FrozenModel):
@@ -103,6 +117,7 @@ class LimitsConfig(FrozenModel):
 
     Attributes:
         position_margin: Distance kept from joint limits, rad or m.
+        positions: Narrower ranges of single joints, rad or m.
         velocity_scale: Factor on the robot's own velocity limits.
         acceleration: Greatest joint acceleration, rad/s^2 or m/s^2.
         base_acceleration: Greatest acceleration of a moving root, m/s^2 and rad/s^2.
@@ -111,9 +126,11 @@ class LimitsConfig(FrozenModel):
         self_collision: Whether links are kept apart.
         collision_pairs: How many of the nearest pairs of links are watched.
         collision_distance: Distance kept between links, m.
+        balance_margin: Distance kept from the edges of the soles, m.
     """
 
     position_margin: NonNegativeFloat = 1e-3
+    positions: dict[Name, tuple[float, float]] = {}
     velocity_scale: float = Field(default=1.0, gt=0.0, le=1.0)
     acceleration: PositiveFloat = 50.0
     base_acceleration: tuple[PositiveFloat, PositiveFloat] = (5.0, 10.0)
@@ -121,6 +138,7 @@ class LimitsConfig(FrozenModel):
     self_collision: bool = True
     collision_pairs: int = Field(default=20, ge=1, le=200)
     collision_distance: PositiveFloat = 0.005
+    balance_margin: NonNegativeFloat = 0.03
 
 
 class WholeBodyIKConfig(FrozenModel):

@@ -17,13 +17,16 @@ from wbc_suite.control.composite.tasks import (
     joint_speeds,
     make_task,
     planar_joints,
+    soles_of,
 )
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp import (
     ComTask,
     FrameTask,
+    Limit,
     PositionLimit,
     PostureTask,
+    SupportLimit,
     TaskStack,
     VelocityLimit,
 )
@@ -43,6 +46,7 @@ NEAR_TIME = 0.5  # s; every second random start lies within this time of the fir
 BLOCKED = 2.0  # s; what it costs that something is in the way
 CLOSE = 0.02  # m and rad; from here on only the targets count
 MET = 1e-7  # m and rad
+INSIDE = 2e-3  # m; how much further from the soles' edges than the controller
 
 
 class GoalSearch:
@@ -70,11 +74,18 @@ class GoalSearch:
         self._tasks = [make_task(frame, unhurried=False) for _, frame in first]
         self._held = [held_equality(held) for held in config.held]
         linear, angular = robot.root.velocity
-        limits = [
-            PositionLimit(margin=2.0 * config.limits.position_margin),
+        limits: list[Limit] = [
+            PositionLimit(
+                margin=2.0 * config.limits.position_margin,
+                joints=config.limits.positions,
+            ),
             VelocityLimit(base_linear=linear, base_angular=angular),
         ]
         self._speeds = joint_speeds(robot, self._configuration)
+        soles = soles_of(config)
+        if soles:
+            margin = config.limits.balance_margin + INSIDE
+            limits.append(SupportLimit(soles, margin=margin))
         self._start = PostureTask(
             NEARBY, costs=_costs(robot), max_speed=HURRY, name="start"
         )

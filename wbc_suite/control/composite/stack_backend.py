@@ -19,12 +19,15 @@ from wbc_suite.qp import (
     LimitKind,
     PostureTask,
     Solution,
+    SupportLimit,
     TaskStack,
 )
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Vector
 
 __all__ = ["StackBackend"]
+
+_ROWS = (LimitKind.SELF_COLLISION, LimitKind.BALANCE)  # of no single joint
 
 
 class StackBackend:
@@ -52,6 +55,7 @@ class StackBackend:
             sideways = FrameEquality(base, directions=("y",), hold_pose=False)
             equalities.append(sideways)
         limits = make_limits(robot, config)
+        self._support = [x for x in limits if isinstance(x, SupportLimit)]
         self._stack = TaskStack(
             self.configuration,
             [*self._tasks, self._posture],
@@ -78,6 +82,8 @@ class StackBackend:
         self.configuration.update(q)
         for held in self._held:
             held.set_target(self.configuration.frame_pose(held.frame))
+        for limit in self._support:
+            limit.reset()
         self._stack.reset()
         self._joint_stack.reset()
 
@@ -113,7 +119,7 @@ class StackBackend:
 
 def _words(solution: Solution) -> tuple[tuple[str | None, str], ...]:
     found = [
-        (None if limit.kind is LimitKind.SELF_COLLISION else limit.name, str(limit))
+        (None if limit.kind in _ROWS else limit.name, str(limit))
         for limit in solution.active
     ]
     found += [(None, f"conflict: {name}") for name in solution.conflicts]

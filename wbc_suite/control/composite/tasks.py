@@ -18,6 +18,8 @@ from wbc_suite.qp import (
     FrameTask,
     Limit,
     PositionLimit,
+    Sole,
+    SupportLimit,
     VelocityLimit,
 )
 from wbc_suite.robot import RobotDescription
@@ -32,6 +34,7 @@ __all__ = [
     "make_limits",
     "make_task",
     "planar_joints",
+    "soles_of",
 ]
 
 LOAD_SAMPLES = 50
@@ -101,7 +104,7 @@ def make_limits(robot: RobotDescription, config: WholeBodyIKConfig) -> list[Limi
     linear, angular = robot.root.velocity
     base_linear, base_angular = limits.base_acceleration
     made: list[Limit] = [
-        PositionLimit(margin=limits.position_margin),
+        PositionLimit(margin=limits.position_margin, joints=limits.positions),
         VelocityLimit(
             base_linear=linear, base_angular=angular, scale=limits.velocity_scale
         ),
@@ -114,7 +117,21 @@ def make_limits(robot: RobotDescription, config: WholeBodyIKConfig) -> list[Limi
     ]
     if limits.self_collision:
         made.append(self_collision_limit(robot, config))
+    soles = soles_of(config)
+    if soles:
+        margin = limits.balance_margin
+        made.append(SupportLimit(soles, margin=margin, pressure_margin=0.5 * margin))
     return made
+
+
+def soles_of(config: WholeBodyIKConfig) -> list[Sole]:
+    """Return what the robot stands on; nothing unless all of it is known."""
+    soles = [
+        Sole(frame=held.frame, x=held.sole[:2], y=held.sole[2:])
+        for held in config.held
+        if held.sole is not None
+    ]
+    return soles if len(soles) == len(config.held) else []
 
 
 def planar_joints(robot: RobotDescription) -> tuple[str, ...]:

@@ -24,6 +24,8 @@ from wbc_suite.control.composite.planner import Planner, Waypoint
 from wbc_suite.control.composite.reduced import lock_groups
 from wbc_suite.control.composite.reference import Reference
 from wbc_suite.control.composite.report import FrameReport, IkReport, WallTime
+from wbc_suite.control.composite.tasks import soles_of
+from wbc_suite.control.part.balance import BalanceLaw
 from wbc_suite.control.part.gripper import GripperController
 from wbc_suite.control.part.joint_position import JointPositionLaw
 from wbc_suite.control.part.stance import StanceContact, StanceLaw
@@ -283,6 +285,9 @@ def _make_law(
         )
         for held in config.held
     ]
+    soles = soles_of(config)
+    if soles:
+        return BalanceLaw(state, joints, contacts, config.joint_law, soles)
     return StanceLaw(state, joints, contacts, config.joint_law)
 
 
