@@ -69,7 +69,7 @@ def run(ticks: int) -> tuple[list[float], list[float], float, int]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--quick", action="store_true", help="1,000 ticks")
     parser.add_argument("--json", type=Path, help="write rows and ratios here")
     arguments = parser.parse_args()

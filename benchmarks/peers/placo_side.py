@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-import placo
+import placo  # pyright: ignore[reportMissingImports]
 
 clock = time.thread_time_ns
 
@@ -73,7 +73,16 @@ def main(folder: Path) -> None:
         out["total"].append((t2 - t0) / 1e3)
         joints = [robot.get_joint(name) for name in job["joints"]]
         out["q"].append([*base_of(robot), *joints] if job["free"] else joints)
-    np.savez(folder / "out.npz", **{k: np.array(v) for k, v in out.items()})
+    names = ("kinematics", "solve", "total", "q", "failed")
+    kinematics, solve, total, states, failed = (np.array(out[n]) for n in names)
+    np.savez(
+        folder / "out.npz",
+        kinematics=kinematics,
+        solve=solve,
+        total=total,
+        q=states,
+        failed=failed,
+    )
 
 
 if __name__ == "__main__":
