@@ -9,7 +9,7 @@ import numpy as np
 
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.control import RobotState
-from wbc_suite.errors import UnknownNameError
+from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.robot import RobotDescription
 from wbc_suite.tomlfile import read_toml
 from wbc_suite.typing import Vector
@@ -88,7 +88,11 @@ def load_benchmark(name: str | Path, catalogue: Catalogue | None = None) -> Benc
     """
     if str(name).endswith(".toml"):
         path = Path(name)
-        return _BUILDERS[_find(str(read_toml(path).get("name")))](path)
+        try:
+            known = _find(str(read_toml(path).get("name")))
+        except UnknownNameError as error:
+            raise ConfigError(f"{path}: key 'name': {error}") from error
+        return _BUILDERS[known](path)
     known = _find(str(name))
     path = (catalogue or Catalogue()).find("tasks", known, kind="benchmark file")
     return _BUILDERS[known](path)

@@ -2,14 +2,17 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import mujoco
 import numpy as np
-from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt
+from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt, field_validator
 
 from wbc_suite.control import RobotState
 from wbc_suite.robot import RobotDescription
+from wbc_suite.robot.component import Channel
+from wbc_suite.robot.parts import NotNegative
+from wbc_suite.robot.shapes import Real, Size
 from wbc_suite.scene import TableConfig, add_box, add_camera, add_table, place_robot
 from wbc_suite.scene.objects import WOOD_DENSITY
 from wbc_suite.sensing.hands import hands_of
@@ -22,10 +25,17 @@ __all__ = ["Lift", "LiftConfig"]
 class CubeConfig(FrozenModel):
     """The cube; half sizes in m, drawn uniformly at each reset."""
 
-    half_size: tuple[PositiveFloat, PositiveFloat]
-    spread: tuple[NonNegativeFloat, NonNegativeFloat]
-    clearance: NonNegativeFloat
-    color: tuple[float, float, float, float]
+    half_size: tuple[Size, Size]
+    spread: tuple[NotNegative, NotNegative]
+    clearance: NotNegative
+    color: tuple[Channel, Channel, Channel, Channel]
+
+    @field_validator("half_size")
+    @classmethod
+    def _from_small_to_large(cls, sizes: tuple[float, float]) -> tuple[float, float]:
+        if sizes[0] > sizes[1]:
+            raise ValueError("the smallest size comes first")
+        return sizes
 
 
 class RewardConfig(FrozenModel):
@@ -47,7 +57,14 @@ class LiftConfig(FrozenModel):
     table: TableConfig
     cube: CubeConfig
     reward: RewardConfig
-    places: dict[str, tuple[float, float]]
+    places: dict[str, tuple[Real, Real]]
+
+    @field_validator("places")
+    @classmethod
+    def _has_a_default(cls, places: dict[str, Any]) -> dict[str, Any]:
+        if "default" not in places:
+            raise ValueError("a place named 'default' is needed")
+        return places
 
 
 class Lift:

@@ -64,7 +64,8 @@ class FrameTask(RowTask):
         self.packed[18] = self.gain
         self.packed[19] = check_speed(self.name, max_linear_speed)
         self.packed[20] = check_speed(self.name, max_angular_speed)
-        self.set_costs(position=position_cost, orientation=orientation_cost)
+        self.packed[12:15] = cost_vector(self.name, position_cost, 3)
+        self.packed[15:18] = cost_vector(self.name, orientation_cost, 3)
         self.has_target = target is not None
         if target is not None:
             self.set_target(target)

@@ -23,6 +23,7 @@ __all__ = [
     "Quaternion",
     "Real",
     "Shape",
+    "Size",
     "Sphere",
     "Vector3",
     "as_table",

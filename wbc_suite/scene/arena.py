@@ -1,8 +1,11 @@
 """Arenas: the room, the light and the furniture that robots work in."""
 
-import mujoco
+from typing import Annotated, TypeAlias
 
-from wbc_suite.robot.shapes import Vector3
+import mujoco
+from pydantic import Field, model_validator
+
+from wbc_suite.robot.shapes import Size, Vector3
 from wbc_suite.scene.textures import wood_pixels
 from wbc_suite.tomlfile import FrozenModel
 
@@ -16,6 +19,11 @@ WOOD_SIZE = 512
 """Pixels along each side of the table's texture."""
 
 
+LEAST_LEG = 0.01
+"""Shortest legs of a table, m."""
+Friction: TypeAlias = Annotated[float, Field(ge=0.0, le=1e3)]
+
+
 class TableConfig(FrozenModel):
     """A table.
 
@@ -25,9 +33,18 @@ class TableConfig(FrozenModel):
         friction: Sliding, torsional, rolling.
     """
 
-    size: Vector3 = (0.8, 0.8, 0.05)
+    size: tuple[Size, Size, Size] = (0.8, 0.8, 0.05)
     center: Vector3 = (0.0, 0.0, 0.8)
-    friction: Vector3 = FRICTION
+    friction: tuple[Friction, Friction, Friction] = FRICTION
+
+    @model_validator(mode="after")
+    def _stands_on_the_floor(self) -> "TableConfig":
+        if self.center[2] - self.size[2] < LEAST_LEG:
+            raise ValueError(
+                f"a top {self.size[2]} m thick at {self.center[2]} m has no room for "
+                "legs"
+            )
+        return self
 
 
 def empty_arena(*, timestep: float = 0.002) -> mujoco.MjSpec:

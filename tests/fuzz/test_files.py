@@ -1,0 +1,134 @@
+"""Damaged benchmark and controller files work, or one error names file and key."""
+
+import copy
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import wbc_suite
+from wbc_suite.benchmark import load_benchmark
+from wbc_suite.catalogue import Catalogue
+from wbc_suite.control.composite.names import read_whole_body
+from wbc_suite.errors import ConfigError, WbcError
+from wbc_suite.scene import empty_arena
+from wbc_suite.tomlfile import read_toml
+
+CONTROLLERS = [read_toml(path) for path in Catalogue().files("controllers")]
+ROBOTS = [
+    wbc_suite.load_robot(path.stem.removesuffix("_whole_body_ik"))
+    for path in Catalogue().files("controllers")
+]
+TASKS = [read_toml(path) for path in Catalogue().files("tasks")]
+
+NUMBERS = st.one_of(
+    st.floats(), st.sampled_from([0, -1, 1e300, 1e-300, 10**30, True, 0.5])
+)
+NAMES = st.one_of(st.text(max_size=8), st.sampled_from(["right_tcp", "redy", "world"]))
+VALUES = st.one_of(
+    NUMBERS,
+    NAMES,
+    st.lists(NUMBERS, max_size=5),
+    st.dictionaries(NAMES, NUMBERS, max_size=2),
+)
+FAST = settings(
+    max_examples=60,
+    deadline=None,
+    derandomize=True,
+    database=None,
+    suppress_health_check=list(HealthCheck),
+)
+
+
+def places(node, path=()):
+    items = node.items() if isinstance(node, dict) else enumerate(node)
+    for key, value in items:
+        yield (*path, key)
+        if isinstance(value, dict | list):
+            yield from places(value, (*path, key))
+
+
+def damage(draw, data):
+    """Return a copy with one value replaced, renamed or removed, and its top key."""
+    data = copy.deepcopy(data)
+    path = draw(st.sampled_from(list(places(data))))
+    holder, key = data, path[-1]
+    for step in path[:-1]:
+        holder = holder[step]
+    match draw(st.sampled_from(["replace", "rename", "remove"])):
+        case "replace":
+            holder[key] = draw(VALUES)
+        case "rename" if isinstance(holder, dict):
+            holder[draw(NAMES)] = holder.pop(key)
+        case _:
+            del holder[key]
+    return data
+
+
+@FAST
+@given(data=st.data())
+def test_a_damaged_controller_names_source_and_key(data):
+    k = data.draw(st.integers(0, len(CONTROLLERS) - 1))
+    config = damage(data.draw, CONTROLLERS[k])
+    try:
+        read_whole_body(config, ROBOTS[k], "my.toml")
+    except WbcError as error:
+        text = str(error)
+    else:
+        text = "my.toml: no key is wrong"
+    assert text.startswith("my.toml: ")
+    assert "key" in text
+    assert len(text) < 3000
+
+
+def dump(value):
+    """Write plain data as TOML; inline tables everywhere but at the top."""
+    match value:
+        case bool():
+            return str(value).lower()
+        case float():
+            return "nan" if np.isnan(value) else repr(value)
+        case str():
+            escaped = "".join(f"\\U{ord(c):08X}" for c in value)
+            return f'"{escaped}"'
+        case dict():
+            return (
+                "{"
+                + ", ".join(f"{dump(k)} = {dump(v)}" for k, v in value.items())
+                + "}"
+            )
+        case list():
+            return "[" + ", ".join(map(dump, value)) + "]"
+    return str(value)
+
+
+@FAST
+@given(data=st.data())
+def test_a_damaged_benchmark_works_or_names_the_file(data, tmp_path_factory):
+    task = damage(data.draw, data.draw(st.sampled_from(TASKS)))
+    file = tmp_path_factory.mktemp("tasks") / "mine.toml"
+    file.write_text("\n".join(f"{dump(k)} = {dump(v)}" for k, v in task.items()))
+    try:
+        benchmark = load_benchmark(file)
+        benchmark.place(ROBOTS[0], 0)
+        spec = empty_arena()
+        benchmark.build(spec)
+        spec.compile()
+    except WbcError as error:
+        text = str(error)
+    else:
+        text = "mine.toml"
+    assert "mine.toml" in text
+    assert len(text) < 3000
+
+
+@pytest.mark.parametrize("path", Catalogue().files("controllers"), ids=lambda p: p.stem)
+def test_a_shipped_controller_file_can_be_passed_by_path(path, tmp_path):
+    robot = wbc_suite.load_robot(path.stem.removesuffix("_whole_body_ik"))
+    config = wbc_suite.load_composite_controller_config(path, robot)
+    assert config["type"] == "WHOLE_BODY_IK"
+    typo = tmp_path / path.name
+    typo.write_text(path.read_text().replace("frame = ", "frame = 'nose' #", 1))
+    with pytest.raises(ConfigError, match=rf"{path.name}: key 'frame\[0\]\.frame'"):
+        wbc_suite.load_composite_controller_config(typo, robot)
