@@ -18,12 +18,12 @@ from wbc_suite.viewers.teleop_session import TeleopSession
 FILE = Path(__file__).parent / "images" / "teleop.jpg"
 RATE = 100.0  # Hz
 FLAGS = ["--no-sandbox", "--enable-unsafe-swiftshader", "--use-angle=swiftshader"]
-MOVES = {"right_hand": (0.10, -0.06, 0.14), "left_hand": (0.04, 0.04, 0.08)}
-PULL = np.array([0.15, -0.55, 0.10])  # m, of the right hand: further than it reaches
+MOVES = {"right_hand": (0.06, -0.06, 0.14), "left_hand": (0.0, 0.06, 0.05)}
+PULL = np.array([0.10, -0.40, 0.02])  # m, of the right hand: the torso gives way
 
 
 def main() -> None:
-    """Move GR1's hands, pull one out of reach, and keep what the browser shows."""
+    """Move both of GR1's hands far, and keep what the browser shows."""
     env = wbc_suite.make("Lift", robots="GR1", control_freq=RATE, horizon=10**7)
     session = TeleopSession(env, period=1.0 / RATE)
     page = TeleopPage(session, Site(port=0), label="GR1 · Lift")
@@ -36,13 +36,13 @@ def main() -> None:
         chromium = shutil.which("chromium")
         browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
         tab = browser.new_page(viewport={"width": 1280, "height": 800})
+        tab.set_default_timeout(120_000)
         tab.goto(page.site.url)
-        time.sleep(20.0)  # the environment's light comes last
-        tab.get_by_text("Software WebGL").locator("xpath=../..").locator(
-            "button"
-        ).first.click()
-        time.sleep(5.0)
-        picture = Image.open(io.BytesIO(tab.screenshot(timeout=120_000)))
+        time.sleep(25.0)  # the environment's light comes last
+        notice = tab.get_by_text("Software WebGL").locator("xpath=../..")
+        notice.locator("button").first.dispatch_event("click")
+        time.sleep(8.0)
+        picture = Image.open(io.BytesIO(tab.screenshot()))
         browser.close()
     session.stop()
     page.stop()
