@@ -109,7 +109,7 @@ class PostureConfig(FrozenModel):
     level: int = Field(default=1, ge=0, le=3)
     gain: float = Field(default=0.1, gt=0.0, le=1.0)
     speed: PositiveFloat = 1.0
-    braking: float = Field(default=0.5, gt=0.0, le=1.0)
+    braking: float = Field(default=0.8, gt=0.0, le=1.0)
 
 
 class LimitsConfig(FrozenModel):

@@ -8,7 +8,7 @@ import pinocchio as pin
 
 from wbc_suite.control.composite.approach import approach_pose, approach_posture
 from wbc_suite.control.composite.config import ControlledFrame, WholeBodyIKConfig
-from wbc_suite.control.composite.search import GoalSearch
+from wbc_suite.control.composite.search import GoalSearch, Way
 from wbc_suite.control.composite.tasks import joint_accelerations, joint_speeds
 from wbc_suite.kinematics import Configuration
 from wbc_suite.robot import RobotDescription
@@ -18,6 +18,7 @@ __all__ = ["Planner", "Waypoint"]
 
 STANDING = 0.02  # rad/s or m/s
 STUCK_AFTER = 0.1  # s of standing
+PASSED = 0.1  # rad or m; this near to a configuration on the way the next one is it
 ARRIVED = 5e-3  # rad or m; from here on goals are approached straight
 
 
@@ -74,7 +75,7 @@ class Planner:
             posture: Configuration to prefer, until a search has found another.
         """
         self._posture = self._rest = posture
-        self._plan: Vector | None = None
+        self._plan: Way = []
         self._search.stop()
         self._still, self._is_new, self._answered = 0.0, False, False
 
@@ -91,9 +92,10 @@ class Planner:
         """
         self._watch(goals, v)
         if self._search.is_running:
-            self._plan = self._search.advance(self._config.search_iterations)
-        if self._plan is not None:
-            return self._joint_by_joint(self._plan)
+            found = self._search.advance(self._config.search_iterations)
+            self._plan = self._plan if found is None else found
+        if self._plan:
+            return self._joint_by_joint()
         return self._straight(goals)
 
     def _watch(self, goals: Sequence[pin.SE3], v: Vector) -> None:
@@ -102,14 +104,14 @@ class Planner:
         self._still = self._still + self._dt if standing else 0.0
         if self._is_new:
             self._is_new = self._answered = False
-            self._still, self._plan = 0.0, None
+            self._still, self._plan = 0.0, []
             self._search.stop()
             if self._is_far(goals, self._config.far):
                 self._rest = self._posture
                 self._begin(goals)
         elif self._still > STUCK_AFTER and not self._search.is_running:
-            if self._plan is not None:
-                self._plan = None
+            if self._plan:
+                self._plan = []
             elif not self._answered and self._is_far(goals, self._config.tolerance):
                 self._begin(goals)
 
@@ -127,10 +129,11 @@ class Planner:
                 return True
         return False
 
-    def _joint_by_joint(self, plan: Vector) -> Waypoint:
-        difference = self._configuration.difference(plan)
-        if float(np.abs(difference).max()) < ARRIVED:
-            self._rest, self._plan = plan, None
+    def _joint_by_joint(self) -> Waypoint:
+        difference = self._configuration.difference(self._plan[0])
+        near = ARRIVED if len(self._plan) == 1 else PASSED
+        if float(np.abs(difference).max()) < near:
+            self._rest = self._plan.pop(0)
         speed = approach_posture(
             difference, dt=self._dt, speed=self._speed, acceleration=self._braking
         )

@@ -6,6 +6,7 @@ from several starts, a few iterations per solve of the controller.
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from typing import TypeAlias
 
 import numpy as np
 import pinocchio as pin
@@ -19,6 +20,7 @@ from wbc_suite.control.composite.tasks import (
     planar_joints,
     soles_of,
 )
+from wbc_suite.control.composite.way import WayFinder
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp import (
     ComTask,
@@ -33,7 +35,10 @@ from wbc_suite.qp import (
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Vector
 
-__all__ = ["GoalSearch"]
+__all__ = ["GoalSearch", "Way"]
+
+Way: TypeAlias = list[Vector]
+"""Configurations to pass through, with straight lines in between."""
 
 STEP = 0.1  # s; one iteration goes as far as joints can in this time
 ITERATIONS = 40  # of one start
@@ -43,6 +48,7 @@ SAMPLES = 12  # configurations on the way that must be acceptable too
 PATIENCE = 5  # iterations without progress end a start
 NEARBY = 0.05  # [cost] s; how dear it is to be a second away from the start
 NEAR_TIME = 0.5  # s; every second random start lies within this time of the first
+CHECKS = 1500  # configurations that the search for a way round may look at
 BLOCKED = 2.0  # s; what it costs that something is in the way
 CLOSE = 0.02  # m and rad; from here on only the targets count
 MET = 1e-7  # m and rad
@@ -101,12 +107,18 @@ class GoalSearch:
             )
             for more in ((self._start,), ())
         )
-        self._run: Iterator[Vector | None] | None = None
+        self._finder = WayFinder(self._configuration.model, self._speeds, accept)
+        self._run: Iterator[Way | None] | None = None
 
     @property
     def is_running(self) -> bool:
         """Whether there are starts left to try."""
         return self._run is not None
+
+    @property
+    def _is_plain(self) -> bool:
+        """Whether all joints have one parameter, and nothing but joints moves."""
+        return self._configuration.nq == self._configuration.nv
 
     def stop(self) -> None:
         """Give up."""
@@ -129,23 +141,22 @@ class GoalSearch:
             _aim(task, goals[k])
         self._run = self._search([q.copy() for q in starts])
 
-    def advance(self, iterations: int) -> Vector | None:
-        """Run some iterations; return a configuration once one is found."""
+    def advance(self, iterations: int) -> Way | None:
+        """Run some iterations; return configurations to pass through once found."""
         for _ in range(iterations):
             if self._run is None:
                 return None
-            found = next(self._run, self)
-            if isinstance(found, GoalSearch):
+            found = next(self._run, ())
+            if found is not None:
                 self._run = None
-            elif found is not None:
-                self._run = None
-                return found
+                return found or None
         return None
 
-    def _search(self, starts: list[Vector]) -> Iterator[Vector | None]:
-        """Yield None after each iteration, and the best that was found at last."""
+    def _search(self, starts: list[Vector]) -> Iterator[Way | None]:
+        """Yield None after each iteration, and the way to the best found at last."""
         rng = np.random.default_rng(0)
-        best, least = None, np.inf
+        best: Vector | None = None
+        least = np.inf
         for trial in range(STARTS):
             q = starts[trial] if trial < len(starts) else self._random(starts[0], rng)
             for found in self._descend(q):
@@ -153,8 +164,12 @@ class GoalSearch:
                 if found is not None and time < least:
                     time += self._detour(starts[0], found)
                     best, least = (found, time) if time < least else (best, least)
-                yield best if least < QUICK else None
-        yield best
+                yield [best] if best is not None and least < QUICK else None
+        if best is None:
+            return
+        if least >= BLOCKED and self._is_plain:
+            yield from self._finder.find(starts[0], best, CHECKS)
+        yield [best]
 
     def _time(self, start: Vector, end: Vector) -> float:
         """Return how long joints need from one configuration to another, s."""
