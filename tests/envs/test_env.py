@@ -1,3 +1,5 @@
+import copy
+import pickle
 import subprocess
 import sys
 
@@ -115,6 +117,51 @@ def test_no_log_file_is_left_behind(env, tmp_path, monkeypatch):
     *_, info = env.step(env.hold_action)
     assert "QVEL" in info["physics_error"]
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "copied", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))]
+)
+def test_copies_go_on_from_where_the_original_stands(env, copied):
+    env.reset(seed=8)
+    action = env.hold_action
+    action[0] += 0.1
+    for _ in range(3):
+        env.step(action)
+    twin = copied(env)
+    # An episode taken again differs in the last digits (1e-12 was seen).
+    np.testing.assert_allclose(state_of(twin), state_of(env), atol=1e-9)
+    for one in (env, twin):
+        for _ in range(5):
+            one.step(action)
+    np.testing.assert_allclose(state_of(twin), state_of(env), atol=1e-9)
+    first, _ = env.reset()
+    second, _ = twin.reset()
+    np.testing.assert_array_equal(first["cube_pos"], second["cube_pos"])
+
+
+@pytest.mark.parametrize("robot", ["GR1", "Tiago", "SpotWithArm"])
+def test_every_robot_stands_at_the_table_and_holds(robot):
+    env = wbc_suite.make("Lift", robots=robot)
+    env.reset(seed=0)
+    for _ in range(10):
+        observation, reward, *_, info = env.step(env.hold_action)
+    assert env.observation_space.contains(observation)
+    assert info["ik"]["frames"]["right_hand"]["reached"]
+    assert reward == 0.0
+    cube = env.simulation.data.joint("cube_joint")
+    assert np.abs(cube.qvel).max() < 0.01
+
+
+def test_pictures_show_the_scene():
+    env = wbc_suite.make(
+        "Lift", robots="Panda", render_mode="rgb_array", render_size=(96, 64)
+    )
+    env.reset(seed=0)
+    picture = env.render()
+    env.close()
+    assert picture.shape == (64, 96, 3)
+    assert picture.std() > 10.0
 
 
 def test_the_horizon_truncates():

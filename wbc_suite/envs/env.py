@@ -56,6 +56,7 @@ class RobotEnv(gymnasium.Env[Observation, Vector]):
     metadata = {"render_modes": ["rgb_array"], "render_fps": 20}
 
     def __init__(self, benchmark: str = "Lift", **arguments: Any) -> None:
+        self._made_of = (benchmark, dict(arguments))
         self.config: EnvConfig = parse_env_config(arguments)
         self._given = benchmark, dict(arguments)
         self.benchmark = load_benchmark(benchmark)
@@ -108,6 +109,7 @@ class RobotEnv(gymnasium.Env[Observation, Vector]):
         vector, clipped = self.action_layout.clip(self.action_layout.check(action))
         if self._broken:
             raise PhysicsError(f"Call reset() first: {self._broken}")
+        self._taken.append(vector)
         self._set_goals(vector)
         self._steps += 1
         try:
@@ -159,6 +161,32 @@ class RobotEnv(gymnasium.Env[Observation, Vector]):
         if self._renderer is not None:
             self._renderer.close()
             self._renderer = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return how to make this environment again, and what happened in it.
+
+        Solvers cannot be copied, and an episode is determined by its start and its
+        actions: a copy takes the same steps again, and goes on bit-equal from there.
+        """
+        return {
+            "made_of": self._made_of,
+            "began_with": self._began_with,
+            "taken": self._taken,
+            "rng": self._np_random,
+            "seed": self._np_random_seed,
+        }
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Make the environment and take its steps again."""
+        benchmark, arguments = state["made_of"]
+        RobotEnv.__init__(self, benchmark, **arguments)
+        rng = np.random.default_rng(0)
+        rng.bit_generator.state = state["began_with"]
+        self._start(rng)
+        self._observation = self._observe()
+        for action in state["taken"]:
+            self.step(action)
+        self._np_random, self._np_random_seed = state["rng"], state["seed"]
 
     def _place_robots(self) -> tuple[RobotDescription, ...]:
         given = self.config.robot_list
@@ -224,6 +252,8 @@ class RobotEnv(gymnasium.Env[Observation, Vector]):
 
     def _start(self, rng: np.random.Generator) -> None:
         """Put robots, objects and controllers at the start of an episode."""
+        self._began_with = rng.bit_generator.state
+        self._taken: list[Vector] = []
         simulation = self.simulation
         mujoco.mj_resetData(simulation.model, simulation.data)
         for state in simulation.robots:

@@ -1,0 +1,68 @@
+import mujoco
+import numpy as np
+import pytest
+
+import wbc_suite
+
+
+@pytest.fixture(scope="module")
+def env():
+    return wbc_suite.make("Lift", robots="Panda", reward_shaping=True)
+
+
+def put_cube(env, position):
+    data = env.simulation.data
+    data.joint("cube_joint").qpos[:3] = position
+    mujoco.mj_forward(env.simulation.model, data)
+    return env.benchmark
+
+
+def test_a_lifted_cube_is_a_success(env):
+    env.reset(seed=0)
+    lift = put_cube(env, [0.0, 0.0, 0.8 + 0.0401])
+    assert lift.success()
+    assert lift.reward(shaped=False) == lift.reward(shaped=True) == 1.0
+
+
+@pytest.mark.parametrize(
+    "position",
+    [[0, 0, 0.8399], [0, 0, 0.82], [0.3, 0.3, 0.825], [0.6, 0, 0.02], [0, 0, 0.5]],
+)
+def test_near_misses_are_no_success(env, position):
+    env.reset(seed=0)
+    lift = put_cube(env, position)
+    assert not lift.success()
+    assert lift.reward(shaped=False) == 0.0
+    assert 0.0 <= lift.reward(shaped=True) < 1.0
+
+
+def test_the_shaped_reward_grows_towards_the_hand(env):
+    env.reset(seed=0)
+    hand = env.simulation.data.site("robot0_right_tcp").xpos.copy()
+    rewards = [
+        put_cube(env, hand - [0, 0, d]).reward(shaped=True) for d in (0.3, 0.2, 0.12)
+    ]
+    below = hand - [0, 0, 0.12]
+    assert below[2] > 0.84 or sorted(rewards) == rewards
+
+
+def test_sizes_are_written_into_the_model(env):
+    model = env.simulation.model
+    seen = set()
+    for seed in range(5):
+        env.reset(seed=seed)
+        half = model.geom("cube").size
+        assert 0.020 <= half[0] <= 0.022
+        np.testing.assert_array_equal(half, half[0])
+        mass = 700.0 * (2 * half[0]) ** 3
+        assert model.body("cube").mass[0] == pytest.approx(mass)
+        seen.add(half[0])
+    assert len(seen) == 5
+
+
+def test_the_cube_rests_on_the_table(env):
+    env.reset(seed=3)
+    for _ in range(10):
+        env.step(env.hold_action)
+    half = env.simulation.model.geom("cube").size[0]
+    assert env.benchmark.cube_position[2] == pytest.approx(0.8 + half, abs=1e-3)
