@@ -144,7 +144,7 @@ def test_copies_go_on_from_where_the_original_stands(env, copied):
 def test_every_robot_stands_at_the_table_and_holds(robot):
     env = wbc_suite.make("Lift", robots=robot)
     env.reset(seed=0)
-    for _ in range(10):
+    for _ in range(16):
         observation, reward, *_, info = env.step(env.hold_action)
     assert env.observation_space.contains(observation)
     assert info["ik"]["frames"]["right_hand"]["reached"]

@@ -1,6 +1,5 @@
 """The environment: robots, controllers, a benchmark and physics behind Gymnasium."""
 
-import copy
 from typing import Any
 
 import gymnasium
@@ -56,7 +55,6 @@ class RobotEnv(gymnasium.Env[Observation, Vector]):
     metadata = {"render_modes": ["rgb_array"], "render_fps": 20}
 
     def __init__(self, benchmark: str = "Lift", **arguments: Any) -> None:
-        self._made_of = (benchmark, dict(arguments))
         self.config: EnvConfig = parse_env_config(arguments)
         self._given = benchmark, dict(arguments)
         self.benchmark = load_benchmark(benchmark)
@@ -131,13 +129,6 @@ class RobotEnv(gymnasium.Env[Observation, Vector]):
             info,
         )
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Copy by pickle and deepcopy: the same arguments and random numbers to come.
-
-        The copy stands at a start; call `reset`, as after `make`.
-        """
-        return _rebuild, (*self._given, self._np_random, self._np_random_seed)
-
     @property
     def hold_action(self) -> Vector:
         """The action that keeps all present goals."""
@@ -166,10 +157,10 @@ class RobotEnv(gymnasium.Env[Observation, Vector]):
         """Return how to make this environment again, and what happened in it.
 
         Solvers cannot be copied, and an episode is determined by its start and its
-        actions: a copy takes the same steps again, and goes on bit-equal from there.
+        actions: a copy takes the same steps again, and goes on from there.
         """
         return {
-            "made_of": self._made_of,
+            "made_of": self._given,
             "began_with": self._began_with,
             "taken": self._taken,
             "rng": self._np_random,
@@ -350,17 +341,6 @@ def _noisy(
             value = moved[name] + noise.magnitude * draw
             moved[name] = float(np.clip(value, low, high))
     return moved
-
-
-def _rebuild(
-    benchmark: str,
-    arguments: dict[str, Any],
-    rng: np.random.Generator | None,
-    seed: int | None,
-) -> RobotEnv:
-    env = RobotEnv(benchmark, **arguments)
-    env._np_random, env._np_random_seed = copy.deepcopy(rng), seed
-    return env
 
 
 def _checked_seed(seed: object) -> int | None:

@@ -39,5 +39,5 @@ def add_box(
         friction=friction,
         density=density,
         condim=4,
-        solref=(0.01, 1.0),
+        solref=(0.02, 2.0),
     )
