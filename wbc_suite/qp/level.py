@@ -7,6 +7,7 @@ from typing import TypeVar
 import numpy as np
 
 from wbc_suite.kinematics import Configuration
+from wbc_suite.qp.active_set import solve_warm
 from wbc_suite.qp.com_task import ComTask
 from wbc_suite.qp.damping_task import DampingTask
 from wbc_suite.qp.frame_task import FrameTask
@@ -201,6 +202,35 @@ class Level:
             problem.H,
             problem.c,
         )
+
+    def warm_optimum(
+        self, problem: Problem, side: Indices
+    ) -> tuple[Vector, Vector] | None:
+        """Return optimum and multipliers from the last active set, see `solve_warm`.
+
+        Inequality rows are not looked at: the caller checks them.
+
+        Args:
+            problem: Gives bounds and equality rows; H and c are not used.
+            side: In and out, the active set, shape (nv,).
+        """
+        x: Vector = np.empty(problem.nv)
+        multipliers: Vector = np.zeros(len(problem.upper))
+        answered = solve_warm(
+            self.W,
+            self.e,
+            problem.A,
+            problem.b,
+            self.diagonal,
+            self.mu,
+            problem.lb,
+            problem.ub,
+            side,
+            x,
+            multipliers[: problem.nv],
+            multipliers[len(multipliers) - problem.equalities :],
+        )
+        return (x, multipliers) if answered else None
 
     def _write_others(self, configuration: Configuration, dt: float) -> None:
         """Run the tasks outside the kernel."""

@@ -1,6 +1,6 @@
 """Why a task is not where it should be."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 from wbc_suite.qp.level import Level
 from wbc_suite.typing import Vector
 
-__all__ = ["TaskReport", "reasons"]
+__all__ = ["TaskReport", "level_reports", "reasons"]
 
 _SHARE = 0.1  # part of a task's pull that something must oppose to be named
 _STRETCHED = 0.05  # pull over its greatest possible value; below, no joint can help
@@ -32,6 +32,33 @@ class TaskReport:
     orientation_error: float
     reached: bool
     reasons: tuple[str, ...]
+
+
+def level_reports(
+    level: Level,
+    x: Vector,
+    opponents: Sequence[tuple[str, Vector]],
+    position_tolerance: float,
+    orientation_tolerance: float,
+) -> dict[str, TaskReport]:
+    """Report every row task of a level by name; see `reasons` for the arguments."""
+    reports: dict[str, TaskReport] = {}
+    for n, task in enumerate(level.row_tasks):
+        position, angle = level.error_of(task)
+        near = position <= position_tolerance and angle <= orientation_tolerance
+        why: tuple[str, ...] = ()
+        if task.name in level.held:
+            why = ("target not finite: held",)
+        elif not near:
+            why = reasons(level, n, x, opponents)
+        reports[task.name] = TaskReport(
+            name=task.name,
+            position_error=position,
+            orientation_error=angle,
+            reached=near,
+            reasons=why,
+        )
+    return reports
 
 
 def reasons(

@@ -1,11 +1,15 @@
-"""An orthonormal basis of rows, compiled."""
+"""An orthonormal basis of rows, and of what the upper levels of a stack decide."""
 
 import numba
 import numpy as np
 
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["row_space"]
+__all__ = ["DecidedDirections", "row_space"]
+
+_LOST_DIRECTION = 0.05  # share of a unit vector outside the present basis
+_SINGULAR = 2e-2  # shortest over longest row, under which a singularity is near
+_RANK_TOLERANCE = 1e-6  # rows of an upper level shorter than this bind nothing
 
 
 @numba.njit(cache=True, nogil=True)
@@ -71,3 +75,43 @@ def _remove(V: Matrix, count: int, v: Vector) -> None:
             dot += V[i, j] * v[j]
         for j in range(v.shape[0]):
             v[j] -= dot * V[i, j]
+
+
+class DecidedDirections:
+    """The directions that some levels decide, kept from tick to tick.
+
+    Near a singularity the direction that they are losing turns quickly. Were it handed
+    over meanwhile, the lower level would bend a stretched arm and the upper stretch it
+    again, at full acceleration. So until the singularity is left, what was theirs at
+    the last tick stays theirs.
+
+    Args:
+        nv: Number of velocities.
+    """
+
+    def __init__(self, nv: int) -> None:
+        self._nv = nv
+        self.forget()
+
+    def forget(self) -> None:
+        """Forget the last tick."""
+        self._kept: Matrix = np.zeros((0, self._nv))
+        self._full_rank = 0
+
+    def basis(self, rows: Matrix) -> Matrix:
+        """Return an orthonormal basis, shape (rank, nv).
+
+        Args:
+            rows: Rows of all levels above and of the equalities; destroyed.
+        """
+        V, lengths = np.zeros((self._nv, self._nv)), np.zeros(self._nv)
+        rank = row_space(rows, _RANK_TOLERANCE, V, lengths)
+        self._full_rank = max(self._full_rank, rank)
+        clear = rank == self._full_rank and (
+            rank == 0 or lengths[rank - 1] > _SINGULAR * lengths[0]
+        )
+        if not clear and len(self._kept):
+            lost = self._kept - self._kept @ V[:rank].T @ V[:rank]
+            rank += row_space(lost, _LOST_DIRECTION, V[rank:], lengths)
+        self._kept = V[:rank]
+        return self._kept

@@ -7,7 +7,6 @@ import numpy as np
 from wbc_suite.arguments import check_array, check_number
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.acceleration_limit import AccelerationLimit
-from wbc_suite.qp.active_set import solve_warm
 from wbc_suite.qp.bounds import LimitKind, merge_bounds
 from wbc_suite.qp.equality import Equality
 from wbc_suite.qp.escape import Escape
@@ -18,8 +17,8 @@ from wbc_suite.qp.limit import BoxLimit, JointBounds, Limit, RowLimit
 from wbc_suite.qp.parts import check_parts
 from wbc_suite.qp.position_limit import PositionLimit
 from wbc_suite.qp.problem import Problem
-from wbc_suite.qp.report import TaskReport, reasons
-from wbc_suite.qp.row_space import row_space
+from wbc_suite.qp.report import TaskReport, level_reports
+from wbc_suite.qp.row_space import DecidedDirections
 from wbc_suite.qp.solution import Fallback, Pressure, Solution
 from wbc_suite.qp.solver import QpSolver, make_solver
 from wbc_suite.qp.task import Task
@@ -29,9 +28,6 @@ from wbc_suite.typing import Indices, Matrix, Vector
 __all__ = ["TaskStack"]
 
 _TOLERANCE = 1e-7  # a row broken by more is reported as a conflict, m or rad
-_LOST_DIRECTION = 0.05  # share of a unit vector outside the present basis
-_SINGULAR = 2e-2  # shortest over longest row, under which a singularity is near
-_RANK_TOLERANCE = 1e-6  # rows of an upper level shorter than this bind nothing
 
 
 class TaskStack:
@@ -116,7 +112,7 @@ class TaskStack:
         self._solver = make_solver(solver)
         self._lower: dict[tuple[int, int], tuple[Problem, QpSolver]] = {}
         self._solved: list[tuple[Problem, Vector, Vector]] = []
-        self._decided: dict[int, tuple[Matrix, int]] = {}
+        self._decided = [DecidedDirections(configuration.nv) for _ in numbers]
         nv = configuration.nv
         self._kinds: Indices = np.zeros((2, nv), dtype=np.int64)
         self._no_window: Vector = np.full(nv, np.inf)
@@ -151,8 +147,10 @@ class TaskStack:
             shape = (self.configuration.nv,)
             self.v_previous[:] = check_array("TaskStack.reset: v", v, shape)
         self._solver = self._solver.fresh()
-        for memory in (self._lower, self._decided, self._solved):
-            memory.clear()
+        self._lower.clear()
+        self._solved.clear()
+        for decided in self._decided:
+            decided.forget()
         for side in self._sides:
             side[:] = 0
         if self._escape is not None:
@@ -243,21 +241,9 @@ class TaskStack:
             self._levels, self._solved, strict=False
         ):
             opponents = list(self._opponents(problem, multipliers))
-            for n, task in enumerate(level.row_tasks):
-                position, angle = level.error_of(task)
-                near = position <= position_tolerance and angle <= orientation_tolerance
-                why: tuple[str, ...] = ()
-                if task.name in level.held:
-                    why = ("target not finite: held",)
-                elif not near:
-                    why = reasons(level, n, x, opponents)
-                reports[task.name] = TaskReport(
-                    name=task.name,
-                    position_error=position,
-                    orientation_error=angle,
-                    reached=near,
-                    reasons=why,
-                )
+            reports |= level_reports(
+                level, x, opponents, position_tolerance, orientation_tolerance
+            )
         return reports
 
     def _opponents(
@@ -325,24 +311,9 @@ class TaskStack:
         self, level: Level, problem: Problem, solver: QpSolver, side: Indices
     ) -> tuple[Vector, Vector] | None:
         """Solve a level: by the active set of the last tick, else by the solver."""
-        x = np.empty(problem.nv)
-        multipliers = np.zeros(len(problem.upper))
-        answered = self._warm and solve_warm(
-            level.W,
-            level.e,
-            problem.A,
-            problem.b,
-            level.diagonal,
-            level.mu,
-            problem.lb,
-            problem.ub,
-            side,
-            x,
-            multipliers[: problem.nv],
-            multipliers[len(multipliers) - problem.equalities :],
-        )
-        if answered and problem.violation(x) <= _TOLERANCE:
-            return x, multipliers
+        result = level.warm_optimum(problem, side) if self._warm else None
+        if result is not None and problem.violation(result[0]) <= _TOLERANCE:
+            return result
         level.form(problem)
         return checked_solve(solver, problem)
 
@@ -370,42 +341,21 @@ class TaskStack:
         of all rows above. x itself is one of them, so the problem has a solution.
         """
         first = self._problem
-        V, rank = self._directions_above(k)
+        above = [first.A, *(level.W for level in self._levels[:k])]
+        V = self._decided[k].basis(np.concatenate(above))
+        rank = len(V)
         if (k, rank) not in self._lower:
             problem = Problem(first.nv, len(first.G), rank)
             self._lower[k, rank] = problem, self._solver.fresh()
         problem, solver = self._lower[k, rank]
         problem.lb[:], problem.ub[:] = first.lb, first.ub
         problem.G[:], problem.h[:] = first.G, np.maximum(first.h, first.G @ x)
-        problem.A[:] = V[:rank]
-        problem.set_equalities(V[:rank] @ x)
+        problem.A[:] = V
+        problem.set_equalities(V @ x)
         if not self._write(k, dt):
             return None
         result = self._optimum(self._levels[k], problem, solver, self._sides[k])
         return None if result is None else (problem, *result)
-
-    def _directions_above(self, k: int) -> tuple[Matrix, int]:
-        """Return a basis of what the levels above k decide, in its first rows.
-
-        Near a singularity the direction that they are losing turns quickly. Were it
-        handed over meanwhile, the lower level would bend a stretched arm and the upper
-        stretch it again, at full acceleration. So until the singularity is left, what
-        was theirs at the last tick stays theirs.
-        """
-        above = np.concatenate(
-            [self._problem.A, *(level.W for level in self._levels[:k])]
-        )
-        nv = self._problem.nv
-        V, lengths = np.zeros((nv, nv)), np.zeros(nv)
-        rank = row_space(above, _RANK_TOLERANCE, V, lengths)
-        kept, full_rank = self._decided.get(k, (V[:0], rank))
-        full_rank = max(full_rank, rank)
-        clear = rank == full_rank and lengths[rank - 1] > _SINGULAR * lengths[0]
-        if not clear and len(kept):
-            lost = kept - kept @ V[:rank].T @ V[:rank]
-            rank += row_space(lost, _LOST_DIRECTION, V[rank:], lengths)
-        self._decided[k] = V[:rank].copy(), full_rank
-        return V, rank
 
     def _answer(
         self, x: Vector, fallback: Fallback, dt: float, residual: float
