@@ -18,14 +18,14 @@ demo: $(VENV)/.installed ## the same without a browser: prints figures, writes p
 	@$(PY) -m wbc_suite.cli demo $(ARGS)
 
 test: $(VENV)/.installed-dev ## run the whole test suite
-	$(PYTEST) -n auto --dist loadgroup $(ARGS)
+	$(PYTEST) -n auto $(ARGS)
 
 check: $(VENV)/.installed-dev ## format, lint, types, import direction, fast tests
 	$(PY) -m ruff format --check .
 	$(PY) -m ruff check .
 	$(PY) -m pyright
 	$(PYTEST) -q tests/test_imports.py
-	$(PYTEST) -n auto --dist loadgroup $(FAST) $(ARGS)
+	$(PYTEST) -n auto $(FAST) $(ARGS)
 
 format: $(VENV)/.installed-dev ## let ruff format and mend what it can
 	$(PY) -m ruff format .
