@@ -108,6 +108,21 @@ def test_a_far_reach_leans_as_far_as_balance_allows():
     assert np.abs(env.simulation.data.qvel).max() < 0.5
 
 
+@pytest.mark.slow
+def test_targets_out_of_reach_are_survived():
+    """90 cm ahead is 30 cm too far, even with all the lean that there is."""
+    env = make()
+    frames = run(env, moved(env, right_hand=(0.9,), left_hand=(0.9,)), 3.0)
+    assert not frames["right_hand"]["reached"]
+    assert any(
+        reason.startswith(("balance:", "effort:"))
+        for reason in frames["right_hand"]["reasons"]
+    )
+    frames = run(env, env.hold_action, 0.2)
+    run(env, moved(env, right_hand=(-0.9,), left_hand=(-0.9,)), 2.5)
+    assert upright(env) > 0.98
+
+
 def test_the_head_turns_alone():
     env = make()
     start = pelvis(env)

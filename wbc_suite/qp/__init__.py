@@ -25,6 +25,7 @@ from wbc_suite.qp.stack import TaskStack
 from wbc_suite.qp.support_limit import Sole, SupportLimit
 from wbc_suite.qp.task import DiagonalTask, RowTask, Task
 from wbc_suite.qp.velocity_limit import VelocityLimit
+from wbc_suite.qp.weight_limit import WeightLimit
 
 __all__ = [
     "AccelerationLimit",
@@ -56,4 +57,5 @@ __all__ = [
     "TaskReport",
     "TaskStack",
     "VelocityLimit",
+    "WeightLimit",
 ]

@@ -20,6 +20,7 @@ class LimitKind(IntEnum):
     SELF_COLLISION = 4
     EQUALITY = 5
     BALANCE = 6
+    EFFORT = 7
 
 
 @numba.njit(cache=True, nogil=True)

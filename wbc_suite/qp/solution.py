@@ -48,7 +48,11 @@ class ActiveLimit:
 
     def __str__(self) -> str:
         words = self.kind.name.lower().replace("_", "-")
-        if self.kind in (LimitKind.SELF_COLLISION, LimitKind.BALANCE):
+        if self.kind in (
+            LimitKind.SELF_COLLISION,
+            LimitKind.BALANCE,
+            LimitKind.EFFORT,
+        ):
             return f"{words}: {self.name}"
         words = "joint" if self.kind is LimitKind.POSITION else words
         return f"{words} limit: {self.name} ({self.side})"

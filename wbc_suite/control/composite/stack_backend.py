@@ -27,7 +27,8 @@ from wbc_suite.typing import Vector
 
 __all__ = ["StackBackend"]
 
-_ROWS = (LimitKind.SELF_COLLISION, LimitKind.BALANCE)  # of no single joint
+_ROWS = (LimitKind.SELF_COLLISION, LimitKind.BALANCE, LimitKind.EFFORT)
+"""Limits of no single joint."""
 
 
 class StackBackend:

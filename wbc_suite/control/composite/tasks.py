@@ -1,5 +1,7 @@
 """QP tasks, equality rows and limits out of a whole-body config."""
 
+from collections.abc import Mapping
+
 import numpy as np
 import pinocchio as pin
 
@@ -10,6 +12,7 @@ from wbc_suite.control.composite.config import (
     WholeBodyIKConfig,
 )
 from wbc_suite.control.composite.postures import random_posture
+from wbc_suite.errors import UnknownNameError
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp import (
     AccelerationLimit,
@@ -21,6 +24,7 @@ from wbc_suite.qp import (
     Sole,
     SupportLimit,
     VelocityLimit,
+    WeightLimit,
 )
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Vector
@@ -117,11 +121,23 @@ def make_limits(robot: RobotDescription, config: WholeBodyIKConfig) -> list[Limi
     ]
     if limits.self_collision:
         made.append(self_collision_limit(robot, config))
+    if limits.weight_shares:
+        made.append(WeightLimit(_greatest_weights(robot, limits.weight_shares)))
     soles = soles_of(config)
     if soles:
         margin = limits.balance_margin
         made.append(SupportLimit(soles, margin=margin, pressure_margin=0.5 * margin))
     return made
+
+
+def _greatest_weights(
+    robot: RobotDescription, shares: Mapping[str, float]
+) -> dict[str, float]:
+    efforts = {j.name: j.effort for j in robot.joints if j.effort is not None}
+    for name in shares:
+        if name not in efforts:
+            raise UnknownNameError("joint with a known effort", name, efforts)
+    return {name: share * efforts[name] for name, share in shares.items()}
 
 
 def soles_of(config: WholeBodyIKConfig) -> list[Sole]:
