@@ -256,6 +256,7 @@ FAULTS = {
     ),
     "urdf": ("<robot/>", "begins with <mujoco>, not <robot>.* name it .urdf"),
     "mujoco refuses": (body('<joint type="wheel"/>'), "MuJoCo refuses it"),
+    "no number": (body('<joint axis="0 nan 1"/>'), "holds what is no number"),
     "outside mesh": (
         '<mujoco><asset><mesh file="../secret.stl"/></asset></mujoco>',
         "lies outside the folder",

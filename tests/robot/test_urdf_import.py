@@ -433,6 +433,15 @@ FAULTS = {
         one_arm('<link name="l0"/>', joint("a", "base", "l0")),
         "the links 'l0' move but weigh nothing",
     ),
+    "point mass that turns": (
+        one_arm(
+            '<link name="l0"/><link name="l1"><inertial><mass value="1"/>'
+            '<inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/></inertial>'
+            "</link>",
+            joint("a", "base", "l0") + joint("b", "l0", "l1", kind="fixed"),
+        ),
+        "link 'l0' moves and so needs an inertia",
+    ),
     "revolute without limit": (
         one_arm(
             f'<link name="l0">{BODY}</link>', joint("a", "base", "l0", kind="revolute")

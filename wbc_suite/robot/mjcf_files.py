@@ -31,6 +31,7 @@ def compile_mjcf(path: Path) -> mujoco.MjModel:
         ):
             raise DescriptionError(f"{path}: plugins run code; they are not loaded.")
         _check_files(element, path)
+        _check_numbers(element, path)
     try:
         return mujoco.MjSpec.from_file(str(path)).compile()
     except ValueError as error:
@@ -71,3 +72,13 @@ def _check_files(root: Element, path: Path) -> None:
             if key.startswith("file") and name:
                 for folder in ("", *filter(None, folders)):
                     inside(path.parent, path.parent / folder / name, source=path)
+
+
+def _check_numbers(root: Element, path: Path) -> None:
+    """Refuse what is not a number; MuJoCo would only print a warning."""
+    for element in root.iter():
+        for key, value in element.items():
+            if key not in ("name", "file") and "nan" in value.lower().split():
+                raise DescriptionError(
+                    f'{path}: <{element.tag} {key}="{value}"> holds what is no number.'
+                )

@@ -100,15 +100,20 @@ def _tree(robot: "RobotDescription") -> Iterator[str]:
 
 
 def _moving(robot: "RobotDescription") -> Iterator[str]:
-    """Every set of links that moves as one rigid body needs mass somewhere."""
+    """Every set of links that moves as one rigid body needs mass and a tensor."""
     rigid = rigid_bodies(robot.links)
     masses = dict.fromkeys(rigid.values(), 0.0)
+    turning: set[str] = set()
     for link in robot.links:
         masses[rigid[link.name]] += link.mass
+        if any(link.inertia):
+            turning.add(rigid[link.name])
     for link in robot.links:
         first = link is robot.links[0] and robot.root.kind != "fixed"
         if (first or link.joint is not None) and masses[link.name] == 0.0:
             yield f"link '{link.name}' moves and so needs a mass"
+        elif (first or link.joint is not None) and link.name not in turning:
+            yield f"link '{link.name}' moves and so needs an inertia"
 
 
 def rigid_bodies(links: "tuple[Link, ...]") -> dict[str, str]:
