@@ -138,14 +138,13 @@ class RobotEnv(gymnasium.Env[Observation, Vector]):
         """Return a picture, shape (height, width, 3), RGB."""
         if self.render_mode is None:
             raise ConfigError("render: make the environment with render_mode.")
-        if self._renderer is None:
+        renderer = self._renderer
+        if renderer is None:
             width, height = self.config.render_size
-            self._renderer = make_renderer(
-                self.simulation.model, width=width, height=height
-            )
-        camera = self.config.render_camera
-        self._renderer.update_scene(self.simulation.data, camera=camera)
-        return self._renderer.render()
+            renderer = make_renderer(self.simulation.model, width=width, height=height)
+            self._renderer = renderer
+        renderer.update_scene(self.simulation.data, camera=self.config.render_camera)
+        return renderer.render()
 
     def close(self) -> None:
         """Free the renderer."""
