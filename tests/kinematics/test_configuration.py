@@ -98,3 +98,19 @@ def test_wrong_names_and_shapes_are_refused(humanoid):
         humanoid.joint_id("nose")
     with pytest.raises(ConfigError, match=r"needs \(35,\)"):
         humanoid.update(np.zeros(3))
+
+
+def test_a_robot_of_one_joint_has_jacobians_of_one_column():
+    """Pinocchio hands a single column over as a vector."""
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "hinge")
+    arm = pin.SE3(np.eye(3), np.array([1.0, 0.0, 0.0]))
+    model.appendBodyToJoint(joint, pin.Inertia(1.0, np.zeros(3), np.eye(3)), arm)
+    model.addFrame(pin.Frame("tip", joint, 0, arm, pin.FrameType.OP_FRAME))
+    one = Configuration(model)
+    expected = np.array([[0.0, 1.0, 0.0, 0.0, 0.0, 1.0]]).T
+    np.testing.assert_allclose(one.frame_jacobian("tip"), expected)
+    np.testing.assert_allclose(one.com_jacobian, expected[:3])
+    one.update(np.array([np.pi / 2]))
+    assert one.joint_jacobians.shape == (1, 6)
+    np.testing.assert_allclose(one.frame_jacobian("tip", "aligned")[0], [-1.0])

@@ -54,13 +54,14 @@ class Configuration:
         self.nq, self.nv = int(model.nq), int(model.nv)
         self.q: Vector = pin.neutral(model)
         self.placements = _view_placements(self.data, int(model.njoints))
-        self.joint_jacobians: Matrix = self.data.J.T
+        # Pinocchio gives a single column as a vector.
+        self.joint_jacobians: Matrix = self.data.J.reshape(6, self.nv).T
         self.root_linear, self.root_angular = _root_indices(model)
         self._frame_ids = {f.name: i for i, f in enumerate(model.frames)}
         self._nframes = len(model.frames)
         self._joint_ids = {n: i for i, n in enumerate(model.names)}
         self._com: Vector = self.data.com[0]
-        self._com_jacobian: Matrix = self.data.Jcom
+        self._com_jacobian: Matrix = self.data.Jcom.reshape(3, self.nv)
         self._com_is_current = False
         self.update(self.q if q is None else q)
 
@@ -145,7 +146,8 @@ class Configuration:
         pin.updateFramePlacement(self.model, self.data, k)
         if axes not in tuple(_REFERENCE):
             raise UnknownNameError("axes", axes, _REFERENCE)
-        return pin.getFrameJacobian(self.model, self.data, k, _REFERENCE[axes])
+        J = pin.getFrameJacobian(self.model, self.data, k, _REFERENCE[axes])
+        return J.reshape(6, self.nv)
 
     @property
     def com(self) -> Vector:

@@ -140,7 +140,7 @@ class QpsolversSolver:
         try:
             with warnings.catch_warnings():
                 # How a solver ended is in what it returns; a tick prints nothing.
-                warnings.simplefilter("ignore", UserWarning)
+                warnings.simplefilter("ignore")
                 solution = qpsolvers.solve_problem(  # pyright: ignore[reportUnknownMemberType]
                     qp, self.name, **self._OPTIONS.get(self.name, {})
                 )
