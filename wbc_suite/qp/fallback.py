@@ -72,10 +72,11 @@ def _solve_without_window(
     weight of a joint: without it the velocity is free, and the next tick's window is
     around a wild one. On failure the problem is as it was.
     """
-    window = problem.lb.copy(), problem.ub.copy()
-    middle = 0.5 * (np.maximum(window[0], lb) + np.minimum(window[1], ub))
-    finite = np.isfinite(middle)
-    w = np.where(finite, float(problem.H.diagonal().max()), 0.0)
+    low, high = np.maximum(problem.lb, lb), np.minimum(problem.ub, ub)
+    held = np.isfinite(low) & np.isfinite(high)
+    middle, w = np.zeros(problem.nv), np.zeros(problem.nv)
+    middle[held] = 0.5 * (low[held] + high[held])
+    w[held] = problem.H.diagonal().max()
     calm = Problem(problem.nv, len(problem.G), problem.equalities)
     calm.rows[:], calm.lower[:], calm.upper[:] = (
         problem.rows,
@@ -83,7 +84,7 @@ def _solve_without_window(
         problem.upper,
     )
     calm.H[:] = problem.H + np.diag(w)
-    calm.c[:] = problem.c - w * np.where(finite, middle, 0.0)
+    calm.c[:] = problem.c - w * middle
     calm.lb[:], calm.ub[:] = lb, ub
     result = checked_solve(solver.fresh(), calm)
     if result is not None:
