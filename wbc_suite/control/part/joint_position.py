@@ -12,8 +12,6 @@ from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["JointLawConfig", "JointPositionLaw", "JointTarget", "computed_torque"]
 
-__all__ = ["JointLawConfig", "JointPositionLaw", "computed_torque"]
-
 
 class JointLawConfig(FrozenModel):
     """Gains of the joint-position law.
