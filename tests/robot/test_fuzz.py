@@ -91,6 +91,7 @@ def outcome(data):
 @settings(
     max_examples=100,
     deadline=None,
+    derandomize=True,
     suppress_health_check=list(HealthCheck),
     database=None,
 )
@@ -108,6 +109,7 @@ def test_undamaged_components_build():
 @settings(
     max_examples=1000,
     deadline=None,
+    derandomize=True,
     suppress_health_check=list(HealthCheck),
     database=None,
 )
