@@ -105,7 +105,7 @@ def _choose(
     for kind, choice in choices.items():
         names = choice.values() if isinstance(choice, Mapping) else (choice,)
         for name in names:
-            if not isinstance(name, str | None):
+            if not isinstance(name, str | None):  # pyright: ignore[reportUnnecessaryIsInstance]
                 raise ConfigError(
                     f"{kind}: a name, a file, or a name for each side, not {name!r}."
                 )

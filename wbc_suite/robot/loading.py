@@ -39,9 +39,10 @@ def load_robot(
         ConfigError: If the file cannot be read.
     """
     catalogue = catalogue or Catalogue()
-    if not isinstance(catalogue, Catalogue):
+    # Callers without a type checker are answered in words.
+    if not isinstance(catalogue, Catalogue):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise ConfigError(f"load_robot: {catalogue!r:.60} is no Catalogue.")
-    if not isinstance(name, str | Path):
+    if not isinstance(name, str | Path):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise UnknownNameError("robot", name, catalogue.names("robots"))
     path = _locate(str(name), catalogue)
     robot = _read(path, catalogue, gripper=gripper, base=base)
