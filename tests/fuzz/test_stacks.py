@@ -179,7 +179,7 @@ def tick(stack, dt):
         return
     assert (np.abs(solution.v) <= bounds.v_max + 1e-9).all()
     if solution.fallback is Fallback.NONE:
-        assert solution.residual < 1e-2  # some rows are scaled by 1e4, each to 1e-7
+        assert solution.residual < 1e-7
     places = bounds.q_index[bounds.q_index >= 0]
     low, high = (x[bounds.q_index >= 0] for x in (bounds.q_lower, bounds.q_upper))
     before = robot.q[places]

@@ -33,6 +33,8 @@ def checked_solve(solver: QpSolver, problem: Problem) -> tuple[Vector, Vector] |
         return None
     np.minimum(x, problem.ub, out=x)
     np.maximum(x, problem.lb, out=x)
+    if problem.violation(x) > _TOLERANCE:  # long rows feel what clipping moved
+        return None
     return x, multipliers
 
 
