@@ -355,7 +355,9 @@ class TaskStack:
         if not self._write(k, dt):
             return None
         result = self._optimum(self._levels[k], problem, solver, self._sides[k])
-        return None if result is None else (problem, *result)
+        if result is None or first.violation(result[0]) > _TOLERANCE:
+            return None  # rows longer than 1 feel more than their orthonormal basis
+        return problem, *result
 
     def _answer(
         self, x: Vector, fallback: Fallback, dt: float, residual: float
