@@ -64,13 +64,17 @@ class Catalogue:
         found = {p.stem: p for p in self._files(folder)}
         return tuple(found[name] for name in self.names(folder))
 
-    def find(self, folder: str, name: str, *, kind: str) -> Path:
+    def find(
+        self, folder: str, name: str, *, kind: str, side: str | None = None
+    ) -> Path:
         """Return the file of a name, without regard to case and underscores.
 
         Args:
             folder: Folder relative to a root, such as `robots` or `robots/arm`.
             name: Name to look up.
             kind: What the name is, for the error: "robot", "gripper".
+            side: The side of a pair of files that a name without side stands for:
+                `InspireHand` is `inspire_right_hand` on the right.
 
         Raises:
             UnknownNameError: If no root has such a file.
@@ -78,7 +82,11 @@ class Catalogue:
         if ".." in Path(str(folder)).parts:
             raise ConfigError(f"'{folder}/{name}' leaves the catalogue.")
         found = {_key(p.stem): p for p in self._files(folder)}
-        path = found.get(_key(str(name)))
+        wanted = _key(str(name))
+        path = found.get(wanted)
+        if path is None and side is not None:
+            paired = (p for k, p in found.items() if k.replace(side, "", 1) == wanted)
+            path = next(paired, None)
         if path is None:
             raise UnknownNameError(kind, name, self.names(folder))
         return path

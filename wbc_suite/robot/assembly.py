@@ -1,23 +1,19 @@
 """Join components into one robot."""
 
 import itertools
-from collections import Counter
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.errors import ConfigError, DescriptionError, UnknownNameError
+from wbc_suite.robot.choosing import Choice, choose, is_path
 from wbc_suite.robot.component import Assembly, Component, Part, read_robot_file
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.parts import Link, Mount, Root, Synergy
 from wbc_suite.robot.placing import compose, depth_first, locked, renamed
 from wbc_suite.tomlfile import parse_model
 
-__all__ = ["Choice", "assemble", "describe_component"]
-
-Choice = str | Mapping[str, str] | None
-"""A component for every side, or one for each side, or the assembly's own."""
+__all__ = ["assemble", "describe_component"]
 
 
 def describe_component(component: Component, *, source: str) -> RobotDescription:
@@ -63,12 +59,17 @@ def assemble(
         DescriptionError: If a part, a mount or a name does not fit.
         UnknownNameError: If a component does not exist.
     """
-    assembly = _extended(path, catalogue)
-    chosen = _choose(assembly, {"gripper": gripper, "base": base}, source=str(path))
     builder = _Builder(path, catalogue)
-    repeated = Counter(part.component for part in chosen)
-    for part in chosen:
-        builder.mount(part, shared=repeated[part.component] > 1)
+    assembly = choose(
+        _extended(path, catalogue),
+        gripper=gripper,
+        base=base,
+        read=builder.read,
+        catalogue=catalogue,
+    )
+    names = [builder.read(part).component.name for part in assembly.parts]
+    for part, name in zip(assembly.parts, names, strict=True):
+        builder.mount(part, shared=names.count(name) > 1)
     return builder.finish(assembly)
 
 
@@ -98,54 +99,6 @@ def _extended(path: Path, catalogue: Catalogue, depth: int = 0) -> Assembly:
     return parent.model_copy(update=given)
 
 
-def _choose(
-    assembly: Assembly, choices: dict[str, Choice], *, source: str
-) -> tuple[Part, ...]:
-    """Replace, or leave out, the components that the caller wants otherwise."""
-    for kind, choice in choices.items():
-        names = choice.values() if isinstance(choice, Mapping) else (choice,)
-        for name in names:
-            if not isinstance(name, str | None):  # pyright: ignore[reportUnnecessaryIsInstance]
-                raise ConfigError(
-                    f"{kind}: a name, a file, or a name for each side, not {name!r}."
-                )
-        _check_choice(assembly, kind, choice, source=source)
-    parts: list[Part] = []
-    for part in assembly.parts:
-        choice = choices.get(part.choice or "")
-        if isinstance(choice, Mapping):
-            choice = choice.get(part.side or part.name)
-        if choice is None:
-            parts.append(part)
-        elif not _is_none(choice):
-            name = choice if _is_path(choice) else f"{part.choice}/{choice}"
-            parts.append(part.model_copy(update={"component": name}))
-    return tuple(parts)
-
-
-def _check_choice(
-    assembly: Assembly, kind: str, choice: Choice, *, source: str
-) -> None:
-    sides = {p.side or p.name for p in assembly.parts if p.choice == kind}
-    if isinstance(choice, Mapping):
-        for side in choice:
-            if side not in sides:
-                raise UnknownNameError(f"side with a {kind}", side, sides)
-    elif choice is not None and not sides and not _is_none(choice):
-        raise DescriptionError(
-            f"{source}: {assembly.assembly.name} has no place for a {kind}."
-        )
-
-
-def _is_none(name: str) -> bool:
-    """Whether a name stands for "leave it out" (`NullMount` and the like are names)."""
-    return name.casefold() == "none"
-
-
-def _is_path(name: str) -> bool:
-    return name.endswith(".toml")
-
-
 class _Builder:
     """Collects the parts of one assembly."""
 
@@ -161,16 +114,19 @@ class _Builder:
         self._materials: dict[str, Any] = {}
         self._synergies: dict[str, tuple[Synergy, ...]] = {}
         self._excludes: list[tuple[str, str]] = []
+        self._root = Root()
 
     def mount(self, part: Part, *, shared: bool) -> None:
         """Add one component."""
-        component = self._read(part)
+        component = self.read(part)
         rename = shared if part.rename is None else part.rename
         prefix = f"{part.side}_" if part.side else ""
         component = renamed(
             component, items=prefix, bodies=prefix if rename else "", part=part.name
         )
         links = depth_first(component.links)
+        if not self._links:
+            self._root = component.root
         first = links[0].model_copy(update=self._placement(part, links[0]))
         self._links += [first, *links[1:]]
         for mount in component.mounts:
@@ -188,13 +144,17 @@ class _Builder:
         header = component.component
         self._headers.append((header.source, header.license, header.deviations))
 
-    def _read(self, part: Part) -> Component:
-        if _is_path(part.component):
+    def read(self, part: Part) -> Component:
+        """Read the component of a part."""
+        if is_path(part.component):
             path = _inside(self._path.parent, part.component)
         else:
             folder, _, name = part.component.rpartition("/")
             path = self._catalogue.find(
-                f"robots/{folder}".rstrip("/"), name, kind=folder or "component"
+                f"robots/{folder}".rstrip("/"),
+                name,
+                kind=folder or "component",
+                side=part.side,
             )
         component = read_robot_file(path)
         if not isinstance(component, Component):
@@ -218,7 +178,6 @@ class _Builder:
 
     def finish(self, assembly: Assembly) -> RobotDescription:
         """Check and freeze the whole."""
-        root = assembly.root or Root()
         keyframes = dict(self._keyframes)
         for name, values in assembly.keyframes.items():
             keyframes[name] = keyframes.get(name, {}) | values
@@ -236,7 +195,7 @@ class _Builder:
             "source": "; ".join(dict.fromkeys(filter(None, sources))),
             "license": "; ".join(dict.fromkeys(filter(None, licenses))),
             "deviations": (*deviations, *header.deviations),
-            "root": root,
+            "root": assembly.root or self._root,
             "links": depth_first(tuple(self._links)),
             "groups": self._groups,
             "keyframes": keyframes,

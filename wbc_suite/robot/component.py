@@ -31,10 +31,21 @@ Rgba: TypeAlias = tuple[Channel, Channel, Channel, Channel]
 
 
 class Header(FrozenModel):
-    """What a component is, and where its figures come from."""
+    """What a component is, and where its figures come from.
+
+    Attributes:
+        name: Unique name.
+        kind: Folder of the catalogue in which it lies.
+        side: The side that a hand is made for; absent when it fits both.
+        title: Name for people.
+        source: Where the figures come from, in words.
+        license: Licence of the figures.
+        deviations: Each deliberate difference from the source, with its reason.
+    """
 
     name: Name
     kind: Literal["arm", "body", "gripper", "base"]
+    side: Literal["left", "right"] | None = None
     title: str = ""
     source: str = ""
     license: str = ""
@@ -104,7 +115,7 @@ class Assembly(FrozenModel):
         format: Version of the format.
         assembly: Name; `extends` takes over another assembly and changes it.
         parts: Components, each mounted on an earlier one.
-        root: How the robot stands in the world.
+        root: How the robot stands in the world; by default as its first part says.
         lock: Groups whose joints are fixed in the `ready` posture.
         groups: Further groups, or renamed ones.
         frames: Further frames.

@@ -5,7 +5,8 @@ from typing import Literal
 
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.errors import ConfigError, UnknownNameError
-from wbc_suite.robot.assembly import Choice, assemble, describe_component
+from wbc_suite.robot.assembly import assemble, describe_component
+from wbc_suite.robot.choosing import Choice
 from wbc_suite.robot.component import Component, read_robot_file
 from wbc_suite.robot.description import RobotDescription
 
@@ -28,8 +29,9 @@ def load_robot(
         name: Catalogue name without regard to case (`Panda`, `gr1`), a component with
             its folder (`gripper/panda_gripper`), or a path to a .toml, .urdf or .xml.
         gripper: Another gripper for every side, or one for each: `{"right": ...}`;
-            "none" leaves it out.
-        base: Another base; "none" leaves it out.
+            "none" leaves it out. `InspireHand` is the one of each side.
+        base: Another base, which brings its own root and height; "none" leaves it out.
+            A robot with legs or wheels takes only a root, such as `NullMobileBase`.
         root: Another root: `fixed`, `planar` or `free`.
         catalogue: Where to look; our own catalogue by default.
 
