@@ -36,18 +36,8 @@ def test_the_hand_arrives_in_simulation(alone, robot, controller):
     np.testing.assert_allclose(moved, STEP[:3], atol=bound)
 
 
-SLIPPED = pytest.mark.xfail(
-    strict=True,
-    reason="Spot's feet slip a little under the fast swing of the arm; the legs then "
-    "press against each other and hold the hand 3.7 mm off",
-)
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "robot",
-    [pytest.param(r, marks=SLIPPED) if r == "SpotWithArm" else r for r in ROBOTS],
-)
+@pytest.mark.parametrize("robot", ROBOTS)
 def test_a_goal_out_of_reach_is_reported_and_forgotten(alone, robot):
     scene = alone(robot)
     report = scene.act({"right_hand": np.array([0, 4.0, 1.0, 0, 0, 0])}, 1.0)

@@ -44,7 +44,7 @@ STEP = 0.1  # s; one iteration goes as far as joints can in this time
 ITERATIONS = 40  # of one start
 STARTS = 16
 QUICK = 0.8  # s; a configuration this near is taken at once, others are compared
-SAMPLES = 12  # configurations on the way that must be acceptable too
+SPACING = 0.02  # s; between configurations on the way that must be acceptable too
 PATIENCE = 5  # iterations without progress end a start
 NEARBY = 0.05  # [cost] s; how dear it is to be a second away from the start
 NEAR_TIME = 0.5  # s; every second random start lies within this time of the first
@@ -184,11 +184,11 @@ class GoalSearch:
         if not self._accept(end):
             return np.inf
         model = self._configuration.model
-        blocked = sum(
-            not self._accept(pin.interpolate(model, start, end, k / SAMPLES))
-            for k in range(2, SAMPLES)
-        )
-        return BLOCKED * (blocked > 0)
+        count = max(2, int(np.ceil(self._time(start, end) / SPACING)))
+        for k in range(count - 1, count // 6, -1):
+            if not self._accept(pin.interpolate(model, start, end, k / count)):
+                return BLOCKED
+        return 0.0
 
     def _descend(self, q: Vector) -> Iterator[Vector | None]:
         self._near.reset()

@@ -8,15 +8,14 @@ give is given up, the trunk's attitude before the centre of mass.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 
 from wbc_suite.control.part.joint_position import JointLawConfig, JointTarget
-from wbc_suite.control.part.stance import StanceContact, StanceLaw
+from wbc_suite.control.part.stance import StanceContact, StanceLaw, damped_inverse
 from wbc_suite.control.state import RobotState
 from wbc_suite.qp import Problem, Sole
 from wbc_suite.qp.solver import DaqpSolver
-from wbc_suite.typing import Indices, Matrix, Vector
+from wbc_suite.typing import Matrix, Vector
 
 __all__ = ["BalanceLaw", "sole_rows"]
 
@@ -24,11 +23,9 @@ COM_STIFFNESS = 60.0  # 1/s^2; well above g / h = 12, or the pendulum falls
 TRUNK_STIFFNESS = 150.0  # 1/s^2
 TRUNK_COST = 0.05  # [cost] s^2/rad against 1 [cost] s^2/m: the trunk gives way first
 SHARE_COST = 1e-4  # [cost]/N; keeps forces near the even share
-SOLE_DAMPING = 30.0  # 1/s; stops a sole that slips or tips
 FRICTION = 0.6  # below that of rubber on most floors, 0.8 to 1
 TWIST = 0.03  # m; friction torque about the normal over normal force, of a sole
 LEAST_PRESSURE = 20.0  # N; a sole never lets go
-SINGULAR = 0.01  # m/rad; below it a leg is stretched
 EDGE = 0.008  # m; how far pressure points stay from a sole's edge
 TORQUE_SHARE = 0.95  # of the motors' limits that planned forces may ask for
 
@@ -129,11 +126,8 @@ class BalanceLaw(StanceLaw):
     ) -> None:
         super().__init__(state, joints, contacts, config)
         self._soles = tuple(soles)
-        carrying = _carrying(state, joints, contacts)
-        self._legs: Indices = 6 + np.flatnonzero(carrying)
         self._problem = Problem(6 * len(soles), 10 * len(soles) + len(self._legs))
         self._solver = DaqpSolver()
-        self._jacobian_rate = np.zeros((6, state.model.nv))
 
     def torque(self, state: RobotState, target: JointTarget) -> Vector:
         """Return torques within the motors' limits; see `JointPositionLaw.torque`."""
@@ -154,11 +148,11 @@ class BalanceLaw(StanceLaw):
         M = state.mass_matrix()[self._block]
         h = (data.qfrc_bias - data.qfrc_passive)[self._dofs]
         J = self._contact_jacobian(state)
-        J_inverse = _damped_inverse(J[:, legs])
+        J_inverse = damped_inverse(J[:, legs])
         S, s = np.zeros((len(M), 6)), np.zeros(len(M))
         S[:6], S[legs] = np.eye(6), -J_inverse @ J[:, :6]
         s[6:] = joints
-        moved = self._contact_bias(state) + SOLE_DAMPING * (J @ data.qvel[self._dofs])
+        moved = self._contact_motion(state, J)
         s[legs] -= J_inverse @ (moved + J[:, legs] @ s[legs])
         A, b = M[:6] @ S, M[:6] @ s + h[:6]
         return _Dynamics(M=M, h=h, J=J, S=S, s=s, A=A, b=b, lift=np.linalg.inv(A))
@@ -221,32 +215,6 @@ class BalanceLaw(StanceLaw):
             TORQUE_SHARE * self._low[legs - 6] - offset
         )
 
-    def _contact_bias(self, state: RobotState) -> Vector:
-        """Return J' v, the soles' acceleration without joint accelerations."""
-        rows: list[Vector] = []
-        model, data = state.model, state.data
-        for contact in self._contacts:
-            linear, angular = self._jacobian_rate[:3], self._jacobian_rate[3:]
-            body = int(model.site_bodyid[contact.site])
-            place = data.site_xpos[contact.site]
-            mujoco.mj_jacDot(model, data, linear, angular, place, body)
-            rows.append(self._jacobian_rate @ data.qvel)
-        return np.concatenate(rows)
-
-
-def _carrying(
-    state: RobotState, joints: tuple[str, ...], contacts: Sequence[StanceContact]
-) -> np.ndarray:
-    """Tell which joints lie between root and a contact, shape (n,)."""
-    model, bodies = state.model, set[int]()
-    for contact in contacts:
-        body = int(model.site_bodyid[contact.site])
-        while body:
-            bodies.add(body)
-            body = int(model.body_parentid[body])
-    owners = [int(model.joint(state.prefix + name).bodyid[0]) for name in joints]
-    return np.array([owner in bodies for owner in owners])
-
 
 def _even_share(J_root: Matrix, wrench: Vector, weights: Vector) -> Vector:
     """Return the least f, by weights, with J_root^T f = wrench; see `contact_forces`.
@@ -259,8 +227,3 @@ def _even_share(J_root: Matrix, wrench: Vector, weights: Vector) -> Vector:
 
 def _damping(stiffness: float) -> float:
     return 2.0 * float(np.sqrt(stiffness))
-
-
-def _damped_inverse(J: Matrix) -> Matrix:
-    """Return J^T (J J^T + eps)^-1, which stays finite at stretched knees."""
-    return np.linalg.solve(J @ J.T + SINGULAR**2 * np.eye(len(J)), J).T

@@ -16,7 +16,10 @@ from wbc_suite.control.part.joint_position import JointLawConfig, JointTarget
 from wbc_suite.control.state import RobotState
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["StanceContact", "StanceLaw", "contact_forces"]
+__all__ = ["StanceContact", "StanceLaw", "contact_forces", "damped_inverse"]
+
+CONTACT_DAMPING = 30.0  # 1/s; stops a foot that slips or tips
+SINGULAR = 0.01  # m/rad; below it a leg is stretched
 
 TORQUE_ARM = 0.05
 """m; a contact torque of 0.05 N m counts as much as a force of 1 N: soles are small."""
@@ -71,10 +74,12 @@ class StanceLaw:
     """Inverse dynamics through contacts, on a robot with a free root.
 
         a     = a* + kp e + kd e'                root and joints alike
+        a_l  -= J_l^+ (J a + J' v + k J v)       but legs as feet at rest allow
         f     = contact forces with  J_r^T f = M_r a + h_r
         tau   = M_j a + h_j - J_j^T f
 
-    With every joint error zero the feet carry the weight and nothing sags.
+    Legs that tracked their own joints would, once a foot has slipped, press against
+    each other and push root and arm aside.
 
     Args:
         state: The robot in the simulation.
@@ -120,6 +125,8 @@ class StanceLaw:
         ends = np.cumsum([6 if c.kind == "surface" else 3 for c in contacts]).tolist()
         self._rows = [slice(a, b) for a, b in zip([0, *ends], ends, strict=False)]
         self._jacobian = np.zeros((6, state.model.nv))
+        self._jacobian_rate = np.zeros((6, state.model.nv))
+        self._legs: Indices = 6 + np.flatnonzero(_carrying(state, joints, contacts))
 
     def torque(self, state: RobotState, target: JointTarget) -> Vector:
         """Return torques within the motors' limits; see `JointPositionLaw.torque`."""
@@ -127,10 +134,12 @@ class StanceLaw:
         assert target.root_acceleration is not None
         wanted = np.concatenate([target.root_acceleration, target.acceleration])
         wanted += self.config.kp * position_error + self.config.kd * velocity_error
+        J, legs = self._contact_jacobian(state), self._legs
+        moved = self._contact_motion(state, J) + J @ wanted
+        wanted[legs] -= damped_inverse(J[:, legs]) @ moved
         data = state.data
         bias = (data.qfrc_bias - data.qfrc_passive)[self._dofs]
         force = state.mass_matrix()[self._block] @ wanted + bias
-        J = self._contact_jacobian(state)
         f = contact_forces(
             J[:, :6], force[:6], weights=self._weights, contacts=self._rows
         )
@@ -162,3 +171,35 @@ class StanceLaw:
             used = self._jacobian if contact.kind == "surface" else linear
             rows.append(used[:, self._dofs])
         return np.concatenate(rows)
+
+    def _contact_motion(self, state: RobotState, J: Matrix) -> Vector:
+        """Return J' v + k J v: without joint accelerations, and to come to rest."""
+        rows: list[Vector] = []
+        model, data = state.model, state.data
+        for contact in self._contacts:
+            linear, angular = self._jacobian_rate[:3], self._jacobian_rate[3:]
+            body = int(model.site_bodyid[contact.site])
+            place = data.site_xpos[contact.site]
+            mujoco.mj_jacDot(model, data, linear, angular, place, body)
+            used = self._jacobian_rate if contact.kind == "surface" else linear
+            rows.append(used @ data.qvel)
+        return np.concatenate(rows) + CONTACT_DAMPING * (J @ data.qvel[self._dofs])
+
+
+def damped_inverse(J: Matrix) -> Matrix:
+    """Return J^T (J J^T + eps)^-1, which stays finite at stretched knees."""
+    return np.linalg.solve(J @ J.T + SINGULAR**2 * np.eye(len(J)), J).T
+
+
+def _carrying(
+    state: RobotState, joints: tuple[str, ...], contacts: Sequence[StanceContact]
+) -> np.ndarray:
+    """Tell which joints lie between root and a contact, shape (n,)."""
+    model, bodies = state.model, set[int]()
+    for contact in contacts:
+        body = int(model.site_bodyid[contact.site])
+        while body:
+            bodies.add(body)
+            body = int(model.body_parentid[body])
+    owners = [int(model.joint(state.prefix + name).bodyid[0]) for name in joints]
+    return np.array([owner in bodies for owner in owners])
