@@ -21,6 +21,9 @@ COLLISION_GROUP = 3
 SITE_GROUP = 4
 """Site group of frames: hidden unless asked for."""
 
+STIFF = (0.005, 1.0)
+"""Time constant in s and damping ratio of couplings: as stiff as 2 ms steps allow."""
+
 GREY = (0.5, 0.5, 0.52, 1.0)
 
 
@@ -303,7 +306,7 @@ def _add_sensors(spec: mujoco.MjSpec, robot: RobotDescription) -> None:
 
 def _add_constraints(spec: mujoco.MjSpec, robot: RobotDescription) -> None:
     for joint in robot.joints:
-        if joint.mimic is None:
+        if joint.mimic is None or joint.mimic.closed:
             continue
         equality = spec.add_equality(
             type=mujoco.mjtEq.mjEQ_JOINT,
@@ -313,7 +316,7 @@ def _add_constraints(spec: mujoco.MjSpec, robot: RobotDescription) -> None:
             name2=joint.mimic.joint,
         )
         equality.data[:5] = (joint.mimic.offset, joint.mimic.ratio, 0, 0, 0)
-        equality.solref[:2] = (0.005, 1.0)
+        equality.solref[:2] = STIFF
     for index, connect in enumerate(robot.connects):
         equality = spec.add_equality(
             type=mujoco.mjtEq.mjEQ_CONNECT,
@@ -323,6 +326,7 @@ def _add_constraints(spec: mujoco.MjSpec, robot: RobotDescription) -> None:
             name2=connect.other,
         )
         equality.data[:3] = connect.anchor
+        equality.solref[:2] = STIFF
     pairs = {*robot.contacts.exclude, *_welded_neighbours(robot)}
     for first, second in sorted(pairs):
         spec.add_exclude(name=f"{first}_{second}", bodyname1=first, bodyname2=second)

@@ -54,11 +54,20 @@ Limits: TypeAlias = Annotated[Range, AfterValidator(_rising)]
 
 
 class Mimic(FrozenModel):
-    """A joint that follows another: `q = ratio * q_joint + offset`."""
+    """A joint that follows another: `q = ratio * q_joint + offset`.
+
+    Attributes:
+        joint: The joint that leads.
+        ratio: How far this one turns (or slides) for each unit of the leader.
+        offset: Where it stands when the leader is at zero.
+        closed: Whether a `[[connect]]` holds the joint in MuJoCo. The relation is then
+            written for engines without loops, and MuJoCo gets no second constraint.
+    """
 
     joint: Name
     ratio: Real = 1.0
     offset: Real = 0.0
+    closed: bool = False
 
 
 class Joint(FrozenModel):

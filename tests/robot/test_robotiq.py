@@ -1,0 +1,111 @@
+"""The Robotiq grippers: linkages that close, and what their data sheets say."""
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wbc_suite
+
+TWO_FINGERS = {
+    "robotiq85_gripper": {
+        "leader": "left_driver_joint",
+        "pads": ("left_pad", "right_pad"),
+        "mass": 0.9,
+        "stroke": 0.085,
+        "loops": 2,
+    },
+}
+
+
+@pytest.fixture(scope="module", params=TWO_FINGERS, ids=str)
+def figures(request):
+    return {"robot": wbc_suite.load_robot(f"gripper/{request.param}")} | TWO_FINGERS[
+        request.param
+    ]
+
+
+def settled(robot, command, seconds=2.0):
+    """Return model and data after the fingers have gone where they are told."""
+    model = robot.to_mjspec().compile()
+    model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    model.opt.gravity[:] = 0.0
+    data = mujoco.MjData(model)
+    for joint, value in command.items():
+        data.actuator(joint).ctrl = value
+    for _ in range(round(seconds / model.opt.timestep)):
+        mujoco.mj_step(model, data)
+    assert not data.warning.number.any()
+    return model, data
+
+
+def gap(data, model, pads):
+    """Return the free width between the pads' faces along y, m."""
+    left, right = (model.body(p).geomadr[0] for p in pads)
+    ends = [data.geom_xpos[g, 1] for g in (left, right)]
+    thick = [
+        np.abs(data.geom_xmat[g].reshape(3, 3)[1] @ model.geom_size[g])
+        for g in (left, right)
+    ]
+    return abs(ends[0] - ends[1]) - sum(thick)
+
+
+def test_mass_is_the_data_sheets(figures):
+    assert figures["robot"].mass == pytest.approx(figures["mass"], rel=0.02)
+
+
+def test_a_joint_in_a_loop_gets_no_second_constraint(figures):
+    robot = figures["robot"]
+    model = robot.to_mjspec().compile()
+    kinds = list(model.eq_type)
+    assert kinds.count(mujoco.mjtEq.mjEQ_CONNECT) == figures["loops"]
+    plain = [j for j in robot.joints if j.mimic and not j.mimic.closed]
+    assert kinds.count(mujoco.mjtEq.mjEQ_JOINT) == len(plain)
+    assert robot.dof == 1
+
+
+@pytest.mark.parametrize("closed", [0.0, 0.3, 0.6, 0.85])
+def test_the_loops_and_the_tree_agree(figures, closed):
+    """The relation that other engines get is the one that the loops enforce."""
+    robot, leader = figures["robot"], figures["leader"]
+    (synergy,) = robot.synergies["gripper"]
+    low, high = synergy.open[leader], synergy.closed[leader]
+    _, data = settled(robot, {leader: low + closed * (high - low)})
+    lead = float(data.joint(leader).qpos[0])
+    assert lead == pytest.approx(low + closed * (high - low), abs=2e-3)
+    tree = robot.to_pinocchio()
+    q = pin.neutral(tree)
+    for joint in robot.joints:
+        mimic = joint.mimic
+        value = lead if mimic is None else mimic.ratio * lead + mimic.offset
+        assert float(data.joint(joint.name).qpos[0]) == pytest.approx(value, abs=1e-3)
+        q[tree.joints[tree.getJointId(joint.name)].idx_q] = value
+    state = tree.createData()
+    pin.framesForwardKinematics(tree, state, q)
+    for pad in figures["pads"]:
+        place = state.oMf[tree.getFrameId(pad)]
+        np.testing.assert_allclose(data.body(pad).xpos, place.translation, atol=3e-4)
+
+
+def test_fingers_open_by_the_stroke_and_meet(figures):
+    robot, leader = figures["robot"], figures["leader"]
+    (synergy,) = robot.synergies["gripper"]
+    model, data = settled(robot, {leader: synergy.open[leader]})
+    assert gap(data, model, figures["pads"]) == pytest.approx(
+        figures["stroke"], rel=0.03
+    )
+    model, data = settled(robot, {leader: synergy.closed[leader]})
+    assert gap(data, model, figures["pads"]) == pytest.approx(0.0, abs=5e-4)
+    tool = data.site("tcp").xpos
+    assert abs(tool[1]) < 1e-9
+    assert np.abs(data.qvel).max() < 1e-3
+
+
+def test_force_at_the_pads_is_within_the_data_sheet(figures):
+    robot = figures["robot"]
+    model, data = settled(robot, robot.synergies["gripper"][0].closed)
+    force, total = np.zeros(6), 0.0
+    for k in range(data.ncon):
+        mujoco.mj_contactForce(model, data, k, force)
+        total += force[0]
+    assert 20.0 < total < 235.0
