@@ -24,6 +24,12 @@ SITE_GROUP = 4
 STIFF = (0.005, 1.0)
 """Time constant in s and damping ratio of couplings: as stiff as 2 ms steps allow."""
 
+STATED_SOLMIX = 1000.0
+"""Weight of a stated contact stiffness against the default of 1: who states it wins.
+
+Mixed half and half, a pad sinks 3.4 mm into a cube of 0.1 kg; like this 0.2 mm.
+"""
+
 GREY = (0.5, 0.5, 0.52, 1.0)
 
 
@@ -188,6 +194,7 @@ def _set_contact(geom: mujoco.MjsGeom, shape: Shape) -> None:
         geom.condim = shape.condim
     if shape.solref is not None:
         geom.solref[:2] = shape.solref
+        geom.solmix = STATED_SOLMIX
     if shape.margin is not None:
         geom.margin = shape.margin
 

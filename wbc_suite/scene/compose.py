@@ -37,15 +37,28 @@ def place_robot(
     return robot.with_root(old.kind, pos=pos, quat=(w, x, y, z))
 
 
-def attach_robot(spec: mujoco.MjSpec, robot: RobotDescription, prefix: str) -> None:
-    """Add a robot at its own root pose; every name of it gets the prefix."""
+def attach_robot(
+    spec: mujoco.MjSpec,
+    robot: RobotDescription,
+    prefix: str,
+    *,
+    frame: mujoco.MjsFrame | None = None,
+) -> None:
+    """Add a robot at its own root pose; every name of it gets the prefix.
+
+    Args:
+        spec: The scene.
+        robot: The robot.
+        prefix: Text before its names.
+        frame: What it hangs on; the world by default.
+    """
     own = robot.to_mjspec()
     for key in list(own.keys):
         own.delete(key)
     for joint in own.joints:
         joint.solref_limit[:] = END_STOP_SOLREF
         joint.solimp_limit[:3] = END_STOP_SOLIMP
-    spec.attach(own, prefix=prefix, frame=spec.worldbody.add_frame())
+    spec.attach(own, prefix=prefix, frame=frame or spec.worldbody.add_frame())
 
 
 def add_camera(
