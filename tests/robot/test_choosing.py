@@ -1,9 +1,12 @@
 """Grippers and bases that the caller chooses: sides, roots, heights."""
 
+import mujoco
+import numpy as np
 import pytest
 
 import wbc_suite
 from wbc_suite.errors import DescriptionError, UnknownNameError
+from wbc_suite.scene import place_robot
 
 
 def test_base_brings_its_own_root_and_height():
@@ -32,7 +35,7 @@ def test_robot_on_its_own_legs_takes_only_a_root():
 
 
 def test_left_hand_does_not_fit_a_right_arm():
-    with pytest.raises(DescriptionError, match="there fit: .*fourier_right_hand"):
+    with pytest.raises(DescriptionError, match=r"there fit: .*fourier_right_hand"):
         wbc_suite.load_robot("Panda", gripper="FourierLeftHand")
     with pytest.raises(DescriptionError, match="left arm; give one for each side"):
         wbc_suite.load_robot("GR1", gripper="FourierRightHand")
@@ -54,3 +57,31 @@ def test_unknown_gripper_or_base_is_told_with_the_nearest():
         wbc_suite.load_robot("Panda", gripper="PandaGriper")
     with pytest.raises(UnknownNameError, match="Did you mean 'null_mount'"):
         wbc_suite.load_robot("Panda", base="NulMount")
+
+
+def test_omron_base_carries_the_arm_on_its_lift():
+    robot = wbc_suite.load_robot("PandaOmron")
+    model = robot.to_mjspec().compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("ready").id)
+    for height in (0.0, 0.34):
+        data.joint("joint_torso_height").qpos = height
+        mujoco.mj_forward(model, data)
+        foot = data.body("panda_link0").xpos
+        np.testing.assert_allclose(foot, [0, 0, 0.7 + height], atol=1e-12)
+        assert data.ncon == 0
+    base = sum(robot.link(name).mass for name in ("base", "wheeled_base"))
+    assert base == 62.0  # Omron's data sheet of the LD-60
+    assert robot.groups["torso"] == ("joint_torso_height",)
+    chosen = wbc_suite.load_robot("Panda", base="Omron_Mobile_Base")
+    assert chosen.links == robot.links
+    assert chosen.root == robot.root
+
+
+def test_arms_stand_where_they_are_placed_though_the_base_turns_behind_them():
+    robot = place_robot(wbc_suite.load_robot("PandaOmron"), (1.0, 2.0), np.pi / 2)
+    model = robot.to_mjspec().compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    np.testing.assert_allclose(data.body("panda_link0").xpos[:2], [1, 2], atol=1e-12)
+    np.testing.assert_allclose(data.body("base").xpos[:2], [1, 1.79], atol=1e-12)

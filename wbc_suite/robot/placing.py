@@ -12,7 +12,7 @@ from wbc_suite.robot.shapes import Posed
 if TYPE_CHECKING:
     from wbc_suite.robot.component import Component
 
-__all__ = ["compose", "depth_first", "locked", "renamed", "se3_of"]
+__all__ = ["compose", "depth_first", "locked", "pose_fields", "renamed", "se3_of"]
 
 
 def se3_of(posed: Posed) -> Any:

@@ -5,6 +5,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.robot import RobotDescription
+from wbc_suite.robot.placing import pose_fields, se3_of
 from wbc_suite.robot.shapes import Vector3
 
 __all__ = ["add_camera", "attach_robot", "place_robot", "robot_prefix"]
@@ -25,16 +26,16 @@ def robot_prefix(index: int) -> str:
 def place_robot(
     robot: RobotDescription, position: tuple[float, float], yaw: float
 ) -> RobotDescription:
-    """Return the robot standing at x, y on the floor, turned about z; z stays.
+    """Return the robot moved to x, y on the floor and turned about z.
 
-    The place is part of the description, so that every engine's model of it measures
-    from the same world.
+    Its own root pose is seen from there: a base whose middle lies behind its arm keeps
+    it there. The place is part of the description, so that every engine's model of it
+    measures from the same world.
     """
-    old = robot.root
     turn = pin.Quaternion(np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2))
-    x, y, z, w = (turn * pin.Quaternion(*old.quat)).normalized().coeffs().tolist()
-    pos = (position[0], position[1], old.pos[2])
-    return robot.with_root(old.kind, pos=pos, quat=(w, x, y, z))
+    place = pin.SE3(turn.matrix(), np.array([*position, 0.0]))
+    root = pose_fields(place * se3_of(robot.root))
+    return robot.with_root(robot.root.kind, **root)
 
 
 def attach_robot(
