@@ -3,7 +3,8 @@
 `oracles/*.json` hold 25 configurations each, evaluated on the source's description by
 two loaders that agree to 1e-13; the figures are rounded to 10 digits. Where our file
 corrects a mass (a listed deviation), `source_masses` gives the source's own mass and
-centre of that link, which are put back before gravity is compared.
+centre of that link, which are put back before gravity is compared. `root_quat` turns a
+first link that is not the source's, so that the source's own stands upright.
 """
 
 import json
@@ -29,8 +30,9 @@ def oracle(request):
 def model(oracle):
     load = dict(oracle["load"])
     robot = wbc_suite.load_robot(load.pop("robot"), **load)
-    home = {"pos": (0.0, 0.0, 0.0), "quat": (1.0, 0.0, 0.0, 0.0)}
-    return robot.with_root(robot.root.kind, **home).to_pinocchio()
+    home = oracle.get("root_quat", (1.0, 0.0, 0.0, 0.0))
+    robot = robot.with_root(robot.root.kind, pos=(0.0, 0.0, 0.0), quat=tuple(home))
+    return robot.to_pinocchio()
 
 
 def configuration(model, oracle, row):
