@@ -3,6 +3,7 @@
 Try one gripper, with figures and a picture:
 
     python tests/robot/grasp_rig.py panda_gripper cube.png
+    python tests/robot/grasp_rig.py fourier_right_hand can.png --can
 """
 
 import sys
@@ -21,14 +22,37 @@ PREFIX = "robot0_"
 TABLE = 0.4  # m, height of the table's top
 CARRIAGE = 200.0  # kg, moves as it is told whatever a gripper of 2 kg does
 STIFFNESS = 2500.0  # 1/s^2, of the carriage's position
-DROP = 0.10  # m, from which the open gripper comes
+CLEAR = 0.002  # m, between fingertips and table
+AWAY = 0.12  # m, from which the open gripper comes
 LIFT = 0.15  # m
 SHAKE = 5.0  # m/s^2
 FREQUENCY = 3.0  # Hz; 5 m/s^2 are 14 mm to either side
-CUBE = 0.02  # m, half an edge
-CUBE_MASS = 0.1  # kg
-CLEAR = 0.002  # m, between fingertips and table
 GRIPPED = 0.9  # s, to close and to squeeze
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Thing:
+    """What is gripped.
+
+    Attributes:
+        grasp: The grasp that it needs; a gripper without takes its only one.
+        approach: R_wt of the tool that grips it.
+        half: Half its height, m.
+        mass: In kg.
+    """
+
+    grasp: str
+    approach: np.ndarray
+    half: float
+    mass: float
+
+
+DOWN = np.diag([1.0, -1.0, -1.0])
+SIDEWAYS = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
+"""z ahead and x up."""
+CUBE = Thing(grasp="pinch", approach=DOWN, half=0.02, mass=0.1)
+CAN = Thing(grasp="wrap", approach=SIDEWAYS, half=0.08, mass=0.3)
+CAN_RADIUS = 0.03  # m
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -40,7 +64,7 @@ class Hold:
         turn: Largest turn in the tool's frame, rad.
         links: Links that touched it at the end.
         depth: Deepest penetration at the end, m.
-        clearance: Height above the table at the end, m.
+        rise: Height above the place where it stood, at the end, m.
         force: Sum of normal forces at the end, N.
     """
 
@@ -48,130 +72,126 @@ class Hold:
     turn: float
     links: frozenset[str]
     depth: float
-    clearance: float
+    rise: float
     force: float
+
+    def __str__(self):
+        return (
+            f"slip {1e3 * self.slip:.2f} mm, turn {self.turn:.3f} rad, sunk "
+            f"{1e3 * self.depth:.2f} mm, {self.force:.1f} N, rise {self.rise:.3f} m, "
+            f"touched by {', '.join(sorted(self.links))}"
+        )
 
 
 class GraspRig:
-    """A table with a thing on it, below a gripper that points down.
+    """A table with a thing on it, and an open gripper before it.
 
     Args:
         name: Catalogue name of the gripper.
+        thing: What it is to grip.
     """
 
-    def __init__(self, name):
-        self.robot = wbc_suite.load_robot(f"gripper/{name}")
-        (self.gripper,) = self.robot.synergies
-        tool = self.pose_of("tcp")
-        spec = empty_arena()
-        add_table(spec, TableConfig(size=(0.8, 0.8, 0.05), center=(0, 0, TABLE)))
-        volume = (2 * CUBE) ** 3
-        add_box(
-            spec,
-            "thing",
-            half_size=(CUBE, CUBE, CUBE),
-            rgba=(0.85, 0.25, 0.15, 1),
-            density=CUBE_MASS / volume,
-        )
-        spec.body("thing").pos = (0, 0, TABLE + CUBE)
-        self._add_carriage(spec, tool)
-        self.model = spec.compile()
+    def __init__(self, name, thing=CUBE):
+        self.robot, self.thing = wbc_suite.load_robot(f"gripper/{name}"), thing
+        (self.synergies,) = self.robot.synergies.values()
+        frames = [frame.name for frame in self.robot.frames]
+        self.tool = thing.grasp if thing.grasp in frames else "tcp"
+        self.model = self._scene().compile()
         self.data = mujoco.MjData(self.model)
         self.state = RobotState(self.model, self.data, self.robot, prefix=PREFIX)
-        self.hand = GripperController(
-            "gripper", self.robot.synergies[self.gripper], self.state
-        )
-        self.start = self.target = np.array([0.0, 0.0, DROP])
+        self.hand = GripperController("gripper", self.synergies, self.state)
+        joints = [self.model.joint(f"carriage_{axis}") for axis in "xyz"]
+        self._dofs = [joint.dofadr[0] for joint in joints]
+        self._places = [joint.qposadr[0] for joint in joints]
         self._begin()
 
-    def pose_of(self, name):
-        """Return T_rf of a frame of the gripper at its zero posture."""
-        model = self.robot.to_pinocchio()
-        data = model.createData()
-        q = pin.neutral(model)
-        pin.framesForwardKinematics(model, data, q)
-        return data.oMf[model.getFrameId(name)].copy()
-
-    def _add_carriage(self, spec, tool):
-        """Hang the gripper so that at zero its tool is at the thing's centre."""
+    def _scene(self):
+        spec = empty_arena()
+        add_table(spec, TableConfig(size=(0.4, 0.4, 0.05), center=(0, 0, TABLE)))
+        if self.thing is CAN:
+            _add_can(spec)
+        else:
+            half = self.thing.half
+            density = self.thing.mass / (2 * half) ** 3
+            size, red = (half, half, half), (0.85, 0.25, 0.15, 1)
+            add_box(spec, "thing", half_size=size, rgba=red, density=density)
+        centre = np.array([0.0, 0.0, TABLE + self.thing.half])
+        spec.body("thing").pos = centre
         body = spec.worldbody.add_body(name="carriage", gravcomp=1)
         body.explicitinertial = True
         body.mass, body.inertia = CARRIAGE, (1.0, 1.0, 1.0)
-        for axis in np.eye(3):
-            body.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
-        down = pin.SE3(
-            pin.Quaternion(0.0, 1.0, 0.0, 0.0).matrix(), np.array([0, 0, TABLE + CUBE])
-        )
-        root = down * tool.inverse()
+        slide = mujoco.mjtJoint.mjJNT_SLIDE
+        for letter, axis in zip("xyz", np.eye(3), strict=True):
+            body.add_joint(name=f"carriage_{letter}", type=slide, axis=axis)
+        root = pin.SE3(self.thing.approach, centre) * self._tool_pose().inverse()
         x, y, z, w = pin.Quaternion(root.rotation).normalized().coeffs()
-        self.robot = self.robot.with_root(
-            "fixed", pos=tuple(root.translation), quat=(w, x, y, z)
-        )
+        pose = {"pos": tuple(root.translation), "quat": (w, x, y, z)}
+        self.robot = self.robot.with_root("fixed", **pose)
         attach_robot(spec, self.robot, PREFIX, frame=body.add_frame())
+        return spec
+
+    def _tool_pose(self):
+        """Return T_rt, the tool in the gripper's first link; no joint moves it."""
+        model = self.robot.to_pinocchio()
+        data = model.createData()
+        pin.framesForwardKinematics(model, data, pin.neutral(model))
+        return data.oMf[model.getFrameId(self.tool)].copy()
 
     def _begin(self):
-        model, data = self.model, self.data
-        joints = [j for j in range(model.njnt) if not model.joint(j).name]
-        self.carriage = model.jnt_dofadr[joints], model.jnt_qposadr[joints]
-        synergies = self.robot.synergies[self.gripper]
-        lowest = self._sweep()
+        """Place the open gripper, so high that closing never reaches the table."""
+        lowest = min(self._lowest(share) for share in np.linspace(0.0, 1.0, 21))
         self.above = max(0.0, TABLE + CLEAR - lowest)
-        self.start = self.target = self.start + np.array([0.0, 0.0, self.above])
-        data.qpos[self.carriage[1]] = self.start
-        self._set_posture({s.name: -1.0 for s in synergies})
-        self.command({s.name: -1.0 for s in synergies})
-        mujoco.mj_forward(model, data)
+        self.target = -AWAY * self.thing.approach[:, 2]
+        self.target[2] += self.above
+        self._set_posture(self.commands(0.0))
+        self.data.qpos[self._places] = self.target
+        self.close(0.0)
+        mujoco.mj_forward(self.model, self.data)
 
-    def _set_posture(self, command):
-        for joint, value in self.posture(command).items():
-            self.data.joint(PREFIX + joint).qpos = value
-
-    def _sweep(self):
-        """Return the height of the lowest point that closing fingers reach, m.
-
-        Above the place where the tool's frame is at the thing's centre.
-        """
+    def _lowest(self, share):
+        """Return the height of the lowest point of the gripper at the thing, m."""
         model, data = self.model, self.data
-        geoms = [g for g in range(model.ngeom) if model.geom(g).name.startswith(PREFIX)]
-        geoms = [g for g in geoms if model.geom_contype[g]]
-        lowest = np.inf
-        for closed in np.linspace(-1.0, 1.0, 21):
-            synergies = self.robot.synergies[self.gripper]
-            self._set_posture({s.name: closed for s in synergies})
-            mujoco.mj_kinematics(model, data)
-            rows = data.geom_xmat[geoms].reshape(-1, 3, 3)[:, 2]
-            middle = data.geom_xpos[geoms, 2]
-            middle += np.sum(rows * model.geom_aabb[geoms, :3], axis=1)
-            half = np.sum(np.abs(rows) * model.geom_aabb[geoms, 3:], axis=1)
-            lowest = min(lowest, float((middle - half).min()))
-        return lowest
+        names = [model.geom(g).name for g in range(model.ngeom)]
+        own = [g for g, n in enumerate(names) if n.startswith(PREFIX)]
+        own = [g for g in own if model.geom_contype[g]]
+        self._set_posture(self.commands(share))
+        mujoco.mj_kinematics(model, data)
+        rows = data.geom_xmat[own].reshape(-1, 3, 3)[:, 2]
+        middle = data.geom_xpos[own, 2]
+        middle = middle + np.sum(rows * model.geom_aabb[own, :3], axis=1)
+        half = np.sum(np.abs(rows) * model.geom_aabb[own, 3:], axis=1)
+        return float((middle - half).min())
 
-    def posture(self, command):
-        """Return the joint values that a command asks for, with followers."""
+    def commands(self, share):
+        """Return the synergies' commands, share 0 before and 1 after closing."""
+        ends = np.array(
+            [s.grasps.get(self.thing.grasp, (-1.0, 1.0)) for s in self.synergies]
+        )
+        return (1.0 - share) * ends[:, 0] + share * ends[:, 1]
+
+    def _set_posture(self, commands):
         values = {}
-        for synergy in self.robot.synergies[self.gripper]:
-            closed = (command[synergy.name] + 1.0) / 2.0
+        for synergy, command in zip(self.synergies, commands, strict=True):
             for joint, low in synergy.open.items():
-                values[joint] = low + closed * (synergy.closed[joint] - low)
+                values[joint] = low + (command + 1) / 2 * (synergy.closed[joint] - low)
         for joint in self.robot.joints:
             if joint.mimic is not None and joint.mimic.joint in values:
                 leader = values[joint.mimic.joint]
                 values[joint.name] = joint.mimic.ratio * leader + joint.mimic.offset
-        return values
+        for joint, value in values.items():
+            self.data.joint(PREFIX + joint).qpos = value
 
-    def command(self, command):
-        """Set the gripper's action by synergy."""
-        names = [s.name for s in self.robot.synergies[self.gripper]]
-        self.hand.set_goal(np.array([command[name] for name in names]))
+    def close(self, share=1.0):
+        """Command the gripper, from 0, open, to 1, closed."""
+        self.hand.set_goal(self.commands(share))
 
     def step(self, position, velocity, acceleration):
         """Advance one step with the carriage on its way."""
         model, data = self.model, self.data
         mujoco.mj_step1(model, data)
-        dofs, places = self.carriage
-        wanted = acceleration + STIFFNESS * (position - data.qpos[places])
-        wanted += 2.0 * np.sqrt(STIFFNESS) * (velocity - data.qvel[dofs])
-        data.qfrc_applied[dofs] = CARRIAGE * wanted
+        wanted = acceleration + STIFFNESS * (position - data.qpos[self._places])
+        wanted += 2.0 * np.sqrt(STIFFNESS) * (velocity - data.qvel[self._dofs])
+        data.qfrc_applied[self._dofs] = CARRIAGE * wanted
         data.ctrl[self.state.actuator_ids[self.hand.outputs]] = self.hand.set_points()
         mujoco.mj_step2(model, data)
         assert not data.warning.number.any()
@@ -194,7 +214,18 @@ class GraspRig:
             self.step(begin + way * change, speed * change, rate * change)
         self.target = begin + change
 
-    def shake(self, axis, seconds, amplitude=SHAKE):
+    def grip(self):
+        """Go to the thing, close, lift; remember how it lies in the hand."""
+        self.wait(0.1)
+        self.move(AWAY * self.thing.approach[:, 2], 0.5)
+        self.close()
+        self.wait(GRIPPED)
+        self.gripped = self._held()
+        self.slip = self.turn = 0.0
+        self.move((0, 0, LIFT), 0.6)
+        self._note()
+
+    def shake(self, axis, seconds=2.0, amplitude=SHAKE):
         """Accelerate by `amplitude cos(w t)` along an axis, over whole periods."""
         axis = np.asarray(axis, dtype=np.float64)
         w, dt = 2 * np.pi * FREQUENCY, self.model.opt.timestep
@@ -205,25 +236,14 @@ class GraspRig:
             self.step(self.target + way * axis, rates[0] * axis, rates[1] * axis)
             self._note()
 
-    def held(self):
-        """Return T_ft, the thing in the tool's frame."""
-        site, body = self.data.site(PREFIX + "tcp"), self.data.body("thing")
+    def _held(self):
+        """Return the thing's pose in the tool's frame."""
+        site, body = self.data.site(PREFIX + self.tool), self.data.body("thing")
         tool = pin.SE3(site.xmat.reshape(3, 3), site.xpos)
         return tool.inverse() * pin.SE3(body.xmat.reshape(3, 3), body.xpos)
 
-    def grip(self):
-        """Come down, close, lift; remember how the thing lies in the hand."""
-        self.wait(0.1)
-        self.move((0, 0, -DROP), 0.5)
-        self.command({s.name: 1.0 for s in self.robot.synergies[self.gripper]})
-        self.wait(GRIPPED)
-        self.gripped = self.held()
-        self.slip = self.turn = 0.0
-        self.move((0, 0, LIFT), 0.6)
-        self._note()
-
     def _note(self):
-        moved = self.gripped.actInv(self.held())
+        moved = self.gripped.actInv(self._held())
         self.slip = max(self.slip, float(np.linalg.norm(moved.translation)))
         self.turn = max(self.turn, float(np.linalg.norm(pin.log3(moved.rotation))))
 
@@ -239,22 +259,35 @@ class GraspRig:
             body = model.body(model.geom_bodyid[other]).name
             mujoco.mj_contactForce(model, data, k, force)
             links.add(body.removeprefix(PREFIX))
-            depth, total = max(depth, -float(contact.dist)), total + force[0]
+            depth, total = max(depth, -float(contact.dist)), total + float(force[0])
         return Hold(
             slip=self.slip,
             turn=self.turn,
             links=frozenset(links),
             depth=depth,
-            clearance=float(data.body("thing").xpos[2] - TABLE - CUBE),
+            rise=float(data.body("thing").xpos[2] - TABLE - self.thing.half),
             force=total,
         )
 
 
-def main(name, picture=None):
-    """Try one gripper: print how it held, and draw it; then shake it loose."""
-    rig = GraspRig(name)
+def _add_can(spec):
+    body = spec.worldbody.add_body(name="thing")
+    body.add_joint(name="thing_joint", type=mujoco.mjtJoint.mjJNT_FREE)
+    body.add_geom(
+        name="thing",
+        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+        size=(CAN_RADIUS, CAN.half, 0.0),
+        rgba=(0.85, 0.25, 0.15, 1),
+        mass=CAN.mass,
+        condim=4,
+    )
+
+
+def main(name, picture=None, *options):
+    """Try one gripper: print how it holds and draw it; then shake it loose."""
+    rig = GraspRig(name, CAN if "--can" in options else CUBE)
     rig.grip()
-    print("lifted:", rig.result())
+    print(f"lifted, {1e3 * rig.above:.1f} mm above the centre: {rig.result()}")
     if picture:
         from PIL import Image
 
@@ -263,10 +296,10 @@ def main(name, picture=None):
         with Camera(rig.model, rig.data, subject=PREFIX) as camera:
             Image.fromarray(camera.take(rig.data)).save(picture)
     amplitude = SHAKE
-    while amplitude < 200.0 and "table" not in rig.result().links:
+    while amplitude < 100.0 and rig.result().rise > LIFT / 2:
         for axis in np.eye(3):
-            rig.shake(axis, seconds=2.0, amplitude=amplitude)
-        print(f"shaken at {amplitude:g} m/s^2:", rig.result())
+            rig.shake(axis, amplitude=amplitude)
+        print(f"shaken at {amplitude:g} m/s^2: {rig.result()}")
         amplitude *= 2.0
 
 

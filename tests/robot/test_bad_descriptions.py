@@ -98,6 +98,8 @@ CASES = {
     "unknown colour": ("radius = 0.04 }", "radius = 0.04, color = \"whit\" }", ["whit"]),
     "flat segment": ("to = [0, 0, 0.2]", "to = [0, 0, 0]", ["same point"]),
     "unknown format": ("format = 1", "format = 2", ["format", "2"]),
+    "grasp beyond closed": ("[groups]", "[[synergy]]\nname = \"hook\"\nopen = { elbow = 0 }\nclosed = { elbow = 1 }\ngrasps = { pinch = [0, 1.5] }\n[groups]",
+                            ["synergy[0].grasps.pinch[1]", "1.5"]),
     "not toml": ("format = 1", "format = ", ["TOML"]),
     "forbidden name": ("name = \"eef\"", "name = \"../eef\"", ["frame[0].name"]),
 }  # fmt: skip

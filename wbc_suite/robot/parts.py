@@ -41,6 +41,7 @@ Name: TypeAlias = Annotated[
 Range: TypeAlias = tuple[Real, Real]
 Positive: TypeAlias = Annotated[float, Field(gt=0.0, le=1e9)]
 NotNegative: TypeAlias = Annotated[float, Field(ge=0.0, le=1e9)]
+Command: TypeAlias = Annotated[float, Field(ge=-1.0, le=1.0)]
 Moment: TypeAlias = Annotated[float, Field(ge=-1e6, le=1e6)]
 
 
@@ -211,12 +212,17 @@ class Synergy(FrozenModel):
             a gripper is called like its part.
         open: Joint values when open.
         closed: The same joints' values when closed.
+        grasps: Commands (-1 open to 1 closed) before and after closing, by the name of
+            a grasp, such as `pinch`; from -1 to 1 where a grasp is not named. A frame
+            of that name tells where: z is the way of approach, fingers close along y
+            and a bar is grasped along x. Without such a frame it is the `tcp`.
     """
 
     name: Name
     gripper: Name = "gripper"
     open: dict[Name, Real]
     closed: dict[Name, Real]
+    grasps: dict[Name, tuple[Command, Command]] = {}
 
     @model_validator(mode="after")
     def _same_joints(self) -> "Synergy":
