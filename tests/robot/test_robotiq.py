@@ -128,3 +128,57 @@ def test_force_at_the_pads_is_within_the_data_sheet(figures):
     slope = (width(closed / 2 + 1e-4) - width(closed / 2 - 1e-4)) / 2e-4
     low, high = figures["force"]
     assert low < robot.joint(leader).effort / abs(slope) < high
+
+
+@pytest.fixture(scope="module")
+def dexterous():
+    return wbc_suite.load_robot("gripper/robotiq_three_finger_dexterous_gripper")
+
+
+def test_three_fingers_weigh_what_the_data_sheet_says(dexterous):
+    assert dexterous.mass == pytest.approx(2.3, rel=0.02)
+
+
+def test_each_command_moves_its_own_finger(dexterous):
+    leaders = {}
+    for synergy in dexterous.synergies["gripper"]:
+        _, data = settled(dexterous, synergy.closed)
+        moved = {
+            joint.name
+            for joint in dexterous.joints
+            if abs(float(data.joint(joint.name).qpos[0])) > 0.05
+        }
+        (leader,) = synergy.closed
+        leaders[leader] = moved
+    for leader, moved in leaders.items():
+        wanted = {
+            j.name
+            for j in dexterous.joints
+            if j.name == leader
+            or (j.mimic and j.mimic.joint == leader and j.mimic.ratio)
+        }
+        assert moved == wanted
+
+
+def test_tips_stay_upright_while_they_close(dexterous):
+    """The outer link turns back by as much as the inner one turns in."""
+    model, data = settled(dexterous, {})
+    tips = [model.body(f"finger_{n}_link_3").id for n in ("1", "2", "middle")]
+    before = data.xquat[tips].copy()
+    closed = {
+        j: v
+        for s in dexterous.synergies["gripper"]
+        for j, v in s.closed.items()
+        if not j.startswith("palm")
+    }
+    _, data = settled(dexterous, closed | {"palm_finger_1_joint": 0.0})
+    np.testing.assert_allclose(data.xquat[tips], before, atol=5e-3)
+    heights = data.xpos[tips, 1]
+    assert np.ptp(np.abs(heights)) < 2e-3
+    assert heights[0] * heights[2] < 0
+
+
+def test_the_plain_three_finger_gripper_has_one_command(dexterous):
+    plain = wbc_suite.load_robot("gripper/robotiq_three_finger_gripper")
+    assert [s.name for s in plain.synergies["gripper"]] == ["grasp"]
+    assert plain.links == dexterous.links

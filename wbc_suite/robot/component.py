@@ -1,11 +1,11 @@
 """The two kinds of robot file: a component, and an assembly of components."""
 
 from pathlib import Path
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import Field
 
-from wbc_suite.errors import ConfigError, DescriptionError
+from wbc_suite.errors import ConfigError, DescriptionError, UnknownNameError
 from wbc_suite.robot.mirror import Mirror, reflect_component
 from wbc_suite.robot.parts import (
     Actuator,
@@ -20,7 +20,7 @@ from wbc_suite.robot.parts import (
     Sensor,
     Synergy,
 )
-from wbc_suite.robot.shapes import Posed
+from wbc_suite.robot.shapes import Posed, as_table
 from wbc_suite.tomlfile import FrozenModel, parse_model, read_toml
 
 __all__ = ["Assembly", "Component", "Part", "read_robot_file"]
@@ -37,6 +37,8 @@ class Header(FrozenModel):
         name: Unique name.
         kind: Folder of the catalogue in which it lies.
         side: The side that a hand is made for; absent when it fits both.
+        extends: Another component of the same folder that this one changes: tables
+            given here, such as `synergy`, replace its tables.
         title: Name for people.
         source: Where the figures come from, in words.
         license: Licence of the figures.
@@ -46,6 +48,7 @@ class Header(FrozenModel):
     name: Name
     kind: Literal["arm", "body", "gripper", "base"]
     side: Literal["left", "right"] | None = None
+    extends: Name | None = None
     title: str = ""
     source: str = ""
     license: str = ""
@@ -145,7 +148,7 @@ def read_robot_file(path: Path) -> Component | Assembly:
     data = read_toml(path)
     if "component" in data:
         component = parse_model(
-            Component, data, source=str(path), error=DescriptionError
+            Component, _extended(data, path), source=str(path), error=DescriptionError
         )
         return reflect_component(component, source=str(path))
     if "assembly" in data:
@@ -154,3 +157,22 @@ def read_robot_file(path: Path) -> Component | Assembly:
         f"{path}: a robot file has a table [component] (links and joints) or "
         f"[assembly] (parts); this one has {', '.join(sorted(data)) or 'nothing'}."
     )
+
+
+def _extended(data: dict[str, Any], path: Path) -> dict[str, Any]:
+    """Lay a component's tables over those of the one that it extends."""
+    header = as_table(data["component"])
+    name = header.get("extends")
+    if not isinstance(name, str):
+        return data
+    beside = [p.stem for p in path.parent.glob("*.toml") if p != path]
+    if name not in beside:
+        raise UnknownNameError("component to extend", name, beside)
+    base = read_toml(path.with_name(f"{name}.toml"))
+    inherited = as_table(base.get("component"))
+    if "extends" in inherited:
+        raise ConfigError(
+            f"{path}: '{name}' extends another component itself; extend "
+            f"'{inherited['extends']}'."
+        )
+    return base | data | {"component": inherited | header}

@@ -24,6 +24,8 @@ def robot_schema(kind: Literal["component", "assembly"]) -> dict[str, Any]:
     """
     model = Component if kind == "component" else Assembly
     schema = model.model_json_schema(by_alias=True)
+    if kind == "component":  # one that extends another may take over its links
+        schema["required"].remove("link")
     for table in (schema, *schema.get("$defs", {}).values()):
         properties = table.get("properties", {})
         if "quat" in properties:
