@@ -11,7 +11,7 @@ import typer
 from wbc_suite.catalogue import ENVIRONMENT_VARIABLE
 from wbc_suite.errors import ConfigError
 
-__all__ = ["CatalogueOption", "RobotArgument", "writing"]
+__all__ = ["CatalogueOption", "RobotArgument", "SkinOption", "writing"]
 
 
 def _add_to_catalogue(folders: list[Path] | None) -> list[Path]:
@@ -39,6 +39,14 @@ RobotArgument = Annotated[
     str,
     typer.Argument(
         metavar="ROBOT", help="Name (`wbc-suite list`) or a .toml, .urdf or .xml file."
+    ),
+]
+
+SkinOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="meshes|DIR",
+        help="Draw with real meshes, from installed packages or from a folder.",
     ),
 ]
 

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from wbc_suite.cli.options import CatalogueOption, RobotArgument, writing
+from wbc_suite.cli.options import CatalogueOption, RobotArgument, SkinOption, writing
 
 __all__ = ["render"]
 
@@ -30,6 +30,7 @@ def render(
     keyframe: Annotated[str, typer.Option(help="Posture of the robot.")] = "ready",
     width: Annotated[int, typer.Option(min=16, max=8192, help="Pixels.")] = 800,
     height: Annotated[int, typer.Option(min=16, max=8192, help="Pixels.")] = 800,
+    skin: SkinOption = None,
     catalogue: CatalogueOption = None,
 ) -> None:
     """Draw a robot in the studio, without a display."""
@@ -39,7 +40,10 @@ def render(
     from wbc_suite.viewers.offscreen import render_robot
 
     picture = render_robot(
-        load_robot(robot), view=view.value, keyframe=keyframe, size=(width, height)
+        load_robot(robot, skin=skin),
+        view=view.value,
+        keyframe=keyframe,
+        size=(width, height),
     )
     with writing(output):
         Image.fromarray(picture).save(output)

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from wbc_suite.cli.options import CatalogueOption
+from wbc_suite.cli.options import CatalogueOption, SkinOption
 from wbc_suite.cli.serving import HostOption, PortOption, serve_until_interrupted
 
 __all__ = ["teleop"]
@@ -23,6 +23,7 @@ def teleop(
     rate: Annotated[
         float, typer.Option(help="Targets taken per second, Hz.", min=5.0, max=200.0)
     ] = 100.0,
+    skin: SkinOption = None,
     seed: Annotated[int, typer.Option(help="Seed of the scene.")] = 0,
     host: HostOption = "127.0.0.1",
     port: PortOption = None,
@@ -42,6 +43,7 @@ def teleop(
         controller_configs=controller,
         control_freq=rate,
         horizon=round(ONE_DAY * rate),
+        skin=skin,
     )
     session = TeleopSession(env, period=1.0 / rate, seed=seed)
     print("Compiling; this takes a few seconds the first time ...", flush=True)

@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from wbc_suite.cli.options import CatalogueOption, RobotArgument
+from wbc_suite.cli.options import CatalogueOption, RobotArgument, SkinOption
 from wbc_suite.cli.serving import HostOption, PortOption, serve_until_interrupted
 
 __all__ = ["view"]
@@ -14,6 +14,7 @@ def view(
     robot: RobotArgument,
     gripper: Annotated[str | None, typer.Option(help="Another gripper.")] = None,
     base: Annotated[str | None, typer.Option(help="Another base.")] = None,
+    skin: SkinOption = None,
     host: HostOption = "127.0.0.1",
     port: PortOption = None,
     catalogue: CatalogueOption = None,
@@ -23,7 +24,7 @@ def view(
     from wbc_suite.viewers.robot_page import RobotPage
     from wbc_suite.viewers.site import Site
 
-    description = load_robot(robot, gripper=gripper, base=base)
+    description = load_robot(robot, gripper=gripper, base=base, skin=skin)
     page = RobotPage(description, Site(host, port))
     serve_until_interrupted(page.site, description.title or description.name)
     page.stop()

@@ -39,6 +39,8 @@ class EnvConfig(FrozenModel):
             all robots, or one for each.
         gripper_types: Another gripper; "default" keeps the robot's own.
         base_types: Another base; "default" keeps the robot's own.
+        skin: "meshes" draws robots with the meshes of installed packages, a folder with
+            those found there.
         initialization_noise: "default", None, or `{"type": ..., "magnitude": ...}`.
         control_freq: Actions per second.
         horizon: Actions in an episode; the benchmark's own when absent.
@@ -57,6 +59,7 @@ class EnvConfig(FrozenModel):
     controller_configs: Any = None
     gripper_types: Any = "default"
     base_types: Any = "default"
+    skin: str | Path | None = None
     initialization_noise: NoiseConfig | Literal["default"] | None = "default"
     control_freq: PositiveFloat = 20.0
     horizon: PositiveInt | None = None

@@ -196,6 +196,7 @@ class RobotEnv(gymnasium.Env[Observation, Vector]):
             robot,
             gripper=None if gripper == "default" else gripper,
             base=None if base == "default" else base,
+            skin=self.config.skin,
         )
 
     def _build(self) -> Simulation:

@@ -11,12 +11,16 @@ from wbc_suite.robot.component import Assembly, Component, Part, read_robot_file
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.parts import Link, Mount, Root, Synergy
 from wbc_suite.robot.placing import compose, depth_first, locked, renamed
+from wbc_suite.robot.shapes import SkinMesh
+from wbc_suite.robot.skins import Wardrobe
 from wbc_suite.tomlfile import parse_model
 
 __all__ = ["assemble", "describe_component"]
 
 
-def describe_component(component: Component, *, source: str) -> RobotDescription:
+def describe_component(
+    component: Component, *, source: str, wardrobe: Wardrobe | None = None
+) -> RobotDescription:
     """Make a robot of one component alone."""
     header = component.component
     data = _collect(component) | {
@@ -28,8 +32,20 @@ def describe_component(component: Component, *, source: str) -> RobotDescription
         "root": component.root,
         "links": depth_first(component.links),
         "synergies": _by_gripper(component.synergies),
+        "skins": _skins(component, wardrobe),
     }
     return parse_model(RobotDescription, data, source=source, error=DescriptionError)
+
+
+def _skins(
+    component: Component, wardrobe: Wardrobe | None, prefix: str = ""
+) -> dict[str, tuple[SkinMesh, ...]]:
+    """Return the meshes of a component's links, whose names then get a prefix."""
+    if wardrobe is None:
+        return {}
+    links = [link.name for link in component.links]
+    found = wardrobe.dress(component.component.name, links)
+    return {prefix + link: meshes for link, meshes in found.items()}
 
 
 def _by_gripper(
@@ -45,7 +61,12 @@ def _by_gripper(
 
 
 def assemble(
-    path: Path, *, catalogue: Catalogue, gripper: Choice = None, base: Choice = None
+    path: Path,
+    *,
+    catalogue: Catalogue,
+    gripper: Choice = None,
+    base: Choice = None,
+    wardrobe: Wardrobe | None = None,
 ) -> RobotDescription:
     """Read an assembly file and mount its parts.
 
@@ -54,12 +75,13 @@ def assemble(
         catalogue: Where components are looked up.
         gripper: Other grippers: a name for all, or a mapping from side to name.
         base: Another base.
+        wardrobe: Where to take meshes from.
 
     Raises:
         DescriptionError: If a part, a mount or a name does not fit.
         UnknownNameError: If a component does not exist.
     """
-    builder = _Builder(path, catalogue)
+    builder = _Builder(path, catalogue, wardrobe)
     assembly = choose(
         _extended(path, catalogue),
         gripper=gripper,
@@ -102,8 +124,11 @@ def _extended(path: Path, catalogue: Catalogue, depth: int = 0) -> Assembly:
 class _Builder:
     """Collects the parts of one assembly."""
 
-    def __init__(self, path: Path, catalogue: Catalogue) -> None:
-        self._path = path
+    def __init__(
+        self, path: Path, catalogue: Catalogue, wardrobe: Wardrobe | None
+    ) -> None:
+        self._path, self._wardrobe = path, wardrobe
+        self._skins: dict[str, tuple[SkinMesh, ...]] = {}
         self._catalogue = catalogue
         self._links: list[Link] = []
         self._mounts: dict[str, Mount] = {}
@@ -121,9 +146,9 @@ class _Builder:
         component = self.read(part)
         rename = shared if part.rename is None else part.rename
         prefix = f"{part.side}_" if part.side else ""
-        component = renamed(
-            component, items=prefix, bodies=prefix if rename else "", part=part.name
-        )
+        bodies = prefix if rename else ""
+        self._skins |= _skins(component, self._wardrobe, bodies)
+        component = renamed(component, items=prefix, bodies=bodies, part=part.name)
         links = depth_first(component.links)
         if not self._links:
             self._root = component.root
@@ -201,6 +226,7 @@ class _Builder:
             "keyframes": keyframes,
             "materials": self._materials,
             "synergies": self._synergies,
+            "skins": self._skins,
             "contacts": {"exclude": (*self._excludes, *assembly.contacts.exclude)},
         }
         data = locked(data, assembly.lock)

@@ -3,7 +3,7 @@
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from wbc_suite.errors import DescriptionError, UnknownNameError
 from wbc_suite.robot.parts import (
@@ -20,6 +20,7 @@ from wbc_suite.robot.parts import (
     Sensor,
     Synergy,
 )
+from wbc_suite.robot.shapes import Shape, SkinMesh
 from wbc_suite.robot.validation import check_description
 from wbc_suite.tomlfile import FrozenModel, parse_model
 
@@ -57,6 +58,7 @@ class RobotDescription(FrozenModel):
         contacts: Pairs of links that never collide.
         connects: Closed loops.
         materials: Colours by name.
+        skins: Meshes that are drawn in place of a link's own shapes, see `robot.skins`.
     """
 
     name: str
@@ -77,6 +79,7 @@ class RobotDescription(FrozenModel):
     contacts: Contacts = Contacts()
     connects: tuple[Connect, ...] = ()
     materials: dict[Name, Rgba] = {}
+    skins: dict[Name, tuple[SkinMesh, ...]] = Field(default={}, exclude=True)
 
     @model_validator(mode="after")
     def _check(self) -> "RobotDescription":
@@ -123,6 +126,10 @@ class RobotDescription(FrozenModel):
             return self._links_by_name[name]
         except (KeyError, TypeError):
             raise UnknownNameError("link", name, self._links_by_name) from None
+
+    def drawn(self, link: Link) -> tuple[Shape | SkinMesh, ...]:
+        """Return what a link is drawn with."""
+        return self.skins.get(link.name, link.visual)
 
     def joint(self, name: str) -> Joint:
         """Return a joint by name; raises UnknownNameError."""

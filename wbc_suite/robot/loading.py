@@ -9,6 +9,7 @@ from wbc_suite.robot.assembly import assemble, describe_component
 from wbc_suite.robot.choosing import Choice
 from wbc_suite.robot.component import Component, read_robot_file
 from wbc_suite.robot.description import RobotDescription
+from wbc_suite.robot.skins import Wardrobe
 
 __all__ = ["load_robot"]
 
@@ -21,6 +22,7 @@ def load_robot(
     gripper: Choice = None,
     base: Choice = None,
     root: Literal["fixed", "planar", "free"] | None = None,
+    skin: str | Path | None = None,
     catalogue: Catalogue | None = None,
 ) -> RobotDescription:
     """Load a robot by its catalogue name, or from a TOML, URDF or MJCF file.
@@ -33,6 +35,8 @@ def load_robot(
         base: Another base, which brings its own root and height; "none" leaves it out.
             A robot with legs or wheels takes only a root, such as `NullMobileBase`.
         root: Another root: `fixed`, `planar` or `free`.
+        skin: "meshes" draws the robot with the meshes of installed packages, a folder
+            with those found there; see `robot.skins`. Nothing else changes.
         catalogue: Where to look; our own catalogue by default.
 
     Raises:
@@ -47,7 +51,10 @@ def load_robot(
     if not isinstance(name, str | Path):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise UnknownNameError("robot", name, catalogue.names("robots"))
     path = _locate(str(name), catalogue)
-    robot = _read(path, catalogue, gripper=gripper, base=base)
+    wardrobe = None if skin is None else Wardrobe(skin, catalogue)
+    robot = _read(path, catalogue, gripper=gripper, base=base, wardrobe=wardrobe)
+    if wardrobe is not None:
+        wardrobe.report()
     return robot if root in (None, robot.root.kind) else robot.with_root(root)
 
 
@@ -66,13 +73,24 @@ def _locate(name: str, catalogue: Catalogue) -> Path:
 
 
 def _read(
-    path: Path, catalogue: Catalogue, *, gripper: Choice, base: Choice
+    path: Path,
+    catalogue: Catalogue,
+    *,
+    gripper: Choice,
+    base: Choice,
+    wardrobe: Wardrobe | None,
 ) -> RobotDescription:
     if path.suffix == ".toml":
         content = read_robot_file(path)
         if not isinstance(content, Component):
-            return assemble(path, catalogue=catalogue, gripper=gripper, base=base)
-        robot = describe_component(content, source=str(path))
+            return assemble(
+                path,
+                catalogue=catalogue,
+                gripper=gripper,
+                base=base,
+                wardrobe=wardrobe,
+            )
+        robot = describe_component(content, source=str(path), wardrobe=wardrobe)
     elif path.suffix == ".urdf":
         from wbc_suite.robot.urdf_import import read_urdf
 

@@ -8,7 +8,15 @@ import pinocchio as pin
 
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.parts import Actuator, Joint, Link
-from wbc_suite.robot.shapes import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
+from wbc_suite.robot.shapes import (
+    Box,
+    Capsule,
+    Cylinder,
+    Ellipsoid,
+    Shape,
+    SkinMesh,
+    Sphere,
+)
 from wbc_suite.robot.surfaces import mesh_of
 from wbc_suite.robot.validation import inertia_matrix, rigid_bodies
 
@@ -167,7 +175,7 @@ def _set_inertia(body: mujoco.MjsBody, inertia: pin.Inertia) -> None:
 def _add_shapes(
     spec: mujoco.MjSpec, body: mujoco.MjsBody, robot: RobotDescription, link: Link
 ) -> None:
-    for shapes, kind in ((link.visual, "visual"), (link.collision, "collision")):
+    for shapes, kind in ((robot.drawn(link), "visual"), (link.collision, "collision")):
         for index, shape in enumerate(shapes):
             geom = _add_geom(spec, body, shape, f"{link.name}_{kind}{index}")
             geom.mass = 0.0
@@ -180,14 +188,16 @@ def _add_shapes(
                 _set_contact(geom, shape)
 
 
-def _rgba(robot: RobotDescription, shape: Shape) -> tuple[float, float, float, float]:
+def _rgba(
+    robot: RobotDescription, shape: Shape | SkinMesh
+) -> tuple[float, float, float, float]:
     color = shape.color
     if isinstance(color, str):
         return robot.materials.get(color, GREY)
     return (color[0], color[1], color[2], color[3] if len(color) == 4 else 1.0)
 
 
-def _set_contact(geom: mujoco.MjsGeom, shape: Shape) -> None:
+def _set_contact(geom: mujoco.MjsGeom, shape: Shape | SkinMesh) -> None:
     if shape.friction is not None:
         geom.friction = shape.friction
     if shape.condim is not None:
@@ -200,7 +210,7 @@ def _set_contact(geom: mujoco.MjsGeom, shape: Shape) -> None:
 
 
 def _add_geom(
-    spec: mujoco.MjSpec, body: mujoco.MjsBody, shape: Shape, name: str
+    spec: mujoco.MjSpec, body: mujoco.MjsBody, shape: Shape | SkinMesh, name: str
 ) -> mujoco.MjsGeom:
     mesh = mesh_of(shape)
     geom = body.add_geom(name=name, pos=shape.pos, quat=shape.quat)

@@ -15,6 +15,7 @@ from wbc_suite.tomlfile import FrozenModel
 __all__ = [
     "Box",
     "Capsule",
+    "Color",
     "Cylinder",
     "Ellipsoid",
     "Hull",
@@ -24,6 +25,7 @@ __all__ = [
     "Real",
     "Shape",
     "Size",
+    "SkinMesh",
     "Sphere",
     "Vector3",
     "as_table",
@@ -56,6 +58,7 @@ Quaternion: TypeAlias = Annotated[tuple[Real, Real, Real, Real], AfterValidator(
 """Unit quaternion w x y z; normalised on reading (rounded files are off by 1e-10)."""
 
 Color: TypeAlias = str | tuple[float, float, float] | tuple[float, float, float, float]
+"""A name in `[materials]`, or red green blue (alpha) from 0 to 1."""
 
 
 def quaternion_from_rpy(rpy: Vector3) -> tuple[float, float, float, float]:
@@ -212,6 +215,19 @@ class Loft(_Surface):
         if any(s[3] < 1e-6 or s[4] < 1e-6 for s in self.sections):
             raise ValueError("half sizes of rings must be positive")
         return self
+
+
+class SkinMesh(_Surface):
+    """A mesh file that dresses a link, see `robot.skins`; drawn, and nothing else.
+
+    Attributes:
+        file: Absolute path of an STL or OBJ file.
+        scale: Factors along the file's axes.
+    """
+
+    shape: Literal["skin"]
+    file: str
+    scale: Vector3 = (1.0, 1.0, 1.0)
 
 
 Shape: TypeAlias = Annotated[

@@ -11,7 +11,8 @@ from scipy.interpolate import PchipInterpolator
 from scipy.spatial import ConvexHull, QhullError
 
 from wbc_suite.errors import DescriptionError
-from wbc_suite.robot.shapes import Box, Cylinder, Hull, Loft, Shape
+from wbc_suite.robot.shapes import Box, Cylinder, Hull, Loft, Shape, SkinMesh
+from wbc_suite.robot.skin_meshes import skin_triangles
 from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["mesh_of", "support_points"]
@@ -22,7 +23,7 @@ SMALL = 0.02
 """Radius in m up to which coarser rings and spheres do: fingers, knobs, edges."""
 
 
-def mesh_of(shape: Shape) -> tuple[Matrix, Indices] | None:
+def mesh_of(shape: Shape | SkinMesh) -> tuple[Matrix, Indices] | None:
     """Compute the triangle mesh of a shape that is no primitive.
 
     Returns:
@@ -38,6 +39,8 @@ def mesh_of(shape: Shape) -> tuple[Matrix, Indices] | None:
             return _convex(support_points(shape))
         case Loft():
             return _loft(shape)
+        case SkinMesh():
+            return skin_triangles(shape)
         case _:
             return None
 

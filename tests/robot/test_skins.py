@@ -1,0 +1,207 @@
+"""Skins change what is seen and nothing else; missing meshes are one sentence."""
+
+import sys
+import tomllib
+
+import mujoco
+import numpy as np
+import pytest
+import trimesh
+
+import wbc_suite
+from wbc_suite.catalogue import Catalogue
+from wbc_suite.errors import ConfigError
+from wbc_suite.robot.component import read_robot_file
+from wbc_suite.robot.skins import PROVIDERS
+
+TABLES = Catalogue().files("robots/skin")
+
+
+def files_of(name):
+    table = tomllib.loads(
+        Catalogue().find("robots/skin", name, kind="skin").read_text()
+    )
+    pieces = [piece for link in table["link"].values() for piece in link]
+    return table["provider"], table.get("folder", ""), {p["file"] for p in pieces}
+
+
+def write_meshes(folder, names, mesh=None):
+    """Write what the tables of components ask for, below a folder."""
+    mesh = trimesh.creation.icosphere(2, radius=0.05) if mesh is None else mesh
+    for name in names:
+        _, inside, files = files_of(name)
+        for file in files:
+            path = folder / inside / file
+            path.parent.mkdir(parents=True, exist_ok=True)
+            mesh.export(path, file_type=path.suffix[1:].lower())
+
+
+@pytest.fixture(autouse=True)
+def _own_cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.delenv("MENAGERIE_ROOT", raising=False)
+    monkeypatch.delenv("MENAGERIE_CACHE_DIR", raising=False)
+
+
+@pytest.fixture
+def package(tmp_path, monkeypatch):
+    """A package `robosuite` with meshes, which must never be imported."""
+    root = tmp_path / "site" / "robosuite"
+    root.mkdir(parents=True)
+    (root / "__init__.py").write_text("raise RuntimeError('imported')\n")
+    monkeypatch.syspath_prepend(str(root.parent))
+    return root
+
+
+def same_dynamics(one, other):
+    for name in (
+        "body_mass",
+        "body_inertia",
+        "body_ipos",
+        "body_iquat",
+        "dof_armature",
+    ):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+    for model in (one, other):
+        touching = (model.geom_contype > 0) | (model.geom_conaffinity > 0)
+        yield [
+            (model.geom(g).name, *model.geom_size[g], *model.geom_pos[g])
+            for g in np.flatnonzero(touching)
+        ]
+
+
+def test_a_skin_changes_what_is_drawn_and_nothing_else(package):
+    write_meshes(package, ["panda", "panda_gripper", "rethink_mount"])
+    plain, dressed = (
+        wbc_suite.load_robot("Panda"),
+        wbc_suite.load_robot("Panda", skin="meshes"),
+    )
+    assert "robosuite" not in sys.modules
+    one, other = plain.to_mjspec().compile(), dressed.to_mjspec().compile()
+    before, after = same_dynamics(one, other)
+    assert before == after
+    drawn = [g for g in range(other.ngeom) if "_visual" in other.geom(g).name]
+    meshes = {
+        other.geom(g).name
+        for g in drawn
+        if other.geom_type[g] == mujoco.mjtGeom.mjGEOM_MESH
+    }
+    wanted = {
+        f"{link}_visual{k}"
+        for link, pieces in dressed.skins.items()
+        for k in range(len(pieces))
+    }
+    assert meshes == wanted
+    assert len(meshes) > 50
+    states = []
+    for model in (one, other):
+        data = mujoco.MjData(model)
+        data.qpos[:7] = (0.1, -0.3, 0.2, -2.0, 0.1, 1.6, 0.5)
+        for _ in range(50):
+            mujoco.mj_step(model, data)
+        states.append(data.qpos.copy())
+    np.testing.assert_array_equal(*states)
+    assert dressed.to_urdf() == plain.to_urdf()
+
+
+def test_a_mesh_lies_where_its_table_says(package):
+    corner = trimesh.Trimesh(
+        [[0, 0, 0], [0.1, 0, 0], [0, 0.2, 0], [0, 0, 0.3]],
+        [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
+    )
+    write_meshes(package, ["panda_gripper"], corner)
+    robot = wbc_suite.load_robot("gripper/panda_gripper", skin="meshes")
+    model = robot.to_mjspec().compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    corners = {}
+    for name in ("panda_leftfinger", "panda_rightfinger"):
+        geom = model.geom(f"{name}_visual0").id
+        mesh = model.geom_dataid[geom]
+        first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+        points = model.mesh_vert[first : first + count]
+        placed = data.geom_xpos[geom] + points @ data.geom_xmat[geom].reshape(3, 3).T
+        corners[name] = placed - data.body(name).xpos
+    top = corners["panda_leftfinger"].max(axis=0)
+    np.testing.assert_allclose(top, (0.1, 0.2, 0.3), atol=1e-6)
+    turned = corners["panda_rightfinger"].min(axis=0)
+    np.testing.assert_allclose(turned, (-0.1, -0.2, 0.0), atol=1e-6)
+
+
+def test_a_folder_of_ones_own_will_do(tmp_path):
+    folder = tmp_path / "mine"
+    write_meshes(folder / "deep" / "down", ["iiwa14"])
+    robot = wbc_suite.load_robot("IIWA14", skin=folder, gripper="none", base="none")
+    assert set(robot.skins) == {f"link_{k}" for k in range(8)} or len(robot.skins) >= 7
+
+
+def test_meshes_are_thinned_once(package, tmp_path, monkeypatch):
+    fine = trimesh.creation.icosphere(5, radius=0.05)
+    assert len(fine.faces) > 20_000
+    write_meshes(package, ["panda_gripper"], fine)
+    robot = wbc_suite.load_robot("gripper/panda_gripper", skin="meshes")
+    model = robot.to_mjspec().compile()
+    mesh = model.geom_dataid[model.geom("panda_hand_visual0").id]
+    assert 300 < model.mesh_facenum[mesh] < 2000
+    first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+    radii = np.linalg.norm(model.mesh_vert[first : first + count], axis=1)
+    np.testing.assert_allclose(radii, 0.05, rtol=0.03)
+    assert list((tmp_path / "cache" / "wbc_suite" / "skins").glob("*.npz"))
+    from wbc_suite.robot import skin_meshes
+
+    skin_meshes.skin_triangles.cache_clear()
+    monkeypatch.setattr(skin_meshes, "_read", None)  # not read again
+    again = robot.to_mjspec().compile()
+    assert again.nmeshface == model.nmeshface
+
+
+def test_what_is_missing_is_said_with_the_command():
+    with pytest.raises(ConfigError, match="pip install --no-deps robosuite"):
+        wbc_suite.load_robot("Panda", skin="meshes")
+
+
+def test_what_is_partly_missing_is_a_warning(package, caplog):
+    write_meshes(package, ["panda"])
+    robot = wbc_suite.load_robot("Panda", skin="meshes")
+    assert "panda_link3" in robot.skins
+    assert "panda_hand" not in robot.skins
+    assert "panda_gripper" in caplog.text
+    assert "pip install" in caplog.text
+
+
+def test_a_skin_that_is_neither_is_an_error(tmp_path):
+    with pytest.raises(ConfigError, match="neither 'meshes' nor a folder"):
+        wbc_suite.load_robot("Panda", skin="mesh")
+
+
+def test_a_broken_mesh_names_the_file(package):
+    write_meshes(package, ["panda_gripper"])
+    path = next(package.rglob("hand_vis.stl"))
+    path.write_bytes(b"solid nothing\n")
+    robot = wbc_suite.load_robot("gripper/panda_gripper", skin="meshes")
+    with pytest.raises(ConfigError, match=r"hand_vis\.stl"):
+        robot.to_mjspec()
+
+
+@pytest.mark.parametrize("path", TABLES, ids=lambda p: p.stem)
+def test_every_table_fits_its_component(path, tmp_path):
+    """Each link exists, each provider is known, and the skin loads."""
+    table = tomllib.loads(path.read_text())
+    assert table["provider"] in PROVIDERS
+    owners = [
+        folder
+        for folder in ("arm", "body", "gripper", "base")
+        if path.stem in component_names(folder)
+    ]
+    assert len(owners) == 1
+    write_meshes(tmp_path, [path.stem])
+    file = component_names(owners[0])[path.stem]
+    robot = wbc_suite.load_robot(f"{owners[0]}/{file}", skin=tmp_path)
+    assert set(robot.skins) == set(table["link"])
+
+
+def component_names(folder):
+    return {
+        read_robot_file(p).component.name: p.stem
+        for p in Catalogue().files(f"robots/{folder}")
+    }
