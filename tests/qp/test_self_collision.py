@@ -99,8 +99,16 @@ def test_rows_are_the_nearest_pairs_and_the_derivative_of_their_distance(rng):
 
 def test_pairs_that_overlap_in_a_keyframe_are_left_out():
     robot, configuration = gr1()
+    crossed = {"left_hip_roll_joint": -0.3, "right_hip_roll_joint": 0.3}
+    robot = robot.model_copy(
+        update={"keyframes": {**robot.keyframes, "crossed": crossed}}
+    )
     limit = SelfCollisionLimit.of_robot(robot)
     limit.bind(configuration)
+    q = configuration.q.copy()
+    for joint, angle in crossed.items():
+        q[configuration.model.joints[configuration.joint_id(joint)].idx_q] = angle
+    configuration.update(q)
     G, h = np.zeros((20, configuration.nv)), np.zeros(20)
     limit.rows(configuration, DT, G, h)
     assert limit.distances[0] >= limit.margin
