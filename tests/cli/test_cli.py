@@ -164,7 +164,7 @@ def test_the_demo_tracks_and_writes_its_pictures(
     assert code == 0
     worst = [float(x) for x in re.findall(r"([\d.]+) mm \(worst\)", out)]
     resting = [float(x) for x in re.findall(r"at rest ([\d.]+) mm", out)]
-    assert max(worst) < 50.0  # mm: an eighth of a second behind, at up to 0.4 m/s
+    assert max(worst) < 30.0  # mm: a twelfth of a second behind, at up to 0.4 m/s
     assert max(resting) < 0.1
     assert len(worst) == len(resting) == 2
     film = Image.open(tmp_path / "reach.gif")

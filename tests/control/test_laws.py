@@ -2,7 +2,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from wbc_suite.control.composite.approach import approach_pose, approach_speed
+from wbc_suite.control.composite.approach import (
+    approach_pose,
+    approach_speed,
+    travel_time,
+)
 from wbc_suite.control.composite.reference import Reference
 from wbc_suite.control.part.joint_position import computed_torque
 from wbc_suite.control.part.stance import contact_forces
@@ -72,6 +76,17 @@ def test_approach_from_far_takes_about_the_time_of_the_parabola():
         now.translation += gain * (target.translation - now.translation)
         ticks += 1
     assert dt * ticks == pytest.approx(np.sqrt(2 * 0.5 / 4.0), abs=0.1)
+
+
+def test_travel_time_is_that_of_the_fastest_profile():
+    distance, speed, braking = (
+        np.array([0.0, 0.5, 3.0]),
+        np.full(3, 2.0),
+        np.full(3, 4.0),
+    )
+    times = travel_time(distance, speed=speed, acceleration=braking)
+    # Nothing; a triangle that peaks at sqrt(2) m/s; 1 m of ramps and 2 m at 2 m/s.
+    np.testing.assert_allclose(times, [0.0, np.sqrt(0.5), 2.0])
 
 
 def test_the_reference_is_smooth_and_stays_between_solved_configurations():

@@ -62,6 +62,18 @@ def test_reasons_say_what_is_in_the_way(alone):
     assert "limit: panda_joint" in words or "out of reach" in words
 
 
+def test_each_hand_is_told_its_own_collisions(alone):
+    scene = alone("GR1")
+    back = np.array([-1.0, 0.0, 0.3, 0.0, 0.0, 0.0])
+    frames = scene.act({"right_hand": back, "left_hand": back}, 0.3)["frames"]
+    for side, other in (("right", "left"), ("left", "right")):
+        collisions = [
+            r for r in frames[f"{side}_hand"]["reasons"] if r.startswith("self-coll")
+        ]
+        assert any(f"{side}_upper_arm" in r for r in collisions)
+        assert not any(f"{other}_upper_arm" in r for r in collisions)
+
+
 @pytest.mark.parametrize("reference", ["world", "base", "eef"])
 def test_deltas_are_along_the_axes_of_their_reference(alone, reference):
     scene = alone("Panda", input_type="delta", input_ref_frame=reference)

@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from wbc_suite.typing import Vector
 
-__all__ = ["approach_pose", "approach_posture", "approach_speed"]
+__all__ = ["approach_pose", "approach_posture", "approach_speed", "travel_time"]
 
 
 def approach_speed(
@@ -81,6 +81,20 @@ def approach_posture(
         np.abs(difference), rate=1.0 / dt, speed=speed, acceleration=acceleration
     )
     return np.sign(difference) * wanted
+
+
+def travel_time(distance: Vector, *, speed: Vector, acceleration: Vector) -> Vector:
+    """Return how long it takes from rest to rest, `d / v + v / a`, s.
+
+    Below v^2 / a full speed is never reached, and it takes `2 sqrt(d / a)`.
+
+    Args:
+        distance: d >= 0.
+        speed: v, greatest speeds.
+        acceleration: a, of speeding up and of braking.
+    """
+    reached = np.minimum(np.sqrt(distance * acceleration), speed)
+    return distance / np.maximum(reached, 1e-12) + reached / acceleration
 
 
 def _part(

@@ -1,5 +1,6 @@
 """What a whole-body composite asks of an inverse-kinematics solver."""
 
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -18,11 +19,14 @@ class IkStep:
         v: Velocity, Pinocchio's conventions, shape (nv,).
         limits: Limits that hold joints back: joint name or None, and words.
         ok: Whether the problem was solved as stated.
+        explain: Tells what holds each frame back, weightiest first, until the next
+            solve; None where only `limits` are known.
     """
 
     v: Vector
     limits: tuple[tuple[str | None, str], ...] = ()
     ok: bool = True
+    explain: Callable[[], Mapping[str, Sequence[str]]] | None = None
 
 
 class IkBackend(Protocol):

@@ -85,21 +85,24 @@ class Clearance:
     Args:
         robot: The reduced robot.
         config: Limits.
+
+    Attributes:
+        limit: The rows.
     """
 
     def __init__(self, robot: RobotDescription, config: WholeBodyIKConfig) -> None:
         self._configuration = Configuration(robot.to_pinocchio())
-        self._limit = self_collision_limit(robot, config)
-        self._limit.bind(self._configuration)
-        self._G: Matrix = np.zeros((self._limit.dim, self._configuration.nv))
-        self._h: Vector = np.zeros(self._limit.dim)
+        self.limit = self_collision_limit(robot, config)
+        self.limit.bind(self._configuration)
+        self._G: Matrix = np.zeros((self.limit.dim, self._configuration.nv))
+        self._h: Vector = np.zeros(self.limit.dim)
 
     def distance(self, q: Vector) -> float:
         """Return the least distance of links that are kept apart, m; inf when far."""
         self._configuration.update(q)
-        self._limit.rows(self._configuration, 1.0, self._G, self._h)
-        return float(self._limit.distances.min())
+        self.limit.rows(self._configuration, 1.0, self._G, self._h)
+        return float(self.limit.distances.min())
 
     def is_kept(self, q: Vector) -> bool:
         """Whether all links are farther apart than the margin."""
-        return self.distance(q) > self._limit.margin
+        return self.distance(q) > self.limit.margin

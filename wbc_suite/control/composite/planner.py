@@ -1,5 +1,6 @@
 """Where to go next: straight to the goals, or joint by joint to a known posture."""
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -11,6 +12,7 @@ from wbc_suite.control.composite.config import ControlledFrame, WholeBodyIKConfi
 from wbc_suite.control.composite.search import GoalSearch, Way
 from wbc_suite.control.composite.tasks import joint_accelerations, joint_speeds
 from wbc_suite.kinematics import Configuration
+from wbc_suite.qp import Limit
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Vector
 
@@ -18,7 +20,7 @@ __all__ = ["Planner", "Waypoint"]
 
 STANDING = 0.02  # rad/s or m/s
 STUCK_AFTER = 0.1  # s of standing
-PASSED = 0.1  # rad or m; this near to a configuration on the way the next one is it
+PASSED = 0.2  # rad or m; this near to a configuration on the way the next one is it
 ARRIVED = 5e-3  # rad or m; from here on goals are approached straight
 
 
@@ -48,6 +50,7 @@ class Planner:
         config: Controlled frames.
         configuration: The commanded configuration; read, and moved by the owner.
         accept: Tells whether a configuration found will do.
+        apart: Keeps links apart.
         dt: Time between solves, s.
     """
 
@@ -58,13 +61,14 @@ class Planner:
         configuration: Configuration,
         *,
         accept: Callable[[Vector], bool],
+        apart: Limit,
         dt: float,
     ) -> None:
         self._config, self._dt = config, dt
         self._configuration = configuration
-        self._search = GoalSearch(robot, config, accept)
         self._first = [k for k, f in enumerate(config.frames) if f.level == 0]
         self._braking = config.posture.braking * _braking(robot, config, configuration)
+        self._search = GoalSearch(robot, config, accept, apart, self._braking)
         self._speed = joint_speeds(robot, configuration)
         self.reset(configuration.q)
 
@@ -135,12 +139,28 @@ class Planner:
         if float(np.abs(difference).max()) < near:
             self._rest = self._plan.pop(0)
         speed = approach_posture(
-            difference, dt=self._dt, speed=self._speed, acceleration=self._braking
+            self._to_turning_point(difference),
+            dt=self._dt,
+            speed=self._speed,
+            acceleration=self._braking,
         )
         moved = np.abs(difference) > 1e-9
         pace = float((speed[moved] / difference[moved]).min(initial=1.0 / self._dt))
         step = self._dt * pace * difference
         return Waypoint(posture=self._configuration.integrate(step))
+
+    def _to_turning_point(self, difference: Vector) -> Vector:
+        """Return how far each joint goes the same way as to the first configuration."""
+        model, run, distance = (
+            self._configuration.model,
+            np.sign(difference),
+            difference,
+        )
+        for a, b in itertools.pairwise(self._plan):
+            step = pin.difference(model, a, b)
+            run = run * (np.sign(step) == run)
+            distance = distance + np.abs(run) * step
+        return distance
 
     def _straight(self, goals: Sequence[pin.SE3]) -> Waypoint:
         targets = [

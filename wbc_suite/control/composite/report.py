@@ -1,6 +1,6 @@
 """What a whole-body controller says about its goals, and why one is not reached."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -83,12 +83,17 @@ class IkReport:
         ]
         linear, angular = self._config.tolerance
         reached = [p <= linear and r <= angular for p, r in errors]
+        known: Mapping[str, Sequence[str]] = {}
+        if answer.explain is not None and not all(reached):
+            known = answer.explain()
         return {
             frame.name: FrameReport(
                 reached=reached[k],
                 position_error=errors[k][0],
                 orientation_error=errors[k][1],
-                reasons=() if reached[k] else self._reasons(k, reached, answer),
+                reasons=()
+                if reached[k]
+                else self._reasons(k, reached, answer, known.get(frame.name)),
             )
             for k, frame in enumerate(self._config.frames)
         }
@@ -108,25 +113,35 @@ class IkReport:
         return linear, angular
 
     def _reasons(
-        self, k: int, reached: Sequence[bool], answer: IkStep
+        self,
+        k: int,
+        reached: Sequence[bool],
+        answer: IkStep,
+        reasons: Sequence[str] | None,
     ) -> tuple[str, ...]:
-        """Return the limits on the frame's joints, then rivals, or the distance."""
-        support = self._support[k]
-        reasons = [
-            words for joint, words in answer.limits if joint is None or joint in support
-        ]
-        if not reasons:
-            reasons = [
-                f"conflict: {other.name}"
-                for i, other in enumerate(self._config.frames)
-                if i != k
-                and not reached[i]
-                and other.level <= self._config.frames[k].level
-                and support & self._support[i]
-            ]
+        """Return reasons, if the solver has any, and some of our own if not."""
+        if reasons is None:
+            reasons = self._from_limits(k, reached, answer)
         if not reasons and float(np.abs(answer.v).max(initial=0.0)) < 1e-3:
             reasons = ["out of reach"]
         return tuple(dict.fromkeys(reasons)) or ("moving",)
+
+    def _from_limits(
+        self, k: int, reached: Sequence[bool], answer: IkStep
+    ) -> list[str]:
+        """Return the limits on the frame's joints, or else rivals."""
+        support = self._support[k]
+        limits = [
+            words for joint, words in answer.limits if joint is None or joint in support
+        ]
+        return limits or [
+            f"conflict: {other.name}"
+            for i, other in enumerate(self._config.frames)
+            if i != k
+            and not reached[i]
+            and other.level <= self._config.frames[k].level
+            and support & self._support[i]
+        ]
 
 
 def _support(configuration: Configuration, frame: ControlledFrame) -> Sequence[int]:

@@ -11,6 +11,7 @@ from typing import TypeAlias
 import numpy as np
 import pinocchio as pin
 
+from wbc_suite.control.composite.approach import travel_time
 from wbc_suite.control.composite.config import WholeBodyIKConfig
 from wbc_suite.control.composite.tasks import (
     HURRY,
@@ -43,7 +44,9 @@ Way: TypeAlias = list[Vector]
 STEP = 0.1  # s; one iteration goes as far as joints can in this time
 ITERATIONS = 40  # of one start
 STARTS = 16
-QUICK = 0.8  # s; a configuration this near is taken at once, others are compared
+MORE_STARTS = 24  # once some configuration is known, for a nearer one
+QUICK = 0.7  # s; a configuration this near is taken at once, others are compared
+WAITING = 4e-4  # s; and one that is farther by what an iteration takes, later
 SPACING = 0.02  # s; between configurations on the way that must be acceptable too
 PATIENCE = 5  # iterations without progress end a start
 NEARBY = 0.05  # [cost] s; how dear it is to be a second away from the start
@@ -65,6 +68,8 @@ class GoalSearch:
         robot: The reduced robot.
         config: Controlled and held frames.
         accept: Tells whether a configuration will do, such as free of collision.
+        apart: Keeps links apart, where they are not at a configuration found.
+        accelerations: What velocities can accelerate and brake, shape (nv,).
     """
 
     def __init__(
@@ -72,8 +77,10 @@ class GoalSearch:
         robot: RobotDescription,
         config: WholeBodyIKConfig,
         accept: Callable[[Vector], bool],
+        apart: Limit,
+        accelerations: Vector,
     ) -> None:
-        self._accept = accept
+        self._accept, self._accelerations = accept, accelerations
         self._configuration = Configuration(robot.to_pinocchio())
         first = [(k, f) for k, f in enumerate(config.frames) if f.level == 0]
         self._frames = [k for k, _ in first]
@@ -95,17 +102,17 @@ class GoalSearch:
         self._start = PostureTask(
             NEARBY, costs=_costs(robot), max_speed=HURRY, name="start"
         )
-        self._near, self._exact = (
+        self._near, self._exact, self._apart = (
             TaskStack(
                 self._configuration,
-                [*self._tasks, *more],
-                limits=limits,
+                [*self._tasks, *tasks],
+                limits=[*limits, *rows],
                 equalities=self._held,
                 damping=1e-6,
                 curvature_damping=0.02,
                 escape=False,
             )
-            for more in ((self._start,), ())
+            for tasks, rows in (((self._start,), ()), ((), ()), ((), (apart,)))
         )
         self._finder = WayFinder(self._configuration.model, self._speeds, accept)
         self._run: Iterator[Way | None] | None = None
@@ -156,15 +163,18 @@ class GoalSearch:
         """Yield None after each iteration, and the way to the best found at last."""
         rng = np.random.default_rng(0)
         best: Vector | None = None
-        least = np.inf
-        for trial in range(STARTS):
+        least, trial, iterations = np.inf, 0, 0
+        while trial < (STARTS if best is None else MORE_STARTS):
             q = starts[trial] if trial < len(starts) else self._random(starts[0], rng)
+            trial += 1
             for found in self._descend(q):
                 time = np.inf if found is None else self._time(starts[0], found)
                 if found is not None and time < least:
                     time += self._detour(starts[0], found)
                     best, least = (found, time) if time < least else (best, least)
-                yield [best] if best is not None and least < QUICK else None
+                iterations += 1
+                is_quick = least < QUICK + WAITING * iterations
+                yield [best] if best is not None and is_quick else None
         if best is None:
             return
         if least >= BLOCKED and self._is_plain:
@@ -172,17 +182,18 @@ class GoalSearch:
         yield [best]
 
     def _time(self, start: Vector, end: Vector) -> float:
-        """Return how long joints need from one configuration to another, s."""
+        """Return how long joints need from rest at one configuration to another, s."""
         step = pin.difference(self._configuration.model, start, end)
-        return float((np.abs(step) / self._speeds).max())
+        times = travel_time(
+            np.abs(step), speed=self._speeds, acceleration=self._accelerations
+        )
+        return float(times.max())
 
     def _detour(self, start: Vector, end: Vector) -> float:
-        """Return seconds to add when something is in the way; inf if it is at the end.
+        """Return seconds to add when something is in the way.
 
         Something may be in the way at the start already: that does not count.
         """
-        if not self._accept(end):
-            return np.inf
         model = self._configuration.model
         count = max(2, int(np.ceil(self._time(start, end) / SPACING)))
         for k in range(count - 1, count // 6, -1):
@@ -191,21 +202,26 @@ class GoalSearch:
         return 0.0
 
     def _descend(self, q: Vector) -> Iterator[Vector | None]:
-        self._near.reset()
-        self._exact.reset()
+        """Yield None after each iteration, and configurations that meet the targets."""
+        for stack in (self._near, self._exact, self._apart):
+            stack.reset()
         self._start.set_target(q)
         stack, best, waited = self._near, np.inf, 0
         for _ in range(ITERATIONS):
             self._configuration.update(q)
             error = self._error()
             if error < MET:
-                yield q
-                return
+                accepted = self._accept(q)
+                if accepted:
+                    yield q
+                if accepted or stack is self._apart:
+                    return
+                stack, best, waited = self._apart, np.inf, -PATIENCE
             waited = 0 if error < 0.95 * best else waited + 1
             best = min(best, error)
-            if waited > PATIENCE and stack is self._exact:
+            if waited > PATIENCE and stack is not self._near:
                 return
-            if error < CLOSE or waited > 2:
+            if stack is self._near and (error < CLOSE or waited > 2):
                 stack = self._exact
             q = self._configuration.integrate(stack.solve(STEP).dq)
             yield None

@@ -1,5 +1,7 @@
 """Inverse kinematics by this package's own QP task stack."""
 
+from dataclasses import replace
+
 import pinocchio as pin
 
 from wbc_suite.control.composite.backend import IkStep
@@ -103,13 +105,18 @@ class StackBackend:
     def solve(self, q: Vector, dt: float) -> IkStep:
         """Solve one tick of the stack."""
         self.configuration.update(q)
-        return self._step(self._stack, self._joint_stack, dt)
+        answer = self._step(self._stack, self._joint_stack, dt)
+        return replace(answer, explain=self._explain)
 
     def solve_posture(self, q: Vector, posture: Vector, dt: float) -> IkStep:
         """Solve one tick of the stack without frames."""
         self.configuration.update(q)
         self._joints.set_target(posture)
         return self._step(self._joint_stack, self._stack, dt)
+
+    def _explain(self) -> dict[str, tuple[str, ...]]:
+        reports = self._stack.explain(position_tolerance=0.0, orientation_tolerance=0.0)
+        return {name: report.reasons for name, report in reports.items()}
 
     @staticmethod
     def _step(stack: TaskStack, other: TaskStack, dt: float) -> IkStep:

@@ -1,5 +1,6 @@
 """A way round what is in the way, between two configurations."""
 
+import itertools
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -12,7 +13,9 @@ __all__ = ["WayFinder"]
 
 STRIDE = 0.25  # s; how far a tree grows at once
 SPACING = 0.06  # s; between configurations that are checked
-SHORTCUTS = 30
+SHORTCUTS = 60
+NEARBY = 0.7  # part of the draws that stay near the two ends
+ASIDE = 0.6  # s; how near
 
 
 class _Tree:
@@ -70,9 +73,13 @@ class WayFinder:
         """
         rng = np.random.default_rng(0)
         trees, self.checks = (_Tree(start), _Tree(end)), 0
+        aside = ASIDE * self._speeds
+        near = np.minimum(start, end) - aside, np.maximum(start, end) + aside
         while self.checks < checks:
             for ours, theirs in (trees, trees[::-1]):
                 drawn = random_posture(self._model, start, rng)
+                if rng.uniform() < NEARBY:
+                    drawn = np.clip(drawn, near[0], near[1])
                 self._grow(ours, drawn, STRIDE)
                 yield None
                 if self._grow(theirs, ours.nodes[-1], np.inf):
@@ -103,10 +110,16 @@ class WayFinder:
         return 1.0
 
     def _shortened(self, way: list[Vector], rng: np.random.Generator) -> list[Vector]:
+        """Replace parts of the way by straight lines, between any of its points."""
         for _ in range(SHORTCUTS):
-            if len(way) < 3:
-                break
-            first, last = sorted(rng.choice(len(way), 2, replace=False).tolist())
-            if last - first > 1 and self._free_part(way[first], way[last]) == 1.0:
-                way = [*way[: first + 1], *way[last:]]
+            times = [self.time(a, b) for a, b in itertools.pairwise(way)]
+            ends = np.cumsum(times)
+            first, last = np.sort(rng.uniform(0.0, ends[-1], 2))
+            i, j = np.searchsorted(ends, (first, last)).tolist()
+            if i == j:
+                continue
+            start = way[i + 1] - (ends[i] - first) / times[i] * (way[i + 1] - way[i])
+            end = way[j + 1] - (ends[j] - last) / times[j] * (way[j + 1] - way[j])
+            if self._free_part(start, end) == 1.0:
+                way = [*way[: i + 1], start, end, *way[j + 1 :]]
         return way

@@ -98,6 +98,7 @@ class WholeBodyIK:
             self.config,
             self._configuration,
             accept=lambda q: clearance.is_kept(q) and check.is_free(q),
+            apart=clearance.limit,
             dt=self._dt,
         )
         self._tau = np.zeros(len(state.actuators))
