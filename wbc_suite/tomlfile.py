@@ -14,7 +14,14 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from wbc_suite.errors import ConfigError, nearest_name
 
-__all__ = ["FrozenModel", "load_model", "parse_model", "read_toml"]
+__all__ = [
+    "FrozenModel",
+    "load_model",
+    "parse_model",
+    "parse_toml",
+    "read_text",
+    "read_toml",
+]
 
 MAX_BYTES = 4_000_000
 """Largest file that is read; the largest of ours has about 60 kB."""
@@ -40,19 +47,39 @@ def read_toml(path: Path) -> dict[str, Any]:
     Raises:
         ConfigError: If the file is missing, too large, not UTF-8 or not TOML.
     """
+    return parse_toml(read_text(path), source=str(path))
+
+
+def read_text(path: Path) -> str:
+    """Read one text file.
+
+    Raises:
+        ConfigError: If the file is missing, too large or not UTF-8.
+    """
     try:
         size = path.stat().st_size
+        if size > MAX_BYTES:
+            raise ConfigError(
+                f"{path}: {size} bytes, more than the {MAX_BYTES} that a description "
+                "may have. Is this the right file?"
+            )
+        return path.read_text(encoding="utf-8")
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read ({error.strerror}).") from error
-    if size > MAX_BYTES:
-        raise ConfigError(
-            f"{path}: {size} bytes, more than the {MAX_BYTES} that a description "
-            "may have. Is this the right file?"
-        )
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
+    except UnicodeDecodeError as error:
         raise ConfigError(f"{path}: not a readable TOML file: {error}") from error
+
+
+def parse_toml(text: str, *, source: str) -> dict[str, Any]:
+    """Parse TOML text.
+
+    Raises:
+        ConfigError: If it is not TOML.
+    """
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(f"{source}: not a readable TOML file: {error}") from error
 
 
 def load_model(model: type[M], path: Path) -> M:

@@ -15,7 +15,7 @@ from wbc_suite.robot.shapes import SkinMesh
 from wbc_suite.robot.skins import Wardrobe
 from wbc_suite.tomlfile import parse_model
 
-__all__ = ["assemble", "describe_component"]
+__all__ = ["assemble", "describe_component", "read_assembly"]
 
 
 def describe_component(
@@ -83,7 +83,7 @@ def assemble(
     """
     builder = _Builder(path, catalogue, wardrobe)
     assembly = choose(
-        _extended(path, catalogue),
+        read_assembly(path, catalogue),
         gripper=gripper,
         base=base,
         read=builder.read,
@@ -95,7 +95,7 @@ def assemble(
     return builder.finish(assembly)
 
 
-def _extended(path: Path, catalogue: Catalogue, depth: int = 0) -> Assembly:
+def read_assembly(path: Path, catalogue: Catalogue, depth: int = 0) -> Assembly:
     """Read an assembly, and lay it over the one that it extends."""
     if depth > 5:
         raise DescriptionError(f"{path}: 'extends' goes round in a circle.")
@@ -104,7 +104,7 @@ def _extended(path: Path, catalogue: Catalogue, depth: int = 0) -> Assembly:
         raise DescriptionError(f"{path}: this is a component, not an assembly.")
     if own.assembly.extends is None:
         return own
-    parent = _extended(
+    parent = read_assembly(
         catalogue.find("robots", own.assembly.extends, kind="robot"),
         catalogue,
         depth + 1,

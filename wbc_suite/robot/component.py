@@ -1,5 +1,6 @@
 """The two kinds of robot file: a component, and an assembly of components."""
 
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
 
@@ -21,7 +22,7 @@ from wbc_suite.robot.parts import (
     Synergy,
 )
 from wbc_suite.robot.shapes import Posed, as_table
-from wbc_suite.tomlfile import FrozenModel, parse_model, read_toml
+from wbc_suite.tomlfile import FrozenModel, parse_model, parse_toml, read_text
 
 __all__ = ["Assembly", "Component", "Part", "read_robot_file"]
 
@@ -142,37 +143,58 @@ class Assembly(FrozenModel):
 def read_robot_file(path: Path) -> Component | Assembly:
     """Read a component or an assembly, whichever the file holds.
 
+    A file that was read before, and has the same text still, is not parsed again.
+
     Raises:
         ConfigError: If the file is neither, or breaks a rule of the format.
     """
-    data = read_toml(path)
+    text = read_text(path)
+    base = _extended_file(path, text)
+    return _parsed(str(path), text, base and read_text(base))
+
+
+@lru_cache(maxsize=256)
+def _tables(source: str, text: str) -> dict[str, Any]:
+    """Parse TOML; nobody changes what this returns."""
+    return parse_toml(text, source=source)
+
+
+@lru_cache(maxsize=256)
+def _parsed(source: str, text: str, base: str | None) -> Component | Assembly:
+    """Read the text of a robot file, and that of the component it extends."""
+    data = _tables(source, text)
     if "component" in data:
-        component = parse_model(
-            Component, _extended(data, path), source=str(path), error=DescriptionError
-        )
-        return reflect_component(component, source=str(path))
+        if base is not None:
+            data = _extended(data, _tables(source, base), source=source)
+        component = parse_model(Component, data, source=source, error=DescriptionError)
+        return reflect_component(component, source=source)
     if "assembly" in data:
-        return parse_model(Assembly, data, source=str(path), error=DescriptionError)
+        return parse_model(Assembly, data, source=source, error=DescriptionError)
     raise ConfigError(
-        f"{path}: a robot file has a table [component] (links and joints) or "
+        f"{source}: a robot file has a table [component] (links and joints) or "
         f"[assembly] (parts); this one has {', '.join(sorted(data)) or 'nothing'}."
     )
 
 
-def _extended(data: dict[str, Any], path: Path) -> dict[str, Any]:
-    """Lay a component's tables over those of the one that it extends."""
-    header = as_table(data["component"])
-    name = header.get("extends")
+def _extended_file(path: Path, text: str) -> Path | None:
+    """Return the file beside it that a component extends."""
+    name = as_table(_tables(str(path), text).get("component")).get("extends")
     if not isinstance(name, str):
-        return data
+        return None
     beside = [p.stem for p in path.parent.glob("*.toml") if p != path]
     if name not in beside:
         raise UnknownNameError("component to extend", name, beside)
-    base = read_toml(path.with_name(f"{name}.toml"))
-    inherited = as_table(base.get("component"))
+    return path.with_name(f"{name}.toml")
+
+
+def _extended(
+    data: dict[str, Any], base: dict[str, Any], *, source: str
+) -> dict[str, Any]:
+    """Lay a component's tables over those of the one that it extends."""
+    header, inherited = as_table(data["component"]), as_table(base.get("component"))
     if "extends" in inherited:
         raise ConfigError(
-            f"{path}: '{name}' extends another component itself; extend "
+            f"{source}: '{header['extends']}' extends another component itself; extend "
             f"'{inherited['extends']}'."
         )
     return base | data | {"component": inherited | header}

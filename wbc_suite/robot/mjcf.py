@@ -1,5 +1,6 @@
 """Build MuJoCo's model of a robot directly from its description."""
 
+import math
 from collections.abc import Iterable
 
 import mujoco
@@ -38,6 +39,8 @@ STATED_SOLMIX = 1000.0
 Mixed half and half, a pad sinks 3.4 mm into a cube of 0.1 kg; like this 0.2 mm.
 """
 
+DOWN = (0.0, 1.0, 0.0, 0.0)
+"""The turn from z to -z."""
 GREY = (0.5, 0.5, 0.52, 1.0)
 
 
@@ -244,15 +247,15 @@ def _add_geom(
 
 def _place_segment(geom: mujoco.MjsGeom, shape: Capsule | Cylinder) -> None:
     """Pose a capsule or cylinder, whose axis is z in MuJoCo, along its segment."""
-    start, end = np.asarray(shape.start), np.asarray(shape.end)
-    axis = (end - start) / np.linalg.norm(end - start)
-    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), axis)
-    own = pin.SE3(pin.Quaternion(*shape.quat).matrix(), np.asarray(shape.pos))
-    pose = own * pin.SE3(turn.matrix(), (start + end) / 2)
-    xyzw = pin.Quaternion(pose.rotation).coeffs()
-    geom.pos = pose.translation
-    geom.quat = xyzw[[3, 0, 1, 2]]
-    geom.size = (shape.radius, float(np.linalg.norm(end - start)) / 2, 0)
+    ends = np.array([shape.start, shape.end])
+    if shape.quat != (1.0, 0.0, 0.0, 0.0):
+        ends = ends @ pin.Quaternion(*shape.quat).matrix().T
+    length = math.dist(ends[0], ends[1])
+    x, y, z = (ends[1] - ends[0]) / length
+    half = math.hypot(x, y, 1.0 + z)  # the shortest turn from z is half way to it
+    geom.quat = ((1.0 + z) / half, -y / half, x / half, 0.0) if half > 1e-9 else DOWN
+    geom.pos = ends.mean(axis=0) + shape.pos
+    geom.size = (shape.radius, length / 2, 0)
 
 
 def _add_actuators(spec: mujoco.MjSpec, robot: RobotDescription) -> None:

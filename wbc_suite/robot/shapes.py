@@ -6,7 +6,9 @@ half sizes, as in MJCF. A hull is the convex hull of spheres, a loft a skin over
 
 import itertools
 import math
-from typing import Annotated, Any, Literal, TypeAlias, cast
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Annotated, Any, Literal, TypeAlias, TypeVar, cast
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -29,7 +31,10 @@ __all__ = [
     "Sphere",
     "Vector3",
     "as_table",
+    "kept_by_shape",
 ]
+
+T = TypeVar("T")
 
 Real: TypeAlias = Annotated[float, Field(ge=-1e4, le=1e4)]
 """A length in m, an angle in rad or the like: what no robot exceeds is a mistake."""
@@ -234,3 +239,13 @@ Shape: TypeAlias = Annotated[
     Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | Loft,
     Field(discriminator="shape"),
 ]
+
+
+def kept_by_shape(compute: Callable[[Shape], T]) -> Callable[[Shape], T]:
+    """Keep what a function computes of a shape, for equal shapes to share.
+
+    Ten robots in one scene, or one robot in a hundred environments, compute their
+    hulls once.
+    """
+    # Frozen models are hashable, which pyright does not see.
+    return lru_cache(maxsize=4096)(compute)  # pyright: ignore[reportReturnType]

@@ -11,7 +11,15 @@ from scipy.interpolate import PchipInterpolator
 from scipy.spatial import ConvexHull, QhullError
 
 from wbc_suite.errors import DescriptionError
-from wbc_suite.robot.shapes import Box, Cylinder, Hull, Loft, Shape, SkinMesh
+from wbc_suite.robot.shapes import (
+    Box,
+    Cylinder,
+    Hull,
+    Loft,
+    Shape,
+    SkinMesh,
+    kept_by_shape,
+)
 from wbc_suite.robot.skin_meshes import skin_triangles
 from wbc_suite.typing import Indices, Matrix, Vector
 
@@ -26,23 +34,31 @@ SMALL = 0.02
 def mesh_of(shape: Shape | SkinMesh) -> tuple[Matrix, Indices] | None:
     """Compute the triangle mesh of a shape that is no primitive.
 
+    Equal shapes share one mesh, which is read-only.
+
     Returns:
         Vertices, shape (n, 3), in the shape's own frame, and faces, shape (m, 3),
         counter-clockwise from outside; None when the engine has a primitive for it.
     """
+    return skin_triangles(shape) if isinstance(shape, SkinMesh) else _computed(shape)
+
+
+@kept_by_shape
+def _computed(shape: Shape) -> tuple[Matrix, Indices] | None:
     match shape:
         case Hull():
-            return _convex(support_points(shape))
+            mesh = _convex(support_points(shape))
         case Box(radius=r) if r > 0.0:
-            return _convex(support_points(shape))
+            mesh = _convex(support_points(shape))
         case Cylinder(radius_to=r) if r is not None:
-            return _convex(support_points(shape))
+            mesh = _convex(support_points(shape))
         case Loft():
-            return _loft(shape)
-        case SkinMesh():
-            return skin_triangles(shape)
+            mesh = _loft(shape)
         case _:
             return None
+    for array in mesh:
+        array.flags.writeable = False
+    return mesh
 
 
 def support_points(shape: Shape) -> Matrix:

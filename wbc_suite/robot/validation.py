@@ -19,6 +19,7 @@ from wbc_suite.robot.shapes import (
     Hull,
     Shape,
     Sphere,
+    kept_by_shape,
 )
 from wbc_suite.typing import Matrix, Vector
 
@@ -208,14 +209,21 @@ def implausible(link: "Link") -> Iterator[tuple[Literal["com", "inertia"], str]]
         )
 
 
+@kept_by_shape
 def shape_bounds(shape: Shape) -> tuple[Vector, Vector]:
-    """Compute the corners of an axis-aligned box around a shape, in the link frame."""
+    """Compute the corners of an axis-aligned box around a shape, in the link frame.
+
+    Read-only, as equal shapes share it.
+    """
     low, high = _own_bounds(shape)
     if shape.quat != (1.0, 0.0, 0.0, 0.0):
         rotation = Rotation.from_quat(shape.quat, scalar_first=True).as_matrix()
         centre, reach = rotation @ (low + high) / 2, np.abs(rotation) @ (high - low) / 2
         low, high = centre - reach, centre + reach
-    return low + shape.pos, high + shape.pos
+    bounds = low + shape.pos, high + shape.pos
+    for corner in bounds:
+        corner.flags.writeable = False
+    return bounds
 
 
 def _own_bounds(shape: Shape) -> tuple[Vector, Vector]:
