@@ -1,6 +1,6 @@
 # Everything a newcomer or a build machine types. `make` alone lists it.
 .DEFAULT_GOAL := help
-.PHONY: help teleop demo test check format bench bench-peers pictures wheel clean
+.PHONY: help teleop demo test check format bench bench-peers pictures gallery wheel clean
 
 VENV := .venv
 PY := $(VENV)/bin/python
@@ -42,6 +42,9 @@ bench-peers: $(VENV)/.installed-dev ## install the peers that the benchmarks com
 
 pictures: $(VENV)/.installed ## draw the pictures of the README anew
 	$(PY) docs/draw_pictures.py
+
+gallery: $(VENV)/.installed ## draw every robot, gripper and base for the README
+	$(PY) docs/draw_gallery.py $(ARGS)
 
 wheel: $(VENV)/.installed ## build the wheel into dist/
 	@rm -rf dist
