@@ -17,6 +17,7 @@ README = HERE.parent / "README.md"
 SIZE = 240  # pixels; drawn twice as large: smooth edges
 COLUMNS = 6
 DOWN = (0.0, 1.0, 0.0, 0.0)  # grippers reach along +z, and are shown reaching down
+SHORT = {"bd": "BD", "pal": "PAL", "xarm7": "XArm7"}
 MARKS = ("<!-- gallery: written by `make gallery` -->\n", "<!-- gallery ends -->\n")
 
 
@@ -44,7 +45,7 @@ def base_files(catalogue: Catalogue) -> list[tuple[str, Component]]:
 
 def camel(name: str) -> str:
     """Write a file's name as users write it: `panda_gripper` is `PandaGripper`."""
-    return "".join(part[:1].upper() + part[1:] for part in name.split("_"))
+    return "".join(SHORT.get(x, x[:1].upper() + x[1:]) for x in name.split("_"))
 
 
 def prepared(name: str) -> RobotDescription:
