@@ -91,6 +91,8 @@ CASES = {
     "frame on nothing": ("link = \"fore\"", "link = \"foer\"", ["eef", "foer", "'fore'"]),
     "group of nothing": ("[\"shoulder\", \"elbow\"]", "[\"shoulder\", \"elbo\"]",
                          ["elbo", "'elbow'"]),
+    "loop without a connect": ("effort = 5 }", "mimic = { joint = \"shoulder\", closed = true } }",
+                               ["elbow", "[[connect]]"]),
     "joint in no group": ("[\"shoulder\", \"elbow\"]", "[\"shoulder\"]",
                           ["elbow", "no group"]),
     "keyframe outside": ("elbow = 1.0", "elbow = 3.0", ["ready", "3.0", "outside"]),

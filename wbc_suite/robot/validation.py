@@ -305,6 +305,8 @@ def _mimics(robot: "RobotDescription") -> Iterator[str]:
             yield _unknown("leader", joint.mimic.joint, joints, where)
         elif leader.mimic is not None:
             yield f"{where} follows '{leader.name}', which itself follows another"
+        elif joint.mimic.closed and not robot.connects:
+            yield f"{where} is said to be held by a loop, but there is no [[connect]]"
 
 
 def _keyframes(robot: "RobotDescription") -> Iterator[str]:
