@@ -85,3 +85,27 @@ def test_arms_stand_where_they_are_placed_though_the_base_turns_behind_them():
     mujoco.mj_forward(model, data)
     np.testing.assert_allclose(data.body("panda_link0").xpos[:2], [1, 2], atol=1e-12)
     np.testing.assert_allclose(data.body("base").xpos[:2], [1, 1.79], atol=1e-12)
+
+
+def test_two_different_grippers_with_equal_names_of_links_fit_one_robot():
+    pair = {"right": "Robotiq140Gripper", "left": "XArm7Gripper"}
+    robot = wbc_suite.load_robot("Tiago", gripper=pair)
+    alone = wbc_suite.load_robot("gripper/xarm7_gripper").joint_names
+    assert {f"left_{name}" for name in alone} <= set(robot.joint_names)
+
+
+def test_every_part_keeps_its_own_colours():
+    """Components call different colours 'white' or 'black'."""
+    whole = wbc_suite.load_robot(
+        "Panda", gripper="XArm7Gripper", base="OmronMobileBase"
+    )
+    for name in ("arm/panda", "gripper/xarm7_gripper", "base/omron_mobile_base"):
+        part = wbc_suite.load_robot(name)
+        for link in part.links:
+            shapes = zip(link.visual, whole.link(link.name).visual, strict=True)
+            for own, mounted in shapes:
+                assert colour(part, own) == colour(whole, mounted)
+
+
+def colour(robot, shape):
+    return robot.materials.get(shape.color, shape.color)

@@ -1,6 +1,7 @@
 """Join components into one robot."""
 
 import itertools
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,14 @@ from wbc_suite.robot.choosing import Choice, choose, is_path
 from wbc_suite.robot.component import Assembly, Component, Part, read_robot_file
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.parts import Link, Mount, Root, Synergy
-from wbc_suite.robot.placing import compose, depth_first, locked, renamed
+from wbc_suite.robot.placing import (
+    compose,
+    depth_first,
+    locked,
+    painted,
+    renamed,
+    repainted,
+)
 from wbc_suite.robot.shapes import SkinMesh
 from wbc_suite.robot.skins import Wardrobe
 from wbc_suite.tomlfile import parse_model
@@ -38,14 +46,17 @@ def describe_component(
 
 
 def _skins(
-    component: Component, wardrobe: Wardrobe | None, prefix: str = ""
+    component: Component,
+    wardrobe: Wardrobe | None,
+    prefix: str = "",
+    colors: Mapping[str, str] | None = None,
 ) -> dict[str, tuple[SkinMesh, ...]]:
-    """Return the meshes of a component's links, whose names then get a prefix."""
+    """Return the meshes of a component's links; names get a prefix, colours change."""
     if wardrobe is None:
         return {}
     links = [link.name for link in component.links]
     found = wardrobe.dress(component.component.name, links)
-    return {prefix + link: meshes for link, meshes in found.items()}
+    return {prefix + n: painted(meshes, colors or {}) for n, meshes in found.items()}
 
 
 def _by_gripper(
@@ -144,11 +155,15 @@ class _Builder:
     def mount(self, part: Part, *, shared: bool) -> None:
         """Add one component."""
         component = self.read(part)
-        rename = shared if part.rename is None else part.rename
-        prefix = f"{part.side}_" if part.side else ""
-        bodies = prefix if rename else ""
-        self._skins |= _skins(component, self._wardrobe, bodies)
-        component = renamed(component, items=prefix, bodies=bodies, part=part.name)
+        bodies = self._prefix(part, component, shared=shared)
+        repaint = self._other_colors(component, part.name)
+        self._skins |= _skins(component, self._wardrobe, bodies, repaint)
+        component = renamed(
+            repainted(component, repaint),
+            items=f"{part.side}_" if part.side else "",
+            bodies=bodies,
+            part=part.name,
+        )
         links = depth_first(component.links)
         if not self._links:
             self._root = component.root
@@ -185,6 +200,22 @@ class _Builder:
         if not isinstance(component, Component):
             raise DescriptionError(f"{path}: a part must be a component.")
         return component
+
+    def _prefix(self, part: Part, component: Component, *, shared: bool) -> str:
+        """Return what makes the component's links and joints differ from those here."""
+        taken = {name for link in self._links for name in _names(link)}
+        own = [name for link in component.links for name in _names(link)]
+        side = f"{part.side or part.name}_"
+        plain = not (shared if part.rename is None else part.rename)
+        choices = ["", side, f"{part.name}_"] if plain else [side, f"{part.name}_"]
+        fitting = (c for c in choices if not any(c + name in taken for name in own))
+        return choices[0] if part.rename is False else next(fitting, choices[0])
+
+    def _other_colors(self, component: Component, part: str) -> dict[str, str]:
+        """Return new names for materials whose name has another colour elsewhere."""
+        own = _collect(component)["materials"]
+        known = self._materials
+        return {n: f"{part}_{n}" for n, c in own.items() if known.get(n, c) != c}
 
     def _placement(self, part: Part, link: Link) -> dict[str, Any]:
         if not self._links:
@@ -233,6 +264,10 @@ class _Builder:
         return parse_model(
             RobotDescription, data, source=str(self._path), error=DescriptionError
         )
+
+
+def _names(link: Link) -> tuple[str, ...]:
+    return (link.name,) if link.joint is None else (link.name, link.joint.name)
 
 
 _LISTS = ("frames", "cameras", "actuators", "sensors", "connects")

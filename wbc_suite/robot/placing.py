@@ -1,18 +1,30 @@
 """Small transformations of parts on their way into an assembly."""
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import pinocchio as pin
 
 from wbc_suite.errors import UnknownNameError
 from wbc_suite.robot.parts import Joint, Link
-from wbc_suite.robot.shapes import Posed
+from wbc_suite.robot.shapes import Posed, Shape, SkinMesh
 
 if TYPE_CHECKING:
     from wbc_suite.robot.component import Component
 
-__all__ = ["compose", "depth_first", "locked", "pose_fields", "renamed", "se3_of"]
+__all__ = [
+    "compose",
+    "depth_first",
+    "locked",
+    "painted",
+    "pose_fields",
+    "renamed",
+    "repainted",
+    "se3_of",
+]
+
+S = TypeVar("S", bound=Shape | SkinMesh)
 
 
 def se3_of(posed: Posed) -> Any:
@@ -107,6 +119,28 @@ def renamed(
         for mount in component.mounts
     )
     return component.model_copy(update=update)
+
+
+def repainted(component: "Component", colors: Mapping[str, str]) -> "Component":
+    """Give materials other names, so that equal ones of two parts stay apart."""
+    if not colors:
+        return component
+    links = tuple(
+        link.model_copy(update={"visual": painted(link.visual, colors)})
+        for link in component.links
+    )
+    materials = {colors.get(n, n): rgba for n, rgba in component.materials.items()}
+    return component.model_copy(update={"links": links, "materials": materials})
+
+
+def painted(shapes: tuple[S, ...], colors: Mapping[str, str]) -> tuple[S, ...]:
+    """Return shapes with other names of materials."""
+    return tuple(
+        shape.model_copy(update={"color": colors[shape.color]})
+        if isinstance(shape.color, str) and shape.color in colors
+        else shape
+        for shape in shapes
+    )
 
 
 def _all(names: tuple[str, ...], prefix: str) -> tuple[str, ...]:
