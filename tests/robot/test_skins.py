@@ -12,9 +12,14 @@ import wbc_suite
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.errors import ConfigError
 from wbc_suite.robot.component import read_robot_file
-from wbc_suite.robot.skins import PROVIDERS
+from wbc_suite.robot.skins import PROVIDERS, Wardrobe
 
 TABLES = Catalogue().files("robots/skin")
+COMPONENTS = [
+    read_robot_file(path)
+    for folder in ("arm", "body", "gripper", "base")
+    for path in Catalogue().files(f"robots/{folder}")
+]
 
 
 def files_of(name):
@@ -188,20 +193,8 @@ def test_every_table_fits_its_component(path, tmp_path):
     """Each link exists, each provider is known, and the skin loads."""
     table = tomllib.loads(path.read_text())
     assert table["provider"] in PROVIDERS
-    owners = [
-        folder
-        for folder in ("arm", "body", "gripper", "base")
-        if path.stem in component_names(folder)
-    ]
-    assert len(owners) == 1
     write_meshes(tmp_path, [path.stem])
-    file = component_names(owners[0])[path.stem]
-    robot = wbc_suite.load_robot(f"{owners[0]}/{file}", skin=tmp_path)
-    assert set(robot.skins) == set(table["link"])
-
-
-def component_names(folder):
-    return {
-        read_robot_file(p).component.name: p.stem
-        for p in Catalogue().files(f"robots/{folder}")
-    }
+    (component,) = [c for c in COMPONENTS if c.component.name == path.stem]
+    links = [link.name for link in component.links]
+    dressed = Wardrobe(tmp_path, Catalogue()).dress(path.stem, links)
+    assert set(dressed) == set(table["link"])
