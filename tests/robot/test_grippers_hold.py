@@ -25,8 +25,8 @@ def can_grip(name):
 
 
 def is_hand(name):
-    """Whether a gripper has a thumb and fingers."""
-    return name.endswith("_hand")
+    """Whether a gripper has three fingers or more."""
+    return name.endswith("_hand") or "three_finger" in name
 
 
 NAMES = Catalogue().names("robots/gripper")
@@ -63,6 +63,14 @@ def test_gripper_picks_a_cube_and_holds_it_when_shaken(name):
 @pytest.mark.parametrize("name", [name for name in NAMES if is_hand(name)])
 def test_hand_closes_around_a_can_and_holds_it_when_shaken(name):
     hold = shaken(name, CAN)
-    assert len(hold.links) >= 4, f"only {set(hold.links)} touch the can"
+    assert len(hold.links) >= 3, f"only {set(hold.links)} touch the can"
     assert hold.slip < SETTLE
     assert hold.turn < LEAN
+
+
+def test_a_slippery_cube_is_lost():
+    """Else the rig would hold things by something other than friction."""
+    rig = GraspRig(QUICK)
+    rig.model.geom_friction[:, 0] = 0.005
+    rig.grip()
+    assert rig.result().rise < LIFT / 2
