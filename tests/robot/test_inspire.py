@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import wbc_suite
+from wbc_suite.control.composite.config import default_whole_body_config
 
 FINGERS = ("index", "middle", "ring", "pinky")
 RATIOS = {"thumb_intermediate": 1.6, "thumb_distal": 2.4}  # to the thumb's pitch
@@ -86,3 +87,5 @@ def test_panda_carries_the_hand_with_its_palm_inward(name):
     assert inward * (tool - flange)[1] > 0.03
     thumb, pinky = (data.site(f"{side}_{tip}_tip").xpos for tip in ("thumb", "pinky"))
     assert thumb[0] > pinky[0] + 0.1  # forward, as of a hand that shakes another
+    (frame,) = default_whole_body_config(robot)["frame"]
+    assert frame["name"] == f"{side}_hand"

@@ -219,6 +219,6 @@ def default_whole_body_config(robot: RobotDescription) -> dict[str, Any]:
 
 def _hand_name(frame: str, count: int) -> str:
     for side in ("right", "left"):
-        if frame.startswith(side) or count == 1:
+        if frame.startswith(f"{side}_"):
             return f"{side}_hand"
-    return frame
+    return "right_hand" if count == 1 else frame
