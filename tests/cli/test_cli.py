@@ -73,6 +73,7 @@ def test_list_names_every_robot_and_component(wbc_suite_command):
 def test_list_of_one_kind_leaves_the_others_out(wbc_suite_command):
     _, out, _ = wbc_suite_command("list", "bases")
     assert "rethink_mount" in out
+    assert "planar" in out  # the root that a base brings
     assert "Panda" not in out
 
 

@@ -5,8 +5,11 @@ import numpy as np
 import pytest
 
 import wbc_suite
-from wbc_suite.errors import DescriptionError, UnknownNameError
+from wbc_suite.catalogue import Catalogue
+from wbc_suite.errors import ConfigError, DescriptionError, UnknownNameError
 from wbc_suite.scene import place_robot
+
+CATALOGUE = Catalogue().root / "robots"
 
 
 def test_base_brings_its_own_root_and_height():
@@ -109,3 +112,15 @@ def test_every_part_keeps_its_own_colours():
 
 def colour(robot, shape):
     return robot.materials.get(shape.color, shape.color)
+
+
+def test_gripper_of_ones_own_is_a_file(tmp_path, monkeypatch):
+    own = CATALOGUE / "gripper" / "panda_gripper.toml"
+    (tmp_path / "mine.toml").write_text(own.read_text())
+    monkeypatch.chdir(tmp_path)
+    robot = wbc_suite.load_robot("Panda", gripper="mine.toml")
+    same = wbc_suite.load_robot("Panda", gripper=str(tmp_path / "mine.toml"))
+    assert robot == same
+    assert robot.joint_names == wbc_suite.load_robot("Panda").joint_names
+    with pytest.raises(ConfigError, match=r"nowhere\.toml: cannot be read"):
+        wbc_suite.load_robot("Panda", gripper="nowhere.toml")

@@ -28,6 +28,8 @@ def check_file(
         print(f"{file}: fine. {_benchmark(file)}")
     elif "frame" in content and "component" not in content:
         print(f"{file}: fine. {_controller(file)}")
+    elif "provider" in content:
+        print(f"{file}: fine. {_skin(file)}")
     else:
         print(f"{file}: fine. {_robot(file)}")
 
@@ -43,6 +45,14 @@ def _robot(file: Path) -> str:
         f"{robot.mass:.1f} kg, {robot.root.kind} root; MuJoCo and Pinocchio models "
         f"with nv = {simulated.nv} and {computed.nv}."
     )
+
+
+def _skin(file: Path) -> str:
+    from wbc_suite.robot.skins import SkinTable
+    from wbc_suite.tomlfile import load_model
+
+    table = load_model(SkinTable, file)
+    return f"Meshes of {len(table.link)} links, from {table.provider}."
 
 
 def _benchmark(file: Path) -> str:

@@ -50,6 +50,8 @@ def list_catalogue(
     for chosen in [kind] if kind else Kind:
         if chosen is Kind.ROBOTS:
             console.print(_robots(known))
+        elif chosen in (Kind.GRIPPERS, Kind.BASES):
+            console.print(_components(known, chosen))
         else:
             console.print(_files(known, chosen))
 
@@ -66,6 +68,27 @@ def _robots(catalogue: "Catalogue") -> "Table":
             str(robot.dof),
             f"{robot.mass:.1f}",
             robot.root.kind,
+        )
+    return table
+
+
+def _components(catalogue: "Catalogue", kind: Kind) -> "Table":
+    """List grippers with the side they fit, bases with the root they bring."""
+    from wbc_suite.robot.component import Component, read_robot_file
+
+    what = "side" if kind is Kind.GRIPPERS else "root"
+    table = _table(kind.capitalize(), "name", "", what, "kg")
+    for path in catalogue.files(_FOLDERS[kind]):
+        component = read_robot_file(path)
+        if not isinstance(component, Component):
+            continue
+        header = component.component
+        side = header.side or "both"
+        table.add_row(
+            path.stem,
+            header.title,
+            side if kind is Kind.GRIPPERS else component.root.kind,
+            f"{sum(link.mass for link in component.links):.2f}",
         )
     return table
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.errors import ConfigError, DescriptionError, UnknownNameError
-from wbc_suite.robot.choosing import Choice, choose, is_path
+from wbc_suite.robot.choosing import Choice, choose, is_bare, is_path
 from wbc_suite.robot.component import Assembly, Component, Part, read_robot_file
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.parts import Link, Mount, Root, Synergy
@@ -29,7 +29,7 @@ __all__ = ["assemble", "describe_component", "read_assembly"]
 def describe_component(
     component: Component, *, source: str, wardrobe: Wardrobe | None = None
 ) -> RobotDescription:
-    """Make a robot of one component alone."""
+    """Make a robot of one component alone; without a body it stands still."""
     header = component.component
     data = _collect(component) | {
         "name": header.name,
@@ -37,7 +37,7 @@ def describe_component(
         "source": header.source,
         "license": header.license,
         "deviations": header.deviations,
-        "root": component.root,
+        "root": Root() if is_bare(component) else component.root,
         "links": depth_first(component.links),
         "synergies": _by_gripper(component.synergies),
         "skins": _skins(component, wardrobe),
@@ -113,6 +113,9 @@ def read_assembly(path: Path, catalogue: Catalogue, depth: int = 0) -> Assembly:
     own = read_robot_file(path)
     if not isinstance(own, Assembly):
         raise DescriptionError(f"{path}: this is a component, not an assembly.")
+    parts = tuple(_located(part, path.parent) for part in own.parts)
+    if "parts" in own.model_fields_set:
+        own = own.model_copy(update={"parts": parts})
     if own.assembly.extends is None:
         return own
     parent = read_assembly(
@@ -187,7 +190,7 @@ class _Builder:
     def read(self, part: Part) -> Component:
         """Read the component of a part."""
         if is_path(part.component):
-            path = _inside(self._path.parent, part.component)
+            path = Path(part.component)
         else:
             folder, _, name = part.component.rpartition("/")
             path = self._catalogue.find(
@@ -283,12 +286,18 @@ def _collect(component: Component) -> dict[str, Any]:
     return data
 
 
-def _inside(folder: Path, name: str) -> Path:
-    """Resolve a file below a folder; raises ConfigError when it leaves the folder."""
-    path = (folder / name).resolve()
+def _located(part: Part, folder: Path) -> Part:
+    """Make the path of a component absolute; it lies beside or below its assembly.
+
+    Raises:
+        ConfigError: If it leaves the folder.
+    """
+    if not is_path(part.component):
+        return part
+    path = (folder / part.component).resolve()
     if not path.is_relative_to(folder.resolve()):
         raise ConfigError(
-            f"'{name}' leaves the folder {folder}: components lie beside or below the "
-            "assembly, or in a catalogue folder."
+            f"'{part.component}' leaves the folder {folder}: components lie beside or "
+            "below the assembly, or in a catalogue folder."
         )
-    return path
+    return part.model_copy(update={"component": str(path)})

@@ -56,7 +56,7 @@ def choose(
 
 
 def is_path(name: str) -> bool:
-    """Whether a component is a file beside the assembly, not a catalogue name."""
+    """Whether a component is a file, not a catalogue name."""
     return name.endswith(".toml")
 
 

@@ -24,7 +24,7 @@ from wbc_suite.robot.parts import Name
 from wbc_suite.robot.shapes import Color, Posed, SkinMesh, Vector3
 from wbc_suite.tomlfile import FrozenModel, load_model
 
-__all__ = ["MESHES", "Wardrobe"]
+__all__ = ["MESHES", "SkinTable", "Wardrobe"]
 
 log = logging.getLogger(__name__)
 
@@ -92,7 +92,7 @@ class _Piece(Posed):
     scale: Vector3 = (1.0, 1.0, 1.0)
 
 
-class _Table(FrozenModel):
+class SkinTable(FrozenModel):
     """One file `robots/skin/NAME.toml`."""
 
     format: Literal[1]
@@ -182,16 +182,16 @@ class Wardrobe:
         for line in lines:
             log.warning("skin: %s", line)
 
-    def _table(self, component: str) -> _Table | None:
+    def _table(self, component: str) -> SkinTable | None:
         if component not in self._catalogue.names("robots/skin"):
             return None
         path = self._catalogue.find("robots/skin", component, kind="skin")
-        table = load_model(_Table, path)
+        table = load_model(SkinTable, path)
         if table.provider not in PROVIDERS:
             raise UnknownNameError("provider of meshes", table.provider, PROVIDERS)
         return table
 
-    def _locate(self, table: _Table, file: str) -> Path | None:
+    def _locate(self, table: SkinTable, file: str) -> Path | None:
         inside = Path(table.folder) / file
         if self._folder is not None:
             return self._in_folder(inside)
@@ -220,7 +220,7 @@ class Wardrobe:
         return found
 
 
-def _pieces(table: _Table) -> Iterator[_Piece]:
+def _pieces(table: SkinTable) -> Iterator[_Piece]:
     for pieces in table.link.values():
         yield from pieces
 
