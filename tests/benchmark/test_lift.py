@@ -3,11 +3,17 @@ import numpy as np
 import pytest
 
 import wbc_suite
+from wbc_suite.catalogue import Catalogue
+from wbc_suite.robot import load_robot
 
 
 @pytest.fixture(scope="module")
 def env():
     return wbc_suite.make("Lift", robots="Panda", reward_shaping=True)
+
+
+ROBOTS = [load_robot(path) for path in Catalogue().files("robots")]
+MOVING = [robot for robot in ROBOTS if robot.root.kind != "fixed"]
 
 
 def put_cube(env, position):
@@ -66,3 +72,28 @@ def test_the_cube_rests_on_the_table(env):
         env.step(env.hold_action)
     half = env.simulation.model.geom("cube").size[0]
     assert env.benchmark.cube_position[2] == pytest.approx(0.8 + half, abs=1e-3)
+
+
+@pytest.mark.parametrize("robot", MOVING, ids=lambda robot: robot.name)
+def test_robots_that_move_have_room_before_the_table(robot):
+    env = wbc_suite.make("Lift", robots=robot, initialization_noise=None)
+    env.reset(seed=0)
+    model, data = env.simulation.model, env.simulation.data
+    bodies = [model.body(int(b)).name for b in model.geom_bodyid]
+    own = [
+        i
+        for i in range(model.ngeom)
+        if bodies[i].startswith("robot0_") and model.geom_contype[i]
+    ]
+    table = [i for i in range(model.ngeom) if bodies[i] == "table"]
+    gaps = [
+        mujoco.mj_geomDistance(model, data, i, k, 1, None) for i in own for k in table
+    ]
+    assert min(gaps) > 0.02
+    edge = data.geom("table").xpos - model.geom("table").size
+    beneath = [
+        bodies[i]
+        for i in own
+        if (data.geom_xpos[i] > edge)[0] and data.geom_xpos[i][2] < edge[2]
+    ]
+    assert beneath == []

@@ -15,7 +15,7 @@ class Alone:
     """One robot on an empty floor, at `ready`, under one controller."""
 
     def __init__(self, name, controller="WHOLE_BODY_IK", **changes):
-        self.robot = load_robot(name)
+        self.robot = load_robot(name) if isinstance(name, str) else name
         spec = empty_arena()
         attach_robot(spec, self.robot, "robot0_")
         model = spec.compile()

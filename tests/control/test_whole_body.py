@@ -8,7 +8,10 @@ from wbc_suite.control import (
     load_composite_controller_config,
     register_composite,
 )
-from wbc_suite.control.composite.config import WholeBodyIKConfig
+from wbc_suite.control.composite.config import (
+    WholeBodyIKConfig,
+    default_whole_body_config,
+)
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.robot import load_robot
 from wbc_suite.tomlfile import load_model
@@ -156,6 +159,43 @@ def test_a_robot_without_a_file_gets_hands_and_held_feet():
     names = [frame["name"] for frame in config["frame"]]
     assert {"right_hand", "left_hand"} <= set(names)
     assert {held["frame"] for held in config["held"]} == {"right_foot", "left_foot"}
+
+
+@pytest.mark.parametrize(
+    ("robot", "gripper", "frames"),
+    [
+        ("UR5e", None, {"right_hand": "right_tcp"}),
+        ("UR5e", "none", {"right_hand": "right_eef"}),
+        ("PandaDexLH", None, {"left_hand": "left_tcp"}),
+        (
+            "Baxter",
+            {"left": "none"},
+            {"right_hand": "right_tcp", "left_hand": "left_eef"},
+        ),
+    ],
+)
+def test_hands_are_named_after_their_side(robot, gripper, frames):
+    config = default_whole_body_config(load_robot(robot, gripper=gripper))
+    assert {f["name"]: f["frame"] for f in config["frame"]} == frames
+
+
+def test_a_robot_without_hands_is_moved_by_its_trunk():
+    config = default_whole_body_config(load_robot("Spot"))
+    assert [frame["frame"] for frame in config["frame"]] == ["base"]
+
+
+@pytest.mark.parametrize("robot", ["Panda", "Tiago", "GR1", "SpotWithArm"])
+def test_without_a_gripper_the_flange_is_the_hand(alone, robot):
+    scene = alone(load_robot(robot, gripper="none"))
+    before = scene.site("right_eef")
+    scene.act({"right_hand": STEP}, 1.5)
+    moved = scene.site("right_eef") - before
+    np.testing.assert_allclose(moved, STEP[:3], atol=1e-3)
+
+
+def test_a_free_robot_that_nothing_holds_is_refused(alone):
+    with pytest.raises(ConfigError, match="UR5e: it is free to fall"):
+        alone(load_robot("UR5e", base="NoActuationBase"))
 
 
 @pytest.mark.parametrize(

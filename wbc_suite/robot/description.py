@@ -32,6 +32,9 @@ __all__ = ["RobotDescription"]
 Rgba = tuple[float, float, float, float]
 
 
+_SIDES = {"right", "left"}
+
+
 class RobotDescription(FrozenModel):
     """A robot: links in depth-first order, and everything that hangs on them.
 
@@ -115,6 +118,27 @@ class RobotDescription(FrozenModel):
     def mass(self) -> float:
         """Mass of the whole robot in kg."""
         return sum(link.mass for link in self.links)
+
+    @cached_property
+    def hands(self) -> dict[str, str]:
+        """The frame of each hand, right before left, by side or by its own name.
+
+        It is the frame with role `tcp`, or `eef` on a side without a gripper.
+        """
+        tcp, eef = self._sided("tcp"), self._sided("eef")
+        if tcp:  # what else ends an arm is no second hand
+            eef = {s: f for s, f in eef.items() if s in _SIDES and set(tcp) <= _SIDES}
+        hands = eef | tcp
+        order = sorted(hands, key=lambda side: (side != "right", side))
+        return {side: hands[side] for side in order}
+
+    def _sided(self, role: str) -> dict[str, str]:
+        found: dict[str, str] = {}
+        for frame in self.frames:
+            side = frame.name.split("_", 1)[0]
+            if frame.role == role:
+                found.setdefault(side if side in _SIDES else frame.name, frame.name)
+        return found
 
     @cached_property
     def _links_by_name(self) -> dict[str, Link]:

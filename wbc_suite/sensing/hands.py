@@ -55,26 +55,12 @@ class Hand:
 
 
 def hands_of(state: RobotState) -> tuple[Hand, ...]:
-    """Return a robot's hands, right before left.
-
-    A hand is a frame with role `tcp`, or `eef` on a side that has no tcp.
-    """
+    """Return a robot's hands, right before left."""
     robot = state.robot
-    chosen: dict[str, str] = {}
-    for role in ("tcp", "eef"):
-        for frame in robot.frames:
-            if frame.role == role:
-                chosen.setdefault(_side(frame.name), frame.name)
-    order = sorted(chosen, key=lambda side: (side != "right", side))
     return tuple(
-        Hand(state, side, chosen[side], _gripper_links(robot, side, chosen[side]))
-        for side in order
+        Hand(state, side, frame, _gripper_links(robot, side, frame))
+        for side, frame in robot.hands.items()
     )
-
-
-def _side(frame: str) -> str:
-    side = frame.split("_", 1)[0]
-    return side if side in ("right", "left") else frame
 
 
 def _gripper_links(robot: RobotDescription, side: str, frame: str) -> list[str]:

@@ -198,14 +198,15 @@ class WholeBodyIKConfig(FrozenModel):
 
 
 def default_whole_body_config(robot: RobotDescription) -> dict[str, Any]:
-    """Return a config for a robot without a file: hands as poses, feet held."""
-    hands = [f.name for f in robot.frames if f.role == "tcp"]
-    hands = hands or [f.name for f in robot.frames if f.role == "eef"]
-    hands = hands or [robot.links[-1].name]
+    """Return a config for a robot without a file: hands as poses, feet held.
+
+    A robot without hands is moved by its trunk or its head.
+    """
     frames = [
-        {"name": _hand_name(hand, len(hands)), "frame": hand, "kind": "pose"}
-        for hand in hands
+        {"name": _hand_name(side, len(robot.hands)), "frame": frame, "kind": "pose"}
+        for side, frame in robot.hands.items()
     ]
+    frames = frames or [{"name": name, "frame": name} for name in [_foremost(robot)]]
     feet = [f.name for f in robot.frames if f.role == "foot"]
     held = feet if robot.root.kind == "free" else []
     keyframe = "ready" if "ready" in robot.keyframes else ""
@@ -217,8 +218,17 @@ def default_whole_body_config(robot: RobotDescription) -> dict[str, Any]:
     return config
 
 
-def _hand_name(frame: str, count: int) -> str:
-    for side in ("right", "left"):
-        if frame.startswith(f"{side}_"):
-            return f"{side}_hand"
-    return "right_hand" if count == 1 else frame
+def _hand_name(side: str, count: int) -> str:
+    if side in ("right", "left"):
+        return f"{side}_hand"
+    return "right_hand" if count == 1 else side
+
+
+def _foremost(robot: RobotDescription) -> str:
+    """Return the frame, or else the link, that moves a robot without hands."""
+    moving = {link.name for link in robot.links[1:]}
+    if robot.root.kind != "fixed":
+        moving.add(robot.links[0].name)
+    frames = {f.role: f.name for f in robot.frames if f.link in moving}
+    roles = ("torso", "base", "head")
+    return next((frames[r] for r in roles if r in frames), robot.links[-1].name)

@@ -30,6 +30,7 @@ from wbc_suite.control.part.gripper import GripperController
 from wbc_suite.control.part.joint_position import JointPositionLaw
 from wbc_suite.control.part.stance import StanceContact, StanceLaw
 from wbc_suite.control.state import RobotState
+from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Configuration, Conversion
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Indices, Vector
@@ -280,6 +281,12 @@ def _make_law(
 ) -> JointPositionLaw | StanceLaw:
     if state.robot.root.kind != "free":
         return JointPositionLaw(state, joints, config.joint_law)
+    if not config.held:
+        raise ConfigError(
+            f"{state.robot.name}: it is free to fall, and the controller holds no foot "
+            "([[held]]). Name its feet there, or let it stand on something: "
+            "root 'fixed' or 'planar', or another base."
+        )
     contacts = [
         StanceContact(
             site=state.model.site(state.prefix + held.frame).id, kind=held.contact
