@@ -48,11 +48,11 @@ def _robot(file: Path) -> str:
 
 
 def _skin(file: Path) -> str:
-    from wbc_suite.robot.skins import SkinTable
-    from wbc_suite.tomlfile import load_model
+    from wbc_suite.robot.skins import read_skin
 
-    table = load_model(SkinTable, file)
-    return f"Meshes of {len(table.link)} links, from {table.provider}."
+    table = read_skin(file)
+    meshes = sum(len(pieces) for pieces in table.link.values())
+    return f"Skin of {len(table.link)} links with {meshes} meshes of {table.provider}."
 
 
 def _benchmark(file: Path) -> str:

@@ -24,7 +24,7 @@ from wbc_suite.robot.parts import Name
 from wbc_suite.robot.shapes import Color, Posed, SkinMesh, Vector3
 from wbc_suite.tomlfile import FrozenModel, load_model
 
-__all__ = ["MESHES", "SkinTable", "Wardrobe"]
+__all__ = ["MESHES", "SkinTable", "Wardrobe", "read_skin"]
 
 log = logging.getLogger(__name__)
 
@@ -93,7 +93,7 @@ class _Piece(Posed):
 
 
 class SkinTable(FrozenModel):
-    """One file `robots/skin/NAME.toml`."""
+    """One file `robots/skin/NAME.toml`: for each link of component NAME its meshes."""
 
     format: Literal[1]
     provider: str
@@ -186,10 +186,7 @@ class Wardrobe:
         if component not in self._catalogue.names("robots/skin"):
             return None
         path = self._catalogue.find("robots/skin", component, kind="skin")
-        table = load_model(SkinTable, path)
-        if table.provider not in PROVIDERS:
-            raise UnknownNameError("provider of meshes", table.provider, PROVIDERS)
-        return table
+        return read_skin(path)
 
     def _locate(self, table: SkinTable, file: str) -> Path | None:
         inside = Path(table.folder) / file
@@ -218,6 +215,19 @@ class Wardrobe:
             if path.suffix.casefold() in (".obj", ".stl"):
                 found.setdefault(path.name.casefold(), []).append(path)
         return found
+
+
+def read_skin(path: Path) -> SkinTable:
+    """Read a table of meshes.
+
+    Raises:
+        ConfigError: Names file, key, value and the rule.
+        UnknownNameError: If the provider is unknown.
+    """
+    table = load_model(SkinTable, path)
+    if table.provider not in PROVIDERS:
+        raise UnknownNameError("provider of meshes", table.provider, PROVIDERS)
+    return table
 
 
 def _pieces(table: SkinTable) -> Iterator[_Piece]:
