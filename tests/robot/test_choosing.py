@@ -124,3 +124,12 @@ def test_gripper_of_ones_own_is_a_file(tmp_path, monkeypatch):
     assert robot.joint_names == wbc_suite.load_robot("Panda").joint_names
     with pytest.raises(ConfigError, match=r"nowhere\.toml: cannot be read"):
         wbc_suite.load_robot("Panda", gripper="nowhere.toml")
+
+
+def test_without_a_gripper_the_tool_point_is_at_the_flange():
+    robot = wbc_suite.load_robot("GR1", gripper={"right": "none"})
+    whole = wbc_suite.load_robot("GR1")
+    assert set(whole.groups) - set(robot.groups) == {"right_gripper"}
+    flange, hand = robot.frame("right_tcp"), whole.link("R_hand_flange")
+    assert (flange.role, flange.link) == ("tcp", hand.parent)
+    assert (flange.pos, flange.quat) == (hand.pos, hand.quat)

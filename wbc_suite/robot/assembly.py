@@ -10,7 +10,7 @@ from wbc_suite.errors import ConfigError, DescriptionError, UnknownNameError
 from wbc_suite.robot.choosing import Choice, choose, is_bare, is_path
 from wbc_suite.robot.component import Assembly, Component, Part, read_robot_file
 from wbc_suite.robot.description import RobotDescription
-from wbc_suite.robot.parts import Link, Mount, Root, Synergy
+from wbc_suite.robot.parts import Frame, Link, Mount, Root, Synergy
 from wbc_suite.robot.placing import (
     compose,
     depth_first,
@@ -93,8 +93,9 @@ def assemble(
         UnknownNameError: If a component does not exist.
     """
     builder = _Builder(path, catalogue, wardrobe)
+    own = read_assembly(path, catalogue)
     assembly = choose(
-        read_assembly(path, catalogue),
+        own,
         gripper=gripper,
         base=base,
         read=builder.read,
@@ -103,6 +104,10 @@ def assemble(
     names = [builder.read(part).component.name for part in assembly.parts]
     for part, name in zip(assembly.parts, names, strict=True):
         builder.mount(part, shared=names.count(name) > 1)
+    kept = {part.name for part in assembly.parts}
+    for part in own.parts:
+        if part.choice == "gripper" and part.name not in kept:
+            builder.leave_bare(part)
     return builder.finish(assembly)
 
 
@@ -186,6 +191,16 @@ class _Builder:
         self._synergies |= _by_gripper(component.synergies, called=part.name)
         header = component.component
         self._headers.append((header.source, header.license, header.deviations))
+
+    def leave_bare(self, part: Part) -> None:
+        """Put the `tcp` of a gripper that is left out at the flange."""
+        mount = self._mounts.get(part.on or "")
+        if mount is None:
+            return
+        name = f"{part.side}_tcp" if part.side else "tcp"
+        fields = {"name": name, "link": mount.link, "role": "tcp"}
+        frame = Frame.model_validate(fields | compose(mount, part))
+        self._items.setdefault("frames", []).append(frame)
 
     def read(self, part: Part) -> Component:
         """Read the component of a part."""

@@ -31,7 +31,8 @@ def load_robot(
         name: Catalogue name without regard to case (`Panda`, `gr1`), a component with
             its folder (`gripper/panda_gripper`), or a path to a .toml, .urdf or .xml.
         gripper: Another gripper for every side, or one for each: `{"right": ...}`;
-            "none" leaves it out. `InspireHand` is the one of each side.
+            "none" leaves it out, and puts `tcp` at the flange. `InspireHand` is the one
+            of each side; a name that ends in .toml is a file.
         base: Another base, which brings its own root and height; "none" leaves it out.
             A robot with legs or wheels takes only a root, such as `NullMobileBase`.
         root: Another root: `fixed`, `planar` or `free`.
