@@ -12,6 +12,7 @@ from wbc_suite.control.composite.config import (
     WholeBodyIKConfig,
     default_whole_body_config,
 )
+from wbc_suite.control.composite.hindrance import lagging_joint
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.robot import load_robot
 from wbc_suite.tomlfile import load_model
@@ -63,6 +64,35 @@ def test_reasons_say_what_is_in_the_way(alone):
     down = scene.act({"right_hand": np.array([-0.4, 0, 0.9, 0, 1.5, 0])}, 2.0)
     words = " ".join(down["frames"]["right_hand"]["reasons"])
     assert "limit: panda_joint" in words or "out of reach" in words
+
+
+def test_what_the_hand_presses_on_is_named(alone):
+    scene = alone(load_robot("Panda", base="NullMount"))
+    height = scene.site("right_tcp")[2]
+    for z in (0.1, -0.03):  # m; the floor is at 0
+        down = scene.act({"right_hand": np.array([0, 0, z - height, 0, 0, 0])}, 2.0)
+        height = z
+    hand = down["frames"]["right_hand"]
+    assert hand["position_error"] > 0.01
+    assert hand["reasons"]
+    assert all(
+        words.startswith("contact: ") and words.endswith(" - floor")
+        for words in hand["reasons"]
+    )
+
+
+def test_a_limb_that_gives_way_is_no_goal_out_of_reach(alone):
+    scene = alone("UR5e")
+    state = scene.state
+    state.data.body("robot0_robotiq_85_base").xfrc_applied[2] = -60.0  # N, unannounced
+    hand = scene.act({"right_hand": 0.5 * STEP}, 3.0)["frames"]["right_hand"]
+    assert hand["position_error"] > 1e-3
+    assert [words.split(":")[0] for words in hand["reasons"]] == ["lag"]
+    joints = state.robot.joint_names[:2]
+    elsewhere = state.data.qpos[state.joint_addresses(joints)[0]] + [0.1, 0.2]
+    assert lagging_joint(state, joints, elsewhere) == f"lag: {joints[1]}"
+    state.data.ctrl[state.actuator_ids[1]] = 1e3
+    assert lagging_joint(state, joints, elsewhere) == f"motor limit: {joints[1]}"
 
 
 def test_each_hand_is_told_its_own_collisions(alone):

@@ -30,6 +30,9 @@ def status(**changes):
         ("velocity limit: waist_yaw_joint (lower)", "waist yaw is at its top speed"),
         ("self-collision: right_forearm - torso", "right forearm would touch torso"),
         ("conflict: left_hand", "it pulls against left hand"),
+        ("contact: left_pad - table", "left pad presses on table"),
+        ("motor limit: waist_yaw_joint", "waist yaw has no more force"),
+        ("lag: waist_yaw_joint", "waist yaw lags behind"),
         ("something new", "something new"),
     ],
 )

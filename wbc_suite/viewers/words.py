@@ -14,6 +14,9 @@ _ON_ITS_WAY = ("moving", "acceleration limit")
 _JOINT_LIMIT = re.compile(r"joint limit: (?P<joint>.+?)(?: \((?P<side>\w+)\))?$")
 _SPEED_LIMIT = re.compile(r"velocity limit: (?P<joint>.+?)(?: \(\w+\))?$")
 _COLLISION = re.compile(r"self-collision: (?P<one>.+?) - (?P<other>.+)$")
+_CONTACT = re.compile(r"contact: (?P<link>.+?) - (?P<thing>.+)$")
+_WEAK = re.compile(r"motor limit: (?P<joint>.+)$")
+_LAG = re.compile(r"lag: (?P<joint>.+)$")
 _CONFLICT = re.compile(r"conflict: (?P<other>.+)$")
 
 
@@ -31,6 +34,12 @@ def describe_reason(reason: str) -> str:
         return f"{plain(match['joint'])} is at its top speed"
     if match := _COLLISION.match(reason):
         return f"{plain(match['one'])} would touch {plain(match['other'])}"
+    if match := _CONTACT.match(reason):
+        return f"{plain(match['link'])} presses on {plain(match['thing'])}"
+    if match := _WEAK.match(reason):
+        return f"{plain(match['joint'])} has no more force"
+    if match := _LAG.match(reason):
+        return f"{plain(match['joint'])} lags behind"
     if match := _CONFLICT.match(reason):
         return f"it pulls against {plain(match['other'])}"
     return reason

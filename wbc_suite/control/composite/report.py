@@ -1,6 +1,6 @@
 """What a whole-body controller says about its goals, and why one is not reached."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -9,10 +9,39 @@ import pinocchio as pin
 
 from wbc_suite.control.composite.backend import IkStep
 from wbc_suite.control.composite.config import ControlledFrame, WholeBodyIKConfig
+from wbc_suite.control.composite.hindrance import Touch
 from wbc_suite.kinematics import Configuration
 from wbc_suite.typing import Vector
 
-__all__ = ["FrameReport", "IkReport", "WallTime"]
+__all__ = ["Body", "FrameReport", "IkReport", "WallTime"]
+
+STANDING = 1e-3
+"""rad/s or m/s; a command slower than that stands."""
+
+RATTLING = 0.1
+"""rad/s or m/s; what a robot that presses on something may still move."""
+
+STANDING_BODY = 0.02
+"""rad/s or m/s; a robot slower than that stands."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Body:
+    """How a robot follows its commands.
+
+    Attributes:
+        commanded: Commanded configuration.
+        goals: Goals in the world of the commanded robot.
+        speed: Speed of the fastest joint, rad/s or m/s.
+        touches: Tells what the robot presses on.
+        lagging: Tells which joint is farthest from its command.
+    """
+
+    commanded: Vector
+    goals: Sequence[pin.SE3]
+    speed: float
+    touches: Callable[[], Sequence[Touch]]
+    lagging: Callable[[], str]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -67,7 +96,11 @@ class IkReport:
         ]
 
     def frames(
-        self, q: Vector, goals: Sequence[pin.SE3], answer: IkStep
+        self,
+        q: Vector,
+        goals: Sequence[pin.SE3],
+        answer: IkStep,
+        body: "Body",
     ) -> dict[str, FrameReport]:
         """Return one report per controlled frame.
 
@@ -75,28 +108,33 @@ class IkReport:
             q: Measured configuration.
             goals: Goals in the world.
             answer: The last solve.
+            body: How the robot follows.
         """
+        errors, reached = self._compare(q, goals)
+        whys: list[Sequence[str]] = [()] * len(goals)
+        if not all(reached):
+            whys = self._reasons(reached, answer, body)
+        return {
+            frame.name: FrameReport(
+                reached=reached[k],
+                position_error=errors[k][0],
+                orientation_error=errors[k][1],
+                reasons=() if reached[k] else tuple(dict.fromkeys(whys[k])),
+            )
+            for k, frame in enumerate(self._config.frames)
+        }
+
+    def _compare(
+        self, q: Vector, goals: Sequence[pin.SE3]
+    ) -> tuple[list[tuple[float, float]], list[bool]]:
+        """Return each frame's distances, and whether they are within tolerance."""
         self._configuration.update(q)
         errors = [
             self._error(frame, goal)
             for frame, goal in zip(self._config.frames, goals, strict=True)
         ]
         linear, angular = self._config.tolerance
-        reached = [p <= linear and r <= angular for p, r in errors]
-        known: Mapping[str, Sequence[str]] = {}
-        if answer.explain is not None and not all(reached):
-            known = answer.explain()
-        return {
-            frame.name: FrameReport(
-                reached=reached[k],
-                position_error=errors[k][0],
-                orientation_error=errors[k][1],
-                reasons=()
-                if reached[k]
-                else self._reasons(k, reached, answer, known.get(frame.name)),
-            )
-            for k, frame in enumerate(self._config.frames)
-        }
+        return errors, [p <= linear and r <= angular for p, r in errors]
 
     def _error(self, frame: ControlledFrame, goal: pin.SE3) -> tuple[float, float]:
         """Return distances that count for the frame's kind, m and rad."""
@@ -113,18 +151,43 @@ class IkReport:
         return linear, angular
 
     def _reasons(
-        self,
-        k: int,
-        reached: Sequence[bool],
-        answer: IkStep,
-        reasons: Sequence[str] | None,
-    ) -> tuple[str, ...]:
-        """Return reasons, if the solver has any, and some of our own if not."""
-        if reasons is None:
-            reasons = self._from_limits(k, reached, answer)
-        if not reasons and float(np.abs(answer.v).max(initial=0.0)) < 1e-3:
-            reasons = ["out of reach"]
-        return tuple(dict.fromkeys(reasons)) or ("moving",)
+        self, reached: Sequence[bool], answer: IkStep, body: "Body"
+    ) -> list[Sequence[str]]:
+        """Return why each frame is not reached.
+
+        Where the commanded robot is at its goal, what counts is why the body is not;
+        else the solver's reasons, or some of our own where it has none.
+        """
+        _, commanded = self._compare(body.commanded, body.goals)
+        known = answer.explain() if answer.explain is not None else {}
+        standing = float(np.abs(answer.v).max(initial=0.0)) < STANDING
+        whys: list[Sequence[str]] = []
+        for k, frame in enumerate(self._config.frames):
+            why = known.get(frame.name) or ()
+            if commanded[k]:
+                why = self._held_back(k, body) if standing else ()
+            elif frame.name not in known:
+                why = self._from_limits(k, reached, answer)
+            if not why and standing and not commanded[k]:
+                why = ["out of reach"]
+            whys.append(why or ["moving"])
+        return whys
+
+    def _held_back(self, k: int, body: "Body") -> Sequence[str]:
+        """Return what the frame's limb presses on, or else the joint that lags."""
+        if body.speed > RATTLING:
+            return ()
+        touching = [
+            str(touch)
+            for touch in body.touches()
+            if self._support[k] & self._names(touch.link)
+        ]
+        standing = body.speed < STANDING_BODY
+        return touching or ([body.lagging()] if standing else ())
+
+    def _names(self, frame: str) -> set[str]:
+        names = self._configuration.velocity_names()
+        return {names[i] for i in self._configuration.support(frame)}
 
     def _from_limits(
         self, k: int, reached: Sequence[bool], answer: IkStep

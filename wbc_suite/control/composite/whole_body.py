@@ -19,11 +19,17 @@ from wbc_suite.control.composite.goals import (
     pose_of_action,
     shift_pose,
 )
+from wbc_suite.control.composite.hindrance import lagging_joint, touches
 from wbc_suite.control.composite.names import read_whole_body
 from wbc_suite.control.composite.planner import Planner, Waypoint
 from wbc_suite.control.composite.reduced import lock_groups
 from wbc_suite.control.composite.reference import Reference
-from wbc_suite.control.composite.report import FrameReport, IkReport, WallTime
+from wbc_suite.control.composite.report import (
+    Body,
+    FrameReport,
+    IkReport,
+    WallTime,
+)
 from wbc_suite.control.composite.tasks import soles_of
 from wbc_suite.control.part.balance import BalanceLaw
 from wbc_suite.control.part.gripper import GripperController
@@ -103,6 +109,7 @@ class WholeBodyIK:
             dt=self._dt,
         )
         self._tau = np.zeros(len(state.actuators))
+        self._feet = {self._link(held.frame) for held in self.config.held}
         self._report = IkReport(self.config, Configuration(model))
         self.reset(state)
 
@@ -190,7 +197,18 @@ class WholeBodyIK:
         """Return `{"ik": ...}`: what is reached, by how much it is missed, and why."""
         q = self._conversion.q_to_pinocchio(state.data.qpos)
         goals = list(self.goals_in_world.values())
-        frames = self._report.frames(q, goals, self._answer)
+        correction = self._root_correction(state)
+        v = self._conversion.v_to_pinocchio(state.data.qpos, state.data.qvel)
+        body = Body(
+            commanded=self.q,
+            goals=[correction * goal for goal in goals],
+            speed=float(np.abs(v).max(initial=0.0)),
+            touches=lambda: touches(state, apart_from=self._feet),
+            lagging=lambda: lagging_joint(
+                state, self._law.joints, np.fromiter(self.joint_targets.values(), float)
+            ),
+        )
+        frames = self._report.frames(q, goals, self._answer, body)
         return {"ik": _as_info(frames, self.solve_time)}
 
     def _solve(self, state: RobotState) -> None:
@@ -234,6 +252,10 @@ class WholeBodyIK:
 
     def _gripper_joints(self) -> set[str]:
         return {joint for gripper in self._grippers for joint in gripper.joints}
+
+    def _link(self, frame: str) -> str:
+        """Return the link that a frame, or a link's own name, belongs to."""
+        return next((f.link for f in self.robot.frames if f.name == frame), frame)
 
     def _frames(self) -> range:
         return range(len(self.config.frames))
