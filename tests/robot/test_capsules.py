@@ -67,6 +67,15 @@ def test_every_surface_point_is_inside_a_capsule(shape):
     assert depth.max() < slack
 
 
+def test_flat_drives_do_not_grow_by_their_radius():
+    """A capsule with the whole axis as segment would reach 100 mm beyond each face."""
+    drive = Cylinder(shape="cylinder", start=(0, 0, 0), end=(0, 0, 0.1), radius=0.1)
+    ((start, end, radius),) = _capsules(drive)
+    assert end[2] + radius - 0.1 < 0.07
+    assert start[2] - radius > -0.07
+    assert radius < 0.12
+
+
 @pytest.mark.parametrize("name", Catalogue().names("robots"))
 def test_pairs_are_those_that_the_simulator_may_collide(name):
     robot = load_robot(name)

@@ -115,13 +115,28 @@ def _capsules(shape: Shape) -> list[Segment]:
             return [(np.asarray(start), np.asarray(end), radius)]
         case Cylinder(start=start, end=end, radius=radius):
             wide = max(radius, shape.radius_to or 0.0)
-            return [(np.asarray(start), np.asarray(end), wide)]
+            return [_around_cylinder(np.asarray(start), np.asarray(end), wide)]
         case Ellipsoid(size=size):
             return [_around_ellipsoid(np.asarray(size))]
         case Box(size=size):
             return _around_box(np.asarray(size))
         case _:
             return [_around_points(support_points(shape))]
+
+
+def _around_cylinder(start: Vector, end: Vector, radius: float) -> Segment:
+    """Return the capsule of least volume on a cylinder's axis.
+
+    Its segment ends `u` before the cylinder's faces, and its radius reaches their rims,
+    `rho^2 = r^2 + u^2`. With the whole axis as segment (u = 0) a flat drive would grow
+    by its radius at either face.
+    """
+    length = float(np.linalg.norm(end - start))
+    u = np.linspace(0.0, length / 2, 101)
+    rho = np.hypot(radius, u)
+    best = int(np.argmin(rho**2 * (length - 2.0 * u + 4.0 / 3.0 * rho)))
+    step = u[best] / length * (end - start)
+    return start + step, end - step, float(rho[best])
 
 
 def _around_ellipsoid(size: Vector) -> Segment:
@@ -145,7 +160,7 @@ def _around_box(size: Vector) -> list[Segment]:
     for k in range(strips):
         centre = np.zeros(3)
         centre[middle] = -size[middle] + (2 * k + 1) * width
-        found.append((centre - half, centre + half, radius))
+        found.append(_around_cylinder(centre - half, centre + half, radius))
     return found
 
 
