@@ -70,6 +70,7 @@ def test_a_near_hand_target_moves_the_arm_and_not_the_pelvis():
     np.testing.assert_allclose(pelvis(env), start, atol=2e-3)
 
 
+@pytest.mark.slow
 def test_it_squats_by_its_pelvis_while_its_hands_stay():
     env = make()
     start = pelvis(env)
@@ -80,6 +81,7 @@ def test_it_squats_by_its_pelvis_while_its_hands_stay():
     np.testing.assert_allclose(pelvis(env), start - [0.0, 0.0, 0.1], atol=3e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("force", [(30.0, 0.0), (-30.0, 0.0), (0.0, 30.0)])
 def test_a_push_is_survived(force: tuple[float, float]):
     env = make()
@@ -93,6 +95,7 @@ def test_a_push_is_survived(force: tuple[float, float]):
     np.testing.assert_allclose(pelvis(env), start, atol=2e-3)
 
 
+@pytest.mark.slow
 def test_a_far_reach_leans_as_far_as_balance_allows():
     env = make()
     action = moved(env, right_hand=(0.6,), left_hand=(0.6,))
@@ -123,6 +126,7 @@ def test_targets_out_of_reach_are_survived():
     assert upright(env) > 0.98
 
 
+@pytest.mark.slow
 def test_the_head_turns_alone():
     env = make()
     start = pelvis(env)
@@ -156,6 +160,7 @@ def test_hands_reach_targets_in_front():
     assert np.mean(np.array(errors) < 5e-3) >= 0.9
 
 
+@pytest.mark.slow
 def test_pressure_stays_inside_the_soles_while_hands_move():
     env = make()
     action = moved(env, right_hand=(0.2, 0.0, 0.1), left_hand=(0.2, 0.0, 0.1))

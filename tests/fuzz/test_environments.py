@@ -150,7 +150,14 @@ FAULTS = {
 }
 
 
-@pytest.mark.parametrize("fault", FAULTS)
+SLOW_FAULTS = ("position", "push")  # MuJoCo takes seconds for these states
+PARAMETERS = [
+    pytest.param(fault, marks=[pytest.mark.slow] if fault in SLOW_FAULTS else [])
+    for fault in FAULTS
+]
+
+
+@pytest.mark.parametrize("fault", PARAMETERS)
 def test_broken_physics_ends_the_episode_in_words(env, fault, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     field, index, value = FAULTS[fault]

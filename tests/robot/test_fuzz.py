@@ -14,11 +14,12 @@ from wbc_suite.robot.component import Component
 from wbc_suite.robot.mirror import reflect_component
 from wbc_suite.tomlfile import parse_model, read_toml
 
-COMPONENTS = [
+FILES = [
     read_toml(path)
     for kind in ("arm", "body", "gripper", "base")
     for path in Catalogue().files(f"robots/{kind}")
 ]
+COMPONENTS = [data for data in FILES if "extends" not in data["component"]]
 
 NUMBERS = st.one_of(
     st.floats(allow_nan=True, allow_infinity=True),

@@ -258,6 +258,9 @@ def test_our_own_robots_come_back(name, root, tmp_path):
     } | {f.name for f in robot.frames}
     for joint in robot.joints:
         back = again.joint(joint.name)
+        if joint.mimic is not None:  # URDF knows no loops: followers just follow
+            mimic = joint.mimic.model_copy(update={"closed": False})
+            joint = joint.model_copy(update={"mimic": mimic})
         for key in ("range", "effort", "velocity", "damping", "mimic", "type"):
             assert getattr(back, key) == getattr(joint, key)
     first, second = robot.to_mjspec().compile(), again.to_mjspec().compile()
