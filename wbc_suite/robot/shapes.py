@@ -34,6 +34,7 @@ __all__ = [
     "kept_by_shape",
 ]
 
+S = TypeVar("S")
 T = TypeVar("T")
 
 Real: TypeAlias = Annotated[float, Field(ge=-1e4, le=1e4)]
@@ -241,7 +242,7 @@ Shape: TypeAlias = Annotated[
 ]
 
 
-def kept_by_shape(compute: Callable[[Shape], T]) -> Callable[[Shape], T]:
+def kept_by_shape(compute: Callable[[S], T]) -> Callable[[S], T]:
     """Keep what a function computes of a shape, for equal shapes to share.
 
     Ten robots in one scene, or one robot in a hundred environments, compute their

@@ -3,7 +3,6 @@
 import hashlib
 import importlib
 import os
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ import numpy as np
 
 from wbc_suite.errors import ConfigError
 from wbc_suite.robot.mesh_files import MAX_BYTES
-from wbc_suite.robot.shapes import SkinMesh, Vector3
+from wbc_suite.robot.shapes import SkinMesh, Vector3, kept_by_shape
 from wbc_suite.typing import Indices, Matrix
 
 __all__ = ["skin_triangles"]
@@ -26,7 +25,7 @@ VERSION = 1
 """Raised when what is kept changes."""
 
 
-@lru_cache(maxsize=512)
+@kept_by_shape
 def skin_triangles(shape: SkinMesh) -> tuple[Matrix, Indices]:
     """Return vertices (n, 3) in the shape's frame and faces (m, 3), thinned out.
 
