@@ -14,19 +14,6 @@ def robot():
     return wbc_suite.load_robot("Baxter")
 
 
-@pytest.fixture(scope="module")
-def model(robot):
-    return robot.to_mjspec().compile()
-
-
-@pytest.fixture
-def data(model):
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, model.key("ready").id)
-    mujoco.mj_forward(model, data)
-    return data
-
-
 def test_it_weighs_the_data_sheets_75_kilograms_without_pedestal():
     robot = wbc_suite.load_robot("Baxter", base="none", gripper="none")
     mass = sum(robot.to_mjspec().compile().body_mass)

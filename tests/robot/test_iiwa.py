@@ -22,11 +22,6 @@ def robot(sheet):
     return wbc_suite.load_robot(sheet[0], gripper="none", base="none")
 
 
-@pytest.fixture(scope="module")
-def model(robot):
-    return robot.to_mjspec().compile()
-
-
 def test_mass_is_the_data_sheets(model, sheet):
     assert sum(model.body_mass) == pytest.approx(sheet[2], abs=1e-4)
 
@@ -55,10 +50,7 @@ def test_rated_torques_hold_the_rated_payload_stretched_out(robot, sheet):
     assert loaded[1] > 0.35 * model.upperEffortLimit[1]
 
 
-def test_ready_posture_is_free_and_the_flange_points_down_in_front(model):
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, model.key("ready").id)
-    mujoco.mj_forward(model, data)
+def test_ready_posture_is_free_and_the_flange_points_down_in_front(model, data):
     assert data.ncon == 0
     flange = data.site("right_eef")
     assert flange.xmat.reshape(3, 3)[2, 2] < -0.99

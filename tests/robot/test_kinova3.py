@@ -1,6 +1,5 @@
 """Kinova Gen3: mass, torques, endless joints, and what its own camera sees."""
 
-import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -14,14 +13,6 @@ NOMINAL_TORQUES = [32.0] * 4 + [13.0] * 3  # N m, large and small actuators
 @pytest.fixture(scope="module")
 def robot():
     return wbc_suite.load_robot("Kinova3", gripper="none", base="none")
-
-
-def at_ready(robot):
-    model = robot.to_mjspec().compile()
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, model.key("ready").id)
-    mujoco.mj_forward(model, data)
-    return model, data
 
 
 def test_mass_is_the_data_sheets(robot):
@@ -46,7 +37,7 @@ def test_stretched_arm_stays_within_the_nominal_torques(robot):
     assert (model.upperEffortLimit[:4] > NOMINAL_TORQUES[:4]).all()
 
 
-def test_ready_posture_is_free_and_the_flange_points_down_in_front(robot):
+def test_ready_posture_is_free_and_the_flange_points_down_in_front(robot, at_ready):
     _, data = at_ready(robot)
     assert data.ncon == 0
     flange = data.site("right_eef")
@@ -54,7 +45,7 @@ def test_ready_posture_is_free_and_the_flange_points_down_in_front(robot):
     assert flange.xpos[0] > 0.4
 
 
-def test_camera_sees_the_fingers_open_to_its_left_and_right():
+def test_camera_sees_the_fingers_open_to_its_left_and_right(at_ready):
     model, data = at_ready(wbc_suite.load_robot("Kinova3"))
     assert (data.contact.dist < 0.0).sum() == 0
     camera = data.camera("right_wrist_camera")

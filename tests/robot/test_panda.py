@@ -14,19 +14,6 @@ def robot():
     return wbc_suite.load_robot("Panda", base="none")
 
 
-@pytest.fixture(scope="module")
-def model(robot):
-    return robot.to_mjspec().compile()
-
-
-@pytest.fixture
-def data(model):
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, model.key("ready").id)
-    mujoco.mj_forward(model, data)
-    return data
-
-
 def test_masses_are_near_the_data_sheets_eighteen_kilograms(model):
     assert sum(model.body_mass) == pytest.approx(ARM_AND_HAND, abs=1e-3)
     assert sum(model.body_mass) == pytest.approx(18.0, rel=0.04)

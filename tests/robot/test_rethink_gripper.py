@@ -14,19 +14,6 @@ def robot():
     return wbc_suite.load_robot("gripper/rethink_gripper")
 
 
-@pytest.fixture(scope="module")
-def model(robot):
-    return robot.to_mjspec().compile()
-
-
-@pytest.fixture
-def data(model):
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, model.key("ready").id)
-    mujoco.mj_forward(model, data)
-    return data
-
-
 def gap(model, data):
     """Distance between the inner faces of the pads, m."""
     left, right = (

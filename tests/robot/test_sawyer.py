@@ -14,19 +14,6 @@ def robot():
     return wbc_suite.load_robot("Sawyer")
 
 
-@pytest.fixture(scope="module")
-def model(robot):
-    return robot.to_mjspec().compile()
-
-
-@pytest.fixture
-def data(model):
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, model.key("ready").id)
-    mujoco.mj_forward(model, data)
-    return data
-
-
 def test_arm_without_head_weighs_the_data_sheets_nineteen_kilograms():
     robot = wbc_suite.load_robot("Sawyer", base="none", gripper="none")
     mass = sum(robot.to_mjspec().compile().body_mass)

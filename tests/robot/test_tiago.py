@@ -17,19 +17,6 @@ def robot():
     return wbc_suite.load_robot("Tiago")
 
 
-@pytest.fixture(scope="module")
-def model(robot):
-    return robot.to_mjspec().compile()
-
-
-@pytest.fixture
-def data(model):
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, model.key("ready").id)
-    mujoco.mj_forward(model, data)
-    return data
-
-
 def penetrations(model, data):
     mujoco.mj_forward(model, data)
     pairs = data.contact.geom[data.contact.dist < 0.0]

@@ -1,6 +1,5 @@
 """UR5e: mass, payload, the ready posture, and how its gripper sits."""
 
-import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -14,14 +13,6 @@ PAYLOAD = 5.0  # kg, data sheet
 @pytest.fixture(scope="module")
 def robot():
     return wbc_suite.load_robot("UR5e", gripper="none", base="none")
-
-
-def at_ready(robot):
-    model = robot.to_mjspec().compile()
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, model.key("ready").id)
-    mujoco.mj_forward(model, data)
-    return model, data
 
 
 def test_mass_is_near_the_data_sheets(robot):
@@ -51,7 +42,7 @@ def test_joints_turn_a_full_turn_but_for_the_elbow(robot):
     np.testing.assert_allclose(span, expected, atol=1e-6)
 
 
-def test_ready_posture_is_free_and_the_flange_points_down_in_front(robot):
+def test_ready_posture_is_free_and_the_flange_points_down_in_front(robot, at_ready):
     _, data = at_ready(robot)
     assert data.ncon == 0
     flange = data.site("right_eef")
@@ -60,7 +51,7 @@ def test_ready_posture_is_free_and_the_flange_points_down_in_front(robot):
     assert abs(flange.xpos[1]) < 0.05
 
 
-def test_on_its_mount_the_gripper_opens_sideways():
+def test_on_its_mount_the_gripper_opens_sideways(at_ready):
     _, data = at_ready(wbc_suite.load_robot("UR5e"))
     assert (data.contact.dist < 0.0).sum() == 0
     assert data.body("base_link").xpos[2] == pytest.approx(0.912)
