@@ -11,6 +11,7 @@ from PIL import Image
 
 from wbc_suite.catalogue import ENVIRONMENT_VARIABLE, Catalogue
 from wbc_suite.cli import main
+from wbc_suite.robot import load_robot
 
 FILES = [
     path
@@ -155,6 +156,20 @@ def test_describe_action_shows_every_slice_with_its_unit(wbc_suite_command):
         assert word in out
 
 
+def test_grippers_and_bases_are_chosen_on_the_command_line(wbc_suite_command, tmp_path):
+    parts = ("--gripper", "right=InspireRightHand, left=none", "--base", "NullMount")
+    code, out, _ = wbc_suite_command("describe-action", "Baxter", *parts)
+    assert code == 0
+    assert "right_gripper" in out
+    assert "left_gripper" not in out
+    file = tmp_path / "baxter.toml"
+    code, *_ = wbc_suite_command("export", "Baxter", "--to", "toml", "-o", file, *parts)
+    assert code == 0
+    robot = load_robot(file)
+    assert list(robot.synergies) == ["right_gripper"]
+    assert "pedestal" not in [link.name for link in robot.links]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("controller", ["WHOLE_BODY_IK", "WHOLE_BODY_MINK_IK"])
 def test_the_demo_tracks_and_writes_its_pictures(
@@ -184,6 +199,14 @@ def _frame(film: Image.Image, number: int) -> Image.Image:
     [
         (["check", "nowhere/robot.toml"], ["nowhere/robot.toml", "No such file"]),
         (["export", "Pandda", "--to", "mjcf"], ["Pandda", "Did you mean 'panda'"]),
+        (
+            ["render", "PandaGripper", "-o", "a.png"],
+            ["No robot named", "Did you mean 'gripper/PandaGripper'"],
+        ),
+        (
+            ["export", "Baxter", "--to", "urdf", "--gripper", "rigth=PandaGripper"],
+            ["rigth", "Did you mean 'right'"],
+        ),
         (["list", "--catalogue", "nowhere"], ["nowhere", "does not exist"]),
         (["render", "Panda", "-o", "nowhere/a.png"], ["nowhere/a.png", "written"]),
         (["render", "Panda", "-o", "a.nonsense"], ["a.nonsense", "written"]),

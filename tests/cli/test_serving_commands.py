@@ -33,7 +33,7 @@ def end(process):
     "command",
     [
         ("view", "Panda"),
-        ("teleop", "--robots", "Panda"),
+        ("teleop", "--robots", "Panda", "--gripper", "Robotiq85Gripper"),
         ("teleop", "--robots", "Panda", "--controller", "WHOLE_BODY_MINK_IK"),
     ],
     ids=lambda words: "-".join(words),

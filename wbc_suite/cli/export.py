@@ -6,7 +6,14 @@ from typing import Annotated
 
 import typer
 
-from wbc_suite.cli.options import CatalogueOption, RobotArgument, writing
+from wbc_suite.cli.options import (
+    BaseOption,
+    CatalogueOption,
+    GripperOption,
+    RobotArgument,
+    chosen,
+    writing,
+)
 
 __all__ = ["export_robot"]
 
@@ -31,14 +38,18 @@ def export_robot(
         bool,
         typer.Option(help="Replace inertias that no body has (of a URDF file)."),
     ] = False,
+    gripper: GripperOption = None,
+    base: BaseOption = None,
     catalogue: CatalogueOption = None,
 ) -> None:
     """Write a robot for other programs, or a URDF or MJCF file as a TOML to edit."""
     from wbc_suite.robot import load_robot
     from wbc_suite.robot.urdf_import import read_urdf
 
-    mending = mend_inertias and robot.endswith(".urdf")
-    description = read_urdf(robot, mend_inertias=True) if mending else load_robot(robot)
+    if mend_inertias and robot.endswith(".urdf"):
+        description = read_urdf(robot, mend_inertias=True)
+    else:
+        description = load_robot(robot, gripper=chosen(gripper), base=base)
     text = {
         Format.MJCF: description.to_mjcf,
         Format.URDF: description.to_urdf,

@@ -11,7 +11,15 @@ import typer
 from wbc_suite.catalogue import ENVIRONMENT_VARIABLE
 from wbc_suite.errors import ConfigError
 
-__all__ = ["CatalogueOption", "RobotArgument", "SkinOption", "writing"]
+__all__ = [
+    "BaseOption",
+    "CatalogueOption",
+    "GripperOption",
+    "RobotArgument",
+    "SkinOption",
+    "chosen",
+    "writing",
+]
 
 
 def _add_to_catalogue(folders: list[Path] | None) -> list[Path]:
@@ -42,6 +50,18 @@ RobotArgument = Annotated[
     ),
 ]
 
+GripperOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME",
+        help="Another gripper; one for each side: right=NAME,left=NAME; or none.",
+    ),
+]
+
+BaseOption = Annotated[
+    str | None, typer.Option(metavar="NAME", help="Another base, or none.")
+]
+
 SkinOption = Annotated[
     str | None,
     typer.Option(
@@ -49,6 +69,16 @@ SkinOption = Annotated[
         help="Draw with real meshes, from installed packages or from a folder.",
     ),
 ]
+
+
+def chosen(gripper: str | None) -> str | dict[str, str] | None:
+    """Return what `--gripper` says: one for all sides, or one for each."""
+    if gripper is None or "=" not in gripper:
+        return gripper
+    return {
+        side.strip(): name.strip()
+        for side, _, name in (part.partition("=") for part in gripper.split(","))
+    }
 
 
 @contextmanager

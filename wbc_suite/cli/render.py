@@ -6,7 +6,15 @@ from typing import Annotated
 
 import typer
 
-from wbc_suite.cli.options import CatalogueOption, RobotArgument, SkinOption, writing
+from wbc_suite.cli.options import (
+    BaseOption,
+    CatalogueOption,
+    GripperOption,
+    RobotArgument,
+    SkinOption,
+    chosen,
+    writing,
+)
 
 __all__ = ["render"]
 
@@ -30,6 +38,8 @@ def render(
     keyframe: Annotated[str, typer.Option(help="Posture of the robot.")] = "ready",
     width: Annotated[int, typer.Option(min=16, max=8192, help="Pixels.")] = 800,
     height: Annotated[int, typer.Option(min=16, max=8192, help="Pixels.")] = 800,
+    gripper: GripperOption = None,
+    base: BaseOption = None,
     skin: SkinOption = None,
     catalogue: CatalogueOption = None,
 ) -> None:
@@ -40,7 +50,7 @@ def render(
     from wbc_suite.viewers.offscreen import render_robot
 
     picture = render_robot(
-        load_robot(robot, skin=skin),
+        load_robot(robot, gripper=chosen(gripper), base=base, skin=skin),
         view=view.value,
         keyframe=keyframe,
         size=(width, height),

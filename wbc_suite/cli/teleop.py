@@ -5,7 +5,13 @@ from typing import Annotated
 
 import typer
 
-from wbc_suite.cli.options import CatalogueOption, SkinOption
+from wbc_suite.cli.options import (
+    BaseOption,
+    CatalogueOption,
+    GripperOption,
+    SkinOption,
+    chosen,
+)
 from wbc_suite.cli.serving import HostOption, PortOption, serve_until_interrupted
 
 __all__ = ["teleop"]
@@ -23,6 +29,8 @@ def teleop(
     rate: Annotated[
         float, typer.Option(help="Targets taken per second, Hz.", min=5.0, max=200.0)
     ] = 100.0,
+    gripper: GripperOption = None,
+    base: BaseOption = None,
     skin: SkinOption = None,
     seed: Annotated[int, typer.Option(help="Seed of the scene.")] = 0,
     host: HostOption = "127.0.0.1",
@@ -41,6 +49,8 @@ def teleop(
         benchmark,
         robots=robots,
         controller_configs=controller,
+        gripper_types=chosen(gripper),
+        base_types=base,
         control_freq=rate,
         horizon=round(ONE_DAY * rate),
         skin=skin,

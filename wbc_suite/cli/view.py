@@ -1,10 +1,13 @@
 """`wbc-suite view`: a robot in the browser, with its joints to turn."""
 
-from typing import Annotated
-
-import typer
-
-from wbc_suite.cli.options import CatalogueOption, RobotArgument, SkinOption
+from wbc_suite.cli.options import (
+    BaseOption,
+    CatalogueOption,
+    GripperOption,
+    RobotArgument,
+    SkinOption,
+    chosen,
+)
 from wbc_suite.cli.serving import HostOption, PortOption, serve_until_interrupted
 
 __all__ = ["view"]
@@ -12,8 +15,8 @@ __all__ = ["view"]
 
 def view(
     robot: RobotArgument,
-    gripper: Annotated[str | None, typer.Option(help="Another gripper.")] = None,
-    base: Annotated[str | None, typer.Option(help="Another base.")] = None,
+    gripper: GripperOption = None,
+    base: BaseOption = None,
     skin: SkinOption = None,
     host: HostOption = "127.0.0.1",
     port: PortOption = None,
@@ -24,7 +27,7 @@ def view(
     from wbc_suite.viewers.robot_page import RobotPage
     from wbc_suite.viewers.site import Site
 
-    description = load_robot(robot, gripper=gripper, base=base, skin=skin)
+    description = load_robot(robot, gripper=chosen(gripper), base=base, skin=skin)
     page = RobotPage(description, Site(host, port))
     serve_until_interrupted(page.site, description.title or description.name)
     page.stop()

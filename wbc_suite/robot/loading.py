@@ -1,5 +1,7 @@
 """`load_robot`: from a catalogue name or a file to a `RobotDescription`."""
 
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Literal
 
@@ -70,7 +72,20 @@ def _locate(name: str, catalogue: Catalogue) -> Path:
         if folder not in FOLDERS:
             raise UnknownNameError("kind of component", folder, FOLDERS)
         return catalogue.find(f"robots/{folder}", stem, kind=folder)
-    return catalogue.find("robots", stem, kind="robot")
+    try:
+        return catalogue.find("robots", stem, kind="robot")
+    except UnknownNameError as error:
+        raise UnknownNameError(
+            "robot", name, [*_components(stem, catalogue)] or error.known
+        ) from None
+
+
+def _components(name: str, catalogue: Catalogue) -> Iterator[str]:
+    """Return the components of a name that no robot has, as `load_robot` takes them."""
+    for folder in FOLDERS:
+        with suppress(UnknownNameError):
+            catalogue.find(f"robots/{folder}", name, kind=folder)
+            yield f"{folder}/{name}"
 
 
 def _read(
