@@ -203,7 +203,10 @@ def reachable(bench, trials, seed, progress=print):
         ]
         rows.append((*history[-1], settled, reasons))
         if history[-1][0] > 2e-3:
-            progress(f"  trial {trial}: {1e3 * history[-1][0]:.2f} mm {reasons}")
+            error = 1e3 * history[-1][0]
+            progress(f"  trial {trial}: {error:.2f} mm {reasons}", flush=True)
+        elif trial % 100 == 99:
+            progress(f"  {trial + 1} trials", flush=True)
     error = np.array([row[:2] for row in rows])
     return {
         "trials": trials,
@@ -228,7 +231,8 @@ def ball(bench, trials, seed):
         for _ in bench.hands:
             direction = rng.normal(size=3)
             direction *= 5.0 * rng.uniform() ** (1 / 3) / np.linalg.norm(direction)
-            poses.append(pin.SE3(pin.SE3.Random().rotation, direction))
+            turn = pin.Quaternion(rng.normal(size=4)).normalized()
+            poses.append(pin.SE3(turn.matrix(), direction))
         bench.send(poses)
         worst = [0.0]
         bench.run(1.0, lambda: worst.append(bench.overshoot()))  # noqa: B023
@@ -270,11 +274,12 @@ def main():
         row = {"case": name, "side": arguments.controller, "n": trials}
         if trials:
             row["reachable"] = reachable(bench, trials, arguments.seed)
+            print(name, json.dumps(row["reachable"], indent=1), flush=True)
         if in_ball:
             row["ball"] = ball(bench, in_ball, arguments.seed)
+            print(name, json.dumps(row["ball"], indent=1), flush=True)
         row["wall_s"] = time.perf_counter() - began
         rows.append(row)
-        print(json.dumps(row, indent=1))
     if arguments.json:
         arguments.json.write_text(json.dumps({"rows": rows, "ratios": {}}, indent=1))
 

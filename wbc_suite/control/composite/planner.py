@@ -135,8 +135,10 @@ class Planner:
 
     def _joint_by_joint(self) -> Waypoint:
         difference = self._configuration.difference(self._plan[0])
-        near = ARRIVED if len(self._plan) == 1 else PASSED
-        if float(np.abs(difference).max()) < near:
+        while len(self._plan) > 1 and np.abs(difference).max() < PASSED:
+            self._plan.pop(0)
+            difference = self._configuration.difference(self._plan[0])
+        if np.abs(difference).max() < ARRIVED:
             self._rest = self._plan.pop(0)
         speed = approach_posture(
             self._to_turning_point(difference),

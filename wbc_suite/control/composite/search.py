@@ -52,7 +52,7 @@ PATIENCE = 5  # iterations without progress end a start
 NEARBY = 0.05  # [cost] s; how dear it is to be a second away from the start
 NEAR_TIME = 0.5  # s; every second random start lies within this time of the first
 CHECKS = 1500  # configurations that the search for a way round may look at
-BLOCKED = 2.0  # s; what it costs that something is in the way
+DETOUR = 1.0  # s; what a way round takes longer than a straight line
 CLOSE = 0.02  # m and rad; from here on only the targets count
 MET = 1e-7  # m and rad
 INSIDE = 2e-3  # m; how much further from the soles' edges than the controller
@@ -163,22 +163,25 @@ class GoalSearch:
         """Yield None after each iteration, and the way to the best found at last."""
         rng = np.random.default_rng(0)
         best: Vector | None = None
-        least, trial, iterations = np.inf, 0, 0
+        least, is_blocked, trial, iterations = np.inf, False, 0, 0
         while trial < (STARTS if best is None else MORE_STARTS):
             q = starts[trial] if trial < len(starts) else self._random(starts[0], rng)
             trial += 1
             for found in self._descend(q):
                 time = np.inf if found is None else self._time(starts[0], found)
                 if found is not None and time < least:
-                    time += self._detour(starts[0], found)
-                    best, least = (found, time) if time < least else (best, least)
+                    blocked = self._is_blocked(starts[0], found)
+                    time += blocked * DETOUR
+                    if time < least:
+                        best, least, is_blocked = found, time, blocked
                 iterations += 1
                 is_quick = least < QUICK + WAITING * iterations
                 yield [best] if best is not None and is_quick else None
         if best is None:
             return
-        if least >= BLOCKED and self._is_plain:
-            yield from self._finder.find(starts[0], best, CHECKS)
+        if is_blocked and self._is_plain:
+            for way in self._finder.find(starts[0], best, CHECKS):
+                yield way and way[1:]
         yield [best]
 
     def _time(self, start: Vector, end: Vector) -> float:
@@ -189,17 +192,17 @@ class GoalSearch:
         )
         return float(times.max())
 
-    def _detour(self, start: Vector, end: Vector) -> float:
-        """Return seconds to add when something is in the way.
+    def _is_blocked(self, start: Vector, end: Vector) -> bool:
+        """Tell whether something is in the way, on a straight line.
 
         Something may be in the way at the start already: that does not count.
         """
         model = self._configuration.model
         count = max(2, int(np.ceil(self._time(start, end) / SPACING)))
-        for k in range(count - 1, count // 6, -1):
-            if not self._accept(pin.interpolate(model, start, end, k / count)):
-                return BLOCKED
-        return 0.0
+        return not all(
+            self._accept(pin.interpolate(model, start, end, k / count))
+            for k in range(count - 1, count // 6, -1)
+        )
 
     def _descend(self, q: Vector) -> Iterator[Vector | None]:
         """Yield None after each iteration, and configurations that meet the targets."""

@@ -7,13 +7,13 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.control.composite.postures import random_posture
-from wbc_suite.typing import Vector
+from wbc_suite.typing import Matrix, Vector
 
 __all__ = ["WayFinder"]
 
 STRIDE = 0.25  # s; how far a tree grows at once
 SPACING = 0.06  # s; between configurations that are checked
-SHORTCUTS = 60
+SHORTCUTS = 80
 NEARBY = 0.7  # part of the draws that stay near the two ends
 ASIDE = 0.6  # s; how near
 
@@ -69,7 +69,7 @@ class WayFinder:
             checks: How many configurations to check before giving up.
 
         Yields:
-            None now and then, and at last the way without its start, if there is one.
+            None now and then, and at last the way with both ends, if there is one.
         """
         rng = np.random.default_rng(0)
         trees, self.checks = (_Tree(start), _Tree(end)), 0
@@ -84,7 +84,7 @@ class WayFinder:
                 yield None
                 if self._grow(theirs, ours.nodes[-1], np.inf):
                     there, back = trees[0].branch()[::-1], trees[1].branch()
-                    yield self._shortened([*there, *back[1:]], rng)[1:]
+                    yield from self._shortened([*there, *back[1:]], rng)
                     return
                 yield None
 
@@ -109,17 +109,40 @@ class WayFinder:
                 return (k - 1) / count
         return 1.0
 
-    def _shortened(self, way: list[Vector], rng: np.random.Generator) -> list[Vector]:
-        """Replace parts of the way by straight lines, between any of its points."""
-        for _ in range(SHORTCUTS):
-            times = [self.time(a, b) for a, b in itertools.pairwise(way)]
-            ends = np.cumsum(times)
-            first, last = np.sort(rng.uniform(0.0, ends[-1], 2))
-            i, j = np.searchsorted(ends, (first, last)).tolist()
-            if i == j:
-                continue
-            start = way[i + 1] - (ends[i] - first) / times[i] * (way[i + 1] - way[i])
-            end = way[j + 1] - (ends[j] - last) / times[j] * (way[j + 1] - way[j])
-            if self._free_part(start, end) == 1.0:
-                way = [*way[: i + 1], start, end, *way[j + 1 :]]
-        return way
+    def _shortened(
+        self, way: list[Vector], rng: np.random.Generator
+    ) -> Iterator[list[Vector] | None]:
+        """Straighten parts of the way, all joints at once or one alone; yield it last.
+
+        Source: Geraerts and Overmars (2007), "Creating High-quality Paths for Motion
+        Planning", IJRR 26(8).
+        """
+        for number in range(SHORTCUTS):
+            times = [max(self.time(a, b), 1e-9) for a, b in itertools.pairwise(way)]
+            straighten = _one_joint if number % 2 else _all_joints
+            first, last, part = straighten(np.array(way), np.cumsum([0.0, *times]), rng)
+            if all(self._free_part(a, b) == 1.0 for a, b in itertools.pairwise(part)):
+                way = [*way[:first], *part, *way[last:]]
+            yield None
+        yield way
+
+
+def _all_joints(
+    way: Matrix, times: Vector, rng: np.random.Generator
+) -> tuple[int, int, Matrix]:
+    """Return a straight line, and between which configurations of the way it fits."""
+    cuts = np.sort(rng.uniform(0.0, times[-1], 2))
+    first, last = np.searchsorted(times, cuts).tolist()
+    part = np.array([np.interp(cuts, times, column) for column in way.T]).T
+    return first, last, part
+
+
+def _one_joint(
+    way: Matrix, times: Vector, rng: np.random.Generator
+) -> tuple[int, int, Matrix]:
+    """Return a part of the way with one joint going straight, and where it fits."""
+    first, last = np.sort(rng.choice(len(way), 2, replace=False)).tolist()
+    part, joint = way[first : last + 1].copy(), rng.integers(way.shape[1])
+    ends = times[[first, last]], part[[0, -1], joint]
+    part[:, joint] = np.interp(times[first : last + 1], *ends)
+    return first, last + 1, part
