@@ -97,3 +97,17 @@ def test_robots_that_move_have_room_before_the_table(robot):
         if (data.geom_xpos[i] > edge)[0] and data.geom_xpos[i][2] < edge[2]
     ]
     assert beneath == []
+
+
+@pytest.mark.parametrize(
+    ("robot", "gripper", "told"),
+    [
+        ("Spot", "default", True),
+        ("Panda", "WipingGripper", True),
+        ("Panda", "default", False),
+        ("Baxter", {"left": "none"}, False),
+    ],
+)
+def test_who_cannot_grip_is_told_so(caplog, robot, gripper, told):
+    wbc_suite.make("Lift", robots=robot, gripper_types=gripper).close()
+    assert (f"Lift: {robot} has no gripper" in caplog.text) == told

@@ -1,5 +1,6 @@
 """Lift: pick a cube up from a table."""
 
+import logging
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal
@@ -20,6 +21,8 @@ from wbc_suite.tomlfile import FrozenModel, load_model
 from wbc_suite.typing import Vector
 
 __all__ = ["Lift", "LiftConfig"]
+
+log = logging.getLogger(__name__)
 
 
 class CubeConfig(FrozenModel):
@@ -103,7 +106,13 @@ class Lift:
     def bind(
         self, model: mujoco.MjModel, data: mujoco.MjData, robots: Sequence[RobotState]
     ) -> None:
-        """Look up the cube and the hands."""
+        """Look up the cube and the hands; say so where nothing can grip it."""
+        if not any(state.robot.synergies for state in robots):
+            log.warning(
+                "%s: %s has no gripper, so the cube will stay where it is.",
+                self.name,
+                ", ".join(state.robot.name for state in robots),
+            )
         self._model, self._data = model, data
         self._hands = [hand for state in robots for hand in hands_of(state)]
         self._geom = model.geom("cube").id
