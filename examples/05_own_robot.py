@@ -1,5 +1,6 @@
 """A robot of your own: from a URDF to a hand that goes where it is told."""
 
+import logging
 import tempfile
 from pathlib import Path
 
@@ -46,6 +47,7 @@ with tempfile.TemporaryDirectory() as folder:
 
 print(f"{robot.name}: {robot.dof} dof, groups: {', '.join(robot.groups)}")
 
+logging.getLogger("wbc_suite.benchmark").setLevel("ERROR")  # no gripper for the cube
 env = wbc_suite.make("Lift", robots=robot, controller_configs="WHOLE_BODY_IK")
 env.reset(seed=0)
 print(env.action_layout)

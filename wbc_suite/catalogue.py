@@ -91,6 +91,10 @@ class Catalogue:
             raise UnknownNameError(kind, name, self.names(folder))
         return path
 
+    def is_ours(self, file: Path) -> bool:
+        """Whether a file came with this package, or from one of the extra folders."""
+        return file.is_relative_to(self.root)
+
     def _files(self, folder: str) -> Iterable[Path]:
         for root in (self.root, *self.extra):
             yield from sorted((Path(root) / str(folder)).glob("*.toml"))

@@ -214,6 +214,33 @@ def test_a_robot_without_hands_is_moved_by_its_trunk():
     assert [frame["frame"] for frame in config["frame"]] == ["base"]
 
 
+def test_another_robot_of_a_name_we_know_gets_no_file_of_ours(caplog):
+    ours = load_robot("UR5e", gripper="none")
+    frames = tuple(
+        f.model_copy(update={"name": f"my_{f.name}"}) if f.role == "tcp" else f
+        for f in ours.frames
+    )
+    theirs = ours.model_copy(update={"name": "panda", "frames": frames})
+    config = load_composite_controller_config("WHOLE_BODY_IK", theirs)
+    assert config["frame"][0]["frame"] == "my_right_tcp"
+    assert "panda_whole_body_ik.toml is not for this 'panda'" in caplog.text
+
+
+def test_a_file_of_ones_own_that_does_not_fit_is_an_error(tmp_path):
+    (tmp_path / "controllers").mkdir()
+    file = tmp_path / "controllers" / "ur5e_whole_body_ik.toml"
+    file.write_text('format = 1\n[[frame]]\nname = "hand"\nframe = "right_tpc"\n')
+    with pytest.raises(ConfigError, match="Did you mean 'right_tcp'"):
+        load_composite_controller_config(
+            "WHOLE_BODY_IK", "UR5e", catalogue=Catalogue(extra=(tmp_path,))
+        )
+
+
+def test_a_robot_without_joints_is_refused_in_words():
+    with pytest.raises(ConfigError, match="it has no joint"):
+        default_whole_body_config(load_robot("base/rethink_mount"))
+
+
 def test_a_free_robot_that_nothing_holds_is_refused(alone):
     with pytest.raises(ConfigError, match="UR5e: it is free to fall"):
         alone(load_robot("UR5e", base="NoActuationBase"))

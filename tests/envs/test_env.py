@@ -10,6 +10,7 @@ from gymnasium.utils.env_checker import check_env
 
 import wbc_suite
 from wbc_suite.errors import ActionError, ConfigError, PhysicsError, UnknownNameError
+from wbc_suite.robot import load_robot
 
 
 @pytest.fixture(scope="module")
@@ -105,6 +106,32 @@ def test_physics_that_diverges_ends_the_episode_with_a_name(env):
     env.reset(seed=0)
     *_, info = env.step(action)
     assert "physics_error" not in info
+
+
+def test_a_controller_that_fails_in_a_broken_state_ends_the_episode(env, monkeypatch):
+    env.reset(seed=0)
+
+    def fail(state):
+        raise np.linalg.LinAlgError("SVD did not converge")
+
+    monkeypatch.setattr(env.controllers[0], "compute", fail)
+    *_, terminated, _, info = env.step(env.hold_action)
+    assert terminated
+    assert "SVD did not converge" in info["physics_error"]
+
+
+def test_a_robot_measured_from_its_pelvis_is_lifted_out_of_the_floor(caplog):
+    own = load_robot("gr1_fixed_lower_body")
+    robot = own.with_root("fixed", pos=(0.0, 0.0, 0.0))
+    env = wbc_suite.make("Lift", robots=robot)
+    assert "GR1FixedLowerBody: nothing says how high it stands" in caplog.text
+    lifted = env.robots[0].root.pos[2]
+    assert 0.85 < lifted <= own.root.pos[2] + 0.01
+    env.reset(seed=0)
+    deepest = env.simulation.data.contact.dist.min(initial=0.0)
+    assert deepest > -1e-3
+    arm = load_robot("UR5e", base="NullMount")
+    assert wbc_suite.make("Lift", robots=arm).robots[0].root.pos[2] == 0.0
 
 
 def test_no_log_file_is_left_behind(env, tmp_path, monkeypatch):

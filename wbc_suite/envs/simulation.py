@@ -90,8 +90,11 @@ class Simulation:
         before = data.warning.number.copy()
         previous = mujoco.get_mju_user_warning()
         mujoco.set_mju_user_warning(log.warning)
+        failed: Exception | None = None
         try:
             yield
+        except np.linalg.LinAlgError as error:
+            failed = error  # mostly of a state that MuJoCo has warned of
         finally:
             mujoco.set_mju_user_warning(previous)
         raised = np.flatnonzero(data.warning.number - before)
@@ -101,8 +104,12 @@ class Simulation:
                 f"MuJoCo reported {names} at t = {data.time:.3f} s "
                 f"(index {int(data.warning.lastinfo[raised[0]])}). The state is no "
                 "longer to be trusted: reset."
-            )
+            ) from failed
         self._check_finite()
+        if failed is not None:
+            raise PhysicsError(
+                f"A controller failed at t = {data.time:.3f} s: {failed}. Reset."
+            ) from failed
 
     def _check_finite(self) -> None:
         data = self.data

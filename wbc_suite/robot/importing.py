@@ -139,7 +139,8 @@ def _physical(links: Sequence[Link], source: Path, *, mend: bool) -> list[Link]:
         shown = "; ".join(f"link '{n}': {fault}" for n, fault in faults.items())
         raise DescriptionError(
             f"{source}: {_shortened(shown)}. Mend these links in the file, or take the "
-            "nearest tensors that a body can have: read_urdf(path, mend_inertias=True)."
+            "nearest tensors that a body can have: wbc-suite export FILE "
+            "--mend-inertias --to toml, or read_urdf(path, mend_inertias=True)."
         )
     for name, fault in faults.items():
         LOG.warning("%s: link '%s': %s; mended.", source, name, fault)

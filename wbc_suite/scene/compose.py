@@ -1,5 +1,7 @@
 """Put robots and things into one MuJoCo specification."""
 
+import logging
+
 import mujoco
 import numpy as np
 import pinocchio as pin
@@ -10,6 +12,11 @@ from wbc_suite.robot.shapes import Vector3
 
 __all__ = ["add_camera", "attach_robot", "place_robot", "robot_prefix"]
 
+
+log = logging.getLogger(__name__)
+
+GROUNDED = 0.03
+"""m; feet and mounts may reach so far into the floor."""
 
 END_STOP_SOLREF = (0.004, 1.0)
 """Time constant, s, and damping ratio of end stops: the stiffest that a physics step of
@@ -32,10 +39,40 @@ def place_robot(
     it there. The place is part of the description, so that every engine's model of it
     measures from the same world.
     """
+    robot = _on_the_floor(robot)
     turn = pin.Quaternion(np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2))
     place = pin.SE3(turn.matrix(), np.array([*position, 0.0]))
     root = pose_fields(place * se3_of(robot.root))
     return robot.with_root(robot.root.kind, **root)
+
+
+def _on_the_floor(robot: RobotDescription) -> RobotDescription:
+    """Lift a robot of which nothing says how high it stands out of the floor.
+
+    The links of many a humanoid's URDF are measured from its pelvis.
+    """
+    if any(robot.root.pos):
+        return robot
+    model = robot.to_mjspec().compile()
+    data = mujoco.MjData(model)
+    if "ready" in robot.keyframes:
+        for name, value in robot.keyframe("ready").items():
+            data.qpos[model.joint(name).qposadr[0]] = value
+    mujoco.mj_kinematics(model, data)
+    solid = (model.geom_contype | model.geom_conaffinity) > 0
+    upward = data.geom_xmat[solid].reshape(-1, 3, 3)[:, 2]  # rows of z
+    centre, half = np.split(model.geom_aabb[solid], 2, axis=1)
+    bottoms = data.geom_xpos[solid, 2] + np.sum(upward * centre - abs(upward) * half, 1)
+    depth = -float(bottoms.min(initial=0.0))
+    if depth < GROUNDED:
+        return robot
+    log.warning(
+        "%s: nothing says how high it stands, and it reaches %.2f m below the floor; "
+        "it is lifted by so much. [root] pos in its own file says better.",
+        robot.name,
+        depth,
+    )
+    return robot.with_root(robot.root.kind, pos=(0.0, 0.0, depth))
 
 
 def attach_robot(

@@ -1,5 +1,6 @@
 """Composite controllers: what drives a whole robot, and where they are found."""
 
+import logging
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Protocol
@@ -20,6 +21,8 @@ __all__ = [
     "load_composite_controller_config",
     "register_composite",
 ]
+
+log = logging.getLogger(__name__)
 
 
 class CompositeController(Protocol):
@@ -163,7 +166,22 @@ def _read(
         )
     except UnknownNameError:
         return kind.default(robot) | own_type, f"{name} for {robot.name}"
-    return read_toml(file) | own_type, str(file)
+    config = read_toml(file) | own_type
+    if catalogue.is_ours(file) and not _fits(kind, config, robot):
+        log.warning("%s is not for this '%s': names differ.", file.name, robot.name)
+        return kind.default(robot) | own_type, f"{name} for {robot.name}"
+    return config, str(file)
+
+
+def _fits(
+    kind: CompositeKind, config: Mapping[str, Any], robot: RobotDescription
+) -> bool:
+    """Whether the robot is ours, and not another of the same name."""
+    try:
+        kind.check(config, robot, "")
+    except ConfigError:
+        return False
+    return True
 
 
 def build_composite_controller(

@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from wbc_suite.control.part.joint_position import JointLawConfig
+from wbc_suite.errors import ConfigError
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.parts import Name
 from wbc_suite.tomlfile import FrozenModel
@@ -226,9 +227,13 @@ def _hand_name(side: str, count: int) -> str:
 
 def _foremost(robot: RobotDescription) -> str:
     """Return the frame, or else the link, that moves a robot without hands."""
-    moving = {link.name for link in robot.links[1:]}
-    if robot.root.kind != "fixed":
-        moving.add(robot.links[0].name)
+    moving: list[str] = []
+    for link in robot.links:
+        root_moves = link.parent is None and robot.root.kind != "fixed"
+        if root_moves or link.joint is not None or link.parent in moving:
+            moving.append(link.name)
+    if not moving:
+        raise ConfigError(f"{robot.name}: it has no joint, so nothing can be moved.")
     frames = {f.role: f.name for f in robot.frames if f.link in moving}
     roles = ("torso", "base", "head")
-    return next((frames[r] for r in roles if r in frames), robot.links[-1].name)
+    return next((frames[r] for r in roles if r in frames), moving[-1])
