@@ -141,6 +141,18 @@ def test_base_goals_of_tiago_move_the_base(alone):
     np.testing.assert_allclose(scene.site("right_tcp"), hand, atol=2e-4)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "robot", ["GR1FloatingBody", "TiagoDifferential", "SpotWithArmFloating"]
+)
+def test_bases_that_glide_move_beneath_the_hands(alone, robot):
+    scene = alone(robot)
+    before = scene.site("right_tcp")
+    frames = scene.act({"base": np.array([-0.1, 0.0, 0.0])}, 2.5)["frames"]
+    assert frames["base"]["position_error"] < 1e-3
+    np.testing.assert_allclose(scene.site("right_tcp"), before, atol=1e-3)
+
+
 def test_spot_stands_and_keeps_its_feet_while_the_body_moves(alone):
     scene = alone("SpotWithArm")
     feet = [f.name for f in scene.robot.frames if f.role == "foot"]
