@@ -90,11 +90,11 @@ class SupportLimit(RowLimit):
         self._edges = 4 * len(self.soles)  # at most
         self.dim = self._edges * (1 if pressure_margin is None else 2)
         self.reset()
-        self._place: Matrix = np.full((4 * len(self.soles), 3), np.nan)
 
     def reset(self) -> None:
-        """Forget how the robot moved."""
+        """Forget how the robot moved and where the soles were."""
         self._before: Vector | None = None
+        self._place: Matrix = np.full((4 * len(self.soles), 3), np.nan)
 
     def bind(self, configuration: Configuration) -> None:
         """Resolve the frames of the soles."""
