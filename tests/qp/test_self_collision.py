@@ -163,6 +163,47 @@ def test_hands_never_touch_the_body_in_a_minute(seed):
     assert least > 0.0
 
 
+@pytest.mark.parametrize("name", ["GR1", "SpotWithArm", "Tiago"])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_robot_that_starts_inside_itself_comes_out_smoothly(name, seed):
+    robot = load_robot(name, root="fixed")
+    model = robot.to_pinocchio()
+    configuration = Configuration(model)
+    limit = SelfCollisionLimit.of_robot(robot)
+    posture = PostureTask(0.1)
+    stack = TaskStack(configuration, [posture], limits=[*default_limits(), limit])
+    posture.set_target(ready(robot, model))
+    configuration.update(inside_itself(limit, configuration, seed))
+    changes, v = [], np.zeros(model.nv)
+    for _ in range(round(8.0 / DT)):
+        solution = stack.solve(DT)
+        configuration.update(configuration.integrate(solution.dq))
+        changes.append(np.abs(solution.v - v).max())
+        v = solution.v
+    assert max(changes) <= 50.0 * DT + 1e-9  # the acceleration limit, from the start
+    assert np.percentile(changes[-round(1.0 / DT) :], 99) <= 0.01  # rad/s
+    assert limit.distances[0] > 0.0
+
+
+def ready(robot, model) -> np.ndarray:
+    q = pin.neutral(model)
+    for joint, value in robot.keyframe("ready").items():
+        q[model.joints[model.getJointId(joint)].idx_q] = value
+    return q
+
+
+def inside_itself(limit, configuration, seed) -> np.ndarray:
+    """Return a random posture with links at least 3 cm inside each other."""
+    rng, model = np.random.default_rng(seed), configuration.model
+    G, h = np.zeros((limit.dim, model.nv)), np.zeros(limit.dim)
+    while True:
+        low, high = model.lowerPositionLimit, model.upperPositionLimit
+        configuration.update(rng.uniform(np.clip(low, -3, 3), np.clip(high, -3, 3)))
+        limit.rows(configuration, DT, G, h)
+        if limit.distances[0] < -0.03:
+            return configuration.q.copy()
+
+
 def test_wrong_numbers_are_refused():
     with pytest.raises(ConfigError, match="more than the margin"):
         SelfCollisionLimit((), (), margin=0.2, influence=0.1)

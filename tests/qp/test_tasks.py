@@ -61,6 +61,25 @@ def test_jacobian_is_minus_the_derivative_of_the_error(humanoid, rng, index):
         np.testing.assert_allclose(J, numeric, atol=2e-7)
 
 
+def test_looking_at_a_point_within_the_frame_backs_off(arm):
+    start = arm.frame_pose("hand")
+    task = LookAtTask("hand", target=start.translation + np.array([1e-3, 0.0, 2e-3]))
+    stack = TaskStack(arm, [task])
+    J, numeric, q = task.jacobian(arm), np.empty((3, arm.nv)), arm.q.copy()
+    for i, dq in enumerate(STEP * np.eye(arm.nv)):
+        arm.update(q + dq)
+        ahead = task.error(arm)
+        arm.update(q - dq)
+        numeric[:, i] = -(ahead - task.error(arm)) / (2 * STEP)
+    np.testing.assert_allclose(J, numeric, atol=1e-6)  # 1 / r is 50 / m here
+    arm.update(q)
+    for _ in range(400):
+        arm.update(arm.integrate(stack.solve(5e-3).dq))
+    assert np.linalg.norm(task.error(arm)) < 1e-3
+    away = np.linalg.norm(arm.frame_pose("hand").translation - task.target)
+    assert 0.019 < away < 0.03
+
+
 def test_frame_kernel_agrees_with_readable_rows(humanoid, rng):
     tasks = [
         FrameTask(

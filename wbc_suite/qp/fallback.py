@@ -1,8 +1,10 @@
 """What a tick does when its problem has no solution.
 
-The ladder, mildest first: leave the acceleration window, as little as may be; keep it,
-and relax equality and inequality rows with slack; damped least squares within the
-joints' bounds; stand still. The bounds of position and velocity are kept on every rung.
+The ladder, mildest first: relax inequality rows with slack; leave the acceleration
+window, as little as may be; keep it, and relax equality rows too; damped least squares
+within the joints' bounds; stand still. The bounds of position and velocity are kept on
+every rung. Limits come before the window: a robot that must brake harder than it can
+brakes as it can, where dropping the window let it jump by 6 rad/s between two ticks.
 """
 
 import numba
@@ -16,7 +18,7 @@ from wbc_suite.typing import Matrix, Vector
 __all__ = ["box_least_squares", "checked_solve", "retreat"]
 
 _TOLERANCE = 1e-7  # greatest broken row or bound of an accepted solution, m or rad
-_SLACK_WEIGHT = 1e4  # of a relaxed row against the largest entry of the cost
+_SLACK_WEIGHT = 1e2  # of a relaxed row against one that is led back
 _SWEEPS = 100
 
 
@@ -25,10 +27,14 @@ def checked_solve(solver: QpSolver, problem: Problem) -> tuple[Vector, Vector] |
 
     The step is clipped to the bounds, which it may have missed by rounding.
     """
-    result = solver.solve(problem)
+    soft = problem.soft()
+    result = solver.solve(problem.with_slack(soft) if len(soft) else problem)
     if result is None:
         return None
     x, multipliers = result
+    if len(soft):
+        x = x[: problem.nv].copy()
+        multipliers = np.delete(multipliers, problem.nv + np.arange(len(soft)))
     if problem.violation(x) > _TOLERANCE:  # infinite for what is not finite
         return None
     np.minimum(x, problem.ub, out=x)
@@ -52,6 +58,9 @@ def retreat(
     Returns:
         The step, multipliers, and the rung that was reached.
     """
+    result = _solve_with_loose_limits(solver, problem)
+    if result is not None:
+        return *result, Fallback.LIMITS
     result = _solve_without_window(solver, problem, lb, ub)
     if result is not None:
         return *result, Fallback.ACCELERATION
@@ -79,19 +88,25 @@ def _solve_without_window(
     middle, w = np.zeros(problem.nv), np.zeros(problem.nv)
     middle[held] = 0.5 * (low[held] + high[held])
     w[held] = problem.H.diagonal().max()
-    calm = Problem(problem.nv, len(problem.G), problem.equalities)
-    calm.rows[:], calm.lower[:], calm.upper[:] = (
-        problem.rows,
-        problem.lower,
-        problem.upper,
-    )
-    calm.H[:] = problem.H + np.diag(w)
-    calm.c[:] = problem.c - w * middle
+    calm = problem.copy()
+    calm.H += np.diag(w)
+    calm.c -= w * middle
     calm.lb[:], calm.ub[:] = lb, ub
     result = checked_solve(solver.fresh(), calm)
     if result is not None:
         problem.lb[:], problem.ub[:] = lb, ub
     return result
+
+
+def _solve_with_loose_limits(
+    solver: QpSolver, problem: Problem
+) -> tuple[Vector, Vector] | None:
+    """Solve with slack s >= 0 on `G dq <= h + s`, within the acceleration window."""
+    loose = problem.copy()
+    loose.wanted[:] = np.minimum(problem.wanted, problem.h)
+    loose.h[:] = UNBOUNDED
+    loose.weight = _SLACK_WEIGHT * problem.weight
+    return checked_solve(solver.fresh(), loose)
 
 
 def _solve_with_slack(
@@ -103,29 +118,21 @@ def _solve_with_slack(
     here too, see `rows.damping_of_rows`: without it a robot whose feet and links
     contradict each other was measured to swing at full speed, 9.6 rad/s between ticks.
     """
-    nv, rows = problem.nv, len(problem.G)
-    weight = _SLACK_WEIGHT * max(1.0, float(np.abs(problem.H).max()))
-    relaxed = Problem(nv + rows, rows)
-    A, b = problem.A, problem.b
+    relaxed = problem.copy(equalities=False)
+    A, b, weight = problem.A, problem.b, _SLACK_WEIGHT * problem.weight
     mu = np.abs(A).max(axis=1, initial=0.0) @ np.abs(b)
-    broken = np.maximum(0.0, -problem.h)
+    broken = np.maximum(0.0, -problem.wanted)
     mu += np.abs(problem.G).max(axis=1, initial=0.0) @ broken
-    relaxed.H[:nv, :nv] = problem.H + weight * (A.T @ A + mu * np.eye(nv))
-    relaxed.H[nv:, nv:] = weight * np.eye(rows)
-    relaxed.c[:nv] = problem.c - weight * (A.T @ b)
-    relaxed.lb[:nv], relaxed.ub[:nv] = problem.lb, problem.ub
-    relaxed.lb[nv:] = 0.0
-    relaxed.G[:, :nv] = problem.G
-    relaxed.G[:, nv:] = -np.eye(rows)
-    relaxed.h[:] = np.minimum(problem.h, UNBOUNDED)
+    relaxed.H += weight * (A.T @ A + mu * np.eye(problem.nv))
+    relaxed.c -= weight * (A.T @ b)
+    relaxed.wanted[:] = np.minimum(problem.wanted, problem.h)
+    relaxed.h[:] = UNBOUNDED
+    relaxed.weight = weight
     result = checked_solve(solver.fresh(), relaxed)
     if result is None:
         return None
     x, multipliers = result
-    out = np.zeros(len(problem.upper))
-    out[:nv] = multipliers[:nv]
-    out[nv : nv + rows] = multipliers[nv + rows :]
-    return x[:nv].copy(), out
+    return x, np.concatenate([multipliers, weight * (A @ x - b)])
 
 
 @numba.njit(cache=True, nogil=True)

@@ -190,6 +190,11 @@ class Level:
             self._name_held()
         return math.isfinite(self.mu)
 
+    def stiffness(self) -> float:
+        """Return the largest entry of H at the last tick, without damping."""
+        squares = np.einsum("ij,ij->j", self.W, self.W) + self.diagonal[0]
+        return max(1.0, float(squares.max()))
+
     def form(self, problem: Problem) -> None:
         """Fill H and c of a problem from the rows of the last `write`."""
         normal_equations(

@@ -84,6 +84,9 @@ class RowLimit(Limit):
     ) -> None:
         """Write G, shape (dim, nv), and h, shape (dim,); unused rows are 0 <= inf."""
 
+    def reset(self) -> None:
+        """Forget how the robot moved; called by a stack's `reset`."""
+
     @abstractmethod
     def label(self, row: int) -> str:
         """Return in words what a row of the last tick limits."""

@@ -12,7 +12,7 @@ from wbc_suite.typing import Matrix, Vector
 
 __all__ = ["LookAtTask"]
 
-_LEAST_DISTANCE = 1e-3  # m; nearer points have no direction worth the name
+_LEAST_DISTANCE = 0.02  # m; nearer points have no direction worth the name
 
 
 class LookAtTask(RowTask):
@@ -23,6 +23,10 @@ class LookAtTask(RowTask):
 
         e = u - a                                           chord, ~ rad
         J = -[u]x J_w_local + R_wf^T (I - d d^T) J_v / r    J_v: linear, aligned
+
+    Nearer than 2 cm, r is 2 cm and `J_v / r` is not projected: d is shorter than 1, and
+    the frame backs off until there is a direction again. Were it to turn with every
+    millimetre, a frame on top of its point would flutter.
 
     The rotation about the axis stays free. Opposite to the point the gradient
     vanishes, but any motion leaves that place.
@@ -99,7 +103,8 @@ class LookAtTask(RowTask):
         R = configuration.frame_pose(self._f).rotation
         J = configuration.frame_jacobian(self._f, "aligned")
         turn = -pin.skew(R.T @ d) @ R.T @ J[3:]
-        return turn + R.T @ (J[:3] - np.outer(d, d @ J[:3])) / distance
+        along = d if distance > _LEAST_DISTANCE else np.zeros(3)
+        return turn + R.T @ (J[:3] - np.outer(along, d @ J[:3])) / distance
 
     def rows(
         self, configuration: Configuration, dt: float, W: Matrix, e: Vector

@@ -3,7 +3,7 @@
 import numba
 import numpy as np
 
-from wbc_suite.typing import Matrix, Vector
+from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["Problem"]
 
@@ -13,6 +13,9 @@ UNBOUNDED = 1e30
 
 class Problem:
     """Minimise `0.5 x^T H x + c^T x` subject to `G x <= h`, `A x = b`, `lb <= x <= ub`.
+
+    Rows of G may want more than they bind to: where `wanted < h`, the cost is joined by
+    `0.5 weight s^2`, s >= 0 being what is missing from `G x <= wanted`.
 
     Owns its arrays, and keeps all bounds in two vectors in the order x, G, A. The
     attributes below are views: write into them.
@@ -27,6 +30,8 @@ class Problem:
         c: Cost vector, shape (nv,).
         G: Inequality rows, shape (inequalities, nv).
         h: Their upper bounds.
+        wanted: What they lead to softly; no soft part where it is not below h.
+        weight: Cost of what is missing from that, [cost]^2/m^2.
         A: Equality rows, shape (equalities, nv).
         lb: Lower bounds of x.
         ub: Upper bounds of x.
@@ -45,6 +50,8 @@ class Problem:
         self.lb, self.ub = self.lower[:nv], self.upper[:nv]
         self.G, self.A = self.rows[:inequalities], self.rows[inequalities:]
         self.h = self.upper[nv : nv + inequalities]
+        self.wanted: Vector = np.full(inequalities, UNBOUNDED)
+        self.weight = 0.0
         self.set_equalities(np.zeros(equalities))
 
     @property
@@ -67,6 +74,35 @@ class Problem:
         if len(b):
             self.lower[-len(b) :] = b
             self.upper[-len(b) :] = b
+
+    def copy(self, *, equalities: bool = True) -> "Problem":
+        """Return a copy, with or without its equality rows."""
+        kept = len(self.G) + (self.equalities if equalities else 0)
+        out = Problem(self.nv, len(self.G), kept - len(self.G))
+        out.H[:], out.c[:], out.rows[:] = self.H, self.c, self.rows[:kept]
+        out.lower[:] = self.lower[: self.nv + kept]
+        out.upper[:] = self.upper[: self.nv + kept]
+        out.wanted[:], out.weight = self.wanted, self.weight
+        return out
+
+    def soft(self) -> Indices:
+        """Return the rows of G that want more than they bind to."""
+        return (self.wanted < self.h).nonzero()[0]
+
+    def with_slack(self, soft: Indices) -> "Problem":
+        """Return the problem over (x, s) that states the soft rows with slack s."""
+        nv, n = self.nv, self.nv + len(soft)
+        out = Problem(n, len(self.G), self.equalities)
+        out.H[:nv, :nv], out.c[:nv] = self.H, self.c
+        out.H[nv:, nv:] *= self.weight
+        out.lower[:nv], out.upper[:nv] = self.lb, self.ub
+        out.lower[n:], out.upper[n:] = self.lower[nv:], self.upper[nv:]
+        out.rows[:, :nv] = self.rows
+        out.lb[nv:] = 0.0
+        out.ub[nv:] = np.minimum(self.h[soft] - self.wanted[soft], UNBOUNDED)
+        out.G[soft, nv + np.arange(len(soft))] = -1.0
+        out.h[soft] = self.wanted[soft]
+        return out
 
     def violation(self, x: Vector) -> float:
         """Return by how much x breaks its worst bound, in the bound's unit."""

@@ -11,6 +11,7 @@ from wbc_suite.typing import Vector
 __all__ = ["TaskReport", "level_reports", "reasons"]
 
 _SHARE = 0.1  # part of a task's pull that something must oppose to be named
+_NOTHING = 1e-12  # pull that is rounding: no joint moves the task at all
 _STRETCHED = 0.05  # pull over its greatest possible value; below, no joint can help
 
 
@@ -97,6 +98,6 @@ def reasons(
     found.append(("conflict: posture", float(-joints @ pull)))
     named = [(words, part) for words, part in found if part > _SHARE * square]
     words = tuple(words for words, _ in sorted(named, key=lambda w: -w[1]))
-    if np.sqrt(square) < _STRETCHED * greatest:
+    if np.sqrt(square) <= max(_STRETCHED * greatest, _NOTHING):
         return ("out of reach: no joint moves it nearer", *words)
     return words

@@ -20,13 +20,15 @@ class Fallback(IntEnum):
     """Solved as stated."""
     LEVEL = 1
     """A lower level could not be solved and was left out."""
-    ACCELERATION = 2
+    LIMITS = 2
+    """Inequality rows were relaxed, by the least that accelerations allow."""
+    ACCELERATION = 3
     """Acceleration limits were dropped for this tick."""
-    SLACK = 3
+    SLACK = 4
     """Equality and inequality rows were relaxed; bounds of joints are kept."""
-    BOX = 4
+    BOX = 5
     """Damped least squares within the bounds of joints, rows left out."""
-    HOLD = 5
+    HOLD = 6
     """Nothing usable came in or out: the robot stands still."""
 
 

@@ -1,25 +1,27 @@
 """A stack of QP tasks under limits, solved once per tick."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from wbc_suite.arguments import check_array, check_number
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.acceleration_limit import AccelerationLimit
+from wbc_suite.qp.bending import RowBending, multipliers_of_rows
 from wbc_suite.qp.bounds import LimitKind, merge_bounds
+from wbc_suite.qp.constraints import Constraints
 from wbc_suite.qp.equality import Equality
 from wbc_suite.qp.escape import Escape
 from wbc_suite.qp.fallback import checked_solve, retreat
 from wbc_suite.qp.frame_task import FrameTask
 from wbc_suite.qp.level import Level
-from wbc_suite.qp.limit import BoxLimit, JointBounds, Limit, RowLimit
+from wbc_suite.qp.limit import BoxLimit, JointBounds, Limit
 from wbc_suite.qp.parts import check_parts
 from wbc_suite.qp.position_limit import PositionLimit
 from wbc_suite.qp.problem import Problem
 from wbc_suite.qp.report import TaskReport, level_reports
 from wbc_suite.qp.row_space import DecidedDirections
-from wbc_suite.qp.solution import Fallback, Pressure, Solution
+from wbc_suite.qp.solution import Fallback, Solution
 from wbc_suite.qp.solver import QpSolver, make_solver
 from wbc_suite.qp.task import Task
 from wbc_suite.qp.velocity_limit import VelocityLimit
@@ -27,6 +29,7 @@ from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["TaskStack"]
 
+_RETURN_WEIGHT = 1e2  # of a row that leads back, against the stiffest joint's cost
 _TOLERANCE = 1e-7  # a row broken by more is reported as a conflict, m or rad
 
 
@@ -90,29 +93,24 @@ class TaskStack:
         self.curvature_damping = check_number(
             "TaskStack: curvature_damping", curvature_damping, least=0.0
         )
-        self._names = configuration.velocity_names()
         self._bounds = JointBounds.unlimited(configuration)
-        self._row_limits = [x for x in limits if isinstance(x, RowLimit)]
         for limit in limits:
             if isinstance(limit, BoxLimit):
                 limit.apply(configuration, self._bounds)
-        for bound in (*self._row_limits, *self.equalities):
-            bound.bind(configuration)
+        self._constraints = Constraints(configuration, limits, self.equalities)
         numbers = sorted({t.level for t in tasks}) or [0]
         self._levels = [
             Level(configuration, [t for t in tasks if t.level == k]) for k in numbers
         ]
         self._sides = [np.zeros(configuration.nv, dtype=np.int64) for _ in numbers]
         self._warm = solver == "daqp" if warm is None else warm
-        self._inequalities = sum(x.dim for x in self._row_limits)
-        self._problem = Problem(
-            configuration.nv, self._inequalities, sum(x.dim for x in self.equalities)
-        )
-        self._b: Vector = np.zeros(self._problem.equalities)
+        rows = self._constraints.inequalities, self._constraints.dim
+        self._problem = Problem(configuration.nv, *rows)
         self._solver = make_solver(solver)
         self._lower: dict[tuple[int, int], tuple[Problem, QpSolver]] = {}
         self._solved: list[tuple[Problem, Vector, Vector]] = []
         self._decided = [DecidedDirections(configuration.nv) for _ in numbers]
+        self._bending = RowBending(len(numbers), self.curvature_damping)
         nv = configuration.nv
         self._kinds: Indices = np.zeros((2, nv), dtype=np.int64)
         self._no_window: Vector = np.full(nv, np.inf)
@@ -151,6 +149,8 @@ class TaskStack:
         self._solved.clear()
         for decided in self._decided:
             decided.forget()
+        self._bending.forget()
+        self._constraints.reset()
         for side in self._sides:
             side[:] = 0
         if self._escape is not None:
@@ -174,8 +174,11 @@ class TaskStack:
             return self._answer(still, Fallback.HOLD, dt, 0.0)
         if self._escape is not None:
             self._bias = self._escape.bias(dt, self.v_previous, self._pressed)
-        self._write_rows(dt)
+        self._constraints.write(self.configuration, dt, self._problem)
         x, multipliers, fallback = self._solve_first(dt)
+        kept = fallback is Fallback.NONE  # what is relaxed has a damping of its own
+        pressing = kept * multipliers[self._problem.nv :]
+        self._bending.note(0, self._problem.rows, pressing, dt)
         self._solved = [(self._problem, x, multipliers)]
         for k in range(1, len(self._levels)):
             if fallback >= Fallback.BOX:
@@ -240,45 +243,16 @@ class TaskStack:
         for level, (problem, x, multipliers) in zip(
             self._levels, self._solved, strict=False
         ):
-            opponents = list(self._opponents(problem, multipliers))
+            first = problem is self._problem
+            opponents = list(
+                self._constraints.opponents(
+                    problem, multipliers, self._kinds, first=first
+                )
+            )
             reports |= level_reports(
                 level, x, opponents, position_tolerance, orientation_tolerance
             )
         return reports
-
-    def _opponents(
-        self, problem: Problem, multipliers: Vector
-    ) -> Iterator[tuple[str, Vector]]:
-        """Yield words and the force on the joints of each pressed limit or row."""
-        nv = problem.nv
-        pressure = self._pressure([multipliers])
-        for i in pressure.multipliers.nonzero()[0].tolist():
-            row = np.eye(nv)[i] if i < nv else problem.G[i - nv]
-            yield str(pressure.limit(i)), multipliers[i] * row
-        forces = multipliers[nv + self._inequalities :, None] * problem.A
-        if problem is not self._problem:
-            yield "conflict: tasks of a higher level", forces.sum(axis=0)
-            return
-        row = 0
-        for equality in self.equalities:
-            force = forces[row : row + equality.dim].sum(axis=0)
-            yield f"conflict: {equality.name}", force
-            row += equality.dim
-
-    def _write_rows(self, dt: float) -> None:
-        """Fill the inequality and equality rows of the first problem."""
-        problem, row = self._problem, 0
-        for limit in self._row_limits:
-            rows = slice(row, row + limit.dim)
-            limit.rows(self.configuration, dt, problem.G[rows], problem.h[rows])
-            row = rows.stop
-        if self.equalities:
-            b, row = self._b, 0
-            for equality in self.equalities:
-                rows = slice(row, row + equality.dim)
-                equality.rows(self.configuration, dt, problem.A[rows], b[rows])
-                row = rows.stop
-            problem.set_equalities(b)
 
     def _write_box(self, a_max: Vector, dt: float, lb: Vector, ub: Vector) -> bool:
         """Merge the joints' limits into bounds; False if q is not finite."""
@@ -286,35 +260,27 @@ class TaskStack:
 
     def _write(self, k: int, dt: float) -> bool:
         """Write the rows of level k; what damps a level damps those below it too."""
+        above = self._levels[k - 1].mu if k else self.damping
         return self._levels[k].write(
             self.configuration,
             dt,
-            damping=self._levels[k - 1].mu if k else self._first_damping(),
+            damping=above + self._bending.values[k],
             curvature=self.curvature_damping,
             bias=None if k else self._bias,
         )
-
-    def _first_damping(self) -> float:
-        """Return the first level's damping without its tasks' part.
-
-        Rows that press bend as tasks do: the curvature of `nu . A(q)` is bounded by
-        the multipliers of the last tick times the longest arms.
-        """
-        problem = self._problem
-        if not len(problem.rows) or not self._solved:
-            return self.damping
-        pressed = np.abs(self._solved[0][2][problem.nv :])
-        longest = np.abs(problem.rows).max(axis=1)
-        return self.damping + self.curvature_damping * float(pressed @ longest)
 
     def _optimum(
         self, level: Level, problem: Problem, solver: QpSolver, side: Indices
     ) -> tuple[Vector, Vector] | None:
         """Solve a level: by the active set of the last tick, else by the solver."""
-        result = level.warm_optimum(problem, side) if self._warm else None
+        leading_back = self._constraints.inequalities > 0 and len(problem.soft()) > 0
+        warm = self._warm and not leading_back
+        result = level.warm_optimum(problem, side) if warm else None
         if result is not None and problem.violation(result[0]) <= _TOLERANCE:
             return result
         level.form(problem)
+        if leading_back:
+            problem.weight = _RETURN_WEIGHT * level.stiffness()
         return checked_solve(solver, problem)
 
     def _solve_first(self, dt: float) -> tuple[Vector, Vector, Fallback]:
@@ -330,6 +296,7 @@ class TaskStack:
         if not finite:
             still = np.clip(np.zeros(problem.nv), lb, ub)
             return still, np.zeros(len(problem.upper)), Fallback.HOLD
+        problem.weight = _RETURN_WEIGHT * level.stiffness()
         return retreat(self._solver, problem, lb=lb, ub=ub)
 
     def _solve_lower(
@@ -341,22 +308,29 @@ class TaskStack:
         of all rows above. x itself is one of them, so the problem has a solution.
         """
         first = self._problem
-        above = [first.A, *(level.W for level in self._levels[:k])]
-        V = self._decided[k].basis(np.concatenate(above))
+        above = np.concatenate([first.A, *(level.W for level in self._levels[:k])])
+        V = self._decided[k].basis(above.copy())
         rank = len(V)
         if (k, rank) not in self._lower:
             problem = Problem(first.nv, len(first.G), rank)
             self._lower[k, rank] = problem, self._solver.fresh()
         problem, solver = self._lower[k, rank]
         problem.lb[:], problem.ub[:] = first.lb, first.ub
-        problem.G[:], problem.h[:] = first.G, np.maximum(first.h, first.G @ x)
+        problem.G[:], problem.h[:] = first.G, np.maximum(first.wanted, first.G @ x)
         problem.A[:] = V
         problem.set_equalities(V @ x)
         if not self._write(k, dt):
             return None
         result = self._optimum(self._levels[k], problem, solver, self._sides[k])
         if result is None or first.violation(result[0]) > _TOLERANCE:
-            return None  # rows longer than 1 feel more than their orthonormal basis
+            # Rows longer than 1 feel more than their orthonormal basis.
+            self._bending.note(k, above[:0], np.zeros(0), dt)
+            return None
+        pressing, sides = result[1][problem.nv :], len(problem.G)
+        nu = multipliers_of_rows(above, pressing[sides:] @ V)
+        rows = np.concatenate([problem.G, above])
+        pressing = np.concatenate([pressing[:sides], nu])
+        self._bending.note(k, rows, pressing, dt)
         return problem, *result
 
     def _answer(
@@ -371,37 +345,10 @@ class TaskStack:
             fallback=fallback,
             residual=residual,
             held=tuple([name for level in self._levels for name in level.held]),
-            conflicts=self._conflicts(x) if fallback >= Fallback.SLACK else (),
-            pressure=self._pressure([m for _, _, m in self._solved]),
+            conflicts=self._constraints.broken(self._problem, x, _TOLERANCE)
+            if fallback >= Fallback.LIMITS
+            else (),
+            pressure=self._constraints.pressure(
+                [m for _, _, m in self._solved], self._kinds
+            ),
         )
-
-    def _conflicts(self, x: Vector) -> tuple[str, ...]:
-        """Return the names of the rows that x does not keep."""
-        problem, names, row = self._problem, list[str](), 0
-        broken = np.abs(problem.A @ x - problem.b) > _TOLERANCE
-        for equality in self.equalities:
-            if broken[row : row + equality.dim].any():
-                names.append(equality.name)
-            row += equality.dim
-        over = problem.G @ x - problem.h > _TOLERANCE
-        return (*names, *(self._row_label(int(i))[1] for i in np.flatnonzero(over)))
-
-    def _row_label(self, row: int) -> tuple[LimitKind, str]:
-        for limit in self._row_limits:
-            if row < limit.dim:
-                return limit.kind, limit.label(row)
-            row -= limit.dim
-        raise IndexError(row)
-
-    def _pressure(self, levels: list[Vector]) -> Pressure:
-        """Merge the multipliers of levels, the greatest of each kept."""
-        rows = self._problem.nv + self._inequalities
-        merged: Vector = levels[0][:rows] if levels else np.zeros(rows)
-        for multipliers in levels[1:]:
-            greater = np.abs(multipliers[:rows]) > np.abs(merged)
-            merged = np.where(greater, multipliers[:rows], merged)
-        labels: dict[int, tuple[LimitKind, str]] = {}
-        if self._inequalities:
-            pressed = merged[self._problem.nv :].nonzero()[0]
-            labels = {int(i): self._row_label(int(i)) for i in pressed}
-        return Pressure(merged, self._kinds.copy(), self._names, labels)

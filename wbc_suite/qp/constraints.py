@@ -1,0 +1,135 @@
+"""The rows of a stack's limits and equalities: written, named, and told apart."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from wbc_suite.kinematics import Configuration
+from wbc_suite.qp.bounds import LimitKind
+from wbc_suite.qp.equality import Equality
+from wbc_suite.qp.limit import Limit, RowLimit
+from wbc_suite.qp.problem import Problem
+from wbc_suite.qp.solution import Pressure
+from wbc_suite.typing import Indices, Vector
+
+__all__ = ["Constraints"]
+
+
+class Constraints:
+    """Inequality rows, then equality rows, in the order in which a problem has them.
+
+    Args:
+        configuration: The robot; the rows are bound to it here.
+        limits: Limits; those with rows are used.
+        equalities: Equality rows.
+
+    Attributes:
+        inequalities: Number of inequality rows.
+        dim: Number of equality rows.
+    """
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        limits: Sequence[Limit],
+        equalities: Sequence[Equality],
+    ) -> None:
+        self._limits = [x for x in limits if isinstance(x, RowLimit)]
+        self._equalities = tuple(equalities)
+        for bound in (*self._limits, *self._equalities):
+            bound.bind(configuration)
+        self.inequalities = sum(x.dim for x in self._limits)
+        self.dim = sum(x.dim for x in self._equalities)
+        self._b: Vector = np.zeros(self.dim)
+        self._names = configuration.velocity_names()
+
+    def reset(self) -> None:
+        """Let limits that remember how the robot moved forget it."""
+        for limit in self._limits:
+            limit.reset()
+
+    def write(self, configuration: Configuration, dt: float, problem: Problem) -> None:
+        """Fill the rows of a problem.
+
+        A row that is outside its limit does not bind to come back, or rows could demand
+        more than joints can do: it wants to, softly, and binds to go no further out
+        than by as much. So a robot that stands is never asked to move.
+        """
+        row = 0
+        for limit in self._limits:
+            rows = slice(row, row + limit.dim)
+            limit.rows(configuration, dt, problem.G[rows], problem.h[rows])
+            row = rows.stop
+        np.copyto(problem.wanted, problem.h)
+        np.abs(problem.h, out=problem.h)
+        row = 0
+        for equality in self._equalities:
+            rows = slice(row, row + equality.dim)
+            equality.rows(configuration, dt, problem.A[rows], self._b[rows])
+            row = rows.stop
+        problem.set_equalities(self._b)
+
+    def broken(self, problem: Problem, x: Vector, tolerance: float) -> tuple[str, ...]:
+        """Return the names of the rows that a step does not keep."""
+        names, row = list[str](), 0
+        missed = np.abs(problem.A @ x - problem.b) > tolerance
+        for equality in self._equalities:
+            if missed[row : row + equality.dim].any():
+                names.append(equality.name)
+            row += equality.dim
+        over = np.flatnonzero(problem.G @ x - problem.h > tolerance)
+        return (*names, *(self._label(int(i))[1] for i in over))
+
+    def pressure(self, levels: Sequence[Vector], kinds: Indices) -> Pressure:
+        """Merge the multipliers of levels, the greatest of each kept.
+
+        Args:
+            levels: Multipliers of each level's bounds and rows.
+            kinds: The `LimitKind` of lower and upper bounds, shape (2, nv).
+        """
+        nv = len(self._names)
+        rows = nv + self.inequalities
+        merged: Vector = levels[0][:rows] if levels else np.zeros(rows)
+        for multipliers in levels[1:]:
+            greater = np.abs(multipliers[:rows]) > np.abs(merged)
+            merged = np.where(greater, multipliers[:rows], merged)
+        labels: dict[int, tuple[LimitKind, str]] = {}
+        if self.inequalities:
+            pressed = merged[nv:].nonzero()[0]
+            labels = {int(i): self._label(int(i)) for i in pressed}
+        return Pressure(merged, kinds.copy(), self._names, labels)
+
+    def opponents(
+        self, problem: Problem, multipliers: Vector, kinds: Indices, *, first: bool
+    ) -> Iterator[tuple[str, Vector]]:
+        """Yield words and the force on the joints of each pressed limit or row.
+
+        Args:
+            problem: Of one level.
+            multipliers: Of its bounds and rows.
+            kinds: See `pressure`.
+            first: Whether the equality rows are these; else they stand for the levels
+                above.
+        """
+        nv = problem.nv
+        pressure = self.pressure([multipliers], kinds)
+        for i in pressure.multipliers.nonzero()[0].tolist():
+            row = np.eye(nv)[i] if i < nv else problem.G[i - nv]
+            yield str(pressure.limit(i)), multipliers[i] * row
+        forces = multipliers[nv + self.inequalities :, None] * problem.A
+        if not first:
+            yield "conflict: tasks of a higher level", forces.sum(axis=0)
+            return
+        row = 0
+        for equality in self._equalities:
+            force = forces[row : row + equality.dim].sum(axis=0)
+            yield f"conflict: {equality.name}", force
+            row += equality.dim
+
+    def _label(self, row: int) -> tuple[LimitKind, str]:
+        """Return kind and words of an inequality row."""
+        for limit in self._limits:
+            if row < limit.dim:
+                return limit.kind, limit.label(row)
+            row -= limit.dim
+        raise IndexError(row)
