@@ -101,7 +101,7 @@ def test_a_far_reach_leans_as_far_as_balance_allows():
     action = moved(env, right_hand=(0.6,), left_hand=(0.6,))
     hand = run(env, action, 1.5)["right_hand"]
     assert any(reason.startswith("balance:") for reason in hand["reasons"])
-    frames = run(env, action, 2.0)
+    frames = run(env, action, 3.0)
     assert frames["right_hand"]["position_error"] < 5e-3
     assert not frames["torso"]["reached"]
     com = env.simulation.data.subtree_com[

@@ -7,6 +7,9 @@ from wbc_suite.typing import Matrix, Vector
 __all__ = ["RowBending", "multipliers_of_rows"]
 
 _MEMORY = 0.2  # s, in which the damping of rows that no longer press falls to 1 / e
+_CALM = 5.0  # s, in which what was seen of swinging is forgotten to 1 / e
+_RISE = 3.0  # 1/s, of the bound, while ticks take back what the ticks before did
+_SWING = 0.01  # rad/s; smaller changes of velocity are nothing to damp
 _RIDGE = 1e-6  # of the rows' squares; rows that depend on each other share a force
 
 
@@ -15,8 +18,10 @@ class RowBending:
 
     Rows bend as tasks do: the curvature of `nu . A(q)` is bounded by the multipliers
     nu times the longest arms, see `rows.damping_of_rows`. For a lower level the rows of
-    all levels above count as well. Without it a level that pulls hard against those
-    above swings between its acceleration limits, tick by tick.
+    all levels above count as well: without it a level that pulls hard against those
+    above swings between its acceleration limits, tick by tick. There the bound is a
+    loose one, and would slow a leaning humanoid; so it counts as far as the robot was
+    seen to swing, which `watch` tells from changes of velocity that are taken back.
 
     The value rises at once and falls slowly: multipliers follow from the damping, and
     would swing with it.
@@ -29,10 +34,23 @@ class RowBending:
     def __init__(self, levels: int, factor: float) -> None:
         self.factor = factor
         self.values: Vector = np.zeros(levels)
+        self.forget()
 
     def forget(self) -> None:
         """Forget the last tick."""
         self.values[:] = 0.0
+        self._swinging = 0.0
+        self._change: Vector = np.zeros(0)
+
+    def watch(self, change: Vector, dt: float) -> None:
+        """Take in by how much the velocity has changed at this tick, shape (nv,)."""
+        if len(self.values) < 2:
+            return
+        before, self._change = self._change, change
+        if len(before) and _taken_back(before, change) > _SWING:
+            self._swinging = min(1.0, self._swinging + _RISE * dt)
+        else:
+            self._swinging *= np.exp(-dt / _CALM)
 
     def note(self, level: int, rows: Matrix, multipliers: Vector, dt: float) -> None:
         """Take in what pressed on a level at this tick.
@@ -48,7 +66,15 @@ class RowBending:
             return
         longest = np.maximum(rows.max(axis=1), -rows.min(axis=1))
         pressed = self.factor * float(np.abs(multipliers) @ longest)
+        if level:
+            pressed *= self._swinging
         self.values[level] = max(pressed, self.values[level])
+
+
+def _taken_back(before: Vector, change: Vector) -> float:
+    """Return the greatest change of a joint that goes against the one before."""
+    least = np.minimum(np.abs(before), np.abs(change))
+    return float(least[before * change < 0.0].max(initial=0.0))
 
 
 def multipliers_of_rows(rows: Matrix, force: Vector) -> Vector:

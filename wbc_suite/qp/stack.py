@@ -338,6 +338,7 @@ class TaskStack:
     ) -> Solution:
         """Remember the velocity and tell what happened."""
         v = x / dt
+        self._bending.watch(v - self.v_previous, dt)
         self.v_previous[:] = v
         return Solution(
             dq=x,
