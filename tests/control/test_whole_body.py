@@ -221,6 +221,15 @@ def test_hands_are_named_after_their_side(robot, gripper, frames):
     assert {f["name"]: f["frame"] for f in config["frame"]} == frames
 
 
+@pytest.mark.slow
+def test_an_arm_put_on_a_mobile_base_can_be_driven(alone):
+    scene = alone(load_robot("UR5e", base="OmronMobileBase"))
+    before = scene.site("right_tcp")
+    frames = scene.act({"base": np.array([-0.1, 0.1, 0.0])}, 3.0)["frames"]
+    assert frames["base"]["position_error"] < 1e-3
+    np.testing.assert_allclose(scene.site("right_tcp"), before, atol=1e-3)
+
+
 def test_a_robot_without_hands_is_moved_by_its_trunk():
     config = default_whole_body_config(load_robot("Spot"))
     assert [frame["frame"] for frame in config["frame"]] == ["base"]
@@ -232,10 +241,10 @@ def test_another_robot_of_a_name_we_know_gets_no_file_of_ours(caplog):
         f.model_copy(update={"name": f"my_{f.name}"}) if f.role == "tcp" else f
         for f in ours.frames
     )
-    theirs = ours.model_copy(update={"name": "panda", "frames": frames})
+    theirs = ours.model_copy(update={"name": "tiago", "frames": frames})
     config = load_composite_controller_config("WHOLE_BODY_IK", theirs)
     assert config["frame"][0]["frame"] == "my_right_tcp"
-    assert "panda_whole_body_ik.toml is not for this 'panda'" in caplog.text
+    assert "tiago_whole_body_ik.toml is not for this 'tiago'" in caplog.text
 
 
 def test_a_file_of_ones_own_that_does_not_fit_is_an_error(tmp_path):
@@ -301,7 +310,7 @@ def test_a_composite_of_ones_own_can_be_registered(alone):
         default=lambda _: {},
     )
     assert "MY_OWN" in composite_names()
-    assert alone("Panda", "my_own").act({}, 0.1)["reached"]
+    assert alone("Tiago", "my_own").act({}, 0.1)["reached"]
     assert made == ["MY_OWN"]
     with pytest.raises(ConfigError, match="exists already"):
         register_composite("my_own", build, family="x", default=lambda _: {})

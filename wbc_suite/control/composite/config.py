@@ -201,12 +201,15 @@ class WholeBodyIKConfig(FrozenModel):
 def default_whole_body_config(robot: RobotDescription) -> dict[str, Any]:
     """Return a config for a robot without a file: hands as poses, feet held.
 
-    A robot without hands is moved by its trunk or its head.
+    A base that glides is moved where the hands leave it free. A robot without hands is
+    moved by its trunk or its head.
     """
     frames = [
         {"name": _hand_name(side, len(robot.hands)), "frame": frame, "kind": "pose"}
         for side, frame in robot.hands.items()
     ]
+    if robot.root.kind == "planar":
+        frames.append(_gliding_base(robot))
     frames = frames or [{"name": name, "frame": name} for name in [_foremost(robot)]]
     feet = [f.name for f in robot.frames if f.role == "foot"]
     held = feet if robot.root.kind == "free" else []
@@ -223,6 +226,24 @@ def _hand_name(side: str, count: int) -> str:
     if side in ("right", "left"):
         return f"{side}_hand"
     return "right_hand" if count == 1 else side
+
+
+def _gliding_base(robot: RobotDescription) -> dict[str, Any]:
+    """Return the frame of a planar root, with the pace of a careful driver."""
+    root = robot.links[0].name
+    found = [f.name for f in robot.frames if f.role == "base" and f.link == root]
+    return {
+        "name": "base",
+        "frame": (found or [root])[0],
+        "kind": "base",
+        "level": 1,
+        "position_cost": 5.0,  # above the posture, which is on the same level
+        "orientation_cost": 5.0,
+        "max_linear_speed": 0.3,
+        "max_angular_speed": 0.4,
+        "linear_braking": 0.5,
+        "angular_braking": 0.8,
+    }
 
 
 def _foremost(robot: RobotDescription) -> str:
