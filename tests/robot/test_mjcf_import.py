@@ -258,6 +258,10 @@ FAULTS = {
     ),
     "urdf": ("<robot/>", "begins with <mujoco>, not <robot>.* name it .urdf"),
     "mujoco refuses": (body('<joint type="wheel"/>'), "MuJoCo refuses it"),
+    "mesh without a file": (
+        body('<joint name="j"/><geom type="mesh"/>'),
+        "MuJoCo refuses it.* valid meshid",
+    ),
     "no number": (body('<joint axis="0 nan 1"/>'), "holds what is no number"),
     "outside mesh": (
         '<mujoco><asset><mesh file="../secret.stl"/></asset></mujoco>',
