@@ -44,8 +44,6 @@ class RowBending:
 
     def watch(self, change: Vector, dt: float) -> None:
         """Take in by how much the velocity has changed at this tick, shape (nv,)."""
-        if len(self.values) < 2:
-            return
         before, self._change = self._change, change
         if len(before) and _taken_back(before, change) > _SWING:
             self._swinging = min(1.0, self._swinging + _RISE * dt)

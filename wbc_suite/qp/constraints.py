@@ -55,6 +55,19 @@ class Constraints:
         more than joints can do: it wants to, softly, and binds to go no further out
         than by as much. So a robot that stands is never asked to move.
         """
+        if self._limits:
+            self._write_limits(configuration, dt, problem)
+        row = 0
+        for equality in self._equalities:
+            rows = slice(row, row + equality.dim)
+            equality.rows(configuration, dt, problem.A[rows], self._b[rows])
+            row = rows.stop
+        if self._equalities:
+            problem.set_equalities(self._b)
+
+    def _write_limits(
+        self, configuration: Configuration, dt: float, problem: Problem
+    ) -> None:
         row = 0
         for limit in self._limits:
             rows = slice(row, row + limit.dim)
@@ -62,12 +75,6 @@ class Constraints:
             row = rows.stop
         np.copyto(problem.wanted, problem.h)
         np.abs(problem.h, out=problem.h)
-        row = 0
-        for equality in self._equalities:
-            rows = slice(row, row + equality.dim)
-            equality.rows(configuration, dt, problem.A[rows], self._b[rows])
-            row = rows.stop
-        problem.set_equalities(self._b)
 
     def broken(self, problem: Problem, x: Vector, tolerance: float) -> tuple[str, ...]:
         """Return the names of the rows that a step does not keep."""

@@ -10,16 +10,17 @@ brakes as it can, where dropping the window let it jump by 6 rad/s between two t
 import numba
 import numpy as np
 
-from wbc_suite.qp.problem import UNBOUNDED, Problem
+from wbc_suite.qp.problem import UNBOUNDED, Problem, clip_step
 from wbc_suite.qp.solution import Fallback
 from wbc_suite.qp.solver import QpSolver
-from wbc_suite.typing import Matrix, Vector
+from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["box_least_squares", "checked_solve", "retreat"]
 
 _TOLERANCE = 1e-7  # greatest broken row or bound of an accepted solution, m or rad
 _SLACK_WEIGHT = 1e2  # of a relaxed row against one that is led back
 _SWEEPS = 100
+_NO_ROWS: Indices = np.zeros(0, dtype=np.int64)
 
 
 def checked_solve(solver: QpSolver, problem: Problem) -> tuple[Vector, Vector] | None:
@@ -27,7 +28,7 @@ def checked_solve(solver: QpSolver, problem: Problem) -> tuple[Vector, Vector] |
 
     The step is clipped to the bounds, which it may have missed by rounding.
     """
-    soft = problem.soft()
+    soft = problem.soft() if len(problem.G) else _NO_ROWS
     result = solver.solve(problem.with_slack(soft) if len(soft) else problem)
     if result is None:
         return None
@@ -35,11 +36,7 @@ def checked_solve(solver: QpSolver, problem: Problem) -> tuple[Vector, Vector] |
     if len(soft):
         x = x[: problem.nv].copy()
         multipliers = np.delete(multipliers, problem.nv + np.arange(len(soft)))
-    if problem.violation(x) > _TOLERANCE:  # infinite for what is not finite
-        return None
-    np.minimum(x, problem.ub, out=x)
-    np.maximum(x, problem.lb, out=x)
-    if problem.violation(x) > _TOLERANCE:  # long rows feel what clipping moved
+    if not clip_step(x, problem.rows, problem.lower, problem.upper, _TOLERANCE):
         return None
     return x, multipliers
 

@@ -5,7 +5,7 @@ import numpy as np
 
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["Problem"]
+__all__ = ["Problem", "clip_step"]
 
 UNBOUNDED = 1e30
 """A bound at or beyond it binds nothing (the convention of most solvers)."""
@@ -127,3 +127,18 @@ def worst_violation(x: Vector, rows: Matrix, lower: Vector, upper: Vector) -> fl
             return np.inf
         worst = max(worst, lower[i] - y, y - upper[i])
     return worst
+
+
+@numba.njit(cache=True, nogil=True)
+def clip_step(
+    x: Vector, rows: Matrix, lower: Vector, upper: Vector, tolerance: float
+) -> bool:
+    """Clip x to its bounds; return whether it broke nothing by more, before and after.
+
+    Long rows feel what clipping has moved.
+    """
+    if not worst_violation(x, rows, lower, upper) <= tolerance:
+        return False
+    for i in range(x.shape[0]):
+        x[i] = max(min(x[i], upper[i]), lower[i])
+    return rows.shape[0] == 0 or worst_violation(x, rows, lower, upper) <= tolerance

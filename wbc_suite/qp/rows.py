@@ -289,9 +289,10 @@ def normal_equations(
             weights = W[row]
             for i in range(first, last):
                 a = support[i]
-                c[a] -= weights[a] * e[row]
-                for j in range(first, i + 1):
-                    H[a, support[j]] += weights[a] * weights[support[j]]
+                weight, of_a = weights[a], H[a]
+                c[a] -= weight * e[row]
+                for j in range(a + 1):  # zeros too: whole vectors are faster
+                    of_a[j] += weight * weights[j]
     for i in range(n):
         for j in range(i):
             H[j, i] = H[i, j]

@@ -176,9 +176,10 @@ class TaskStack:
             self._bias = self._escape.bias(dt, self.v_previous, self._pressed)
         self._constraints.write(self.configuration, dt, self._problem)
         x, multipliers, fallback = self._solve_first(dt)
-        kept = fallback is Fallback.NONE  # what is relaxed has a damping of its own
-        pressing = kept * multipliers[self._problem.nv :]
-        self._bending.note(0, self._problem.rows, pressing, dt)
+        if len(self._problem.rows):
+            kept = fallback is Fallback.NONE  # what is relaxed has its own damping
+            pressing = kept * multipliers[self._problem.nv :]
+            self._bending.note(0, self._problem.rows, pressing, dt)
         self._solved = [(self._problem, x, multipliers)]
         for k in range(1, len(self._levels)):
             if fallback >= Fallback.BOX:
@@ -194,7 +195,8 @@ class TaskStack:
     def problem(self) -> Problem:
         """Return the QP of the first level at the last tick: a view, valid until next.
 
-        After a retreat its bounds are those without acceleration limits.
+        After a retreat its bounds are those without acceleration limits. What rows
+        outside their limit want is beside it, see `Problem`.
         """
         self._levels[0].form(self._problem)
         return self._problem
@@ -338,7 +340,8 @@ class TaskStack:
     ) -> Solution:
         """Remember the velocity and tell what happened."""
         v = x / dt
-        self._bending.watch(v - self.v_previous, dt)
+        if len(self._levels) > 1:
+            self._bending.watch(v - self.v_previous, dt)
         self.v_previous[:] = v
         return Solution(
             dq=x,
