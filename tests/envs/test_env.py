@@ -134,6 +134,15 @@ def test_a_robot_measured_from_its_pelvis_is_lifted_out_of_the_floor(caplog):
     assert wbc_suite.make("Lift", robots=arm).robots[0].root.pos[2] == 0.0
 
 
+def test_a_quaternion_rounded_past_one_is_observed_within_its_bounds(monkeypatch):
+    spot = wbc_suite.make("Lift", robots="Spot", initialization_noise=None)
+    (sense,) = spot._senses
+    past = {"robot0_base_quat": np.array([0.0, 0.0, 0.0, 1.0 + 1e-15])}
+    seen = sense.observe() | past
+    monkeypatch.setattr(sense, "observe", lambda: seen)
+    assert spot.observation_space.contains(spot._observe())
+
+
 def test_no_log_file_is_left_behind(env, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     env.reset(seed=0)

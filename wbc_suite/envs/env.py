@@ -273,6 +273,9 @@ class RobotEnv(gymnasium.Env[Observation, Vector]):
             objects = self.benchmark.observe()
             observation |= objects
             observation["object-state"] = np.concatenate(list(objects.values()))
+        for key, value in observation.items():
+            if key.endswith(_UNIT_KEYS):  # rounding makes 1 + 2e-16 of a unit vector
+                value.clip(-1.0, 1.0, out=value)
         return observation
 
     def _observation_space(self) -> gymnasium.Space[Any]:
