@@ -52,8 +52,9 @@ class Constraints:
         """Fill the rows of a problem.
 
         A row that is outside its limit does not bind to come back, or rows could demand
-        more than joints can do: it wants to, softly, and binds to go no further out
-        than by as much. So a robot that stands is never asked to move.
+        more than joints can do: it wants to, softly, and binds to go no further out. So
+        a robot that stands is never asked to move. Far outside it may give way, see
+        `RowLimit.gives_way`.
         """
         if self._limits:
             self._write_limits(configuration, dt, problem)
@@ -71,10 +72,12 @@ class Constraints:
         row = 0
         for limit in self._limits:
             rows = slice(row, row + limit.dim)
-            limit.rows(configuration, dt, problem.G[rows], problem.h[rows])
+            h, wanted = problem.h[rows], problem.wanted[rows]
+            limit.rows(configuration, dt, problem.G[rows], h)
+            np.copyto(wanted, h)
+            np.maximum(h, 0.0, out=h)
+            np.maximum(h, -2.0 * (wanted + limit.gives_way * dt), out=h)
             row = rows.stop
-        np.copyto(problem.wanted, problem.h)
-        np.abs(problem.h, out=problem.h)
 
     def broken(self, problem: Problem, x: Vector, tolerance: float) -> tuple[str, ...]:
         """Return the names of the rows that a step does not keep."""

@@ -69,10 +69,13 @@ class RowLimit(Limit):
     Attributes:
         dim: Number of rows.
         kind: What its rows are called in reports.
+        gives_way: Speed of return, in the rows' unit per second, beyond which a row may
+            go further out, so that other rows can lead back; endless is never.
     """
 
     dim: int
     kind: LimitKind = LimitKind.SELF_COLLISION
+    gives_way: float = np.inf
 
     @abstractmethod
     def bind(self, configuration: Configuration) -> None:

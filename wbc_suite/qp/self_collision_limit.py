@@ -47,6 +47,8 @@ class SelfCollisionLimit(RowLimit):
     of Manipulators With a High Number of Degrees of Freedom", ICRA.
     """
 
+    gives_way = 0.1  # m/s: links that start inside each other, 1 cm at the usual rate
+
     def __init__(
         self,
         capsules: Sequence[EnclosingCapsule],
