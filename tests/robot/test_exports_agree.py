@@ -126,3 +126,23 @@ def jacobian_error(twin, B):
         )
         worst = max(worst, float(np.abs(J - other @ B).max()))
     return worst
+
+
+def test_stops_are_hard():
+    """A joint that swings into its stop passes it by less than a milliradian."""
+    robot = wbc_suite.load_robot("Panda", gripper="none", base="none")
+    spec = robot.to_mjspec()
+    spec.option.gravity = (0.0, 0.0, 0.0)
+    spec.option.timestep = 0.002
+    model = spec.compile()
+    for joint in ("panda_joint4", "panda_joint6"):
+        data = mujoco.MjData(model)
+        data.qpos[:] = model.key("ready").qpos
+        high = model.joint(joint).range[1]
+        data.joint(joint).qpos[0] = high - 0.02
+        data.joint(joint).qvel[0] = 0.25
+        passed = 0.0
+        for _ in range(100):
+            mujoco.mj_step(model, data)
+            passed = max(passed, data.joint(joint).qpos[0] - high)
+        assert 0.0 < passed < 1e-3

@@ -29,6 +29,9 @@ VISUAL_GROUP = 2
 """Geom group of shapes that are only drawn."""
 COLLISION_GROUP = 3
 """Geom group of shapes that only collide."""
+STOP_SOLREF = (0.004, 1.0)
+"""Time constant in s and damping ratio of joints' stops, which are hard on a machine:
+with MuJoCo's own 20 ms a joint that arrives at 0.5 rad/s passes by 3.7 mrad."""
 SITE_GROUP = 4
 """Site group of frames: hidden unless asked for."""
 
@@ -130,6 +133,7 @@ def _add_joint(body: mujoco.MjsBody, joint: Joint) -> None:
     added.limited = mujoco.mjtLimited.mjLIMITED_FALSE
     if joint.range is not None:
         added.limited = mujoco.mjtLimited.mjLIMITED_TRUE
+        added.solref_limit = STOP_SOLREF
         added.range = joint.range
 
 
