@@ -17,33 +17,54 @@ torques to 1e-7 N m (`tests/robot/test_vendor_figures.py`).
 """
 
 
-def section(path: Path) -> str:
-    """Return one component's text, or nothing when it has no deviation."""
+def rows(path: Path) -> list[str]:
+    """Return one file's rows of the table."""
     component = read_robot_file(path)
     if isinstance(component, Component):
         header, links = component.component, component.links
-        title, source = header.title or header.name, header.source
-        source += f" ({header.license})" if source else ""
     else:
-        header, links, source = component.assembly, (), ""
-        title = header.title or header.name
-    lines = [f"- {text}" for text in header.deviations]
-    lines += [
-        f"- `{link.name}` is excused from the check of its {rule}: {reason}."
-        for link in links
-        for rule, reason in link.accept.items()
+        header, links = component.assembly, ()
+    excused: dict[str, list[str]] = {}
+    for link in links:
+        for rule, reason in link.accept.items():
+            key = f"excused from the check of its {rule}: {reason}"
+            excused.setdefault(key, []).append(f"`{link.name}`")
+    texts = [
+        *header.deviations,
+        *(f"{', '.join(names)}: {reason}" for reason, names in excused.items()),
     ]
-    if not lines:
-        return ""
-    about = f"Source: {source}.\n\n" if source else ""
-    return f"\n## {title} (`{path.stem}`)\n\n{about}" + "\n".join(lines) + "\n"
+    name = f"**{header.title or header.name}** `{path.parent.name}/{path.stem}`"
+    names = [name, *([""] * len(texts))]
+    return [
+        f"| {name} | {text.replace('|', '/')} |"
+        for name, text in zip(names, texts, strict=False)
+    ]
+
+
+def sources() -> str:
+    """Return the table of sources."""
+    lines = ["| component | figures from | licence |", "|---|---|---|"]
+    for path in files():
+        component = read_robot_file(path)
+        if isinstance(component, Component) and component.component.source:
+            header = component.component
+            name = f"`{path.parent.name}/{path.stem}`"
+            lines.append(f"| {name} | {header.source} | {header.license} |")
+    return "\n".join(lines)
+
+
+def files() -> list[Path]:
+    """Return every robot file: assemblies, then components."""
+    folders = ("robots", "robots/arm", "robots/body", "robots/gripper", "robots/base")
+    return [path for folder in folders for path in Catalogue().files(folder)]
 
 
 def text() -> str:
     """Return the whole page."""
-    folders = ("robots", "robots/arm", "robots/body", "robots/gripper", "robots/base")
-    files = [path for folder in folders for path in Catalogue().files(folder)]
-    return HEAD + "".join(section(path) for path in files)
+    table = ["| component | difference, and its reason |", "|---|---|"]
+    for path in files():
+        table += rows(path)
+    return f"{HEAD}\n" + "\n".join(table) + f"\n\n## Sources\n\n{sources()}\n"
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ import numpy as np
 from wbc_suite.arguments import check_array, check_number
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.acceleration_limit import AccelerationLimit
-from wbc_suite.qp.bending import RowBending, multipliers_of_rows
+from wbc_suite.qp.bending import RowBending
 from wbc_suite.qp.bounds import LimitKind, merge_bounds
 from wbc_suite.qp.constraints import Constraints
 from wbc_suite.qp.equality import Equality
@@ -110,7 +110,7 @@ class TaskStack:
         self._lower: dict[tuple[int, int], tuple[Problem, QpSolver]] = {}
         self._solved: list[tuple[Problem, Vector, Vector]] = []
         self._decided = [DecidedDirections(configuration.nv) for _ in numbers]
-        self._bending = RowBending(len(numbers), self.curvature_damping)
+        self._bending = RowBending(self.curvature_damping)
         nv = configuration.nv
         self._kinds: Indices = np.zeros((2, nv), dtype=np.int64)
         self._no_window: Vector = np.full(nv, np.inf)
@@ -179,7 +179,7 @@ class TaskStack:
         if len(self._problem.rows):
             kept = fallback is Fallback.NONE  # what is relaxed has its own damping
             pressing = kept * multipliers[self._problem.nv :]
-            self._bending.note(0, self._problem.rows, pressing, dt)
+            self._bending.note(self._problem.rows, pressing, dt)
         self._solved = [(self._problem, x, multipliers)]
         for k in range(1, len(self._levels)):
             if fallback >= Fallback.BOX:
@@ -262,11 +262,10 @@ class TaskStack:
 
     def _write(self, k: int, dt: float) -> bool:
         """Write the rows of level k; what damps a level damps those below it too."""
-        above = self._levels[k - 1].mu if k else self.damping
         return self._levels[k].write(
             self.configuration,
             dt,
-            damping=above + self._bending.values[k],
+            damping=self._levels[k - 1].mu if k else self.damping + self._bending.value,
             curvature=self.curvature_damping,
             bias=None if k else self._bias,
         )
@@ -310,8 +309,8 @@ class TaskStack:
         of all rows above. x itself is one of them, so the problem has a solution.
         """
         first = self._problem
-        above = np.concatenate([first.A, *(level.W for level in self._levels[:k])])
-        V = self._decided[k].basis(above.copy())
+        above = [first.A, *(level.W for level in self._levels[:k])]
+        V = self._decided[k].basis(np.concatenate(above))
         rank = len(V)
         if (k, rank) not in self._lower:
             problem = Problem(first.nv, len(first.G), rank)
@@ -325,14 +324,7 @@ class TaskStack:
             return None
         result = self._optimum(self._levels[k], problem, solver, self._sides[k])
         if result is None or first.violation(result[0]) > _TOLERANCE:
-            # Rows longer than 1 feel more than their orthonormal basis.
-            self._bending.note(k, above[:0], np.zeros(0), dt)
-            return None
-        pressing, sides = result[1][problem.nv :], len(problem.G)
-        nu = multipliers_of_rows(above, pressing[sides:] @ V)
-        rows = np.concatenate([problem.G, above])
-        pressing = np.concatenate([pressing[:sides], nu])
-        self._bending.note(k, rows, pressing, dt)
+            return None  # rows longer than 1 feel more than their orthonormal basis
         return problem, *result
 
     def _answer(
@@ -340,8 +332,6 @@ class TaskStack:
     ) -> Solution:
         """Remember the velocity and tell what happened."""
         v = x / dt
-        if len(self._levels) > 1:
-            self._bending.watch(v - self.v_previous, dt)
         self.v_previous[:] = v
         return Solution(
             dq=x,
