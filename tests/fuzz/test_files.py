@@ -4,6 +4,7 @@ import copy
 
 import numpy as np
 import pytest
+from damage import parent_of, places
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -41,21 +42,11 @@ FAST = settings(
 )
 
 
-def places(node, path=()):
-    items = node.items() if isinstance(node, dict) else enumerate(node)
-    for key, value in items:
-        yield (*path, key)
-        if isinstance(value, dict | list):
-            yield from places(value, (*path, key))
-
-
 def damage(draw, data):
     """Return a copy with one value replaced, renamed or removed, and its top key."""
     data = copy.deepcopy(data)
     path = draw(st.sampled_from(list(places(data))))
-    holder, key = data, path[-1]
-    for step in path[:-1]:
-        holder = holder[step]
+    holder, key = parent_of(data, path), path[-1]
     match draw(st.sampled_from(["replace", "rename", "remove"])):
         case "replace":
             holder[key] = draw(VALUES)

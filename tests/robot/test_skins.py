@@ -154,7 +154,8 @@ def test_meshes_are_thinned_once(package, tmp_path, monkeypatch):
     assert list((tmp_path / "cache" / "wbc_suite" / "skins").glob("*.npz"))
     from wbc_suite.robot import skin_meshes
 
-    skin_meshes.skin_triangles.cache_clear()
+    forget = skin_meshes.skin_triangles.cache_clear  # pyright: ignore[reportFunctionMemberAccess]
+    forget()
     monkeypatch.setattr(skin_meshes, "_read", None)  # not read again
     again = robot.to_mjspec().compile()
     assert again.nmeshface == model.nmeshface
@@ -177,6 +178,15 @@ def test_what_is_partly_missing_is_a_warning(package, caplog):
 def test_a_skin_that_is_neither_is_an_error(tmp_path):
     with pytest.raises(ConfigError, match="neither 'meshes' nor a folder"):
         wbc_suite.load_robot("Panda", skin="mesh")
+
+
+def test_a_component_that_extends_another_wears_its_skin(tmp_path):
+    write_meshes(tmp_path, ["jaco_three_finger_gripper"])
+    plain, dexterous = (
+        wbc_suite.load_robot(f"gripper/jaco_three_finger{kind}_gripper", skin=tmp_path)
+        for kind in ("", "_dexterous")
+    )
+    assert plain.skins == dexterous.skins != {}
 
 
 def test_a_broken_mesh_names_the_file(package):

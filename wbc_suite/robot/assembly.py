@@ -55,7 +55,8 @@ def _skins(
     if wardrobe is None:
         return {}
     links = [link.name for link in component.links]
-    found = wardrobe.dress(component.component.name, links)
+    header = component.component
+    found = wardrobe.dress(header.extends or header.name, links)
     return {prefix + n: painted(meshes, colors or {}) for n, meshes in found.items()}
 
 

@@ -98,7 +98,6 @@ class SkinTable(FrozenModel):
     format: Literal[1]
     provider: str
     folder: str = ""
-    note: str = ""
     link: dict[Name, tuple[_Piece, ...]]
 
 

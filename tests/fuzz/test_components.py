@@ -4,6 +4,7 @@ import copy
 
 import numpy as np
 import pytest
+from damage import parent_of, places
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -33,21 +34,6 @@ VALUES = st.one_of(
     st.lists(NUMBERS, max_size=7),
     st.dictionaries(NAMES, NUMBERS, max_size=3),
 )
-
-
-def places(node, path=()):
-    """List the paths of all values in nested tables and arrays."""
-    items = node.items() if isinstance(node, dict) else enumerate(node)
-    for key, value in items:
-        yield (*path, key)
-        if isinstance(value, dict | list):
-            yield from places(value, (*path, key))
-
-
-def parent_of(data, path):
-    for key in path[:-1]:
-        data = data[key]
-    return data
 
 
 @st.composite
