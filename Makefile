@@ -18,7 +18,7 @@ demo: $(VENV)/.installed ## the same without a browser: prints figures, writes p
 	@$(PY) -m wbc_suite.cli demo $(ARGS)
 
 test: $(VENV)/.installed-dev ## run the whole test suite
-	$(PYTEST) -n auto $(ARGS)
+	$(PYTEST) -n auto --durations=20 $(ARGS)
 
 check: $(VENV)/.installed-dev ## format, lint, types, import direction, fast tests
 	$(PY) -m ruff format --check .
@@ -31,20 +31,27 @@ format: $(VENV)/.installed-dev ## let ruff format and mend what it can
 	$(PY) -m ruff format .
 	$(PY) -m ruff check --fix .
 
-bench: $(VENV)/.installed-dev ## run every benchmark (ARGS=--quick for under a minute each)
-	@set -e; for script in benchmarks/*.py; do \
-	  echo "== $$script"; $(PY) "$$script" $(ARGS); done
+bench: $(VENV)/.installed-dev ## run every benchmark, write docs/benchmarks.md (ARGS=--quick)
+	$(PY) docs/write_benchmarks.py $(ARGS)
 
-bench-peers: $(VENV)/.installed-dev ## install the peers that the benchmarks compare with
-	$(PY) -m pip install --group peers
-	@test -x .venv-placo/bin/python || $(PY) -m venv .venv-placo
-	.venv-placo/bin/python -m pip install placo
+# Peers get environments of their own where they ask for other versions than ours.
+bench-peers: $(VENV)/.installed-peers .venv-placo/.installed .venv-robosuite/.installed .venv-cluster/.installed .venv-datasets/.installed ## install what benchmarks and tests compare or work with
+
+$(VENV)/.installed-peers: $(VENV)/.installed-dev
+	$(PY) -m pip install --disable-pip-version-check --group peers
+	@touch $@
+
+.venv-%/.installed: benchmarks/peers/%.txt | $(VENV)/.python
+	@test -x .venv-$*/bin/python || $(PY) -m venv .venv-$*
+	.venv-$*/bin/python -m pip install --disable-pip-version-check -r $<
+	@touch $@
 
 pictures: $(VENV)/.installed ## draw the pictures of the README anew
 	$(PY) docs/draw_pictures.py
 
-gallery: $(VENV)/.installed ## draw every robot, gripper and base for the README
+gallery: $(VENV)/.installed ## draw every robot, gripper and base for the README, and every benchmark
 	$(PY) docs/draw_gallery.py $(ARGS)
+	$(PY) docs/draw_benchmarks.py $(ARGS)
 
 wheel: $(VENV)/.installed ## build the wheel into dist/
 	@rm -rf dist

@@ -6,15 +6,11 @@ body, so that rows are active. Times are CPU times of the thread, in microsecond
 Usage: python benchmarks/self_collision.py [--quick] [--json FILE]
 """
 
-import argparse
-import json
-import os
 import time
-from pathlib import Path
 
-os.environ.setdefault("OMP_NUM_THREADS", "1")
+from harness.report import Report, options
 
-import numpy as np
+import numpy as np  # isort: skip  (after harness: it sets the number of threads)
 import pinocchio as pin
 
 import wbc_suite
@@ -69,29 +65,23 @@ def run(ticks: int) -> tuple[list[float], list[float], float, int]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--quick", action="store_true", help="1,000 ticks")
-    parser.add_argument("--json", type=Path, help="write rows and ratios here")
-    arguments = parser.parse_args()
-    ticks = 1000 if arguments.quick else 12_000
-    rows, total, least, pairs = run(ticks)
-    report = []
-    for side, times in (("rows", rows), ("tick", total)):
-        median, p99 = float(np.median(times)), float(np.percentile(times, 99))
-        report.append(
-            {
-                "case": "GR1",
-                "side": side,
-                "median_us": median,
-                "p99_us": p99,
-                "n": len(times),
-            }
-        )
-        print(f"GR1 {side:5} median {median:7.1f} us   p99 {p99:7.1f} us")
-    print(f"{NEAREST} nearest of {pairs} capsule pairs; least distance {least:.4f} m")
-    if arguments.json:
-        text = json.dumps({"rows": report, "ratios": {}}, indent=1)
-        arguments.json.write_text(text + "\n")
+    arguments = options(__doc__, "1,000 ticks").parse_args()
+    rows, total, least, pairs = run(1000 if arguments.quick else 12_000)
+    report = Report()
+    report.add("GR1", "rows", rows, pairs=pairs, nearest=NEAREST, least_m=least)
+    report.add("GR1", "tick", total)
+    columns = (
+        "case",
+        "side",
+        "median_us",
+        "p99_us",
+        "n",
+        "nearest",
+        "pairs",
+        "least_m",
+    )
+    report.show("Self-collision rows, us of CPU time", columns)
+    report.write(arguments.json)
 
 
 if __name__ == "__main__":

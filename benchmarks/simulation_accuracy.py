@@ -2,20 +2,24 @@
 
 Each robot stands alone on a floor, its own collisions on. Two experiments:
 
-reachable  From `ready`, targets for all hands at once are sent in one step and held for
-           2 s. They are the poses of a random configuration, free of collision (5 mm
-           between links) and within joint limits, each joint no farther than its limits
-           of speed and acceleration let it go in 0.6 s (so that 1 s can suffice).
-           Reported: error at 2 s, and how many are within 1 mm and 0.2 degree from 1 s.
-ball       Targets anywhere in a ball of 5 m for 1 s, then the hands' first poses for
-           2 s. Reported: how far joints left their limits, whether the controller said
-           so when it did not arrive, and the error after the return.
+- reachable: from `ready`, targets for all hands at once are sent in one step and held
+  for 2 s. They are the poses of a random configuration, free of collision (5 mm between
+  links) and within joint limits, each joint no farther than its limits of speed and
+  acceleration let it go in 0.6 s (so that 1 s can suffice). Reported: error at 2 s, and
+  how many are within 1 mm and 0.2 degree from 1 s.
+- ball: targets anywhere in a ball of 5 m for 1 s, then the hands' first poses for 2 s.
+  Reported: how far joints left their limits, looked at after each physics step, whether
+  the controller said so when it did not arrive, and the error after the return.
 
+Each trial has a seed of its own, so a bad one can be run alone, and `--keep` lets a
+long run be stopped and taken up again.
+
+Usage:
     python benchmarks/simulation_accuracy.py --quick
-    python benchmarks/simulation_accuracy.py --robots GR1 --trials 1000 --json out.json
+    python benchmarks/simulation_accuracy.py --robots GR1 --keep gr1.jsonl
+    python benchmarks/simulation_accuracy.py --robots GR1 --first 379 --trials 1
 """
 
-import argparse
 import json
 import time
 from pathlib import Path
@@ -23,44 +27,40 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pinocchio as pin
+from harness.report import Report, options
+from harness.stand import Stand
 
-from wbc_suite.control import (
-    RobotState,
-    build_composite_controller,
-    load_composite_controller_config,
-)
 from wbc_suite.control.composite.clearance import Clearance
 from wbc_suite.control.composite.tasks import joint_accelerations
 from wbc_suite.control.composite.whole_body import WholeBodyIK
-from wbc_suite.envs.simulation import Simulation
-from wbc_suite.robot import load_robot
-from wbc_suite.scene import attach_robot, empty_arena, robot_prefix
 
 ROBOTS = ("Panda", "GR1", "Tiago", "SpotWithArm")
 REACH_TIME = 0.6  # s
 ROOT_STEP = np.array([0.2, 0.2, 0.3])  # m, m, rad: of a planar root
+TITLES = {
+    "reachable": "Reachable poses, all hands at once, 2 s after one step",
+    "ball": "Targets anywhere in a ball of 5 m, then back",
+}
+COLUMNS = {
+    "reachable": ("trials", "median_mm", "worst_mm", "worst_deg", "settled"),
+    "ball": (
+        "trials",
+        "worst_limit_overshoot_rad",
+        "missed_in_silence",
+        "back_median_mm",
+        "back_worst_mm",
+    ),
+}
 TOLERANCE = (1e-3, np.deg2rad(0.2))
+KEYS = ("case", "side", "experiment", "seed", "trial")
 
 
-class Bench:
-    """One robot alone on a floor, under one controller."""
+class Bench(Stand):
+    """A robot under a whole-body controller, sent to random poses."""
 
     def __init__(self, name, controller):
-        self.robot = load_robot(name)
-        spec = empty_arena()
-        attach_robot(spec, self.robot, robot_prefix(0))
-        self.model = spec.compile()
-        self.data = mujoco.MjData(self.model)
-        self.state = RobotState(
-            self.model, self.data, self.robot, prefix=robot_prefix(0)
-        )
-        self.start()
-        config = load_composite_controller_config(controller, self.robot)
-        self.controller = build_composite_controller(config, self.state)
+        super().__init__(name, controller)
         assert isinstance(self.controller, WholeBodyIK)
-        self.simulation = Simulation(
-            self.model, self.data, [(self.state, self.controller)]
-        )
         self.hands = [
             k
             for k, frame in enumerate(self.controller.config.frames)
@@ -71,24 +71,9 @@ class Bench:
             self.controller.robot, self.controller.config
         )
         self.free = mujoco.MjData(self.model)
-        self.worst = (0.0, "")
-        self.limited = np.flatnonzero(self.model.jnt_limited)
-
-    def start(self):
-        """Stand at `ready`."""
-        mujoco.mj_resetData(self.model, self.data)
-        posture = self.robot.keyframe("ready")
-        q, _ = self.state.joint_addresses(tuple(posture))
-        self.data.qpos[q] = list(posture.values())
-        if self.robot.root.kind == "free":
-            at = self.model.joint(f"{self.state.prefix}root").qposadr[0]
-            self.data.qpos[at : at + 7] = (*self.robot.root.pos, *self.robot.root.quat)
-        mujoco.mj_forward(self.model, self.data)
-
-    def reset(self):
-        """Stand at `ready` with goals that hold."""
-        self.start()
-        self.controller.reset(self.state)
+        self._limited = np.flatnonzero(self.model.jnt_limited)
+        self._limited_q = self.model.jnt_qposadr[self._limited]
+        self._low, self._high = self.model.jnt_range[self._limited].T
 
     def random_poses(self, rng):
         """Return poses of all hands at a random configuration free of collision."""
@@ -102,7 +87,7 @@ class Bench:
             apart = self.clearance.is_kept(q)
             if apart and self._touching(self.free.qpos) <= resting:
                 self.controller._configuration.update(q)
-                return [self.controller._planner.frame_pose(k) for k in self.hands]
+                return [self.controller.frames.pose(k) for k in self.hands]
         raise RuntimeError("no configuration free of collision in 1000 draws")
 
     def _touching(self, qpos):
@@ -155,7 +140,7 @@ class Bench:
         self.controller._configuration.update(q)
         worst = np.zeros(2)
         for k, goal in zip(self.hands, poses, strict=True):
-            pose = self.controller._planner.frame_pose(k)
+            pose = self.controller.frames.pose(k)
             error = (
                 np.linalg.norm(goal.translation - pose.translation),
                 np.linalg.norm(pin.log3(pose.rotation.T @ goal.rotation)),
@@ -163,125 +148,194 @@ class Bench:
             worst = np.maximum(worst, error)
         return worst
 
-    def run(self, seconds, watch=None):
-        """Advance; call `watch` every 20 ms."""
-        period = round(0.02 / self.model.opt.timestep)
-        for _ in range(round(seconds / 0.02)):
-            self.simulation.tick(period)
+    def run(self, seconds, watch=None, period=0.02):
+        """Advance; call `watch` every `period` seconds, at each physics step if 0."""
+        steps = max(round(period / self.model.opt.timestep), 1)
+        for _ in range(round(seconds / (steps * self.model.opt.timestep))):
+            self.simulation.tick(steps)
             if watch is not None:
                 watch()
 
     def overshoot(self):
-        """Return how far the worst joint is outside its range, rad or m; note it."""
-        q = self.data.qpos[self.model.jnt_qposadr[self.limited]]
-        low, high = self.model.jnt_range[self.limited].T
-        outside = np.maximum(low - q, q - high)
+        """Return how far the worst joint is outside its range, rad or m, and which."""
+        q = self.data.qpos[self._limited_q]
+        outside = np.maximum(self._low - q, q - self._high)
         worst = int(outside.argmax())
-        if outside[worst] > self.worst[0]:
-            name = self.model.joint(self.limited[worst]).name
-            self.worst = (float(outside[worst]), name.removeprefix("robot0_"))
-        return max(float(outside[worst]), 0.0)
+        return max(float(outside[worst]), 0.0), worst
+
+    def joint_name(self, worst):
+        """Return the name of the joint that `overshoot` numbered."""
+        name = self.model.joint(self._limited[worst]).name
+        return name.removeprefix("robot0_")
 
 
-def reachable(bench, trials, seed, progress=print):
-    """Run the first experiment."""
+def reachable(bench, trial, seed):
+    """Send the hands to where some configuration has them; return a row."""
+    rng = np.random.default_rng((seed, trial))
+    bench.reset()
+    poses = bench.random_poses(rng)
+    bench.send(poses)
+    bench.run(1.0)
+    history = [bench.errors(poses)]
+    bench.run(1.0, lambda: history.append(bench.errors(poses)))
+    info = bench.controller.info(bench.state)["ik"]["frames"]
+    frames = [info[bench.controller.config.frames[k].name] for k in bench.hands]
+    return {
+        "mm": 1e3 * float(history[-1][0]),
+        "deg": float(np.rad2deg(history[-1][1])),
+        "settled": bool((np.array(history) <= TOLERANCE).all()),
+        "reasons": [str(reason) for frame in frames for reason in frame["reasons"]],
+    }
+
+
+def ball(bench, trial, seed):
+    """Send the hands somewhere in the ball, then home; return a row."""
+    rng = np.random.default_rng((seed, 1, trial))
+    bench.reset()
+    names = [bench.controller.config.frames[k].name for k in bench.hands]
+    home = [bench.controller.goals_in_world[name].copy() for name in names]
+    poses = []
+    for _ in bench.hands:
+        direction = rng.normal(size=3)
+        direction *= 5.0 * rng.uniform() ** (1 / 3) / np.linalg.norm(direction)
+        turn = pin.Quaternion(rng.normal(size=4)).normalized()
+        poses.append(pin.SE3(turn.matrix(), direction))
+    outside = [(0.0, 0)]
+    bench.send(poses)
+    bench.run(1.0, lambda: outside.append(bench.overshoot()), period=0.0)
+    missed = bench.errors(poses)[0] > 2e-3
+    reached = bench.controller.info(bench.state)["ik"]["reached"]
+    bench.send(home)
+    bench.run(2.0, lambda: outside.append(bench.overshoot()), period=0.0)
+    most, joint = max(outside)
+    return {
+        "back_mm": 1e3 * float(bench.errors(home)[0]),
+        "limit_overshoot_rad": most,
+        "limit_joint": bench.joint_name(joint),
+        "silent": bool(missed and reached),
+    }
+
+
+def is_bad(row):
+    """Tell whether a trial is to be looked at."""
+    if "mm" in row:
+        return row["mm"] > 2.0
+    return row["back_mm"] > 1.0 or row["limit_overshoot_rad"] > 1e-3 or row["silent"]
+
+
+def reachable_summary(rows):
+    """Return the figures of the first experiment."""
+    mm, deg = (np.array([row[key] for row in rows]) for key in ("mm", "deg"))
+    return {
+        "trials": len(rows),
+        "median_mm": float(np.median(mm)),
+        "median_deg": float(np.median(deg)),
+        "worst_mm": float(mm.max()),
+        "worst_deg": float(deg.max()),
+        "over_2mm": int((mm > 2.0).sum()),
+        "settled": float(np.mean([row["settled"] for row in rows])),
+    }
+
+
+def ball_summary(rows):
+    """Return the figures of the second experiment."""
+    back = np.array([row["back_mm"] for row in rows])
+    worst = max(rows, key=lambda row: row["limit_overshoot_rad"])
+    return {
+        "trials": len(rows),
+        "worst_limit_overshoot_rad": worst["limit_overshoot_rad"],
+        "worst_limit_joint": worst["limit_joint"],
+        "missed_in_silence": sum(row["silent"] for row in rows),
+        "back_median_mm": float(np.median(back)),
+        "back_worst_mm": float(back.max()),
+        "back_over_1mm": int((back > 1.0).sum()),
+    }
+
+
+EXPERIMENTS = {
+    "reachable": (reachable, reachable_summary),
+    "ball": (ball, ball_summary),
+}
+
+
+class Kept:
+    """Rows of trials by case and number, in a file of JSON lines if there is one."""
+
+    def __init__(self, path):
+        self.path, self.rows = path, {}
+        if path is not None and path.exists():
+            for line in path.read_text("utf-8").splitlines():
+                row = json.loads(line)
+                self.rows[self._key(row)] = row
+
+    def _key(self, row):
+        return tuple(row[key] for key in KEYS)
+
+    def find(self, *key):
+        """Return a row that is already there, or None."""
+        return self.rows.get(key)
+
+    def add(self, row):
+        """Keep a row; it is on the disk when this returns."""
+        self.rows[self._key(row)] = row
+        if self.path is not None:
+            with self.path.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(row) + "\n")
+
+
+def run_trials(bench, case, experiment, numbers, seed, kept):
+    """Run the trials that are not yet kept; return the figures of all of them."""
+    trial, summary = EXPERIMENTS[experiment]
     rows = []
-    for trial in range(trials):
-        rng = np.random.default_rng((seed, trial))
-        bench.reset()
-        poses = bench.random_poses(rng)
-        bench.send(poses)
-        bench.run(1.0)
-        history = [bench.errors(poses)]
-        bench.run(1.0, lambda: history.append(bench.errors(poses)))  # noqa: B023
-        settled = bool((np.array(history) <= TOLERANCE).all())
-        info = bench.controller.info(bench.state)["ik"]["frames"]
-        reasons = [
-            r
-            for k in bench.hands
-            for r in info[bench.controller.config.frames[k].name]["reasons"]
-        ]
-        rows.append((*history[-1], settled, reasons))
-        if history[-1][0] > 2e-3:
-            error = 1e3 * history[-1][0]
-            progress(f"  trial {trial}: {error:.2f} mm {reasons}", flush=True)
-        elif trial % 100 == 99:
-            progress(f"  {trial + 1} trials", flush=True)
-    error = np.array([row[:2] for row in rows])
-    return {
-        "trials": trials,
-        "median_mm": 1e3 * float(np.median(error[:, 0])),
-        "median_deg": float(np.rad2deg(np.median(error[:, 1]))),
-        "worst_mm": 1e3 * float(error[:, 0].max()),
-        "worst_deg": float(np.rad2deg(error[:, 1].max())),
-        "over_2mm": int((error[:, 0] > 2e-3).sum()),
-        "settled": float(np.mean([row[2] for row in rows])),
-    }
-
-
-def ball(bench, trials, seed):
-    """Run the second experiment."""
-    overshoot, silent, back = [], 0, []
-    for trial in range(trials):
-        rng = np.random.default_rng((seed, 1, trial))
-        bench.reset()
-        names = [bench.controller.config.frames[k].name for k in bench.hands]
-        home = [bench.controller.goals_in_world[name].copy() for name in names]
-        poses = []
-        for _ in bench.hands:
-            direction = rng.normal(size=3)
-            direction *= 5.0 * rng.uniform() ** (1 / 3) / np.linalg.norm(direction)
-            turn = pin.Quaternion(rng.normal(size=4)).normalized()
-            poses.append(pin.SE3(turn.matrix(), direction))
-        bench.send(poses)
-        worst = [0.0]
-        bench.run(1.0, lambda: worst.append(bench.overshoot()))  # noqa: B023
-        missed = bench.errors(poses)[0] > 2e-3
-        silent += int(missed and bench.controller.info(bench.state)["ik"]["reached"])
-        bench.send(home)
-        bench.run(2.0, lambda: worst.append(bench.overshoot()))  # noqa: B023
-        overshoot.append(max(worst))
-        back.append(bench.errors(home)[0])
-    return {
-        "trials": trials,
-        "worst_limit_overshoot_rad": max(overshoot),
-        "worst_limit_joint": bench.worst[1],
-        "missed_in_silence": silent,
-        "back_median_mm": 1e3 * float(np.median(back)),
-        "back_worst_mm": 1e3 * max(back),
-        "back_over_1mm": int((np.array(back) > 1e-3).sum()),
-    }
+    for k in numbers:
+        key = (*case, experiment, seed, k)
+        row = kept.find(*key)
+        if row is None:
+            row = dict(zip(KEYS, key, strict=True)) | trial(bench, k, seed)
+            kept.add(row)
+        if is_bad(row):
+            print("  bad:", json.dumps(row), flush=True)
+        elif k % 100 == 99:
+            print(f"  {experiment} {k}", flush=True)
+        rows.append(row)
+    figures = summary(rows)
+    print(case[0], experiment, json.dumps(figures, indent=1), flush=True)
+    return figures
 
 
 def main():
     """Run from the command line."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = options(__doc__, "8 trials")
     parser.add_argument("--robots", nargs="+", default=list(ROBOTS))
     parser.add_argument("--controller", default="WHOLE_BODY_IK")
     parser.add_argument("--trials", type=int, default=1000)
     parser.add_argument("--ball", type=int, help="trials in the ball; as many")
+    parser.add_argument("--first", type=int, default=0, help="number of the first")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--quick", action="store_true", help="8 trials, under 50 s")
-    parser.add_argument("--json", type=Path)
+    parser.add_argument(
+        "--keep", type=Path, help="keep trials here, and go on with those already there"
+    )
     arguments = parser.parse_args()
     trials = 8 if arguments.quick else arguments.trials
     in_ball = trials // 4 if arguments.quick else arguments.ball
     in_ball = trials if in_ball is None else in_ball
-    rows = []
+    counts = {"reachable": trials, "ball": in_ball}
+    report, kept = Report(), Kept(arguments.keep)
     for name in arguments.robots:
-        began = time.perf_counter()
-        bench = Bench(name, arguments.controller)
+        began, case = time.process_time(), (name, arguments.controller)
+        bench = Bench(*case)
         row = {"case": name, "side": arguments.controller, "n": trials}
-        if trials:
-            row["reachable"] = reachable(bench, trials, arguments.seed)
-            print(name, json.dumps(row["reachable"], indent=1), flush=True)
-        if in_ball:
-            row["ball"] = ball(bench, in_ball, arguments.seed)
-            print(name, json.dumps(row["ball"], indent=1), flush=True)
-        row["wall_s"] = time.perf_counter() - began
-        rows.append(row)
-    if arguments.json:
-        arguments.json.write_text(json.dumps({"rows": rows, "ratios": {}}, indent=1))
+        for experiment, count in counts.items():
+            numbers = range(arguments.first, arguments.first + count)
+            if numbers:
+                row[experiment] = run_trials(
+                    bench, case, experiment, numbers, arguments.seed, kept
+                )
+        row["cpu_s"] = time.process_time() - began
+        report.rows.append(row)
+    for name, columns in COLUMNS.items():
+        report.show(TITLES[name], ("case", *(f"{name}.{key}" for key in columns)))
+    report.write(arguments.json)
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+COMPILING = "once on this machine"  # the first run of all says what takes long
 EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.py"))
 
 
@@ -24,7 +25,8 @@ def test_example_runs_quietly_and_leaves_nothing_behind(path, tmp_path):
         cwd=tmp_path,
         timeout=300,
     )
-    assert (result.returncode, result.stderr) == (0, "")
+    said = [line for line in result.stderr.splitlines() if COMPILING not in line]
+    assert (result.returncode, said) == (0, [])
     assert result.stdout.count("\n") >= 2
     assert "nan" not in result.stdout.split()
     assert list(tmp_path.iterdir()) == []

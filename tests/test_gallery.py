@@ -1,22 +1,41 @@
-"""The README shows every robot, gripper and base of the catalogue."""
+"""The README shows every robot, gripper and base, a page every benchmark."""
 
 import importlib.util
 from pathlib import Path
 
+import numpy as np
 import pytest
 from PIL import Image
+
+from wbc_suite.benchmark import benchmark_names
 
 ROOT = Path(__file__).parent.parent
 
 
-@pytest.fixture(scope="module")
-def gallery():
-    spec = importlib.util.spec_from_file_location(
-        "draw_gallery", ROOT / "docs" / "draw_gallery.py"
-    )
+def script(name):
+    spec = importlib.util.spec_from_file_location(name, ROOT / "docs" / f"{name}.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+@pytest.fixture(scope="module")
+def gallery():
+    return script("draw_gallery")
+
+
+@pytest.fixture(scope="module")
+def benchmarks():
+    return script("draw_benchmarks")
+
+
+def check_picture(path, size, name):
+    assert path.is_file(), f"run `make gallery ARGS={name}`"
+    assert path.stat().st_size < 30_000
+    with Image.open(path) as picture:
+        assert picture.size == size
+        pixels = np.asarray(picture.convert("RGB")).reshape(-1, 3)
+    assert len(np.unique(pixels, axis=0)) > 500  # something is drawn
 
 
 def test_the_readme_shows_the_catalogue(gallery):
@@ -28,10 +47,14 @@ def test_every_subject_has_a_small_picture(gallery):
     names = [name for rows in gallery.subjects().values() for _, name in rows]
     assert len(names) > 30
     for name in names:
-        path = gallery.picture_of(name)
-        assert path.is_file(), f"run `make gallery ARGS={name}`"
-        assert path.stat().st_size < 30_000
-        with Image.open(path) as picture:
-            assert picture.size == (gallery.SIZE, gallery.SIZE)
-            assert len(set(picture.getdata())) > 500  # something is drawn
+        check_picture(gallery.picture_of(name), (gallery.SIZE, gallery.SIZE), name)
     assert len(list(gallery.FOLDER.iterdir())) == len(names)
+
+
+def test_every_benchmark_has_a_picture_and_a_place_on_the_page(benchmarks):
+    names = benchmark_names()
+    assert benchmarks.PAGE.read_text(encoding="utf-8") == benchmarks.page()
+    assert set(benchmarks.ROBOTS) == set(names)
+    for name in names:
+        check_picture(benchmarks.picture_of(name), benchmarks.SIZE, name)
+    assert len(list(benchmarks.FOLDER.iterdir())) == len(names)

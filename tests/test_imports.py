@@ -11,7 +11,18 @@ import wbc_suite
 PACKAGE = Path(wbc_suite.__file__).parent
 MODULES = sorted(p for p in PACKAGE.rglob("*.py") if "_catalogue" not in p.parts)
 
-BASE = ("errors", "typing", "arguments", "tomlfile", "catalogue", "registration")
+BASE = (
+    "errors",
+    "typing",
+    "arguments",
+    "timing",
+    "tomlfile",
+    "catalogue",
+    "registration",
+    "user_cache",
+    "linked_code",
+    "compiling",
+)
 ORDER = (
     "robot",
     "kinematics",
@@ -23,10 +34,14 @@ ORDER = (
     "envs",
 )
 TOP = (
+    "executors",
+    "policies",
     "randomisation",
     "devices",
     "recording",
     "wrappers",
+    "rollout",
+    "compat",
     "viewers",
     "teleoperation",
     "cli",

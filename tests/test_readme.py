@@ -29,7 +29,8 @@ SNIPPETS = [
 
 
 @pytest.mark.parametrize("snippet", SNIPPETS)
-def test_python_snippets_run(snippet):
+def test_python_snippets_run(snippet, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # some write files
     exec(compile(snippet, "snippet", "exec"), {"__name__": "__main__"})
 
 

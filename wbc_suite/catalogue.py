@@ -7,6 +7,7 @@ the top of the repository. A laboratory adds a folder of its own of the same sha
 """
 
 import os
+import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -32,6 +33,16 @@ def _default_extra() -> tuple[Path, ...]:
 def _key(name: str) -> str:
     """Fold a name so that `SpotWithArm`, `spot_with_arm` and `spotwitharm` agree."""
     return name.casefold().replace("_", "").replace("-", "")
+
+
+def _own_name(path: Path) -> str:
+    try:
+        content = tomllib.loads(path.read_text("utf-8"))
+    except (OSError, ValueError):
+        return path.stem  # the error is about another name than this one
+    headers = (content, *map(content.get, ("assembly", "component")))
+    names = (header.get("name") for header in headers if isinstance(header, dict))
+    return next((name for name in names if isinstance(name, str)), path.stem)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -64,6 +75,17 @@ class Catalogue:
         found = {p.stem: p for p in self._files(folder)}
         return tuple(found[name] for name in self.names(folder))
 
+    def called(self, folder: str) -> tuple[str, ...]:
+        """Return what files call themselves, such as `Robotiq85Gripper`, as `names`.
+
+        A file that says no name, or cannot be read, is called by its stem.
+        """
+        return tuple(_own_name(path) for path in self.files(folder))
+
+    def holds(self, folder: str, name: str) -> bool:
+        """Whether a folder has a file of a name, as `find` looks for it."""
+        return _key(name) in map(_key, self.names(folder))
+
     def find(
         self, folder: str, name: str, *, kind: str, side: str | None = None
     ) -> Path:
@@ -88,7 +110,7 @@ class Catalogue:
             paired = (p for k, p in found.items() if k.replace(side, "", 1) == wanted)
             path = next(paired, None)
         if path is None:
-            raise UnknownNameError(kind, name, self.names(folder))
+            raise UnknownNameError(kind, name, self.called(folder))
         return path
 
     def is_ours(self, file: Path) -> bool:

@@ -13,7 +13,17 @@ from types import ModuleType
 
 __all__ = ["BENCHMARKS", "register_environments"]
 
-BENCHMARKS = ("Lift",)
+BENCHMARKS = (
+    "Door",
+    "Lift",
+    *("NutAssembly", "NutAssemblySingle", "NutAssemblySquare", "NutAssemblyRound"),
+    *("PickPlace", "PickPlaceSingle"),
+    *("PickPlaceMilk", "PickPlaceBread", "PickPlaceCereal", "PickPlaceCan"),
+    "Stack",
+    "ToolHang",
+    *("TwoArmHandover", "TwoArmLift", "TwoArmPegInHole", "TwoArmTransport"),
+    "Wipe",
+)
 """Benchmarks with an id, `wbc_suite/{name}-v0`."""
 
 
@@ -33,6 +43,7 @@ def _register() -> None:
             register(
                 id=f"wbc_suite/{name}-v0",
                 entry_point="wbc_suite.envs.env:RobotEnv",
+                vector_entry_point="wbc_suite.envs.vector:VectorRobotEnv",
                 kwargs={"benchmark": name},
             )
 

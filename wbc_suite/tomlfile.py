@@ -78,7 +78,9 @@ def parse_toml(text: str, *, source: str) -> dict[str, Any]:
     """
     try:
         return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except RecursionError as error:
+        raise ConfigError(f"{source}: its values are nested too deep.") from error
+    except ValueError as error:  # no TOML, or a number of thousands of digits
         raise ConfigError(f"{source}: not a readable TOML file: {error}") from error
 
 
@@ -143,12 +145,14 @@ def _dotted(loc: tuple[int | str, ...], model: type[BaseModel]) -> str:
         if isinstance(part, int):
             text += f"[{part}]"
             continue
-        tagged = [m for m in options if _tag(m) == part]
+        tagged = [m for m in options if part in _tags(m)]
         if tagged and len(options) > 1:
             options = tagged
             continue
+        if not options and _is_type(part):  # which of `float | tuple` it was not
+            continue
         text += f".{part}" if text else part
-        options = [n for m in options for n in _field_models(m, part)]
+        options = _below(options, part)
     return text
 
 
@@ -158,22 +162,37 @@ def _legal_keys(model: type[BaseModel], loc: tuple[int | str, ...]) -> list[str]
     for part in loc:
         if isinstance(part, int):
             continue
-        tagged = [m for m in options if _tag(m) == part]
-        if tagged and len(options) > 1:
-            options = tagged
-        else:
-            options = [n for m in options for n in _field_models(m, part)]
+        tagged = [m for m in options if part in _tags(m)]
+        several = tagged and len(options) > 1
+        options = tagged if several else _below(options, part)
     return [f.alias or n for m in options for n, f in m.model_fields.items()]
 
 
-def _tag(model: type[BaseModel]) -> str | None:
-    """Return the literal that selects this model in a discriminated union."""
-    for field in model.model_fields.values():
+def _tags(model: type[BaseModel]) -> tuple[object, ...]:
+    """Return the literals that select this model in a discriminated union."""
+    for name, field in model.model_fields.items():
         if typing.get_origin(field.annotation) is typing.Literal:
-            arguments = typing.get_args(field.annotation)
-            if len(arguments) == 1:
-                return str(arguments[0])
-    return None
+            literals = typing.get_args(field.annotation)
+            if len(literals) == 1 or name == "type":
+                return literals
+    return ()
+
+
+def _is_type(part: str) -> bool:
+    """Whether a part of a location is pydantic's name of a type, and no key."""
+    return part.startswith(("constrained-", "tuple[", "literal[", "list[")) or part in (
+        *("float", "int", "str", "bool", "none"),
+    )
+
+
+def _below(options: list[type[BaseModel]], part: str) -> list[type[BaseModel]]:
+    """Return the models of a key's value; a name in a table of models changes none."""
+    fields = {
+        key for m in options for n, f in m.model_fields.items() for key in (n, f.alias)
+    }
+    if part not in fields:
+        return options
+    return [n for m in options for n in _field_models(m, part)]
 
 
 def _field_models(model: type[BaseModel], key: str) -> list[type[BaseModel]]:

@@ -1,6 +1,7 @@
 """placo's side of `whole_body_ik.py`; runs in .venv-placo, which has no wbc_suite.
 
-Reads robot.urdf, job.json and in.npz from a folder, writes out.npz there.
+Reads robot.urdf, job.json and in.npz from a folder. Each line of its input is a number
+of ticks to run, which it answers with a line; at the end it writes out.npz.
 """
 
 import json
@@ -22,6 +23,18 @@ def base_of(robot) -> list[float]:
     y = (T[0, 2] - T[2, 0]) / (4 * w)
     z = (T[1, 0] - T[0, 1]) / (4 * w)
     return [*T[:3, 3], x, y, z, w]
+
+
+def in_turns(targets):
+    """Yield targets, as many as each line asks for, and answer the line."""
+    k = 0
+    print("ready", flush=True)
+    for line in sys.stdin:
+        last = k + int(line)
+        while k < last:
+            yield targets[k]
+            k += 1
+        print("done", flush=True)
 
 
 def main(folder: Path) -> None:
@@ -57,7 +70,7 @@ def main(folder: Path) -> None:
     posture.configure("posture", "soft", job["posture_cost"] ** 2)
     solver.add_regularization_task(job["damping"])
     out = {"kinematics": [], "solve": [], "total": [], "q": [], "failed": 0}
-    for poses in targets:
+    for poses in in_turns(targets):
         t0 = clock()
         robot.update_kinematics()
         t1 = clock()

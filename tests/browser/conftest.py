@@ -11,6 +11,7 @@ import pinocchio as pin
 import pytest
 
 import wbc_suite
+from wbc_suite.cli.by_hand import SWITCH_INTERVAL
 from wbc_suite.viewers.site import Site
 from wbc_suite.viewers.teleop_page import TeleopPage
 from wbc_suite.viewers.teleop_session import TeleopSession
@@ -27,8 +28,17 @@ FLAGS = [
     "--disable-sync",
     "--no-first-run",
 ]
-PATIENCE = 120.0  # s; software WebGL draws 2 or 3 pictures a second
+PATIENCE = 300.0  # s; software WebGL draws 2 or 3 pictures a second, shared by all
 RATE = 100.0  # Hz, what `wbc-suite teleop` uses
+TRIES = 5
+DRAWN = """pictures => new Promise(done => {
+    const count = () => pictures-- > 0 ? requestAnimationFrame(count) : done()
+    count()
+})"""
+SELDOM = """
+    const time = () => performance.now()
+    window.requestAnimationFrame = draw => setTimeout(() => draw(time()), 2000)
+"""
 
 
 def wait_until(condition, what, patience=PATIENCE):
@@ -48,13 +58,16 @@ class Viewer:
         site: Site to open.
         size: Of the page, in pixels.
         dots: Drawn per pixel; fewer cost a browser without graphics card less.
+        watching: Whether anybody looks at the robot; else it is drawn seldom.
     """
 
-    def __init__(self, context, site, *, size=(960, 600), dots=0.4):
+    def __init__(self, context, site, *, size=(960, 600), dots=0.4, watching=True):
         self.site = site
         self.requests = []
         before = set(site.server.get_clients())
         self.page = context.new_page()
+        if not watching:
+            self.page.add_init_script(SELDOM)
         self.page.set_default_timeout(1e3 * PATIENCE)
         self.page.set_viewport_size({"width": size[0], "height": size[1]})
         self.page.on("request", lambda request: self.requests.append(request.url))
@@ -94,17 +107,44 @@ class Viewer:
         along = tips[best] - origin
         return pose.rotation[:, best], tips[best], along / np.linalg.norm(along)
 
+    def draw(self, pictures=3):
+        """Wait until the page has drawn: what it was told is on the screen then."""
+        self.page.evaluate(DRAWN, pictures)
+
     def drag(self, start, direction, pixels, *, release=True, steps=6):
         """Press at a pixel, move, and let go, as a hand on a mouse would."""
         mouse = self.page.mouse
+        self.page.bring_to_front()
         mouse.move(*start)
-        time.sleep(0.3)
+        self.draw()
         mouse.down()
         for k in range(1, steps + 1):
             mouse.move(*(start + direction * pixels * k / steps))
-            time.sleep(0.05)
+            self.draw(1)
         if release:
             mouse.up()
+
+    def drag_until(self, took, grip, pixels, *, sign=1.0, release=True, steps=6):
+        """Drag; again where the arrow was missed, as a person does.
+
+        Args:
+            took: Tells whether it was not missed.
+            grip: Returns an axis, a pixel, and a direction; see `arrow`.
+            pixels: How far.
+            sign: 1 along the direction, -1 against it.
+            release: Whether the button is let go.
+            steps: Moves of the mouse.
+        """
+        for _ in range(TRIES):
+            _, start, along = grip()
+            self.drag(start, sign * along, pixels, release=release, steps=steps)
+            deadline = time.monotonic() + PATIENCE / TRIES
+            while time.monotonic() < deadline:
+                if took():
+                    return
+                time.sleep(0.02)
+            self.page.mouse.up()
+        raise AssertionError(f"dragged {TRIES} times in vain")
 
     def screenshot(self, name):
         ARTIFACTS.mkdir(exist_ok=True)
@@ -155,6 +195,8 @@ def served(robot, controller="WHOLE_BODY_IK", host="127.0.0.1"):
         horizon=10**7,
     )
     session = TeleopSession(env, period=1 / RATE)
+    for limb in session.limbs.values():  # a slow browser is not a frozen one
+        limb.ownership.timeout = PATIENCE
     page = TeleopPage(session, Site(host, port=0), label=f"{robot} · Lift")
     page.start()
     session.start()
@@ -163,7 +205,7 @@ def served(robot, controller="WHOLE_BODY_IK", host="127.0.0.1"):
 
 def running(robot):
     interval = sys.getswitchinterval()
-    sys.setswitchinterval(1e-3)  # as the command does
+    sys.setswitchinterval(SWITCH_INTERVAL)  # as the command does
     session, page = served(robot)
     yield session, page
     session.stop()

@@ -1,3 +1,4 @@
+import json
 import os
 import re
 import subprocess
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from wbc_suite.benchmark import benchmark_names
 from wbc_suite.catalogue import ENVIRONMENT_VARIABLE, Catalogue
 from wbc_suite.cli import main
 from wbc_suite.robot import load_robot
@@ -67,15 +69,20 @@ def test_version_is_printed(wbc_suite_command):
 def test_list_names_every_robot_and_component(wbc_suite_command):
     code, out, _ = wbc_suite_command("list")
     assert code == 0
-    for name in ("Panda", "GR1", "Tiago", "SpotWithArm", "rethink_mount"):
+    for name in ("Panda", "GR1", "Tiago", "SpotWithArm", "RethinkMount"):
         assert name in out
 
 
 def test_list_of_one_kind_leaves_the_others_out(wbc_suite_command):
     _, out, _ = wbc_suite_command("list", "bases")
-    assert "rethink_mount" in out
+    assert "RethinkMount" in out
     assert "planar" in out  # the root that a base brings
     assert "Panda" not in out
+
+
+def test_list_calls_benchmarks_as_users_do(wbc_suite_command):
+    _, out, _ = wbc_suite_command("list", "benchmarks")
+    assert all(name in out for name in benchmark_names())
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda p: f"{p.parent.name}-{p.stem}")
@@ -152,8 +159,40 @@ def test_a_typo_in_any_file_is_told_in_one_line(wbc_suite_command, tmp_path, dam
 def test_describe_action_shows_every_slice_with_its_unit(wbc_suite_command):
     code, out, _ = wbc_suite_command("describe-action", "Panda")
     assert code == 0
-    for word in ("right_hand", "0:6", "m rad", "right_gripper", "-1 open .. 1 closed"):
+    words = ["BASIC: 7 values", "0:6", "0.05 m 0.5 rad", "hold the present goal"]
+    for word in (*words, "right_gripper", "-1 open .. 1 closed", "half closed"):
         assert word in out
+    whole = ("--controller", "WHOLE_BODY_IK")
+    code, out, _ = wbc_suite_command("describe-action", "Panda", *whole)
+    assert code == 0
+    for word in ("right_hand", "0:6", "m rad", "go to the origin; hold_action holds"):
+        assert word in out
+    code, out, _ = wbc_suite_command("describe-action", "PandaOmron")
+    assert code == 0
+    for word in ("HYBRID_MOBILE_BASE: 12", "forward", "stands still", "base_mode"):
+        assert word in out
+
+
+def test_a_json_controller_is_checked_against_its_robot(wbc_suite_command, tmp_path):
+    file = tmp_path / "mine.json"
+    file.write_text('{"type": "OSC_POSE", "kp": 100}')
+    code, out, _ = wbc_suite_command("check", file, "--robot", "Baxter")
+    assert code == 0
+    assert "BASIC of right (OSC_POSE), left (OSC_POSE)" in out
+    code, _, err = wbc_suite_command("check", file)
+    assert code == 2
+    assert "name the robot" in err
+    file.write_text('{"type": "OSC_POSE", "kpp": 100}')
+    code, _, err = wbc_suite_command("check", file, "--robot", "Baxter")
+    assert code == 2
+    assert "Did you mean 'kp'" in err
+
+
+def test_the_list_names_part_controllers_and_what_files_control(wbc_suite_command):
+    _, out, _ = wbc_suite_command("list", "controllers")
+    for word in ("HYBRID_MOBILE_BASE", "JOINT_TORQUE", "STANCE", "right_hand"):
+        assert word in out
+    assert "pandaomron_basic" in out
 
 
 def test_grippers_and_bases_are_chosen_on_the_command_line(wbc_suite_command, tmp_path):
@@ -198,7 +237,7 @@ def _frame(film: Image.Image, number: int) -> Image.Image:
     ("arguments", "words"),
     [
         (["check", "nowhere/robot.toml"], ["nowhere/robot.toml", "No such file"]),
-        (["export", "Pandda", "--to", "mjcf"], ["Pandda", "Did you mean 'panda'"]),
+        (["export", "Pandda", "--to", "mjcf"], ["Pandda", "Did you mean 'Panda'"]),
         (
             ["render", "PandaGripper", "-o", "a.png"],
             ["No robot named", "Did you mean 'gripper/PandaGripper'"],
@@ -223,3 +262,20 @@ def test_a_mistake_gets_one_line_and_exit_code_2(wbc_suite_command, arguments, w
     assert err.count("\n") == 1
     for word in words:
         assert word in err
+
+
+def test_bench_times_steps_beside_raw_physics(wbc_suite_command, tmp_path):
+    file = tmp_path / "bench.json"
+    code, out, _ = wbc_suite_command(
+        *("bench", "Lift", "--actions", 10, "--camera", "agentview"),
+        *("--size", 32, "--json", file),
+    )
+    assert code == 0
+    times = json.loads(file.read_text("utf-8"))["us"]
+    assert len(times["step"]) == 10
+    assert len(times["raw physics, 25 steps of it"]) == 10
+    assert min(min(found) for found in times.values()) > 0.0
+    for name in times:
+        assert name in out
+    ratio = np.median(times["step"]) / np.median(times["raw physics, 25 steps of it"])
+    assert f"{ratio:.2f} of its own raw physics" in out

@@ -85,3 +85,25 @@ def test_table_names_every_slice_and_unit(layout):
     assert lines[1].split()[:3] == ["hand", "position", "0:3"]
     assert "3:5" in lines[2]
     assert " m " in lines[2]
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32, np.int64])
+def test_take_is_check_and_clip_and_leaves_the_callers_array(layout, dtype):
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        action = rng.uniform(-3.0, 4.0, 5).astype(dtype)
+        before = action.copy()
+        taken, outside = layout.take(action)
+        expected, count = layout.clip(layout.check(action))
+        np.testing.assert_array_equal(taken, expected)
+        assert (taken.dtype, outside) == (np.float64, count)
+        taken += 1.0
+        np.testing.assert_array_equal(action, before)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_take_refuses_what_is_not_finite(layout, bad):
+    with pytest.raises(ActionError, match=r"index 3 \(foot: x\)"):
+        layout.take(np.array([0.0, 0.0, 0.0, bad, 0.0]))
+    with pytest.raises(ActionError, match="shape"):
+        layout.take(np.zeros(4))

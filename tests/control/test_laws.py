@@ -2,34 +2,14 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from wbc_suite.control.composite.approach import (
+from wbc_suite.control.part.approach import (
     approach_pose,
     approach_speed,
     travel_time,
 )
-from wbc_suite.control.composite.reference import Reference
-from wbc_suite.control.part.joint_position import computed_torque
+from wbc_suite.control.part.reference import Reference, mean_over
 from wbc_suite.control.part.stance import contact_forces
 from wbc_suite.robot import load_robot
-
-
-def test_computed_torque_is_inverse_dynamics_of_the_wanted_acceleration():
-    model = load_robot("Panda").to_pinocchio()
-    data = model.createData()
-    rng = np.random.default_rng(0)
-    for _ in range(20):
-        q, v, a, e, de = rng.normal(size=(5, model.nv))
-        tau = computed_torque(
-            mass_matrix=pin.crba(model, data, q).copy(),
-            bias=pin.nle(model, data, q, v).copy(),
-            acceleration=a,
-            position_error=e,
-            velocity_error=de,
-            kp=100.0,
-            kd=20.0,
-        )
-        wanted = a + 100.0 * e + 20.0 * de
-        np.testing.assert_allclose(tau, pin.rnea(model, data, q, v, wanted), atol=1e-8)
 
 
 def standing():
@@ -89,26 +69,77 @@ def test_travel_time_is_that_of_the_fastest_profile():
     np.testing.assert_allclose(times, [0.0, np.sqrt(0.5), 2.0])
 
 
-def test_the_reference_is_smooth_and_stays_between_solved_configurations():
+def sampled_reference(mean, rates, samples=4):
+    """Return solved configurations, then p, v, a of the reference, sampled finely."""
     model = load_robot("Panda").to_pinocchio()
     index = np.arange(3)
-    reference = Reference(model, index, index, 0.01)
+    reference = Reference(model, index, index, 0.01, mean=mean)
     q0 = np.zeros(model.nq)
     reference.reset(q0)
-    rng = np.random.default_rng(1)
-    solved, positions, velocities = [q0[:3]], [], []
-    for _ in range(20):
+    solved, sampled = [q0[:3]], []
+    for rate in rates:
         v = np.zeros(model.nv)
-        v[:3] = rng.normal(size=3)
+        v[:3] = rate
         solved.append(reference.extend(v)[:3])
-        for s in (0.0025, 0.005, 0.0075, 0.01):
-            target = reference.sample(s, np.zeros(0))
-            positions.append(target.position)
-            velocities.append(target.velocity)
-            low = np.min(solved[-3:], axis=0)
-            high = np.max(solved[-3:], axis=0)
-            assert (target.position >= low - 1e-12).all()
-            assert (target.position <= high + 1e-12).all()
-    steps = np.diff(positions, axis=0) / 0.0025
-    means = 0.5 * (np.array(velocities)[1:] + np.array(velocities)[:-1])
-    np.testing.assert_allclose(steps, means, atol=1e-9)
+        p, r, c, j = reference.polynomial()
+        for s in np.linspace(0.01 / samples, 0.01, samples):
+            a = c + s * j
+            sampled.append(
+                (p + s * (r + s * (c / 2 + s * j / 6)), r + s * (c + a) / 2, a)
+            )
+        np.testing.assert_allclose(sampled[-1][0], reference.targets(), atol=1e-15)
+    return np.array(solved), np.array(sampled)
+
+
+@pytest.mark.parametrize("mean", [1, 2, 5])
+def test_the_reference_keeps_every_limit_of_what_was_solved(mean):
+    rng, dt, most = np.random.default_rng(1), 0.01, 50.0
+    changes = rng.choice([-1.0, 1.0], size=(60, 3)) * most * dt  # the worst there is
+    rates = np.cumsum(changes, axis=0)
+    solved, sampled = sampled_reference(mean, rates)
+    position, velocity, acceleration = np.swapaxes(sampled, 0, 1)
+    for k in range(len(position)):
+        recent = solved[max(0, k // 4 - 1 - mean) : k // 4 + 2]
+        assert (position[k] >= recent.min(axis=0) - 1e-12).all()
+        assert (position[k] <= recent.max(axis=0) + 1e-12).all()
+    assert (np.abs(velocity).max(axis=0) <= np.abs(rates).max(axis=0) + 1e-9).all()
+    assert np.abs(acceleration).max() <= most * (1.0 + 1e-9)
+    steps, spans = np.diff(sampled, axis=0), 0.0025
+    np.testing.assert_allclose(
+        steps[:, 0] / spans, (velocity[1:] + velocity[:-1]) / 2, atol=6e-3
+    )
+    np.testing.assert_allclose(
+        steps[:, 1] / spans, (acceleration[1:] + acceleration[:-1]) / 2, atol=1e-8
+    )
+    jerk = np.abs(steps[:, 2]).max() / spans
+    assert jerk <= 2.0 * most / (mean * dt) * (1.0 + 1e-6)
+    assert mean_over(most, jerk, dt) <= mean
+    assert jerk > most / (mean * dt), "the worst was asked for"
+
+
+@pytest.mark.parametrize("mean", [1, 3])
+def test_the_reference_arrives_where_the_last_solve_was(mean):
+    rates = [[0.3, -0.2, 0.1]] * 5 + [[0.0] * 3] * (mean + 2)
+    solved, sampled = sampled_reference(mean, rates)
+    np.testing.assert_allclose(
+        sampled[-1], [solved[-1], np.zeros(3), np.zeros(3)], atol=1e-12
+    )
+
+
+def test_a_mean_of_turned_roots_is_a_turn_and_arrives():
+    model = load_robot("GR1FreeBody").to_pinocchio()
+    none = np.zeros(0, dtype=np.int64)
+    reference = Reference(model, none, none, 0.01, mean=3)
+    rng, q = np.random.default_rng(2), pin.neutral(model)
+    reference.reset(q)
+    for _ in range(8):
+        q = reference.extend(rng.normal(size=model.nv))
+        turn = reference.root_motion().start.rotation
+        np.testing.assert_allclose(turn @ turn.T, np.eye(3), atol=1e-12)
+    for _ in range(5):
+        reference.extend(np.zeros(model.nv))
+    motion = reference.root_motion()
+    assert motion.start.isApprox(pin.XYZQUATToSE3(q[:7]), 1e-12)
+    assert (
+        np.abs(np.concatenate([motion.twist, motion.curve, motion.bend])).max() < 1e-8
+    )

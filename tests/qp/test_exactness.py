@@ -152,6 +152,50 @@ def test_warm_active_set_answers_exactly_or_not_at_all(rng):
     assert answers > 300
 
 
+def random_problem(rng, n: int, inequalities: int, equalities: int) -> Problem:
+    problem = Problem(n, inequalities, equalities)
+    W = rng.normal(size=(n, n))
+    problem.H[:], problem.c[:] = W.T @ W + 0.01 * np.eye(n), rng.normal(size=n)
+    problem.lb[:], problem.ub[:] = -rng.random(n), rng.random(n)
+    problem.rows[:] = rng.normal(size=problem.rows.shape)
+    inside = rng.uniform(problem.lb, problem.ub)
+    problem.h[:] = problem.G @ inside + 0.2 * rng.random(inequalities)
+    problem.set_equalities(problem.A @ inside)
+    return problem
+
+
+def test_daqp_is_exact_whatever_bound_the_time_before(rng):
+    for _ in range(30):
+        n, solver = int(rng.integers(4, 20)), make_solver("daqp")
+        for _ in range(5):  # of one size, and with nothing else in common
+            problem = random_problem(rng, n, 6, 2)
+            problem.G[1], problem.h[1] = problem.G[0], problem.h[0]  # both bind
+            problem.G[2], problem.h[2] = 0.0, 0.1
+            x, multipliers = solver.solve(problem) or pytest.fail("not solved")
+            np.testing.assert_allclose(x, exact(problem), atol=1e-9)
+            pull = multipliers[:n] + problem.rows.T @ multipliers[n:]
+            np.testing.assert_allclose(problem.H @ x + problem.c, -pull, atol=1e-9)
+            kept = np.concatenate([x, problem.rows @ x])
+            at_upper = np.isclose(kept, problem.upper, atol=1e-9)
+            at_lower = np.isclose(kept, problem.lower, atol=1e-9)
+            assert (at_upper | (multipliers <= 0.0)).all()
+            assert (at_lower | (multipliers >= 0.0)).all()
+
+
+def test_daqp_tells_what_has_no_solution_and_goes_on(rng):
+    solver, problem = make_solver("daqp"), random_problem(rng, 8, 2, 1)
+    assert solver.solve(problem) is not None
+    impossible = problem.copy()
+    impossible.G[0], impossible.h[0] = 1.0, -1.0 + impossible.lb.sum()
+    assert solver.solve(impossible) is None
+    for value in (-1.0, np.nan):
+        bent = problem.copy()
+        bent.H[3, 3] = value
+        assert solver.solve(bent) is None
+    x, _ = solver.solve(problem) or pytest.fail("not solved")
+    np.testing.assert_allclose(x, exact(problem), atol=1e-9)
+
+
 def test_box_least_squares_converges_to_the_exact_optimum(rng):
     for _ in range(20):
         W = rng.normal(size=(12, 8))

@@ -77,11 +77,11 @@ def test_rows_are_the_nearest_pairs_and_the_derivative_of_their_distance(rng):
     for _ in range(5):
         q = rng.uniform(model.lowerPositionLimit, model.upperPositionLimit) * 0.7
         configuration.update(q)
-        G, h = np.zeros((20, model.nv)), np.zeros(20)
+        G, h = np.zeros((limit.dim, model.nv)), np.zeros(limit.dim)
         limit.rows(configuration, DT, G, h)
         used = limit.found >= 0
         expected = all_distances(robot, configuration)
-        expected = expected[expected < limit.influence][:20]
+        expected = expected[expected < limit.influence][: limit.dim]
         np.testing.assert_allclose(limit.distances[used], expected, atol=1e-12)
         found, before = limit.found.copy(), limit.distances.copy()
         for i in rng.permutation(model.nv)[:10]:
@@ -109,7 +109,7 @@ def test_pairs_that_overlap_in_a_keyframe_are_left_out():
     for joint, angle in crossed.items():
         q[configuration.model.joints[configuration.joint_id(joint)].idx_q] = angle
     configuration.update(q)
-    G, h = np.zeros((20, configuration.nv)), np.zeros(20)
+    G, h = np.zeros((limit.dim, configuration.nv)), np.zeros(limit.dim)
     limit.rows(configuration, DT, G, h)
     assert limit.distances[0] >= limit.margin
     assert all_distances(robot, configuration)[0] < 0.0
@@ -138,7 +138,7 @@ def attack(seconds: float, seed: int) -> tuple[float, set]:
         assert np.isfinite(solution.dq).all()
         kinds |= {a.kind for a in solution.active}
         configuration.update(configuration.integrate(solution.dq))
-        G, h = np.zeros((20, configuration.nv)), np.zeros(20)
+        G, h = np.zeros((limit.dim, configuration.nv)), np.zeros(limit.dim)
         limit.rows(configuration, DT, G, h)
         least = min(least, limit.distances[0])
     return least, kinds

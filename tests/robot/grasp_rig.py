@@ -16,7 +16,8 @@ import pinocchio as pin
 import wbc_suite
 from wbc_suite.control import RobotState
 from wbc_suite.control.part.gripper import GripperController
-from wbc_suite.scene import TableConfig, add_box, add_table, attach_robot, empty_arena
+from wbc_suite.scene import TableConfig, add_table, attach_robot, empty_arena
+from wbc_suite.scene.objects import box
 
 PREFIX = "robot0_"
 TABLE = 0.4  # m, height of the table's top
@@ -114,7 +115,7 @@ class GraspRig:
             half = self.thing.half
             density = self.thing.mass / (2 * half) ** 3
             size, red = (half, half, half), (0.85, 0.25, 0.15, 1)
-            add_box(spec, "thing", half_size=size, rgba=red, density=density)
+            box("thing", size, color=red, density=density).add_to(spec)
         centre = np.array([0.0, 0.0, TABLE + self.thing.half])
         spec.body("thing").pos = centre
         body = spec.worldbody.add_body(name="carriage", gravcomp=1)
@@ -183,7 +184,7 @@ class GraspRig:
 
     def close(self, share=1.0):
         """Command the gripper, from 0, open, to 1, closed."""
-        self.hand.set_goal(self.commands(share))
+        self.hand.set_goal(self.commands(share), 0.05)
 
     def step(self, position, velocity, acceleration):
         """Advance one step with the carriage on its way."""
@@ -192,7 +193,8 @@ class GraspRig:
         wanted = acceleration + STIFFNESS * (position - data.qpos[self._places])
         wanted += 2.0 * np.sqrt(STIFFNESS) * (velocity - data.qvel[self._dofs])
         data.qfrc_applied[self._dofs] = CARRIAGE * wanted
-        data.ctrl[self.state.actuator_ids[self.hand.outputs]] = self.hand.set_points()
+        law = self.hand.law
+        data.ctrl[law.drives["ctrl"]] = law.target()[0]
         mujoco.mj_step2(model, data)
         assert not data.warning.number.any()
 

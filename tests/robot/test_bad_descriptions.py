@@ -146,7 +146,7 @@ def test_a_table_without_a_kind_is_explained(load):
 
 @pytest.mark.parametrize(
     ("name", "hint"),
-    [("Pnda", "'panda'"), ("GR2", "'gr1"), ("Spot_Arm", "arm/Spot_Arm")],
+    [("Pnda", "'Panda'"), ("GR2", "'GR1'"), ("Spot_Arm", "arm/Spot_Arm")],
 )
 def test_an_unknown_robot_is_answered_with_the_nearest(name, hint):
     with pytest.raises(UnknownNameError, match=hint):

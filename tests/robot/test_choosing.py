@@ -33,12 +33,12 @@ def test_robot_on_its_own_legs_takes_only_a_root():
     assert planar.root.kind == "planar"
     assert planar.root.pos == own.root.pos
     assert planar.links == own.links
-    with pytest.raises(DescriptionError, match=r"GR1 stands on its own .* null_mount"):
+    with pytest.raises(DescriptionError, match=r"GR1 stands on its own .* NullMount"):
         wbc_suite.load_robot("GR1", base="RethinkMount")
 
 
 def test_left_hand_does_not_fit_a_right_arm():
-    with pytest.raises(DescriptionError, match=r"there fit: .*fourier_right_hand"):
+    with pytest.raises(DescriptionError, match=r"there fit: .*FourierRightHand"):
         wbc_suite.load_robot("Panda", gripper="FourierLeftHand")
     with pytest.raises(DescriptionError, match="left arm; give one for each side"):
         wbc_suite.load_robot("GR1", gripper="FourierRightHand")
@@ -56,9 +56,9 @@ def test_name_without_side_is_the_hand_of_each_side():
 
 
 def test_unknown_gripper_or_base_is_told_with_the_nearest():
-    with pytest.raises(UnknownNameError, match="Did you mean 'panda_gripper'"):
+    with pytest.raises(UnknownNameError, match="Did you mean 'PandaGripper'"):
         wbc_suite.load_robot("Panda", gripper="PandaGriper")
-    with pytest.raises(UnknownNameError, match="Did you mean 'null_mount'"):
+    with pytest.raises(UnknownNameError, match="Did you mean 'NullMount'"):
         wbc_suite.load_robot("Panda", base="NulMount")
 
 

@@ -7,6 +7,7 @@ import pytest
 
 import wbc_suite
 from wbc_suite.catalogue import Catalogue
+from wbc_suite.robot.mjcf import STOP_MARGIN
 
 ROBOTS = Catalogue().names("robots")
 ROOTS = ("fixed", "planar", "free")
@@ -135,14 +136,15 @@ def test_stops_are_hard():
     spec.option.gravity = (0.0, 0.0, 0.0)
     spec.option.timestep = 0.002
     model = spec.compile()
-    for joint in ("panda_joint4", "panda_joint6"):
+    for joint, speed in (("panda_joint4", 0.25), ("panda_joint6", 2.0)):
         data = mujoco.MjData(model)
         data.qpos[:] = model.key("ready").qpos
         high = model.joint(joint).range[1]
         data.joint(joint).qpos[0] = high - 0.02
-        data.joint(joint).qvel[0] = 0.25
-        passed = 0.0
+        data.joint(joint).qvel[0] = speed
+        passed = -np.inf
         for _ in range(100):
             mujoco.mj_step(model, data)
             passed = max(passed, data.joint(joint).qpos[0] - high)
-        assert 0.0 < passed < 1e-3
+        assert -STOP_MARGIN < passed < 1e-3
+        assert data.joint(joint).qvel[0] < 0.0  # it was thrown back

@@ -6,11 +6,8 @@ import pytest
 
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.control import RobotState
-from wbc_suite.control.part.joint_position import (
-    JointLawConfig,
-    JointPositionLaw,
-    JointTarget,
-)
+from wbc_suite.control.part.joint import JointLaw
+from wbc_suite.control.part.law import commands
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp import SelfCollisionLimit
 from wbc_suite.robot import load_robot
@@ -74,16 +71,14 @@ class Lone:
         state = RobotState(self.model, self.data, self.robot, prefix=PREFIX)
         servos = {a.joint for a in self.robot.actuators if a.kind == "position"}
         driven = tuple(j for j in state.actuators if j not in servos)
-        law = JointPositionLaw(state, driven, JointLawConfig())
-        still = np.zeros(len(driven))
-        wanted = np.array([self.ready.get(joint, 0.0) for joint in driven])
-        target = JointTarget(position=wanted, velocity=still, acceleration=still)
+        law = JointLaw(state, driven, kp=900.0, kd=60.0)
+        law.aim(np.array([self.ready.get(joint, 0.0) for joint in driven]))
         for joint in servos:
             self.data.actuator(PREFIX + joint).ctrl = self.ready[joint]
         drift = dict.fromkeys((*driven, *sorted(servos)), 0.0)
         for _ in range(round(seconds / self.model.opt.timestep)):
             mujoco.mj_step1(self.model, self.data)
-            self.data.ctrl[state.actuator_ids[law.outputs]] = law.torque(state, target)
+            self.data.ctrl[law.drives["ctrl"]] = commands(state, [law])[law.outputs]
             mujoco.mj_step2(self.model, self.data)
             for joint, largest in drift.items():
                 way = self.data.joint(PREFIX + joint).qpos[0] - self.ready.get(

@@ -91,13 +91,10 @@ def test_a_skin_changes_what_is_drawn_and_nothing_else(package):
         for g in drawn
         if other.geom_type[g] == mujoco.mjtGeom.mjGEOM_MESH
     }
-    wanted = {
-        f"{link}_visual{k}"
-        for link, pieces in dressed.skins.items()
-        for k in range(len(pieces))
-    }
-    assert meshes == wanted
-    assert len(meshes) > 50
+    pieces = sum(len(pieces) for pieces in dressed.skins.values())
+    faces = [other.mesh_facenum[other.geom_dataid[other.geom(g).id]] for g in meshes]
+    assert sum(faces) == pieces * len(trimesh.creation.icosphere(2).faces)
+    assert 5 < len(meshes) < pieces
     states = []
     for model in (one, other):
         data = mujoco.MjData(model)
@@ -171,7 +168,7 @@ def test_what_is_partly_missing_is_a_warning(package, caplog):
     robot = wbc_suite.load_robot("Panda", skin="meshes")
     assert "panda_link3" in robot.skins
     assert "panda_hand" not in robot.skins
-    assert "panda_gripper" in caplog.text
+    assert "PandaGripper" in caplog.text
     assert "pip install" in caplog.text
 
 
@@ -198,13 +195,17 @@ def test_a_broken_mesh_names_the_file(package):
         robot.to_mjspec()
 
 
+def is_table_of(path, name):
+    return path.stem.replace("_", "") == name.replace("_", "").casefold()
+
+
 @pytest.mark.parametrize("path", TABLES, ids=lambda p: p.stem)
 def test_every_table_fits_its_component(path, tmp_path):
     """Each link exists, each provider is known, and the skin loads."""
     table = tomllib.loads(path.read_text())
     assert table["provider"] in PROVIDERS
     write_meshes(tmp_path, [path.stem])
-    (component,) = [c for c in COMPONENTS if c.component.name == path.stem]
+    (component,) = [c for c in COMPONENTS if is_table_of(path, c.component.name)]
     links = [link.name for link in component.links]
-    dressed = Wardrobe(tmp_path, Catalogue()).dress(path.stem, links)
+    dressed = Wardrobe(tmp_path, Catalogue()).dress(component.component.name, links)
     assert set(dressed) == set(table["link"])

@@ -6,6 +6,7 @@ import pytest
 
 from wbc_suite.errors import DescriptionError
 from wbc_suite.robot import load_robot
+from wbc_suite.robot.mjcf import build_mjspec
 from wbc_suite.robot.shapes import Box, Cylinder, Hull, Loft
 from wbc_suite.robot.surfaces import mesh_of
 
@@ -103,7 +104,7 @@ visual = [
 ]
 """)
     robot = load_robot(path)
-    direct = robot.to_mjspec().compile()
+    direct = build_mjspec(robot, merged=False).compile()
     read = mujoco.MjModel.from_xml_string(robot.to_mjcf())
     assert direct.nmesh == read.nmesh == 2
     np.testing.assert_allclose(read.mesh_vert, direct.mesh_vert, atol=1e-7)

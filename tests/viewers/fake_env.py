@@ -1,12 +1,13 @@
 """A tiny stand-in for an environment: two hands that float, with a bounded reach."""
 
-from dataclasses import dataclass
 from types import SimpleNamespace
 
 import gymnasium
 import mujoco
 import numpy as np
 import pinocchio as pin
+
+from wbc_suite.control.action import ActionLayout, ActionPart
 
 MJCF = """
 <mujoco>
@@ -35,39 +36,25 @@ REACH = 0.8  # m, from the trunk
 STRIDE = 0.02  # m, furthest that a hand moves in a step
 
 
-@dataclass(frozen=True)
-class Slice:
-    name: str
-    kind: str
-    start: int
-    stop: int
-    low: np.ndarray
-    high: np.ndarray
-    labels: tuple[str, ...] = ()
+def part(name, kind, labels, bound):
+    return ActionPart(
+        name=name,
+        kind=kind,
+        labels=labels,
+        units=("m",) * len(labels),
+        low=(-bound,) * len(labels),
+        high=(bound,) * len(labels),
+    )
 
 
-class Layout:
-    def __init__(self):
-        bound = np.full(6, 10.0)
-        self.slices = (
-            Slice("right_hand", "pose", 0, 6, -bound, bound),
-            Slice("left_hand", "pose", 6, 12, -bound, bound),
-            Slice(
-                "right_gripper",
-                "gripper",
-                12,
-                14,
-                -np.ones(2),
-                np.ones(2),
-                ("thumb", "fingers"),
-            ),
-        )
-
-    def pack(self, values):
-        return np.concatenate([values[s.name] for s in self.slices])
-
-    def unpack(self, action):
-        return {s.name: action[s.start : s.stop] for s in self.slices}
+AXES = ("x", "y", "z", "rx", "ry", "rz")
+LAYOUT = ActionLayout(
+    [
+        part("right_hand", "pose", AXES, 10.0),
+        part("left_hand", "pose", AXES, 10.0),
+        part("right_gripper", "gripper", ("thumb", "fingers"), 1.0),
+    ]
+)
 
 
 class FakeEnv(gymnasium.Env):
@@ -75,7 +62,9 @@ class FakeEnv(gymnasium.Env):
         self.model = mujoco.MjModel.from_xml_string(MJCF)
         self.data = mujoco.MjData(self.model)
         self.simulation = SimpleNamespace(model=self.model, data=self.data)
-        self.action_layout = Layout()
+        self.action_layout = LAYOUT
+        self.hold_action = np.append(np.zeros(12), [-1.0, -1.0])
+        self.config = SimpleNamespace(control_freq=50.0)
         frames = [
             SimpleNamespace(name=side + "_hand", frame=side + "_hand", kind="pose")
             for side in ("right", "left")

@@ -2,8 +2,21 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from wbc_suite.devices import Clutch
-from wbc_suite.viewers.limb import Limb, LimbKind, Ownership
+from wbc_suite.devices import PipelineConfig
+from wbc_suite.devices.limbs import LimbKind, LimbPort, command
+from wbc_suite.devices.pipeline.limb import LimbPipeline
+from wbc_suite.viewers.limb import Limb, Ownership
+
+
+def limb(name, kind, T):
+    port = LimbPort(
+        name=name,
+        kind=kind,
+        body=-1,
+        measure=lambda: T,
+        encode=lambda target: command(kind, target),
+    )
+    return Limb(LimbPipeline(port, PipelineConfig(), dt=0.01), Ownership())
 
 
 def test_first_client_keeps_it_until_release():
@@ -36,18 +49,14 @@ def test_silent_holder_loses_it_after_the_timeout():
 )
 def test_command_holds_what_the_kind_commands(kind, expected):
     T = pin.SE3(pin.exp3(np.array([0, 0, 0.5])), np.array([1.0, 2.0, 3.0]))
-    limb = Limb("right_hand", kind, Clutch(T), Ownership())
-    np.testing.assert_allclose(limb.command(), expected, atol=1e-12)
-    assert limb.title == "Right hand"
+    np.testing.assert_allclose(command(kind, T), expected, atol=1e-12)
+    assert limb("right_hand", kind, T).title == "Right hand"
 
 
 def test_seen_target_takes_what_is_not_commanded_from_the_measured_pose():
     T = pin.SE3(pin.exp3(np.array([0, 0, 0.5])), np.array([1.0, 2.0, 3.0]))
     measured = pin.SE3.Identity()
-    seen = {
-        kind: Limb("x", kind, Clutch(T), Ownership()).seen_target(measured)
-        for kind in LimbKind
-    }
+    seen = {kind: limb("x", kind, T).seen_target(measured) for kind in LimbKind}
     assert seen[LimbKind.POSE] == T
     assert seen[LimbKind.POSITION] == pin.SE3(np.eye(3), T.translation)
     assert seen[LimbKind.ORIENTATION] == pin.SE3(T.rotation, np.zeros(3))

@@ -2,7 +2,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from wbc_suite.viewers.shapes import geom_mesh, merge
+from wbc_suite.viewers.shapes import colored_meshes, geom_mesh, merge
 
 VOLUMES = {
     'type="box" size="0.1 0.2 0.3"': 8 * 0.1 * 0.2 * 0.3,
@@ -49,3 +49,22 @@ def test_merged_and_moved_meshes_keep_their_triangles():
     both = merge([mesh, away])
     assert volume(both) == pytest.approx(2 * volume(mesh))
     np.testing.assert_allclose(away.vertices.mean(axis=0), [1, 0, 0], atol=1e-12)
+
+
+GREY_WOOD = """
+<texture name="wood" type="2d" builtin="flat" rgb1="0.5 0.5 0.5" width="8" height="8"/>
+<material name="wood" texture="wood" rgba="0.2 0.4 0.6 1"/>"""
+
+
+@pytest.mark.parametrize(
+    ("geom", "color"),
+    [
+        ('rgba="0.8 0.2 0.1 1"', (0.8, 0.2, 0.1)),
+        ('material="wood"', (0.1, 0.2, 0.3)),
+        ('material="wood" rgba="0.8 0.2 0.1 1"', (0.4, 0.1, 0.05)),
+    ],
+)
+def test_a_page_draws_the_colours_that_mujoco_draws(geom, color):
+    model = compiled(f'type="box" size="1 1 1" {geom}', GREY_WOOD)
+    ((drawn, _),) = colored_meshes(model, 0)
+    np.testing.assert_allclose(drawn, (*color, 1.0), atol=2e-3)  # pixels have 8 bits

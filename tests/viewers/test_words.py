@@ -1,7 +1,7 @@
 import pinocchio as pin
 import pytest
 
-from wbc_suite.viewers.teleop_session import LimbStatus
+from wbc_suite.viewers.snapshot import LimbStatus
 from wbc_suite.viewers.words import describe_reason, explain
 
 
@@ -15,6 +15,7 @@ def status(**changes):
         "reasons": (),
         "holder": None,
         "enabled": True,
+        "acting": (),
     }
     return LimbStatus(**(values | changes))
 

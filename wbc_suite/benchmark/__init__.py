@@ -6,14 +6,63 @@ from wbc_suite.benchmark.base import (
     load_benchmark,
     register_benchmark,
 )
+from wbc_suite.benchmark.door import Door
 from wbc_suite.benchmark.lift import Lift
+from wbc_suite.benchmark.nut_assembly import NutAssembly
+from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
+from wbc_suite.benchmark.pick_place import PickPlace
+from wbc_suite.benchmark.stack import Stack
+from wbc_suite.benchmark.tool_hang import ToolHang
+from wbc_suite.benchmark.two_arm_handover import TwoArmHandover
+from wbc_suite.benchmark.two_arm_lift import TwoArmLift
+from wbc_suite.benchmark.two_arm_peg_in_hole import TwoArmPegInHole
+from wbc_suite.benchmark.two_arm_transport import TwoArmTransport
+from wbc_suite.benchmark.wipe import Wipe
 
 __all__ = [
     "Benchmark",
+    "Door",
     "Lift",
+    "NutAssembly",
+    "ObjectBenchmark",
+    "ObjectBenchmarkConfig",
+    "PickPlace",
+    "Stack",
+    "ToolHang",
+    "TwoArmHandover",
+    "TwoArmLift",
+    "TwoArmPegInHole",
+    "TwoArmTransport",
+    "Wipe",
     "benchmark_names",
     "load_benchmark",
     "register_benchmark",
 ]
 
-register_benchmark("Lift", Lift)
+for _build, _names in (
+    (Door, ("Door",)),
+    (Lift, ("Lift",)),
+    (
+        NutAssembly,
+        (
+            *("NutAssembly", "NutAssemblySingle"),
+            *("NutAssemblySquare", "NutAssemblyRound"),
+        ),
+    ),
+    (
+        PickPlace,
+        (
+            *("PickPlace", "PickPlaceSingle"),
+            *("PickPlaceMilk", "PickPlaceBread", "PickPlaceCereal", "PickPlaceCan"),
+        ),
+    ),
+    (Stack, ("Stack",)),
+    (ToolHang, ("ToolHang",)),
+    (TwoArmHandover, ("TwoArmHandover",)),
+    (TwoArmLift, ("TwoArmLift",)),
+    (TwoArmPegInHole, ("TwoArmPegInHole",)),
+    (TwoArmTransport, ("TwoArmTransport",)),
+    (Wipe, ("Wipe",)),
+):
+    for _name in _names:
+        register_benchmark(_name, _build)

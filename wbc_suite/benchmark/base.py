@@ -11,8 +11,8 @@ from wbc_suite.catalogue import Catalogue
 from wbc_suite.control import RobotState
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.robot import RobotDescription
+from wbc_suite.sensing.reading import Reading
 from wbc_suite.tomlfile import read_toml
-from wbc_suite.typing import Vector
 
 __all__ = [
     "Benchmark",
@@ -28,19 +28,36 @@ class Benchmark(Protocol):
     Attributes:
         name: Its name.
         horizon: Actions in an episode, unless the user says otherwise.
-        max_robots: How many robots it has a place for.
+        robots: Robots that are taken unless the user says otherwise.
+        gripper: Gripper that they get unless the user says otherwise; None keeps
+            theirs.
     """
 
     name: str
     horizon: int
-    max_robots: int
+    robots: Sequence[str]
+    gripper: str | None
 
-    def place(self, robot: RobotDescription, index: int) -> RobotDescription:
-        """Return the robot standing where this benchmark wants it."""
+    def arrange(
+        self, robots: Sequence[RobotDescription], configuration: str
+    ) -> tuple[RobotDescription, ...]:
+        """Return the robots standing where this benchmark wants them.
+
+        Args:
+            robots: One or several.
+            configuration: `default`, `single-robot`, `opposed` or `parallel`.
+
+        Raises:
+            ConfigError: If they are too many or too few, or cannot stand so.
+        """
         ...
 
     def build(self, spec: mujoco.MjSpec) -> None:
         """Add furniture, objects and cameras to an empty arena."""
+        ...
+
+    def equip(self, spec: mujoco.MjSpec, robots: Sequence[RobotDescription]) -> None:
+        """Add what is fixed to the robots, which are in the scene now."""
         ...
 
     def bind(
@@ -53,8 +70,22 @@ class Benchmark(Protocol):
         """Place the objects; positions and sizes are written into model and data."""
         ...
 
-    def observe(self) -> dict[str, Vector]:
-        """Return the objects' observations."""
+    def watch(self) -> None:
+        """Note what happened in a control period, where success depends on the past.
+
+        Notes belong into `data.userdata`, so that they are part of the state.
+        """
+        ...
+
+    def observables(self) -> dict[str, Reading]:
+        """Return what is seen of the objects, by key; see `wbc_suite.sensing.reading`.
+
+        It is asked once, after `bind`.
+        """
+        ...
+
+    def felt(self) -> dict[str, dict[str, Reading]]:
+        """Return what robots feel of it, by robot's prefix and key; asked likewise."""
         ...
 
     def success(self) -> bool:
@@ -79,13 +110,21 @@ def benchmark_names() -> tuple[str, ...]:
     return tuple(sorted(_BUILDERS))
 
 
-def load_benchmark(name: str | Path, catalogue: Catalogue | None = None) -> Benchmark:
+def load_benchmark(
+    name: str | Path | Callable[[], Benchmark], catalogue: Catalogue | None = None
+) -> Benchmark:
     """Make a benchmark by its name, without regard to case, or from its file.
+
+    A class of your own, or any function that returns a benchmark, is called.
 
     Raises:
         UnknownNameError: If there is no such benchmark.
         ConfigError: If its file is wrong.
     """
+    if not isinstance(name, str | Path):
+        if not callable(name):
+            raise UnknownNameError("benchmark", name, _BUILDERS)
+        return name()
     if str(name).endswith(".toml"):
         path = Path(name)
         try:

@@ -10,13 +10,20 @@ import typer
 
 from wbc_suite import __version__
 from wbc_suite.cli import (
+    bench,
     check,
+    convert,
+    datasets,
     demo,
     describe_action,
     doctor,
     export,
+    inspect,
     listing,
+    record,
     render,
+    replay,
+    rollout,
     schema,
     teleop,
     view,
@@ -36,8 +43,20 @@ app = typer.Typer(
 app.command("teleop")(teleop.teleop)
 app.command("view")(view.view)
 app.command("demo")(demo.demo)
+app.command("record")(record.record)
+app.command("replay")(replay.replay)
+app.command("inspect")(inspect.inspect)
+app.command("verify")(datasets.verify)
+app.command("repair")(datasets.repair)
+app.command("merge")(datasets.merge)
+app.command("split")(datasets.split)
+app.command("filter")(datasets.filter_episodes)
+app.command("extract")(convert.extract)
+app.command("convert")(convert.convert)
 app.command("list")(listing.list_catalogue)
 app.command("render")(render.render)
+app.command("rollout")(rollout.rollout)
+app.command("bench")(bench.bench)
 app.command("check")(check.check_file)
 app.command("export")(export.export_robot)
 app.command("schema")(schema.print_schema)

@@ -12,22 +12,28 @@ __all__ = ["check_file"]
 
 def check_file(
     file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="A .toml, .urdf or .xml file.")
+        Path, typer.Argument(metavar="FILE", help="A .toml, .json, .urdf or .xml file.")
     ],
+    robot: Annotated[
+        str | None,
+        typer.Option(metavar="ROBOT", help="Check a controller's names against it."),
+    ] = None,
     catalogue: CatalogueOption = None,
 ) -> None:
     """Check a robot, benchmark or controller file, and say what it is.
 
     It is read as loading would read it, and a robot's models are built for both
     engines. The first fault ends it with the file, the key, the value and the rule.
+    A JSON file is a controller of this field, which needs its robot.
     """
     from wbc_suite.tomlfile import read_toml
 
     content = read_toml(file) if file.suffix == ".toml" else {"component": None}
+    controls = "body_parts" in content or "frame" in content
     if "name" in content:
         print(f"{file}: fine. {_benchmark(file)}")
-    elif "frame" in content and "component" not in content:
-        print(f"{file}: fine. {_controller(file)}")
+    elif file.suffix == ".json" or (controls and "component" not in content):
+        print(f"{file}: fine. {_controller(file, robot)}")
     elif "provider" in content:
         print(f"{file}: fine. {_skin(file)}")
     else:
@@ -62,10 +68,13 @@ def _benchmark(file: Path) -> str:
     return f"Benchmark '{benchmark.name}': {benchmark.horizon} actions an episode."
 
 
-def _controller(file: Path) -> str:
-    from wbc_suite.control.composite.config import WholeBodyIKConfig
-    from wbc_suite.tomlfile import load_model
+def _controller(file: Path, robot: str | None) -> str:
+    from wbc_suite.control import load_composite_controller_config
 
-    config = load_model(WholeBodyIKConfig, file)
-    frames = ", ".join(frame.name for frame in config.frames)
-    return f"Whole-body controller of {frames}; {config.solve_hz:g} solves a second."
+    config = load_composite_controller_config(file, robot)
+    given = config.get("body_parts")
+    if given is None:
+        frames = ", ".join(frame["name"] for frame in config["frame"])
+        return f"{config['type']} of {frames}."
+    parts = ", ".join(f"{name} ({part['type']})" for name, part in given.items())
+    return f"{config['type']} of {parts}."

@@ -2,7 +2,7 @@
 
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -85,7 +85,7 @@ def _components(catalogue: "Catalogue", kind: Kind) -> "Table":
         header = component.component
         side = header.side or "both"
         table.add_row(
-            path.stem,
+            header.name,
             header.title,
             side if kind is Kind.GRIPPERS else component.root.kind,
             f"{sum(link.mass for link in component.links):.2f}",
@@ -97,22 +97,38 @@ def _files(catalogue: "Catalogue", kind: Kind) -> "Table":
     table = _table(kind.capitalize(), "name", "")
     if kind is Kind.CONTROLLERS:
         from wbc_suite.control.composite import composite_names
+        from wbc_suite.control.composite.parts import part_models
 
         for name in composite_names():
             table.add_row(name, "for any robot, with its file below when there is one")
+        for name, model in part_models().items():
+            about = str(model.__doc__).split("\n")[0].partition(";")[0]
+            table.add_row(name, f"of one part: {about}")
     for path in catalogue.files(_FOLDERS[kind]):
-        table.add_row(*_name_and_title(path))
+        table.add_row(*_name_and_title(path, kind))
     return table
 
 
-def _name_and_title(path: Path) -> tuple[str, str]:
-    """Return what a file calls itself, in its first table or at its top."""
+def _name_and_title(path: Path, kind: Kind) -> tuple[str, str]:
+    """Return what a file is called, and what it says of itself."""
     from wbc_suite.tomlfile import read_toml
 
     content = read_toml(path)
+    if kind is Kind.CONTROLLERS:
+        return path.stem, _controlled(content)
+    if kind is Kind.BENCHMARKS:
+        return content["name"], content["title"]
     tables = [content, *(t for t in content.values() if isinstance(t, dict))]
     titles = (t.get("title") or t.get("description") for t in tables)
     return path.stem, next((title for title in titles if isinstance(title, str)), "")
+
+
+def _controlled(content: dict[str, Any]) -> str:
+    """Return what a controller's file controls."""
+    if "frame" in content:
+        return ", ".join(frame["name"] for frame in content["frame"])
+    parts = content["body_parts"].items()
+    return ", ".join(f"{name}: {part['type']}" for name, part in parts)
 
 
 def _table(title: str, *columns: str) -> "Table":

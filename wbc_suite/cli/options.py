@@ -1,10 +1,11 @@
 """Options that several commands share."""
 
 import os
-from collections.abc import Iterator
+import tomllib
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 import typer
 
@@ -14,12 +15,19 @@ from wbc_suite.errors import ConfigError
 __all__ = [
     "BaseOption",
     "CatalogueOption",
+    "ExecutorOption",
     "GripperOption",
     "RobotArgument",
     "SkinOption",
     "chosen",
+    "device_options",
+    "progress",
+    "tracked",
     "writing",
 ]
+
+
+T = TypeVar("T")
 
 
 def _add_to_catalogue(folders: list[Path] | None) -> list[Path]:
@@ -62,12 +70,33 @@ BaseOption = Annotated[
     str | None, typer.Option(metavar="NAME", help="Another base, or none.")
 ]
 
+ExecutorOption = Annotated[
+    str, typer.Option(metavar="NAME", help="process, serial, ray or slurm.")
+]
+
 SkinOption = Annotated[
     str | None,
     typer.Option(
         metavar="meshes|DIR",
         help="Draw with real meshes, from installed packages or from a folder.",
     ),
+]
+
+DeviceOptions = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--device-option",
+        metavar="NAME=VALUE",
+        help="Option of the device; may be repeated.",
+    ),
+]
+
+ScaleOption = Annotated[
+    float, typer.Option(help="Motion of a hand per motion of the device.", min=0.01)
+]
+
+MirrorOption = Annotated[
+    bool, typer.Option("--mirror", help="Face the robot: swap left and right.")
 ]
 
 
@@ -81,6 +110,26 @@ def chosen(gripper: str | None) -> str | dict[str, str] | None:
     }
 
 
+def device_options(pairs: list[str] | None) -> dict[str, object]:
+    """Return what `--device-option NAME=VALUE` says.
+
+    Values are read as TOML (`8091`, `true`, `["right", "left"]`), else they are text.
+
+    Raises:
+        ConfigError: If there is no `=`.
+    """
+    options: dict[str, object] = {}
+    for pair in pairs or []:
+        name, equals, value = pair.partition("=")
+        if not equals:
+            raise ConfigError(f"--device-option {pair}: write NAME=VALUE.")
+        try:
+            options[name] = tomllib.loads(f"value = {value}")["value"]
+        except tomllib.TOMLDecodeError:
+            options[name] = value
+    return options
+
+
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
     """Turn what can go wrong with an output file into one line that names it."""
@@ -88,3 +137,31 @@ def writing(path: Path) -> Iterator[None]:
         yield
     except (OSError, ValueError) as error:
         raise ConfigError(f"'{path}' cannot be written: {error}.") from error
+
+
+@contextmanager
+def progress(title: str, total: int) -> Iterator[Callable[[int], None]]:
+    """Show a bar on the error output where that is a terminal; call to advance it."""
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TimeRemainingColumn,
+    )
+
+    console = Console(stderr=True)
+    columns = (title, BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(
+        *columns, console=console, transient=True, disable=not console.is_terminal
+    ) as bar:
+        line = bar.add_task(title, total=total)
+        yield lambda done: bar.advance(line, done)
+
+
+def tracked(items: Sequence[T], title: str) -> Iterator[T]:
+    """Hand out items one by one, and show how many have been dealt with."""
+    with progress(title, len(items)) as advance:
+        for item in items:
+            yield item
+            advance(1)

@@ -1,4 +1,4 @@
-"""`wbc-suite schema`: what an editor needs to help with robot files."""
+"""`wbc-suite schema`: what editors and senders of frames need to know."""
 
 import json
 from typing import Annotated, Literal
@@ -10,11 +10,16 @@ __all__ = ["print_schema"]
 
 def print_schema(
     kind: Annotated[
-        Literal["component", "assembly"],
-        typer.Argument(help="Kind of robot file."),
+        Literal["component", "assembly", "frame"],
+        typer.Argument(help="Kind of robot file, or a stream's pose frame."),
     ],
 ) -> None:
-    """Print the JSON Schema of robot files, for completion in an editor."""
+    """Print the JSON Schema of robot files, or of the frames that a stream takes."""
+    if kind == "frame":
+        from wbc_suite.devices.frame import frame_schema
+
+        print(json.dumps(frame_schema(), indent=2))
+        return
     from wbc_suite.robot.schema import robot_schema
 
     print(json.dumps(robot_schema(kind), indent=2))

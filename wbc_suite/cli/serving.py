@@ -29,13 +29,21 @@ PortOption = Annotated[
 ]
 
 
-def serve_until_interrupted(site: "Site", title: str) -> None:
-    """Print where the page is, and wait for Ctrl-C or a request to terminate."""
+def serve_until_interrupted(
+    site: "Site", title: str, until: threading.Event | None = None
+) -> None:
+    """Print where the page is, and wait for Ctrl-C or a request to terminate.
+
+    Args:
+        site: What is served.
+        title: What it is, for the terminal.
+        until: Another reason to end.
+    """
+    interrupted = until or threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):  # before anybody knows the address
+        signal.signal(number, lambda *_: interrupted.set())
     print(f"{title}\n\n    {site.url}\n", flush=True)
     if site.token is not None:
         print("Anybody with this address may use the page.", flush=True)
     print("Ctrl-C ends it.", flush=True)
-    interrupted = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: interrupted.set())
     interrupted.wait()

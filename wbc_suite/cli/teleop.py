@@ -1,23 +1,27 @@
 """`wbc-suite teleop`: move a simulated robot in the browser."""
 
-import sys
-from typing import Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from wbc_suite.cli.by_hand import ONE_DAY, device_maker, drive, stages_of
 from wbc_suite.cli.options import (
     BaseOption,
     CatalogueOption,
+    DeviceOptions,
     GripperOption,
+    MirrorOption,
+    ScaleOption,
     SkinOption,
     chosen,
 )
-from wbc_suite.cli.serving import HostOption, PortOption, serve_until_interrupted
+from wbc_suite.cli.serving import HostOption, PortOption
+
+if TYPE_CHECKING:
+    import gymnasium
 
 __all__ = ["teleop"]
-
-ONE_DAY = 86_400  # s; nobody's session is cut off by the benchmark's horizon
-SWITCH_INTERVAL = 1e-3  # s; Python's own 5 ms would hold the loop up for the page
 
 
 def teleop(
@@ -35,17 +39,32 @@ def teleop(
     seed: Annotated[int, typer.Option(help="Seed of the scene.")] = 0,
     host: HostOption = "127.0.0.1",
     port: PortOption = None,
+    device: Annotated[
+        str | None,
+        typer.Option(
+            help="A device beside the page's handles: keyboard, stream, spacemouse, "
+            "gamepad, dualsense, mjgui, or yours: module:Class."
+        ),
+    ] = None,
+    device_option: DeviceOptions = None,
+    scale: ScaleOption = 1.0,
+    mirror: MirrorOption = False,
+    record: Annotated[
+        Path | None,
+        typer.Option(help="File that the page's button Record adds episodes to."),
+    ] = None,
     catalogue: CatalogueOption = None,
 ) -> None:
     """Move a robot's hands, head, feet and base by dragging them in a web page."""
     import wbc_suite
+    from wbc_suite.recording.desk import RecordingDesk
     from wbc_suite.viewers.site import Site
-    from wbc_suite.viewers.teleop_page import TeleopPage
-    from wbc_suite.viewers.teleop_session import TeleopSession
+    from wbc_suite.wrappers import DataCollection
 
-    sys.setswitchinterval(SWITCH_INTERVAL)
+    make = None if device is None else device_maker(device, device_option)
+    stages = stages_of(device=device is not None, scale=scale, mirror=mirror)
     print(f"Building {benchmark} with {robots} ...", flush=True)
-    env = wbc_suite.make(
+    env: gymnasium.Env[Any, Any] = wbc_suite.make(
         benchmark,
         robots=robots,
         controller_configs=controller,
@@ -55,15 +74,21 @@ def teleop(
         horizon=round(ONE_DAY * rate),
         skin=skin,
     )
-    session = TeleopSession(env, period=1.0 / rate, seed=seed)
-    print("Compiling; this takes a few seconds the first time ...", flush=True)
-    session.tick()
-    page = TeleopPage(session, Site(host, port), label=f"{robots} · {benchmark}")
-    page.start()
-    session.start()
+    desk = None
+    chosen_device = None if make is None else make(env)
+    if record is not None:
+        collection = DataCollection(env, record, automatic=False)
+        env, desk = collection, RecordingDesk(collection.recorder, seed=seed)
     try:
-        serve_until_interrupted(page.site, f"Teleoperation of {robots}, {benchmark}:")
+        drive(
+            env,
+            names=(robots, benchmark),
+            rate=rate,
+            seed=seed,
+            site=Site(host, port),
+            device=chosen_device,
+            stages=stages,
+            desk=desk,
+        )
     finally:
-        session.stop()
-        page.stop()
         env.close()

@@ -1,18 +1,36 @@
 """Actions: one flat vector, cut into named slices with units and bounds."""
 
+import math
+import textwrap
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from itertools import zip_longest
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from wbc_suite.compiling import compiled_short
 from wbc_suite.errors import ActionError, ConfigError, UnknownNameError
 from wbc_suite.typing import Vector
 
 __all__ = ["ActionLayout", "ActionPart", "ActionSlice", "SliceKind"]
 
-SliceKind = Literal["pose", "position", "orientation", "gripper", "base", "posture"]
+SliceKind = Literal[
+    "pose",
+    "position",
+    "orientation",
+    "gripper",
+    "base",
+    "posture",
+    "velocity",
+    "torque",
+    "stiffness",
+    "damping",
+]
+
+CELL = 40
+"""Letters in a line of a printed layout's cell."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -169,18 +187,33 @@ class ActionLayout:
                 "print(env.unwrapped.action_layout) explains the values."
             )
         vector = array.astype(np.float64)
-        bad = np.flatnonzero(~np.isfinite(vector))
-        if bad.size:
+        values = vector.tolist()
+        if not all(map(math.isfinite, values)):
+            bad = next(i for i, x in enumerate(values) if not math.isfinite(x))
             raise ActionError(
-                f"Action value {vector[bad[0]]} at index {bad[0]} "
-                f"({self.describe(int(bad[0]))}) is not finite."
+                f"Action value {vector[bad]} at index {bad} "
+                f"({self.describe(bad)}) is not finite."
             )
         return vector
 
     def clip(self, action: Vector) -> tuple[Vector, int]:
         """Return the action within the bounds, and how many values were outside."""
-        clipped = np.clip(action, self.low, self.high)
+        clipped = np.minimum(np.maximum(action, self.low), self.high)
         return clipped, int(np.count_nonzero(clipped != action))
+
+    def take(self, action: ArrayLike) -> tuple[Vector, int]:
+        """Check and clip an action; what `clip` returns of what `check` does.
+
+        Raises:
+            ActionError: See `check`.
+        """
+        if isinstance(action, np.ndarray) and action.dtype == np.float64:
+            vector = action.copy()
+            if vector.shape == self.low.shape:
+                outside = _clip(vector, self.low, self.high)
+                if outside >= 0:
+                    return vector, outside
+        return self.clip(self.check(action))
 
     def describe(self, index: int) -> str:
         """Return "slice: label" of one value."""
@@ -203,12 +236,38 @@ class ActionLayout:
                     " ".join(f"{x:g}" for x in dict.fromkeys(s.high)),
                 )
             )
-        widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
-        lines = [
-            "  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True))
-            for row in rows
-        ]
-        return "\n".join(line.rstrip() for line in lines)
+        return _table(rows)
+
+
+def _table(rows: list[tuple[str, ...]]) -> str:
+    """Return rows as lines; long cells go on below."""
+    wrapped = [[textwrap.wrap(cell, CELL) or [""] for cell in row] for row in rows]
+    widths = [
+        max(len(x) for row in wrapped for x in row[k]) for k in range(len(rows[0]))
+    ]
+    lines = [
+        "  ".join(cell.ljust(w) for cell, w in zip(line, widths, strict=True)).rstrip()
+        for row in wrapped
+        for line in zip_longest(*row, fillvalue="")
+    ]
+    return "\n".join(lines)
+
+
+@compiled_short
+def _clip(values: Vector, low: Vector, high: Vector) -> int:
+    """Clip in place; return how many values were outside, or -1 if one is not finite.
+
+    It keeps Python's lock, which other threads would take for longer than this takes.
+    """
+    outside = 0
+    for i in range(len(values)):
+        value = values[i]
+        if not np.isfinite(value):
+            return -1
+        if not low[i] <= value <= high[i]:
+            values[i] = min(max(value, low[i]), high[i])
+            outside += 1
+    return outside
 
 
 def _frozen(values: list[float]) -> Vector:

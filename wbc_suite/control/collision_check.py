@@ -1,6 +1,7 @@
 """Ask the simulator whether a robot would touch something."""
 
 import mujoco
+import numpy as np
 
 from wbc_suite.control.state import RobotState
 from wbc_suite.kinematics import Conversion
@@ -13,7 +14,7 @@ DEPTH = 1e-3
 
 
 class CollisionCheck:
-    """Tells whether a configuration is free of contacts that are not there now.
+    """Tells how a configuration is free of contacts that are not there now.
 
     Works on a copy of the simulation's state.
 
@@ -26,16 +27,20 @@ class CollisionCheck:
         self._state, self._conversion = state, conversion
         self._data = mujoco.MjData(state.model)
 
-    def is_free(self, q: Vector) -> bool:
-        """Whether the robot could be at q without touching more than it does."""
+    def room(self, q: Vector) -> float:
+        """Return how far contacts at q are from being deep, m; inf without any.
+
+        Contacts that are there now do not count.
+        """
         scene, data = self._state.data, self._data
-        present = _pairs(scene, deeper_than=0.0)
         data.qpos[:] = scene.qpos
         self._conversion.q_to_mujoco(q, data.qpos)
-        mujoco.mj_fwdPosition(self._state.model, data)
-        return _pairs(data, deeper_than=DEPTH) <= present
-
-
-def _pairs(data: mujoco.MjData, *, deeper_than: float) -> set[tuple[int, int]]:
-    deep = data.contact.dist < -deeper_than
-    return {(int(a), int(b)) for a, b in data.contact.geom[deep]}
+        mujoco.mj_kinematics(self._state.model, data)
+        mujoco.mj_collision(self._state.model, data)
+        if not data.ncon:
+            return np.inf
+        touching = scene.contact.geom[scene.contact.dist < 0.0]
+        present = {(int(a), int(b)) for a, b in touching}
+        found = zip(data.contact.geom.tolist(), data.contact.dist, strict=True)
+        new = [float(dist) for (a, b), dist in found if (a, b) not in present]
+        return min(new, default=np.inf) + DEPTH

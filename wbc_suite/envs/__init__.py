@@ -3,5 +3,6 @@
 from wbc_suite.envs.env import RobotEnv
 from wbc_suite.envs.making import make
 from wbc_suite.envs.simulation import Simulation
+from wbc_suite.envs.vector import VectorRobotEnv
 
-__all__ = ["RobotEnv", "Simulation", "make"]
+__all__ = ["RobotEnv", "Simulation", "VectorRobotEnv", "make"]

@@ -14,13 +14,25 @@ from pydantic import (
     model_validator,
 )
 
+from wbc_suite.envs.display import RenderMode
 from wbc_suite.robot import RobotDescription
+from wbc_suite.sensing.cameras import CameraRequest
+from wbc_suite.sensing.renderer import RenderPreset
+from wbc_suite.sensing.segmentation import SegmentationLevel
 from wbc_suite.tomlfile import FrozenModel, parse_model
 
 __all__ = ["EnvConfig", "NoiseConfig", "parse_env_config"]
 
 
 Pixels: TypeAlias = Annotated[int, Field(gt=0, le=8192)]
+Segmentations: TypeAlias = SegmentationLevel | tuple[SegmentationLevel, ...] | None
+
+_PER_CAMERA = (
+    "camera_heights",
+    "camera_widths",
+    "camera_depths",
+    "camera_segmentations",
+)
 
 
 class NoiseConfig(FrozenModel):
@@ -34,21 +46,46 @@ class EnvConfig(FrozenModel):
     """Arguments of an environment, under the names this field knows.
 
     Attributes:
-        robots: One robot, or several: names, files or descriptions.
+        robots: One robot, or several: names, files or descriptions; the benchmark's
+            own choice by default.
+        env_configuration: How robots stand: two `opposed` (by default) or
+            `parallel`, one `single-robot`.
         controller_configs: Composite controller: a name, a file or a config; one for
             all robots, or one for each.
-        gripper_types: Another gripper; "default" keeps the robot's own.
+        placement_initializer: Draws where things start, in place of the benchmark's own
+            sampler; see `wbc_suite.scene.placement`.
+        gripper_types: Another gripper; "default" keeps the benchmark's choice, most
+            often the robot's own.
         base_types: Another base; "default" keeps the robot's own.
         skin: "meshes" draws robots with the meshes of installed packages, a folder with
             those found there.
         initialization_noise: "default", None, or `{"type": ..., "magnitude": ...}`.
         control_freq: Actions per second.
+        lite_physics: Whether contacts, accelerations and sensors are left as MuJoCo's
+            last step saw them, one step behind the positions; computing them anew
+            costs one more step.
+        compiled: Whether the control loop is compiled; the plain one can be debugged,
+            and gives the same states.
         horizon: Actions in an episode; the benchmark's own when absent.
         reward_shaping: A reward on the way, or only for success.
         reward_scale: Factor on the reward.
         terminate_on_success: Whether success ends the episode.
         use_object_obs: Whether objects are observed.
-        render_mode: `rgb_array`, or None.
+        randomisation: What changes at each reset: a
+            `wbc_suite.randomisation.Randomisation`.
+        use_sensor_obs: Whether robots' sensors are observed: joint torques, wrists,
+            IMU, fingers, feet.
+        observables: Changes of observations by key, such as `{"cube_pos": {"delay":
+            0.05}}`; see `wbc_suite.sensing.observables.Change`.
+        use_camera_obs: Whether cameras are observed.
+        camera_names: The observed cameras: one name, or several.
+        camera_heights: Pixels; one number for all cameras, or one for each.
+        camera_widths: Pixels; likewise.
+        camera_depths: Whether depth is observed too; one for all, or one for each.
+        camera_segmentations: `instance`, `class`, `element` or None; one for all, or
+            one for each camera, which may be a list of several.
+        render_preset: `fast`, `balanced`, `quality`; chosen by what draws when absent.
+        render_mode: `human`, `rgb_array`, `depth_array`, or None.
         render_camera: Camera of `render`.
         render_size: Width and height of `render`, pixels.
     """
@@ -56,20 +93,45 @@ class EnvConfig(FrozenModel):
     model_config = ConfigDict(arbitrary_types_allowed=True)
 
     robots: Any = "Panda"
+    env_configuration: Literal["default", "single-robot", "opposed", "parallel"] = (
+        "default"
+    )
     controller_configs: Any = None
+    placement_initializer: Any = None
     gripper_types: Any = "default"
     base_types: Any = "default"
     skin: str | Path | None = None
     initialization_noise: NoiseConfig | Literal["default"] | None = "default"
     control_freq: PositiveFloat = 20.0
+    lite_physics: bool = True
+    compiled: bool = True
     horizon: PositiveInt | None = None
     reward_shaping: bool = False
     reward_scale: PositiveFloat = 1.0
     terminate_on_success: bool = False
     use_object_obs: bool = True
-    render_mode: Literal["rgb_array"] | None = None
+    randomisation: Any = None
+    use_sensor_obs: bool = False
+    observables: dict[str, dict[str, Any]] | None = None
+    use_camera_obs: bool = False
+    camera_names: str | tuple[str, ...] = "agentview"
+    camera_heights: Pixels | tuple[Pixels, ...] = 256
+    camera_widths: Pixels | tuple[Pixels, ...] = 256
+    camera_depths: bool | tuple[bool, ...] = False
+    camera_segmentations: Segmentations | tuple[Segmentations, ...] = None
+    render_preset: RenderPreset | None = None
+    render_mode: RenderMode | None = None
     render_camera: str = "agentview"
     render_size: tuple[Pixels, Pixels] = (512, 512)
+
+    @field_validator("placement_initializer")
+    @classmethod
+    def _draws_places(cls, sampler: Any) -> Any:
+        if sampler is not None and not callable(getattr(sampler, "sample", None)):
+            raise ValueError(
+                "a sampler has a method `sample`, as those of wbc_suite.scene.placement"
+            )
+        return sampler
 
     @field_validator("robots")
     @classmethod
@@ -81,6 +143,13 @@ class EnvConfig(FrozenModel):
             )
         return robots
 
+    @field_validator("randomisation")
+    @classmethod
+    def _randomisation_binds(cls, given: Any) -> Any:
+        if given is not None and not hasattr(given, "bind"):
+            raise ValueError("randomisation is a wbc_suite.randomisation.Randomisation")
+        return given
+
     @model_validator(mode="after")
     def _one_controller_each(self) -> "EnvConfig":
         robots, controllers = len(self.robot_list), len(self.controller_list)
@@ -91,11 +160,57 @@ class EnvConfig(FrozenModel):
             )
         return self
 
+    @model_validator(mode="after")
+    def _one_value_per_camera(self) -> "EnvConfig":
+        names = self.camera_name_list
+        if len(set(names)) < len(names):
+            raise ValueError("camera_names has a camera twice")
+        for key in _PER_CAMERA:
+            given = getattr(self, key)
+            if isinstance(given, tuple) and len(given) != len(names):
+                raise ValueError(
+                    f"{key} has {len(given)} entries for {len(names)} camera(s); give "
+                    "one for all, or one for each"
+                )
+        return self
+
+    @property
+    def camera_name_list(self) -> list[str]:
+        """Names of the observed cameras, always as a list."""
+        given = self.camera_names
+        return [given] if isinstance(given, str) else list(given)
+
+    @property
+    def cameras(self) -> list[CameraRequest]:
+        """What is observed of cameras; empty without `use_camera_obs`."""
+        if not self.use_camera_obs:
+            return []
+        names = self.camera_name_list
+        columns = [_one_each(getattr(self, key), len(names)) for key in _PER_CAMERA]
+        return [
+            CameraRequest(
+                name=name,
+                height=height,
+                width=width,
+                depth=depth,
+                segmentations=_levels(segmentations),
+            )
+            for name, height, width, depth, segmentations in zip(
+                names, *columns, strict=True
+            )
+        ]
+
     @property
     def robot_list(self) -> list[str | Path | RobotDescription]:
         """The robots, always as a list."""
         one = isinstance(self.robots, str | Path | RobotDescription)
         return [self.robots] if one else list(self.robots)
+
+    @property
+    def noise(self) -> NoiseConfig | None:
+        """The noise at reset."""
+        given = self.initialization_noise
+        return NoiseConfig() if given == "default" else given
 
     @property
     def controller_list(self) -> list[str | Path | Mapping[str, Any] | None]:
@@ -104,6 +219,16 @@ class EnvConfig(FrozenModel):
         if isinstance(given, Sequence) and not isinstance(given, str):
             return list(given)
         return [given] * len(self.robot_list)
+
+
+def _one_each(given: Any, count: int) -> Sequence[Any]:
+    return given if isinstance(given, tuple) else (given,) * count
+
+
+def _levels(given: Segmentations) -> tuple[SegmentationLevel, ...]:
+    if given is None:
+        return ()
+    return (given,) if isinstance(given, SegmentationLevel) else given
 
 
 def parse_env_config(arguments: Mapping[str, Any]) -> EnvConfig:

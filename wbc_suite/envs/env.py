@@ -1,42 +1,45 @@
 """The environment: robots, controllers, a benchmark and physics behind Gymnasium."""
 
+import copy
+from collections import deque
+from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
 import gymnasium
 import mujoco
 import numpy as np
+from numpy.typing import ArrayLike
 
-from wbc_suite.benchmark import load_benchmark
-from wbc_suite.control import (
-    ActionLayout,
-    CompositeController,
-    RobotState,
-    build_composite_controller,
-    load_composite_controller_config,
+from wbc_suite.benchmark import Benchmark, load_benchmark
+from wbc_suite.control import ActionLayout, CompositeController
+from wbc_suite.envs.building import (
+    compose,
+    make_observables,
+    place_robots,
+    simulate,
+    take_sampler,
 )
-from wbc_suite.envs.config import EnvConfig, NoiseConfig, parse_env_config
-from wbc_suite.envs.simulation import Simulation
-from wbc_suite.errors import ConfigError, PhysicsError, UnknownNameError
-from wbc_suite.robot import RobotDescription, load_robot
-from wbc_suite.scene import attach_robot, empty_arena, robot_prefix
-from wbc_suite.sensing.proprioception import Proprioception
-from wbc_suite.sensing.renderer import make_renderer
+from wbc_suite.envs.config import EnvConfig, parse_env_config
+from wbc_suite.envs.display import Display
+from wbc_suite.envs.states import EnvState, write_physics, write_scene
+from wbc_suite.errors import ConfigError, PhysicsError
+from wbc_suite.scene import robot_prefix
+from wbc_suite.sensing.cameras import Cameras
+from wbc_suite.sensing.observer import Observer
+from wbc_suite.sensing.projection import camera_id
 from wbc_suite.typing import Vector
 
-__all__ = ["RobotEnv"]
+__all__ = ["RobotEnv", "checked_seed"]
 
-Observation = dict[str, Vector]
-
-_UNIT_KEYS = ("_quat", "_cos", "_sin")
-_LARGEST = 1e4
-"""Bound of positions and speeds, SI units: physics that goes beyond has diverged."""
+Observation = dict[str, Any]
 
 
-class RobotEnv(gymnasium.Env[Observation, Vector]):
+class RobotEnv(gymnasium.Env[Observation, Any]):
     """One benchmark with its robots.
 
     Args:
-        benchmark: Name of the benchmark, such as `Lift`.
+        benchmark: Name of the benchmark, such as `Lift`; or see `load_benchmark`.
         arguments: See `EnvConfig`.
 
     Raises:
@@ -50,33 +53,48 @@ class RobotEnv(gymnasium.Env[Observation, Vector]):
         controllers: One composite controller per robot.
         action_layout: Slices of the action.
         simulation: Model, data and `tick`.
+        observables: What is seen but pictures; changes, adds and leaves out.
+        cameras: Pictures of the scene, and where points are in them.
+        latency: Physics steps from a step's beginning until its action counts; may be
+            several control periods.
     """
 
-    metadata = {"render_modes": ["rgb_array"], "render_fps": 20}
+    metadata = {
+        "render_modes": ["human", "rgb_array", "depth_array"],
+        "render_fps": 20,
+    }
 
-    def __init__(self, benchmark: str = "Lift", **arguments: Any) -> None:
-        self.config: EnvConfig = parse_env_config(arguments)
+    def __init__(
+        self,
+        benchmark: str | Path | Callable[[], Benchmark] = "Lift",
+        **arguments: Any,
+    ) -> None:
         self._given = benchmark, dict(arguments)
         self.benchmark = load_benchmark(benchmark)
+        robots = list(self.benchmark.robots)
+        self.config: EnvConfig = parse_env_config({"robots": robots, **arguments})
+        take_sampler(self.benchmark, self.config)
         self.render_mode = self.config.render_mode
-        self.robots = self._place_robots()
-        self.simulation = self._build()
+        self.robots = place_robots(self.benchmark, self.config)
+        self.simulation, self._postures = simulate(
+            self.benchmark, self.robots, self.config
+        )
         self.controllers = self.simulation.controllers
         self.action_layout = _joint_layout(self.controllers)
-        layout = self.action_layout
-        self.action_space = gymnasium.spaces.Box(
-            layout.low.copy(), layout.high.copy(), dtype=np.float64
+        self.action_space = _action_space(self.action_layout)
+        self._period = 1.0 / self.config.control_freq
+        self.observables = make_observables(
+            self.benchmark, self.simulation, self.config
         )
-        self._check_camera()
-        self._senses = [Proprioception(state) for state in self.simulation.robots]
+        self.cameras, self._display = self._make_cameras()
+        self._spaces: tuple[Observer, gymnasium.spaces.Dict] | None = None
         self._substeps = self._count_substeps()
         self.metadata = {**self.metadata, "render_fps": round(self.config.control_freq)}
         self.horizon = self.config.horizon or self.benchmark.horizon
-        self._renderer: mujoco.Renderer | None = None
-        self._steps, self._broken = 0, ""
+        self._steps, self._broken, self.latency = 0, "", 0
+        given = self.config.randomisation
+        self._randomiser = None if given is None else given.bind(self)
         self._start(np.random.default_rng(0))
-        self._observation = self._observe()
-        self.observation_space = self._observation_space()
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -89,10 +107,10 @@ class RobotEnv(gymnasium.Env[Observation, Vector]):
         """
         if options:
             raise ConfigError(f"reset: there are no options, got {options!r:.60}.")
-        super().reset(seed=_checked_seed(seed))
-        self._start(self.np_random)
-        self._observation = self._observe()
-        return _copied(self._observation), self._info(0)
+        info = self.begin(seed)
+        if self.render_mode == "human":
+            self.render()
+        return self.observation(), info
 
     def step(
         self, action: Any
@@ -104,30 +122,58 @@ class RobotEnv(gymnasium.Env[Observation, Vector]):
                 nothing has changed.
             PhysicsError: If the last step ended in one and `reset` was not called.
         """
-        vector, clipped = self.action_layout.clip(self.action_layout.check(action))
+        reward, terminated, truncated, info = self.advance(action)
+        if self.render_mode == "human":
+            self.render()
+        return self.observation(), reward, terminated, truncated, info
+
+    def begin(self, seed: int | None = None) -> dict[str, Any]:
+        """Do what `reset` does, but leave what is seen in `observer`."""
+        super().reset(seed=checked_seed(seed))
+        self._start(self.np_random)
+        return self._info(0)
+
+    def advance(self, action: Any) -> tuple[float, bool, bool, dict[str, Any]]:
+        """Do what `step` does, but leave what is seen in `observer`."""
+        vector, clipped = self.action_layout.take(action)
         if self._broken:
             raise PhysicsError(f"Call reset() first: {self._broken}")
         self._taken.append(vector)
-        self._set_goals(vector)
         self._steps += 1
         try:
-            self.simulation.tick(self._substeps)
+            self._drive(vector)
         except PhysicsError as error:
             self._broken = str(error)
             info = {"physics_error": str(error), "clipped": clipped}
             info |= {"success": False, "is_success": False}
-            return _copied(self._observation), 0.0, True, False, info
-        self._observation = self._observe()
+            return 0.0, True, False, info
+        self.benchmark.watch()
+        self.observables.look()
         reward = self.benchmark.reward(shaped=self.config.reward_shaping)
         info = self._info(clipped)
         terminated = self.config.terminate_on_success and info["success"]
-        return (
-            _copied(self._observation),
-            reward * self.config.reward_scale,
-            terminated,
-            self._steps >= self.horizon,
-            info,
-        )
+        truncated = self._steps >= self.horizon
+        return reward * self.config.reward_scale, terminated, truncated, info
+
+    def observation(self) -> Observation:
+        """Return what is seen now; after a physics error pictures are black."""
+        seen: Observation = self.observer.observation()
+        if self._broken:
+            return seen | self.cameras.black()
+        return seen | self.cameras.observation()
+
+    @property
+    def observer(self) -> Observer:
+        """What was seen last, and its places in one vector."""
+        return self.observables.observer
+
+    @property
+    def observation_space(self) -> gymnasium.spaces.Dict:  # pyright: ignore[reportIncompatibleVariableOverride] - it changes with what is observed
+        """What can be seen, by key."""
+        if self._spaces is None or self._spaces[0] is not self.observer:
+            spaces = {**self.observer.space.spaces, **self.cameras.space}
+            self._spaces = self.observer, gymnasium.spaces.Dict(spaces)
+        return self._spaces[1]
 
     @property
     def hold_action(self) -> Vector:
@@ -135,101 +181,118 @@ class RobotEnv(gymnasium.Env[Observation, Vector]):
         return np.concatenate([c.hold_action for c in self.controllers])
 
     def render(self) -> Any:
-        """Return a picture, shape (height, width, 3), RGB."""
-        if self.render_mode is None:
-            raise ConfigError("render: make the environment with render_mode.")
-        renderer = self._renderer
-        if renderer is None:
-            width, height = self.config.render_size
-            renderer = make_renderer(self.simulation.model, width=width, height=height)
-            self._renderer = renderer
-        renderer.update_scene(self.simulation.data, camera=self.config.render_camera)
-        return renderer.render()
+        """Return a picture, as `render_mode` says; see `Display.render`.
+
+        Mode `human` shows every step by itself, on a page whose address is logged.
+        """
+        return self._display.render()
 
     def close(self) -> None:
-        """Free the renderer."""
-        if self._renderer is not None:
-            self._renderer.close()
-            self._renderer = None
+        """Free what draws; a next picture makes it anew."""
+        self.cameras.close()
+        self._display.close()
+
+    def get_state(self) -> EnvState:
+        """Return the episode up to now, to go on from with `set_state`."""
+        return EnvState(
+            began_with=self._began_with,
+            placed=self._placed,
+            taken=tuple(self._taken),
+            observables=copy.deepcopy(self.observables.state()),
+            rng=copy.deepcopy(self._np_random),
+            seed=self._np_random_seed,
+        )
+
+    def set_state(self, state: EnvState) -> Observation:
+        """Take the steps of an episode again, and go on from there, bit by bit.
+
+        The environment must be made as the one that the state is from. What was written
+        into its simulation by hand is not in the state.
+        """
+        self.begin_at(state.began_with, state.placed)
+        for action in state.taken:
+            self.advance(action)
+        self.observables.restore(copy.deepcopy(state.observables))
+        self._np_random, self._np_random_seed = copy.deepcopy(state.rng), state.seed
+        return self.observation()
+
+    def reset_to(self, physics: ArrayLike) -> Observation:
+        """Start an episode at a physics state: time, qpos, qvel in one vector.
+
+        All else is drawn as at a reset: sizes of objects are not those of the episode
+        that the state is from, unless the random generator is.
+
+        Raises:
+            ConfigError: If its size is wrong, or a value is not finite.
+        """
+        self._start(self.np_random, np.array(physics, dtype=np.float64))
+        return self.observation()
+
+    def begin_at(
+        self, began_with: Mapping[str, Any], placed: ArrayLike | None = None
+    ) -> None:
+        """Start an episode as another one started; see `beginning`."""
+        rng = np.random.default_rng(0)
+        rng.bit_generator.state = dict(began_with)
+        self._start(rng, None if placed is None else np.array(placed, dtype=np.float64))
+
+    @property
+    def beginning(self) -> tuple[Mapping[str, Any], Vector | None]:
+        """What the episode began with: the random generator's state, a physics state.
+
+        With the actions since, it determines the episode; the second is None unless
+        the episode began by `reset_to`.
+        """
+        return self._began_with, self._placed
+
+    @property
+    def made_of(self) -> tuple[Any, dict[str, Any]]:
+        """The benchmark and the arguments, as they were given (a copy)."""
+        return self._given[0], dict(self._given[1])
+
+    @property
+    def physics_state(self) -> Vector:
+        """Time, qpos and qvel in one vector, as `reset_to` takes it."""
+        data = self.simulation.data
+        return np.concatenate([[data.time], data.qpos, data.qvel])
+
+    @property
+    def scene_xml(self) -> str:
+        """The scene as MJCF text, with plain colours for computed textures."""
+        benchmark = load_benchmark(self._given[0])
+        return write_scene(compose(benchmark, self.robots, self.config))
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return how to make this environment again, and what happened in it.
-
-        Solvers cannot be copied, and an episode is determined by its start and its
-        actions: a copy takes the same steps again, and goes on from there.
-        """
-        return {
-            "made_of": self._given,
-            "began_with": self._began_with,
-            "taken": self._taken,
-            "rng": self._np_random,
-            "seed": self._np_random_seed,
-        }
+        """Return how to make this environment again, and what happened in it."""
+        return {"made_of": self._given, "state": self.get_state()}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Make the environment and take its steps again."""
         benchmark, arguments = state["made_of"]
         RobotEnv.__init__(self, benchmark, **arguments)
-        rng = np.random.default_rng(0)
-        rng.bit_generator.state = state["began_with"]
-        self._start(rng)
-        self._observation = self._observe()
-        for action in state["taken"]:
-            self.step(action)
-        self._np_random, self._np_random_seed = state["rng"], state["seed"]
+        self.observables.prepare(state["state"].observables)
+        self.set_state(state["state"])
 
-    def _place_robots(self) -> tuple[RobotDescription, ...]:
-        given = self.config.robot_list
-        if not 1 <= len(given) <= self.benchmark.max_robots:
-            raise ConfigError(
-                f"{self.benchmark.name} has a place for {self.benchmark.max_robots} "
-                f"robot(s), not {len(given)}."
-            )
-        robots = [self._load(robot) for robot in given]
-        return tuple(self.benchmark.place(r, i) for i, r in enumerate(robots))
-
-    def _load(self, robot: Any) -> RobotDescription:
-        if isinstance(robot, RobotDescription):
-            return robot
-        gripper, base = self.config.gripper_types, self.config.base_types
-        return load_robot(
-            robot,
-            gripper=None if gripper == "default" else gripper,
-            base=None if base == "default" else base,
-            skin=self.config.skin,
+    def _make_cameras(self) -> tuple[Cameras, Display]:
+        config, simulation = self.config, self.simulation
+        cameras = Cameras(
+            simulation.model,
+            simulation.data,
+            simulation.robots,
+            config.cameras,
+            preset=config.render_preset,
         )
-
-    def _build(self) -> Simulation:
-        spec = empty_arena()
-        self.benchmark.build(spec)
-        for i, robot in enumerate(self.robots):
-            attach_robot(spec, robot, robot_prefix(i))
-        model = spec.compile()
-        data = mujoco.MjData(model)
-        states = [
-            RobotState(model, data, robot, prefix=robot_prefix(i))
-            for i, robot in enumerate(self.robots)
-        ]
-        self.benchmark.bind(model, data, states)
-        for state in states:
-            _set_posture(state, state.robot.keyframe("ready"))
-        mujoco.mj_forward(model, data)
-        pairs = [
-            (
-                state,
-                build_composite_controller(
-                    load_composite_controller_config(given, state.robot), state
-                ),
-            )
-            for state, given in zip(states, self.config.controller_list, strict=True)
-        ]
-        return Simulation(model, data, pairs)
-
-    def _check_camera(self) -> None:
-        model = self.simulation.model
-        known = [model.camera(i).name for i in range(model.ncam)]
-        if self.config.render_mode and self.config.render_camera not in known:
-            raise UnknownNameError("camera", self.config.render_camera, known)
+        if config.render_mode:
+            camera_id(simulation.model, config.render_camera)
+        display = Display(
+            config.render_mode,
+            simulation,
+            cameras,
+            camera=config.render_camera,
+            size=config.render_size,
+            period=self._period,
+        )
+        return cameras, display
 
     def _count_substeps(self) -> int:
         period = 1.0 / (self.config.control_freq * self.simulation.timestep)
@@ -241,61 +304,55 @@ class RobotEnv(gymnasium.Env[Observation, Vector]):
             )
         return count
 
-    def _start(self, rng: np.random.Generator) -> None:
+    def _start(self, rng: np.random.Generator, placed: Vector | None = None) -> None:
         """Put robots, objects and controllers at the start of an episode."""
-        self._began_with = rng.bit_generator.state
+        self._began_with, self._placed = rng.bit_generator.state, placed
         self._taken: list[Vector] = []
+        self._waiting: deque[tuple[int, Vector]] = deque()
         simulation = self.simulation
+        if self._randomiser is not None:
+            self._randomiser.restore()
         mujoco.mj_resetData(simulation.model, simulation.data)
-        for state in simulation.robots:
-            posture = state.robot.keyframe("ready")
-            _set_posture(state, _noisy(posture, state.robot, self.config, rng))
+        for posture in self._postures:
+            posture.write(rng)
         self.benchmark.reset(rng)
-        simulation.forward()
-        for state, controller in zip(
-            simulation.robots, simulation.controllers, strict=True
-        ):
-            controller.reset(state)
+        if self._randomiser is not None:
+            self._randomiser.apply(rng)
+        if placed is not None:
+            write_physics(simulation.model, simulation.data, placed)
+        simulation.start()
         self._steps, self._broken = 0, ""
+        self.observables.start(rng)
+
+    def _drive(self, action: Vector) -> None:
+        """Do the physics of one step; each action counts when its latency is over."""
+        now = (self._steps - 1) * self._substeps
+        end = now + self._substeps
+        self._waiting.append((now + self.latency, action))
+        while self._waiting and self._waiting[0][0] < end:
+            due, action = self._waiting.popleft()
+            if due > now:
+                self.observables.tick(self.simulation.tick, due - now)
+                now = due
+            self._set_goals(action)
+        self.observables.tick(self.simulation.tick, end - now)
 
     def _set_goals(self, action: Vector) -> None:
         start = 0
         for controller in self.controllers:
             stop = start + controller.layout.size
-            controller.set_goal(action[start:stop])
+            controller.set_goal(action[start:stop], self._period)
             start = stop
-
-    def _observe(self) -> Observation:
-        observation: Observation = {}
-        for sense in self._senses:
-            observation |= sense.observe()
-        if self.config.use_object_obs:
-            objects = self.benchmark.observe()
-            observation |= objects
-            observation["object-state"] = np.concatenate(list(objects.values()))
-        for key, value in observation.items():
-            if key.endswith(_UNIT_KEYS):  # rounding makes 1 + 2e-16 of a unit vector
-                value.clip(-1.0, 1.0, out=value)
-        return observation
-
-    def _observation_space(self) -> gymnasium.Space[Any]:
-        return gymnasium.spaces.Dict(
-            {
-                key: gymnasium.spaces.Box(-bound, bound, value.shape, np.float64)
-                for key, value in self._observation.items()
-                for bound in (1.0 if key.endswith(_UNIT_KEYS) else _LARGEST,)
-            }
-        )
 
     def _info(self, clipped: int) -> dict[str, Any]:
         success = self.benchmark.success()
-        info: dict[str, Any] = {"success": success, "is_success": success}
-        info["clipped"] = clipped
-        for state, controller in zip(
-            self.simulation.robots, self.controllers, strict=True
-        ):
-            prefix = state.prefix if len(self.controllers) > 1 else ""
-            info |= {prefix + k: v for k, v in controller.info(state).items()}
+        info = {"success": success, "is_success": success, "clipped": clipped}
+        several = len(self.controllers) > 1
+        for k, state in enumerate(self.simulation.robots):
+            told = self.controllers[k].info(state)
+            if several:
+                told = {state.prefix + key: value for key, value in told.items()}
+            info |= told
         return info
 
 
@@ -310,49 +367,22 @@ def _joint_layout(controllers: tuple[CompositeController, ...]) -> ActionLayout:
     )
 
 
-def _set_posture(state: RobotState, posture: dict[str, float]) -> None:
-    """Write joint positions, and the root's pose, into the simulation."""
-    data, robot = state.data, state.robot
-    q, _ = state.joint_addresses(tuple(posture))
-    data.qpos[q] = list(posture.values())
-    if robot.root.kind == "free":
-        start = state.model.joint(state.prefix + "root").qposadr[0]
-        data.qpos[start : start + 7] = (*robot.root.pos, *robot.root.quat)
-    for name in robot.root_joint_names if robot.root.kind == "planar" else ():
-        data.qpos[state.model.joint(state.prefix + name).qposadr[0]] = 0.0
+def _action_space(layout: ActionLayout) -> gymnasium.spaces.Box:
+    """Return the space of actions: float32 inside of the layout's bounds."""
+    low, high = (bound.astype(np.float32) for bound in (layout.low, layout.high))
+    low = np.where(low < layout.low, np.nextafter(low, np.float32(np.inf)), low)
+    high = np.where(high > layout.high, np.nextafter(high, np.float32(-np.inf)), high)
+    return gymnasium.spaces.Box(low, high, dtype=np.float32)
 
 
-def _noisy(
-    posture: dict[str, float],
-    robot: RobotDescription,
-    config: EnvConfig,
-    rng: np.random.Generator,
-) -> dict[str, float]:
-    """Return the posture with noise on the arms' joints, inside their ranges."""
-    noise = config.initialization_noise
-    if noise is None:
-        return posture
-    if noise == "default":
-        noise = NoiseConfig()
-    moved = dict(posture)
-    for group, joints in robot.groups.items():
-        if not group.endswith("arm"):
-            continue
-        for name in joints:
-            draw = rng.normal() if noise.type == "gaussian" else rng.uniform(-1.0, 1.0)
-            low, high = robot.joint(name).range or (-np.inf, np.inf)
-            value = moved[name] + noise.magnitude * draw
-            moved[name] = float(np.clip(value, low, high))
-    return moved
+def checked_seed(seed: object) -> int | None:
+    """Return a seed, or None.
 
-
-def _checked_seed(seed: object) -> int | None:
+    Raises:
+        ConfigError: If it is no whole number from 0 on.
+    """
     if seed is None:
         return None
     if not isinstance(seed, int | np.integer) or isinstance(seed, bool) or seed < 0:
         raise ConfigError(f"reset: a seed is a whole number from 0 on, not {seed!r}.")
     return int(seed)
-
-
-def _copied(observation: Observation) -> Observation:
-    return {key: value.copy() for key, value in observation.items()}

@@ -1,24 +1,21 @@
 """Physics with controllers in the loop: n steps of one call."""
 
-import logging
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+import math
+from collections.abc import Sequence
 
 import mujoco
-import numpy as np
 
+from wbc_suite.compiling import announced
 from wbc_suite.control import CompositeController, RobotState
-from wbc_suite.errors import PhysicsError
+from wbc_suite.control.loop import (
+    bind_physics,
+    gather,
+    loop_of,
+    physics_table,
+)
+from wbc_suite.envs.watch import PhysicsWatch
 
 __all__ = ["Simulation"]
-
-log = logging.getLogger(__name__)
-
-_NAMES = [
-    name.removeprefix("mjWARN_")
-    for name, value in mujoco.mjtWarning.__members__.items()
-    if value != mujoco.mjtWarning.mjNWARNING
-]
 
 
 class Simulation:
@@ -32,12 +29,18 @@ class Simulation:
         model: Compiled scene; its automatic reset is switched off.
         data: Its state.
         pairs: Controllers with their robots.
+        compiled: Whether controllers run in the compiled loop; one of them that has no
+            compiled law keeps all of them out. The plain loop gives the same states.
+        lite: Whether a tick ends with positions alone brought up to date. Else all that
+            follows from the new state is computed, such as contacts, accelerations and
+            what sensors read; MuJoCo leaves them one step behind.
 
     Attributes:
         model: The scene.
         data: The state.
         robots: The robots in the scene.
         controllers: Their controllers.
+        compiled: Whether the compiled loop runs.
     """
 
     def __init__(
@@ -45,11 +48,31 @@ class Simulation:
         model: mujoco.MjModel,
         data: mujoco.MjData,
         pairs: Sequence[tuple[RobotState, CompositeController]] = (),
+        *,
+        compiled: bool = True,
+        lite: bool = True,
     ) -> None:
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
         self.model, self.data = model, data
+        self._watch, self.lite = PhysicsWatch(data), lite
         self.robots = tuple(state for state, _ in pairs)
         self.controllers = tuple(controller for _, controller in pairs)
+        self._pairs = tuple(pairs)
+        self._left, self._prepared = [0] * len(pairs), False
+        self.compiled = compiled and all(c.laws for c in self.controllers)
+        physics = bind_physics(model, data)
+        self._table = physics_table(model, physics)
+        laws = [law for controller in self.controllers for law in controller.laws]
+        self._laws, self._drives = gather([(law.record, law.drives) for law in laws])
+        for k, law in enumerate(laws):
+            first, last = self._laws["first"][k], self._laws["last"][k]
+            law.adopt(self._laws[k : k + 1], self._drives[first:last])
+        tables = self._table.table, self._watch.sound
+        self._bound = (*physics[:3], *tables, self._laws, self._drives)
+        self._run = loop_of(self._laws)
+        if self.compiled:
+            with announced("the control loop"):
+                self._advance_compiled(0)
 
     @property
     def timestep(self) -> float:
@@ -62,8 +85,19 @@ class Simulation:
         Raises:
             PhysicsError: If the state is not finite or MuJoCo warns.
         """
-        with self._watched():
+        with self._watch:
             mujoco.mj_forward(self.model, self.data)
+
+    def start(self) -> None:
+        """Compute what follows from the state, and let controllers start from there.
+
+        Raises:
+            PhysicsError: If the state is not finite or MuJoCo warns.
+        """
+        self.forward()
+        for state, controller in self._pairs:
+            controller.reset(state)
+        self._left = [0] * len(self._pairs)
 
     def tick(self, n: int) -> None:
         """Advance n physics steps with the controllers in the loop.
@@ -72,56 +106,55 @@ class Simulation:
             PhysicsError: If MuJoCo warns, or the state is not finite; names the
                 warning. The state is left as it was found, for inspection.
         """
-        with self._watched():
-            for _ in range(n):
-                mujoco.mj_step1(self.model, self.data)
-                self._control()
-                mujoco.mj_step2(self.model, self.data)
+        if self.compiled and n <= min(self._left, default=n):
+            self._left = [left - n for left in self._left]
+            self._advance_compiled(n)
+        elif self._prepared:
+            self._advance_by_parts(n)
+        else:
+            with announced("the controllers"):
+                self._advance_by_parts(n)
+            self._prepared = True
+        if not self.lite:
+            self._refresh()
 
-    def _control(self) -> None:
-        for state, controller in zip(self.robots, self.controllers, strict=True):
-            self.data.ctrl[state.actuator_ids] = controller.compute(state)
+    def _advance_by_parts(self, n: int) -> None:
+        """Advance n steps; controllers do in between what is due."""
+        with self._watch:
+            while n > 0:
+                span = n
+                for k, (state, controller) in enumerate(self._pairs):
+                    if self._left[k] <= 0:
+                        self._left[k] = controller.prepare(state)
+                    span = min(span, self._left[k])
+                self._advance(span)
+                self._left = [left - span for left in self._left]
+                n -= span
 
-    @contextmanager
-    def _watched(self) -> Iterator[None]:
-        """Turn MuJoCo's warnings into an error, and keep its log file unwritten."""
-        data = self.data
-        self._check_finite()
-        before = data.warning.number.copy()
-        previous = mujoco.get_mju_user_warning()
-        mujoco.set_mju_user_warning(log.warning)
-        failed: Exception | None = None
-        try:
-            yield
-        except np.linalg.LinAlgError as error:
-            failed = error  # mostly of a state that MuJoCo has warned of
-        finally:
-            mujoco.set_mju_user_warning(previous)
-        raised = np.flatnonzero(data.warning.number - before)
-        if raised.size:
-            names = ", ".join(_NAMES[i] for i in raised)
-            raise PhysicsError(
-                f"MuJoCo reported {names} at t = {data.time:.3f} s "
-                f"(index {int(data.warning.lastinfo[raised[0]])}). The state is no "
-                "longer to be trusted: reset."
-            ) from failed
-        self._check_finite()
-        if failed is not None:
-            raise PhysicsError(
-                f"A controller failed at t = {data.time:.3f} s: {failed}. Reset."
-            ) from failed
+    def _refresh(self) -> None:
+        """Compute what follows from the state; physics goes on as if it had not."""
+        start = self.data.qacc_warmstart.copy()
+        with self._watch:
+            mujoco.mj_forward(self.model, self.data)
+        self.data.qacc_warmstart[:] = start
 
-    def _check_finite(self) -> None:
-        data = self.data
-        for name, values in (
-            ("QPOS", data.qpos),
-            ("QVEL", data.qvel),
-            ("QFRC_APPLIED", data.qfrc_applied),
-            ("XFRC_APPLIED", data.xfrc_applied),
-            ("TIME", data.time),
-        ):
-            if not np.isfinite(values).all():
-                raise PhysicsError(
-                    f"Not finite: {name} at t = {data.time:.3f} s. Reset, and look at "
-                    "what was written into the simulation."
-                )
+    def _advance(self, steps: int) -> None:
+        if self.compiled:
+            self._advance_compiled(steps)
+        else:
+            self._advance_plainly(steps)
+
+    def _advance_compiled(self, steps: int) -> None:
+        if not math.isfinite(self.data.time) or not self._run(*self._bound, steps):
+            self._watch.check()
+
+    def _advance_plainly(self, steps: int) -> None:
+        """Do what the compiled loop does, step by step: to be read and debugged."""
+        model, data = self.model, self.data
+        for _ in range(steps):
+            mujoco.mj_step1(model, data)
+            for state, controller in self._pairs:
+                data.ctrl[state.actuator_ids] = controller.compute(state)
+            mujoco.mj_step2(model, data)
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)

@@ -8,6 +8,14 @@ import pinocchio as pin
 
 from wbc_suite.arguments import check_array
 from wbc_suite.errors import ConfigError, UnknownNameError
+from wbc_suite.kinematics.array_table import ArrayTable
+from wbc_suite.kinematics.forward import (
+    JointKind,
+    RobotField,
+    joint_kinds,
+    place_joints,
+    weigh_joints,
+)
 from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["Axes", "Configuration"]
@@ -26,18 +34,16 @@ _ROOT_NAMES = ("root_x", "root_y", "root_yaw")
 class Configuration:
     """Joint positions q with everything that follows from them.
 
-    `update` runs forward kinematics and the joint Jacobians once; poses and frame
-    Jacobians are then read off. Twists are linear first, then angular.
+    `update` takes new positions; what follows from them is computed when it is first
+    asked for, and read off from then on. Twists are linear first, then angular.
 
     Args:
         model: The Pinocchio model; shared, not copied.
         q: Joint positions, shape (nq,); the neutral ones when absent.
 
     Attributes:
-        placements: View of all joint poses in the world, shape (njoints, 12): the
-            rotation column by column, then the position. Follows each `update`.
-        joint_jacobians: View of the joint Jacobians, transposed, shape (nv, 6), world
-            axes at the world's origin. Follows each `update`.
+        q: Joint positions, shape (nq,); move them with `update`.
+        table: What compiled kernels read and write, by `RobotField`.
         root_linear: Velocity indices that translate a free or planar root.
         root_angular: Velocity indices that turn a free or planar root.
     """
@@ -50,23 +56,52 @@ class Configuration:
                 f"not {type(model).__name__}."
             )
         self.model = model
-        self.data: pin.Data = model.createData()
+        self._data: pin.Data = model.createData()
         self.nq, self.nv = int(model.nq), int(model.nv)
         self.q: Vector = pin.neutral(model)
-        self.placements = _view_placements(self.data, int(model.njoints))
-        # Pinocchio gives a single column as a vector.
-        self.joint_jacobians: Matrix = self.data.J.reshape(6, self.nv).T
         self.root_linear, self.root_angular = _root_indices(model)
         self._frame_ids = {f.name: i for i, f in enumerate(model.frames)}
         self._nframes = len(model.frames)
         self._joint_ids = {n: i for i, n in enumerate(model.names)}
-        self._com: Vector = self.data.com[0]
-        self._com_jacobian: Matrix = self.data.Jcom.reshape(3, self.nv)
-        self._com_is_current = False
+        self._current: Indices = np.zeros(2, dtype=np.int64)
+        self._arrays = self._make_table()
+        self.table = self._arrays.table
         self.update(self.q if q is None else q)
 
+    def _make_table(self) -> ArrayTable:
+        """Gather what the kernels of `forward` read and write."""
+        model, data = self.model, self._data
+        kinds, axes = joint_kinds(model)
+        self._by_pinocchio = bool((kinds[1:] == JointKind.OTHER).any())
+        self._placements = _view_placements(data, int(model.njoints))
+        # Pinocchio gives a single column as a vector.
+        self._joint_jacobians: Matrix = data.J.reshape(6, self.nv).T
+        self._com: Vector = data.com[0]
+        self._com_jacobian: Matrix = data.Jcom.reshape(3, self.nv)
+        f = RobotField
+        return ArrayTable(
+            RobotField,
+            {
+                f.Q: self.q,
+                f.CURRENT: self._current,
+                f.KIND: kinds,
+                f.PARENT: np.array(model.parents, dtype=np.int64),
+                f.V_FIRST: np.array(model.idx_vs, dtype=np.int64),
+                f.V_COUNT: np.array(model.nvs, dtype=np.int64),
+                f.Q_FIRST: np.array(model.idx_qs, dtype=np.int64),
+                f.MOUNT: np.array([_packed(T) for T in model.jointPlacements]),
+                f.AXIS: axes,
+                f.MASS: np.array([body.mass for body in model.inertias]),
+                f.LEVER: np.array([body.lever for body in model.inertias]),
+                f.PLACEMENT: self._placements,
+                f.JACOBIAN: self._joint_jacobians,
+                f.COM: self._com,
+                f.COM_JACOBIAN: self._com_jacobian.T,
+            },
+        )
+
     def update(self, q: Vector) -> None:
-        """Move to q and compute joint poses and Jacobians, about 5 us for 50 joints.
+        """Move to q.
 
         Args:
             q: Joint positions, shape (nq,). Values are taken as they are; the task
@@ -76,12 +111,40 @@ class Configuration:
             ConfigError: If the shape is wrong.
         """
         self.q[:] = self._checked("q", q, self.nq)
-        pin.computeJointJacobians(self.model, self.data, self.q)
-        self._com_is_current = False
+        self._current.fill(0)
+        if self._by_pinocchio:  # it has joints that the kernels do not know
+            pin.computeJointJacobians(self.model, self._data, self.q)
+            self._current[0] = 1
+
+    @property
+    def data(self) -> pin.Data:
+        """Pinocchio's data with `oMi` and `J` of the present q."""
+        self._place()
+        return self._data
+
+    @property
+    def placements(self) -> Matrix:
+        """Joint poses in the world, shape (njoints, 12), a view.
+
+        The rotation column by column, then the position.
+        """
+        self._place()
+        return self._placements
+
+    @property
+    def joint_jacobians(self) -> Matrix:
+        """Joint Jacobians, transposed, shape (nv, 6), a view.
+
+        World axes at the world's origin.
+        """
+        self._place()
+        return self._joint_jacobians
 
     def integrate(self, dq: Vector) -> Vector:
         """Return `q (+) dq`: the configuration reached by the tangent step dq (nv,)."""
         dq = self._checked("dq", dq, self.nv)
+        if self.nq == self.nv:  # a vector space
+            return self.q + dq
         return pin.integrate(self.model, self.q, dq)
 
     def difference(self, q: Vector) -> Vector:
@@ -143,29 +206,33 @@ class Configuration:
         frame's origin ("aligned"), or the spatial twist ("world").
         """
         k = self._resolve(frame)
-        pin.updateFramePlacement(self.model, self.data, k)
         if axes not in tuple(_REFERENCE):
             raise UnknownNameError("axes", axes, _REFERENCE)
-        J = pin.getFrameJacobian(self.model, self.data, k, _REFERENCE[axes])
+        data = self.data
+        pin.updateFramePlacement(self.model, data, k)
+        J = pin.getFrameJacobian(self.model, data, k, _REFERENCE[axes])
         return J.reshape(6, self.nv)
 
     @property
     def com(self) -> Vector:
         """Centre of mass in the world, m, shape (3,). A view."""
-        self.update_com()
+        self._weigh()
         return self._com
 
     @property
     def com_jacobian(self) -> Matrix:
         """Jacobian of the centre of mass, shape (3, nv). A view."""
-        self.update_com()
+        self._weigh()
         return self._com_jacobian
 
-    def update_com(self) -> None:
-        """Compute the centre of mass and its Jacobian, once after each `update`."""
-        if not self._com_is_current:
-            pin.jacobianCenterOfMass(self.model, self.data, False)
-            self._com_is_current = True
+    def _place(self) -> None:
+        if not self._current[0]:
+            place_joints(self.table)
+
+    def _weigh(self) -> None:
+        if not self._current[1]:
+            self._place()
+            weigh_joints(self.table)
 
     def _resolve(self, frame: str | int) -> int:
         """Return a frame's index; Pinocchio would read past its own memory."""
@@ -195,6 +262,10 @@ def _root_indices(model: pin.Model) -> tuple[Indices, Indices]:
         elif name in _ROOT_NAMES:
             (angular if name == "root_yaw" else linear).append(joint.idx_v)
     return np.array(linear, dtype=np.int64), np.array(angular, dtype=np.int64)
+
+
+def _packed(T: pin.SE3) -> Vector:
+    return np.concatenate([T.rotation.T.ravel(), T.translation])
 
 
 def _view_placements(data: pin.Data, count: int) -> Matrix:

@@ -18,7 +18,7 @@ from wbc_suite.qp.position_limit import PositionLimit
 from wbc_suite.qp.posture_task import PostureTask
 from wbc_suite.qp.problem import Problem
 from wbc_suite.qp.relative_frame_task import RelativeFrameTask
-from wbc_suite.qp.report import TaskReport
+from wbc_suite.qp.report import TaskReport, TickRecord
 from wbc_suite.qp.self_collision_limit import SelfCollisionLimit
 from wbc_suite.qp.solution import ActiveLimit, Fallback, Solution
 from wbc_suite.qp.stack import TaskStack
@@ -56,6 +56,7 @@ __all__ = [
     "Task",
     "TaskReport",
     "TaskStack",
+    "TickRecord",
     "VelocityLimit",
     "WeightLimit",
 ]

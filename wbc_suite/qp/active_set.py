@@ -10,28 +10,29 @@ size of the rows, not of the robot:
 
 with F the free and K the kept joints. Joints that leave their bounds are kept, joints
 whose multiplier has the wrong sign are freed, until nothing changes: then the KKT
-conditions hold, and x is the one optimum. Where that takes too long nothing is
-answered, and a general solver takes over.
+conditions hold, and x is the one optimum if it keeps `A x = b`, which the caller
+checks: rows that the kept joints leave nothing to are left out. Where that takes too
+long nothing is answered, and a general solver takes over.
 
 Source: Hintermueller, Ito, Kunisch (2002), "The Primal-Dual Active Set Strategy as a
 Semismooth Newton Method", SIAM J. Optim. 13(3); the small system is the matrix
 inversion lemma.
 """
 
-import numba
 import numpy as np
 
+from wbc_suite.compiling import compiled
+from wbc_suite.qp.sums import dot
 from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["solve_warm"]
 
 _ROUNDS = 12  # changes of the set before a general solver is asked
+_DEPENDENT = 1e-12  # part of a row's square that is left by the rows above
 _TOLERANCE = 1e-13  # m, rad: how far a free joint may pass its bound by rounding
 
-_SUMS = {"reassoc", "contract"}  # lets sums be vectorised; NaN stays NaN
 
-
-@numba.njit(cache=True, nogil=True)
+@compiled
 def solve_warm(  # noqa: C901, one flat loop is what compiles well
     W: Matrix,
     e: Vector,
@@ -63,77 +64,84 @@ def solve_warm(  # noqa: C901, one flat loop is what compiles well
         row_multipliers: Output, of A, shape (k,).
 
     Returns:
-        Whether x is the optimum.
+        Whether x is the optimum, provided that it keeps A x = b.
     """
     m, k, n = W.shape[0], A.shape[0], x.shape[0]
-    scaled = np.empty((m + k, n))
-    system = np.empty((m + k, m + k))
+    scaled, system = np.empty((m + k, n)), np.empty((m + k, m + k))
     y, root = np.empty(m + k), np.empty(n)
+    loose, kept = np.empty(n), np.empty(n)
+    ends = np.empty(m + k, dtype=np.int64)
+    for row in range(m + k):
+        ends[row] = _end(W[row] if row < m else A[row - m])
     for i in range(n):
         root[i] = 1.0 / np.sqrt(diagonal[0, i] + mu)
     for _ in range(_ROUNDS):
         for i in range(n):
-            if side[i] == 0:
-                x[i] = root[i] * diagonal[1, i]  # scaled right-hand side, for now
-            else:
-                x[i] = 0.0
+            loose[i], kept[i] = root[i], 0.0
+            if side[i] != 0:
+                loose[i], kept[i] = 0.0, ub[i] if side[i] > 0 else lb[i]
+            x[i] = loose[i] * diagonal[1, i]  # scaled right-hand side, for now
         for row in range(m + k):
-            of = W[row] if row < m else A[row - m]
-            kept = 0.0
-            for i in range(n):
-                if side[i] == 0:
-                    scaled[row, i] = of[i] * root[i]
-                else:
-                    scaled[row, i] = 0.0
-                    kept += of[i] * (ub[i] if side[i] > 0 else lb[i])
-            y[row] = kept - (e[row] if row < m else b[row - m])
-            y[row] += _dot(scaled[row], x)
+            of, own, end = W[row] if row < m else A[row - m], scaled[row], ends[row]
+            for i in range(end):
+                own[i] = of[i] * loose[i]
+            y[row] = dot(of, kept, end) - (e[row] if row < m else b[row - m])
+            y[row] += dot(own, x, end)
             for other in range(row + 1):
-                system[row, other] = _dot(scaled[row], scaled[other])
+                last = min(end, ends[other])
+                system[row, other] = dot(own, scaled[other], last)
             if row < m:
                 system[row, row] += 1.0
-        if not _solve_in_place(system, y):
-            break
+        _solve_in_place(system, y)
         for i in range(n):
             x[i] = root[i] * diagonal[1, i]
         for row in range(m + k):
-            for i in range(n):
+            for i in range(ends[row]):
                 x[i] -= scaled[row, i] * y[row]
         if _settle(W, A, y, diagonal, mu, root, lb, ub, side, x, multipliers):
-            row_multipliers[:] = y[m:]
+            for row in range(k):
+                row_multipliers[row] = y[m + row]
             return True
-    side[:] = 0
+    for i in range(n):
+        side[i] = 0
     return False
 
 
-@numba.njit(cache=True, nogil=True, fastmath=_SUMS)
-def _dot(a: Vector, b: Vector) -> float:
-    total = 0.0
-    for i in range(a.shape[0]):
-        total += a[i] * b[i]
-    return total
+@compiled
+def _end(row: Vector) -> int:
+    """Return where a row's last entry other than zero is, and one more.
+
+    Joints count from the root outwards, so that many rows end early.
+    """
+    end = row.shape[0]
+    while end > 0 and row[end - 1] == 0.0:
+        end -= 1
+    return end
 
 
-@numba.njit(cache=True, nogil=True)
-def _solve_in_place(S: Matrix, y: Vector) -> bool:
-    """Solve `S y = y` by Cholesky, lower triangle; False if S is not positive."""
+@compiled
+def _solve_in_place(S: Matrix, y: Vector) -> None:
+    """Solve `S y = y` by Cholesky, lower triangle.
+
+    The factor's diagonal is kept as its inverse. Rows that follow from those above are
+    left out, with y = 0: on the way to the right set, joints that are kept for now may
+    leave fewer free ones than there are equality rows.
+    """
     n = y.shape[0]
     for i in range(n):
+        own = S[i]
         for j in range(i):
-            S[i, j] = (S[i, j] - _dot(S[i, :j], S[j, :j])) / S[j, j]
-        pivot = S[i, i] - _dot(S[i, :i], S[i, :i])
-        if not pivot > 1e-12 * S[i, i]:
-            return False
-        S[i, i] = np.sqrt(pivot)
-        y[i] = (y[i] - _dot(S[i, :i], y[:i])) / S[i, i]
+            own[j] = (own[j] - dot(own, S[j], j)) * S[j, j]
+        pivot = own[i] - dot(own, own, i)
+        own[i] = 1.0 / np.sqrt(pivot) if pivot > _DEPENDENT * own[i] else 0.0
+        y[i] = (y[i] - dot(own, y, i)) * own[i]
     for i in range(n - 1, -1, -1):
-        y[i] /= S[i, i]
+        y[i] *= S[i, i]
         for j in range(i):
             y[j] -= S[i, j] * y[i]
-    return True
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def _settle(
     W: Matrix,
     A: Matrix,

@@ -1,7 +1,8 @@
 """How much the rows bend that a stack presses against, and the damping that needs."""
 
-import numpy as np
+import math
 
+from wbc_suite.compiling import compiled
 from wbc_suite.typing import Matrix, Vector
 
 __all__ = ["RowBending"]
@@ -30,14 +31,28 @@ class RowBending:
         """Forget the last tick."""
         self.value = 0.0
 
-    def note(self, rows: Matrix, multipliers: Vector, dt: float) -> None:
+    def note(self, rows: Matrix, multipliers: Vector, dt: float, *, kept: bool) -> None:
         """Take in what pressed at this tick.
 
         Args:
             rows: Shape (m, nv).
             multipliers: Shape (m,).
             dt: Step, s.
+            kept: Whether the rows were; those that are relaxed count as not pressing.
         """
-        self.value *= float(np.exp(-dt / _MEMORY))
-        longest = np.maximum(rows.max(axis=1), -rows.min(axis=1))
-        self.value = max(self.factor * float(np.abs(multipliers) @ longest), self.value)
+        self.value *= math.exp(-dt / _MEMORY)
+        if kept:
+            self.value = max(self.factor * _bending(rows, multipliers), self.value)
+
+
+@compiled
+def _bending(rows: Matrix, multipliers: Vector) -> float:
+    """Return `sum |nu| max|A|`, over rows (m, nv) and multipliers nu (m,)."""
+    total = 0.0
+    for row in range(rows.shape[0]):
+        if multipliers[row] != 0.0:
+            longest = 0.0
+            for i in range(rows.shape[1]):
+                longest = max(longest, abs(rows[row, i]))
+            total += abs(multipliers[row]) * longest
+    return total

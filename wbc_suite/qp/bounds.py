@@ -2,9 +2,9 @@
 
 from enum import IntEnum
 
-import numba
 import numpy as np
 
+from wbc_suite.compiling import compiled
 from wbc_suite.typing import Indices, Vector
 
 __all__ = ["LimitKind", "merge_bounds"]
@@ -23,7 +23,7 @@ class LimitKind(IntEnum):
     EFFORT = 7
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def merge_bounds(  # noqa: C901, one flat loop is what compiles well
     q: Vector,
     q_index: Indices,
@@ -115,7 +115,7 @@ def merge_bounds(  # noqa: C901, one flat loop is what compiles well
     return True
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def _brake(distance: float, a: float, dt: float) -> float:
     """Return the greatest step after which braking at a stops within the distance."""
     if not np.isfinite(a) or not np.isfinite(distance):

@@ -1,14 +1,14 @@
 """Compiled search for the nearest pairs of capsules, and their distance's Jacobian."""
 
-import numba
 import numpy as np
 
+from wbc_suite.compiling import compiled
 from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["nearest_pairs", "segment_parameters"]
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def segment_parameters(
     p0: Vector, p1: Vector, q0: Vector, q1: Vector
 ) -> tuple[float, float]:
@@ -42,7 +42,7 @@ def segment_parameters(
     return s, t
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def nearest_pairs(  # noqa: C901, one flat loop is what compiles well
     placements: Matrix,
     joint_jacobians: Matrix,
@@ -91,7 +91,8 @@ def nearest_pairs(  # noqa: C901, one flat loop is what compiles well
             length += (world[c, 0, i] - world[c, 1, i]) ** 2
         reach[c] = radii[c] + 0.5 * np.sqrt(length)
     rows = found.shape[0]
-    found[:], distances[:] = -1, np.inf
+    for row in range(rows):
+        found[row], distances[row] = -1, np.inf
     total = 0
     for p in range(pairs.shape[0]):
         a, b = pairs[p]
@@ -127,11 +128,12 @@ def nearest_pairs(  # noqa: C901, one flat loop is what compiles well
                 G[row],
             )
         else:
-            G[row] = 0.0
+            for col in range(G.shape[1]):
+                G[row, col] = 0.0
     return total
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def _distance_row(
     A: Matrix,
     B: Matrix,

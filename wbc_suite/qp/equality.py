@@ -10,7 +10,7 @@ import pinocchio as pin
 from wbc_suite.arguments import check_array, check_number
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.kinematics import Configuration
-from wbc_suite.qp.frame_task import pose_matrix
+from wbc_suite.qp.frame_task import homogeneous
 from wbc_suite.qp.lie import is_usable, saturate
 from wbc_suite.typing import Indices, Matrix, Vector
 
@@ -91,7 +91,8 @@ class FrameEquality(Equality):
 
     def set_target(self, target: pin.SE3 | Matrix) -> None:
         """Set the pose T_wt to hold."""
-        self.target = pin.SE3(*(a.copy() for a in pose_matrix(self.name, target)))
+        T = homogeneous(self.name, target)
+        self.target = pin.SE3(T[:3, :3].copy(), T[:3, 3].copy())
 
     def bind(self, configuration: Configuration) -> None:
         """Resolve the frame; without a target, hold its present pose."""

@@ -7,9 +7,9 @@ every rung. Limits come before the window: a robot that must brake harder than i
 brakes as it can, where dropping the window let it jump by 6 rad/s between two ticks.
 """
 
-import numba
 import numpy as np
 
+from wbc_suite.compiling import compiled
 from wbc_suite.qp.problem import UNBOUNDED, Problem, clip_step
 from wbc_suite.qp.solution import Fallback
 from wbc_suite.qp.solver import QpSolver
@@ -132,7 +132,7 @@ def _solve_with_slack(
     return x, np.concatenate([multipliers, weight * (A @ x - b)])
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def box_least_squares(
     H: Matrix, c: Vector, lb: Vector, ub: Vector, sweeps: int
 ) -> Vector:

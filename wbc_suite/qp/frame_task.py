@@ -11,7 +11,7 @@ from wbc_suite.qp.rows import PACKED_FRAME
 from wbc_suite.qp.task import RowTask, check_speed, cost_vector
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["FrameTask", "pose_matrix"]
+__all__ = ["FrameTask", "homogeneous"]
 
 
 class FrameTask(RowTask):
@@ -61,6 +61,7 @@ class FrameTask(RowTask):
         super().__init__(name or frame, gain=gain, level=level)
         self.frame = frame
         self.packed: Vector = np.zeros(PACKED_FRAME)
+        self._pose: Matrix = self.packed[:12].reshape(3, 4)
         self.packed[18] = self.gain
         self.packed[19] = check_speed(self.name, max_linear_speed)
         self.packed[20] = check_speed(self.name, max_angular_speed)
@@ -91,15 +92,13 @@ class FrameTask(RowTask):
         Raises:
             ConfigError: If the shape is wrong or the rotation is no rotation.
         """
-        rotation, position = pose_matrix(self.name, target)
-        self.packed[:9] = rotation.T.ravel()
-        self.packed[9:12] = position
+        self._pose[:] = homogeneous(self.name, target)[:3]
         self.has_target = True
 
     @property
     def target(self) -> pin.SE3:
         """Target pose T_wt, a copy."""
-        return pin.SE3(self.packed[:9].reshape(3, 3).T.copy(), self.packed[9:12].copy())
+        return pin.SE3(self._pose[:, :3].copy(), self._pose[:, 3].copy())
 
     def bind(self, configuration: Configuration) -> None:
         """Resolve the frame; without a target, hold its present pose."""
@@ -131,11 +130,10 @@ class FrameTask(RowTask):
         """Return (e_p, e_r), m and rad, shape (6,)."""
         if not is_usable(self.packed[:12]):
             return np.full(6, np.nan)
-        pose = configuration.frame_pose(self.frame_index)
-        rotation = pose.rotation.T @ self.packed[:9].reshape(3, 3).T
-        return np.concatenate(
-            [self.packed[9:12] - pose.translation, pin.log3(rotation)]
-        )
+        pose, error = configuration.frame_pose(self.frame_index), np.empty(6)
+        np.subtract(self._pose[:, 3], pose.translation, out=error[:3])
+        error[3:] = pin.log3(pose.rotation.T @ self._pose[:, :3])
+        return error
 
     def jacobian(
         self, configuration: Configuration, rotation_error: Vector | None = None
@@ -150,14 +148,14 @@ class FrameTask(RowTask):
         return J
 
 
-def pose_matrix(owner: str, pose: pin.SE3 | Matrix) -> tuple[Matrix, Vector]:
-    """Return rotation (3, 3) and position (3,) of a pose given in either form.
+def homogeneous(owner: str, pose: pin.SE3 | Matrix) -> Matrix:
+    """Return a pose given in either form as a matrix, shape (4, 4).
 
     Raises:
         ConfigError: If the shape is wrong, or a finite rotation is not orthonormal.
     """
     if isinstance(pose, pin.SE3):
-        return pose.rotation, pose.translation
+        return pose.homogeneous
     matrix = check_array(f"{owner}: the pose, an SE3 or a matrix,", pose, (4, 4))
     rotation = matrix[:3, :3]
     if np.isfinite(rotation).all() and (
@@ -165,4 +163,4 @@ def pose_matrix(owner: str, pose: pin.SE3 | Matrix) -> tuple[Matrix, Vector]:
         or np.linalg.det(rotation) < 0.0
     ):
         raise ConfigError(f"{owner}: the upper left 3 x 3 block is not a rotation.")
-    return rotation, matrix[:3, 3]
+    return matrix

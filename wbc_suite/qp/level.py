@@ -1,21 +1,22 @@
 """The rows of all tasks that share one strict level."""
 
-import math
 from collections.abc import Sequence
 from typing import TypeVar
 
 import numpy as np
 
 from wbc_suite.kinematics import Configuration
-from wbc_suite.qp.active_set import solve_warm
+from wbc_suite.kinematics.array_table import ArrayTable
 from wbc_suite.qp.com_task import ComTask
 from wbc_suite.qp.damping_task import DampingTask
 from wbc_suite.qp.frame_task import FrameTask
 from wbc_suite.qp.limit import JointBounds
 from wbc_suite.qp.posture_task import PostureTask
 from wbc_suite.qp.problem import Problem
-from wbc_suite.qp.rows import PACKED_COM, PACKED_FRAME, normal_equations, write_rows
+from wbc_suite.qp.report import LevelRecord
+from wbc_suite.qp.rows import normal_equations
 from wbc_suite.qp.task import DiagonalTask, RowTask, Task
+from wbc_suite.qp.tick import RowField
 from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["Level"]
@@ -42,6 +43,8 @@ class Level:
         diagonal: Squared weights and weighted steps of joints, shape (2, nv).
         mu: Damping of every joint at the last tick, see `rows.damping_of_rows`.
         held: Names of the tasks whose target was not finite at the last tick.
+        is_interpreted: Whether there are tasks that are not compiled.
+        table: What the kernels of `tick` read, by `RowField`.
     """
 
     def __init__(self, configuration: Configuration, tasks: Sequence[Task]) -> None:
@@ -55,7 +58,7 @@ class Level:
         ]
         self.W: Matrix = np.zeros((int(self._starts[-1]), configuration.nv))
         self.e: Vector = np.zeros(len(self.W))
-        self.held: list[str] = []
+        self.held: tuple[str, ...] = ()
         self._support = _concatenate([t.support(configuration) for t in self.row_tasks])
         self._bind_frames(configuration)
         self._bind_coms()
@@ -66,9 +69,11 @@ class Level:
             for t, s in zip(self.row_tasks, self.slices, strict=True)
             if t not in compiled
         ]
+        self.is_interpreted = len(self._others) + len(self._diagonals) > 0
         self._errors: dict[RowTask, Vector] = {}
-        self.mu = 0.0
-        self._bind_kernel(configuration)
+        self.mu, self._biased = 0.0, False
+        self._arrays = self._make_table()
+        self.table = self._arrays.table
 
     def _rows_of(self, kind: type[AnyTask]) -> tuple[list[AnyTask], Indices]:
         """Return the tasks of exactly one class, and the first row of each."""
@@ -92,12 +97,10 @@ class Level:
         self._frame_support = _concatenate(
             [t.support(configuration) for t in self._frames]
         )
-        self._frame_targets: Matrix = np.zeros((count, PACKED_FRAME))
         self._frame_errors: Matrix = np.zeros((count, 2))
 
     def _bind_coms(self) -> None:
         self._coms, self._com_row = self._rows_of(ComTask)
-        self._com_targets: Matrix = np.zeros((len(self._coms), PACKED_COM))
         self._com_errors: Vector = np.zeros(len(self._coms))
 
     def _bind_joints(self, configuration: Configuration, tasks: Sequence[Task]) -> None:
@@ -111,7 +114,6 @@ class Level:
         ]
         count = len(self._postures)
         self._posture_costs: Matrix = np.zeros((count, nv))
-        self._posture_targets: Matrix = np.zeros((count, configuration.nq))
         self._posture_gains: Matrix = np.zeros((count, 2))
         for k, task in enumerate(self._postures):
             self._posture_costs[k] = task.squared_costs
@@ -123,72 +125,70 @@ class Level:
                 self._constant[0] += task.squared_costs
             elif isinstance(task, DiagonalTask) and task not in self._postures:
                 self._diagonals.append(task)
+        self._given: Matrix = self._constant.copy()
         self.diagonal: Matrix = np.zeros((2, nv))
 
-    def _bind_kernel(self, configuration: Configuration) -> None:
-        """Gather the kernel's arguments; every array lives as long as the level."""
-        self._arguments = (
-            configuration.q,
-            configuration.placements,
-            configuration.joint_jacobians,
-            self._joints,
-            self._offsets,
-            self._frame_targets,
-            self._frame_row,
-            *self._frame_support,
-            self._frame_errors,
-            configuration.com,
-            configuration.com_jacobian,
-            self._com_targets,
-            self._com_row,
-            self._com_errors,
-            self._q_index,
-            self._posture_costs,
-            self._posture_targets,
-            self._posture_gains,
-            self._starts,
-            *self._support,
-            self.W,
-            self.e,
-            self.diagonal,
-        )
-        self._frame_pairs = list(zip(self._frame_targets, self._frames, strict=True))
-        self._com_pairs = list(zip(self._com_targets, self._coms, strict=True))
-        self._posture_pairs = list(
-            zip(self._posture_targets, self._postures, strict=True)
+    def _make_table(self) -> ArrayTable:
+        """Gather what the kernels read; targets where the tasks keep them."""
+        f = RowField
+        return ArrayTable(
+            RowField,
+            {
+                f.FRAME_JOINTS: self._joints,
+                f.FRAME_OFFSETS: self._offsets,
+                f.FRAME_TASKS: _addresses([t.packed for t in self._frames]),
+                f.FRAME_ROW: self._frame_row,
+                f.FRAME_SUPPORT_START: self._frame_support[0],
+                f.FRAME_SUPPORT: self._frame_support[1],
+                f.FRAME_ERRORS: self._frame_errors,
+                f.COM_TASKS: _addresses([t.packed for t in self._coms]),
+                f.COM_ROW: self._com_row,
+                f.COM_ERRORS: self._com_errors,
+                f.Q_INDEX: self._q_index,
+                f.POSTURE_COSTS: self._posture_costs,
+                f.POSTURE_TARGETS: _addresses([t.target for t in self._postures]),
+                f.POSTURE_GAINS: self._posture_gains,
+                f.ROW_START: self._starts,
+                f.SUPPORT_START: self._support[0],
+                f.SUPPORT: self._support[1],
+                f.W: self.W,
+                f.E: self.e,
+                f.GIVEN: self._given,
+                f.DIAGONAL: self.diagonal,
+            },
         )
 
-    def write(
-        self,
-        configuration: Configuration,
-        dt: float,
-        *,
-        damping: float,
-        curvature: float,
-        bias: Matrix | None = None,
-    ) -> bool:
-        """Fill rows, diagonal and mu; return whether they are finite.
+    def prepare(
+        self, configuration: Configuration, dt: float, bias: Matrix | None = None
+    ) -> None:
+        """Do what comes before the kernels: the terms of tasks that are not compiled.
 
         A bias, shape (2, nv), adds squared costs and weighted steps on single joints.
         """
-        if self.held:
-            self.held.clear()
-        for packed, frame in self._frame_pairs:  # callers may have moved the targets
-            packed[:] = frame.packed
-        for packed, com in self._com_pairs:
-            packed[:] = com.packed
-            configuration.update_com()
-        for target, posture in self._posture_pairs:
-            target[:] = posture.target
-        self.diagonal[:] = self._constant
-        if bias is not None:
-            self.diagonal += bias
-        if self._diagonals or self._others:
+        self.held = ()
+        if self._biased or bias is not None or self._diagonals:
+            self._given[:] = self._constant if bias is None else self._constant + bias
+            self._biased = bias is not None
+        if self.is_interpreted:
             self._write_others(configuration, dt)
-        self.mu, finite = write_rows(*self._arguments, dt, damping, curvature)
+
+    def note(self, mu: float, *, finite: bool) -> None:
+        """Take in what a kernel has answered."""
+        self.mu = mu
         if not finite:
             self._name_held()
-        return math.isfinite(self.mu)
+
+    def record(self) -> LevelRecord:
+        """Return a copy of what is known of the last tick."""
+        return LevelRecord(
+            names=tuple(task.name for task in self.row_tasks),
+            slices=self.slices,
+            errors=[self.error_of(task) for task in self.row_tasks],
+            held=self.held,
+            W=self.W.copy(),
+            e=self.e.copy(),
+            diagonal=self.diagonal.copy(),
+        )
 
     def stiffness(self) -> float:
         """Return the largest entry of H at the last tick, without damping."""
@@ -196,7 +196,7 @@ class Level:
         return max(1.0, float(squares.max()))
 
     def form(self, problem: Problem) -> None:
-        """Fill H and c of a problem from the rows of the last `write`."""
+        """Fill H and c of a problem from the rows of the last tick."""
         normal_equations(
             self.W,
             self.e,
@@ -208,57 +208,28 @@ class Level:
             problem.c,
         )
 
-    def warm_optimum(
-        self, problem: Problem, side: Indices
-    ) -> tuple[Vector, Vector] | None:
-        """Return optimum and multipliers from the last active set, see `solve_warm`.
-
-        Inequality rows are not looked at: the caller checks them.
-
-        Args:
-            problem: Gives bounds and equality rows; H and c are not used.
-            side: In and out, the active set, shape (nv,).
-        """
-        x: Vector = np.empty(problem.nv)
-        multipliers: Vector = np.zeros(len(problem.upper))
-        answered = solve_warm(
-            self.W,
-            self.e,
-            problem.A,
-            problem.b,
-            self.diagonal,
-            self.mu,
-            problem.lb,
-            problem.ub,
-            side,
-            x,
-            multipliers[: problem.nv],
-            multipliers[len(multipliers) - problem.equalities :],
-        )
-        return (x, multipliers) if answered else None
-
     def _write_others(self, configuration: Configuration, dt: float) -> None:
         """Run the tasks outside the kernel."""
         for task in self._diagonals:
-            if not task.diagonal(configuration, dt, *self.diagonal):
-                self.held.append(task.name)
+            if not task.diagonal(configuration, dt, *self._given):
+                self.held += (task.name,)
         for task, W, e in self._others:
             error = task.rows(configuration, dt, W, e)
             self._errors[task] = error
             if not np.isfinite(error).all():
-                self.held.append(task.name)
+                self.held += (task.name,)
 
     def _name_held(self) -> None:
         for task, error in zip(self._frames, self._frame_errors, strict=True):
             if not np.isfinite(error[0]):
-                self.held.append(task.name)
+                self.held += (task.name,)
         for task, error in zip(self._coms, self._com_errors, strict=True):
             if not np.isfinite(error):
-                self.held.append(task.name)
+                self.held += (task.name,)
         for task, costs in zip(self._postures, self._posture_costs, strict=True):
             used = self._q_index[costs > 0.0]
-            if not np.isfinite(self._posture_targets[:, used]).all():
-                self.held.append(task.name)
+            if not np.isfinite(task.target[used]).all():
+                self.held += (task.name,)
 
     def error_of(self, task: RowTask) -> tuple[float, float]:
         """Return position (m) and orientation error (rad) of a task at the last tick.
@@ -282,3 +253,7 @@ def _concatenate(lists: Sequence[Indices]) -> tuple[Indices, Indices]:
     starts = np.cumsum([0] + [len(x) for x in lists]).astype(np.int64)
     joined = np.concatenate(lists) if lists else np.zeros(0)
     return starts, joined.astype(np.int64)
+
+
+def _addresses(arrays: Sequence[Vector]) -> Indices:
+    return np.array([a.ctypes.data for a in arrays], dtype=np.int64)

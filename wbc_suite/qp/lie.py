@@ -1,11 +1,11 @@
 """Rotation vectors, compiled; Pinocchio's `log3` and `Jlog3` are the reference."""
 
-import numba
 import numpy as np
 
+from wbc_suite.compiling import compiled, compiled_inner
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["FAR", "inverse_left_jacobian", "is_usable", "log3", "saturate"]
+__all__ = ["FAR", "exp3", "inverse_left_jacobian", "is_usable", "log3", "saturate"]
 
 FAR = 1e9
 """m or rad; a target beyond it counts as not finite, since squares of errors may
@@ -14,7 +14,7 @@ overflow."""
 _SMALL_ANGLE = 1e-4  # below it series are exact to 1e-16
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def log3(R: Matrix, out: Vector) -> float:
     """Write the rotation vector of R, shape (3,), and return its angle in [0, pi].
 
@@ -51,12 +51,34 @@ def log3(R: Matrix, out: Vector) -> float:
     return angle
 
 
+@compiled_inner
+def exp3(x: float, y: float, z: float, out: Matrix) -> None:
+    """Write the rotation of a rotation vector r, `I + a [r] + b [r]^2`, shape (3, 3).
+
+    Source: Rodrigues' formula; b from half the angle, which keeps its digits.
+    """
+    square = x * x + y * y + z * z
+    angle = np.sqrt(square)
+    if angle < _SMALL_ANGLE:
+        a, b = 1.0 - square / 6.0, 0.5 - square / 24.0
+    else:
+        half = np.sin(0.5 * angle) / angle
+        a, b = np.sin(angle) / angle, 2.0 * half * half
+    out[0, 0] = 1.0 - b * (y * y + z * z)
+    out[1, 1] = 1.0 - b * (x * x + z * z)
+    out[2, 2] = 1.0 - b * (x * x + y * y)
+    out[0, 1], out[1, 0] = b * x * y - a * z, b * x * y + a * z
+    out[0, 2], out[2, 0] = b * x * z + a * y, b * x * z - a * y
+    out[1, 2], out[2, 1] = b * y * z - a * x, b * y * z + a * x
+
+
 def is_usable(target: Vector) -> bool:
     """Return whether all values are finite and nearer than FAR."""
-    return bool((np.abs(target) < FAR).all())  # NaN compares false
+    values = target.ravel().tolist()  # a dozen: three times as fast as NumPy's calls
+    return all(-FAR < value < FAR for value in values)  # NaN compares false
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def saturate(step: Vector, limit: float) -> None:
     """Shorten a step in place to the given length, keeping its direction."""
     norm = 0.0
@@ -68,7 +90,7 @@ def saturate(step: Vector, limit: float) -> None:
             step[i] *= limit / norm
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def inverse_left_jacobian(r: Vector, angle: float, out: Matrix) -> None:
     """Write `Jl^-1(r)`, the inverse left Jacobian of SO(3) at rotation vector r."""
     if angle < _SMALL_ANGLE:

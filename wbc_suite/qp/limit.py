@@ -7,7 +7,7 @@ import numpy as np
 
 from wbc_suite.kinematics import Configuration
 from wbc_suite.kinematics.configuration import named_joints
-from wbc_suite.qp.bounds import LimitKind
+from wbc_suite.qp.bounds import LimitKind, merge_bounds
 from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["BoxLimit", "JointBounds", "Limit", "RowLimit"]
@@ -49,6 +49,35 @@ class JointBounds:
             v_max=np.full(nv, np.inf),
             a_max=np.full(nv, np.inf),
         )
+
+    def without_acceleration(
+        self, q: Vector, v_previous: Vector, dt: float, kinds: Indices
+    ) -> tuple[Vector, Vector]:
+        """Return the bounds of a step dq that may change speeds at once, shape (nv,).
+
+        Args:
+            q: Joint positions, shape (nq,).
+            v_previous: Velocity of the last step, shape (nv,).
+            dt: Duration of the step, s.
+            kinds: Output: which limit set each lower and upper bound, shape (2, nv).
+        """
+        nv = len(self.v_max)
+        lower, upper = np.empty(nv), np.empty(nv)
+        merge_bounds(
+            q,
+            self.q_index,
+            self.q_lower,
+            self.q_upper,
+            self.position_gain,
+            self.v_max,
+            v_previous,
+            np.full(nv, np.inf),
+            dt,
+            lower,
+            upper,
+            *kinds,
+        )
+        return lower, upper
 
 
 class Limit(ABC):  # noqa: B024, what a stack takes is either of the two below

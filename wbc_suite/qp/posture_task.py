@@ -45,7 +45,7 @@ class PostureTask(DiagonalTask):
         for value in (cost, *self.costs.values()):
             cost_vector(name, value, 1)
         self.max_speed = check_speed(name, max_speed)
-        self.target: Vector | None = None
+        self._target: Vector | None = None
         if target is not None:
             self.set_target(target)
 
@@ -56,14 +56,22 @@ class PostureTask(DiagonalTask):
             ConfigError: If the shape is wrong.
         """
         what = f"Task '{self.name}': the posture"
-        shape = None if self.target is None else self.target.shape
-        self.target = check_array(what, target, shape).copy()
+        if self._target is None:
+            self._target = check_array(what, target, None).copy()
+        else:  # in place: kernels know where it is
+            self._target[:] = check_array(what, target, self._target.shape)
+
+    @property
+    def target(self) -> Vector:
+        """Posture q*, shape (nq,), known once it is set or bound. The task's own."""
+        assert self._target is not None
+        return self._target
 
     def bind(self, configuration: Configuration) -> None:
         """Resolve joint names; without a target, take the present posture."""
         self.squared_costs = joint_costs(configuration, self.cost, self.costs) ** 2
-        if self.target is None:
-            self.target = configuration.q.copy()
+        if self._target is None:
+            self.set_target(configuration.q)
         if self.target.shape != (configuration.nq,):
             raise ConfigError(
                 f"Task '{self.name}': the posture has shape {self.target.shape}; "
@@ -72,7 +80,6 @@ class PostureTask(DiagonalTask):
 
     def error(self, configuration: Configuration) -> Vector:
         """Return `q* (-) q`, rad or m, shape (nv,)."""
-        assert self.target is not None
         return configuration.difference(self.target)
 
     def diagonal(

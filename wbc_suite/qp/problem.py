@@ -1,8 +1,8 @@
 """The quadratic program of one tick."""
 
-import numba
 import numpy as np
 
+from wbc_suite.compiling import compiled
 from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["Problem", "clip_step"]
@@ -109,7 +109,7 @@ class Problem:
         return worst_violation(x, self.rows, self.lower, self.upper)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def worst_violation(x: Vector, rows: Matrix, lower: Vector, upper: Vector) -> float:
     """Return the largest of 0, `lower - y` and `y - upper`, where y is (x, rows x).
 
@@ -129,7 +129,7 @@ def worst_violation(x: Vector, rows: Matrix, lower: Vector, upper: Vector) -> fl
     return worst
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def clip_step(
     x: Vector, rows: Matrix, lower: Vector, upper: Vector, tolerance: float
 ) -> bool:

@@ -4,7 +4,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.kinematics import Configuration
-from wbc_suite.qp.frame_task import pose_matrix
+from wbc_suite.qp.frame_task import homogeneous
 from wbc_suite.qp.lie import is_usable, saturate
 from wbc_suite.qp.task import RowTask, check_speed, cost_vector
 from wbc_suite.typing import Matrix, Vector
@@ -74,8 +74,8 @@ class RelativeFrameTask(RowTask):
         Raises:
             ConfigError: If the shape is wrong or the rotation is no rotation.
         """
-        rotation, position = pose_matrix(self.name, target)
-        self.target = pin.SE3(rotation.copy(), position.copy())
+        T = homogeneous(self.name, target)
+        self.target = pin.SE3(T[:3, :3].copy(), T[:3, 3].copy())
 
     def bind(self, configuration: Configuration) -> None:
         """Resolve both frames; without a target, hold the present relative pose."""

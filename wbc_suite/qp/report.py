@@ -1,14 +1,13 @@
 """Why a task is not where it should be."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from wbc_suite.qp.level import Level
-from wbc_suite.typing import Vector
+from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["TaskReport", "level_reports", "reasons"]
+__all__ = ["LevelRecord", "TaskReport", "TickRecord", "reasons"]
 
 _SHARE = 0.1  # part of a task's pull that something must oppose to be named
 _NOTHING = 1e-12  # pull that is rounding: no joint moves the task at all
@@ -35,35 +34,84 @@ class TaskReport:
     reasons: tuple[str, ...]
 
 
-def level_reports(
-    level: Level,
-    x: Vector,
-    opponents: Sequence[tuple[str, Vector]],
-    position_tolerance: float,
-    orientation_tolerance: float,
-) -> dict[str, TaskReport]:
-    """Report every row task of a level by name; see `reasons` for the arguments."""
-    reports: dict[str, TaskReport] = {}
-    for n, task in enumerate(level.row_tasks):
-        position, angle = level.error_of(task)
-        near = position <= position_tolerance and angle <= orientation_tolerance
-        why: tuple[str, ...] = ()
-        if task.name in level.held:
-            why = ("target not finite: held",)
-        elif not near:
-            why = reasons(level, n, x, opponents)
-        reports[task.name] = TaskReport(
-            name=task.name,
-            position_error=position,
-            orientation_error=angle,
-            reached=near,
-            reasons=why,
-        )
-    return reports
+Opponents = Iterable[tuple[str, Vector]]
+"""Words and force on the joints, shape (nv,), of each active limit and equality."""
+
+
+@dataclass(frozen=True, slots=True)
+class LevelRecord:
+    """What a level knew at one tick, in arrays of its own.
+
+    Attributes:
+        names: Its row tasks.
+        slices: Where each one's rows are.
+        errors: Position (m) and orientation error (rad) of each.
+        held: Names of the tasks whose target was not finite.
+        W: Weighted rows, shape (m, nv).
+        e: Weighted steps, shape (m,).
+        diagonal: Squared weights and weighted steps of joints, shape (2, nv).
+    """
+
+    names: tuple[str, ...]
+    slices: Sequence[slice]
+    errors: Sequence[tuple[float, float]]
+    held: tuple[str, ...]
+    W: Matrix
+    e: Vector
+    diagonal: Matrix
+
+    def reports(
+        self,
+        x: Vector,
+        opponents: Sequence[tuple[str, Vector]],
+        position_tolerance: float,
+        orientation_tolerance: float,
+    ) -> dict[str, TaskReport]:
+        """Report every row task by name; see `reasons` for the arguments."""
+        found: dict[str, TaskReport] = {}
+        for n, (name, (position, angle)) in enumerate(
+            zip(self.names, self.errors, strict=True)
+        ):
+            near = position <= position_tolerance and angle <= orientation_tolerance
+            why: tuple[str, ...] = ()
+            if name in self.held:
+                why = ("target not finite: held",)
+            elif not near:
+                why = reasons(self, n, x, opponents)
+            found[name] = TaskReport(
+                name=name,
+                position_error=position,
+                orientation_error=angle,
+                reached=near,
+                reasons=why,
+            )
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class TickRecord:
+    """What a stack knew at one tick: it explains it at any later time.
+
+    Attributes:
+        levels: Each level that was solved, with its step and what tells its opponents.
+    """
+
+    levels: Sequence[tuple[LevelRecord, Vector, Callable[[], Opponents]]]
+
+    def explain(
+        self, *, position_tolerance: float, orientation_tolerance: float
+    ) -> dict[str, TaskReport]:
+        """See `TaskStack.explain`."""
+        found: dict[str, TaskReport] = {}
+        for level, x, opponents in self.levels:
+            found |= level.reports(
+                x, list(opponents()), position_tolerance, orientation_tolerance
+            )
+        return found
 
 
 def reasons(
-    level: Level, task: int, x: Vector, opponents: Iterable[tuple[str, Vector]]
+    level: LevelRecord, task: int, x: Vector, opponents: Opponents
 ) -> tuple[str, ...]:
     """Return what opposes the pull of a task, weightiest first.
 
@@ -88,10 +136,8 @@ def reasons(
     square = float(pull @ pull)
     found = [(words, float(force @ pull)) for words, force in opponents]
     found += [
-        (f"conflict: {other.name}", float(-other_pull @ pull))
-        for k, (other, other_pull) in enumerate(
-            zip(level.row_tasks, pulls, strict=True)
-        )
+        (f"conflict: {other}", float(-other_pull @ pull))
+        for k, (other, other_pull) in enumerate(zip(level.names, pulls, strict=True))
         if k != task
     ]
     joints = level.diagonal[1] - level.diagonal[0] * x

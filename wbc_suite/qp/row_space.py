@@ -1,18 +1,18 @@
 """An orthonormal basis of rows, and of what the upper levels of a stack decide."""
 
-import numba
 import numpy as np
 
-from wbc_suite.typing import Matrix, Vector
+from wbc_suite.compiling import compiled
+from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["DecidedDirections", "row_space"]
+__all__ = ["decided_directions", "row_space"]
 
 _LOST_DIRECTION = 0.05  # share of a unit vector outside the present basis
 _SINGULAR = 2e-2  # shortest over longest row, under which a singularity is near
 _RANK_TOLERANCE = 1e-6  # rows of an upper level shorter than this bind nothing
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def row_space(  # noqa: C901, one flat loop is what compiles well
     W: Matrix, tolerance: float, V: Matrix, lengths: Vector
 ) -> int:
@@ -66,7 +66,7 @@ def row_space(  # noqa: C901, one flat loop is what compiles well
     return rank
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def _remove(V: Matrix, count: int, v: Vector) -> None:
     """Take from v, in place, its components along the first rows of V."""
     for i in range(count):
@@ -77,8 +77,11 @@ def _remove(V: Matrix, count: int, v: Vector) -> None:
             v[j] -= dot * V[i, j]
 
 
-class DecidedDirections:
-    """The directions that some levels decide, kept from tick to tick.
+@compiled
+def decided_directions(
+    rows: Matrix, V: Matrix, lengths: Vector, kept: Matrix, counts: Indices
+) -> int:
+    """Write an orthonormal basis of what some levels decide; return its size.
 
     Near a singularity the direction that they are losing turns quickly. Were it handed
     over meanwhile, the lower level would bend a stretched arm and the upper stretch it
@@ -86,32 +89,24 @@ class DecidedDirections:
     the last tick stays theirs.
 
     Args:
-        nv: Number of velocities.
+        rows: Rows of all levels above and of the equalities, shape (m, nv); destroyed.
+        V: Output, shape (nv, nv).
+        lengths: Output of `row_space`, shape (nv,).
+        kept: In and out, the basis of the last tick, shape (nv, nv).
+        counts: In and out, its size, and the greatest number of independent rows since
+            both were zero.
     """
-
-    def __init__(self, nv: int) -> None:
-        self._nv = nv
-        self.forget()
-
-    def forget(self) -> None:
-        """Forget the last tick."""
-        self._kept: Matrix = np.zeros((0, self._nv))
-        self._full_rank = 0
-
-    def basis(self, rows: Matrix) -> Matrix:
-        """Return an orthonormal basis, shape (rank, nv).
-
-        Args:
-            rows: Rows of all levels above and of the equalities; destroyed.
-        """
-        V, lengths = np.zeros((self._nv, self._nv)), np.zeros(self._nv)
-        rank = row_space(rows, _RANK_TOLERANCE, V, lengths)
-        self._full_rank = max(self._full_rank, rank)
-        clear = rank == self._full_rank and (
-            rank == 0 or lengths[rank - 1] > _SINGULAR * lengths[0]
-        )
-        if not clear and len(self._kept):
-            lost = self._kept - self._kept @ V[:rank].T @ V[:rank]
-            rank += row_space(lost, _LOST_DIRECTION, V[rank:], lengths)
-        self._kept = V[:rank]
-        return self._kept
+    rank = row_space(rows, _RANK_TOLERANCE, V, lengths)
+    counts[1] = max(counts[1], rank)
+    clear = rank == counts[1]
+    if rank > 0:
+        clear = clear and lengths[rank - 1] > _SINGULAR * lengths[0]
+    if not clear and counts[0] > 0:
+        for i in range(counts[0]):
+            _remove(V, rank, kept[i])
+        rank += row_space(kept[: counts[0]], _LOST_DIRECTION, V[rank:], lengths)
+    for i in range(rank):
+        for j in range(V.shape[1]):
+            kept[i, j] = V[i, j]
+    counts[0] = rank
+    return rank

@@ -5,9 +5,10 @@ to at 1e-10: `FrameTask.rows`, `ComTask.rows`, `PostureTask.diagonal`, and for
 `normal_equations` the formula `H = W^T W`, `c = -W^T e`.
 """
 
-import numba
 import numpy as np
 
+from wbc_suite.compiling import compiled
+from wbc_suite.kinematics.array_table import vector_at
 from wbc_suite.qp.lie import FAR, inverse_left_jacobian, log3, saturate
 from wbc_suite.typing import Indices, Matrix, Vector
 
@@ -19,24 +20,23 @@ __all__ = [
     "frame_rows",
     "normal_equations",
     "posture_terms",
-    "write_rows",
 ]
 
 PACKED_FRAME = 21
-"""Length of a packed frame task: target rotation by columns (9), target position (3),
+"""Length of a packed frame task: the target's rotation and position, row by row (12),
 costs (6), gain, greatest speeds in m/s and rad/s."""
 
 PACKED_COM = 8
 """Length of a packed centre-of-mass task: target (3), costs (3), gain, speed in m/s."""
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def frame_rows(  # noqa: C901, one flat loop is what compiles well
     placements: Matrix,
     joint_jacobians: Matrix,
     joints: Indices,
     offsets: Matrix,
-    packed: Matrix,
+    tasks: Indices,
     first_row: Indices,
     support_start: Indices,
     support: Indices,
@@ -52,7 +52,7 @@ def frame_rows(  # noqa: C901, one flat loop is what compiles well
         joint_jacobians: Joint Jacobians, transposed, shape (nv, 6).
         joints: Parent joint of each frame, shape (n,).
         offsets: Rotation (row by row) and position of each frame in its joint, (n, 12).
-        packed: Targets, costs, gain and speeds, shape (n, PACKED_FRAME).
+        tasks: Addresses of targets, costs, gain and speeds, PACKED_FRAME values each.
         first_row: First of each task's six rows in W and e, shape (n,).
         support_start: Where each task's entries of `support` begin, shape (n + 1,).
         support: Velocity indices that move each frame.
@@ -70,7 +70,7 @@ def frame_rows(  # noqa: C901, one flat loop is what compiles well
     p, r, s = np.empty(3), np.empty(3), np.empty(3)
     a = np.empty(3)
     for t in range(joints.shape[0]):
-        T, F, X = placements[joints[t]], offsets[t], packed[t]
+        T, F, X = placements[joints[t]], offsets[t], vector_at(tasks[t], PACKED_FRAME)
         for i in range(3):
             p[i] = T[9 + i]
             for j in range(3):
@@ -82,19 +82,15 @@ def frame_rows(  # noqa: C901, one flat loop is what compiles well
         angle, distance = 0.0, 0.0
         if finite:
             for i in range(3):
-                s[i] = X[9 + i] - p[i]
+                s[i] = X[4 * i + 3] - p[i]
                 distance += s[i] * s[i]
                 for j in range(3):
-                    E[i, j] = (
-                        R[0, i] * X[3 * j]
-                        + R[1, i] * X[3 * j + 1]
-                        + R[2, i] * X[3 * j + 2]
-                    )
+                    E[i, j] = R[0, i] * X[j] + R[1, i] * X[4 + j] + R[2, i] * X[8 + j]
             angle = log3(E, r)
             errors[t, 0], errors[t, 1] = np.sqrt(distance), angle
         else:
-            s[:] = 0.0
-            r[:] = 0.0
+            for i in range(3):
+                s[i], r[i] = 0.0, 0.0
             errors[t, 0], errors[t, 1] = np.nan, np.nan
             all_finite = False
         inverse_left_jacobian(r, angle, L)
@@ -123,11 +119,11 @@ def frame_rows(  # noqa: C901, one flat loop is what compiles well
     return all_finite
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def com_rows(
     com: Vector,
     com_jacobian: Matrix,
-    packed: Matrix,
+    tasks: Indices,
     first_row: Indices,
     dt: float,
     W: Matrix,
@@ -138,8 +134,8 @@ def com_rows(
 
     Args:
         com: Centre of mass, shape (3,).
-        com_jacobian: Its Jacobian, shape (3, nv).
-        packed: Targets, costs, gain and speed, shape (n, PACKED_COM).
+        com_jacobian: Its Jacobian, transposed, shape (nv, 3).
+        tasks: Addresses of targets, costs, gain and speed, PACKED_COM values each.
         first_row: First of each task's three rows, shape (n,).
         dt: Step, s.
         W: Output, weighted Jacobian rows.
@@ -152,31 +148,32 @@ def com_rows(
     """
     all_finite = True
     step = np.empty(3)
-    for t in range(packed.shape[0]):
-        X, row, square = packed[t], first_row[t], 0.0
+    for t in range(tasks.shape[0]):
+        X, row, square = vector_at(tasks[t], PACKED_COM), first_row[t], 0.0
         for i in range(3):
             step[i] = X[i] - com[i]
             square += step[i] * step[i]
         errors[t] = np.sqrt(square)
         if not square < FAR * FAR:
             all_finite, errors[t] = False, np.nan
-            step[:] = 0.0
+            for i in range(3):
+                step[i] = 0.0
         for i in range(3):
             step[i] *= X[6]
         saturate(step, X[7] * dt)
         for i in range(3):
             e[row + i] = X[3 + i] * step[i]
             for col in range(W.shape[1]):
-                W[row + i, col] = X[3 + i] * com_jacobian[i, col]
+                W[row + i, col] = X[3 + i] * com_jacobian[col, i]
     return all_finite
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def posture_terms(
     q: Vector,
     q_index: Indices,
     squared_costs: Matrix,
-    targets: Matrix,
+    targets: Indices,
     gains: Matrix,
     dt: float,
     diagonal: Matrix,
@@ -187,7 +184,7 @@ def posture_terms(
         q: Joint positions, shape (nq,).
         q_index: Position index of each velocity, shape (nv,).
         squared_costs: Squared cost of each velocity, shape (n, nv).
-        targets: Postures, shape (n, nq).
+        targets: Addresses of the postures, nq values each.
         gains: Gain and greatest speed of each task, shape (n, 2).
         dt: Step, s.
         diagonal: In and out, squared weights and weighted steps, shape (2, nv).
@@ -197,11 +194,11 @@ def posture_terms(
     """
     all_finite = True
     for t in range(squared_costs.shape[0]):
-        total = 0.0
+        target, total = vector_at(targets[t], q.shape[0]), 0.0
         for i in range(q_index.shape[0]):
             if squared_costs[t, i] > 0.0:
-                total += targets[t, q_index[i]]
-        finite = np.isfinite(total)
+                total += target[q_index[i]]
+        finite = bool(np.isfinite(total))
         all_finite &= finite
         limit = gains[t, 1] * dt
         for i in range(q_index.shape[0]):
@@ -209,12 +206,12 @@ def posture_terms(
             if weight > 0.0:
                 diagonal[0, i] += weight
                 if finite:
-                    step = gains[t, 0] * (targets[t, q_index[i]] - q[q_index[i]])
+                    step = gains[t, 0] * (target[q_index[i]] - q[q_index[i]])
                     diagonal[1, i] += weight * min(max(step, -limit), limit)
     return all_finite
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def damping_of_rows(
     W: Matrix,
     e: Vector,
@@ -253,7 +250,7 @@ def damping_of_rows(
     return mu if np.isfinite(total) else np.nan
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def normal_equations(
     W: Matrix,
     e: Vector,
@@ -279,8 +276,9 @@ def normal_equations(
         c: Output, shape (nv,).
     """
     n = c.shape[0]
-    H[:, :] = 0.0
     for i in range(n):
+        for j in range(n):
+            H[i, j] = 0.0
         H[i, i] = diagonal[0, i] + mu
         c[i] = -diagonal[1, i]
     for block in range(row_start.shape[0] - 1):
@@ -296,64 +294,3 @@ def normal_equations(
     for i in range(n):
         for j in range(i):
             H[j, i] = H[i, j]
-
-
-@numba.njit(cache=True, nogil=True)
-def write_rows(
-    q: Vector,
-    placements: Matrix,
-    joint_jacobians: Matrix,
-    joints: Indices,
-    offsets: Matrix,
-    frames: Matrix,
-    frame_row: Indices,
-    frame_support_start: Indices,
-    frame_support: Indices,
-    frame_errors: Matrix,
-    com: Vector,
-    com_jacobian: Matrix,
-    coms: Matrix,
-    com_row: Indices,
-    com_errors: Vector,
-    q_index: Indices,
-    postures: Matrix,
-    posture_targets: Matrix,
-    posture_gains: Matrix,
-    row_start: Indices,
-    support_start: Indices,
-    support: Indices,
-    W: Matrix,
-    e: Vector,
-    diagonal: Matrix,
-    dt: float,
-    damping: float,
-    curvature: float,
-) -> tuple[float, bool]:
-    """Write all compiled tasks of a level in one call.
-
-    The arguments are those of the kernels above; `diagonal` comes in with what tasks
-    outside the kernels have added.
-
-    Returns:
-        mu of `damping_of_rows`, and whether all targets were finite.
-    """
-    finite = frame_rows(
-        placements,
-        joint_jacobians,
-        joints,
-        offsets,
-        frames,
-        frame_row,
-        frame_support_start,
-        frame_support,
-        dt,
-        W,
-        e,
-        frame_errors,
-    )
-    finite &= com_rows(com, com_jacobian, coms, com_row, dt, W, e, com_errors)
-    finite &= posture_terms(
-        q, q_index, postures, posture_targets, posture_gains, dt, diagonal
-    )
-    mu = damping_of_rows(W, e, row_start, support_start, support, damping, curvature)
-    return mu, finite

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wbc_suite.arguments import check_count, check_number
+from wbc_suite.compiling import compiled
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.capsule_distance import nearest_pairs
 from wbc_suite.qp.limit import RowLimit
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
     from wbc_suite.robot import RobotDescription
 
 __all__ = ["SelfCollisionLimit"]
+
+_APART = 0.2  # m/s, greatest speed of separation where links are too near
 
 
 class SelfCollisionLimit(RowLimit):
@@ -54,7 +57,7 @@ class SelfCollisionLimit(RowLimit):
         capsules: Sequence[EnclosingCapsule],
         pairs: Iterable[Collection[str]],
         *,
-        nearest: int = 20,
+        nearest: int = 40,
         margin: float = 0.005,
         influence: float = 0.1,
         rate: float = 10.0,
@@ -72,7 +75,7 @@ class SelfCollisionLimit(RowLimit):
 
     @classmethod
     def of_robot(
-        cls, robot: "RobotDescription", *, nearest: int = 20, margin: float = 0.005
+        cls, robot: "RobotDescription", *, nearest: int = 40, margin: float = 0.005
     ) -> "SelfCollisionLimit":
         """Return the limit for a robot's own collision shapes and pairs.
 
@@ -105,19 +108,8 @@ class SelfCollisionLimit(RowLimit):
         """Leave out the capsule pairs that are nearer than the margin right now."""
         count = len(self._pairs)
         found = np.full(count, -1, dtype=np.int64)
-        touching = nearest_pairs(
-            configuration.placements,
-            configuration.joint_jacobians,
-            self._joints,
-            self._ends,
-            self._radii,
-            self._pairs,
-            self._moves,
-            self.margin,
-            found,
-            np.full(count, np.inf),
-            np.zeros((count, configuration.nv)),
-        )
+        distances, normals = np.full(count, np.inf), np.zeros((count, configuration.nv))
+        touching = self._nearest(configuration, self.margin, found, distances, normals)
         self._pairs = np.delete(self._pairs, found[:touching], axis=0)
 
     def bind(self, configuration: Configuration) -> None:
@@ -145,7 +137,19 @@ class SelfCollisionLimit(RowLimit):
         self, configuration: Configuration, dt: float, G: Matrix, h: Vector
     ) -> None:
         """Write the dampers of the nearest pairs, `-n . (J_a - J_b) dq <= ...`."""
-        nearest_pairs(
+        self._nearest(configuration, self.influence, self.found, self.distances, G)
+        _dampers(self.distances, self.margin, self.rate * dt, _APART * dt, h)
+
+    def _nearest(
+        self,
+        configuration: Configuration,
+        within: float,
+        found: Indices,
+        distances: Vector,
+        rows: Matrix,
+    ) -> int:
+        """Write the pairs nearer than a distance; see `nearest_pairs`."""
+        return nearest_pairs(
             configuration.placements,
             configuration.joint_jacobians,
             self._joints,
@@ -153,14 +157,11 @@ class SelfCollisionLimit(RowLimit):
             self._radii,
             self._pairs,
             self._moves,
-            self.influence,
-            self.found,
-            self.distances,
-            G,
+            within,
+            found,
+            distances,
+            rows,
         )
-        np.subtract(self.distances, self.margin, out=h)
-        h *= self.rate * dt
-        np.clip(h, -0.2 * dt, UNBOUNDED, out=h)
 
     @property
     def pair_count(self) -> int:
@@ -171,6 +172,15 @@ class SelfCollisionLimit(RowLimit):
         """Return the two links of a row of the last tick."""
         a, b = (int(k) for k in self._pairs[self.found[row]])
         return f"{self._capsules[a].link} - {self._capsules[b].link}"
+
+
+@compiled
+def _dampers(
+    distances: Vector, margin: float, rate: float, apart: float, h: Vector
+) -> None:
+    """Write how far each pair may approach; endless distances bind nothing."""
+    for i in range(h.shape[0]):
+        h[i] = min(max(rate * (distances[i] - margin), -apart), UNBOUNDED)
 
 
 def _capsule_pairs(

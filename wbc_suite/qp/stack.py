@@ -1,14 +1,17 @@
 """A stack of QP tasks under limits, solved once per tick."""
 
+import math
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
 from wbc_suite.arguments import check_array, check_number
 from wbc_suite.kinematics import Configuration
+from wbc_suite.kinematics.array_table import ArrayTable
 from wbc_suite.qp.acceleration_limit import AccelerationLimit
 from wbc_suite.qp.bending import RowBending
-from wbc_suite.qp.bounds import LimitKind, merge_bounds
+from wbc_suite.qp.bounds import LimitKind
 from wbc_suite.qp.constraints import Constraints
 from wbc_suite.qp.equality import Equality
 from wbc_suite.qp.escape import Escape
@@ -16,21 +19,21 @@ from wbc_suite.qp.fallback import checked_solve, retreat
 from wbc_suite.qp.frame_task import FrameTask
 from wbc_suite.qp.level import Level
 from wbc_suite.qp.limit import BoxLimit, JointBounds, Limit
+from wbc_suite.qp.lower_levels import LowerLevels
 from wbc_suite.qp.parts import check_parts
 from wbc_suite.qp.position_limit import PositionLimit
 from wbc_suite.qp.problem import Problem
-from wbc_suite.qp.report import TaskReport, level_reports
-from wbc_suite.qp.row_space import DecidedDirections
+from wbc_suite.qp.report import TaskReport, TickRecord
 from wbc_suite.qp.solution import Fallback, Solution
-from wbc_suite.qp.solver import QpSolver, make_solver
+from wbc_suite.qp.solver import make_solver
 from wbc_suite.qp.task import Task
+from wbc_suite.qp.tick import LOST, SOLVED, STATED, TOLERANCE, BoxField, tick
 from wbc_suite.qp.velocity_limit import VelocityLimit
-from wbc_suite.typing import Indices, Matrix, Vector
+from wbc_suite.typing import Array, Indices, Matrix, Vector
 
 __all__ = ["TaskStack"]
 
 _RETURN_WEIGHT = 1e2  # of a row that leads back, against the stiffest joint's cost
-_TOLERANCE = 1e-7  # a row broken by more is reported as a conflict, m or rad
 
 
 class TaskStack:
@@ -102,28 +105,25 @@ class TaskStack:
         self._levels = [
             Level(configuration, [t for t in tasks if t.level == k]) for k in numbers
         ]
-        self._sides = [np.zeros(configuration.nv, dtype=np.int64) for _ in numbers]
         self._warm = solver == "daqp" if warm is None else warm
         rows = self._constraints.inequalities, self._constraints.dim
         self._problem = Problem(configuration.nv, *rows)
         self._solver = make_solver(solver)
-        self._lower: dict[tuple[int, int], tuple[Problem, QpSolver]] = {}
-        self._solved: list[tuple[Problem, Vector, Vector]] = []
-        self._decided = [DecidedDirections(configuration.nv) for _ in numbers]
+        self._solved: list[tuple[Matrix, Vector, Vector]] = []
         self._bending = RowBending(self.curvature_damping)
         nv = configuration.nv
+        self._side: Indices = np.zeros(nv, dtype=np.int64)
         self._kinds: Indices = np.zeros((2, nv), dtype=np.int64)
-        self._no_window: Vector = np.full(nv, np.inf)
         self.v_previous: Vector = np.zeros(nv)
-        bounds = self._bounds
-        self._box = (
-            configuration.q,
-            bounds.q_index,
-            bounds.q_lower,
-            bounds.q_upper,
-            bounds.position_gain,
-            bounds.v_max,
-            self.v_previous,
+        self._arrays = self._make_table()
+        self._box = self._arrays.table
+        self._lower = LowerLevels(
+            configuration,
+            self._levels,
+            self._problem,
+            self._box,
+            warm=self._warm,
+            curvature=self.curvature_damping,
         )
         self._limits = tuple(limits)
         self._bias: Matrix | None = None
@@ -132,6 +132,13 @@ class TaskStack:
             Escape(configuration, frames, self._bounds, self._shadow)
             if escape and frames
             else None
+        )
+        self._is_plain = len(self._levels) == 1 and len(self._problem.rows) == 0
+        # Python code that reads q comes before the kernel, which would say it is lost.
+        self._looks_first = (
+            self._escape is not None
+            or len(self._problem.rows) > 0
+            or any(level.is_interpreted for level in self._levels)
         )
 
     def reset(self, v: Vector | None = None) -> None:
@@ -145,14 +152,11 @@ class TaskStack:
             shape = (self.configuration.nv,)
             self.v_previous[:] = check_array("TaskStack.reset: v", v, shape)
         self._solver = self._solver.fresh()
-        self._lower.clear()
+        self._lower.reset()
+        self._side[:] = 0
         self._solved.clear()
-        for decided in self._decided:
-            decided.forget()
         self._bending.forget()
         self._constraints.reset()
-        for side in self._sides:
-            side[:] = 0
         if self._escape is not None:
             self._escape.reset()
 
@@ -165,32 +169,50 @@ class TaskStack:
         Raises:
             ConfigError: If dt is not positive and finite.
         """
-        if not isinstance(dt, float) or not 0.0 < dt < np.inf:
+        if not isinstance(dt, float) or not 0.0 < dt < math.inf:
             dt = check_number("TaskStack.solve: dt, a time,", dt, above=0.0)
-        problem = self._problem
-        if not self._write_box(self._bounds.a_max, dt, problem.lb, problem.ub):
-            still = np.zeros(self.configuration.nv)
-            self._solved.clear()
-            return self._answer(still, Fallback.HOLD, dt, 0.0)
+        if self._looks_first and not self._look(dt):
+            return self._stand(dt)
+        problem, leading_back = self._problem, False
+        if len(problem.rows):
+            leading_back = self._constraints.write(self.configuration, dt, problem)
+        outcome, residual = self._tick(dt, warm=self._warm and not leading_back)
+        if outcome == LOST:
+            return self._stand(dt)
+        if outcome == SOLVED:
+            answer, fallback = self._first.copy(), Fallback.NONE
+            of_x, of_v, of_multipliers, of_kinds = self._parts
+            x, v = answer[of_x], answer[of_v]
+            multipliers, kinds = answer[of_multipliers], answer[of_kinds]
+        else:
+            x, multipliers, fallback = self._ask_solver(
+                dt, stated=outcome == STATED, leading_back=leading_back
+            )
+            v, residual, kinds = x / dt, problem.violation(x), self._kinds.copy()
+            self.v_previous[:] = v
+        self._solved = [(problem.rows, x, multipliers)]
+        if self._is_plain:
+            press = partial(self._constraints.pressure, [multipliers], kinds)
+            held = self._levels[0].held
+            return Solution(x, v, fallback, residual, held, (), press)
+        if len(problem.rows):
+            kept = fallback is Fallback.NONE  # what is relaxed has its own damping
+            pressing = multipliers[problem.nv :]
+            self._bending.note(problem.rows, pressing, dt, kept=kept)
+        if len(self._levels) > 1:
+            x, fallback = self._solve_lower(x, fallback, dt)
+            v, residual = x / dt, problem.violation(x)
+            self.v_previous[:] = v
+        return self._answer(x, v, fallback, residual, kinds)
+
+    def _look(self, dt: float) -> bool:
+        """Let the escape see the robot; False where q is not finite."""
+        q = self.configuration.q
+        if not math.isfinite(q.dot(q)):
+            return False
         if self._escape is not None:
             self._bias = self._escape.bias(dt, self.v_previous, self._pressed)
-        self._constraints.write(self.configuration, dt, self._problem)
-        x, multipliers, fallback = self._solve_first(dt)
-        if len(self._problem.rows):
-            kept = fallback is Fallback.NONE  # what is relaxed has its own damping
-            pressing = kept * multipliers[self._problem.nv :]
-            self._bending.note(self._problem.rows, pressing, dt)
-        self._solved = [(self._problem, x, multipliers)]
-        for k in range(1, len(self._levels)):
-            if fallback >= Fallback.BOX:
-                break
-            result = self._solve_lower(k, x, dt)
-            if result is None:
-                fallback = max(fallback, Fallback.LEVEL)
-                break
-            x = result[1]
-            self._solved.append(result)
-        return self._answer(x, fallback, dt, self._problem.violation(x))
+        return True
 
     def problem(self) -> Problem:
         """Return the QP of the first level at the last tick: a view, valid until next.
@@ -235,114 +257,143 @@ class TaskStack:
     ) -> dict[str, TaskReport]:
         """Tell how each task with rows stood at the last tick, and why.
 
-        Costs some 50 us a task: meant for reports, not for every tick of a fast loop.
+        Costs some 50 us a task: meant for reports, not for every tick of a fast loop,
+        which can keep a `record` and be told later.
 
         Args:
             position_tolerance: Distance that counts as reached, m.
             orientation_tolerance: Angle that counts as reached, rad.
         """
-        reports: dict[str, TaskReport] = {}
-        for level, (problem, x, multipliers) in zip(
-            self._levels, self._solved, strict=False
-        ):
-            first = problem is self._problem
-            opponents = list(
-                self._constraints.opponents(
-                    problem, multipliers, self._kinds, first=first
-                )
-            )
-            reports |= level_reports(
-                level, x, opponents, position_tolerance, orientation_tolerance
-            )
-        return reports
-
-    def _write_box(self, a_max: Vector, dt: float, lb: Vector, ub: Vector) -> bool:
-        """Merge the joints' limits into bounds; False if q is not finite."""
-        return merge_bounds(*self._box, a_max, dt, lb, ub, *self._kinds)
-
-    def _write(self, k: int, dt: float) -> bool:
-        """Write the rows of level k; what damps a level damps those below it too."""
-        return self._levels[k].write(
-            self.configuration,
-            dt,
-            damping=self._levels[k - 1].mu if k else self.damping + self._bending.value,
-            curvature=self.curvature_damping,
-            bias=None if k else self._bias,
+        return self.record().explain(
+            position_tolerance=position_tolerance,
+            orientation_tolerance=orientation_tolerance,
         )
 
-    def _optimum(
-        self, level: Level, problem: Problem, solver: QpSolver, side: Indices
-    ) -> tuple[Vector, Vector] | None:
-        """Solve a level: by the active set of the last tick, else by the solver."""
-        leading_back = self._constraints.inequalities > 0 and len(problem.soft()) > 0
-        warm = self._warm and not leading_back
-        result = level.warm_optimum(problem, side) if warm else None
-        if result is not None and problem.violation(result[0]) <= _TOLERANCE:
-            return result
-        level.form(problem)
-        if leading_back:
-            problem.weight = _RETURN_WEIGHT * level.stiffness()
-        return checked_solve(solver, problem)
+    def record(self) -> TickRecord:
+        """Return what explains the last tick, also after the next ones."""
+        solved = zip(self._levels, self._solved, strict=False)
+        return TickRecord(
+            [
+                (
+                    level.record(),
+                    x,
+                    self._constraints.opponents(
+                        rows, multipliers, self._kinds, first=k == 0
+                    ),
+                )
+                for k, (level, (rows, x, multipliers)) in enumerate(solved)
+            ]
+        )
 
-    def _solve_first(self, dt: float) -> tuple[Vector, Vector, Fallback]:
-        """Solve the first level under all constraints, or retreat."""
-        problem, level = self._problem, self._levels[0]
-        finite = self._write(0, dt)
-        if finite:
-            result = self._optimum(level, problem, self._solver, self._sides[0])
+    def _make_table(self) -> ArrayTable:
+        """Gather what the kernel `tick` reads and writes beside the first level."""
+        bounds, problem, f = self._bounds, self._problem, BoxField
+        nv, last = problem.nv, 2 * problem.nv + len(problem.upper)
+        self._first: Vector = np.zeros(last + 2 * nv)
+        self._parts = (
+            slice(0, nv),
+            slice(nv, 2 * nv),
+            slice(2 * nv, last),
+            slice(last, None),
+        )
+        return ArrayTable(
+            BoxField,
+            {
+                f.Q_LOWER: bounds.q_lower,
+                f.Q_UPPER: bounds.q_upper,
+                f.V_MAX: bounds.v_max,
+                f.A_MAX: bounds.a_max,
+                f.V_PREVIOUS: self.v_previous,
+                f.KINDS: self._kinds,
+                f.H: problem.H,
+                f.C: problem.c,
+                f.ROWS: problem.rows,
+                f.EQUALITIES: problem.A,
+                f.LOWER: problem.lower,
+                f.UPPER: problem.upper,
+                f.SIDE: self._side,
+                f.ANSWER: self._first,
+                f.WANTED: problem.wanted,
+            },
+        )
+
+    def _tick(self, dt: float, *, warm: bool) -> tuple[int, float]:
+        """Run the kernel; return its outcome and by how much a bound is broken."""
+        level = self._levels[0]
+        level.prepare(self.configuration, dt, self._bias)
+        outcome, mu, finite, residual = tick(
+            self.configuration.table,
+            level.table,
+            self._box,
+            dt,
+            self._bounds.position_gain,
+            self.damping + self._bending.value,
+            self.curvature_damping,
+            warm,
+        )
+        level.note(mu, finite=finite)
+        return outcome, residual
+
+    def _ask_solver(
+        self, dt: float, *, stated: bool, leading_back: bool
+    ) -> tuple[Vector, Vector, Fallback]:
+        """Solve the first level as it is stated, or retreat."""
+        problem = self._problem
+        if stated:
+            if leading_back:
+                problem.weight = _RETURN_WEIGHT * self._levels[0].stiffness()
+            result = checked_solve(self._solver, problem)
             if result is not None:
                 return *result, Fallback.NONE
-        lb, ub = np.empty(problem.nv), np.empty(problem.nv)
-        self._write_box(self._no_window, dt, lb, ub)
+        return self._retreat(dt, finite=stated)
+
+    def _retreat(self, dt: float, *, finite: bool) -> tuple[Vector, Vector, Fallback]:
+        """Find a step where the first level has no solution."""
+        problem, bounds = self._problem, self._bounds
+        q, kinds = self.configuration.q, self._kinds
+        lb, ub = bounds.without_acceleration(q, self.v_previous, dt, kinds)
         if not finite:
             still = np.clip(np.zeros(problem.nv), lb, ub)
             return still, np.zeros(len(problem.upper)), Fallback.HOLD
-        problem.weight = _RETURN_WEIGHT * level.stiffness()
+        problem.weight = _RETURN_WEIGHT * self._levels[0].stiffness()
         return retreat(self._solver, problem, lb=lb, ub=ub)
 
     def _solve_lower(
-        self, k: int, x: Vector, dt: float
-    ) -> tuple[Problem, Vector, Vector] | None:
-        """Solve level k among the steps that all levels above rate like x.
+        self, x: Vector, fallback: Fallback, dt: float
+    ) -> tuple[Vector, Fallback]:
+        """Let the lower levels, one after another, improve on the first one's step."""
+        for k in range(1, len(self._levels)):
+            if fallback >= Fallback.BOX:
+                break
+            result = self._lower.solve(k, x, dt, self._solver)
+            if result is None:
+                return x, max(fallback, Fallback.LEVEL)
+            x = result[1]
+            self._solved.append(result)
+        return x, fallback
 
-        Those are `V dq = V x`, where V is an orthonormal basis of the equality rows and
-        of all rows above. x itself is one of them, so the problem has a solution.
-        """
-        first = self._problem
-        above = [first.A, *(level.W for level in self._levels[:k])]
-        V = self._decided[k].basis(np.concatenate(above))
-        rank = len(V)
-        if (k, rank) not in self._lower:
-            problem = Problem(first.nv, len(first.G), rank)
-            self._lower[k, rank] = problem, self._solver.fresh()
-        problem, solver = self._lower[k, rank]
-        problem.lb[:], problem.ub[:] = first.lb, first.ub
-        problem.G[:], problem.h[:] = first.G, np.maximum(first.wanted, first.G @ x)
-        problem.A[:] = V
-        problem.set_equalities(V @ x)
-        if not self._write(k, dt):
-            return None
-        result = self._optimum(self._levels[k], problem, solver, self._sides[k])
-        if result is None or first.violation(result[0]) > _TOLERANCE:
-            return None  # rows longer than 1 feel more than their orthonormal basis
-        return problem, *result
+    def _stand(self, dt: float) -> Solution:
+        """Answer a position that is not finite."""
+        self._solved.clear()
+        still = np.zeros(self.configuration.nv)
+        self.v_previous[:] = 0.0
+        return self._answer(still, still / dt, Fallback.HOLD, 0.0, self._kinds.copy())
 
     def _answer(
-        self, x: Vector, fallback: Fallback, dt: float, residual: float
+        self,
+        x: Vector,
+        v: Vector,
+        fallback: Fallback,
+        residual: float,
+        kinds: Array | Indices,
     ) -> Solution:
-        """Remember the velocity and tell what happened."""
-        v = x / dt
-        self.v_previous[:] = v
-        return Solution(
-            dq=x,
-            v=v,
-            fallback=fallback,
-            residual=residual,
-            held=tuple([name for level in self._levels for name in level.held]),
-            conflicts=self._constraints.broken(self._problem, x, _TOLERANCE)
-            if fallback >= Fallback.LIMITS
-            else (),
-            pressure=self._constraints.pressure(
-                [m for _, _, m in self._solved], self._kinds
-            ),
-        )
+        """Tell what happened."""
+        held = self._levels[0].held
+        for level in self._levels[1:]:
+            held += level.held
+        conflicts: tuple[str, ...] = ()
+        if fallback is not Fallback.NONE and fallback >= Fallback.LIMITS:
+            conflicts = self._constraints.broken(self._problem, x, TOLERANCE)
+        multipliers = [multipliers for _, _, multipliers in self._solved]
+        press = self._constraints.press(multipliers, kinds)
+        return Solution(x, v, fallback, residual, held, conflicts, press)

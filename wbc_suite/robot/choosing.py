@@ -117,7 +117,7 @@ def _check_hand(
             f"{fault} arm; give one for each side, such as gripper = "
             f'{{"{made_for}": "{hand}", "{part.side}": "..."}}.'
         )
-    names = catalogue.names("robots/gripper")
+    names = catalogue.called("robots/gripper")
     fitting = [n for n in names if _fits(n, part, read)]
     raise DescriptionError(
         f"{fault} arm, the only one; there fit: {', '.join(fitting)}."
@@ -142,7 +142,7 @@ def _on_bare_root(
     component = read(part)
     own = assembly.root or read(assembly.parts[0]).root
     if not is_bare(component):
-        names = catalogue.names("robots/base")
+        names = catalogue.called("robots/base")
         roots = [n for n in names if is_bare(_base(n, part, read))]
         raise DescriptionError(
             f"{assembly.assembly.name} stands on its own body, and '{base}' is a body "

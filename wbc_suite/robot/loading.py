@@ -52,7 +52,7 @@ def load_robot(
     if not isinstance(catalogue, Catalogue):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise ConfigError(f"load_robot: {catalogue!r:.60} is no Catalogue.")
     if not isinstance(name, str | Path):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise UnknownNameError("robot", name, catalogue.names("robots"))
+        raise UnknownNameError("robot", name, catalogue.called("robots"))
     path = _locate(str(name), catalogue)
     wardrobe = None if skin is None else Wardrobe(skin, catalogue)
     robot = _read(path, catalogue, gripper=gripper, base=base, wardrobe=wardrobe)

@@ -1,6 +1,5 @@
 """Build MuJoCo's model of a robot directly from its description."""
 
-import math
 from collections.abc import Iterable
 
 import mujoco
@@ -8,52 +7,40 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.robot.description import RobotDescription
+from wbc_suite.robot.mjcf_drawn import DrawnLinks
+from wbc_suite.robot.mjcf_geoms import add_collision_geoms
 from wbc_suite.robot.parts import Actuator, Joint, Link
-from wbc_suite.robot.placing import compose
-from wbc_suite.robot.shapes import (
-    Box,
-    Capsule,
-    Cylinder,
-    Ellipsoid,
-    Posed,
-    Shape,
-    SkinMesh,
-    Sphere,
-)
-from wbc_suite.robot.surfaces import mesh_of
 from wbc_suite.robot.validation import inertia_matrix, rigid_bodies
 
-__all__ = ["COLLISION_GROUP", "VISUAL_GROUP", "build_mjspec", "write_mjcf"]
+__all__ = ["build_mjspec", "write_mjcf"]
 
-VISUAL_GROUP = 2
-"""Geom group of shapes that are only drawn."""
-COLLISION_GROUP = 3
-"""Geom group of shapes that only collide."""
 STOP_SOLREF = (0.004, 1.0)
 """Time constant in s and damping ratio of joints' stops, which are hard on a machine:
-with MuJoCo's own 20 ms a joint that arrives at 0.5 rad/s passes by 3.7 mrad."""
+with MuJoCo's own 20 ms a joint that arrives at 0.5 rad/s passes by 3.7 mrad, and a head
+of 4 kg swings 20 mrad into its stop. It is the stiffest that a step of 2 ms carries."""
+STOP_SOLIMP = (0.95, 0.99, 0.001)
+"""How firmly a stop holds: least, most, and the depth, m or rad, between the two."""
+STOP_MARGIN = 3e-3
+"""rad; so far before its end a limb's stop begins to act: MuJoCo sees a stop only where
+a step of 2 ms begins, and a contact throws a joint at up to 2.6 rad/s. Controllers keep
+limbs at least as far inside; fingers, which rest at their stops, have none."""
 SITE_GROUP = 4
 """Site group of frames: hidden unless asked for."""
 
 STIFF = (0.005, 1.0)
 """Time constant in s and damping ratio of couplings: as stiff as 2 ms steps allow."""
 
-STATED_SOLMIX = 1000.0
-"""Weight of a stated contact stiffness against the default of 1: who states it wins.
 
-Mixed half and half, a pad sinks 3.4 mm into a cube of 0.1 kg; like this 0.2 mm.
-"""
-
-DOWN = (0.0, 1.0, 0.0, 0.0)
-"""The turn from z to -z."""
-GREY = (0.5, 0.5, 0.52, 1.0)
-
-
-def build_mjspec(robot: RobotDescription) -> mujoco.MjSpec:
+def build_mjspec(robot: RobotDescription, *, merged: bool = True) -> mujoco.MjSpec:
     """Build the MuJoCo specification of a robot.
 
     Links become bodies, frames become sites, and each joint with an effort gets a
     torque motor of its own name unless the description gives another.
+
+    Args:
+        robot: The robot.
+        merged: Whether the drawn shapes of a link become one mesh, which is faster to
+            simulate and to draw.
     """
     spec = mujoco.MjSpec()
     spec.modelname = robot.name
@@ -61,11 +48,17 @@ def build_mjspec(robot: RobotDescription) -> mujoco.MjSpec:
     spec.compiler.savecompiled = False
     bodies = {"world": spec.worldbody}
     inertias = _inertias(robot)
+    limbs = robot.groups.keys() - robot.synergies.keys()
+    clear = {joint for name in limbs for joint in robot.groups[name]}
+    drawn = DrawnLinks(spec, robot, merged=merged)
     for link in robot.links:
         parent = bodies[link.parent or "world"]
         bodies[link.name] = body = _add_body(parent, robot, link)
+        if link.joint is not None:
+            _add_joint(body, link.joint, clear=link.joint.name in clear)
         _set_inertia(body, inertias[link.name])
-        _add_shapes(spec, body, robot, link)
+        drawn.add(body, link)
+        add_collision_geoms(spec, body, robot, link)
     for frame in robot.frames:
         bodies[frame.link].add_site(
             name=frame.name, pos=frame.pos, quat=frame.quat, group=SITE_GROUP
@@ -86,8 +79,8 @@ def build_mjspec(robot: RobotDescription) -> mujoco.MjSpec:
 
 
 def write_mjcf(robot: RobotDescription) -> str:
-    """Write the specification as MJCF text with all digits."""
-    spec = build_mjspec(robot)
+    """Write the specification as MJCF text with all digits, every shape by itself."""
+    spec = build_mjspec(robot, merged=False)
     spec.compile()
     return spec.to_xml()
 
@@ -98,8 +91,6 @@ def _add_body(parent: mujoco.MjsBody, robot: RobotDescription, link: Link):  # n
         _add_root_joints(body, robot)
     else:
         body = parent.add_body(name=link.name, pos=link.pos, quat=link.quat)
-    if link.joint is not None:
-        _add_joint(body, link.joint)
     return body
 
 
@@ -117,7 +108,8 @@ def _add_root_joints(body: mujoco.MjsBody, robot: RobotDescription) -> None:
             joint.damping[0] = damping
 
 
-def _add_joint(body: mujoco.MjsBody, joint: Joint) -> None:
+def _add_joint(body: mujoco.MjsBody, joint: Joint, *, clear: bool) -> None:
+    """Add a joint, one that is kept clear of its stops or one that rests at them."""
     kinds = {
         "hinge": mujoco.mjtJoint.mjJNT_HINGE,
         "slide": mujoco.mjtJoint.mjJNT_SLIDE,
@@ -134,7 +126,10 @@ def _add_joint(body: mujoco.MjsBody, joint: Joint) -> None:
     if joint.range is not None:
         added.limited = mujoco.mjtLimited.mjLIMITED_TRUE
         added.solref_limit = STOP_SOLREF
+        added.solimp_limit[:3] = STOP_SOLIMP
         added.range = joint.range
+        if joint.type == "hinge" and clear:
+            added.margin = STOP_MARGIN
 
 
 def _inertias(robot: RobotDescription) -> dict[str, pin.Inertia]:
@@ -179,89 +174,6 @@ def _set_inertia(body: mujoco.MjsBody, inertia: pin.Inertia) -> None:
     body.fullinertia = [
         about[0, 0], about[1, 1], about[2, 2], about[0, 1], about[0, 2], about[1, 2]
     ]  # fmt: skip
-
-
-def _add_shapes(
-    spec: mujoco.MjSpec, body: mujoco.MjsBody, robot: RobotDescription, link: Link
-) -> None:
-    for shapes, kind in ((robot.drawn(link), "visual"), (link.collision, "collision")):
-        for index, shape in enumerate(shapes):
-            geom = _add_geom(spec, body, shape, f"{link.name}_{kind}{index}")
-            geom.mass = 0.0
-            geom.rgba = _rgba(robot, shape)
-            if kind == "visual":
-                geom.contype = geom.conaffinity = 0
-                geom.group = VISUAL_GROUP
-            else:
-                geom.group = COLLISION_GROUP
-                _set_contact(geom, shape)
-
-
-def _rgba(
-    robot: RobotDescription, shape: Shape | SkinMesh
-) -> tuple[float, float, float, float]:
-    color = shape.color
-    if isinstance(color, str):
-        return robot.materials.get(color, GREY)
-    return (color[0], color[1], color[2], color[3] if len(color) == 4 else 1.0)
-
-
-def _set_contact(geom: mujoco.MjsGeom, shape: Shape | SkinMesh) -> None:
-    if shape.friction is not None:
-        geom.friction = shape.friction
-    if shape.condim is not None:
-        geom.condim = shape.condim
-    if shape.solref is not None:
-        geom.solref[:2] = shape.solref
-        geom.solmix = STATED_SOLMIX
-    if shape.margin is not None:
-        geom.margin = shape.margin
-
-
-def _add_geom(
-    spec: mujoco.MjSpec, body: mujoco.MjsBody, shape: Shape | SkinMesh, name: str
-) -> mujoco.MjsGeom:
-    mesh = mesh_of(shape)
-    geom = body.add_geom(name=name, pos=shape.pos, quat=shape.quat)
-    kinds = mujoco.mjtGeom
-    if mesh is not None:
-        vertices, faces = mesh
-        spec.add_mesh(
-            name=name,
-            uservert=vertices.ravel().tolist(),  # twice as fast as arrays
-            userface=faces.ravel().tolist(),
-            inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
-        )
-        geom.type = kinds.mjGEOM_MESH
-        geom.meshname = name
-        return geom
-    match shape:
-        case Box(size=size):
-            geom.type, geom.size = kinds.mjGEOM_BOX, size
-        case Ellipsoid(size=size):
-            geom.type, geom.size = kinds.mjGEOM_ELLIPSOID, size
-        case Sphere(radius=radius):
-            geom.type, geom.size = kinds.mjGEOM_SPHERE, (radius, 0, 0)
-        case Capsule() | Cylinder():
-            capsule = isinstance(shape, Capsule)
-            geom.type = kinds.mjGEOM_CAPSULE if capsule else kinds.mjGEOM_CYLINDER
-            _place_segment(geom, shape)
-        case _:
-            raise AssertionError(f"no geom for shape {shape.shape}")
-    return geom
-
-
-def _place_segment(geom: mujoco.MjsGeom, shape: Capsule | Cylinder) -> None:
-    """Pose a capsule or cylinder, whose axis is z in MuJoCo, along its segment."""
-    (ax, ay, az), (bx, by, bz) = shape.start, shape.end
-    length = math.dist(shape.start, shape.end)
-    x, y, z = (bx - ax) / length, (by - ay) / length, (bz - az) / length
-    half = math.hypot(x, y, 1.0 + z)  # the shortest turn from z is half way to it
-    turn = ((1.0 + z) / half, -y / half, x / half, 0.0) if half > 1e-9 else DOWN
-    middle = ((ax + bx) / 2, (ay + by) / 2, (az + bz) / 2)
-    placed = compose(shape, Posed(pos=middle, quat=turn))
-    geom.pos, geom.quat = placed["pos"], placed["quat"]
-    geom.size = (shape.radius, length / 2, 0)
 
 
 def _add_actuators(spec: mujoco.MjSpec, robot: RobotDescription) -> None:

@@ -6,9 +6,10 @@ from xml.etree import ElementTree
 import mujoco
 
 from wbc_suite.errors import ConfigError, DescriptionError
+from wbc_suite.robot.mjcf_limits import check_file, check_size
 from wbc_suite.robot.xml_files import inside, read_xml
 
-__all__ = ["compile_mjcf"]
+__all__ = ["compile_mjcf", "read_mjcf_spec"]
 
 MAX_FILES = 50
 """Most XML files that may include one another."""
@@ -23,7 +24,22 @@ def compile_mjcf(path: Path) -> mujoco.MjModel:
         ConfigError: If it is no MJCF, or names a file outside its folder.
         DescriptionError: If MuJoCo refuses it.
     """
+    return _read(path)[1]
+
+
+def read_mjcf_spec(path: Path) -> mujoco.MjSpec:
+    """Read an MJCF file as `compile_mjcf` does, for other models to take in.
+
+    Raises:
+        ConfigError: If it is no MJCF, or names a file outside its folder.
+        DescriptionError: If MuJoCo refuses it.
+    """
+    return _read(path)[0]
+
+
+def _read(path: Path) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
     roots = _included(path)
+    check_size(roots, path)
     for element in roots:
         if (
             element.find("extension") is not None
@@ -33,8 +49,9 @@ def compile_mjcf(path: Path) -> mujoco.MjModel:
         _check_files(element, path)
         _check_numbers(element, path)
     try:
-        return mujoco.MjSpec.from_file(str(path)).compile()
-    except ValueError as error:
+        spec = mujoco.MjSpec.from_file(str(path))
+        return spec, spec.compile()
+    except (ValueError, RuntimeError, MemoryError) as error:  # it has all three
         raise DescriptionError(f"{path}: MuJoCo refuses it: {error}") from error
 
 
@@ -71,7 +88,8 @@ def _check_files(root: Element, path: Path) -> None:
         for key, name in element.items():
             if key.startswith("file") and name:
                 for folder in ("", *filter(None, folders)):
-                    inside(path.parent, path.parent / folder / name, source=path)
+                    file = path.parent / folder / name
+                    check_file(inside(path.parent, file, source=path), source=path)
 
 
 def _check_numbers(root: Element, path: Path) -> None:
@@ -80,5 +98,6 @@ def _check_numbers(root: Element, path: Path) -> None:
         for key, value in element.items():
             if key not in ("name", "file") and "nan" in value.lower().split():
                 raise DescriptionError(
-                    f'{path}: <{element.tag} {key}="{value}"> holds what is no number.'
+                    f'{path}: <{element.tag} {key}="{value:.80}"> holds what is no '
+                    "number."
                 )

@@ -21,12 +21,14 @@ __all__ = [
     "Cylinder",
     "Ellipsoid",
     "Hull",
+    "Interval",
     "Loft",
     "Posed",
     "Quaternion",
     "Real",
     "Shape",
     "Size",
+    "SizeInterval",
     "SkinMesh",
     "Sphere",
     "Vector3",
@@ -42,6 +44,16 @@ Real: TypeAlias = Annotated[float, Field(ge=-1e4, le=1e4)]
 Size: TypeAlias = Annotated[float, Field(ge=1e-6, le=1e4)]
 """A positive length in m; an engine cannot draw less than a micrometre."""
 Vector3: TypeAlias = tuple[Real, Real, Real]
+
+
+def _ordered(ends: tuple[float, float]) -> tuple[float, float]:
+    if ends[0] > ends[1]:
+        raise ValueError(f"the smaller end comes first, {ends[0]:g} > {ends[1]:g}")
+    return ends
+
+
+Interval: TypeAlias = Annotated[tuple[Real, Real], AfterValidator(_ordered)]
+SizeInterval: TypeAlias = Annotated[tuple[Size, Size], AfterValidator(_ordered)]
 
 
 ROUNDING = 1e-14

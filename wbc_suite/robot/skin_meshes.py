@@ -12,6 +12,7 @@ from wbc_suite.errors import ConfigError
 from wbc_suite.robot.mesh_files import MAX_BYTES
 from wbc_suite.robot.shapes import SkinMesh, Vector3, kept_by_shape
 from wbc_suite.typing import Indices, Matrix
+from wbc_suite.user_cache import user_cache
 
 __all__ = ["skin_triangles"]
 
@@ -97,8 +98,7 @@ def _digest(path: Path, scale: Vector3) -> str:
 
 
 def _cache_folder() -> Path:
-    home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(home) / "wbc_suite" / "skins"
+    return user_cache() / "skins"
 
 
 def _keep(path: Path, vertices: Matrix, faces: Indices) -> None:

@@ -23,6 +23,7 @@ from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.robot.parts import Name
 from wbc_suite.robot.shapes import Color, Posed, SkinMesh, Vector3
 from wbc_suite.tomlfile import FrozenModel, load_model
+from wbc_suite.user_cache import user_cache_root
 
 __all__ = ["MESHES", "SkinTable", "Wardrobe", "read_skin"]
 
@@ -58,10 +59,10 @@ class _Menagerie(_Provider):
     def folders(self) -> Iterator[Path]:
         if root := os.environ.get("MENAGERIE_ROOT"):
             yield Path(root)
-        home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+        home = user_cache_root()
         if sys.platform == "darwin":
             home = Path.home() / "Library/Caches"
-        own = os.environ.get("MENAGERIE_CACHE_DIR") or Path(home) / "mujoco_menagerie"
+        own = os.environ.get("MENAGERIE_CACHE_DIR") or home / "mujoco_menagerie"
         yield Path(own) / "models"
 
 
@@ -182,7 +183,7 @@ class Wardrobe:
             log.warning("skin: %s", line)
 
     def _table(self, component: str) -> SkinTable | None:
-        if component not in self._catalogue.names("robots/skin"):
+        if not self._catalogue.holds("robots/skin", component):
             return None
         path = self._catalogue.find("robots/skin", component, kind="skin")
         return read_skin(path)

@@ -1,5 +1,6 @@
 """Arenas: the room, the light and the furniture that robots work in."""
 
+from collections.abc import Mapping
 from typing import Annotated, TypeAlias
 
 import mujoco
@@ -9,7 +10,7 @@ from wbc_suite.robot.shapes import Size, Vector3
 from wbc_suite.scene.textures import wood_pixels
 from wbc_suite.tomlfile import FrozenModel
 
-__all__ = ["TableConfig", "add_table", "empty_arena"]
+__all__ = ["TableConfig", "add_table", "add_tables", "empty_arena"]
 
 FRICTION = (1.0, 0.005, 0.0001)
 """Sliding, torsional, rolling; the default of this field's table-top benchmarks."""
@@ -19,8 +20,12 @@ WOOD_SIZE = 512
 """Pixels along each side of the table's texture."""
 
 
+LEG_AT = 0.5
+"""Where a table's legs stand, from its middle, as a share of half its side; further out
+they would stand on the feet of robots' pedestals, which reach 24 cm under it."""
 LEAST_LEG = 0.01
 """Shortest legs of a table, m."""
+
 Friction: TypeAlias = Annotated[float, Field(ge=0.0, le=1e3)]
 
 
@@ -76,32 +81,46 @@ def empty_arena(*, timestep: float = 0.002) -> mujoco.MjSpec:
     return spec
 
 
-def add_table(spec: mujoco.MjSpec, table: TableConfig) -> None:
-    """Add a table on four legs; the top is the geom `table`."""
+def add_table(spec: mujoco.MjSpec, table: TableConfig, name: str = "table") -> None:
+    """Add a table on four legs; body and top are called `name`."""
     length, width, thickness = table.size
     height = table.center[2] - thickness
-    body = spec.worldbody.add_body(name="table", pos=table.center)
+    body = spec.worldbody.add_body(name=name, pos=table.center)
     body.add_geom(
-        name="table",
+        name=name,
         type=mujoco.mjtGeom.mjGEOM_BOX,
         pos=(0, 0, -thickness / 2),
         size=(length / 2, width / 2, thickness / 2),
         material="wood",
         friction=table.friction,
     )
-    inset = 0.06
     for i, (side, end) in enumerate(((-1, -1), (-1, 1), (1, -1), (1, 1))):
         body.add_geom(
-            name=f"table_leg{i}",
+            name=f"{name}_leg{i}",
             type=mujoco.mjtGeom.mjGEOM_BOX,
             pos=(
-                side * (length / 2 - inset),
-                end * (width / 2 - inset),
+                side * LEG_AT * length / 2,
+                end * LEG_AT * width / 2,
                 -thickness - height / 2,
             ),
             size=(0.025, 0.025, height / 2),
             material="table_leg",
         )
+
+
+def add_tables(
+    spec: mujoco.MjSpec, table: TableConfig, centers: Mapping[str, Vector3]
+) -> None:
+    """Add several equal tables, such as one before each arm.
+
+    Args:
+        spec: The scene.
+        table: What they are like.
+        centers: Middle of each top's upper face, m, by the name of its body and top.
+    """
+    for name, center in centers.items():
+        given = table.model_dump() | {"center": center}
+        add_table(spec, TableConfig(**given), name)
 
 
 def _add_looks(spec: mujoco.MjSpec) -> None:
@@ -115,8 +134,8 @@ def _add_looks(spec: mujoco.MjSpec) -> None:
         builtin=gradient,
         rgb1=(0.93, 0.95, 0.97),
         rgb2=(0.62, 0.68, 0.75),
-        width=256,
-        height=1536,
+        width=64,  # a gradient needs no more, and every environment holds it
+        height=384,
     )
     spec.add_texture(
         name="floor",
@@ -152,6 +171,8 @@ def _add_lights(spec: mujoco.MjSpec) -> None:
     spec.visual.headlight.diffuse = (0.28, 0.28, 0.28)
     spec.visual.headlight.specular = (0.05, 0.05, 0.05)
     spec.visual.map.znear = 0.005
+    spec.visual.map.shadowclip = 6.0  # extents; at its edge the floor is full of dots
+    spec.visual.rgba.haze = (0.80, 0.83, 0.86, 1.0)  # white is a bar at the horizon
     for name, pos, diffuse, shadow in (
         ("key_light", (-1.5, -2.0, 4.0), 0.5, True),
         ("fill_light", (2.0, 2.0, 3.0), 0.2, False),

@@ -24,6 +24,7 @@ import mujoco
 from mujoco.rendering.classic import gl_context
 
 from wbc_suite.errors import DeviceError
+from wbc_suite.user_cache import user_cache
 
 __all__ = ["GlBackend", "activate", "forget", "probe"]
 
@@ -183,10 +184,9 @@ def _ask_subprocess(name: str) -> str | None:
 
 
 def _verdict_path() -> Path:
-    base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     machine = f"{platform.node()} {sys.prefix} {mujoco.__version__}"
     key = hashlib.sha256(machine.encode()).hexdigest()[:12]
-    return base / "wbc_suite" / f"gl_backend_{key}.json"
+    return user_cache() / f"gl_backend_{key}.json"
 
 
 def _remembered() -> GlBackend | None:

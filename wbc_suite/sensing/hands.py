@@ -1,15 +1,12 @@
 """Hands of a robot in a scene: where they are, and what they hold."""
 
-from collections.abc import Sequence
-
-import mujoco
-import numpy as np
+from collections.abc import Collection, Sequence
 
 from wbc_suite.control import RobotState
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Vector
 
-__all__ = ["Hand", "hands_of"]
+__all__ = ["Hand", "gripper_links", "hands_of"]
 
 
 class Hand:
@@ -20,50 +17,56 @@ class Hand:
         name: `right`, `left`, or the frame's own name.
         frame: The frame between the fingers.
         links: Links of the gripper.
+
+    Attributes:
+        site: The frame's site in the simulation.
+        gripper_bodies: The gripper's bodies, and the one that it hangs on.
     """
 
     def __init__(
         self, state: RobotState, name: str, frame: str, links: Sequence[str]
     ) -> None:
+        model, self._data = state.model, state.data
         self.name, self.frame = name, frame
-        self._data, self._model = state.data, state.model
-        self._site = state.model.site(state.prefix + frame).id
-        self._bodies = {state.model.body(state.prefix + link).id for link in links}
+        self.site: int = model.site(state.prefix + frame).id
+        self._position = state.data.site_xpos[self.site]
+        bodies = {int(model.body(state.prefix + link).id) for link in links}
+        self.gripper_bodies = frozenset(bodies)
+        self._body_of = {
+            geom: int(body)
+            for geom, body in enumerate(model.geom_bodyid)
+            if body in bodies
+        }
 
     @property
     def position(self) -> Vector:
         """Position of the frame in the world, m. A view."""
-        return self._data.site_xpos[self._site]
+        return self._position
 
-    @property
-    def quat_xyzw(self) -> Vector:
-        """Orientation of the frame in the world."""
-        quat = np.empty(4)
-        mujoco.mju_mat2Quat(quat, self._data.site_xmat[self._site])
-        return quat[[1, 2, 3, 0]]
+    def owns(self, geom: int) -> bool:
+        """Whether a geom belongs to the gripper."""
+        return geom in self._body_of
 
-    def grasps(self, geom: int) -> bool:
-        """Whether two different links of the gripper touch a geom."""
-        touching: set[int] = set()
-        for pair in self._data.contact.geom:
-            if geom in pair:
-                other = int(pair[1] if pair[0] == geom else pair[0])
-                body = int(self._model.geom_bodyid[other])
-                if body in self._bodies:
-                    touching.add(body)
-        return len(touching) >= 2
+    def grasps(self, geoms: Collection[int]) -> bool:
+        """Whether two different links of the gripper touch geoms of a thing."""
+        touching = {
+            self._body_of.get(b if a in geoms else a)
+            for a, b in self._data.contact.geom.tolist()
+            if a in geoms or b in geoms
+        }
+        return len(touching - {None}) >= 2
 
 
 def hands_of(state: RobotState) -> tuple[Hand, ...]:
     """Return a robot's hands, right before left."""
     robot = state.robot
     return tuple(
-        Hand(state, side, frame, _gripper_links(robot, side, frame))
+        Hand(state, side, frame, gripper_links(robot, side, frame))
         for side, frame in robot.hands.items()
     )
 
 
-def _gripper_links(robot: RobotDescription, side: str, frame: str) -> list[str]:
+def gripper_links(robot: RobotDescription, side: str, frame: str) -> list[str]:
     """Return the links that the side's gripper moves, and the one they hang on."""
     joints = {
         joint

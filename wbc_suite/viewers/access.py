@@ -4,50 +4,29 @@ viser, which serves the pages, knows neither tokens nor origins. So it listens o
 machine's own address only, and the gate listens where people come. The gate reads the
 head of each request, decides, and from then on copies bytes both ways.
 
-- A page of another site that a browser of ours happens to show must not reach us: the
-  `Origin` of a WebSocket must be the host that it asks for; and without a token, that
-  host must be this machine (which stops names that point at 127.0.0.1).
-- Anybody beyond this machine needs the token. It comes once, in the address, and is
-  traded for a cookie that scripts cannot read.
-- The gate marks what it lets through, and viser's side takes nothing without the mark,
-  so that other users of this machine cannot walk around the gate.
+Whom it lets in, `Admission` says. The gate marks what it lets through, and viser's side
+takes nothing without the mark, so that other users of this machine cannot walk around
+the gate.
 """
 
 import asyncio
 import contextlib
-import hmac
-import ipaddress
-import logging
-import secrets
-import socket
 import threading
 from collections.abc import Coroutine, Mapping
 from dataclasses import dataclass
 from http import HTTPStatus
-from http.cookies import CookieError, SimpleCookie
 from types import MappingProxyType
-from urllib.parse import parse_qs, urlsplit
 
-from wbc_suite.errors import DeviceError
+from wbc_suite.devices.admission import Admission, Refusal
+from wbc_suite.devices.listening import listen
 
-__all__ = ["MARK", "AccessGate", "Request", "is_loopback"]
-
-logger = logging.getLogger(__name__)
+__all__ = ["MARK", "AccessGate", "Request"]
 
 MARK = "X-Wbc-Gate"  # header with which the gate marks what it lets through
 HEAD_LIMIT = 16 * 1024  # bytes; browsers stay far below
 HEAD_TIMEOUT = 10.0  # s
 CONNECTIONS = 256  # at a time; a browser needs one and, while it loads, a few more
 CHUNK = 64 * 1024  # bytes
-
-
-def is_loopback(host: str) -> bool:
-    """Whether an address to listen on, or a host name asked for, is this machine's."""
-    if host == "localhost":
-        return True
-    with contextlib.suppress(ValueError):
-        return ipaddress.ip_address(host.strip("[]")).is_loopback
-    return False
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,33 +53,20 @@ class Request:
             headers[name] = value.strip()
         return cls(words[0], words[1], MappingProxyType(headers))
 
-    @property
-    def upgrades(self) -> bool:
-        """Whether the request opens a WebSocket."""
-        return self.headers.get("upgrade", "").lower() == "websocket"
 
-
-@dataclass(frozen=True, slots=True)
-class _Answer:
-    """What the gate itself says to a request that it does not let through."""
-
-    status: HTTPStatus
-    text: str
-    headers: tuple[tuple[str, str], ...] = ()
-
-    def encoded(self) -> bytes:
-        """Return the answer as it goes on the wire."""
-        body = self.text.encode()
-        fields = (
-            ("Content-Type", "text/plain; charset=utf-8"),
-            ("Content-Length", str(len(body))),
-            ("Connection", "close"),
-            ("Cache-Control", "no-store"),
-            *self.headers,
-        )
-        head = f"HTTP/1.1 {self.status.value} {self.status.phrase}\r\n"
-        head += "".join(f"{name}: {value}\r\n" for name, value in fields)
-        return head.encode("latin-1") + b"\r\n" + body
+def _encoded(answer: Refusal) -> bytes:
+    """Return a refusal as it goes on the wire."""
+    body = answer.text.encode()
+    fields = (
+        ("Content-Type", "text/plain; charset=utf-8"),
+        ("Content-Length", str(len(body))),
+        ("Connection", "close"),
+        ("Cache-Control", "no-store"),
+        *answer.headers,
+    )
+    head = f"HTTP/1.1 {answer.status.value} {answer.status.phrase}\r\n"
+    head += "".join(f"{name}: {value}\r\n" for name, value in fields)
+    return head.encode("latin-1") + b"\r\n" + body
 
 
 class AccessGate:
@@ -120,14 +86,11 @@ class AccessGate:
     def __init__(
         self, *, host: str, port: int, upstream: int, mark: str, token: str | None
     ) -> None:
-        if token is None and not is_loopback(host):
-            raise DeviceError(
-                f"A server on '{host}' can be reached by others and needs a token."
-            )
-        self._upstream, self._mark, self._token = upstream, mark, token
-        self._socket = _listen(host, port)
+        self._upstream, self._mark = upstream, mark
+        Admission(host, token, "")  # before anything listens
+        self._socket = listen(host, port)
         self.port: int = self._socket.getsockname()[1]
-        self._cookie = f"wbc_token_{self.port}"
+        self._admission = Admission(host, token, f"wbc_token_{self.port}")
         self._open = 0
         self._loop = asyncio.new_event_loop()
         self._stopping = asyncio.Event()
@@ -140,42 +103,9 @@ class AccessGate:
             self._loop.call_soon_threadsafe(self._stopping.set)
             self._thread.join()
 
-    def decide(self, request: Request) -> _Answer | None:
+    def decide(self, request: Request) -> Refusal | None:
         """Return the answer that keeps a request out, or None to let it in."""
-        if request.method != "GET":
-            return _Answer(HTTPStatus.METHOD_NOT_ALLOWED, "Only GET is served here.")
-        host = request.headers.get("host", "")
-        if self._token is None and not is_loopback(_host_name(host)):
-            return _Answer(
-                HTTPStatus.FORBIDDEN,
-                "This page is for this machine only: open it as 127.0.0.1.",
-            )
-        origin = request.headers.get("origin")
-        if origin is not None and urlsplit(origin).netloc != host:
-            logger.warning("Refused a request from a page of %s.", origin)
-            return _Answer(HTTPStatus.FORBIDDEN, "Another site's page asked for this.")
-        return self._check_token(request)
-
-    def _check_token(self, request: Request) -> _Answer | None:
-        if self._token is None or self._matches(_cookie(request, self._cookie)):
-            return None
-        target = urlsplit(request.target)
-        if not self._matches(parse_qs(target.query).get("token", [""])[0]):
-            return _Answer(
-                HTTPStatus.UNAUTHORIZED,
-                "This page needs its token: open the whole address that the terminal "
-                "shows, with '?token=' and what follows.",
-            )
-        if request.upgrades:
-            return None
-        cookie = f"{self._cookie}={self._token}; HttpOnly; SameSite=Lax; Path=/"
-        return _Answer(
-            HTTPStatus.SEE_OTHER, "", (("Location", "/"), ("Set-Cookie", cookie))
-        )
-
-    def _matches(self, candidate: str) -> bool:
-        assert self._token is not None
-        return hmac.compare_digest(candidate.encode(), self._token.encode())
+        return self._admission.decide(request.method, request.target, request.headers)
 
     def _run(self) -> None:
         asyncio.set_event_loop(self._loop)
@@ -211,7 +141,7 @@ class AccessGate:
     ) -> None:
         answer, head = await self._judge(reader)
         if answer is not None:
-            writer.write(answer.encoded())
+            writer.write(_encoded(answer))
             await writer.drain()
             return
         inner, outer = await asyncio.open_connection("127.0.0.1", self._upstream)
@@ -223,17 +153,17 @@ class AccessGate:
 
     async def _judge(
         self, reader: asyncio.StreamReader
-    ) -> tuple[_Answer | None, bytes]:
+    ) -> tuple[Refusal | None, bytes]:
         if self._open > CONNECTIONS:
-            return _Answer(HTTPStatus.SERVICE_UNAVAILABLE, "Too many viewers."), b""
+            return Refusal(HTTPStatus.SERVICE_UNAVAILABLE, "Too many viewers."), b""
         try:
             head = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), HEAD_TIMEOUT)
         except asyncio.LimitOverrunError:
             status = HTTPStatus.REQUEST_HEADER_FIELDS_TOO_LARGE
-            return _Answer(status, "The request's head is too long."), b""
+            return Refusal(status, "The request's head is too long."), b""
         request = Request.parse(head)
         if request is None:
-            return _Answer(HTTPStatus.BAD_REQUEST, "This is not HTTP."), b""
+            return Refusal(HTTPStatus.BAD_REQUEST, "This is not HTTP."), b""
         return self.decide(request), head
 
     def _marked(self, head: bytes) -> bytes:
@@ -243,36 +173,6 @@ class AccessGate:
         kept = [field for field in fields if not field.lower().startswith(name)]
         mark = f"{MARK}: {self._mark}".encode()
         return b"\r\n".join([first, *kept, mark, b"", b""])
-
-
-def new_secret() -> str:
-    """Return a secret of 128 bits that may stand in an address."""
-    return secrets.token_urlsafe(16)
-
-
-def _listen(host: str, port: int) -> socket.socket:
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    try:
-        return socket.create_server((host, port), family=family)
-    except OSError as error:
-        raise DeviceError(
-            f"Cannot listen on {host}, port {port}: {error.strerror}. "
-            "Choose another port, or 0 for any free one."
-        ) from error
-
-
-def _host_name(host: str) -> str:
-    """Return the name in a Host header, without its port."""
-    with contextlib.suppress(ValueError):
-        return urlsplit(f"//{host}").hostname or ""
-    return ""
-
-
-def _cookie(request: Request, name: str) -> str:
-    jar: SimpleCookie = SimpleCookie()
-    with contextlib.suppress(CookieError):
-        jar.load(request.headers.get("cookie", ""))
-    return jar[name].value if name in jar else ""
 
 
 async def _copy(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

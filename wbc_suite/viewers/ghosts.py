@@ -9,7 +9,7 @@ import pinocchio as pin
 
 from wbc_suite.viewers.scene_mirror import COLLISION_GROUP
 from wbc_suite.viewers.shapes import TriangleMesh, geom_mesh, merge
-from wbc_suite.viewers.teleop_session import LimbStatus, Snapshot
+from wbc_suite.viewers.snapshot import LimbStatus, Snapshot
 
 if TYPE_CHECKING:
     import viser

@@ -14,9 +14,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
+from wbc_suite.devices.limbs import LimbKind
 from wbc_suite.viewers.ghosts import place
-from wbc_suite.viewers.limb import Limb, LimbKind
-from wbc_suite.viewers.teleop_session import Snapshot, TeleopSession
+from wbc_suite.viewers.limb import Limb
+from wbc_suite.viewers.snapshot import Snapshot
+from wbc_suite.viewers.teleop_session import TeleopSession
 
 if TYPE_CHECKING:
     import viser
@@ -153,7 +155,7 @@ class Gizmos:
             disable_rotations=not turns,
             active_axes=(True, True, limb.kind is not LimbKind.PLANAR),
         )
-        place(handle, limb.clutch.target)
+        place(handle, limb.asked)
         gizmo = _Gizmo(handle)
 
         @handle.on_update

@@ -1,26 +1,16 @@
 """One thing that a person can hold: a hand, a foot, the head, the base."""
 
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.devices import Clutch
-from wbc_suite.typing import Vector
+from wbc_suite.devices.limbs import LimbKind
+from wbc_suite.devices.pipeline.limb import LimbPipeline
 
-__all__ = ["Limb", "LimbKind", "Ownership"]
+__all__ = ["Limb", "Ownership"]
 
 HOLD_TIMEOUT = 20.0  # s; a frozen tab may keep a limb for this long, not longer
-
-
-class LimbKind(StrEnum):
-    """Which part of a pose a limb's target commands."""
-
-    POSE = "pose"
-    POSITION = "position"
-    ORIENTATION = "orientation"
-    PLANAR = "planar"
 
 
 class Ownership:
@@ -58,21 +48,32 @@ class Ownership:
 
 @dataclass(slots=True)
 class Limb:
-    """A controlled frame with the target that people move.
+    """A limb of the pipeline that several people may want to move.
 
     Attributes:
-        name: Name of the controlled frame, which is also its slice of the action.
-        kind: Which part of the pose is commanded.
-        clutch: Couples the holder's input to the target.
+        stages: What makes its targets of people's input.
         ownership: Which client holds the limb.
         enabled: Whether the limb listens to anybody at all.
     """
 
-    name: str
-    kind: LimbKind
-    clutch: Clutch
+    stages: LimbPipeline
     ownership: Ownership
     enabled: bool = True
+
+    @property
+    def name(self) -> str:
+        """Name of its slice of the action."""
+        return self.stages.port.name
+
+    @property
+    def kind(self) -> LimbKind:
+        """Which part of a pose is commanded."""
+        return self.stages.port.kind
+
+    @property
+    def asked(self) -> pin.SE3:
+        """The pose that people ask for, which the target heads for."""
+        return self.stages.clutch.target
 
     @property
     def title(self) -> str:
@@ -83,7 +84,7 @@ class Limb:
 
     def seen_target(self, measured: pin.SE3) -> pin.SE3:
         """Return the target, with what it does not command as it is measured."""
-        target = self.clutch.target
+        target = self.asked
         match self.kind:
             case LimbKind.POSE:
                 return target
@@ -95,24 +96,3 @@ class Limb:
                 height = np.array([0.0, 0.0, measured.translation[2]])
                 height[:2] = target.translation[:2]
                 return pin.SE3(target.rotation, height)
-
-    def command(self) -> Vector:
-        """Return the target as the action expects it.
-
-        Returns:
-            Position (3) and rotation vector (3), either of the two, or x, y and yaw.
-        """
-        T_world_target = self.clutch.target
-        position = T_world_target.translation
-        rotation = pin.log3(T_world_target.rotation)
-        match self.kind:
-            case LimbKind.POSE:
-                return np.concatenate([position, rotation])
-            case LimbKind.POSITION:
-                return position
-            case LimbKind.ORIENTATION:
-                return rotation
-            case LimbKind.PLANAR:
-                x_axis = T_world_target.rotation[:, 0]
-                yaw = np.arctan2(x_axis[1], x_axis[0])
-                return np.array([position[0], position[1], yaw])

@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from wbc_suite.typing import Matrix, Vector
-from wbc_suite.viewers.shapes import TriangleMesh, geom_mesh, merge
+from wbc_suite.viewers.shapes import TriangleMesh, colored_meshes, merge
 
 if TYPE_CHECKING:
     import viser
@@ -134,8 +134,10 @@ def robot_box(
     bodies = [model.body(body).name for body in range(model.nbody)]
     prefix = "robot0_" if any(n.startswith("robot0_") for n in bodies) else ""
     corners = []
-    for geom in np.flatnonzero(model.geom_rbound > 0.0):
-        body, radius = model.geom_bodyid[geom], model.geom_rbound[geom]
+    reach = np.abs(model.geom_aabb[:, :3]) + model.geom_aabb[:, 3:]
+    radii = np.linalg.norm(reach, axis=1)
+    for geom in np.flatnonzero(model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE):
+        body, radius = model.geom_bodyid[geom], radii[geom]
         if body == 0 or not bodies[body].startswith(prefix):
             continue
         place = np.empty(3)
@@ -159,15 +161,12 @@ def _parts(
     """Return the meshes of each body, kind and colour: each becomes one mesh."""
     parts: dict[tuple[int, bool, tuple[float, ...]], list[TriangleMesh]] = {}
     for geom in range(model.ngeom):
-        mesh = geom_mesh(model, geom)
-        material = model.geom_matid[geom]
-        rgba = model.mat_rgba[material] if material >= 0 else model.geom_rgba[geom]
-        if mesh is None or rgba[3] == 0.0:
-            continue
         rotation = np.empty(9)
         mujoco.mju_quat2Mat(rotation, model.geom_quat[geom])
-        placed = mesh.moved(model.geom_pos[geom], rotation.reshape(3, 3))
         collision = bool(model.geom_group[geom] >= COLLISION_GROUP)
-        key = int(model.geom_bodyid[geom]), collision, tuple(map(float, rgba))
-        parts.setdefault(key, []).append(placed)
+        for rgba, mesh in colored_meshes(model, geom):
+            if rgba[3] > 0.0:
+                placed = mesh.moved(model.geom_pos[geom], rotation.reshape(3, 3))
+                key = int(model.geom_bodyid[geom]), collision, rgba
+                parts.setdefault(key, []).append(placed)
     return parts

@@ -1,31 +1,25 @@
-"""Triangle meshes of MuJoCo's geometries, for a page to draw.
+"""Triangle meshes of MuJoCo's geometries, for a page to draw."""
 
-Corners that should look sharp are repeated, one copy per face, because the page
-smooths normals over shared vertices.
-"""
-
-from dataclasses import dataclass
+import math
 
 import mujoco
 import numpy as np
 
-from wbc_suite.typing import Indices, Matrix, Vector
+from wbc_suite.robot.triangles import (
+    TriangleMesh,
+    box_mesh,
+    capsule_mesh,
+    cylinder_mesh,
+    ellipsoid_mesh,
+    merge,
+)
 
-__all__ = ["TriangleMesh", "geom_mesh", "merge"]
+__all__ = ["Rgba", "TriangleMesh", "colored_meshes", "geom_mesh", "merge"]
 
-SEGMENTS = 24  # around an axis; a 5 cm link then deviates by 0.4 mm from round
+Rgba = tuple[float, float, float, float]
 
-
-@dataclass(frozen=True, slots=True)
-class TriangleMesh:
-    """Vertices, shape (n, 3), in m, and faces, shape (m, 3), counter-clockwise."""
-
-    vertices: Matrix
-    faces: Indices
-
-    def moved(self, position: Vector, rotation: Matrix) -> "TriangleMesh":
-        """Return the mesh carried from its own frame into another one."""
-        return TriangleMesh(self.vertices @ rotation.T + position, self.faces)
+DEFAULT_COLOR = (0.5, 0.5, 0.5, 1.0)
+"""Of a geometry that says none; its material's counts then."""
 
 
 def geom_mesh(model: mujoco.MjModel, geom: int) -> TriangleMesh | None:
@@ -33,82 +27,73 @@ def geom_mesh(model: mujoco.MjModel, geom: int) -> TriangleMesh | None:
     size = model.geom_size[geom]
     match model.geom_type[geom]:
         case mujoco.mjtGeom.mjGEOM_BOX:
-            return _box(size)
+            return box_mesh(size)
         case mujoco.mjtGeom.mjGEOM_SPHERE:
-            return _lathe(*_arc(size[0], 0.0), np.ones(3))
+            return ellipsoid_mesh(np.full(3, size[0]))
         case mujoco.mjtGeom.mjGEOM_ELLIPSOID:
-            return _lathe(*_arc(1.0, 0.0), size)
+            return ellipsoid_mesh(size)
         case mujoco.mjtGeom.mjGEOM_CAPSULE:
-            return _lathe(*_arc(size[0], size[1]), np.ones(3))
+            return capsule_mesh(size[0], size[1])
         case mujoco.mjtGeom.mjGEOM_CYLINDER:
-            return _cylinder(size[0], size[1])
+            return cylinder_mesh(size[0], size[1])
         case mujoco.mjtGeom.mjGEOM_MESH:
             return _mesh(model, int(model.geom_dataid[geom]))
         case _:
             return None
 
 
-def merge(meshes: list[TriangleMesh]) -> TriangleMesh:
-    """Return one mesh with the triangles of all."""
-    starts = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
-    return TriangleMesh(
-        np.concatenate([mesh.vertices for mesh in meshes]),
-        np.concatenate(
-            [m.faces + start for m, start in zip(meshes, starts, strict=True)]
-        ),
-    )
+def colored_meshes(model: mujoco.MjModel, geom: int) -> list[tuple[Rgba, TriangleMesh]]:
+    """Return a geometry in its own frame, one mesh for each of its colours.
+
+    Links have several, from a palette: a picture of one row. Of other pictures the mean
+    colour is shown, times the geometry's own.
+    """
+    mesh, material = geom_mesh(model, geom), int(model.geom_matid[geom])
+    if mesh is None:
+        return []
+    rgba, pixels = _color_of(model, geom), _pixels_of(model, material)
+    if pixels is None:
+        return [(_rgba(rgba), mesh)]
+    if len(pixels) > 1 or model.geom_type[geom] != mujoco.mjtGeom.mjGEOM_MESH:
+        mean = pixels.mean(axis=(0, 1)) / 255.0
+        return [(_rgba([*(mean * rgba[:3]), rgba[3]]), mesh)]
+    data, palette = int(model.geom_dataid[geom]), pixels[0]
+    first, start = model.mesh_faceadr[data], model.mesh_texcoordadr[data]
+    corner = model.mesh_facetexcoord[first : first + len(mesh.faces), 0]
+    column = (model.mesh_texcoord[start + corner, 0] * len(palette)).astype(np.int64)
+    return [
+        (_rgba([*palette[k] / 255.0, rgba[3]]), _part(mesh, column == k))
+        for k in np.unique(column)
+    ]
 
 
-def _box(half: Vector) -> TriangleMesh:
-    square = np.array([[-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]], dtype=float)
-    cyclic = [np.roll(square, k, axis=1) for k in range(3)]
-    sides = [side for c in cyclic for side in (c, -c[::-1])]
-    quads = 4 * np.arange(6)[:, None, None] + np.array([[0, 1, 2], [0, 2, 3]])
-    return TriangleMesh(np.concatenate(sides) * half, quads.reshape(-1, 3))
+def _color_of(model: mujoco.MjModel, geom: int) -> np.ndarray:
+    """Return the colour that MuJoCo draws with: its own, unless it has the default."""
+    own, material = model.geom_rgba[geom], model.geom_matid[geom]
+    is_default = material >= 0 and np.array_equal(own, DEFAULT_COLOR)
+    return model.mat_rgba[material] if is_default else own
 
 
-def _arc(radius: float, half_length: float) -> tuple[Vector, Vector]:
-    """Return radii and heights of half a circle, its middle stretched by a shaft."""
-    angles = np.linspace(-np.pi / 2, np.pi / 2, SEGMENTS // 2 + 2)
-    lower, upper = angles[angles <= 1e-9], angles[angles >= -1e-9]
-    if half_length == 0.0:
-        lower, upper = angles, angles[:0]
-    radii = radius * np.cos(np.concatenate([lower, upper]))
-    heights = radius * np.sin(np.concatenate([lower, upper]))
-    return radii, heights + half_length * np.repeat([-1, 1], [len(lower), len(upper)])
+def _rgba(values: np.ndarray | list[float]) -> Rgba:
+    red, green, blue, alpha = map(float, values)
+    return red, green, blue, alpha
 
 
-def _lathe(radii: Vector, heights: Vector, scale: Vector) -> TriangleMesh:
-    """Turn a profile around z; neighbouring rings share their vertices."""
-    turn = np.linspace(0, 2 * np.pi, SEGMENTS, endpoint=False)
-    ring = np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    vertices = np.concatenate(
-        [
-            np.column_stack([r * ring, np.full(SEGMENTS, z)])
-            for r, z in zip(radii, heights, strict=True)
-        ]
-    )
-    return TriangleMesh(vertices * scale, _ring_faces(len(radii)))
+def _pixels_of(model: mujoco.MjModel, material: int) -> np.ndarray | None:
+    """Return the picture of a material, shape (height, width, 3)."""
+    role = mujoco.mjtTextureRole.mjTEXROLE_RGB
+    texture = -1 if material < 0 else int(model.mat_texid[material, role])
+    if texture < 0 or model.tex_nchannel[texture] != 3:
+        return None
+    first = model.tex_adr[texture]
+    shape = int(model.tex_height[texture]), int(model.tex_width[texture]), 3
+    return model.tex_data[first : first + math.prod(shape)].reshape(shape)
 
 
-def _ring_faces(rings: int) -> Indices:
-    here = np.arange(SEGMENTS)
-    there = np.roll(here, -1)
-    band = np.concatenate(
-        [
-            np.stack([here, there, here + SEGMENTS], axis=1),
-            np.stack([there, there + SEGMENTS, here + SEGMENTS], axis=1),
-        ]
-    )
-    return np.concatenate([band + SEGMENTS * k for k in range(rings - 1)])
-
-
-def _cylinder(radius: float, half: float) -> TriangleMesh:
-    ones = np.ones(3)
-    side = _lathe(np.full(2, radius), np.array([-half, half]), ones)
-    top = _lathe(np.array([radius, 1e-6]), np.full(2, half), ones)
-    bottom = _lathe(np.array([1e-6, radius]), np.full(2, -half), ones)
-    return merge([side, top, bottom])
+def _part(mesh: TriangleMesh, chosen: np.ndarray) -> TriangleMesh:
+    """Return some faces of a mesh, with their own vertices only."""
+    used, faces = np.unique(mesh.faces[chosen], return_inverse=True)
+    return TriangleMesh(mesh.vertices[used], faces.reshape(-1, 3))
 
 
 def _mesh(model: mujoco.MjModel, mesh: int) -> TriangleMesh:

@@ -5,8 +5,9 @@ import io
 import socket
 from typing import TYPE_CHECKING
 
+from wbc_suite.devices.admission import is_loopback, new_secret
 from wbc_suite.errors import DeviceError
-from wbc_suite.viewers.access import MARK, AccessGate, is_loopback, new_secret
+from wbc_suite.viewers.access import MARK, AccessGate
 
 if TYPE_CHECKING:
     import viser

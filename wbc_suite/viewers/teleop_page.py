@@ -1,12 +1,13 @@
 """The teleoperation page: a session, shown and driven in browsers."""
 
+import logging
 import threading
 import time
 from typing import TYPE_CHECKING
 
+from wbc_suite.devices.limbs import LimbKind
 from wbc_suite.viewers.ghosts import Ghosts
 from wbc_suite.viewers.gizmos import Gizmos
-from wbc_suite.viewers.limb import LimbKind
 from wbc_suite.viewers.palette import limb_colours
 from wbc_suite.viewers.scene_mirror import SceneMirror, robot_box
 from wbc_suite.viewers.site import Site
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
     import viser
 
 __all__ = ["TeleopPage"]
+
+log = logging.getLogger(__name__)
 
 PUSH_RATE = 25.0  # Hz; the eye wants no more, and every push costs the loop's processor
 PANEL_EVERY = 5  # pushes
@@ -90,7 +93,12 @@ class TeleopPage:
         count = 0
         while not self._stopping.wait(1.0 / PUSH_RATE):
             begun = time.thread_time()
-            self.push(count)
+            try:
+                self.push(count)
+            except RuntimeError:
+                # A client came or went while viser woke all of them. What was not sent
+                # still differs from what is shown, and is sent next time.
+                log.debug("The page missed a push", exc_info=True)
             self.push_times.append(time.thread_time() - begun)
             del self.push_times[:-1000]
             count += 1

@@ -6,12 +6,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from wbc_suite.devices.limbs import LimbKind
+from wbc_suite.recording.desk import Wish
 from wbc_suite.typing import Vector
 from wbc_suite.viewers.gizmos import GizmoMode, Gizmos
-from wbc_suite.viewers.limb import Limb, LimbKind
+from wbc_suite.viewers.limb import Limb
 from wbc_suite.viewers.palette import css
+from wbc_suite.viewers.snapshot import LimbStatus, Snapshot
 from wbc_suite.viewers.stage import VIEWS, look_from
-from wbc_suite.viewers.teleop_session import LimbStatus, Snapshot, TeleopSession
+from wbc_suite.viewers.teleop_session import TeleopSession
 from wbc_suite.viewers.words import explain, plain
 
 if TYPE_CHECKING:
@@ -22,9 +25,19 @@ __all__ = ["TeleopPanel"]
 PLOT_SECONDS = 10.0
 PLOT_POINTS = 150
 RECORD_NOTE = (
-    "Recording is not part of this version yet. "
-    "It comes with demonstrations: episodes, replay and datasets."
+    "This session was started without a file to record into. "
+    "`wbc-suite teleop --record FILE` records."
 )
+BUTTON_HINT = (
+    "Keys: P to pause, R to reset; C to record and to keep, Y to keep as a success, "
+    "X to discard, U to take the last episode back"
+)
+RECORD_KEYS = {
+    "C": (Wish.RECORD, "Record, or keep the episode"),
+    "Y": (Wish.SUCCESS, "Keep the episode as a success"),
+    "X": (Wish.DISCARD, "Discard the episode"),
+    "U": (Wish.UNDO, "Take the last episode back"),
+}
 
 
 class TeleopPanel:
@@ -120,8 +133,8 @@ class TeleopPanel:
             self._epoch = snapshot.epoch
             for slider in self._closing:
                 slider.value = -1.0
-        if self._buttons.options != _buttons(snapshot.paused):
-            self._buttons.options = _buttons(snapshot.paused)
+        if self._buttons.options != (buttons := _buttons(snapshot)):
+            self._buttons.options = buttons
 
     def update_plots(self) -> None:
         """Draw the last seconds of errors and solve times."""
@@ -139,7 +152,7 @@ class TeleopPanel:
     def _add_buttons(self) -> None:
         gui = self._server.gui
         self._buttons = gui.add_button_group(
-            "Session", _buttons(False), hint="Keys: P to pause, R to reset"
+            "Session", _buttons(self._session.snapshot), hint=BUTTON_HINT
         )
 
         @self._buttons.on_click
@@ -147,8 +160,10 @@ class TeleopPanel:
             match event.target.value:
                 case "Reset":
                     self._session.reset()
-                case "Record":
-                    _announce_recording(event.client)
+                case "Record" | "Keep":
+                    self._wish(Wish.RECORD, event.client)
+                case "Discard":
+                    self._wish(Wish.DISCARD, event.client)
                 case _:
                     self._toggle()
 
@@ -156,6 +171,16 @@ class TeleopPanel:
             lambda _: self._toggle()
         )
         gui.add_command("Reset", hotkey="R").on_trigger(lambda _: self._session.reset())
+
+        for key, (wish, text) in RECORD_KEYS.items():
+            command = gui.add_command(text, hotkey=key)  # type: ignore[arg-type]
+            command.on_trigger(lambda event, w=wish: self._wish(w, event.client))
+
+    def _wish(self, wish: Wish, client: "viser.ClientHandle | None") -> None:
+        if self._session.desk is not None:
+            self._session.desk.ask(wish)
+        elif client is not None:
+            client.add_notification("Record", RECORD_NOTE, auto_close_seconds=8.0)
 
     def _toggle(self) -> None:
         self._session.pause(not self._session.snapshot.paused)
@@ -250,8 +275,10 @@ class TeleopPanel:
         )
 
 
-def _buttons(paused: bool) -> tuple[str, ...]:
-    return ("Go on" if paused else "Pause", "Reset", "Record")
+def _buttons(snapshot: Snapshot) -> tuple[str, ...]:
+    held = snapshot.recording is not None and snapshot.recording.recording
+    last = ("Keep", "Discard") if held else ("Record",)
+    return ("Go on" if snapshot.paused else "Pause", "Reset", *last)
 
 
 def _marked(chosen: GizmoMode) -> tuple[str, ...]:
@@ -261,11 +288,6 @@ def _marked(chosen: GizmoMode) -> tuple[str, ...]:
 
 def _unmarked(label: str) -> GizmoMode:
     return GizmoMode(label.strip("• "))
-
-
-def _announce_recording(client: "viser.ClientHandle | None") -> None:
-    if client is not None:
-        client.add_notification("Record", RECORD_NOTE, auto_close_seconds=8.0)
 
 
 def _status_html(
@@ -292,8 +314,21 @@ def _status_html(
         "<div style='font-weight:600;margin-bottom:.5em'>"
         f"<span style='color:{dot}'>&#9679;</span> {html.escape(state)}</div>"
         f"<div style='display:flex;gap:.4em'>{cells}</div>"
-        f"{_why_html(snapshot, limbs, colours)}</div>"
+        f"{_recording_html(snapshot)}{_why_html(snapshot, limbs, colours)}</div>"
     )
+
+
+def _recording_html(snapshot: Snapshot) -> str:
+    """Say how the recording stands; nothing before anybody asked for one."""
+    told = snapshot.recording
+    if told is None or not (told.said or told.recording):
+        return ""
+    if told.recording:
+        words = f"Recording episode {told.kept + 1}: {told.length} actions"
+    else:
+        words = f"{told.said} {told.kept} episode{'s' * (told.kept != 1)} in the file."
+    dot = "<span style='color:#c8553d'>&#9679;</span> " if told.recording else ""
+    return f"<div style='margin-top:.5em'>{dot}{html.escape(words)}</div>"
 
 
 def _state(snapshot: Snapshot) -> tuple[str, str]:
@@ -301,6 +336,8 @@ def _state(snapshot: Snapshot) -> tuple[str, str]:
         return snapshot.message, "#c8553d"
     if snapshot.paused:
         return "Paused", "#b08a2e"
+    if snapshot.device:
+        return ", ".join(snapshot.device).capitalize(), "#b08a2e"
     if snapshot.success:
         return "Solved", "#3f8f5b"
     return f"Running, {snapshot.time:.0f} s", "#3f8f5b"
@@ -335,7 +372,8 @@ def _limbs_html(
 
 
 def _limb_row(limb: Limb, colour: str, status: LimbStatus) -> str:
-    held = "" if status.holder is None else f"held by viewer {status.holder + 1}"
+    notes = [] if status.holder is None else [f"held by viewer {status.holder + 1}"]
+    held = html.escape(", ".join([*notes, *status.acting]))
     if limb.kind is LimbKind.ORIENTATION:
         error = f"{np.rad2deg(status.orientation_error):.0f}°"
     else:

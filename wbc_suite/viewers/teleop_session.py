@@ -17,14 +17,16 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.devices import Clutch
-from wbc_suite.errors import UnknownNameError
-from wbc_suite.typing import Matrix, Vector
-from wbc_suite.viewers.frames import FrameReader, frame_readers
+from wbc_suite.devices import Device, DeviceState, LimbInput, Pipeline, PipelineConfig
+from wbc_suite.devices.pipeline.config import RatesConfig
+from wbc_suite.errors import DatasetError, UnknownNameError
+from wbc_suite.recording.desk import RecordingDesk
+from wbc_suite.typing import Vector
 from wbc_suite.viewers.history import History
 from wbc_suite.viewers.limb import Limb, Ownership
+from wbc_suite.viewers.snapshot import LimbStatus, Snapshot
 
-__all__ = ["LimbStatus", "Snapshot", "TeleopSession"]
+__all__ = ["DRAGGED", "TeleopSession"]
 
 WINDOW = 600  # rows of history: 12 s at 50 Hz
 LEAD_POSITION = 0.03  # m; a released target that is further than this from its limb ...
@@ -32,65 +34,15 @@ LEAD_ORIENTATION = 0.2  # rad; ... or turned by more than this, goes back to it 
 REST_SPEED = 0.02  # m/s; ... when the limb has been slower than this ...
 REST_TIME = 0.4  # s; ... for so long
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LimbStatus:
-    """How one limb stands after a tick.
-
-    Attributes:
-        measured: Pose of the simulated frame in the world.
-        target: Pose that was asked for, in the world; what is not commanded of it is
-            as measured.
-        position_error: Distance that is commanded and missing, in m, as the controller
-            reports it.
-        orientation_error: Angle that is commanded and missing, in rad.
-        reached: Whether the controller can bring the frame to its target.
-        reasons: Why it cannot, in words.
-        holder: Client that holds the limb, or None.
-        enabled: Whether the limb's clutch is in.
-    """
-
-    measured: pin.SE3
-    target: pin.SE3
-    position_error: float
-    orientation_error: float
-    reached: bool
-    reasons: tuple[str, ...]
-    holder: int | None
-    enabled: bool
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Snapshot:
-    """Everything a page shows, at one tick.
-
-    Attributes:
-        tick: Number of ticks since the session was made.
-        epoch: Number of resets; when it grows, targets have moved by themselves.
-        time: Simulated time, in s.
-        body_positions: Positions of all bodies in the world, shape (nbody, 3).
-        body_quaternions: Their orientations (wxyz), shape (nbody, 4).
-        limbs: Status per limb name.
-        solve_time: Time of the controller's last solve, in s.
-        latency: Median time from an input to its joint target, in s; nan before any.
-        speed: Simulated seconds per second of wall time.
-        paused: Whether time stands still.
-        success: Whether the benchmark counts as solved.
-        message: What the session wants to tell people, possibly empty.
-    """
-
-    tick: int
-    epoch: int
-    time: float
-    body_positions: Matrix
-    body_quaternions: Matrix
-    limbs: MappingProxyType[str, LimbStatus]
-    solve_time: float
-    latency: float
-    speed: float
-    paused: bool
-    success: bool
-    message: str
+DRAGGED = PipelineConfig(
+    jump=None,  # a page that draws slowly sends a drag in few, long steps
+    leash=None,  # a handle that is far away says so; see `_settle`
+    linear=RatesConfig(speed=2.0, acceleration=30.0, jerk=1500.0),
+    angular=RatesConfig(speed=6.0, acceleration=90.0, jerk=4500.0),
+    ramp=0.0,
+    return_after=None,
+)
+"""The pipeline behind handles that people drag."""
 
 
 @dataclass(slots=True)
@@ -109,6 +61,9 @@ class TeleopSession:
         period: Simulated and wall time of one step, in s.
         seed: Seed of every reset.
         clock: Source of wall time, in s.
+        device: A device that people use beside the page; it has been started.
+        pipeline: Stages between people and the controller.
+        desk: Where people ask for episodes to be recorded; None if nothing records.
     """
 
     def __init__(
@@ -118,12 +73,16 @@ class TeleopSession:
         period: float,
         seed: int = 0,
         clock: Callable[[], float] = time.perf_counter,
+        device: Device | None = None,
+        pipeline: PipelineConfig = DRAGGED,
+        desk: RecordingDesk | None = None,
     ) -> None:
-        self.env = env
+        self.env, self.desk = env, desk
         self.period = period
         self._seed = seed
         self._clock = clock
-        self._layout = env.unwrapped.action_layout  # type: ignore[attr-defined]
+        layout = env.unwrapped.action_layout  # type: ignore[attr-defined]
+        self._device, self._pressed = device, frozenset[str]()
         self._simulation = env.unwrapped.simulation  # type: ignore[attr-defined]
         self.model: mujoco.MjModel = self._simulation.model
         self._lock = threading.Lock()
@@ -132,6 +91,7 @@ class TeleopSession:
         self._epoch = self._tick = 0
         self._thread: threading.Thread | None = None
         self._stopping = threading.Event()
+        self.quit = threading.Event()  # by the device's button, or all is recorded
         self._message, self._success = "", False
         self._ik: dict[str, Any] = {}
         self._latencies = History(1, 512)
@@ -139,17 +99,15 @@ class TeleopSession:
 
         env.reset(seed=seed)
         self._controller = env.unwrapped.controllers[0]  # type: ignore[attr-defined]
-        self._readers = frame_readers(self._controller, self.model)
+        self._pipeline = Pipeline(env, pipeline)
         self._let_go: dict[str, int] = {}  # ticks at rest, of limbs let go lately
-        self.limbs = {
-            name: Limb(name, reader.kind, Clutch(self._measure(reader)), Ownership())
-            for name, reader in self._readers.items()
-        }
-        self.grippers = self._open_grippers()
+        stages = self._pipeline.limbs
+        self.limbs = {name: Limb(limb, Ownership()) for name, limb in stages.items()}
+        self._open_grippers()
         self.gripper_labels = {
-            s.name: tuple(s.labels) for s in self._layout.slices if s.kind == "gripper"
+            s.name: tuple(s.labels) for s in layout.slices if s.kind == "gripper"
         }
-        self.bodies = {name: reader.body for name, reader in self._readers.items()}
+        self.bodies = {name: limb.port.body for name, limb in stages.items()}
         # Columns: wall time, solve time, then the position error of every limb.
         self.history = History(2 + len(self.limbs), WINDOW)
         self._publish()
@@ -163,7 +121,8 @@ class TeleopSession:
             if not limb.ownership.take(client, now):
                 return False
             if limb.enabled:
-                limb.clutch.engage(T_world_input)
+                limb.stages.release()
+                limb.stages.follow(LimbInput(pose=T_world_input))
             return True
 
     def drag(self, name: str, client: int, T_world_input: pin.SE3) -> bool:
@@ -173,9 +132,7 @@ class TeleopSession:
             if not limb.ownership.take(client, now):
                 return False
             if limb.enabled:
-                if not limb.clutch.engaged:
-                    limb.clutch.engage(T_world_input)
-                limb.clutch.move(T_world_input)
+                limb.stages.follow(LimbInput(pose=T_world_input))
                 self._inbox.stamps.append(now)
             return True
 
@@ -184,7 +141,7 @@ class TeleopSession:
         limb = self._limb(name)
         with self._lock:
             if limb.ownership.release(client):
-                limb.clutch.release()
+                limb.stages.release()
                 self._let_go[name] = 0
 
     def leave(self, client: int) -> None:
@@ -197,7 +154,7 @@ class TeleopSession:
         limb = self._limb(name)
         with self._lock:
             limb.enabled = enabled
-            limb.clutch.release()
+            limb.stages.release()
 
     def set_gripper(self, name: str, index: int, value: float) -> None:
         """Set one synergy of a gripper, from -1 (open) to 1 (closed)."""
@@ -205,8 +162,13 @@ class TeleopSession:
             raise UnknownNameError("gripper", name, self.grippers)
         now = self._clock()
         with self._lock:
-            self.grippers[name][index] = value
+            self.grippers[name][index] = float(np.clip(value, -1.0, 1.0))
             self._inbox.stamps.append(now)
+
+    @property
+    def grippers(self) -> dict[str, Vector]:
+        """How far each gripper's synergies shall close, -1 open .. 1 closed."""
+        return {name: grip.goal for name, grip in self._pipeline.grips.items()}
 
     def pause(self, paused: bool) -> None:
         """Let time stand still, or go on."""
@@ -225,6 +187,11 @@ class TeleopSession:
         self._thread = threading.Thread(target=self._run, name="teleop", daemon=True)
         self._thread.start()
 
+    @property
+    def running(self) -> bool:
+        """Whether the loop's thread goes on; an error ends it."""
+        return self._thread is not None and self._thread.is_alive()
+
     def stop(self) -> None:
         """End the loop and wait for its last tick."""
         self._stopping.set()
@@ -236,10 +203,15 @@ class TeleopSession:
         """Do one step, or none while paused, and publish a snapshot."""
         with self._lock:
             inbox, self._inbox = self._inbox, _Inbox()
+        state = self._hear()
         if inbox.reset:
             self._reset()
+        if self.desk is not None:
+            self.desk.serve(self._reset)
+            if self.desk.finished:
+                self.quit.set()
         if not self._paused:
-            self._step(inbox.stamps)
+            self._step(state, inbox.stamps)
         self._publish()
 
     def latencies(self) -> Vector:
@@ -249,6 +221,22 @@ class TeleopSession:
         controller has found the joint targets that follow from it.
         """
         return self._latencies.rows()[:, 0]
+
+    def _hear(self) -> DeviceState:
+        """Return what the device says, and do what its buttons ask of the session."""
+        if self._device is None:
+            return DeviceState(time=self._clock())
+        state = self._device.read()
+        pressed, self._pressed = state.buttons - self._pressed, state.buttons
+        if "pause" in pressed:
+            self._paused = not self._paused
+        if "reset" in pressed:
+            self._reset()
+        if "quit" in pressed:
+            self.quit.set()
+        if self.desk is not None:
+            self.desk.press(pressed)
+        return state
 
     def _run(self) -> None:
         try:
@@ -270,11 +258,13 @@ class TeleopSession:
             elif wait < -5 * self.period:
                 due = self._clock()  # too slow for real time: do not race after it
 
-    def _step(self, stamps: list[float]) -> None:
+    def _step(self, state: DeviceState, stamps: list[float]) -> None:
         with self._lock:
-            values = {name: limb.command() for name, limb in self.limbs.items()}
-            values |= {name: value.copy() for name, value in self.grippers.items()}
-        *_, info = self.env.step(self._layout.pack(values))
+            action = self._pipeline.update(state)
+        try:
+            *_, info = self.env.step(action)
+        except DatasetError as error:  # the disk is full; people go on without it
+            info, self._message = {}, str(error)
         now = self._clock()
         found = getattr(self._controller, "solved_at", now)
         for stamp in stamps:
@@ -298,7 +288,7 @@ class TeleopSession:
         """
         for name in list(self._let_go):
             status = self.snapshot.limbs[name]
-            measured = self._measure(self._readers[name])
+            measured = self.limbs[name].stages.port.measure()
             step = measured.translation - status.measured.translation
             rests = bool(np.linalg.norm(step) < REST_SPEED * self.period)
             self._let_go[name] = self._let_go[name] + 1 if rests else 0
@@ -308,7 +298,7 @@ class TeleopSession:
             elif self._let_go[name] * self.period > REST_TIME:
                 del self._let_go[name]
                 if _is_far(status):
-                    self.limbs[name].clutch.place(measured)
+                    self.limbs[name].stages.place(measured)
 
     def _note_speed(self, now: float) -> None:
         if not np.isnan(self._begun):
@@ -317,24 +307,19 @@ class TeleopSession:
             self._spent = spent if np.isnan(old) else 0.97 * old + 0.03 * spent
         self._begun = now
 
-    def _reset(self) -> None:
-        self.env.reset(seed=self._seed)
+    def _reset(self, seed: int | None = None) -> None:
+        self.env.reset(seed=self._seed if seed is None else seed)
         with self._lock:
-            for name, reader in self._readers.items():
-                self.limbs[name].clutch.place(self._measure(reader))
-            self.grippers = self._open_grippers()
+            self._pipeline.reset()
+            self._open_grippers()
             self._let_go.clear()
         self._message, self._success, self._ik = "", False, {}
         self._begun = float("nan")
         self._epoch += 1
 
-    def _open_grippers(self) -> dict[str, Vector]:
-        """Return the least value, which is open, of every gripper's synergies."""
-        return {
-            s.name: np.array(s.low, dtype=np.float64)
-            for s in self._layout.slices
-            if s.kind == "gripper"
-        }
+    def _open_grippers(self) -> None:
+        for grip in self._pipeline.grips.values():
+            grip.goal[:] = -1.0
 
     # What is shown.
 
@@ -356,6 +341,8 @@ class TeleopSession:
             paused=self._paused,
             success=self._success,
             message=self._message,
+            device=self._pipeline.acting.get("device", ()),
+            recording=None if self.desk is None else self.desk.status,
         )
         if not self._paused:
             errors = [status.position_error for status in limbs.values()]
@@ -363,7 +350,7 @@ class TeleopSession:
 
     def _status(self, name: str, now: float) -> LimbStatus:
         limb = self.limbs[name]
-        measured = self._measure(self._readers[name])
+        measured = self.limbs[name].stages.port.measure()
         target = limb.seen_target(measured)
         report = self._ik.get("frames", {}).get(name, {})
         return LimbStatus(
@@ -375,10 +362,8 @@ class TeleopSession:
             reasons=tuple(report.get("reasons", ())),
             holder=limb.ownership.holder(now),
             enabled=limb.enabled,
+            acting=limb.stages.acting,
         )
-
-    def _measure(self, reader: FrameReader) -> pin.SE3:
-        return reader.pose(self._simulation.data)
 
     def _limb(self, name: str) -> Limb:
         if name not in self.limbs:

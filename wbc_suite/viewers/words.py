@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 
-from wbc_suite.viewers.teleop_session import LimbStatus
+from wbc_suite.viewers.snapshot import LimbStatus
 
 __all__ = ["describe_reason", "explain", "plain"]
 

@@ -7,17 +7,27 @@ from wbc_suite.control.composite.base import (
     CompositeController,
     build_composite_controller,
     composite_names,
+    default_composite,
     load_composite_controller_config,
     register_composite,
 )
+from wbc_suite.control.composite.basic import (
+    BasicController,
+    check_basic,
+    default_basic_config,
+)
 from wbc_suite.control.composite.config import default_whole_body_config
+from wbc_suite.control.composite.hybrid import HybridMobileBase, check_hybrid
 from wbc_suite.control.composite.names import check_whole_body
 from wbc_suite.control.state import RobotState
 
 __all__ = [
+    "BasicController",
     "CompositeController",
     "build_composite_controller",
     "composite_names",
+    "default_basic_config",
+    "default_composite",
     "load_composite_controller_config",
     "register_composite",
 ]
@@ -39,6 +49,20 @@ def _whole_body_mink_ik(
     return WholeBodyIK(config, state, MinkBackend)
 
 
+register_composite(
+    "BASIC",
+    BasicController,
+    family="basic",
+    default=default_basic_config,
+    check=check_basic,
+)
+register_composite(
+    "HYBRID_MOBILE_BASE",
+    HybridMobileBase,
+    family="basic",
+    default=default_basic_config,
+    check=check_hybrid,
+)
 for _name, _build in (
     ("WHOLE_BODY_IK", _whole_body_ik),
     ("WHOLE_BODY_MINK_IK", _whole_body_mink_ik),

@@ -2,13 +2,14 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
-import pinocchio as pin
+from wbc_suite.typing import Matrix, Vector
 
-from wbc_suite.typing import Vector
+__all__ = ["Explanation", "IkBackend", "IkStep", "Limits"]
 
-__all__ = ["IkBackend", "IkStep"]
+Limits: TypeAlias = tuple[tuple[str | None, str], ...]
+Explanation: TypeAlias = Callable[[], Mapping[str, Sequence[str]]]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -17,16 +18,17 @@ class IkStep:
 
     Attributes:
         v: Velocity, Pinocchio's conventions, shape (nv,).
-        limits: Limits that hold joints back: joint name or None, and words.
+        limits: Tells the limits that hold joints back: joint name or None, and words.
         ok: Whether the problem was solved as stated.
-        explain: Tells what holds each frame back, weightiest first, until the next
-            solve; None where only `limits` are known.
+        record: Keeps what the solver knows, until the next solve; what it returns tells
+            at any later time what holds each frame back, weightiest first. None where
+            only `limits` are known.
     """
 
     v: Vector
-    limits: tuple[tuple[str | None, str], ...] = ()
+    limits: Callable[[], Limits] = tuple
     ok: bool = True
-    explain: Callable[[], Mapping[str, Sequence[str]]] | None = None
+    record: Callable[[], Explanation] | None = None
 
 
 class IkBackend(Protocol):
@@ -39,10 +41,12 @@ class IkBackend(Protocol):
         """Forget the past; held frames are held where q puts them."""
         ...
 
-    def set_target(self, index: int, target: pin.SE3) -> None:
-        """Set the target of the index-th controlled frame.
+    def set_targets(self, targets: Matrix) -> None:
+        """Set the targets of all controlled frames.
 
-        Only the translation counts for the centre of mass.
+        Args:
+            targets: Poses, [R p] row by row, shape (n, 12). Only the position counts
+                for the centre of mass.
         """
         ...
 

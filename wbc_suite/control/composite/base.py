@@ -7,6 +7,9 @@ from typing import Any, Protocol
 
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.control.action import ActionLayout
+from wbc_suite.control.composite.json_config import convert, is_foreign, read_json
+from wbc_suite.control.composite.parts import part_models
+from wbc_suite.control.part.law import Law
 from wbc_suite.control.state import RobotState
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.robot import RobotDescription, load_robot
@@ -18,6 +21,7 @@ __all__ = [
     "CompositeKind",
     "build_composite_controller",
     "composite_names",
+    "default_composite",
     "load_composite_controller_config",
     "register_composite",
 ]
@@ -28,14 +32,18 @@ log = logging.getLogger(__name__)
 class CompositeController(Protocol):
     """Drives all actuators of one robot.
 
-    The order of calls is `reset`, then `set_goal` once per action, then `compute` once
-    per physics step, between `mj_step1` and `mj_step2`.
+    The order of calls is `reset`, then `set_goal` once per action, then `prepare`
+    before the first physics step and whenever its answer has run out. Between
+    `mj_step1` and `mj_step2` of every step the laws act: compiled, or by `compute`.
 
     Attributes:
         layout: Slices of the action.
+        laws: What the compiled loop acts by. None at all: `compute` is called at every
+            step instead, and the loop is a plain one.
     """
 
     layout: ActionLayout
+    laws: tuple[Law, ...]
 
     @property
     def hold_action(self) -> Vector:
@@ -50,20 +58,30 @@ class CompositeController(Protocol):
         """Start from where the robot is; goals hold it there."""
         ...
 
-    def set_goal(self, action: Vector) -> None:
-        """Take an action that `layout` has checked and clipped."""
+    def set_goal(self, action: Vector, period: float = 0.05) -> None:
+        """Take an action that `layout` has checked and clipped.
+
+        Args:
+            action: Shape (layout.size,).
+            period: When the next one is expected, s.
+        """
+        ...
+
+    def prepare(self, state: RobotState) -> int:
+        """Do what is due now; return for how many physics steps that is enough."""
         ...
 
     def compute(self, state: RobotState) -> Vector:
         """Return one command per actuator, in the order of `state.actuators`.
 
-        A command is a torque, or a set point where the actuator is a servo.
+        A command is a torque, or a set point where the actuator is a servo. This is
+        the readable form of what the compiled loop makes of `laws`.
         """
         ...
 
 
 Builder = Callable[[Mapping[str, Any], RobotState], CompositeController]
-Check = Callable[[Mapping[str, Any], RobotDescription | None, str], None]
+Check = Callable[[Mapping[str, Any], RobotDescription | None, str], object]
 DefaultConfig = Callable[[RobotDescription], dict[str, Any]]
 
 
@@ -126,8 +144,10 @@ def load_composite_controller_config(
     """Return a composite controller's config as plain data, `{"type": ..., ...}`.
 
     Args:
-        controller: A registered name such as `WHOLE_BODY_IK` (the default), a path to
-            a TOML file, or a config, which is returned as a copy.
+        controller: A registered name such as `BASIC`, the name of a part controller
+            such as `OSC_POSE` (BASIC with that in all arms), a path to a TOML file or
+            to a JSON file of this field, or a config, which is returned as a copy.
+            None: what `default_composite` says.
         robot: The robot; needed with a name. Names in the config are checked against
             it.
         catalogue: Where to look for the robot's file; ours by default.
@@ -149,13 +169,52 @@ def _read(
 ) -> tuple[dict[str, Any], str]:
     """Return a config, and what to call it in messages."""
     if isinstance(controller, Mapping):
-        config = dict(controller)
-        return config, str(config.get("type"))
+        given, source = dict(controller), str(controller.get("type"))
+        return _ours(given, source, robot, catalogue), source
     if not isinstance(controller, str | Path | None):
         raise UnknownNameError("composite controller", controller, _KINDS)
-    name = str(controller or "WHOLE_BODY_IK")
+    name = str(controller or (default_composite(robot) if robot else "BASIC"))
+    if name.endswith(".json"):
+        return _ours(read_json(Path(name)), name, robot, catalogue), name
+    if name.upper() in part_models():
+        return _ours({"type": name.upper()}, name, robot, catalogue), name
     if name.endswith(".toml"):
-        return {"type": "WHOLE_BODY_IK"} | read_toml(Path(name)), name
+        config = read_toml(Path(name))
+        kind = "BASIC" if "body_parts" in config else "WHOLE_BODY_IK"
+        return {"type": kind} | config, name
+    return _named(name, robot, catalogue)
+
+
+def _ours(
+    config: dict[str, Any],
+    source: str,
+    robot: RobotDescription | None,
+    catalogue: Catalogue,
+) -> dict[str, Any]:
+    """Return a config in our layout, whichever it has."""
+    if not is_foreign(config):
+        return config
+    return convert(
+        config, robot, source, named=lambda name: _named(name, robot, catalogue)[0]
+    )
+
+
+def default_composite(robot: RobotDescription) -> str:
+    """Return the composite of a robot that is asked for none.
+
+    What has feet or no hand: WHOLE_BODY_IK. Arms on a base that drives:
+    HYBRID_MOBILE_BASE. Other arms: BASIC.
+    """
+    if not robot.hands or any(frame.role == "foot" for frame in robot.frames):
+        return "WHOLE_BODY_IK"
+    driven = robot.root.kind == "planar" and robot.root.actuated
+    return "HYBRID_MOBILE_BASE" if driven else "BASIC"
+
+
+def _named(
+    name: str, robot: RobotDescription | None, catalogue: Catalogue
+) -> tuple[dict[str, Any], str]:
+    """Return the config of a registered name, from the robot's file if there is one."""
     kind = _find(name)
     if robot is None:
         raise ConfigError(f"Controller '{name}' needs a robot to be configured for.")
@@ -207,5 +266,6 @@ def _kind_of(config: Mapping[str, Any]) -> CompositeKind:
 
 def _find(name: str) -> CompositeKind:
     if name.upper() not in _KINDS:
-        raise UnknownNameError("composite controller", name, _KINDS)
+        known = {**_KINDS, **part_models()}
+        raise UnknownNameError("composite controller or part controller", name, known)
     return _KINDS[name.upper()]

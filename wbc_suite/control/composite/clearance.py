@@ -3,7 +3,7 @@
 import numpy as np
 
 from wbc_suite.control.composite.config import WholeBodyIKConfig
-from wbc_suite.control.composite.postures import random_posture
+from wbc_suite.control.part.postures import random_posture
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp import SelfCollisionLimit
 from wbc_suite.robot import RobotDescription
@@ -103,6 +103,10 @@ class Clearance:
         self.limit.rows(self._configuration, 1.0, self._G, self._h)
         return float(self.limit.distances.min())
 
+    def room(self, q: Vector) -> float:
+        """Return how much farther than the margin all links are apart, m."""
+        return self.distance(q) - self.limit.margin
+
     def is_kept(self, q: Vector) -> bool:
         """Whether all links are farther apart than the margin."""
-        return self.distance(q) > self.limit.margin
+        return self.room(q) > 0.0

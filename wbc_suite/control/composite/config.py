@@ -4,9 +4,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
-from wbc_suite.control.part.joint_position import JointLawConfig
+from wbc_suite.control.part.joint import JointLawConfig
 from wbc_suite.errors import ConfigError
 from wbc_suite.robot import RobotDescription
+from wbc_suite.robot.mjcf import STOP_MARGIN
 from wbc_suite.robot.parts import Name
 from wbc_suite.tomlfile import FrozenModel
 
@@ -122,6 +123,8 @@ class LimitsConfig(FrozenModel):
         velocity_scale: Factor on the robot's own velocity limits.
         acceleration: Greatest joint acceleration, rad/s^2 or m/s^2.
         base_acceleration: Greatest acceleration of a moving root, m/s^2 and rad/s^2.
+        jerk: Greatest jerk of a joint's target, rad/s^3 or m/s^3; targets lag by
+            `acceleration / jerk`.
         effort_share: Part of a motor's effort that acceleration may take; it bounds
             the joint's acceleration through the inertia at the posture.
         self_collision: Whether links are kept apart.
@@ -131,11 +134,12 @@ class LimitsConfig(FrozenModel):
         balance_margin: Distance kept from the edges of the soles, m.
     """
 
-    position_margin: NonNegativeFloat = 1e-3
+    position_margin: NonNegativeFloat = STOP_MARGIN
     positions: dict[Name, tuple[float, float]] = {}
     velocity_scale: float = Field(default=1.0, gt=0.0, le=1.0)
     acceleration: PositiveFloat = 50.0
     base_acceleration: tuple[PositiveFloat, PositiveFloat] = (5.0, 10.0)
+    jerk: float = Field(default=5000.0, ge=100.0)
     effort_share: float = Field(default=0.6, gt=0.0, le=1.0)
     self_collision: bool = True
     collision_pairs: int = Field(default=20, ge=1, le=200)
@@ -164,7 +168,8 @@ class WholeBodyIKConfig(FrozenModel):
         joint_law: Gains of the joint-position law.
         far: Distances of a goal, m and rad, from which on a configuration that meets it
             is searched first, and then approached joint by joint.
-        search_iterations: Iterations of that search in one solve.
+        search_iterations: Iterations of that search in one solve; twice as many while
+            the robot stands.
         tolerance: Errors below which a frame counts as reached, m and rad.
     """
 

@@ -1,15 +1,16 @@
 """Inverse kinematics by mink, on the MuJoCo model of the robot alone."""
 
+from functools import partial
+
 import mink
 import numpy as np
-import pinocchio as pin
 
-from wbc_suite.control.composite.backend import IkStep
+from wbc_suite.control.composite.backend import IkStep, Limits
 from wbc_suite.control.composite.config import ControlledFrame, WholeBodyIKConfig
-from wbc_suite.control.composite.tasks import frame_costs
+from wbc_suite.control.composite.tasks import FOLLOW, frame_costs, travel_costs
 from wbc_suite.kinematics import Conversion
 from wbc_suite.robot import RobotDescription
-from wbc_suite.typing import Vector
+from wbc_suite.typing import Matrix, Vector
 
 __all__ = ["MinkBackend"]
 
@@ -49,13 +50,17 @@ class MinkBackend:
         for task in self._held:
             task.set_target_from_configuration(self._configuration)
 
-    def set_target(self, index: int, target: pin.SE3) -> None:
-        """Set a controlled frame's target."""
-        task = self._tasks[index]
-        if isinstance(task, mink.ComTask):
-            task.set_target(target.translation)
-            return
-        task.set_target(mink.SE3.from_matrix(target.homogeneous))
+    def set_targets(self, targets: Matrix) -> None:
+        """Set the targets of all controlled frames."""
+        for task, (rotation, position) in zip(
+            self._tasks, map(_split, targets), strict=True
+        ):
+            if isinstance(task, mink.ComTask):
+                task.set_target(position)
+            else:
+                turn = mink.SO3.from_matrix(rotation)
+                pose = mink.SE3.from_rotation_and_translation(turn, position)
+                task.set_target(pose)
 
     def set_posture(self, q: Vector) -> None:
         """Set the posture to prefer."""
@@ -86,10 +91,11 @@ class MinkBackend:
             v = np.full(self._model.nv, np.nan)
         if not np.isfinite(v).all():
             still = np.zeros(len(self._conversion.v_index))
-            return IkStep(v=still, limits=((None, "no solution"),), ok=False)
+            return IkStep(v=still, limits=_unsolved, ok=False)
         qpos = self._configuration.q
         return IkStep(
-            v=self._conversion.v_to_pinocchio(qpos, v), limits=self._active(v, dt)
+            v=self._conversion.v_to_pinocchio(qpos, v),
+            limits=partial(self._active, qpos.copy(), v, dt),
         )
 
     def _task(self, frame: ControlledFrame) -> mink.FrameTask | mink.ComTask:
@@ -123,9 +129,9 @@ class MinkBackend:
         return costs
 
     def _joint_costs(self, robot: RobotDescription) -> Vector:
-        costs = np.ones(self._model.nv)
-        if robot.root.kind == "free":
-            costs[:6] = 0.0
+        costs = np.zeros(self._model.nv)  # a free root's stay
+        for joint, cost in travel_costs(robot, FOLLOW).items():
+            costs[self._model.joint(joint).dofadr[0]] = cost
         return costs
 
     def _hold(self, frame: str, contact: str) -> mink.FrameTask:
@@ -152,7 +158,7 @@ class MinkBackend:
         )
         return [position, mink.VelocityLimit(self._model, speeds)]
 
-    def _active(self, v: Vector, dt: float) -> tuple[tuple[str | None, str], ...]:
+    def _active(self, q: Vector, v: Vector, dt: float) -> Limits:
         """Return joints that the step brings to a position limit."""
         found: list[tuple[str | None, str]] = []
         margin = self._config.limits.position_margin + 1e-6
@@ -161,10 +167,19 @@ class MinkBackend:
                 continue
             name = self._model.joint(k).name
             dof, place = self._model.jnt_dofadr[k], self._model.jnt_qposadr[k]
-            reached = self._configuration.q[place] + dt * v[dof]
+            reached = q[place] + dt * v[dof]
             low, high = self._model.jnt_range[k]
             if reached <= low + margin:
                 found.append((name, f"joint limit: {name} (lower)"))
             elif reached >= high - margin:
                 found.append((name, f"joint limit: {name} (upper)"))
         return tuple(found)
+
+
+def _split(target: Vector) -> tuple[Matrix, Vector]:
+    T = target.reshape(3, 4)
+    return T[:, :3], T[:, 3]
+
+
+def _unsolved() -> Limits:
+    return ((None, "no solution"),)

@@ -1,26 +1,35 @@
 """Where to go next: straight to the goals, or joint by joint to a known posture."""
 
-import itertools
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.control.composite.approach import approach_pose, approach_posture
-from wbc_suite.control.composite.config import ControlledFrame, WholeBodyIKConfig
-from wbc_suite.control.composite.search import GoalSearch, Way
-from wbc_suite.control.composite.tasks import joint_accelerations, joint_speeds
+from wbc_suite.control.composite.config import WholeBodyIKConfig
+from wbc_suite.control.composite.frames import ControlledFrames, approach_joints
+from wbc_suite.control.composite.pursuit import HORIZONS, pursue
+from wbc_suite.control.composite.search import GoalSearch
+from wbc_suite.control.composite.tasks import accelerations, joint_speeds
+from wbc_suite.control.composite.travel import HELD_UP, Passed, Way
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp import Limit
 from wbc_suite.robot import RobotDescription
-from wbc_suite.typing import Vector
+from wbc_suite.typing import Matrix, Vector
 
 __all__ = ["Planner", "Waypoint"]
 
 STANDING = 0.02  # rad/s or m/s
 STUCK_AFTER = 0.1  # s of standing
-PASSED = 0.2  # rad or m; this near to a configuration on the way the next one is it
+BRISK = 0.95  # of the acceleration limits on a way
+CHASE = 0.98  # of them for catching up
+LATE = 0.15  # s; so far behind the clock runs slowest, so that the robot catches up
+SLOWEST = 0.2
+TRAIL = 60  # configurations that are remembered
+TRAIL_STEP = 5  # solves between them
+STRAY = 0.2  # part of the tolerance; so far off, lower levels have half their speed
+HURRIED = 2  # times as many iterations where the robot stands and waits
 ARRIVED = 5e-3  # rad or m; from here on goals are approached straight
 
 
@@ -30,11 +39,12 @@ class Waypoint:
 
     Attributes:
         posture: Configuration to prefer; without targets, to go to at once.
-        targets: Poses of the controlled frames, or None to move joint by joint.
+        targets: Poses of the controlled frames, [R p] row by row, shape (n, 12), or
+            None to move joint by joint. A buffer.
     """
 
     posture: Vector
-    targets: list[pin.SE3] | None = None
+    targets: Matrix | None = None
 
 
 class Planner:
@@ -49,7 +59,8 @@ class Planner:
         robot: The reduced robot.
         config: Controlled frames.
         configuration: The commanded configuration; read, and moved by the owner.
-        accept: Tells whether a configuration found will do.
+        frames: Its controlled frames.
+        room: Tells how much farther apart links are than they must be, m.
         apart: Keeps links apart.
         dt: Time between solves, s.
     """
@@ -59,17 +70,20 @@ class Planner:
         robot: RobotDescription,
         config: WholeBodyIKConfig,
         configuration: Configuration,
+        frames: ControlledFrames,
         *,
-        accept: Callable[[Vector], bool],
+        room: Callable[[Vector], float],
         apart: Limit,
         dt: float,
     ) -> None:
         self._config, self._dt = config, dt
-        self._configuration = configuration
-        self._first = [k for k, f in enumerate(config.frames) if f.level == 0]
-        self._braking = config.posture.braking * _braking(robot, config, configuration)
-        self._search = GoalSearch(robot, config, accept, apart, self._braking)
+        self._configuration, self._frames = configuration, frames
+        self._first = np.flatnonzero([f.level == 0 for f in config.frames])
+        able = accelerations(robot, config, configuration)
+        self._able, self._braking = able, config.posture.braking * able
+        self._search = GoalSearch(robot, config, room, apart, BRISK * able)
         self._speed = joint_speeds(robot, configuration)
+        self._posture_speed: Vector = np.full(configuration.nv, config.posture.speed)
         self.reset(configuration.q)
 
     def reset(self, posture: Vector) -> None:
@@ -79,9 +93,12 @@ class Planner:
             posture: Configuration to prefer, until a search has found another.
         """
         self._posture = self._rest = posture
-        self._plan: Way = []
+        self._way: Way | None = None
+        self._trail: deque[Passed] = deque(maxlen=TRAIL)
+        self._solves = 0
         self._search.stop()
         self._still, self._is_new, self._answered = 0.0, False, False
+        self._has_arrived = False
 
     def renew(self) -> None:
         """Say that goals have changed."""
@@ -95,11 +112,16 @@ class Planner:
             v: Velocity of the last solve, shape (nv,).
         """
         self._watch(goals, v)
+        self._solves += 1
+        now = Passed(self._solves * self._dt, self._configuration.q.copy(), v)
         if self._search.is_running:
-            found = self._search.advance(self._config.search_iterations)
-            self._plan = self._plan if found is None else found
-        if self._plan:
-            return self._joint_by_joint()
+            hurry = HURRIED if self._still > 0.0 else 1
+            found = self._search.advance(hurry * self._config.search_iterations, now)
+            self._way = found or self._way
+        if self._solves % TRAIL_STEP == 0:
+            self._trail.appendleft(now)
+        if self._way is not None:
+            return self._along(self._way, now)
         return self._straight(goals)
 
     def _watch(self, goals: Sequence[pin.SE3], v: Vector) -> None:
@@ -107,118 +129,80 @@ class Planner:
         standing = float(np.abs(v).max(initial=0.0)) < STANDING
         self._still = self._still + self._dt if standing else 0.0
         if self._is_new:
-            self._is_new = self._answered = False
-            self._still, self._plan = 0.0, []
+            self._is_new = self._answered = self._has_arrived = False
+            self._still, self._way = 0.0, None
             self._search.stop()
             if self._is_far(goals, self._config.far):
                 self._rest = self._posture
                 self._begin(goals)
         elif self._still > STUCK_AFTER and not self._search.is_running:
-            if self._plan:
-                self._plan = []
+            if self._way is not None:
+                self._way = None
             elif not self._answered and self._is_far(goals, self._config.tolerance):
                 self._begin(goals)
 
     def _begin(self, goals: Sequence[pin.SE3]) -> None:
         self._answered = True
         q = self._configuration.q
-        self._search.start(goals, [q, self._posture], q)
+        self._search.start(goals, [q, self._posture], q, self._trail)
 
     def _is_far(self, goals: Sequence[pin.SE3], far: tuple[float, float]) -> bool:
-        for k in self._first:
-            linear, angular = _distances(
-                self._config.frames[k], self.frame_pose(k), goals[k]
-            )
-            if linear > far[0] or angular > far[1]:
-                return True
-        return False
+        return bool((self._frames.measure(goals)[self._first] > far).any())
 
-    def _joint_by_joint(self) -> Waypoint:
-        difference = self._configuration.difference(self._plan[0])
-        while len(self._plan) > 1 and np.abs(difference).max() < PASSED:
-            self._plan.pop(0)
-            difference = self._configuration.difference(self._plan[0])
-        if np.abs(difference).max() < ARRIVED:
-            self._rest = self._plan.pop(0)
-        speed = approach_posture(
-            self._to_turning_point(difference),
-            dt=self._dt,
-            speed=self._speed,
-            acceleration=self._braking,
-        )
-        moved = np.abs(difference) > 1e-9
-        pace = float((speed[moved] / difference[moved]).min(initial=1.0 / self._dt))
-        step = self._dt * pace * difference
-        return Waypoint(posture=self._configuration.integrate(step))
+    def _along(self, way: Way, now: Passed) -> Waypoint:
+        """Return the next configuration on the way; the clock waits for the robot."""
+        if self._search.router.late(way, now) > HELD_UP:
+            self._search.router.rejoin(way, now)
+            if self._still <= STUCK_AFTER and not self._search.is_running:
+                self._search.again(way)
+        pace = max(SLOWEST, 1.0 - self._search.router.late(way, now) / LATE)
+        wanted = self._pursuit(way, pace, now.v)
+        way.clock += self._dt * pace
+        after = way.configuration()
+        left = self._configuration.difference(after)
+        is_known = not way.left and not self._search.is_running
+        if is_known and np.abs(left).max() < ARRIVED:
+            self._rest, self._way = after, None
+        return Waypoint(posture=self._configuration.integrate(self._dt * wanted))
 
-    def _to_turning_point(self, difference: Vector) -> Vector:
-        """Return how far each joint goes the same way as to the first configuration."""
-        model, run, distance = (
-            self._configuration.model,
-            np.sign(difference),
-            difference,
-        )
-        for a, b in itertools.pairwise(self._plan):
-            step = pin.difference(model, a, b)
-            run = run * (np.sign(step) == run)
-            distance = distance + np.abs(run) * step
-        return distance
+    def _pursuit(self, way: Way, pace: float, v: Vector) -> Vector:
+        """Return velocities that lead onto the way, whose clock runs at a pace."""
+        times = np.array([self._dt, *HORIZONS])
+        states = [way.motion.state(way.clock + pace * time) for time in times]
+        ahead = [self._configuration.difference(way.place(x)) for x, _ in states]
+        motion = pace * np.array([velocity for _, velocity in states])
+        return pursue(v, np.array(ahead), motion, times, rate=CHASE * self._able)
 
     def _straight(self, goals: Sequence[pin.SE3]) -> Waypoint:
-        targets = [
-            approach_pose(
-                self.frame_pose(k),
-                goals[k],
-                dt=self._dt,
-                gain=frame.gain,
-                speed=(frame.max_linear_speed, frame.max_angular_speed),
-                acceleration=(frame.linear_braking, frame.angular_braking),
-            )
-            for k, frame in enumerate(self._config.frames)
-        ]
-        posture = self._config.posture
-        speed = approach_posture(
+        self._frames.measure(goals)
+        pace = self._pace_below(self._frames.off)
+        step = self._approach(
             self._configuration.difference(self._rest),
-            dt=self._dt / posture.gain,
-            speed=posture.speed,
-            acceleration=self._braking,
+            self._dt / self._config.posture.gain,
+            pace,
+            self._posture_speed,
         )
         return Waypoint(
-            targets=targets,
-            posture=self._configuration.integrate(self._dt / posture.gain * speed),
+            targets=self._frames.approach(self._dt, pace),
+            posture=self._configuration.integrate(step),
         )
 
-    def frame_pose(self, k: int) -> pin.SE3:
-        """Return the pose of a controlled frame at the commanded configuration."""
-        return _frame_pose(self._configuration, self._config.frames[k])
+    def _approach(
+        self, difference: Vector, dt: float, pace: float, speed: Vector
+    ) -> Vector:
+        """Return the step that takes a difference away; see `approach_joints`."""
+        step: Vector = np.empty_like(difference)
+        approach_joints(difference, dt, pace, speed, self._braking, step)
+        return step
 
+    def _pace_below(self, off: float) -> float:
+        """Return how much of its speed a lower level may take, 0 to 1.
 
-def _frame_pose(configuration: Configuration, frame: ControlledFrame) -> pin.SE3:
-    if frame.frame is None:
-        return pin.SE3(np.eye(3), configuration.com.copy())
-    return configuration.frame_pose(frame.frame)
-
-
-def _distances(
-    frame: ControlledFrame, now: pin.SE3, goal: pin.SE3
-) -> tuple[float, float]:
-    """Return distances that count for the frame's kind, m and rad."""
-    offset = goal.translation - now.translation
-    turn = pin.log3(now.rotation.T @ goal.rotation)
-    if frame.kind == "base":
-        offset, turn = offset[:2], turn[2:]
-    linear = 0.0 if frame.kind == "orientation" else float(np.linalg.norm(offset))
-    still = frame.kind in ("position", "com")
-    return linear, 0.0 if still else float(np.linalg.norm(turn))
-
-
-def _braking(
-    robot: RobotDescription, config: WholeBodyIKConfig, configuration: Configuration
-) -> Vector:
-    """Return the acceleration limit of each velocity."""
-    limits = np.full(configuration.nv, config.limits.acceleration)
-    limits[configuration.root_linear] = config.limits.base_acceleration[0]
-    limits[configuration.root_angular] = config.limits.base_acceleration[1]
-    for name, value in joint_accelerations(robot, config).items():
-        limits[configuration.model.joints[configuration.joint_id(name)].idx_v] = value
-    return limits
+        Once frames of level 0 have arrived, motion below must not take them off again
+        where joints cannot follow it. What stands on its feet balances by that motion
+        and must not stop it.
+        """
+        if self._config.held:
+            return 1.0
+        self._has_arrived |= off < 1.0
+        return 1.0 / (1.0 + (off / STRAY) ** 2) if self._has_arrived else 1.0

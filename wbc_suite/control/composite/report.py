@@ -1,19 +1,22 @@
 """What a whole-body controller says about its goals, and why one is not reached."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.control.composite.backend import IkStep
+from wbc_suite.control.composite.backend import Explanation, IkStep
 from wbc_suite.control.composite.config import ControlledFrame, WholeBodyIKConfig
+from wbc_suite.control.composite.frames import ControlledFrames
 from wbc_suite.control.composite.hindrance import Touch
+from wbc_suite.control.reasons import Reasons
 from wbc_suite.kinematics import Configuration
 from wbc_suite.typing import Vector
 
-__all__ = ["Body", "FrameReport", "IkReport", "WallTime"]
+__all__ = ["Body", "IkReport", "WallTime"]
 
 STANDING = 1e-3
 """rad/s or m/s; a command slower than that stands."""
@@ -33,8 +36,8 @@ class Body:
         commanded: Commanded configuration.
         goals: Goals in the world of the commanded robot.
         speed: Speed of the fastest joint, rad/s or m/s.
-        touches: Tells what the robot presses on.
-        lagging: Tells which joint is farthest from its command.
+        touches: Tells what the robot presses on now.
+        lagging: Tells which joint is farthest from its command now.
     """
 
     commanded: Vector
@@ -42,27 +45,6 @@ class Body:
     speed: float
     touches: Callable[[], Sequence[Touch]]
     lagging: Callable[[], str]
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class FrameReport:
-    """One controlled frame.
-
-    Attributes:
-        reached: Whether both errors are below the tolerance.
-        position_error: m.
-        orientation_error: rad.
-        reasons: Why it is not reached, in words; hardest first.
-    """
-
-    reached: bool
-    position_error: float
-    orientation_error: float
-    reasons: tuple[str, ...]
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain data."""
-        return asdict(self) | {"reasons": list(self.reasons)}
 
 
 class WallTime(float):
@@ -89,6 +71,7 @@ class IkReport:
 
     def __init__(self, config: WholeBodyIKConfig, configuration: Configuration) -> None:
         self._config, self._configuration = config, configuration
+        self._frames = ControlledFrames(config, configuration)
         names = configuration.velocity_names()
         self._support = [
             {names[i] for i in _support(configuration, frame)}
@@ -96,13 +79,11 @@ class IkReport:
         ]
 
     def frames(
-        self,
-        q: Vector,
-        goals: Sequence[pin.SE3],
-        answer: IkStep,
-        body: "Body",
-    ) -> dict[str, FrameReport]:
-        """Return one report per controlled frame.
+        self, q: Vector, goals: Sequence[pin.SE3], answer: IkStep, body: Body
+    ) -> dict[str, dict[str, Any]]:
+        """Return what `info["ik"]["frames"]` holds.
+
+        Reasons are told later, of what was so now.
 
         Args:
             q: Measured configuration.
@@ -111,61 +92,62 @@ class IkReport:
             body: How the robot follows.
         """
         errors, reached = self._compare(q, goals)
-        whys: list[Sequence[str]] = [()] * len(goals)
+        tell: Callable[[], Sequence[Sequence[str]]] = tuple
         if not all(reached):
-            whys = self._reasons(reached, answer, body)
+            tell = cache(self._reasons(reached, answer, body))
         return {
-            frame.name: FrameReport(
-                reached=reached[k],
-                position_error=errors[k][0],
-                orientation_error=errors[k][1],
-                reasons=() if reached[k] else tuple(dict.fromkeys(whys[k])),
+            frame.name: {
+                "reached": there,
+                "position_error": position,
+                "orientation_error": angle,
+                "reasons": [] if there else Reasons(partial(_pick, tell, k)),
+            }
+            for k, (frame, there, (position, angle)) in enumerate(
+                zip(self._config.frames, reached, errors, strict=True)
             )
-            for k, frame in enumerate(self._config.frames)
         }
 
     def _compare(
         self, q: Vector, goals: Sequence[pin.SE3]
-    ) -> tuple[list[tuple[float, float]], list[bool]]:
+    ) -> tuple[list[list[float]], list[bool]]:
         """Return each frame's distances, and whether they are within tolerance."""
         self._configuration.update(q)
-        errors = [
-            self._error(frame, goal)
-            for frame, goal in zip(self._config.frames, goals, strict=True)
-        ]
+        errors = self._frames.measure(goals).tolist()
         linear, angular = self._config.tolerance
         return errors, [p <= linear and r <= angular for p, r in errors]
 
-    def _error(self, frame: ControlledFrame, goal: pin.SE3) -> tuple[float, float]:
-        """Return distances that count for the frame's kind, m and rad."""
-        if frame.frame is None:
-            offset = goal.translation - self._configuration.com
-            return float(np.linalg.norm(offset)), 0.0
-        pose = self._configuration.frame_pose(frame.frame)
-        offset = goal.translation - pose.translation
-        turn = pin.log3(pose.rotation.T @ goal.rotation)
-        if frame.kind == "base":
-            offset, turn = offset[:2], turn[2:]
-        linear = 0.0 if frame.kind == "orientation" else float(np.linalg.norm(offset))
-        angular = 0.0 if frame.kind == "position" else float(np.linalg.norm(turn))
-        return linear, angular
-
     def _reasons(
-        self, reached: Sequence[bool], answer: IkStep, body: "Body"
-    ) -> list[Sequence[str]]:
-        """Return why each frame is not reached.
+        self, reached: Sequence[bool], answer: IkStep, body: Body
+    ) -> Callable[[], Sequence[Sequence[str]]]:
+        """Return what tells why each frame is not reached, now or later.
 
         Where the commanded robot is at its goal, what counts is why the body is not;
         else the solver's reasons, or some of our own where it has none.
         """
         _, commanded = self._compare(body.commanded, body.goals)
-        known = answer.explain() if answer.explain is not None else {}
         standing = float(np.abs(answer.v).max(initial=0.0)) < STANDING
-        whys: list[Sequence[str]] = []
+        explain = answer.record() if answer.record is not None else dict
+        held_back: Sequence[Sequence[str]] = [()] * len(reached)
+        if standing and any(commanded) and body.speed <= RATTLING:
+            held_back = self._held_back(body)
+        return partial(
+            self._tell, reached, commanded, standing, held_back, explain, answer
+        )
+
+    def _tell(
+        self,
+        reached: Sequence[bool],
+        commanded: Sequence[bool],
+        standing: bool,
+        held_back: Sequence[Sequence[str]],
+        explain: Explanation,
+        answer: IkStep,
+    ) -> Sequence[Sequence[str]]:
+        known, whys = explain(), list[Sequence[str]]()
         for k, frame in enumerate(self._config.frames):
             why = known.get(frame.name) or ()
             if commanded[k]:
-                why = self._held_back(k, body) if standing else ()
+                why = held_back[k]
             elif frame.name not in known:
                 why = self._from_limits(k, reached, answer)
             if not why and standing and not commanded[k]:
@@ -173,17 +155,14 @@ class IkReport:
             whys.append(why or ["moving"])
         return whys
 
-    def _held_back(self, k: int, body: "Body") -> Sequence[str]:
-        """Return what the frame's limb presses on, or else the joint that lags."""
-        if body.speed > RATTLING:
-            return ()
-        touching = [
-            str(touch)
-            for touch in body.touches()
-            if self._support[k] & self._names(touch.link)
+    def _held_back(self, body: Body) -> Sequence[Sequence[str]]:
+        """Return what each frame's limb presses on, or else the joint that lags."""
+        touches = [(self._names(touch.link), str(touch)) for touch in body.touches()]
+        lagging = [body.lagging()] if body.speed < STANDING_BODY else []
+        return [
+            [words for names, words in touches if support & names] or lagging
+            for support in self._support
         ]
-        standing = body.speed < STANDING_BODY
-        return touching or ([body.lagging()] if standing else ())
 
     def _names(self, frame: str) -> set[str]:
         names = self._configuration.velocity_names()
@@ -195,7 +174,9 @@ class IkReport:
         """Return the limits on the frame's joints, or else rivals."""
         support = self._support[k]
         limits = [
-            words for joint, words in answer.limits if joint is None or joint in support
+            words
+            for joint, words in answer.limits()
+            if joint is None or joint in support
         ]
         return limits or [
             f"conflict: {other.name}"
@@ -211,3 +192,8 @@ def _support(configuration: Configuration, frame: ControlledFrame) -> Sequence[i
     if frame.frame is None:
         return range(configuration.nv)
     return [int(i) for i in configuration.support(frame.frame)]
+
+
+def _pick(tell: Callable[[], Sequence[Sequence[str]]], k: int) -> list[str]:
+    """Return the k-th words, each once."""
+    return list(dict.fromkeys(tell()[k]))

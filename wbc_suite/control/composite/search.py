@@ -6,22 +6,20 @@ from several starts, a few iterations per solve of the controller.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import TypeAlias
 
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.control.composite.approach import travel_time
 from wbc_suite.control.composite.config import WholeBodyIKConfig
 from wbc_suite.control.composite.tasks import (
     HURRY,
     held_equality,
     joint_speeds,
     make_task,
-    planar_joints,
     soles_of,
+    travel_costs,
 )
-from wbc_suite.control.composite.way import WayFinder
+from wbc_suite.control.composite.travel import Passed, Router, Way
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp import (
     ComTask,
@@ -36,10 +34,7 @@ from wbc_suite.qp import (
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Vector
 
-__all__ = ["GoalSearch", "Way"]
-
-Way: TypeAlias = list[Vector]
-"""Configurations to pass through, with straight lines in between."""
+__all__ = ["GoalSearch"]
 
 STEP = 0.1  # s; one iteration goes as far as joints can in this time
 ITERATIONS = 40  # of one start
@@ -47,12 +42,10 @@ STARTS = 16
 MORE_STARTS = 24  # once some configuration is known, for a nearer one
 QUICK = 0.7  # s; a configuration this near is taken at once, others are compared
 WAITING = 4e-4  # s; and one that is farther by what an iteration takes, later
-SPACING = 0.02  # s; between configurations on the way that must be acceptable too
 PATIENCE = 5  # iterations without progress end a start
 NEARBY = 0.05  # [cost] s; how dear it is to be a second away from the start
 NEAR_TIME = 0.5  # s; every second random start lies within this time of the first
-CHECKS = 1500  # configurations that the search for a way round may look at
-DETOUR = 1.0  # s; what a way round takes longer than a straight line
+GAIN = 0.05  # s; a way must be so much shorter to be taken instead
 CLOSE = 0.02  # m and rad; from here on only the targets count
 MET = 1e-7  # m and rad
 INSIDE = 2e-3  # m; how much further from the soles' edges than the controller
@@ -67,20 +60,23 @@ class GoalSearch:
     Args:
         robot: The reduced robot.
         config: Controlled and held frames.
-        accept: Tells whether a configuration will do, such as free of collision.
+        room: Tells how much farther apart links are than they must be, m.
         apart: Keeps links apart, where they are not at a configuration found.
         accelerations: What velocities can accelerate and brake, shape (nv,).
+
+    Attributes:
+        router: Plans the ways to what is found.
     """
 
     def __init__(
         self,
         robot: RobotDescription,
         config: WholeBodyIKConfig,
-        accept: Callable[[Vector], bool],
+        room: Callable[[Vector], float],
         apart: Limit,
         accelerations: Vector,
     ) -> None:
-        self._accept, self._accelerations = accept, accelerations
+        self._room = room
         self._configuration = Configuration(robot.to_pinocchio())
         first = [(k, f) for k, f in enumerate(config.frames) if f.level == 0]
         self._frames = [k for k, _ in first]
@@ -94,13 +90,12 @@ class GoalSearch:
             ),
             VelocityLimit(base_linear=linear, base_angular=angular),
         ]
-        self._speeds = joint_speeds(robot, self._configuration)
         soles = soles_of(config)
         if soles:
             margin = config.limits.balance_margin + INSIDE
             limits.append(SupportLimit(soles, margin=margin))
         self._start = PostureTask(
-            NEARBY, costs=_costs(robot), max_speed=HURRY, name="start"
+            NEARBY, costs=travel_costs(robot, NEARBY), max_speed=HURRY, name="start"
         )
         self._near, self._exact, self._apart = (
             TaskStack(
@@ -114,25 +109,30 @@ class GoalSearch:
             )
             for tasks, rows in (((self._start,), ()), ((), ()), ((), (apart,)))
         )
-        self._finder = WayFinder(self._configuration.model, self._speeds, accept)
+        self._speeds = joint_speeds(robot, self._configuration)
+        self.router = Router(
+            self._configuration.model, room, speed=self._speeds, rate=accelerations
+        )
         self._run: Iterator[Way | None] | None = None
+        self._best: Way | None = None
+        self._stopping: Way | None = None
+        self._blocked: Vector | None = None
 
     @property
     def is_running(self) -> bool:
         """Whether there are starts left to try."""
         return self._run is not None
 
-    @property
-    def _is_plain(self) -> bool:
-        """Whether all joints have one parameter, and nothing but joints moves."""
-        return self._configuration.nq == self._configuration.nv
-
     def stop(self) -> None:
         """Give up."""
         self._run = None
 
     def start(
-        self, goals: Sequence[pin.SE3], starts: Sequence[Vector], held: Vector
+        self,
+        goals: Sequence[pin.SE3],
+        starts: Sequence[Vector],
+        held: Vector,
+        trail: Sequence[Passed] = (),
     ) -> None:
         """Begin.
 
@@ -140,7 +140,9 @@ class GoalSearch:
             goals: Goals of all controlled frames in the world.
             starts: Configurations to start from, best first.
             held: Configuration that tells where held frames are.
+            trail: Where the robot was, last first: a way back that is known.
         """
+        self._trail = trail
         self._configuration.update(held)
         for equality in self._held:
             equality.set_target(self._configuration.frame_pose(equality.frame))
@@ -148,61 +150,90 @@ class GoalSearch:
             _aim(task, goals[k])
         self._run = self._search([q.copy() for q in starts])
 
-    def advance(self, iterations: int) -> Way | None:
-        """Run some iterations; return configurations to pass through once found."""
+    def advance(self, iterations: int, now: Passed) -> Way | None:
+        """Run some iterations; return a way once one is known, or a shorter one.
+
+        It may still change ahead of the robot while the search is running.
+
+        Args:
+            iterations: How many.
+            now: Where the robot is, and how fast.
+        """
+        self._now = now
         for _ in range(iterations):
             if self._run is None:
                 return None
-            found = next(self._run, ())
-            if found is not None:
+            try:
+                found = next(self._run)
+            except StopIteration:
                 self._run = None
-                return found or None
+                return None
+            if found is not None:
+                return found
         return None
 
     def _search(self, starts: list[Vector]) -> Iterator[Way | None]:
-        """Yield None after each iteration, and the way to the best found at last."""
+        """Yield None after each iteration, and better and better ways."""
         rng = np.random.default_rng(0)
-        best: Vector | None = None
-        least, is_blocked, trial, iterations = np.inf, False, 0, 0
-        while trial < (STARTS if best is None else MORE_STARTS):
+        self._best = self._stopping = self._blocked = None
+        iterations, trial = 0, 0
+        while trial < (MORE_STARTS if self._best or self._stopping else STARTS):
             q = starts[trial] if trial < len(starts) else self._random(starts[0], rng)
             trial += 1
             for found in self._descend(q):
-                time = np.inf if found is None else self._time(starts[0], found)
-                if found is not None and time < least:
-                    blocked = self._is_blocked(starts[0], found)
-                    time += blocked * DETOUR
-                    if time < least:
-                        best, least, is_blocked = found, time, blocked
                 iterations += 1
-                is_quick = least < QUICK + WAITING * iterations
-                yield [best] if best is not None and is_quick else None
-        if best is None:
+                if found is None:
+                    yield None
+                else:
+                    yield from self._judge(found)
+                if self._left < QUICK + WAITING * iterations:
+                    yield from self._improve()
+                    return
+        yield from self._improve()
+
+    def again(self, way: Way) -> None:
+        """Look for another way to the same end, for the robot was held up on this."""
+        self._best = way
+        self._run = self._replace(way.place(way.motion.end))
+
+    def _replace(self, end: Vector) -> Iterator[Way | None]:
+        best = self._best
+        yield from self._judge(end)
+        if self._best is not best:
+            yield from self._improve()
+
+    @property
+    def _left(self) -> float:
+        """How long the best way still takes, and how late the robot is on it, s."""
+        best = self._best
+        return np.inf if best is None else best.left + self.router.late(best, self._now)
+
+    def _judge(self, found: Vector) -> Iterator[Way | None]:
+        """Yield the way to a configuration that has been found, if it is the best."""
+        yield None
+        now = self._now
+        if self.router.time(now, found) > self._left - GAIN:
             return
-        if is_blocked and self._is_plain:
-            for way in self._finder.find(starts[0], best, CHECKS):
-                yield way and way[1:]
-        yield [best]
+        way = self.router.direct(now, found)
+        if way is None:
+            if self._best is None:
+                self._blocked = found
+            way = yield from self.router.back(now, found, self._trail)
+        if way is not None and way.left < self._left - GAIN:
+            self._best = way
+            yield way
+        elif self._best is None and self._stopping is None:
+            self._stopping = self.router.stop(now)
+            yield self._stopping
 
-    def _time(self, start: Vector, end: Vector) -> float:
-        """Return how long joints need from rest at one configuration to another, s."""
-        step = pin.difference(self._configuration.model, start, end)
-        times = travel_time(
-            np.abs(step), speed=self._speeds, acceleration=self._accelerations
-        )
-        return float(times.max())
-
-    def _is_blocked(self, start: Vector, end: Vector) -> bool:
-        """Tell whether something is in the way, on a straight line.
-
-        Something may be in the way at the start already: that does not count.
-        """
-        model = self._configuration.model
-        count = max(2, int(np.ceil(self._time(start, end) / SPACING)))
-        return not all(
-            self._accept(pin.interpolate(model, start, end, k / count))
-            for k in range(count - 1, count // 6, -1)
-        )
+    def _improve(self) -> Iterator[Way | None]:
+        """Go round what is in the way, if nothing else is known; shorten the way."""
+        if self._best is None and self._blocked is not None:
+            assert self._stopping is not None
+            yield from self.router.round(self._stopping, self._blocked)
+            self._best = self._stopping
+        if self._best is not None:
+            yield from self.router.shorten(self._best)
 
     def _descend(self, q: Vector) -> Iterator[Vector | None]:
         """Yield None after each iteration, and configurations that meet the targets."""
@@ -214,7 +245,7 @@ class GoalSearch:
             self._configuration.update(q)
             error = self._error()
             if error < MET:
-                accepted = self._accept(q)
+                accepted = self._room(q) > 0.0
                 if accepted:
                     yield q
                 if accepted or stack is self._apart:
@@ -233,10 +264,13 @@ class GoalSearch:
         """Return the largest error of all frames, m or rad."""
         worst = 0.0
         for task in self._tasks:
-            error = task.error(self._configuration)
+            errors = task.error(self._configuration).tolist()
             if isinstance(task, FrameTask):
-                error = error * (task.packed[12:18] > 0.0)
-            worst = max(worst, float(np.abs(error).max()))
+                costs = task.packed[12:18].tolist()
+                errors = [
+                    e for e, cost in zip(errors, costs, strict=True) if cost > 0.0
+                ]
+            worst = max([worst, *map(abs, errors)])
         return worst
 
     def _random(self, q: Vector, rng: np.random.Generator) -> Vector:
@@ -254,16 +288,6 @@ class GoalSearch:
             least, most = max(low[k], q[k] - far), min(high[k], q[k] + far)
             drawn[k] = least + draw[k] * (most - least)
         return drawn
-
-
-def _costs(robot: RobotDescription) -> dict[str, float]:
-    """Return costs that measure joint distances in seconds at full speed."""
-    costs = {j.name: NEARBY / (j.velocity or 10.0) for j in robot.joints}
-    linear, angular = robot.root.velocity
-    speeds = (linear, linear, angular)
-    for name, speed in zip(planar_joints(robot), speeds, strict=False):
-        costs[name] = NEARBY / speed
-    return costs
 
 
 def _aim(task: FrameTask | ComTask, goal: pin.SE3) -> None:

@@ -1,20 +1,22 @@
 """Inverse kinematics by this package's own QP task stack."""
 
-from dataclasses import replace
+from collections.abc import Callable
+from functools import partial
 
-import pinocchio as pin
-
-from wbc_suite.control.composite.backend import IkStep
+from wbc_suite.control.composite.backend import Explanation, IkStep
 from wbc_suite.control.composite.config import WholeBodyIKConfig
+from wbc_suite.control.composite.effort import EffortGuard
 from wbc_suite.control.composite.tasks import (
+    FOLLOW,
     HURRY,
     held_equality,
     make_limits,
     make_task,
-    planar_joints,
+    travel_costs,
 )
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp import (
+    ComTask,
     Equality,
     FrameEquality,
     FrameTask,
@@ -23,9 +25,10 @@ from wbc_suite.qp import (
     Solution,
     SupportLimit,
     TaskStack,
+    TickRecord,
 )
 from wbc_suite.robot import RobotDescription
-from wbc_suite.typing import Vector
+from wbc_suite.typing import Matrix, Vector
 
 __all__ = ["StackBackend"]
 
@@ -51,6 +54,7 @@ class StackBackend:
             level=config.posture.level,
         )
         self._tasks = [make_task(frame) for frame in config.frames]
+        self._places = [_place_of_target(task) for task in self._tasks]
         self._held = [held_equality(held) for held in config.held]
         equalities: list[Equality] = list(self._held)
         if robot.root.kind == "planar" and robot.root.drive == "differential":
@@ -66,9 +70,10 @@ class StackBackend:
             equalities=equalities,
             escape=False,
         )
+        self._guard = EffortGuard(robot, self.configuration)
         self._joints = PostureTask(
             1.0,
-            costs=dict.fromkeys(planar_joints(robot), 1.0),
+            costs=travel_costs(robot, FOLLOW),
             max_speed=HURRY,
             name="configuration",
         )
@@ -90,13 +95,10 @@ class StackBackend:
         self._stack.reset()
         self._joint_stack.reset()
 
-    def set_target(self, index: int, target: pin.SE3) -> None:
-        """Set a controlled frame's target."""
-        task = self._tasks[index]
-        if isinstance(task, FrameTask):
-            task.set_target(target)
-        else:
-            task.set_target(target.translation)
+    def set_targets(self, targets: Matrix) -> None:
+        """Set the targets of all controlled frames."""
+        for (place, part), target in zip(self._places, targets, strict=True):
+            place[:] = target[part]
 
     def set_posture(self, q: Vector) -> None:
         """Set the posture to prefer."""
@@ -105,8 +107,7 @@ class StackBackend:
     def solve(self, q: Vector, dt: float) -> IkStep:
         """Solve one tick of the stack."""
         self.configuration.update(q)
-        answer = self._step(self._stack, self._joint_stack, dt)
-        return replace(answer, explain=self._explain)
+        return self._step(self._stack, self._joint_stack, dt, record=self._record)
 
     def solve_posture(self, q: Vector, posture: Vector, dt: float) -> IkStep:
         """Solve one tick of the stack without frames."""
@@ -114,15 +115,33 @@ class StackBackend:
         self._joints.set_target(posture)
         return self._step(self._joint_stack, self._stack, dt)
 
-    def _explain(self) -> dict[str, tuple[str, ...]]:
-        reports = self._stack.explain(position_tolerance=0.0, orientation_tolerance=0.0)
-        return {name: report.reasons for name, report in reports.items()}
+    def _record(self) -> Explanation:
+        return partial(_reasons, self._stack.record())
 
-    @staticmethod
-    def _step(stack: TaskStack, other: TaskStack, dt: float) -> IkStep:
+    def _step(
+        self,
+        stack: TaskStack,
+        other: TaskStack,
+        dt: float,
+        record: Callable[[], Explanation] | None = None,
+    ) -> IkStep:
         solution = stack.solve(dt)
-        other.v_previous[:] = solution.v
-        return IkStep(v=solution.v, limits=_words(solution), ok=solution.ok)
+        v = self._guard.able(other.v_previous, solution.v, dt)
+        stack.v_previous[:] = other.v_previous[:] = v
+        limits = partial(_words, solution)
+        return IkStep(v=v, limits=limits, ok=solution.ok, record=record)
+
+
+def _place_of_target(task: FrameTask | ComTask) -> tuple[Vector, slice]:
+    """Return where a task keeps its target, and which part of a pose that is."""
+    if isinstance(task, FrameTask):
+        return task.packed[:12], slice(12)
+    return task.packed[:3], slice(3, 12, 4)
+
+
+def _reasons(tick: TickRecord) -> dict[str, tuple[str, ...]]:
+    reports = tick.explain(position_tolerance=0.0, orientation_tolerance=0.0)
+    return {name: report.reasons for name, report in reports.items()}
 
 
 def _words(solution: Solution) -> tuple[tuple[str | None, str], ...]:

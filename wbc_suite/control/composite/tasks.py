@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 
 import numpy as np
-import pinocchio as pin
 
 from wbc_suite.control.composite.clearance import self_collision_limit
 from wbc_suite.control.composite.config import (
@@ -11,7 +10,7 @@ from wbc_suite.control.composite.config import (
     HeldFrame,
     WholeBodyIKConfig,
 )
-from wbc_suite.control.composite.postures import random_posture
+from wbc_suite.control.part.able import able_accelerations, greatest_loads
 from wbc_suite.errors import UnknownNameError
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp import (
@@ -30,7 +29,9 @@ from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Vector
 
 __all__ = [
+    "FOLLOW",
     "HURRY",
+    "accelerations",
     "frame_costs",
     "held_equality",
     "joint_accelerations",
@@ -39,11 +40,11 @@ __all__ = [
     "make_task",
     "planar_joints",
     "soles_of",
+    "travel_costs",
 ]
 
-LOAD_SAMPLES = 50
-LEAST_ACCELERATION = 2.0
-"""rad/s^2 or m/s^2; for motors that hardly carry their load."""
+FOLLOW = 10.0
+"""[cost]/s of following a motion of all joints; far above the solver's damping."""
 
 HURRY = 1e3
 """Speed limit, m/s and rad/s, of tasks that something else slows."""
@@ -106,7 +107,7 @@ def make_limits(robot: RobotDescription, config: WholeBodyIKConfig) -> list[Limi
     """Return the limits of the command."""
     limits = config.limits
     linear, angular = robot.root.velocity
-    base_linear, base_angular = limits.base_acceleration
+    base_linear, base_angular = base_accelerations(robot, config)
     made: list[Limit] = [
         PositionLimit(margin=limits.position_margin, joints=limits.positions),
         VelocityLimit(
@@ -158,39 +159,56 @@ def planar_joints(robot: RobotDescription) -> tuple[str, ...]:
 def joint_accelerations(
     robot: RobotDescription, config: WholeBodyIKConfig
 ) -> dict[str, float]:
-    """Return what each joint can accelerate, rad/s^2 or m/s^2.
+    """Return what each joint can accelerate by a config's limits."""
+    limits = config.limits
+    return able_accelerations(
+        robot, most=limits.acceleration, effort_share=limits.effort_share
+    )
 
-    The least of the config's limit, the robot's own, and what a part of the motor's
-    effort gives where it has most to move: the greatest inertia M_ii of random
-    configurations, after the greatest weight. Some acceleration is left in any case.
+
+def base_accelerations(
+    robot: RobotDescription, config: WholeBodyIKConfig
+) -> tuple[float, float]:
+    """Return what a moving root can accelerate, m/s^2 and rad/s^2.
+
+    The config's limits, or what a part of a planar root's motors gives.
     """
-    model = robot.to_pinocchio()
-    inertia, weight = _greatest_loads(model)
-    found: dict[str, float] = {}
-    for joint in robot.joints:
-        limit = config.limits.acceleration
-        if joint.acceleration is not None:
-            limit = min(limit, joint.acceleration)
-        if joint.effort is not None:
-            v = model.joints[model.getJointId(joint.name)].idx_v
-            left = max(joint.effort - float(weight[v]), 0.2 * joint.effort)
-            able = config.limits.effort_share * left / float(inertia[v])
-            limit = min(limit, max(able, LEAST_ACCELERATION))
-        found[joint.name] = limit
-    return found
+    linear, angular = config.limits.base_acceleration
+    root = robot.root
+    if root.kind == "planar" and root.actuated:
+        inertia, _ = greatest_loads(robot.to_pinocchio())
+        force, torque = (config.limits.effort_share * effort for effort in root.effort)
+        linear = min(linear, force / float(inertia[:2].max()))
+        angular = min(angular, torque / float(inertia[2]))
+    return linear, angular
 
 
-def _greatest_loads(model: pin.Model) -> tuple[Vector, Vector]:
-    """Return the greatest inertia and weight at each joint, over random postures."""
-    data = model.createData()
-    inertia, weight = np.zeros(model.nv), np.zeros(model.nv)
-    rng = np.random.default_rng(0)
-    for _ in range(LOAD_SAMPLES):
-        q = random_posture(model, pin.neutral(model), rng)
-        np.maximum(inertia, np.diag(pin.crba(model, data, q)), out=inertia)
-        gravity = pin.computeGeneralizedGravity(model, data, q)
-        np.maximum(weight, np.abs(gravity), out=weight)
-    return inertia, weight
+def accelerations(
+    robot: RobotDescription, config: WholeBodyIKConfig, configuration: Configuration
+) -> Vector:
+    """Return the acceleration limit of each velocity, shape (nv,)."""
+    limits = np.full(configuration.nv, config.limits.acceleration)
+    linear, angular = base_accelerations(robot, config)
+    limits[configuration.root_linear] = linear
+    limits[configuration.root_angular] = angular
+    for name, value in joint_accelerations(robot, config).items():
+        limits[configuration.model.joints[configuration.joint_id(name)].idx_v] = value
+    return limits
+
+
+def travel_costs(robot: RobotDescription, cost: float) -> dict[str, float]:
+    """Return costs that measure joint distances in seconds at full speed.
+
+    Args:
+        robot: The reduced robot.
+        cost: [cost]/s.
+    """
+    costs = {j.name: cost / (j.velocity or 10.0) for j in robot.joints}
+    linear, angular = robot.root.velocity
+    speeds = (linear, linear, angular)
+    for name, speed in zip(planar_joints(robot), speeds, strict=False):
+        costs[name] = cost / speed
+    return costs
 
 
 def joint_speeds(robot: RobotDescription, configuration: Configuration) -> Vector:

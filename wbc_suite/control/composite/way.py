@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.control.composite.postures import random_posture
+from wbc_suite.control.part.postures import random_posture
 from wbc_suite.typing import Matrix, Vector
 
 __all__ = ["WayFinder"]

@@ -12,6 +12,7 @@ from wbc_suite.control.collision_check import CollisionCheck
 from wbc_suite.control.composite.backend import IkBackend, IkStep
 from wbc_suite.control.composite.clearance import Clearance
 from wbc_suite.control.composite.config import WholeBodyIKConfig
+from wbc_suite.control.composite.frames import ControlledFrames
 from wbc_suite.control.composite.goals import (
     action_of_pose,
     action_part,
@@ -23,23 +24,19 @@ from wbc_suite.control.composite.hindrance import lagging_joint, touches
 from wbc_suite.control.composite.names import read_whole_body
 from wbc_suite.control.composite.planner import Planner, Waypoint
 from wbc_suite.control.composite.reduced import lock_groups
-from wbc_suite.control.composite.reference import Reference
-from wbc_suite.control.composite.report import (
-    Body,
-    FrameReport,
-    IkReport,
-    WallTime,
-)
-from wbc_suite.control.composite.tasks import soles_of
+from wbc_suite.control.composite.report import Body, IkReport, WallTime
+from wbc_suite.control.composite.tasks import accelerations, soles_of
 from wbc_suite.control.part.balance import BalanceLaw
 from wbc_suite.control.part.gripper import GripperController
-from wbc_suite.control.part.joint_position import JointPositionLaw
+from wbc_suite.control.part.joint import JointLaw
+from wbc_suite.control.part.law import Law, commands
+from wbc_suite.control.part.reference import Reference, mean_over
 from wbc_suite.control.part.stance import StanceContact, StanceLaw
 from wbc_suite.control.state import RobotState
 from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Configuration, Conversion
 from wbc_suite.robot import RobotDescription
-from wbc_suite.typing import Indices, Vector
+from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["WholeBodyIK"]
 
@@ -62,6 +59,7 @@ class WholeBodyIK:
     Attributes:
         layout: Slices of the action: controlled frames, then grippers.
         robot: The robot that is solved for: grippers and locked groups are rigid.
+        frames: Controlled frames, on the commanded configuration.
         q: Commanded configuration, Pinocchio's conventions, shape (nq,).
         goals: Goal of each controlled frame, in the input's reference frame.
         solved_at: When the present joint targets were found, on `time.perf_counter`'s
@@ -77,6 +75,7 @@ class WholeBodyIK:
         self._backend = backend(self.robot, self.config)
         self._configuration = Configuration(self.robot.to_pinocchio())
         model = self._configuration.model
+        self.frames = ControlledFrames(self.config, self._configuration)
         self._conversion = Conversion(state.model, model, prefix=state.prefix)
         self._grippers = [
             GripperController(gripper, synergies, state)
@@ -85,52 +84,64 @@ class WholeBodyIK:
         self.layout = ActionLayout(
             [
                 *(action_part(frame, self.config) for frame in self.config.frames),
-                *(gripper.part for gripper in self._grippers),
+                *(part for gripper in self._grippers for part in gripper.slices),
             ]
         )
         moved = _moved_joints(self.robot, state)
         rigid = _rigid_joints(state, {*moved, *self._gripper_joints()})
-        self._law = _make_law((*moved, *rigid), self.config, state)
+        gains = self.config.joint_law
+        self._law = JointLaw(state, (*moved, *rigid), kp=gains.kp, kd=gains.kd)
+        self._stance = _stance_law(self._law.joints, self.config, state)
         self._rigid: Vector = np.zeros(len(rigid))
+        self._motion: Matrix = np.zeros((4, len(self._law.joints)))
         self._rigid_index = state.joint_addresses(rigid)[0]
         self._q_index, self._v_index = _joint_indices(model, moved)
         period = 1.0 / (self.config.solve_hz * state.model.opt.timestep)
         self._steps_per_solve = max(1, round(period))
         self._dt = self._steps_per_solve * float(state.model.opt.timestep)
-        self._reference = Reference(model, self._q_index, self._v_index, self._dt)
+        most = float(accelerations(self.robot, self.config, self._configuration).max())
+        mean = mean_over(most, self.config.limits.jerk, self._dt)
+        self._reference = Reference(
+            model, self._q_index, self._v_index, self._dt, mean=mean
+        )
         check = CollisionCheck(state, self._conversion)
         clearance = Clearance(self.robot, self.config)
         self._planner = Planner(
             self.robot,
             self.config,
             self._configuration,
-            accept=lambda q: clearance.is_kept(q) and check.is_free(q),
+            self.frames,
+            room=lambda q: min(clearance.room(q), check.room(q)),
             apart=clearance.limit,
             dt=self._dt,
         )
-        self._tau = np.zeros(len(state.actuators))
+        servos = tuple(gripper.law for gripper in self._grippers)
+        stances = () if self._stance is None else (self._stance,)
+        self.laws: tuple[Law, ...] = (self._law, *servos, *stances)
         self._feet = {self._link(held.frame) for held in self.config.held}
+        kind = self.robot.root.kind
+        self._follows_root = kind == "free" or (kind == "planar" and self._in_base())
         self._report = IkReport(self.config, Configuration(model))
         self.reset(state)
 
     def reset(self, state: RobotState) -> None:
         """Hold the robot where it is."""
-        self._step, self.solve_time, self.solved_at = 0, 0.0, 0.0
+        self.solve_time, self.solved_at = 0.0, 0.0
         self.q: Vector = self._conversion.q_to_pinocchio(state.data.qpos)
         self._reference.reset(self.q)
-        self._answer = IkStep(v=self._reference.v)
+        self._answer = IkStep(v=np.zeros(self._configuration.nv))
         self._rigid = state.data.qpos[self._rigid_index]
+        self._motion[0, len(self._q_index) :] = self._rigid
         self._base = self._root_pose()
-        self.goals = [
-            self._to_input(self._planner.frame_pose(k)) for k in self._frames()
-        ]
+        self.goals = [self._to_input(self.frames.pose(k)) for k in self._frames()]
         self._homes = [self._to_world(goal) for goal in self.goals]
+        self._aims = self._bounded_goals()
         self._backend.reset(self.q)
         self._planner.reset(self._preferred_posture())
         for gripper in self._grippers:
             gripper.reset(state)
 
-    def set_goal(self, action: Vector) -> None:
+    def set_goal(self, action: Vector, period: float = 0.05) -> None:
         """Move the goals; see `layout`."""
         before = list(self.goals)
         for k in self._frames():
@@ -148,22 +159,24 @@ class WholeBodyIK:
             a.isApprox(b, 1e-9) for a, b in zip(before, self.goals, strict=True)
         ):
             self._planner.renew()
+        self._aims = self._bounded_goals()
         for gripper in self._grippers:
             part = self.layout[gripper.name]
-            gripper.set_goal(action[part.start : part.stop])
+            gripper.set_goal(action[part.start : part.stop], period)
+
+    def prepare(self, state: RobotState) -> int:
+        """Solve; return for how many physics steps the answer is good."""
+        self._solve(state)
+        self._reference.write(self._motion)
+        self._law.follow(self._motion)
+        if self._stance is not None:
+            self._stance.aim(*self._motion)
+            self._stance.lead(self._reference.root_motion())
+        return self._steps_per_solve
 
     def compute(self, state: RobotState) -> Vector:
-        """Solve when it is time to, and return actuator commands. A buffer."""
-        if self._step % self._steps_per_solve == 0:
-            self._solve(state)
-        self._step += 1
-        phase = self._step % self._steps_per_solve or self._steps_per_solve
-        ahead = phase * float(state.model.opt.timestep)
-        target = self._reference.sample(ahead, self._rigid)
-        self._tau[self._law.outputs] = self._law.torque(state, target)
-        for gripper in self._grippers:
-            self._tau[gripper.outputs] = gripper.set_points()
-        return self._tau
+        """Return actuator commands by the readable forms of the laws."""
+        return commands(state, self.laws)
 
     @property
     def hold_action(self) -> Vector:
@@ -189,19 +202,19 @@ class WholeBodyIK:
 
     @property
     def joint_targets(self) -> dict[str, float]:
-        """Commanded position of each driven joint, rad or m."""
-        positions = np.concatenate([self.q[self._q_index], self._rigid]).tolist()
+        """Where each driven joint is told to be at the next solve, rad or m."""
+        targets = self._reference.targets()
+        positions = np.concatenate([targets, self._rigid]).tolist()
         return dict(zip(self._law.joints, positions, strict=True))
 
     def info(self, state: RobotState) -> dict[str, Any]:
         """Return `{"ik": ...}`: what is reached, by how much it is missed, and why."""
         q = self._conversion.q_to_pinocchio(state.data.qpos)
         goals = list(self.goals_in_world.values())
-        correction = self._root_correction(state)
         v = self._conversion.v_to_pinocchio(state.data.qpos, state.data.qvel)
         body = Body(
             commanded=self.q,
-            goals=[correction * goal for goal in goals],
+            goals=self._corrected(goals, state),
             speed=float(np.abs(v).max(initial=0.0)),
             touches=lambda: touches(state, apart_from=self._feet),
             lagging=lambda: lagging_joint(
@@ -209,14 +222,22 @@ class WholeBodyIK:
             ),
         )
         frames = self._report.frames(q, goals, self._answer, body)
-        return {"ik": _as_info(frames, self.solve_time)}
+        return {
+            "ik": {
+                "reached": all(report["reached"] for report in frames.values()),
+                "solve_time": WallTime(self.solve_time),
+                "frames": frames,
+            }
+        }
 
     def _solve(self, state: RobotState) -> None:
         began = time.perf_counter()
-        self._base = self._root_pose()
-        correction = self._root_correction(state)
-        goals = [correction * goal for goal in self._bounded_goals()]
-        self._answer = self._step_towards(self._planner.next(goals, self._answer.v))
+        self._configuration.update(self.q)
+        if self._follows_root:
+            self._base = self._root_pose()
+            self._aims = self._corrected(self._bounded_goals(), state)
+        waypoint = self._planner.next(self._aims, self._answer.v)
+        self._answer = self._step_towards(waypoint)
         self.q = self._reference.extend(self._answer.v)
         self.solved_at = time.perf_counter()
         self.solve_time = self.solved_at - began
@@ -233,17 +254,17 @@ class WholeBodyIK:
     def _step_towards(self, waypoint: Waypoint) -> IkStep:
         if waypoint.targets is None:
             return self._backend.solve_posture(self.q, waypoint.posture, self._dt)
-        for k, target in enumerate(waypoint.targets):
-            self._backend.set_target(k, target)
+        self._backend.set_targets(waypoint.targets)
         self._backend.set_posture(waypoint.posture)
         return self._backend.solve(self.q, self._dt)
 
-    def _root_correction(self, state: RobotState) -> pin.SE3:
-        """Return what takes world poses into the world of the commanded root."""
+    def _corrected(self, goals: list[pin.SE3], state: RobotState) -> list[pin.SE3]:
+        """Return poses in the world of the commanded root."""
         if self.robot.root.kind != "free":
-            return pin.SE3.Identity()
+            return goals
         measured = self._conversion.q_to_pinocchio(state.data.qpos)[:7]
-        return self._base * pin.XYZQUATToSE3(measured).inverse()
+        correction = self._base * pin.XYZQUATToSE3(measured).inverse()
+        return [correction * goal for goal in goals]
 
     def _root_pose(self) -> pin.SE3:
         """Return the pose of the first link at the commanded configuration."""
@@ -251,7 +272,7 @@ class WholeBodyIK:
         return self._configuration.frame_pose(self.robot.links[0].name)
 
     def _gripper_joints(self) -> set[str]:
-        return {joint for gripper in self._grippers for joint in gripper.joints}
+        return {joint for gripper in self._grippers for joint in gripper.law.joints}
 
     def _link(self, frame: str) -> str:
         """Return the link that a frame, or a link's own name, belongs to."""
@@ -298,11 +319,11 @@ def _rigid_joints(state: RobotState, driven: set[str]) -> tuple[str, ...]:
     return tuple(name for name in state.actuators if name not in driven)
 
 
-def _make_law(
+def _stance_law(
     joints: tuple[str, ...], config: WholeBodyIKConfig, state: RobotState
-) -> JointPositionLaw | StanceLaw:
+) -> StanceLaw | None:
     if state.robot.root.kind != "free":
-        return JointPositionLaw(state, joints, config.joint_law)
+        return None
     if not config.held:
         raise ConfigError(
             f"{state.robot.name}: it is free to fall, and the controller holds no foot "
@@ -328,11 +349,3 @@ def _joint_indices(
     q = np.array([joint.idx_q for joint in found], dtype=np.int64)
     v = np.array([joint.idx_v for joint in found], dtype=np.int64)
     return q, v
-
-
-def _as_info(frames: Mapping[str, FrameReport], solve_time: float) -> dict[str, Any]:
-    return {
-        "reached": all(report.reached for report in frames.values()),
-        "solve_time": WallTime(solve_time),
-        "frames": {name: report.as_dict() for name, report in frames.items()},
-    }

@@ -8,26 +8,34 @@ give is given up, the trunk's attitude before the centre of mass.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import daqp
 import numpy as np
 
-from wbc_suite.control.part.joint_position import JointLawConfig, JointTarget
-from wbc_suite.control.part.stance import StanceContact, StanceLaw, damped_inverse
+from wbc_suite.control.loop.balance import (
+    COM_STIFFNESS,
+    EDGE,
+    FRICTION,
+    LEAST_PRESSURE,
+    SHARE_COST,
+    TORQUE_SHARE,
+    TRUNK_COST,
+    TRUNK_STIFFNESS,
+    TWIST,
+)
+from wbc_suite.control.loop.table import LawKind
+from wbc_suite.control.part.joint import JointLawConfig
+from wbc_suite.control.part.stance import (
+    StanceContact,
+    StanceLaw,
+    damped_inverse,
+    even_share,
+)
 from wbc_suite.control.state import RobotState
-from wbc_suite.qp import Problem, Sole
-from wbc_suite.qp.solver import DaqpSolver
+from wbc_suite.qp import Sole
+from wbc_suite.qp.problem import UNBOUNDED
 from wbc_suite.typing import Matrix, Vector
 
 __all__ = ["BalanceLaw", "sole_rows"]
-
-COM_STIFFNESS = 60.0  # 1/s^2; well above g / h = 12, or the pendulum falls
-TRUNK_STIFFNESS = 150.0  # 1/s^2
-TRUNK_COST = 0.05  # [cost] s^2/rad against 1 [cost] s^2/m: the trunk gives way first
-SHARE_COST = 1e-4  # [cost]/N; keeps forces near the even share
-FRICTION = 0.6  # below that of rubber on most floors, 0.8 to 1
-TWIST = 0.03  # m; friction torque about the normal over normal force, of a sole
-LEAST_PRESSURE = 20.0  # N; a sole never lets go
-EDGE = 0.008  # m; how far pressure points stay from a sole's edge
-TORQUE_SHARE = 0.95  # of the motors' limits that planned forces may ask for
 
 
 def sole_rows(sole: Sole, rotation: Matrix) -> Matrix:
@@ -91,7 +99,7 @@ class _Dynamics:
 
 
 class BalanceLaw(StanceLaw):
-    """Inverse dynamics through soles that push, with feedback of the centre of mass.
+    """Contact forces of soles that push, with feedback of the centre of mass.
 
     With soles at rest, the acceleration of the legs follows from the root's, and the
     root's from the contact forces f alone, M being the inertia of everything:
@@ -101,15 +109,16 @@ class BalanceLaw(StanceLaw):
 
     a_t is what tracks the legs' joints, and counts only where knees are stretched.
     Wanted are the centre of mass's acceleration `c*'' + k e + d e'`, the trunk's
-    likewise, and, of arms, waist and head, what `JointPositionLaw` asks for. The f that
+    likewise, and, of arms, waist and head, what other laws ask for. The f that
     gives both, shared evenly, is taken when all soles can give it and all legs can
     carry it. Otherwise the nearest that they can is, by a QP in f.
 
     Args:
         state: The robot in the simulation.
-        joints: Driven joints; each has a motor.
+        joints: All joints with a motor that follows accelerations; their targets tell
+            where the centre of mass should be.
         contacts: The soles' frames.
-        config: Gains of joints.
+        config: Not used: the root follows the centre of mass.
         soles: The soles' edges, in the same order.
 
     Source: Righetti et al. (2013), "Optimal distribution of contact forces with
@@ -119,110 +128,121 @@ class BalanceLaw(StanceLaw):
     def __init__(
         self,
         state: RobotState,
-        joints: tuple[str, ...],
+        joints: Sequence[str],
         contacts: Sequence[StanceContact],
         config: JointLawConfig,
         soles: Sequence[Sole],
     ) -> None:
-        super().__init__(state, joints, contacts, config)
+        super().__init__(state, joints, contacts, config, LawKind.BALANCE)
         self._soles = tuple(soles)
-        self._problem = Problem(6 * len(soles), 10 * len(soles) + len(self._legs))
-        self._solver = DaqpSolver()
+        self._stance["edges"][: len(soles)] = [(*s.x, *s.y) for s in soles]
 
-    def torque(self, state: RobotState, target: JointTarget) -> Vector:
-        """Return torques within the motors' limits; see `JointPositionLaw.torque`."""
-        errors = self._errors(state, target)
-        joints = target.acceleration + self.config.kp * errors[0][6:]
-        joints += self.config.kd * errors[1][6:]
-        dynamics = self._dynamics(state, joints)
-        root = self._root_acceleration(dynamics, target, errors)
+    def stand(self, state: RobotState, asked: Vector) -> None:
+        """Do what `StanceLaw.stand` does, for soles."""
+        dynamics = self._standing(state, asked[self._dofs])
+        root = self._root_acceleration(state, dynamics)
         f = self._forces(state, dynamics, dynamics.A @ root + dynamics.b)
         root = dynamics.lift @ (dynamics.J[:, :6].T @ f - dynamics.b)
-        a = dynamics.S @ root + dynamics.s
-        tau = dynamics.M[6:] @ a + dynamics.h[6:] - dynamics.J[:, 6:].T @ f
-        return np.clip(tau, self._low, self._high)
+        self._give(state, asked, dynamics.S @ root + dynamics.s, dynamics.J, f)
 
-    def _dynamics(self, state: RobotState, joints: Vector) -> _Dynamics:
+    def _standing(self, state: RobotState, asked: Vector) -> _Dynamics:
         """Express all accelerations by the root's, with soles at rest."""
-        data, legs = state.data, self._legs
-        M = state.mass_matrix()[self._block]
-        h = (data.qfrc_bias - data.qfrc_passive)[self._dofs]
-        J = self._contact_jacobian(state)
+        legs, (M, h) = self._legs, self._dynamics(state)
+        J, moved = self._contacts_now(state)
         J_inverse = damped_inverse(J[:, legs])
-        S, s = np.zeros((len(M), 6)), np.zeros(len(M))
-        S[:6], S[legs] = np.eye(6), -J_inverse @ J[:, :6]
-        s[6:] = joints
-        moved = self._contact_motion(state, J)
+        S, s = np.zeros((len(M), 6)), asked.copy()
+        S[:6], S[legs], s[:6] = np.eye(6), -J_inverse @ J[:, :6], 0.0
         s[legs] -= J_inverse @ (moved + J[:, legs] @ s[legs])
         A, b = M[:6] @ S, M[:6] @ s + h[:6]
         return _Dynamics(M=M, h=h, J=J, S=S, s=s, A=A, b=b, lift=np.linalg.inv(A))
 
-    def _root_acceleration(
-        self, dynamics: _Dynamics, target: JointTarget, errors: tuple[Vector, Vector]
-    ) -> Vector:
+    def _root_acceleration(self, state: RobotState, dynamics: _Dynamics) -> Vector:
         """Return what moves the centre of mass and turns the trunk as wanted, (6,).
 
         The root's linear rows of M are m J_c: they turn errors of joints into those of
         the centre of mass.
         """
-        assert target.root_acceleration is not None
-        position, velocity = errors
-        ahead = np.concatenate([target.root_acceleration, target.acceleration])
-        com = ahead + COM_STIFFNESS * position + _damping(COM_STIFFNESS) * velocity
+        position, velocity, root = self._root_errors(state)
+        (q, v, a), drives, data = self.target(), self.drives, state.data
+        e = np.concatenate([position, q - data.qpos[drives["qpos"]]])
+        e_rate = np.concatenate([velocity, v - data.qvel[drives["dof"]]])
+        com = np.concatenate([root, a]) + COM_STIFFNESS * e
+        com += _damping(COM_STIFFNESS) * e_rate
         force = dynamics.M[:3] @ com + dynamics.h[:3]
-        turn = target.root_acceleration[3:] + TRUNK_STIFFNESS * position[3:6]
-        turn = turn + _damping(TRUNK_STIFFNESS) * velocity[3:6]
+        turn = root[3:] + TRUNK_STIFFNESS * position[3:]
+        turn = turn + _damping(TRUNK_STIFFNESS) * velocity[3:]
         A = dynamics.A[:3]
         linear = np.linalg.solve(A[:, :3], force - dynamics.b[:3] - A[:, 3:] @ turn)
         return np.concatenate([linear, turn])
 
     def _forces(self, state: RobotState, dynamics: _Dynamics, wrench: Vector) -> Vector:
-        """Return contact forces that soles and legs can bear, for a wrench or near."""
+        """Return contact forces that soles and legs can bear, for a wrench or near.
+
+            minimise    || J_r^T (f - f_even) ||^2 + c || f - f_even ||^2
+            subject to  what soles can give and legs can carry
+
+        with errors of the wrench as accelerations, those of the trunk at a lower cost.
+        """
         J_root = dynamics.J[:, :6]
-        even = _even_share(J_root, wrench, self._weights)
-        problem = self._problem
-        self._write_bounds(state, dynamics)
-        if problem.violation(even) <= 0.0:
+        even = even_share(J_root, self._weights) @ wrench
+        rows, low, high = self._bounds(state, dynamics)
+        low, high = low - rows @ even, high - rows @ even
+        if (low <= 0.0).all() and (high >= 0.0).all():
             return even
         effect = np.concatenate(
             [np.eye(6)[:3] / dynamics.M[0, 0], TRUNK_COST * dynamics.lift[3:]]
         )
         effect = effect @ J_root.T
-        problem.H[:] = effect.T @ effect + np.diag(SHARE_COST**2 * self._weights)
-        problem.c[:] = -problem.H @ even
-        answer = self._solver.solve(problem)
-        return even if answer is None else answer[0]
+        H = effect.T @ effect + np.diag(SHARE_COST**2 * self._weights)
+        change = _least_change(H, rows, low, high)
+        return even if change is None else even + change
 
-    def _write_bounds(self, state: RobotState, dynamics: _Dynamics) -> None:
-        """Fill in what soles can give and legs can carry."""
-        problem, count = self._problem, len(self._soles)
+    def _bounds(
+        self, state: RobotState, dynamics: _Dynamics
+    ) -> tuple[Matrix, Vector, Vector]:
+        """Return rows of what soles can give and legs can carry, with their bounds."""
+        legs, J, m = self._legs, dynamics.J, len(dynamics.J)
+        count, drives = len(self._soles), self.drives
+        soles, pressed = np.zeros((10 * count, m)), np.zeros((count, m))
         for k, (contact, sole) in enumerate(
             zip(self._contacts, self._soles, strict=True)
         ):
             rotation = state.data.site_xmat[contact.site].reshape(3, 3)
-            rows, columns = slice(10 * k, 10 * k + 10), slice(6 * k, 6 * k + 6)
-            problem.G[rows, columns] = sole_rows(sole, rotation)
-            problem.lb[6 * k + 2] = LEAST_PRESSURE
-        problem.h[: 10 * count] = 0.0
-        legs, M = self._legs, dynamics.M[self._legs]
-        J = dynamics.J
-        problem.G[10 * count :] = M @ dynamics.S @ dynamics.lift @ J[:, :6].T
-        problem.G[10 * count :] -= J[:, legs].T
-        offset = M @ (dynamics.s - dynamics.S @ (dynamics.lift @ dynamics.b))
-        offset += dynamics.h[legs]
-        problem.h[10 * count :] = TORQUE_SHARE * self._high[legs - 6] - offset
-        problem.lower[problem.nv + 10 * count :] = (
-            TORQUE_SHARE * self._low[legs - 6] - offset
-        )
+            soles[10 * k : 10 * k + 10, 6 * k : 6 * k + 6] = sole_rows(sole, rotation)
+            pressed[k, 6 * k + 2] = 1.0
+        M, lift = dynamics.M[legs], dynamics.lift
+        carried = M @ dynamics.S @ lift @ J[:, :6].T - J[:, legs].T
+        offset = M @ (dynamics.s - dynamics.S @ (lift @ dynamics.b)) + dynamics.h[legs]
+        below, above = drives["low"][legs - 6], drives["high"][legs - 6]
+        least = np.full(count, LEAST_PRESSURE)
+        low = [np.full(10 * count, -np.inf), least, TORQUE_SHARE * below - offset]
+        high = [np.zeros(10 * count), np.full(count, np.inf)]
+        high.append(TORQUE_SHARE * above - offset)
+        rows = np.concatenate([soles, pressed, carried])
+        return rows, np.concatenate(low), np.concatenate(high)
 
 
-def _even_share(J_root: Matrix, wrench: Vector, weights: Vector) -> Vector:
-    """Return the least f, by weights, with J_root^T f = wrench; see `contact_forces`.
+def _least_change(H: Matrix, rows: Matrix, low: Vector, high: Vector) -> Vector | None:
+    """Minimise `x^T H x` subject to `low <= rows x <= high`; None if nothing obeys.
 
-    Here a sole may have to pull: what it cannot give, a QP makes up for.
+    In the variables R^T x, with `H = R R^T`, and with rows of length 1.
     """
-    scaled = J_root / weights[:, None]
-    return scaled @ np.linalg.solve(J_root.T @ scaled, wrench)
+    R = np.linalg.cholesky(H)
+    scaled = np.linalg.solve(R, rows.T).T
+    length = np.linalg.norm(scaled, axis=1)
+    n, free = len(H), np.zeros(len(rows), dtype=np.intc)
+    low, high = low / length, high / length
+    low, high = np.maximum(low, -UNBOUNDED), np.minimum(high, UNBOUNDED)
+    y, _, flag, _ = daqp.solve(
+        np.eye(n),
+        np.zeros(n),
+        scaled / length[:, None],
+        high,
+        low,
+        free,
+        primal_tol=1e-12,
+    )
+    return np.linalg.solve(R.T, y) if flag > 0 else None
 
 
 def _damping(stiffness: float) -> float:

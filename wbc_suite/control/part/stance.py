@@ -1,4 +1,4 @@
-"""Track joint targets of a robot that stands on its feet.
+"""Keep a robot with a free root on its feet while other laws move its joints.
 
 A free root has no motor: what carries it are the contact forces at the held frames, so
 they are chosen first, and the joint torques follow from them.
@@ -12,17 +12,55 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.control.part.joint_position import JointLawConfig, JointTarget
+from wbc_suite.control.loop.stance import (
+    CONTACT_DAMPING,
+    LEAST_PRESSURE,
+    RANK,
+    SINGULAR,
+    TORQUE_ARM,
+)
+from wbc_suite.control.loop.table import MOST_FEET, LawKind, Records
+from wbc_suite.control.part.joint import JointLawConfig
+from wbc_suite.control.part.law import Law
 from wbc_suite.control.state import RobotState
+from wbc_suite.errors import ConfigError
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["StanceContact", "StanceLaw", "contact_forces", "damped_inverse"]
+__all__ = [
+    "RootMotion",
+    "StanceContact",
+    "StanceLaw",
+    "contact_forces",
+    "damped_inverse",
+    "even_share",
+]
 
-CONTACT_DAMPING = 30.0  # 1/s; stops a foot that slips or tips
-SINGULAR = 0.01  # m/rad; below it a leg is stretched
 
-TORQUE_ARM = 0.05
-"""m; a contact torque of 0.05 N m counts as much as a force of 1 N: soles are small."""
+@dataclass(frozen=True, kw_only=True, slots=True)
+class RootMotion:
+    """Where a free root should be.
+
+        start * exp(behind + twist s + curve s^2 / 2 + bend s^3 / 6)
+
+    Attributes:
+        start: A pose in the world.
+        behind: Linear then angular, in the root's own axes, shape (6,).
+        twist: The same per second.
+        curve: The same per second squared.
+        bend: The same per second cubed.
+    """
+
+    start: pin.SE3
+    behind: Vector
+    twist: Vector
+    curve: Vector
+    bend: Vector
+
+    @classmethod
+    def still(cls, pose: pin.SE3) -> "RootMotion":
+        """Stand still at a pose."""
+        behind, twist, curve, bend = np.zeros((4, 6))
+        return cls(start=pose, behind=behind, twist=twist, curve=curve, bend=bend)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -31,6 +69,20 @@ class StanceContact:
 
     site: int
     kind: Literal["point", "surface"]
+
+
+def even_share(root_jacobian: Matrix, weights: Vector) -> Matrix:
+    """Return `W^-1 J (J^T W^-1 J)^+`, which makes contact forces of a wrench, (m, 6).
+
+    They are the least by weights that give the wrench, or the nearest to it.
+
+    Args:
+        root_jacobian: Columns of the contact Jacobian that belong to the root,
+            shape (m, 6).
+        weights: Diagonal of W, shape (m,); infinite where nothing is to be given.
+    """
+    scaled = root_jacobian / weights[:, None]
+    return scaled @ np.linalg.pinv(root_jacobian.T @ scaled, rcond=RANK)
 
 
 def contact_forces(
@@ -57,39 +109,42 @@ def contact_forces(
     Returns:
         Contact forces, shape (m,), N and N m.
     """
-    f: Vector = np.zeros(len(weights))
-    kept = np.ones(len(weights))
+    weights = weights.copy()
+    f: Vector = even_share(root_jacobian, weights) @ wrench
     normal = np.array([rows.start + 2 for rows in contacts])
     for _ in contacts:
-        scaled = root_jacobian * (kept / weights)[:, None]
-        f = scaled @ (np.linalg.pinv(root_jacobian.T @ scaled, rcond=1e-9) @ wrench)
         worst = int(np.argmin(f[normal]))
         if f[normal[worst]] >= 0.0:
             break
-        kept[contacts[worst]] = 0.0
-    return f * kept
+        weights[contacts[worst]] = np.inf
+        f = even_share(root_jacobian, weights) @ wrench
+    return f
 
 
-class StanceLaw:
-    """Inverse dynamics through contacts, on a robot with a free root.
+class StanceLaw(Law):
+    """Contact forces that let a robot with a free root move as other laws ask.
 
-        a     = a* + kp e + kd e'                root and joints alike
-        a_l  -= J_l^+ (J a + J' v + k J v)       but legs as feet at rest allow
+        a_r   = a_r* + kp e + kd e'              the root tracks its target
+        a_l  -= J_l^+ (J a + J' v + k J v)       legs do as feet at rest allow
+        a_a  *= s                                arms do as feet can bear
         f     = contact forces with  J_r^T f = M_r a + h_r
         tau   = M_j a + h_j - J_j^T f
 
     Legs that tracked their own joints would, once a foot has slipped, press against
     each other and push root and arm aside.
 
+    s is the greatest part of 1 that leaves every foot 10 N to press with. A hand that
+    is stopped by floor or table presses as hard as what its arm asks for swings; with
+    this the robot neither swings nor presses itself off its feet.
+
+    It drives no joint itself: the forces are taken off the torques of the laws that do.
+
     Args:
         state: The robot in the simulation.
-        joints: Driven joints; each has a motor.
+        joints: All joints with a motor that follows accelerations.
         contacts: Frames on the ground.
-        config: Gains of joints.
-
-    Attributes:
-        joints: The driven joints.
-        outputs: Their places among the robot's actuators.
+        config: Gains of the root.
+        kind: Which kernel computes it.
 
     Source: Righetti et al. (2011), "Inverse dynamics control of floating-base robots
     with external constraints: a unified view", ICRA.
@@ -98,92 +153,150 @@ class StanceLaw:
     def __init__(
         self,
         state: RobotState,
-        joints: tuple[str, ...],
+        joints: Sequence[str],
         contacts: Sequence[StanceContact],
         config: JointLawConfig,
+        kind: LawKind = LawKind.STANCE,
     ) -> None:
-        self.joints, self.config = joints, config
-        self.q_index, self.v_index = state.joint_addresses(joints)
-        root = state.model.joint(state.prefix + "root")
-        self._root_q = int(root.qposadr[0])
-        first = int(root.dofadr[0])
-        self._dofs: Indices = np.concatenate(
-            [np.arange(first, first + 6), self.v_index]
-        )
-        self._block = np.ix_(self._dofs, self._dofs)
-        order = {name: i for i, name in enumerate(state.actuators)}
-        self.outputs: Indices = np.array([order[j] for j in joints], dtype=np.int64)
-        limits = state.model.actuator_ctrlrange[state.actuator_ids[self.outputs]]
-        self._low, self._high = limits[:, 0].copy(), limits[:, 1].copy()
+        super().__init__(kind, state, joints)
+        if len(contacts) > MOST_FEET:
+            raise ConfigError(
+                f"{state.robot.name}: {len(contacts)} frames are held; a robot stands "
+                f"on {MOST_FEET} feet at most."
+            )
+        self.record["kp"], self.record["kd"] = config.kp, config.kd
+        root, stance = state.model.joint(state.prefix + "root"), self._stance
+        stance["qpos"], stance["dof"] = root.qposadr[0], root.dofadr[0]
+        stance["body"], stance["feet"] = root.bodyid[0], len(contacts)
+        rows = [6 if c.kind == "surface" else 3 for c in contacts]
+        stance["site"][: len(contacts)] = [c.site for c in contacts]
+        stance["rows"][: len(contacts)] = rows
+        first, driven = int(root.dofadr[0]), self.drives["dof"]
+        self._dofs: Indices = np.concatenate([np.arange(first, first + 6), driven])
         self._contacts = tuple(contacts)
         self._weights = np.concatenate(
-            [
-                [1.0] * 3 + ([TORQUE_ARM**-2] * 3 if c.kind == "surface" else [])
-                for c in contacts
-            ]
+            [[1.0] * 3 + [TORQUE_ARM**-2] * (count - 3) for count in rows]
         )
-        ends = np.cumsum([6 if c.kind == "surface" else 3 for c in contacts]).tolist()
+        ends = np.cumsum(rows).tolist()
         self._rows = [slice(a, b) for a, b in zip([0, *ends], ends, strict=False)]
-        self._jacobian = np.zeros((6, state.model.nv))
-        self._jacobian_rate = np.zeros((6, state.model.nv))
-        self._legs: Indices = 6 + np.flatnonzero(_carrying(state, joints, contacts))
+        is_leg = _carrying(state, self.joints, contacts)
+        self._legs: Indices = 6 + np.flatnonzero(is_leg)
+        self._arms: Indices = 6 + np.flatnonzero(~is_leg)
+        self.lead(RootMotion.still(pin.SE3.Identity()))
 
-    def torque(self, state: RobotState, target: JointTarget) -> Vector:
-        """Return torques within the motors' limits; see `JointPositionLaw.torque`."""
-        position_error, velocity_error = self._errors(state, target)
-        assert target.root_acceleration is not None
-        wanted = np.concatenate([target.root_acceleration, target.acceleration])
-        wanted += self.config.kp * position_error + self.config.kd * velocity_error
-        J, legs = self._contact_jacobian(state), self._legs
-        moved = self._contact_motion(state, J) + J @ wanted
-        wanted[legs] -= damped_inverse(J[:, legs]) @ moved
-        data = state.data
-        bias = (data.qfrc_bias - data.qfrc_passive)[self._dofs]
-        force = state.mass_matrix()[self._block] @ wanted + bias
+    def reset(self, state: RobotState) -> None:
+        """Forget what the observer remembers."""
+        super().reset(state)
+        self._stance["asked"] = 0.0
+        self._stance["before"] = state.data.qvel[self._dofs[:6]]
+
+    def lead(self, motion: RootMotion) -> None:
+        """Set the root's target from now on; `aim` sets that of the joints."""
+        start = motion.start
+        self.record["start"] = np.concatenate(
+            [start.rotation.ravel(), start.translation]
+        )
+        stance = self._stance
+        stance["behind"], stance["twist"] = motion.behind, motion.twist
+        stance["curve"], stance["bend"] = motion.curve, motion.bend
+        self.record["since"] = 0.0
+
+    def root_target(self) -> tuple[pin.SE3, Vector, Vector]:
+        """Return the root's target now, its velocity and acceleration, (6,) each.
+
+        The latter as MuJoCo has them: linear in the world's axes, angular in its own.
+        """
+        s, stance = float(self.record["since"][0]), self._stance
+        rate, curve, bend = stance["twist"], stance["curve"], stance["bend"]
+        v, a = rate + s * (curve + 0.5 * s * bend), curve + s * bend
+        way = stance["behind"] + s * (rate + s * (0.5 * curve + s / 6.0 * bend))
+        start = self.record["start"][0]
+        pose = pin.SE3(start[:9].reshape(3, 3), start[9:]) * pin.exp6(way)
+        R = pose.rotation
+        linear = R @ (a[:3] + np.cross(v[3:], v[:3]))
+        twist = np.concatenate([R @ v[:3], v[3:]])
+        return pose, twist, np.concatenate([linear, a[3:]])
+
+    def stand(self, state: RobotState, asked: Vector) -> None:
+        """Ask root and legs for accelerations as well; note what the feet give.
+
+        Args:
+            state: The robot, after `mj_step1`.
+            asked: What all other laws ask of the scene, shape (nv,); changed in place.
+        """
+        position, velocity, root = self._root_errors(state)
+        gains = self.record[0]
+        a, legs, arms = asked[self._dofs], self._legs, self._arms
+        a[:6] = root + gains["kp"] * position + gains["kd"] * velocity
+        J, moved = self._contacts_now(state)
+        a[legs] -= damped_inverse(J[:, legs]) @ (J @ a + moved)
+        M, h = self._dynamics(state)
+        swung = M[:6, arms] @ a[arms]
+        still = M[:6] @ a + h[:6] - swung
+        part = self._bearable(J[:, :6], still, swung)
+        a[arms] *= part
         f = contact_forces(
-            J[:, :6], force[:6], weights=self._weights, contacts=self._rows
+            J[:, :6], still + part * swung, weights=self._weights, contacts=self._rows
         )
-        return np.clip(force[6:] - J[:, 6:].T @ f, self._low, self._high)
+        self._give(state, asked, a, J, f)
 
-    def _errors(self, state: RobotState, target: JointTarget) -> tuple[Vector, Vector]:
-        """Return errors of root (MuJoCo's velocity axes) and joints, (6 + n,) each."""
-        assert target.root is not None
-        assert target.root_twist is not None
-        data, k = state.data, self._root_q
-        rotation = np.empty(9)
-        mujoco.mju_quat2Mat(rotation, data.qpos[k + 3 : k + 7])
-        turn = pin.log3(rotation.reshape(3, 3).T @ target.root.rotation)
-        position = np.concatenate(
-            [
-                target.root.translation - data.qpos[k : k + 3],
-                turn,
-                target.position - data.qpos[self.q_index],
-            ]
-        )
-        velocity = np.concatenate([target.root_twist, target.velocity])
-        return position, velocity - data.qvel[self._dofs]
+    def _bearable(self, root_jacobian: Matrix, still: Vector, swung: Vector) -> float:
+        """Return the part of a wrench that leaves all feet pressing, beside another."""
+        normal = [rows.start + 2 for rows in self._rows]
+        give = even_share(root_jacobian, self._weights)[normal]
+        force, change = give @ still, give @ swung
+        less = change < 0.0
+        part = (force[less] - LEAST_PRESSURE) / -change[less]
+        return float(np.clip(part, 0.0, 1.0).min(initial=1.0))
 
-    def _contact_jacobian(self, state: RobotState) -> Matrix:
+    def _give(
+        self, state: RobotState, asked: Vector, a: Vector, J: Matrix, f: Vector
+    ) -> None:
+        """Hand on accelerations, and what contact forces do at the joints."""
+        stance = self._stance
+        asked[self._dofs] = a
+        stance["asked"], stance["before"] = a[:6], state.data.qvel[self._dofs[:6]]
+        stance["force"][: len(f)] = f
+        self.drives["command"] = J[:, 6:].T @ f
+
+    @property
+    def _stance(self) -> Records:
+        return self.record["stance"][0]
+
+    def _root_errors(self, state: RobotState) -> tuple[Vector, Vector, Vector]:
+        """Return errors of the root's position and velocity, and the target's motion.
+
+        In MuJoCo's velocity axes, shape (6,) each.
+        """
+        data, stance = state.data, self._stance
+        pose, twist, acceleration = self.root_target()
+        R, k = data.xmat[stance["body"]].reshape(3, 3), int(stance["qpos"])
+        away = pose.translation - data.qpos[k : k + 3]
+        position = np.concatenate([away, pin.log3(R.T @ pose.rotation)])
+        return position, twist - data.qvel[self._dofs[:6]], acceleration
+
+    def _dynamics(self, state: RobotState) -> tuple[Matrix, Vector]:
+        """Return inertia and bias of root and joints, (n, n) and (n,)."""
+        bias = state.data.qfrc_bias - state.data.qfrc_passive
+        return state.mass_matrix()[np.ix_(self._dofs, self._dofs)], bias[self._dofs]
+
+    def _contacts_now(self, state: RobotState) -> tuple[Matrix, Vector]:
+        """Return the contact Jacobian, shape (m, n), and `J' v + k J v`.
+
+        The latter: what feet do without accelerations, and to come to rest.
+        """
+        model, data, v = state.model, state.data, state.data.qvel
+        J, rate = np.zeros((6, model.nv)), np.zeros((6, model.nv))
         rows: list[Matrix] = []
+        moved: list[Vector] = []
         for contact in self._contacts:
-            linear, angular = self._jacobian[:3], self._jacobian[3:]
-            mujoco.mj_jacSite(state.model, state.data, linear, angular, contact.site)
-            used = self._jacobian if contact.kind == "surface" else linear
-            rows.append(used[:, self._dofs])
-        return np.concatenate(rows)
-
-    def _contact_motion(self, state: RobotState, J: Matrix) -> Vector:
-        """Return J' v + k J v: without joint accelerations, and to come to rest."""
-        rows: list[Vector] = []
-        model, data = state.model, state.data
-        for contact in self._contacts:
-            linear, angular = self._jacobian_rate[:3], self._jacobian_rate[3:]
-            body = int(model.site_bodyid[contact.site])
-            place = data.site_xpos[contact.site]
-            mujoco.mj_jacDot(model, data, linear, angular, place, body)
-            used = self._jacobian_rate if contact.kind == "surface" else linear
-            rows.append(used @ data.qvel)
-        return np.concatenate(rows) + CONTACT_DAMPING * (J @ data.qvel[self._dofs])
+            body, place = model.site_bodyid[contact.site], data.site_xpos[contact.site]
+            mujoco.mj_jac(model, data, J[:3], J[3:], place, body)
+            mujoco.mj_jacDot(model, data, rate[:3], rate[3:], place, body)
+            count = 6 if contact.kind == "surface" else 3
+            rows.append(J[:count, self._dofs])
+            moved.append(rate[:count] @ v + CONTACT_DAMPING * (J[:count] @ v))
+        return np.concatenate(rows), np.concatenate(moved)
 
 
 def damped_inverse(J: Matrix) -> Matrix:
@@ -192,7 +305,7 @@ def damped_inverse(J: Matrix) -> Matrix:
 
 
 def _carrying(
-    state: RobotState, joints: tuple[str, ...], contacts: Sequence[StanceContact]
+    state: RobotState, joints: Sequence[str], contacts: Sequence[StanceContact]
 ) -> np.ndarray:
     """Tell which joints lie between root and a contact, shape (n,)."""
     model, bodies = state.model, set[int]()

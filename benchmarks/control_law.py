@@ -1,0 +1,131 @@
+"""What each control law costs in a physics step: its kernel, and its readable form.
+
+Robots stand alone on a floor; one kind of part controller drives every arm, grippers
+and the rest are held. "kernel" is the whole compiled control of a step, all laws of the
+robot, between `mj_step1` and `mj_step2`; "readable" is the same in NumPy; "physics" is
+`mj_step1` and `mj_step2` without control. Blocks alternate; times are CPU times of the
+thread, in microseconds a step. The ratio "physics" is (physics + kernel) / physics.
+
+Usage: python benchmarks/control_law.py [--quick] [--json FILE] [--robots NAME ...]
+"""
+
+import time
+from collections.abc import Callable
+
+from harness.report import Report, options
+from harness.stand import Stand, arms_config
+
+import mujoco  # isort: skip  (after harness: it sets the number of threads)
+import numba
+
+from wbc_suite.control.loop import bind_physics, gather, physics_table
+from wbc_suite.control.loop.kernels import control
+from wbc_suite.control.loop.physics import mj_step1, mj_step2
+from wbc_suite.control.loop.table import Records
+from wbc_suite.typing import Indices
+
+ROBOTS = ("Panda", "Sawyer", "UR5e", "Baxter", "Tiago", "GR1")
+KINDS = ("OSC_POSE", "OSC_POSITION")
+KINDS += ("JOINT_POSITION", "JOINT_VELOCITY", "JOINT_TORQUE")
+STEPS = 200  # of one block of compiled code
+READABLE_STEPS = 10
+COLUMNS = ("case", "kernel_us", "readable_us", "physics_us", "over_physics")
+clock = time.thread_time_ns
+
+
+@numba.njit(nogil=True)
+def physics_only(model: int, data: int, steps: int) -> None:
+    """Advance physics, controls held."""
+    for _ in range(steps):
+        mj_step1(model, data)
+        mj_step2(model, data)
+
+
+@numba.njit(nogil=True)
+def control_only(
+    timestep: float, table: Indices, laws: Records, drives: Records, steps: int
+) -> None:
+    """Compute the control of one instant again and again."""
+    for _ in range(steps):
+        control(timestep, table, laws, drives)
+
+
+class Law:
+    """One robot under one kind of part controller, and what is timed of it."""
+
+    def __init__(self, robot: str, kind: str) -> None:
+        self.stand = Stand(robot, arms_config(robot, kind))
+        self.stand.reset()
+        stand = self.stand
+        self.physics = bind_physics(stand.model, stand.data)
+        self.arrays = physics_table(stand.model, self.physics)
+        laws = [(law.record, law.drives) for law in stand.controller.laws]
+        self.laws, self.drives = gather(laws)
+        mujoco.mj_step1(stand.model, stand.data)
+
+    def readable(self, steps: int) -> None:
+        """Compute the control of one instant again and again, in NumPy."""
+        stand = self.stand
+        for _ in range(steps):
+            stand.data.ctrl[stand.state.actuator_ids] = stand.controller.compute(
+                stand.state
+            )
+
+    def run(self, blocks: int) -> dict[str, list[float]]:
+        """Return times of one step by side, us."""
+        runs: dict[str, tuple[int, Callable[[int], None]]] = {
+            "kernel": (STEPS, self._kernel),
+            "readable": (READABLE_STEPS, self.readable),
+            "physics": (STEPS, self._physics),
+        }
+        found: dict[str, list[float]] = {side: [] for side in runs}
+        for k in range(blocks + 1):
+            for side, (steps, call) in runs.items():
+                self.stand.start()
+                mujoco.mj_step1(self.stand.model, self.stand.data)
+                self._kernel(1)
+                start = clock()
+                call(steps)
+                if k:  # the first compiles
+                    found[side].append((clock() - start) / 1e3 / steps)
+        return found
+
+    def _kernel(self, steps: int) -> None:
+        step = self.physics.timestep
+        control_only(step, self.arrays.table, self.laws, self.drives, steps)
+
+    def _physics(self, steps: int) -> None:
+        physics_only(self.physics.model, self.physics.data, steps)
+
+
+def run_case(robot: str, kind: str, report: Report, *, blocks: int) -> None:
+    """Add rows and ratios of one robot and one kind."""
+    name = f"{robot}/{kind}"
+    found = Law(robot, kind).run(blocks)
+    rows = {side: report.add(name, side, times) for side, times in found.items()}
+    medians = {f"{side}_us": row["median_us"] for side, row in rows.items()}
+    ratio = 1.0 + medians["kernel_us"] / medians["physics_us"]
+    rows["kernel"] |= {**medians, "over_physics": ratio}
+    report.ratios[f"{name}/physics"] = ratio
+    report.compare(f"{name}/readable", rows["kernel"], rows["readable"])
+
+
+def main() -> None:
+    parser = options(__doc__, "Panda and Baxter, 20 blocks")
+    parser.add_argument("--robots", nargs="+", default=list(ROBOTS))
+    parser.add_argument("--kinds", nargs="+", default=list(KINDS))
+    parser.add_argument("--blocks", type=int, default=200)
+    arguments = parser.parse_args()
+    robots = ["Panda", "Baxter"] if arguments.quick else arguments.robots
+    report = Report()
+    for robot in robots:
+        for kind in arguments.kinds:
+            blocks = 20 if arguments.quick else arguments.blocks
+            run_case(robot, kind, report, blocks=blocks)
+    report.show("Control of one physics step, us of CPU time", COLUMNS)
+    report.show_ratios()
+    report.write(arguments.json)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,63 @@
+"""How soon joints at their top speeds can bring a hand somewhere, by any way.
+
+What no law can beat: accelerations and torques, and the way between, count for nothing.
+"""
+
+import mujoco
+import numpy as np
+from scipy.optimize import least_squares
+
+from harness.motion import BAND
+from harness.stand import Stand
+
+__all__ = ["soonest"]
+
+LONGEST = 2.0  # s
+EXACT = 2e-3  # s; as the physics' steps
+STARTS = 6
+
+
+def soonest(stand: Stand, goal: np.ndarray, *, site: str, drives: np.ndarray) -> float:
+    """Return the least time until a hand can be within a step's band, s.
+
+    In the time t joint j is within `v_j t` of where it is; t is halved while some such
+    configuration, within its limits, has the hand in the band.
+
+    Args:
+        stand: The robot where it starts; it is not moved.
+        goal: Where to, relative to where the hand is, as in `harness.motion`.
+        site: The hand.
+        drives: The joints' table of the law that moves it.
+    """
+    scratch = mujoco.MjData(stand.model)
+    scratch.qpos[:] = stand.data.qpos
+    q0 = scratch.qpos[drives["qpos"]].copy()
+    lowest, highest = drives["lowest"], drives["highest"]
+    mujoco.mj_kinematics(stand.model, scratch)
+    hand = scratch.site(site)
+    start, turned = hand.xpos.copy(), hand.xmat.reshape(3, 3).copy()
+    band = BAND * np.repeat([np.linalg.norm(half) for half in np.split(goal, 2)], 3)
+
+    def off(q: np.ndarray) -> np.ndarray:
+        scratch.qpos[drives["qpos"]] = q
+        mujoco.mj_kinematics(stand.model, scratch)
+        turn, quat = np.empty(3), np.empty(4)
+        mujoco.mju_mat2Quat(quat, (hand.xmat.reshape(3, 3) @ turned.T).ravel())
+        mujoco.mju_quat2Vel(turn, quat, 1.0)
+        return (np.concatenate([hand.xpos - start, turn]) - goal) / band
+
+    def is_possible(time: float) -> bool:
+        rng, reach = np.random.default_rng(0), time * drives["fastest"]
+        low, high = np.maximum(lowest, q0 - reach), np.minimum(highest, q0 + reach)
+        for k in range(STARTS):
+            first = rng.uniform(low, high) if k else (low + high) / 2.0
+            found = least_squares(off, first, bounds=(low, high), xtol=1e-12).x
+            if np.linalg.norm(np.split(off(found), 2), axis=1).max() <= 1.0:
+                return True
+        return False
+
+    least, most = 0.0, LONGEST
+    while most - least > EXACT:
+        middle = (least + most) / 2.0
+        least, most = (least, middle) if is_possible(middle) else (middle, most)
+    return most

@@ -1,0 +1,214 @@
+"""Teleoperation in time: from a person's input to joint targets, and the loop's beat.
+
+A session runs at 100 Hz as `wbc-suite teleop` does, with its page served, two viewers
+connected and an episode being recorded, while a hand is dragged: an input every 4 to 20
+milliseconds, at random times, from another thread, as the page's come. Viewers are
+clients that take all that the page sends, in a process of their own: a browser without
+a graphics card would take the processors that are measured.
+
+Reported, in ms:
+
+- latency: from an input's arrival to the joint targets that follow from it (bounds:
+  median 20, 99th percentile 50)
+- jitter: by how much a period differs from 10 ms (bound: 99th percentile 1)
+- behind: how late a tick begins, which does not add up
+- load: what waits for a processor, per processor, when the run begins; above 1 the
+  machine is not the session's own, and wall times say more of others than of it
+
+Usage: python benchmarks/teleop_loop.py [--quick] [--json FILE] [--seconds S]
+"""
+
+import asyncio
+import multiprocessing
+import os
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+
+from harness.report import Report, options
+
+import numpy as np  # isort: skip  (after harness: it sets the number of BLAS threads)
+
+import wbc_suite
+from wbc_suite.cli.by_hand import SWITCH_INTERVAL
+from wbc_suite.recording.desk import RecordingDesk, Wish
+from wbc_suite.viewers.site import Site
+from wbc_suite.viewers.teleop_page import TeleopPage
+from wbc_suite.viewers.teleop_session import TeleopSession
+from wbc_suite.wrappers import DataCollection
+
+RATE = 100.0  # Hz
+ROBOTS = ("Panda", "GR1")
+VIEWERS = 2
+COLUMNS = (
+    "case",
+    "latency_median_ms",
+    "latency_p99_ms",
+    "jitter_median_ms",
+    "jitter_p99_ms",
+    "behind_p99_ms",
+    "inputs",
+    "load",
+)
+CAMERA = {
+    "type": "ViewerCameraMessage",
+    "wxyz": (1.0, 0.0, 0.0, 0.0),
+    "position": (2.0, 0.0, 1.5),
+    "fov": 1.0,
+    "near": 0.01,
+    "far": 100.0,
+    "image_height": 600,
+    "image_width": 960,
+    "look_at": (0.0, 0.0, 1.0),
+    "up_direction": (0.0, 0.0, 1.0),
+}
+"""What a browser says first; viser's clients count from then on."""
+
+SETTLE = 1.0  # s; the first ticks fill caches
+
+
+class Clock:
+    """A session's clock, which notes when steps begin and what inputs took."""
+
+    def __init__(self, env, session):
+        self.begun, self.latencies = [], []
+        step, append = env.step, session._latencies.append
+
+        def noted_step(action):
+            self.begun.append(time.perf_counter())
+            return step(action)
+
+        def noted_latency(row):
+            self.latencies.append(float(row[0]))
+            append(row)
+
+        env.step, session._latencies.append = noted_step, noted_latency
+
+
+def watch(url, ready, stop):
+    """Be a viewer: take what the page sends, and throw it away."""
+    import msgspec
+    import viser
+    from websockets.asyncio.client import connect
+    from websockets.typing import Subprotocol
+
+    async def run():
+        origin = url.rstrip("/")
+        async with connect(
+            origin.replace("http", "ws"),
+            origin=origin,
+            max_size=None,
+            subprotocols=[Subprotocol(f"viser-v{viser.__version__}")],
+        ) as socket:
+            await socket.send(msgspec.msgpack.encode(CAMERA))
+            ready.set()
+            while not stop.is_set():
+                try:
+                    await asyncio.wait_for(socket.recv(), 0.2)
+                except TimeoutError:
+                    continue
+
+    asyncio.run(run())
+
+
+def drag(session, stop, rng):
+    """Drag a hand about where it is, at random times."""
+    name = "right_hand"
+    start = session.snapshot.limbs[name].target.copy()
+    session.grab(name, 1, start)
+    begun = time.perf_counter()
+    while not stop.wait(rng.uniform(0.004, 0.02)):
+        since = time.perf_counter() - begun
+        pose = start.copy()
+        pose.translation[2] += 0.05 * np.sin(2.0 * since)
+        session.drag(name, 1, pose)
+    session.release(name, 1)
+
+
+def measure(robot, seconds, folder):
+    """Return one row."""
+    env = wbc_suite.make(
+        "Lift",
+        robots=robot,
+        controller_configs="WHOLE_BODY_IK",
+        control_freq=RATE,
+        horizon=10**7,
+    )
+    collection = DataCollection(env, folder / f"{robot}.hdf5", automatic=False)
+    desk = RecordingDesk(collection.recorder)
+    session = TeleopSession(collection, period=1.0 / RATE, desk=desk)
+    clock = Clock(collection, session)
+    session.tick()
+    page = TeleopPage(session, Site(port=0), label=robot)
+    page.start()
+    stop, make = threading.Event(), multiprocessing.get_context("spawn")
+    left, ready = make.Event(), [make.Event() for _ in range(VIEWERS)]
+    viewers = [
+        make.Process(target=watch, args=(page.site.url, r, left), daemon=True)
+        for r in ready
+    ]
+    for viewer in viewers:
+        viewer.start()
+    session.start()
+    for number, event in enumerate(ready):
+        if not event.wait(60.0):
+            raise RuntimeError(f"viewer {number} did not connect")
+    while len(page.server.get_clients()) < VIEWERS:
+        time.sleep(0.05)
+    desk.ask(Wish.RECORD)
+    while not session.snapshot.recording.recording:
+        time.sleep(0.01)
+    hand = threading.Thread(target=drag, args=(session, stop, np.random.default_rng(0)))
+    load = os.getloadavg()[0] / (os.cpu_count() or 1)
+    hand.start()
+    time.sleep(SETTLE)
+    first = len(clock.begun), len(clock.latencies)
+    time.sleep(seconds)
+    begun = np.array(clock.begun[first[0] :])
+    latencies = clock.latencies[first[1] :]
+    stop.set()
+    hand.join()
+    session.stop()
+    left.set()
+    for viewer in viewers:
+        viewer.join()
+    page.stop()
+    collection.close()
+    periods = np.diff(begun)
+    behind = begun - begun[0] - np.arange(len(begun)) / RATE
+    row = {"case": f"Lift/{robot}", "side": "ours", "inputs": len(latencies)}
+    row |= figures("latency", latencies)
+    row |= figures("jitter", np.abs(periods - 1.0 / RATE))
+    row |= figures("behind", behind - behind.min())
+    return row | {"load": load, "seconds": seconds}
+
+
+def figures(name, times):
+    """Return median and 99th percentile, ms."""
+    found = 1e3 * np.asarray(times)
+    return {
+        f"{name}_median_ms": float(np.median(found)),
+        f"{name}_p99_ms": float(np.percentile(found, 99)),
+    }
+
+
+def main():
+    """Run from the command line."""
+    parser = options(__doc__, "4 s each")
+    parser.add_argument("--seconds", type=float, default=30.0)
+    parser.add_argument("--robots", nargs="+", default=list(ROBOTS))
+    arguments = parser.parse_args()
+    seconds = 4.0 if arguments.quick else arguments.seconds
+    sys.setswitchinterval(SWITCH_INTERVAL)
+    report = Report()
+    with tempfile.TemporaryDirectory() as folder:
+        for robot in arguments.robots:
+            report.rows.append(measure(robot, seconds, Path(folder)))
+    report.show("Teleoperation at 100 Hz, two viewers, recording", COLUMNS)
+    report.write(arguments.json)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,214 @@
+"""Run the benchmarks and write docs/benchmarks.md: tables and plots on one page.
+
+`make bench` runs all of them; `ARGS=--quick` takes under a minute each. A script's JSON
+file stays in artifacts/bench; `--only env_step` runs one and takes the others' files as
+they are.
+"""
+
+import argparse
+import datetime
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parent.parent
+sys.path.insert(0, str(ROOT / "benchmarks"))
+
+from harness.report import cell, heading, look_up, rows_with  # noqa: E402
+
+FOUND = ROOT / "artifacts" / "bench"
+IMAGES = ROOT / "docs" / "images"
+ORDER = (
+    "env_step",
+    "control_law",
+    "tracking",
+    "scaling",
+    "whole_body_ik",
+    "cameras",
+)
+ALWAYS = {"tracking": ["--plot", str(IMAGES / "tracking.png")]}
+FULL = {"simulation_accuracy": ["--trials", "50"], "long_runs": ["--quick"]}
+"""More arguments of some scripts: in every run, and in full ones.
+
+All of `long_runs` takes an hour, so the page shows the quick one.
+"""
+
+HEAD = """# Benchmarks
+
+Written by `make bench` (`docs/write_benchmarks.py`), which runs every script in
+`benchmarks/`; `make bench-peers` installs what they compare with. Times are CPU times,
+so other work on the machine counts less, but compare ratios, not microseconds: both
+sides of a ratio took turns in one run. A ratio is ours over theirs, smaller is better.
+"""
+
+GOALS = (
+    ("Lift/Panda/OSC_POSE/raw", 1.3, "environment step over its own raw physics"),
+    ("Lift/Panda/OSC_POSE/robosuite", 1 / 15, "environment step over robosuite's"),
+    ("Lift/Panda/JOINT_POSITION/raw", 1.3, "environment step over its own raw physics"),
+    (
+        "Lift/Panda/JOINT_POSITION/robosuite",
+        1 / 15,
+        "environment step over robosuite's",
+    ),
+    ("Lift/GR1/WHOLE_BODY_IK/raw", 2.0, "environment step over its own raw physics"),
+    ("Lift/Panda/reset/1ms", 1.0, "reset over 1 ms"),
+    ("GR1/mink", 0.2, "tick of whole-body IK over mink's"),
+    ("Tiago/mink", 0.2, "tick of whole-body IK over mink's"),
+    ("GR1/placo", 1.3, "tick of whole-body IK over placo's"),
+    ("Tiago/placo", 1.3, "tick of whole-body IK over placo's"),
+)
+"""Ratios that this project sets itself as goals, at most."""
+
+AT_LEAST = (
+    (
+        "Lift/Panda/OSC_POSE/threads/processes",
+        0.95,
+        "steps of two threads over those of two processes",
+    ),
+)
+
+
+def scripts() -> list[Path]:
+    """Return all benchmarks, the most telling first."""
+    places = {name: k for k, name in enumerate(ORDER)}
+    found = (ROOT / "benchmarks").glob("*.py")
+    return sorted(found, key=lambda p: (places.get(p.stem, len(ORDER)), p.stem))
+
+
+def run(script: Path, *, quick: bool) -> None:
+    """Run one benchmark; its JSON file goes to artifacts/."""
+    FOUND.mkdir(parents=True, exist_ok=True)
+    command = [
+        sys.executable,
+        str(script),
+        "--json",
+        str(FOUND / f"{script.stem}.json"),
+    ]
+    command += ALWAYS.get(script.stem, [])
+    command += ["--quick"] if quick else FULL.get(script.stem, [])
+    print(f"== {script.name}", flush=True)
+    subprocess.run(command, check=True, cwd=ROOT)
+
+
+def reports() -> dict[Path, dict[str, Any]]:
+    """Return what scripts have found, as far as they have run."""
+    return {
+        script: json.loads((FOUND / f"{script.stem}.json").read_text("utf-8"))
+        for script in scripts()
+        if (FOUND / f"{script.stem}.json").exists()
+    }
+
+
+WORDS = ("case", "side", "ratio", "what")
+"""Columns of text."""
+
+
+def table(head: list[str], rows: list[list[str]]) -> str:
+    """Return a table of Markdown; figures stand on the right."""
+    lines = [head, ["---" if name in WORDS else "---:" for name in head], *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
+
+
+def about(found: dict[Path, dict[str, Any]]) -> str:
+    """Return machine, dates and versions."""
+    notes = [report["about"] for report in found.values()]
+    machines = ", ".join(sorted({note["machine"] for note in notes}))
+    dates = sorted({note["date"] for note in notes})
+    versions: dict[str, str] = {}
+    for note in notes:
+        versions |= note["versions"]
+    today = datetime.datetime.now(datetime.UTC).date().isoformat()
+    when = " to ".join(dict.fromkeys([dates[0], dates[-1]])) if dates else today
+    packages = ", ".join(f"{name} {version}" for name, version in versions.items())
+    return f"Machine: {machines}. Date: {when}. Versions: {packages}.\n"
+
+
+def goals(found: dict[Path, dict[str, Any]]) -> str:
+    """Return the goals beside what was found."""
+    ratios = {n: r for report in found.values() for n, r in report["ratios"].items()}
+    rows = [
+        [f"`{name}`", text, f"{words} {limit:.3g}", f"{ratios[name]:.3g}"]
+        for words, wanted in (("at most", GOALS), ("at least", AT_LEAST))
+        for name, limit, text in wanted
+        if name in ratios
+    ]
+    return table(["ratio", "what", "goal", "found"], rows)
+
+
+def section(script: Path, report: dict[str, Any]) -> str:
+    """Return one benchmark's part of the page."""
+    words = script.read_text("utf-8").split('"""')[1].strip().splitlines()
+    text = "\n".join(words[1:]).partition("\nUsage:")[0].strip()
+    parts = [f"## {words[0].rstrip('.')}\n", f"`benchmarks/{script.name}`\n", text, ""]
+    for shown in report["tables"]:
+        columns = shown["columns"]
+        rows = [
+            [cell(look_up(row, name)) for name in columns]
+            for row in rows_with(report["rows"], columns)
+        ]
+        parts += [f"**{shown['title']}**\n", table([*map(heading, columns)], rows)]
+    for image in sorted(IMAGES.glob(f"{script.stem}*.png")):
+        parts.append(f"![{words[0]}](images/{image.name})\n")
+    if report["ratios"]:
+        rows = [[f"`{name}`", cell(value)] for name, value in report["ratios"].items()]
+        ratios = table(["ratio", "ours / theirs"], rows)
+        parts.append(f"<details><summary>Ratios</summary>\n\n{ratios}\n</details>\n")
+    return "\n".join(parts)
+
+
+def draw_env_step(report: dict[str, Any], path: Path) -> None:
+    """Draw what a step costs on both sides, and their raw physics."""
+    import matplotlib
+
+    matplotlib.use("agg")
+    from matplotlib import pyplot
+
+    rows = [row for row in report["rows"] if row.get("raw_us")]
+    cases = list(dict.fromkeys(row["case"] for row in rows))
+    figure, axes = pyplot.subplots(figsize=(9, 0.8 + 0.7 * len(cases)))
+    for row in rows:
+        ours = row["side"] == "ours"
+        y, colour = (
+            cases.index(row["case"]) + (-0.2 if ours else 0.2),
+            "C0" if ours else "C1",
+        )
+        total, raw = row["median_us"] / 1e3, row["raw_us"] / 1e3
+        axes.barh(y, total, 0.36, color=colour, label=row["side"])
+        axes.barh(y, raw, 0.36, color="0.3", alpha=0.6, label="its raw physics")
+        axes.text(
+            total, y, f" {total:.2f} ms, {total / raw:.2f} x", va="center", size=8
+        )
+    axes.set_yticks(range(len(cases)), cases)
+    axes.invert_yaxis()
+    axes.set(xlabel="ms of CPU time for one step at 20 Hz (25 physics steps)")
+    axes.margins(x=0.28)
+    handles, labels = axes.get_legend_handles_labels()
+    legend = dict(zip(labels, handles, strict=True))
+    axes.legend(list(legend.values()), list(legend), fontsize=8)
+    figure.tight_layout()
+    figure.savefig(path, dpi=80)
+
+
+def main() -> None:
+    """Run from the command line."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--only", nargs="*", help="run these scripts; none: no script")
+    arguments = parser.parse_args()
+    for script in scripts():
+        if arguments.only is None or script.stem in arguments.only:
+            run(script, quick=arguments.quick)
+    found = reports()
+    for script, report in found.items():
+        if script.stem == "env_step":
+            draw_env_step(report, IMAGES / "env_step.png")
+    parts = [HEAD, about(found), goals(found)]
+    parts += [section(script, report) for script, report in found.items()]
+    page = ROOT / "docs" / "benchmarks.md"
+    page.write_text("\n".join(parts), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

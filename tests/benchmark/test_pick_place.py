@@ -1,0 +1,174 @@
+import mujoco
+import numpy as np
+import pytest
+from conftest import put
+
+import wbc_suite
+from wbc_suite.benchmark import load_benchmark
+from wbc_suite.benchmark.pick_place import GROCERIES, REST
+from wbc_suite.errors import ConfigError
+from wbc_suite.scene.placement import Region, UniformSampler
+
+FLOOR = 0.8
+
+
+@pytest.fixture(scope="module")
+def env():
+    return wbc_suite.make("PickPlace", robots="Panda")
+
+
+def goals(env):
+    """Return where each thing stands in its own quadrant."""
+    return {n: (*env.benchmark.goal(n), FLOOR + REST[n] - 1e-4) for n in GROCERIES}
+
+
+def put_at(env, places):
+    env.reset(seed=0)
+    return put(env, **{name: (at, None) for name, at in places.items()})
+
+
+def test_everything_in_its_quadrant_is_a_success(env):
+    bins = put_at(env, goals(env))
+    assert bins.success()
+    assert bins.reward(shaped=False) == bins.reward(shaped=True) == 1.0
+    for _ in range(10):
+        _, reward, _, _, info = env.step(env.hold_action)
+        assert info["success"]
+        assert reward == 1.0
+
+
+def swapped(places):
+    places["Milk"], places["Bread"] = places["Bread"], places["Milk"]
+
+
+def one_left(places):
+    del places["Can"]
+
+
+def too_high(places):
+    x, y, _ = places["Cereal"]
+    places["Cereal"] = (x, y, FLOOR + 0.101)
+
+
+def below_the_bin(places):
+    x, y, _ = places["Bread"]
+    places["Bread"] = (x, y, 0.022)
+
+
+def over_the_edge(places):
+    _, y, z = places["Can"]
+    places["Can"] = (0.1 + 0.195 + 0.04, y, z)
+
+
+@pytest.mark.parametrize(
+    "change", [swapped, one_left, too_high, below_the_bin, over_the_edge]
+)
+def test_near_misses_are_no_success(env, change):
+    places = goals(env)
+    change(places)
+    bins = put_at(env, places)
+    assert not bins.success()
+    assert bins.reward(shaped=False) == 0.0
+    assert 0.5 <= bins.reward(shaped=True) < 1.0
+
+
+def test_a_hand_that_has_not_left_is_no_success(env):
+    bins = put_at(env, goals(env))
+    hand = bins.hands[0].position
+    for distance, done in ((0.04, False), (0.05, True)):
+        x, y, z = bins.states["Can"].position
+        hand[:] = x, y, z + distance
+        assert bins.success() is done
+
+
+def test_each_thing_in_place_is_a_quarter(env):
+    places = goals(env)
+    for count in range(4):
+        given = {name: places[name] for name in GROCERIES[:count]}
+        reward = put_at(env, given).reward(shaped=True)
+        assert count / 4 <= reward < count / 4 + 0.1 / 4 + 1e-9
+
+
+def test_stages_rise(env):
+    stages = env.benchmark.config.stages
+
+    def reward(distance, grasped=False, missing=0.25, aside=0.5, over=False):
+        return stages.reward(
+            distance=distance, grasped=grasped, missing=missing, aside=aside, over=over
+        )
+
+    rewards = [
+        reward(0.3),
+        reward(0.0),
+        reward(0.0, True),
+        reward(0.0, True, 0.0),
+        reward(0.0, True, 0.0, 0.2),
+        reward(0.0, True, 0.0, 0.05, True),
+        reward(0.0, True, 0.0, 0.0, True),
+    ]
+    assert sorted(rewards) == rewards
+    assert rewards[-1] == pytest.approx(0.7)
+    assert rewards[1] == pytest.approx(0.1)
+    assert 0.35 <= rewards[2] < rewards[3]
+    assert reward(0.0, False, 0.0, 0.0, True) == pytest.approx(0.1)  # thrown
+
+
+def test_observed_poses_are_those_of_the_hand(env):
+    observation, _ = env.reset(seed=1)
+    data = env.simulation.data
+    site = data.site(f"robot0_{env.benchmark.hands[0].frame}")
+    R = site.xmat.reshape(3, 3)
+    for name in GROCERIES:
+        body = data.body(name)
+        at = R @ observation[f"{name}_to_robot0_eef_pos"] + site.xpos
+        np.testing.assert_allclose(at, body.xpos, atol=1e-12)
+        x, y, z, w = observation[f"{name}_to_robot0_eef_quat"]
+        seen = np.empty(9)
+        mujoco.mju_quat2Mat(seen, np.array([w, x, y, z]))
+        turn = R @ seen.reshape(3, 3)
+        np.testing.assert_allclose(turn, body.xmat.reshape(3, 3), atol=1e-12)
+    assert observation["object-state"].shape == (56,)
+
+
+def test_single_draws_one_thing_and_puts_the_others_away():
+    env = wbc_suite.make("PickPlaceSingle", robots="Panda")
+    seen = set()
+    for seed in range(12):
+        observation, _ = env.reset(seed=seed)
+        name = env.benchmark.active[0]
+        seen.add(name)
+        assert GROCERIES[int(observation["obj_id"][0])] == name
+        position = env.simulation.data.body(name).xpos
+        np.testing.assert_array_equal(observation["obj_pos"], position)
+        assert np.abs(position - (0.1, -0.25, FLOOR)).max() < 0.25
+        assert observation["object-state"].shape == (15,)
+        at = (*env.benchmark.goal(name), FLOOR + REST[name] - 1e-4)
+        assert put(env, **{name: (at, None)}).success()
+    assert seen == set(GROCERIES)
+
+
+def test_a_variant_says_only_what_differs():
+    full, can = load_benchmark("PickPlace"), load_benchmark("PickPlaceCan")
+    assert can.config.objects == ("Can",)
+    assert can.config.source == full.config.source
+    assert can.config.name == "PickPlaceCan"
+
+
+def test_a_file_extends_only_its_neighbours(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text('extends = "../pick_place"\nname = "PickPlace"\n')
+    with pytest.raises(ConfigError, match="same folder"):
+        load_benchmark(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "thing"), [("PickPlaceCan", "Can"), ("NutAssemblySquare", "SquareNut")]
+)
+def test_a_sampler_of_ones_own_places_the_things(name, thing):
+    here = Region(x=(0.01, 0.01), y=(-0.02, -0.02))
+    origin = (0.1, -0.2, 0.9)
+    own = UniformSampler(names=[thing], region=here, origin=origin)
+    env = wbc_suite.make(name, placement_initializer=own)
+    for seed in range(3):
+        seen, _ = env.reset(seed=seed)
+        np.testing.assert_allclose(seen[f"{thing}_pos"][:2], (0.11, -0.22))

@@ -1,0 +1,28 @@
+"""Every two-arm benchmark with pairs of arms, both ways round, and two-armed robots."""
+
+import pytest
+from conftest import penetration
+from posing import act_at_random
+
+import wbc_suite
+
+BENCHMARKS = ("TwoArmHandover", "TwoArmLift", "TwoArmPegInHole", "TwoArmTransport")
+ARMS = ("Panda", "Sawyer", "IIWA", "UR5e", "Jaco", "Kinova3", "XArm7", "PandaOmron")
+TWO_ARMED = ("Baxter", "Tiago", "GR1", "GR1ArmsOnly")
+CASES = [(name, "single-robot") for name in TWO_ARMED] + [
+    ([name, name], way) for name in ARMS for way in ("opposed", "parallel")
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", BENCHMARKS)
+@pytest.mark.parametrize(("robots", "way"), CASES)
+def test_robots_start_clear_of_everything_and_act(name, robots, way):
+    env = wbc_suite.make(
+        name, robots=robots, env_configuration=way, reward_shaping=True
+    )
+    for seed in range(3):
+        env.reset(seed=seed)
+        assert penetration(env) < 5e-4
+    act_at_random(env, 20, seed=0)
+    env.close()

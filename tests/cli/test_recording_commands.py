@@ -1,0 +1,133 @@
+"""The commands of recordings, as a person types them."""
+
+import shutil
+import sys
+
+import pytest
+from PIL import Image
+
+from wbc_suite.cli import main
+from wbc_suite.recording import Dataset
+
+
+@pytest.fixture
+def command(monkeypatch, capsys):
+    """Run a command as the shell would; give its exit code, output and errors."""
+
+    def run(*arguments):
+        monkeypatch.setattr(sys, "argv", ["wbc-suite", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        out, err = capsys.readouterr()
+        return int(ended.value.code or 0), out, err
+
+    return run
+
+
+def test_a_recording_is_made_inspected_and_replayed(command, tmp_path):
+    file = tmp_path / "lift.hdf5"
+    arguments = ("Lift", "--robots", "Panda", "--horizon", 70, "--out", file)
+    code, out, err = command("record", *arguments, "--episodes", 1)
+    assert (code, err) == (0, "")
+    assert "success (1 of 1)" in out
+    code, out, _ = command(
+        "inspect", file, "--columns", "--plots", tmp_path / "p.png",
+        "--sheet", tmp_path / "s.png",
+    )  # fmt: skip
+    assert code == 0
+    assert "1 of 1 succeeded" in out
+    assert "obs/cube_pos" in out
+    with Image.open(tmp_path / "s.png") as sheet:
+        assert sheet.size == (6 * 128, 128 + 14)
+        colours = sheet.getcolors(100_000)
+    assert colours is None or len(colours) > 100
+    film = tmp_path / "film.webp"
+    code, out, _ = command("replay", file, "--film", film, "--size", 32)
+    assert "1 of 1 episodes replay bit by bit" in out
+    with Dataset(file) as dataset, Image.open(film) as pictures:
+        assert pictures.n_frames > dataset.length("demo_0") // 2  # equal ones are one
+
+
+def test_a_film_that_cannot_be_written_is_said_before_anything_is_played(
+    command, tmp_path
+):
+    missing = tmp_path / "none.hdf5"
+    code, _, err = command("replay", missing, "--film", "film.avi")
+    assert code == 2
+    assert ".mp4, .webp or .gif" in err
+
+
+def test_a_scripted_hand_says_what_it_knows(command, tmp_path):
+    code, _, err = command(
+        "record", "Stack", "--robots", "Panda", "--out", tmp_path / "a.hdf5"
+    )
+    assert code == 2
+    assert "picks up the cube of Lift" in err
+    assert not list(tmp_path.iterdir())
+
+
+def test_random_actions_of_any_robot_are_recorded(command, tmp_path):
+    file = tmp_path / "a.hdf5"
+    arguments = ("--robots", "UR5e", "--device", "random", "--horizon", 3)
+    for _ in range(2):  # the second run adds to the first
+        code, out, _ = command("record", "Lift", *arguments, "-o", file, "--episodes=2")
+        assert code == 0
+    assert "4 episodes" in out
+    shutil.rmtree(tmp_path / "a.hdf5.parts", ignore_errors=True)
+    assert "4 episodes, 12 actions" in command("inspect", file)[1]
+
+
+HAND = '''
+from wbc_suite.devices import DeviceState, LimbInput
+
+
+class Hand:
+    """Lifts its hand; keeps, discards and takes back what it did."""
+
+    presses = {40: "keep", 60: "discard", 80: "keep", 90: "undo"}
+    presses |= {110: "keep", 130: "keep"}
+
+    def __init__(self, speed):
+        self.twist, self.reads = [0.0, 0.0, speed, 0.0, 0.0, 0.0], 0
+
+    def start(self):
+        pass
+
+    def stop(self):
+        pass
+
+    def read(self):
+        self.reads += 1
+        pressed = {self.presses.get(self.reads, "nothing")}
+        return DeviceState(
+            time=0.01 * self.reads,
+            limbs={"hand": LimbInput(twist=self.twist)},
+            buttons=frozenset(pressed),
+        )
+'''
+
+
+def test_a_person_with_a_device_records(command, tmp_path, monkeypatch):
+    (tmp_path / "waving.py").write_text(HAND)
+    monkeypatch.syspath_prepend(tmp_path)
+    file = tmp_path / "hand.hdf5"
+    device = ("--device", "waving:Hand", "--device-option", "speed=0.1", "--no-page")
+    code, out, err = command(
+        "record", "Lift", "--robots", "Panda", "--out", file, "--episodes", 3,
+        "--horizon", 300, *device,
+    )  # fmt: skip
+    assert (code, err) == (0, "")
+    said = [line.strip() for line in out.splitlines() if line.startswith("  ")]
+    kept = [line for line in said if "Kept as" in line]
+    assert [line[-8:] for line in kept] == [
+        "1 of 3).",
+        "2 of 3).",
+        "2 of 3).",
+        "3 of 3).",
+    ]
+    assert any(line.startswith("Took demo_1 back") for line in said)
+    assert "Discarded." in said
+    with Dataset(file) as dataset:
+        assert len(dataset) == 3
+        lifted = dataset.column("demo_0", "obs/robot0_eef_pos")[:, 2]
+    assert lifted[-1] > lifted[0] + 0.01

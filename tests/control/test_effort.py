@@ -1,0 +1,78 @@
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from wbc_suite.control.composite.effort import SHARE, EffortGuard
+from wbc_suite.control.composite.reduced import lock_groups
+from wbc_suite.kinematics import Configuration
+from wbc_suite.robot import load_robot
+
+DT = 0.01
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return lock_groups(load_robot("GR1"), ["legs"])
+
+
+@pytest.fixture
+def configuration(robot):
+    found = Configuration(robot.to_pinocchio())
+    found.update(found.model.referenceConfigurations["ready"])
+    return found
+
+
+def torque(configuration, before, v):
+    model, a = configuration.model, (v - before) / DT
+    return pin.rnea(model, model.createData(), configuration.q, v, a)
+
+
+def efforts(robot, configuration):
+    model = configuration.model
+    found = np.full(configuration.nv, np.inf)
+    for joint in robot.joints:
+        if joint.effort:
+            v = model.joints[configuration.joint_id(joint.name)].idx_v
+            found[v] = joint.effort
+    return found
+
+
+def test_what_motors_can_give_is_left_alone(robot, configuration):
+    guard = EffortGuard(robot, configuration)
+    before = np.zeros(configuration.nv)
+    v = np.full(configuration.nv, 0.01)
+    assert guard.able(before, v, DT) is v
+
+
+def test_no_motor_is_asked_for_more_than_it_has(robot, configuration):
+    guard = EffortGuard(robot, configuration)
+    most = efforts(robot, configuration)
+    rng = np.random.default_rng(0)
+    before = np.zeros(configuration.nv)
+    slowed = 0
+    for _ in range(100):
+        v = rng.uniform(-0.5, 0.5, configuration.nv)
+        found = guard.able(before, v, DT)
+        asked = np.abs(torque(configuration, before, v)) / most
+        got = np.abs(torque(configuration, before, found)) / most
+        if found is v or asked.max() > 4.0:  # some change is always left
+            continue
+        slowed += 1
+        # Coriolis terms change a little with the velocity that is given up.
+        assert got.max() < SHARE + 0.03
+        part = found / v
+        np.testing.assert_allclose(part, part[0], rtol=1e-9)  # the same direction
+    assert slowed > 20
+
+
+def test_slowed_joints_stay_within_their_limits(robot, configuration):
+    model = configuration.model
+    joint = model.joints[configuration.joint_id("waist_roll_joint")]
+    q = configuration.q.copy()
+    q[joint.idx_q] = model.upperPositionLimit[joint.idx_q] - 1e-4
+    configuration.update(q)
+    before = np.zeros(configuration.nv)
+    before[joint.idx_v] = 1.0  # too late to brake: 100 rad/s^2
+    v = np.zeros(configuration.nv)
+    found = EffortGuard(robot, configuration).able(before, v, DT)
+    assert found[joint.idx_v] * DT <= 1e-4 + 1e-12

@@ -1,0 +1,121 @@
+import os
+import struct
+
+import numpy as np
+import pytest
+
+from wbc_suite.devices.gamepad import (
+    DualSense,
+    Gamepad,
+    Pad,
+    PadJog,
+    parse_dualsense,
+    parse_joystick,
+)
+from wbc_suite.errors import DeviceError
+
+
+def dualsense(
+    left=(127, 127), right=(127, 127), triggers=(0, 0), hat=8, face=0, rest=0
+):
+    return bytes([1, *left, *right, *triggers, 0, hat | face << 4, rest, 0, 0])
+
+
+def test_dualsense_at_rest_is_at_rest():
+    pad = parse_dualsense(dualsense())
+    np.testing.assert_allclose([*pad.left, *pad.right], 0.0, atol=0.005)
+    assert (pad.triggers, pad.cross, pad.down) == ((0, 0), (0, 0), frozenset())
+
+
+def test_dualsense_sticks_triggers_cross_and_buttons():
+    pad = parse_dualsense(
+        dualsense((255, 0), (0, 255), (51, 255), hat=1, face=0b0010, rest=0b100010)
+    )
+    np.testing.assert_allclose([*pad.left, *pad.right], [1, 1, -1, -1])
+    assert pad.triggers == (0.2, 1.0)
+    assert pad.cross == (1, 1)
+    assert pad.down == {"south", "r1", "start"}
+
+
+def test_dualsense_by_bluetooth_has_one_byte_more():
+    report = dualsense((255, 0))
+    assert parse_dualsense(b"\x31\x02" + report[1:]) == parse_dualsense(report)
+
+
+@pytest.mark.parametrize("broken", [b"", b"\x01", b"\x05" * 64])
+def test_other_reports_are_not_read(broken):
+    assert parse_dualsense(broken) is None
+
+
+def event(kind, number, value):
+    return struct.pack("<IhBB", 0, value, kind, number)
+
+
+def test_joystick_events_change_what_they_name():
+    pad = Pad()
+    for kind, number, value in [
+        (0x82, 0, 32767), (2, 1, 32767), (2, 5, 0), (2, 7, -32767),
+        (1, 0, 1), (1, 3, 1), (1, 0, 0), (1, 40, 1), (2, 30, 1),
+    ]:  # fmt: skip
+        pad = parse_joystick(event(kind, number, value), pad)
+    assert pad.left == (1.0, -1.0)
+    assert pad.triggers == (0.0, 0.5)
+    assert pad.cross == (0, 1)
+    assert pad.down == {"north"}
+
+
+def test_pad_moves_the_hand_and_closes_once_per_press():
+    jog, pressed = PadJog(), frozenset({"south"})
+    state = jog.state(0.0, Pad(left=(0.0, 1.0), cross=(1, 0), down=pressed))
+    assert (np.sign(state.limbs["hand"].twist) == [1, 0, 0, 0, 0, 0]).all()
+    assert (np.sign(state.base) == [0, 0, -1]).all()
+    assert state.limbs["hand"].grip == 1.0
+    assert jog.state(0.1, Pad(down=pressed)).limbs["hand"].grip == 1.0
+    assert jog.state(0.2, Pad()).limbs["hand"].grip == 1.0
+    assert jog.state(0.3, Pad(down=pressed)).limbs["hand"].grip == -1.0
+    assert jog.state(0.4, Pad(down=frozenset({"north"}))).buttons == {"next"}
+
+
+def test_small_deflections_are_rest():
+    state = PadJog().state(0.0, Pad(left=(0.06, 0.06), right=(0.0, -0.09)))
+    assert not state.limbs["hand"].twist.any()
+
+
+def test_gamepad_reads_the_kernels_file(tmp_path):
+    file = tmp_path / "js0"
+    os.mkfifo(file)
+    gamepad = Gamepad(file)
+    gamepad.start()
+    with file.open("wb", buffering=0) as writer:
+        writer.write(event(2, 1, -32767) + event(1, 0, 1))
+        state = gamepad.read()
+        assert state.limbs["hand"].twist[0] > 0
+        assert state.limbs["hand"].grip == 1.0
+        assert gamepad.read().limbs["hand"].twist[0] > 0  # it is still held
+    gamepad.stop()
+
+
+def test_dualsense_takes_the_newest_of_many_reports():
+    class Hid:
+        waiting = [dualsense((255, 127)), dualsense((127, 0))]
+        closed = False
+
+        def read(self, _):
+            return self.waiting.pop(0) if self.waiting else b""
+
+        def close(self):
+            self.closed = True
+
+    hid = Hid()
+    pad = DualSense(find=lambda: [hid])
+    pad.start()
+    twist = pad.read().limbs["hand"].twist
+    assert twist[0] > 0
+    assert abs(twist[1]) < 0.01
+    pad.stop()
+    assert hid.closed
+
+
+def test_no_gamepad_is_said_plainly(tmp_path):
+    with pytest.raises(DeviceError, match="No gamepad at"):
+        Gamepad(tmp_path / "js9").start()

@@ -1,0 +1,73 @@
+import os
+import pty
+
+import numpy as np
+import pytest
+
+from wbc_suite.devices.keyboard import Keyboard, parse_keys
+from wbc_suite.errors import DeviceError
+
+
+class Clock:
+    now = 100.0
+
+    def __call__(self):
+        return self.now
+
+
+@pytest.fixture
+def terminal():
+    master, slave = pty.openpty()
+    clock = Clock()
+    keyboard = Keyboard(slave, clock)
+    keyboard.start()
+
+    def press(keys, later=0.0):
+        os.write(master, keys)
+        clock.now += later
+        return keyboard.read()
+
+    yield press
+    keyboard.stop()
+    os.close(master)
+    os.close(slave)
+
+
+def test_keys_are_parsed_with_arrows_and_names():
+    assert list(parse_keys(b"wW\x1b[A\t\x1b \x7f")) == [
+        "w", "w", "up", "tab", "escape", " ", "backspace",
+    ]  # fmt: skip
+
+
+def test_held_keys_make_a_twist_and_end_a_moment_later(terminal):
+    state = terminal(b"wrj")
+    twist = state.limbs["hand"].twist
+    assert (np.sign(twist) == [1, 0, 1, 0, 0, 1]).all()
+    np.testing.assert_array_equal(terminal(b"", 0.2).limbs["hand"].twist, np.zeros(6))
+
+
+def test_repeats_of_a_held_key_press_its_button_once(terminal):
+    assert terminal(b"\t").buttons == {"next"}
+    assert terminal(b"\t", 0.03).buttons == frozenset()
+    assert terminal(b"\t", 0.5).buttons == {"next"}
+
+
+def test_space_closes_and_opens_and_plus_is_faster(terminal):
+    assert terminal(b"w").limbs["hand"].grip is None
+    slow = terminal(b"").limbs["hand"].twist[0]
+    assert terminal(b" +w", 0.05).limbs["hand"].grip == 1.0
+    assert terminal(b"").limbs["hand"].twist[0] == pytest.approx(1.5 * slow)
+    assert terminal(b" ", 0.5).limbs["hand"].grip == -1.0
+
+
+def test_arrows_drive_the_base(terminal):
+    state = terminal(b"\x1b[A\x1b[D")
+    assert (np.sign(state.base) == [1, 0, 1]).all()
+
+
+def test_a_pipe_is_no_terminal():
+    reader, writer = os.pipe()
+    with pytest.raises(DeviceError, match="needs a terminal"):
+        Keyboard(reader).start()
+    os.close(reader)
+    os.close(writer)

@@ -1,0 +1,95 @@
+"""The compiled forward kinematics, against Pinocchio."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wbc_suite
+from wbc_suite.kinematics import Configuration
+from wbc_suite.kinematics.forward import JointKind, joint_kinds
+
+ROBOTS = ("GR1", "Tiago", "Panda", "SpotWithArm", "Baxter", "UR5e", "Jaco")
+
+
+def chain(*joints: pin.JointModel) -> pin.Model:
+    """Return a chain of joints at odd places, one body each."""
+    model, rng = pin.Model(), np.random.default_rng(3)
+    parent = 0
+    for k, joint in enumerate(joints):
+        place = pin.SE3(pin.exp3(rng.normal(size=3)), rng.normal(size=3))
+        parent = model.addJoint(parent, joint, place, f"joint_{k}")
+        model.appendBodyToJoint(parent, pin.Inertia.Random(), pin.SE3.Identity())
+    return model
+
+
+def random_q(model: pin.Model, rng: np.random.Generator) -> np.ndarray:
+    return pin.integrate(model, pin.neutral(model), rng.normal(size=model.nv) * 2.0)
+
+
+def check(model: pin.Model) -> None:
+    rng, robot, data = (
+        np.random.default_rng(0),
+        Configuration(model),
+        model.createData(),
+    )
+    for _ in range(20):
+        q = random_q(model, rng)
+        robot.update(q)
+        J = pin.computeJointJacobians(model, data, q)
+        np.testing.assert_allclose(robot.joint_jacobians.T, J, atol=1e-12)
+        for T, expected in zip(robot.placements, data.oMi, strict=True):
+            rotation = T[:9].reshape(3, 3).T
+            np.testing.assert_allclose(rotation, expected.rotation, atol=1e-12)
+            np.testing.assert_allclose(T[9:], expected.translation, atol=1e-12)
+        J_com = pin.jacobianCenterOfMass(model, data, q)
+        np.testing.assert_allclose(robot.com_jacobian, J_com, atol=1e-12)
+        np.testing.assert_allclose(robot.com, data.com[0], atol=1e-12)
+        frame = model.nframes - 1
+        pose = pin.updateFramePlacement(model, data, frame)
+        assert robot.frame_pose(frame).isApprox(pose, 1e-12)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_kernels_agree_with_pinocchio_on_robots(name):
+    check(wbc_suite.load_robot(name).to_pinocchio())
+
+
+@pytest.mark.parametrize("root", ["planar", "free"])
+def test_kernels_agree_with_pinocchio_under_moving_roots(root):
+    model = wbc_suite.load_robot("GR1", root=root).to_pinocchio()
+    assert (joint_kinds(model)[0][1:] != JointKind.OTHER).all()
+    check(model)
+
+
+def test_kernels_agree_with_pinocchio_on_every_joint_they_know():
+    axis = np.array([0.6, 0.0, 0.8])
+    model = chain(
+        pin.JointModelFreeFlyer(),
+        pin.JointModelRX(),
+        pin.JointModelRY(),
+        pin.JointModelPX(),
+        pin.JointModelPY(),
+        pin.JointModelRevoluteUnaligned(axis),
+        pin.JointModelPZ(),
+        pin.JointModelPrismaticUnaligned(axis),
+        pin.JointModelFreeFlyer(),
+        pin.JointModelRZ(),
+    )
+    assert (joint_kinds(model)[0][1:] != JointKind.OTHER).all()
+    check(model)
+
+
+def test_pinocchio_places_joints_that_the_kernels_do_not_know():
+    model = chain(pin.JointModelRX(), pin.JointModelSpherical(), pin.JointModelRUBY())
+    assert (joint_kinds(model)[0] == JointKind.OTHER).sum() == 3  # and the universe
+    check(model)
+
+
+def test_what_follows_from_q_is_computed_anew_after_each_update():
+    model = wbc_suite.load_robot("Panda").to_pinocchio()
+    robot = Configuration(model)
+    before = robot.placements.copy(), robot.com.copy(), robot.com_jacobian.copy()
+    robot.update(robot.q + 0.3)
+    assert np.abs(robot.com - before[1]).max() > 1e-2
+    assert np.abs(robot.com_jacobian - before[2]).max() > 1e-2
+    assert np.abs(robot.placements - before[0]).max() > 1e-2

@@ -1,0 +1,141 @@
+"""Door: turn the lever and pull the door open."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import mujoco
+from pydantic import NonNegativeFloat, PositiveFloat
+
+from wbc_suite.benchmark.object_benchmark import (
+    ObjectBenchmark,
+    ObjectBenchmarkConfig,
+    add_table_cameras,
+    load_config,
+)
+from wbc_suite.control import RobotState
+from wbc_suite.robot.shapes import Vector3
+from wbc_suite.scene import TableConfig, add_table, objects
+from wbc_suite.scene.objects import Thing
+from wbc_suite.scene.placement import Region, UniformSampler
+from wbc_suite.sensing.reading import (
+    Reading,
+    body_position,
+    joint_positions,
+    offset,
+    site_position,
+)
+from wbc_suite.tomlfile import FrozenModel
+from wbc_suite.typing import Vector
+
+__all__ = ["Door", "DoorConfig"]
+
+DOOR = "door"
+HINGE, LEVER, GRIP = "door_panel_joint", "door_handle_joint", "door_handle_grip"
+
+
+class RewardConfig(FrozenModel):
+    """Numbers of the reward; see `Door.progress`."""
+
+    reach_scale: PositiveFloat
+    reach: NonNegativeFloat
+    lever: NonNegativeFloat
+    lever_angle: PositiveFloat
+    open_angle: PositiveFloat
+
+
+class DoorConfig(ObjectBenchmarkConfig):
+    """`tasks/door.toml`.
+
+    Attributes:
+        latch: Whether the lever has to be turned first.
+        table: The table that the door stands on.
+        origin: What the region is measured from, m.
+        region: Where the door stands.
+        reward: Numbers of the reward.
+    """
+
+    latch: bool = True
+    table: TableConfig
+    origin: Vector3
+    region: Region
+    reward: RewardConfig
+
+
+class Door(ObjectBenchmark):
+    """A door with a lever is to be opened.
+
+    Source of geometry and reward: the benchmark of this name in robosuite 1.5, see
+    `Lift`.
+
+    Args:
+        path: `tasks/door.toml`, or a file of the same form.
+    """
+
+    needs_gripper = False  # a lever can be pushed down, and the door pulled, with less
+
+    def __init__(self, path: Path) -> None:
+        self.config = load_config(DoorConfig, path)
+        super().__init__(self.config)
+        self.sampler = UniformSampler(
+            names=[DOOR], region=self.config.region, origin=self.config.origin
+        )
+
+    def furnish(self, spec: mujoco.MjSpec) -> None:
+        """Add table and cameras."""
+        add_table(spec, self.config.table)
+        x, y, z = self.config.origin
+        add_table_cameras(spec, (x + 0.2, y + 0.25, z), side=1.0)
+
+    def things(self) -> Sequence[Thing]:
+        """Return the door, which stands still but for its hinges."""
+        door = objects.door(DOOR, latch=self.config.latch)
+        return [door.fixed(self.config.origin)]
+
+    def bind(
+        self, model: mujoco.MjModel, data: mujoco.MjData, robots: Sequence[RobotState]
+    ) -> None:
+        """Look up the hinges too."""
+        super().bind(model, data, robots)
+        self._hinge, self._lever = (
+            int(model.joint(name).qposadr[0]) for name in (HINGE, LEVER)
+        )
+
+    def observables(self) -> dict[str, Reading]:
+        """Return where door and lever are, their angles, and their ways from the hands.
+
+        Keys are those of this field's datasets.
+        """
+        door = body_position(self.model.body(f"{DOOR}_panel").id)
+        handle = site_position(self.model.site(GRIP).id)
+        readings = {"door_pos": door, "handle_pos": handle}
+        for side, hand in self.sided_hands():
+            at = site_position(hand.site)
+            readings[f"door_to_{side}eef_pos"] = offset(door, at)
+            readings[f"handle_to_{side}eef_pos"] = offset(handle, at)
+        readings["hinge_qpos"] = joint_positions([self._hinge])
+        if self.config.latch:
+            readings["handle_qpos"] = joint_positions([self._lever])
+        return readings
+
+    @property
+    def handle_position(self) -> Vector:
+        """Middle of the lever in the world, m. A view."""
+        return self.site(GRIP)
+
+    def success(self) -> bool:
+        """Whether the hinge is opened by more than `open_angle`."""
+        return self.data.qpos.item(self._hinge) > self.config.reward.open_angle
+
+    def progress(self) -> float:
+        """Return the shaped reward.
+
+        With d the distance of the nearest hand to the lever, and h the lever's angle:
+
+            reach (1 - tanh(reach_scale d)) + lever min(|h| / lever_angle, 1)
+        """
+        numbers = self.config.reward
+        distance = self.distance(self.handle_position)
+        reward = numbers.reach * (1.0 - math.tanh(numbers.reach_scale * distance))
+        turned = abs(self.data.qpos.item(self._lever)) / numbers.lever_angle
+        return reward + self.config.latch * numbers.lever * min(turned, 1.0)

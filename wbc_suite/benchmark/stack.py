@@ -1,0 +1,119 @@
+"""Stack: put one cube on another."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import mujoco
+from pydantic import NonNegativeFloat, PositiveFloat
+
+from wbc_suite.benchmark.object_benchmark import (
+    ObjectBenchmark,
+    ObjectBenchmarkConfig,
+    add_table_cameras,
+    load_config,
+)
+from wbc_suite.robot.component import Channel
+from wbc_suite.robot.shapes import Size
+from wbc_suite.scene import TableConfig, add_table
+from wbc_suite.scene.objects import Thing, box
+from wbc_suite.scene.placement import Region, UniformSampler
+from wbc_suite.sensing.reading import Reading, body_position, offset
+from wbc_suite.tomlfile import FrozenModel
+
+__all__ = ["Stack", "StackConfig"]
+
+A, B = "cubeA", "cubeB"
+
+
+class BlockConfig(FrozenModel):
+    """One cube."""
+
+    half_size: Size
+    color: tuple[Channel, Channel, Channel, Channel]
+
+
+class RewardConfig(FrozenModel):
+    """Numbers of the reward; see `Stack.progress`."""
+
+    reach_scale: PositiveFloat
+    reach: NonNegativeFloat
+    grasp: NonNegativeFloat
+    lift: NonNegativeFloat
+    align: NonNegativeFloat
+    success: PositiveFloat
+    lift_height: PositiveFloat
+
+
+class StackConfig(ObjectBenchmarkConfig):
+    """`tasks/stack.toml`."""
+
+    table: TableConfig
+    cube_a: BlockConfig
+    cube_b: BlockConfig
+    region: Region
+    reward: RewardConfig
+
+
+class Stack(ObjectBenchmark):
+    """The smaller cube A is to rest on the larger cube B.
+
+    Source of geometry and reward: the benchmark of this name in robosuite 1.5, see
+    `Lift`.
+
+    Args:
+        path: `tasks/stack.toml`, or a file of the same form.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.config = load_config(StackConfig, path)
+        super().__init__(self.config)
+        self.sampler = UniformSampler(
+            names=[A, B], region=self.config.region, origin=self.config.table.center
+        )
+
+    def furnish(self, spec: mujoco.MjSpec) -> None:
+        """Add table and cameras."""
+        add_table(spec, self.config.table)
+        add_table_cameras(spec, self.config.table.center)
+
+    def things(self) -> Sequence[Thing]:
+        """Return both cubes."""
+        pairs = ((A, self.config.cube_a), (B, self.config.cube_b))
+        return [
+            box(n, (c.half_size, c.half_size, c.half_size), color=c.color)
+            for n, c in pairs
+        ]
+
+    def observables(self) -> dict[str, Reading]:
+        """Return both cubes' poses, their ways from each hand, and from A to B."""
+        a, b = (body_position(self.states[name].body) for name in (A, B))
+        return {**self.poses_of([A, B]), "cubeA_to_cubeB": offset(b, a)}
+
+    def success(self) -> bool:
+        """Whether A touches B, its middle over B's top face, and no hand holds it."""
+        a, b = self.states[A].position.tolist(), self.states[B].position.tolist()
+        half = self.config.cube_b.half_size
+        over = math.hypot(a[0] - b[0], a[1] - b[1]) < math.sqrt(2.0) * half
+        on_top = over and a[2] - b[2] > half
+        return on_top and self.touching(A, B) and not self.grasped(A)
+
+    def progress(self) -> float:
+        """Return the shaped reward.
+
+        With d the distance of the nearest hand to A, and s that of A's axis to B's:
+
+            max(reach (1 - tanh(reach_scale d)) + grasp [two links touch A],
+                lift + align (1 - tanh(s))      if A is `lift_height` above the table)
+            / success
+        """
+        numbers, a = self.config.reward, self.states[A].position.tolist()
+        near = 1.0 - math.tanh(numbers.reach_scale * self.distance(a))
+        reward = numbers.reach * near + numbers.grasp * self.grasped(A)
+        lowest = self.config.table.center[2] + numbers.lift_height
+        if a[2] > lowest + self.config.cube_a.half_size:
+            b = self.states[B].position.tolist()
+            aside = math.hypot(a[0] - b[0], a[1] - b[1])
+            aligned = numbers.align * (1.0 - math.tanh(aside))
+            reward = max(reward, numbers.lift + aligned)
+        return reward / numbers.success

@@ -1,0 +1,201 @@
+"""TwoArmHandover: pick a hammer up with one arm and hand it to the other."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from pydantic import Field, NonNegativeFloat, PositiveFloat
+
+from wbc_suite.benchmark.object_benchmark import add_table_cameras, load_config
+from wbc_suite.benchmark.two_arms import TwoArmBenchmark, TwoArmConfig
+from wbc_suite.control import RobotState
+from wbc_suite.robot.shapes import Size, SizeInterval
+from wbc_suite.scene import TableConfig, add_table
+from wbc_suite.scene.objects import Thing, hammer
+from wbc_suite.scene.objects.tools import HAMMER_LYING
+from wbc_suite.scene.placement import (
+    PickySampler,
+    Placements,
+    Region,
+    UniformSampler,
+)
+from wbc_suite.sensing.reading import (
+    Reading,
+    body_position,
+    body_quat,
+    site_position,
+)
+from wbc_suite.tomlfile import FrozenModel
+
+__all__ = ["TwoArmHandover", "TwoArmHandoverConfig"]
+
+HAMMER, HANDLE = "hammer", "hammer_handle"
+
+
+class HammerConfig(FrozenModel):
+    """The hammer; sizes in m, the handle's drawn uniformly at each reset."""
+
+    handle_radius: SizeInterval
+    handle_length: SizeInterval
+    head_half_size: Size
+    mass: float = Field(gt=0.0, le=1e3)
+    region: Region
+
+
+class RewardConfig(FrozenModel):
+    """Numbers of the reward; see `TwoArmHandover.progress`."""
+
+    reach: NonNegativeFloat
+    grasp: NonNegativeFloat
+    lift: NonNegativeFloat
+    both: NonNegativeFloat
+    success: PositiveFloat
+    lift_height: PositiveFloat
+
+
+class TwoArmHandoverConfig(TwoArmConfig):
+    """`tasks/two_arm_handover.toml`."""
+
+    table: TableConfig
+    hammer: HammerConfig
+    reward: RewardConfig
+
+
+class TwoArmHandover(TwoArmBenchmark):
+    """Arm 0 picks a hammer up and hands it to arm 1, which alone holds it in the end.
+
+    That both have held it in the air at once is noted in `data.userdata[0]`: without
+    that, an arm which takes the hammer from the table by itself would succeed.
+
+    Source of geometry and reward: the benchmark of this name in robosuite 1.5, see
+    `Lift`.
+
+    Args:
+        path: `tasks/two_arm_handover.toml`, or a file of the same form.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.config = load_config(TwoArmHandoverConfig, path)
+        super().__init__(self.config)
+        self._head = 0.0
+        self.sampler = PickySampler(
+            sampler=UniformSampler(
+                names=[HAMMER],
+                region=self.config.hammer.region,
+                origin=self.config.table.center,
+                rest=HAMMER_LYING,
+            ),
+            accepts=self._rests,
+            wanted="its head lies on the table",
+        )
+
+    def furnish(self, spec: mujoco.MjSpec) -> None:
+        """Add table and cameras, and room for one note."""
+        add_table(spec, self.config.table)
+        add_table_cameras(spec, (0.0, 0.0, self.config.table.center[2]), before=1.2)
+        spec.nuserdata += 1
+
+    def things(self) -> Sequence[Thing]:
+        """Return the hammer, of middle size."""
+        numbers = self.config.hammer
+        sizes = (numbers.handle_radius, numbers.handle_length)
+        return [self._hammer(*(float(np.mean(size)) for size in sizes))]
+
+    def _hammer(self, radius: float, length: float) -> Thing:
+        numbers = self.config.hammer
+        return hammer(
+            HAMMER,
+            handle_radius=radius,
+            handle_length=length,
+            head_half_size=numbers.head_half_size,
+            mass=numbers.mass,
+        )
+
+    def bind(
+        self, model: mujoco.MjModel, data: mujoco.MjData, robots: Sequence[RobotState]
+    ) -> None:
+        """Look up the hammer and its handle, which is its first part."""
+        super().bind(model, data, robots)
+        self._handle = {model.geom(f"{HAMMER}_0").id}
+
+    def reset(self, rng: np.random.Generator) -> None:
+        """Draw the hammer's size and place, and lay it on the table."""
+        numbers = self.config.hammer
+        radius = rng.uniform(*numbers.handle_radius)
+        length = rng.uniform(*numbers.handle_length)
+        self.states[HAMMER].reshape(self._hammer(radius, length))
+        self._head = length / 2 + numbers.head_half_size
+        super().reset(rng)
+
+    def _rests(self, placements: Placements) -> bool:
+        """Whether the head's middle is above the table; else the hammer rolls."""
+        placed, table, head = placements[HAMMER], self.config.table, np.empty(3)
+        mujoco.mju_rotVecQuat(head, np.array([0.0, 0.0, self._head]), placed.quat)
+        away = np.abs(placed.position + head - table.center)[:2]
+        return bool((away <= np.array(table.size[:2]) / 2).all())
+
+    def watch(self) -> None:
+        """Note when both arms hold the hammer in the air."""
+        if self.raised and self.held_by_first and self.held_by_second:
+            self.data.userdata[0] = 1.0
+
+    @property
+    def handed(self) -> bool:
+        """Whether both arms have held the hammer in the air in this episode."""
+        return self.data.userdata[0] > 0.0
+
+    @property
+    def raised(self) -> bool:
+        """Whether the handle's middle is more than `lift_height` above the table."""
+        height = float(self.site(HANDLE)[2]) - self.config.table.center[2]
+        return height > self.config.reward.lift_height
+
+    @property
+    def held_by_first(self) -> bool:
+        """Whether arm 0 holds the hammer anywhere."""
+        return self.hands[0].grasps(self.states[HAMMER].geoms)
+
+    @property
+    def held_by_second(self) -> bool:
+        """Whether arm 1 holds the handle."""
+        return self.hands[1].grasps(self._handle)
+
+    def observables(self) -> dict[str, Reading]:
+        """Return the hammer's pose, its handle, and the way of each hand to it."""
+        body = self.states[HAMMER].body
+        handle = site_position(self.model.site(HANDLE).id)
+        return {
+            "hammer_pos": body_position(body),
+            "hammer_quat": body_quat(body),
+            "handle_xpos": handle,
+            **{f"gripper{i}_to_handle": self.arm_to(i, handle) for i in (0, 1)},
+        }
+
+    def success(self) -> bool:
+        """Whether arm 1 alone holds the handle in the air, after a handover."""
+        alone = self.held_by_second and not self.held_by_first
+        return alone and self.raised and self.handed
+
+    def progress(self) -> float:
+        """Return the shaped reward.
+
+        With d_i the distance of hand i to the handle's middle, it is, over `success`,
+
+            both                                if both hold it in the air
+            lift + reach (1 - tanh(d_1))        if arm 0 holds it in the air
+            grasp                               if arm 0 holds it
+            reach (1 - tanh(d_0))               else
+        """
+        numbers, handle = self.config.reward, self.site(HANDLE)
+        if not self.held_by_first:
+            reward = numbers.reach * (1.0 - math.tanh(self.reach(0, handle)))
+        elif not self.raised:
+            reward = numbers.grasp
+        elif self.held_by_second:
+            reward = numbers.both
+        else:
+            near = 1.0 - math.tanh(self.reach(1, handle))
+            reward = numbers.lift + numbers.reach * near
+        return reward / numbers.success

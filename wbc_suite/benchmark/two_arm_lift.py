@@ -1,0 +1,184 @@
+"""TwoArmLift: lift a pot by both handles, without tilting it."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from pydantic import Field, NonNegativeFloat, PositiveFloat, field_validator
+
+from wbc_suite.benchmark.object_benchmark import add_table_cameras, load_config
+from wbc_suite.benchmark.two_arms import TwoArmBenchmark, TwoArmConfig
+from wbc_suite.control import RobotState
+from wbc_suite.robot.shapes import Size
+from wbc_suite.scene import TableConfig, add_table
+from wbc_suite.scene.objects import Thing, pot
+from wbc_suite.scene.placement import Region, UniformSampler
+from wbc_suite.sensing.reading import (
+    Reading,
+    body_position,
+    body_quat,
+    site_position,
+)
+from wbc_suite.tomlfile import FrozenModel
+
+__all__ = ["TwoArmLift", "TwoArmLiftConfig"]
+
+POT, HANDLES = "pot", ("pot_handle0", "pot_handle1")
+WALL = 0.006
+"""Thickness of the pot's walls, m."""
+
+
+class PotConfig(FrozenModel):
+    """The pot; sizes in m, see `scene.objects.pot`; mass in kg."""
+
+    half_size: tuple[Size, Size, Size]
+    handle_length: Size
+    handle_width: Size
+    handle_radius: Size
+    mass: float = Field(gt=0.0, le=1e3)
+    region: Region
+
+    @field_validator("half_size")
+    @classmethod
+    def _has_room_for_walls(
+        cls, sizes: tuple[float, float, float]
+    ) -> tuple[float, float, float]:
+        if min(sizes) <= 2 * WALL:
+            raise ValueError(f"half sizes are more than {2 * WALL} m")
+        return sizes
+
+
+class RewardConfig(FrozenModel):
+    """Numbers of the reward; see `TwoArmLift.progress`."""
+
+    reach: NonNegativeFloat
+    reach_scale: PositiveFloat
+    grasp: NonNegativeFloat
+    lift_scale: NonNegativeFloat
+    lift_from: NonNegativeFloat
+    lift_most: NonNegativeFloat
+    success: PositiveFloat
+    lift_height: PositiveFloat
+    tilt: PositiveFloat
+
+
+class TwoArmLiftConfig(TwoArmConfig):
+    """`tasks/two_arm_lift.toml`."""
+
+    table: TableConfig
+    pot: PotConfig
+    reward: RewardConfig
+
+
+class TwoArmLift(TwoArmBenchmark):
+    """A pot on a table is to be lifted 10 cm by both arms, and kept level.
+
+    Arm 0 is meant for `handle0`, which starts towards -y, and arm 1 for `handle1`.
+
+    Source of geometry and reward: the benchmark of this name in robosuite 1.5, see
+    `Lift`. There one arm may lift the pot alone; here both hands must hold it.
+
+    Args:
+        path: `tasks/two_arm_lift.toml`, or a file of the same form.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.config = load_config(TwoArmLiftConfig, path)
+        super().__init__(self.config)
+        self.sampler = UniformSampler(
+            names=[POT],
+            region=self.config.pot.region,
+            origin=self.config.table.center,
+        )
+
+    def furnish(self, spec: mujoco.MjSpec) -> None:
+        """Add table and cameras."""
+        add_table(spec, self.config.table)
+        add_table_cameras(spec, self.config.table.center)
+
+    def things(self) -> Sequence[Thing]:
+        """Return the pot."""
+        numbers = self.config.pot
+        made = pot(
+            POT,
+            half_size=numbers.half_size,
+            wall=WALL,
+            handle_length=numbers.handle_length,
+            handle_width=numbers.handle_width,
+            handle_radius=numbers.handle_radius,
+        )
+        return [made.with_mass(numbers.mass)]
+
+    def bind(
+        self, model: mujoco.MjModel, data: mujoco.MjData, robots: Sequence[RobotState]
+    ) -> None:
+        """Look up the pot's handles: its geoms beyond the walls, on either side."""
+        super().bind(model, data, robots)
+        self._bars = [
+            {
+                geom
+                for geom in self.states[POT].geoms
+                if side * model.geom_pos[geom, 1] > self.config.pot.half_size[1]
+            }
+            for side in (1.0, -1.0)
+        ]
+
+    def observables(self) -> dict[str, Reading]:
+        """Return the pot's pose, its handles, and the way of each hand to its own."""
+        body = self.states[POT].body
+        sites = (self.model.site(handle).id for handle in HANDLES)
+        points = [site_position(site) for site in sites]
+        return {
+            "pot_pos": body_position(body),
+            "pot_quat": body_quat(body),
+            **{f"handle{i}_xpos": point for i, point in enumerate(points)},
+            **{
+                f"gripper{i}_to_handle{i}": self.arm_to(i, point)
+                for i, point in enumerate(points)
+            },
+        }
+
+    @property
+    def height(self) -> float:
+        """Height of the middle of the pot's bottom above the table, m."""
+        state, half = self.states[POT], self.config.pot.half_size[2]
+        bottom = state.position[2] - half * state.rotation[2, 2]
+        return float(bottom) - self.config.table.center[2]
+
+    @property
+    def level(self) -> bool:
+        """Whether the pot's axis is tilted less than `tilt`."""
+        upward = float(self.states[POT].rotation[2, 2])
+        return upward > math.cos(self.config.reward.tilt)
+
+    def success(self) -> bool:
+        """Whether the pot is level, above `lift_height`, and held by both hands."""
+        geoms = self.states[POT].geoms
+        return (
+            self.height > self.config.reward.lift_height
+            and self.level
+            and all(hand.grasps(geoms) for hand in self.hands)
+        )
+
+    def progress(self) -> float:
+        """Return the shaped reward.
+
+        With h the height of the pot's bottom, and d_i the distance of hand i to its own
+        handle, it is
+
+            (lift_scale clip(h - lift_from, 0, lift_most)       if tilted less than tilt
+             + sum_i grasp [hand i holds handle i] + reach (1 - tanh(reach_scale d_i)))
+            / success
+        """
+        numbers, reward = self.config.reward, 0.0
+        if self.level:
+            raised = np.clip(self.height - numbers.lift_from, 0.0, numbers.lift_most)
+            reward += numbers.lift_scale * float(raised)
+        for arm, hand in enumerate(self.hands):
+            distance = self.reach(arm, self.site(HANDLES[arm]))
+            near = 1.0 - math.tanh(numbers.reach_scale * distance)
+            held = hand.grasps(self._bars[arm])
+            reward += numbers.reach * near + numbers.grasp * held
+        return reward / numbers.success

@@ -1,0 +1,216 @@
+"""TwoArmPegInHole: put the peg on one wrist through the plate on the other."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from pydantic import Field, PositiveFloat, model_validator
+
+from wbc_suite.benchmark.object_benchmark import add_table_cameras, load_config
+from wbc_suite.benchmark.two_arms import TwoArmBenchmark, TwoArmConfig
+from wbc_suite.errors import ConfigError
+from wbc_suite.robot import RobotDescription
+from wbc_suite.robot.component import Rgba
+from wbc_suite.robot.shapes import Real, Size, SizeInterval, Vector3
+from wbc_suite.scene import fix_to_frame, robot_prefix
+from wbc_suite.scene.objects import Part, Thing, cylinder, plate_with_hole
+from wbc_suite.sensing.reading import (
+    Reading,
+    body_position,
+    body_quat,
+    computed,
+    offset,
+)
+from wbc_suite.tomlfile import FrozenModel
+
+__all__ = ["TwoArmPegInHole", "TwoArmPegInHoleConfig"]
+
+PEG, PLATE = "peg", "plate"
+ACROSS = (math.sqrt(0.5), -math.sqrt(0.5), 0.0, 0.0)
+"""Turns a plate's normal to the hand's y axis."""
+
+
+class PegConfig(FrozenModel):
+    """The peg; sizes in m, the radius drawn uniformly at each reset."""
+
+    radius: SizeInterval
+    half_length: Size
+    mass: float = Field(gt=0.0, le=1e3)
+    color: Rgba
+
+
+class PlateConfig(FrozenModel):
+    """The plate; sizes in m, mass in kg."""
+
+    half_size: Size
+    hole: Size
+    half_thickness: Size
+    mass: float = Field(gt=0.0, le=1e3)
+    stem: Size
+    color: Rgba
+
+    @model_validator(mode="after")
+    def _has_a_rim(self) -> "PlateConfig":
+        if self.hole > 0.9 * self.half_size:
+            raise ValueError("the hole is at most nine tenths of the plate")
+        return self
+
+
+class RewardConfig(FrozenModel):
+    """When the peg is in the hole; see `TwoArmPegInHole.alignment`."""
+
+    distance: PositiveFloat
+    depth: tuple[Real, Real]
+    cosine: float = Field(ge=0.0, le=1.0)
+
+
+class TwoArmPegInHoleConfig(TwoArmConfig):
+    """`tasks/two_arm_peg_in_hole.toml`."""
+
+    center: Vector3
+    peg: PegConfig
+    plate: PlateConfig
+    reward: RewardConfig
+
+
+class TwoArmPegInHole(TwoArmBenchmark):
+    """Arm 0 has a peg instead of a hand and arm 1 a plate with a hole.
+
+    Source of geometry and reward: the benchmark of this name in robosuite 1.5, see
+    `Lift`.
+
+    Args:
+        path: `tasks/two_arm_peg_in_hole.toml`, or a file of the same form.
+    """
+
+    gripper: str | None = "none"
+    needs_gripper = False
+
+    def __init__(self, path: Path) -> None:
+        self.config = load_config(TwoArmPegInHoleConfig, path)
+        super().__init__(self.config)
+
+    def arrange(
+        self, robots: Sequence[RobotDescription], configuration: str
+    ) -> tuple[RobotDescription, ...]:
+        """Return the robots at their places; their wrists must be bare."""
+        gripping = dict.fromkeys(robot.name for robot in robots if robot.synergies)
+        if gripping:
+            raise ConfigError(
+                f"{self.name} fixes peg and plate to the wrists: leave "
+                "gripper_types at 'default', and describe robots without grippers; "
+                f"{' and '.join(gripping)} have one."
+            )
+        return super().arrange(robots, configuration)
+
+    def furnish(self, spec: mujoco.MjSpec) -> None:
+        """Add cameras."""
+        add_table_cameras(spec, self.config.center, before=1.0)
+
+    def things(self) -> Sequence[Thing]:
+        """Return the peg, of middle radius, and the plate."""
+        return [self._peg(float(np.mean(self.config.peg.radius))), self._plate()]
+
+    def build(self, spec: mujoco.MjSpec) -> None:
+        """Add cameras; the things are fixed to the robots."""
+        self.furnish(spec)
+
+    def equip(self, spec: mujoco.MjSpec, robots: Sequence[RobotDescription]) -> None:
+        """Fix peg and plate to the wrists, before the hands' frames."""
+        frames = [
+            robot_prefix(i) + frame
+            for i, robot in enumerate(robots)
+            for frame in robot.hands.values()
+        ]
+        for frame, thing in zip(frames, self.things(), strict=True):
+            fix_to_frame(spec, thing, frame)
+
+    def reset(self, rng: np.random.Generator) -> None:
+        """Draw the peg's radius."""
+        radius = rng.uniform(*self.config.peg.radius)
+        self.states[PEG].reshape(self._peg(radius))
+
+    def _peg(self, radius: float) -> Thing:
+        """Return a peg along z, whose lower end is the wrist."""
+        numbers = self.config.peg
+        rod = cylinder(
+            PEG, radius, numbers.half_length, color=numbers.color, material="wood"
+        )
+        at = (0.0, 0.0, numbers.half_length)
+        return rod.with_mass(numbers.mass).fixed(at)
+
+    def _plate(self) -> Thing:
+        """Return a plate that holds z in its plane, on a stem."""
+        numbers = self.config.plate
+        plate = plate_with_hole(
+            PLATE,
+            half_size=numbers.half_size,
+            hole=numbers.hole,
+            half_thickness=numbers.half_thickness,
+            color=numbers.color,
+        )
+        half = numbers.stem / 2
+        stem = Part(
+            kind="box",
+            size=(0.02, half, 0.8 * numbers.half_thickness),
+            pos=(0.0, numbers.half_size + half, 0.0),
+            color=(0.16, 0.16, 0.18, 1.0),
+        )
+        whole = replace(plate, parts=(*plate.parts, stem)).with_mass(numbers.mass)
+        return whole.fixed((0.0, 0.0, numbers.stem + numbers.half_size), ACROSS)
+
+    def alignment(self) -> tuple[float, float, float]:
+        """Return how peg and hole lie: depth t, distance d, m, and cosine.
+
+        With p the peg's middle, v its axis away from the wrist, h the hole's middle and
+        n the plate's normal: t = (h - p) . v, d = |(h - p) - t v|, cosine = |n . v|.
+        """
+        peg, plate = self.states[PEG], self.states[PLATE]
+        v, n = peg.rotation[:, 2].tolist(), plate.rotation[:, 2].tolist()
+        way = (plate.position - peg.position).tolist()
+        depth = _dot(way, v)
+        distance = math.dist(way, [depth * x for x in v])
+        return depth, distance, min(abs(_dot(n, v)), 1.0)
+
+    def observables(self) -> dict[str, Reading]:
+        """Return where hole and peg are, and how they lie (`alignment`)."""
+        hole = body_position(self.states[PLATE].body)
+        peg = self.states[PEG].body
+        return {
+            "hole_pos": hole,
+            "hole_quat": body_quat(self.states[PLATE].body),
+            "peg_to_hole": offset(hole, body_position(peg)),
+            "peg_quat": body_quat(peg),
+            "angle": computed(1, lambda: [self.alignment()[2]]),
+            "t": computed(1, lambda: [self.alignment()[0]]),
+            "d": computed(1, lambda: [self.alignment()[1]]),
+        }
+
+    def success(self) -> bool:
+        """Whether depth, distance and cosine are within their bounds."""
+        depth, distance, cosine = self.alignment()
+        numbers = self.config.reward
+        low, high = numbers.depth
+        within = distance < numbers.distance and low <= depth <= high
+        return within and cosine > numbers.cosine
+
+    def progress(self) -> float:
+        """Return the shaped reward.
+
+        With r the distance of the middles of peg and hole, and t, d, cosine of
+        `alignment`:
+
+            ((1 - tanh(r)) + (1 - tanh(d)) + (1 - tanh(|t|)) + cosine) / 5
+        """
+        depth, distance, cosine = self.alignment()
+        between = math.hypot(depth, distance)
+        near = sum(1.0 - math.tanh(x) for x in (between, distance, abs(depth)))
+        return (near + cosine) / 5.0
+
+
+def _dot(a: list[float], b: list[float]) -> float:
+    """Return a . b; of three numbers, NumPy takes ten times as long."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -1,0 +1,141 @@
+"""`wbc-suite bench`: how fast environments are on this machine."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from wbc_suite.cli.options import (
+    BaseOption,
+    CatalogueOption,
+    GripperOption,
+    chosen,
+    writing,
+)
+
+if TYPE_CHECKING:
+    from wbc_suite.envs import RobotEnv
+    from wbc_suite.typing import Vector
+
+__all__ = ["bench"]
+
+BLOCKS = 5
+RESETS, PICTURES = 20, 50
+SHARE = 0.05  # of the way from what holds the robot to a random action
+
+
+def bench(
+    benchmark: Annotated[str, typer.Argument(help="Benchmark to step.")] = "Lift",
+    *,
+    robots: Annotated[
+        list[str] | None, typer.Option(help="Robot; repeat it for several.")
+    ] = None,
+    controller: Annotated[
+        str | None, typer.Option(help="Controller, by name or file.")
+    ] = None,
+    rate: Annotated[float, typer.Option(help="Actions per second, Hz.")] = 20.0,
+    actions: Annotated[int, typer.Option(min=BLOCKS, help="How many to time.")] = 200,
+    camera: Annotated[
+        list[str] | None,
+        typer.Option(help="Camera whose pictures are timed; may be repeated."),
+    ] = None,
+    size: Annotated[
+        int, typer.Option(min=8, max=2048, help="Of its pictures, pixels.")
+    ] = 84,
+    output: Annotated[
+        Path | None, typer.Option("--json", help="Write the figures here, too.")
+    ] = None,
+    gripper: GripperOption = None,
+    base: BaseOption = None,
+    catalogue: CatalogueOption = None,
+) -> None:
+    """Time steps of an environment beside its raw physics, resets and pictures.
+
+    Times are of the processor, so that other programs disturb them little. Example:
+    wbc-suite bench Door --robots GR1 --controller WHOLE_BODY_IK --camera agentview
+    """
+    import wbc_suite
+    from wbc_suite.envs import RobotEnv
+
+    arguments: dict[str, Any] = {"control_freq": rate, "horizon": 10**9}
+    if robots:
+        arguments["robots"] = robots[0] if len(robots) == 1 else robots
+    if controller:
+        arguments["controller_configs"] = controller
+    if gripper:
+        arguments["gripper_types"] = chosen(gripper)
+    if base:
+        arguments["base_types"] = base
+    env = wbc_suite.make(benchmark, **arguments).unwrapped
+    assert isinstance(env, RobotEnv), "`make` made it"
+    found = _times(env, actions)
+    for name in camera or ():
+        found[f"picture of {name}, {size} x {size}"] = _pictures(env, name, size)
+    env.close()
+    names = " and ".join(robots or ["Panda"])
+    _print_table(f"{benchmark}, {names}, {rate:g} Hz", found)
+    if output is not None:
+        with writing(output):
+            rows = {name: times.tolist() for name, times in found.items()}
+            output.write_text(json.dumps({"us": rows}) + "\n", encoding="utf-8")
+
+
+def _times(env: "RobotEnv", actions: int) -> "dict[str, Vector]":
+    """Return CPU times of steps, raw physics and resets, us."""
+    import numpy as np
+
+    from wbc_suite.timing import Block, time_block, times
+
+    layout, rng = env.action_layout, np.random.default_rng(0)
+    simulation, found = env.simulation, Block()
+    substeps = round(1.0 / (env.config.control_freq * simulation.timestep))
+    env.reset(seed=0)
+    env.step(env.hold_action)  # compiles
+    for k in range(BLOCKS):
+        env.reset(seed=k)
+        count, hold = actions // BLOCKS, env.hold_action
+        drawn = rng.uniform(layout.low, layout.high, (count, hold.size))
+        block = time_block(
+            env.step,
+            list(hold + SHARE * (drawn - hold)),
+            model=simulation.model,
+            data=simulation.data,
+            substeps=substeps,
+        )
+        found.extend(block)
+    return {
+        "step": np.array(found.step),
+        f"raw physics, {substeps} steps of it": np.array(found.raw),
+        "reset": np.array(times(RESETS, env.reset)),
+    }
+
+
+def _pictures(env: "RobotEnv", camera: str, size: int) -> "Vector":
+    """Return CPU times of pictures, us; the first makes the renderer."""
+    import numpy as np
+
+    from wbc_suite.timing import time_frames
+
+    def take() -> object:
+        return env.cameras.image(camera, width=size, height=size)
+
+    take()
+    return np.array(time_frames(PICTURES, take).cpu)
+
+
+def _print_table(title: str, found: "dict[str, Vector]") -> None:
+    """Print medians, 99th percentiles and rates; then what a step is of its physics."""
+    import numpy as np
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table("", "median, ms", "99 %, ms", "per second", title=title)
+    for column in table.columns[1:]:
+        column.justify = "right"
+    for name, times in found.items():
+        median, tail = np.percentile(times, [50, 99]) / 1e3
+        table.add_row(name, f"{median:.3f}", f"{tail:.3f}", f"{1e3 / median:,.0f}")
+    Console().print(table)
+    step, raw, *_ = (float(np.median(times)) for times in found.values())
+    print(f"A step takes {step / raw:.2f} of its own raw physics.")

@@ -1,0 +1,182 @@
+"""`wbc-suite rollout`: many episodes, on all processors or a cluster."""
+
+import json
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from wbc_suite.cli.options import CatalogueOption, ExecutorOption, writing
+
+if TYPE_CHECKING:
+    from wbc_suite.executors import Item, Outcome
+    from wbc_suite.rollout import Case, Summary
+
+__all__ = ["rollout"]
+
+
+def rollout(
+    benchmarks: Annotated[list[str], typer.Argument(help="Benchmarks, one or more.")],
+    robots: Annotated[
+        list[str],
+        typer.Option(
+            help="Robot; a,b for two in one scene. Repeat it to compare.",
+            default_factory=lambda: ["Panda"],
+            show_default="Panda",
+        ),
+    ],
+    controller: Annotated[
+        list[str] | None,
+        typer.Option(help="Controller, by name or file. Repeat it to compare."),
+    ] = None,
+    policy: Annotated[
+        str,
+        typer.Option(help="random, hold, scripted (Lift), or module:function."),
+    ] = "random",
+    episodes: Annotated[int, typer.Option(min=1, help="Per case.")] = 10,
+    first_seed: Annotated[int, typer.Option(min=0, help="Seed of the first.")] = 0,
+    horizon: Annotated[
+        int | None, typer.Option(min=1, help="Steps of an episode at most.")
+    ] = None,
+    shaped: Annotated[bool, typer.Option(help="Shaped rewards.")] = False,
+    record: Annotated[
+        bool,
+        typer.Option("--record", help="Record them: one HDF5 file per item of work."),
+    ] = False,
+    output: Annotated[
+        Path,
+        typer.Option("--output", "-o", help="Folder of the results; goes on there."),
+    ] = Path("artifacts/rollout"),
+    executor: ExecutorOption = "process",
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="At once; one per processor by default.")
+    ] = None,
+    chunk: Annotated[int, typer.Option(min=1, help="Episodes per item of work.")] = 10,
+    catalogue: CatalogueOption = None,
+) -> None:
+    """Play many episodes and count successes; stop and go on whenever you like.
+
+    Example: wbc-suite rollout Lift Door --robots Panda --robots UR5e --episodes 100
+    """
+    from wbc_suite.executors import make_executor, work_off
+    from wbc_suite.rollout import plan, roll_out
+
+    arguments: dict[str, str | int | float | bool] = {"reward_shaping": shaped}
+    if horizon is not None:
+        arguments["horizon"] = horizon
+    cases = _cases(benchmarks, robots, controller, policy, arguments, record=record)
+    seeds = range(first_seed, first_seed + episodes)
+    items = {case: plan([case], seeds=seeds, chunk=chunk) for case in cases}
+    every = [item for mine in items.values() for item in mine]
+    with _progress(len(every)) as tell:
+        outcomes = work_off(
+            roll_out,
+            every,
+            folder=output,
+            executor=make_executor(executor, workers=workers),
+            tell=tell,
+        )
+    _report(items, outcomes, output)
+
+
+def _cases(
+    benchmarks: Sequence[str],
+    robots: Sequence[str],
+    controllers: Sequence[str] | None,
+    policy: str,
+    arguments: dict[str, str | int | float | bool],
+    *,
+    record: bool,
+) -> "list[Case]":
+    """Return every combination; a robot that does not exist is told at once."""
+    from wbc_suite import load_robot
+    from wbc_suite.rollout import Case
+
+    for name in {name.strip() for together in robots for name in together.split(",")}:
+        load_robot(name)
+    return [
+        Case(
+            benchmark=benchmark,
+            robots=tuple(name.strip() for name in together.split(",")),
+            controller=controller,
+            policy=policy,
+            record=record,
+            arguments=tuple(sorted(arguments.items())),
+        )
+        for benchmark in benchmarks
+        for together in robots
+        for controller in controllers or [None]
+    ]
+
+
+@contextmanager
+def _progress(total: int) -> "Iterator[Callable[[Item, Outcome], None]]":
+    """Show a bar; errors are told above it as they come."""
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TimeRemainingColumn,
+    )
+
+    with Progress(
+        "Rollouts", BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
+    ) as bar:
+        line = bar.add_task("rollouts", total=total)
+
+        def tell(item: "Item", outcome: "Outcome") -> None:
+            if outcome.error is not None:
+                bar.console.print(f"{item.name}: {outcome.error}", markup=False)
+            bar.advance(line)
+
+        yield tell
+
+
+def _report(
+    items: "dict[Case, list[Item]]", outcomes: "list[Outcome]", output: Path
+) -> None:
+    """Print a table and write summary.json; fail when an item failed."""
+    from wbc_suite.rollout import episodes_of, summarise
+
+    by_name = {outcome.name: outcome for outcome in outcomes}
+    summaries: dict[str, Summary] = {}
+    for case, mine in items.items():
+        played = episodes_of(by_name[item.name] for item in mine)
+        if played:
+            summaries[case.title] = summarise(played)
+    _print_table(summaries)
+    path = output / "summary.json"
+    with writing(path):
+        figures = {title: asdict(summary) for title, summary in summaries.items()}
+        path.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
+    print(f"Written: {path}; every episode is in {output / 'results'}.")
+    failed = sum(outcome.error is not None for outcome in outcomes)
+    if failed:
+        print(
+            f"{failed} of {len(outcomes)} items failed; the same command does them "
+            "again."
+        )
+        raise typer.Exit(1)
+
+
+def _print_table(summaries: "dict[str, Summary]") -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table("case", "episodes", "success", "95 %", "return", "steps", "steps/s")
+    for title, s in summaries.items():
+        low, high = s.interval
+        table.add_row(
+            title,
+            str(s.episodes),
+            f"{s.success:.1%}",
+            f"{low:.1%} to {high:.1%}",
+            f"{s.mean_return:.3g}",
+            f"{s.mean_steps:.0f}"
+            + (f" ({s.physics_errors} broken)" * bool(s.physics_errors)),
+            f"{s.steps_per_second:.0f}",
+        )
+    Console().print(table)

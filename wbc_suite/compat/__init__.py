@@ -1,0 +1,1 @@
+"""Other libraries' shapes, so that scripts written for them run here."""

@@ -1,0 +1,195 @@
+"""BASIC: every part of a robot has a controller of its own."""
+
+from collections.abc import Mapping
+from typing import Any, Literal
+
+import numpy as np
+
+from wbc_suite.control.action import ActionLayout
+from wbc_suite.control.composite.parts import (
+    PartConfig,
+    check_part,
+    hands_of,
+    make_part,
+    motors,
+    parts_of,
+)
+from wbc_suite.control.composite.standing import StanceConfig, StanceController
+from wbc_suite.control.part.controller import WHENEVER, PartController
+from wbc_suite.control.part.gripper import GripperController
+from wbc_suite.control.part.ik_pose import IkPoseController
+from wbc_suite.control.part.joint import JointLaw, JointLawConfig
+from wbc_suite.control.part.law import Law, ServoLaw, commands
+from wbc_suite.control.state import RobotState
+from wbc_suite.errors import ConfigError
+from wbc_suite.robot import RobotDescription
+from wbc_suite.robot.parts import Name
+from wbc_suite.tomlfile import FrozenModel, parse_model
+from wbc_suite.typing import Vector
+
+__all__ = ["BasicConfig", "BasicController", "check_basic", "default_basic_config"]
+
+
+class BasicConfig(FrozenModel):
+    """Config of BASIC.
+
+    Attributes:
+        format: Version of the format, 1.
+        type: Registered name.
+        body_parts: Controller by part, in the order of the action; grippers follow.
+            Joints that no part names are held.
+        may_fall: Whether a robot with a free root may go without a STANCE, such as for
+            learning to walk by the joints of its legs.
+    """
+
+    format: Literal[1] = 1
+    type: str = "BASIC"
+    body_parts: dict[Name, PartConfig]
+    may_fall: bool = False
+
+
+class BasicController:
+    """Drives parts side by side; see `CompositeController`.
+
+    Args:
+        config: Plain data of a `BasicConfig`.
+        state: The robot in the simulation.
+
+    Attributes:
+        layout: Slices of the action: parts, then grippers.
+        parts: Controllers by part, grippers as `{part}_gripper`.
+        laws: Their laws, those that hold joints of no part, and that of feet.
+    """
+
+    def __init__(self, config: Mapping[str, Any], state: RobotState) -> None:
+        self.config = check_basic(config, state.robot, str(config.get("type")))
+        self.parts: dict[str, PartController] = {
+            name: make_part(name, part, state)
+            for name, part in self.config.body_parts.items()
+        }
+        hands = hands_of(state.robot)
+        for name, part in self.config.body_parts.items():
+            gripper = f"{name}_gripper"
+            if part.gripper is not None and gripper in state.robot.synergies:
+                synergies, grasp = state.robot.synergies[gripper], hands.get(name)
+                self.parts[gripper] = GripperController(
+                    gripper, synergies, state, part.gripper, grasp
+                )
+        self.layout = ActionLayout(s for p in self.parts.values() for s in p.slices)
+        self._places = [
+            (
+                part,
+                self.layout[part.slices[0].name].start,
+                self.layout[part.slices[-1].name].stop,
+            )
+            for part in self.parts.values()
+            if part.slices
+        ]
+        self._ik_parts = {
+            name: part
+            for name, part in self.parts.items()
+            if isinstance(part, IkPoseController)
+        }
+        driven = {joint for part in self.parts.values() for joint in part.law.joints}
+        self._idle = _holding_laws(state, driven)
+        stances = [p for p in self.parts.values() if isinstance(p, StanceController)]
+        self.laws: tuple[Law, ...] = (
+            *(part.law for part in self.parts.values()),
+            *self._idle,
+            *(part.stance for part in stances),
+        )
+        self.reset(state)
+
+    def reset(self, state: RobotState) -> None:
+        """Hold every part where it is."""
+        for law in self.laws:
+            law.reset(state)
+        for part in self.parts.values():
+            part.reset(state)
+        for law in self._idle:
+            law.aim(state.data.qpos[law.drives["qpos"]])
+
+    def set_goal(self, action: Vector, period: float = 0.05) -> None:
+        """Hand each part its values; see `layout`."""
+        for part, start, stop in self._places:
+            part.set_goal(action[start:stop], period)
+
+    def prepare(self, state: RobotState) -> int:
+        """Let parts do what is due."""
+        return min(
+            (part.prepare(state) for part in self.parts.values()), default=WHENEVER
+        )
+
+    def compute(self, state: RobotState) -> Vector:
+        """Return actuator commands by the readable forms of the laws."""
+        return commands(state, self.laws)
+
+    @property
+    def hold_action(self) -> Vector:
+        """The action that keeps all goals."""
+        held = [part.hold_action for part in self.parts.values()]
+        return np.concatenate([np.zeros(0), *held])
+
+    def info(self, state: RobotState) -> dict[str, Any]:
+        """Return `{"ik": ...}` of parts with inverse kinematics, if there are any."""
+        if not self._ik_parts:
+            return {}
+        frames = {name: part.report(state) for name, part in self._ik_parts.items()}
+        reached = all(frame["reached"] for frame in frames.values())
+        return {"ik": {"reached": reached, "frames": frames}}
+
+
+def _holding_laws(state: RobotState, driven: set[str]) -> tuple[JointLaw, ServoLaw]:
+    """Return laws of the joints that no part drives, by torque and by set point."""
+    idle = [joint for joint in state.actuators if joint not in driven]
+    torques, gains = set(motors(state.robot)), JointLawConfig()
+    return (
+        JointLaw(state, [j for j in idle if j in torques], kp=gains.kp, kd=gains.kd),
+        ServoLaw(state, [j for j in idle if j not in torques]),
+    )
+
+
+def check_basic(
+    config: Mapping[str, Any], robot: RobotDescription | None, source: str
+) -> BasicConfig:
+    """Return the config as a model.
+
+    Raises:
+        ConfigError: If it breaks a rule of the format, names a part that the robot
+            does not have, or would let it fall.
+    """
+    read = parse_model(BasicConfig, config, source=source)
+    if robot is None:
+        return read
+    for name, part in read.body_parts.items():
+        try:
+            check_part(name, part, robot)
+        except ConfigError as error:
+            raise ConfigError(f"{source}: key 'body_parts.{name}': {error}") from error
+    stands = any(isinstance(part, StanceConfig) for part in read.body_parts.values())
+    if robot.root.kind == "free" and not (stands or read.may_fall):
+        raise ConfigError(
+            f"{source}: key 'body_parts': {robot.name} is free to fall, and no part "
+            "keeps it on its feet. Give its legs the type 'STANCE', or the robot a "
+            "root 'fixed' or 'planar'; 'may_fall = true' lets it fall."
+        )
+    return read
+
+
+def default_basic_config(robot: RobotDescription) -> dict[str, Any]:
+    """Return a config for a robot without a file.
+
+    Hands move in operational space, other joints by steps, bases by speeds, and legs
+    under a free root carry it.
+    """
+    hands = hands_of(robot)
+    parts: dict[str, Any] = {
+        name: {"type": "OSC_POSE" if name in hands else "JOINT_POSITION"}
+        for name in parts_of(robot)
+    }
+    if "base" in parts:
+        parts["base"] = {"type": "BASE_VELOCITY"}
+    if robot.root.kind == "free" and parts:
+        legs = [name for name in parts if name not in hands] or list(parts)
+        parts["legs" if "legs" in parts else legs[-1]] = {"type": "STANCE"}
+    return {"format": 1, "body_parts": parts}

@@ -1,0 +1,235 @@
+"""MuJoCo as compiled code sees it: its step functions, and views of its arrays."""
+
+import ctypes
+from collections.abc import Callable
+from enum import IntEnum
+from pathlib import Path
+from typing import Any, NamedTuple, cast
+
+import llvmlite.binding
+import mujoco
+import numpy as np
+from numba import types
+from numba.core import cgutils
+from numba.core.imputils import lower_getattr_generic
+from numba.core.typing.templates import AttributeTemplate
+from numba.extending import infer_getattr, intrinsic, models, register_model
+from numba.np.arrayobj import make_array
+
+from wbc_suite.compiling import compiled
+from wbc_suite.kinematics.array_table import (
+    INDICES,
+    MATRIX,
+    VECTOR,
+    ArrayTable,
+    array_at,
+    indices,
+)
+from wbc_suite.typing import Indices, Matrix, Vector
+
+__all__ = ["Physics", "bind_physics", "physics_of", "physics_table"]
+__all__ += ["flags_of", "let_sense"]
+__all__ += ["mj_comPos", "mj_kinematics", "mj_step1", "mj_step2"]
+
+WANTED, PULL, PLACE, REST, CHANGE, COLUMN = 18, 19, 20, 21, 22, 23
+VECTORS, LIMITS, ROTATIONS, INERTIA = 24, 33, 35, 56
+"""Rows of a law's scratch after three matrices of six rows: vectors, rotations of three
+rows each, the inertia, then what `straight` needs."""
+
+_LIBRARY = next(Path(mujoco.__file__).parent.glob("libmujoco*"))
+llvmlite.binding.load_library_permanently(str(_LIBRARY))
+_OF_MODEL_AND_DATA = types.void(types.intp, types.intp)
+
+mj_step1 = types.ExternalFunction("mj_step1", _OF_MODEL_AND_DATA)
+mj_step2 = types.ExternalFunction("mj_step2", _OF_MODEL_AND_DATA)
+mj_kinematics = types.ExternalFunction("mj_kinematics", _OF_MODEL_AND_DATA)
+mj_comPos = types.ExternalFunction("mj_comPos", _OF_MODEL_AND_DATA)
+
+
+class Physics(NamedTuple):
+    """Addresses of a model and its data, and views of their arrays.
+
+    Valid as long as model and data live; names are MuJoCo's.
+    """
+
+    model: int
+    data: int
+    timestep: float
+    qpos: Vector
+    qvel: Vector
+    ctrl: Vector
+    qfrc_bias: Vector
+    qfrc_passive: Vector
+    M: Vector
+    M_rownnz: Indices
+    M_rowadr: Indices
+    M_colind: Indices
+    site_xpos: Matrix
+    site_xmat: Matrix
+    xpos: Matrix
+    xmat: Matrix
+    cdof: Matrix
+    cdof_dot: Matrix
+    cvel: Matrix
+    subtree_com: Matrix
+    site_bodyid: Indices
+    body_rootid: Indices
+    body_last_dof: Indices
+    dof_parentid: Indices
+    acceleration: Vector
+    """What laws ask of each degree of freedom, shape (nv,): scratch of the loop."""
+    force: Vector
+    """M times that, shape (nv,): scratch of the loop."""
+    work: Matrix
+    """Scratch of one law, shape (70 + 6 nv, 2 nv + 8); see its rows above."""
+
+
+_NUMBERS = ("model", "data", "timestep")
+_ARRAYS = tuple(name for name in Physics._fields if name not in _NUMBERS)
+_SWITCH = ("flags", "no_sensors")
+_TABLE = (*_ARRAYS, *_SWITCH)
+_INDICES = ("M_rownnz", "M_rowadr", "M_colind", "site_bodyid", "body_rootid")
+_INDICES += ("body_last_dof", "dof_parentid")
+_MATRICES = ("site_xpos", "site_xmat", "xpos", "xmat", "cdof", "cdof_dot", "cvel")
+_MATRICES += ("subtree_com", "work")
+_KINDS: dict[str, Any] = (
+    dict.fromkeys(_ARRAYS, VECTOR)
+    | dict.fromkeys(_INDICES, INDICES)
+    | dict.fromkeys(_MATRICES, MATRIX)
+)
+
+PhysicsField = cast(
+    "type[IntEnum]",
+    IntEnum("PhysicsField", [name.upper() for name in _TABLE], start=0),
+)
+"""Places of the arrays in a `physics_table`: those of `Physics`, and the switch of
+`let_sense`."""
+
+
+def bind_physics(model: mujoco.MjModel, data: mujoco.MjData) -> Physics:
+    """Return the view of a simulation for compiled code."""
+    own = {
+        "body_last_dof": _last_dofs(model),
+        "acceleration": np.zeros(model.nv),
+        "force": np.zeros(model.nv),
+        "work": np.zeros((70 + 6 * model.nv, 2 * model.nv + 8)),
+    }
+    views = {
+        name: getattr(data if hasattr(data, name) else model, name)
+        for name in _ARRAYS
+        if name not in own
+    }
+    constant = {
+        name: array.astype(np.int64)
+        for name, array in views.items()
+        if array.dtype == np.int32
+    }
+    return Physics(
+        model=model._address,
+        data=data._address,
+        timestep=float(model.opt.timestep),
+        **{**views, **constant, **own},
+    )
+
+
+def physics_table(model: mujoco.MjModel, physics: Physics) -> ArrayTable:
+    """Return where the arrays are: one argument of compiled calls in place of all."""
+    arrays = physics._asdict() | dict(zip(_SWITCH, _sensor_switch(model), strict=True))
+    return ArrayTable(
+        PhysicsField, {field: arrays[_TABLE[field]] for field in PhysicsField}
+    )
+
+
+class _PhysicsType(types.Type):
+    """A `Physics` in compiled code: where its table is, and the timestep.
+
+    Attributes are read where they are asked for. A call hands over two numbers, not
+    the seven of each array; those take most of the time to compile.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(name="Physics")
+
+
+@register_model(_PhysicsType)
+class _PhysicsModel(models.StructModel):
+    def __init__(self, manager: Any, kind: _PhysicsType) -> None:
+        members = [("table", types.CPointer(types.int64)), ("timestep", types.float64)]
+        super().__init__(manager, kind, members)
+
+
+@infer_getattr
+class _PhysicsAttributes(AttributeTemplate):
+    key = _PhysicsType
+
+    def generic_resolve(self, value: _PhysicsType, attr: str) -> types.Type | None:
+        return types.float64 if attr == "timestep" else _KINDS.get(attr)
+
+
+@lower_getattr_generic(_PhysicsType)
+def _read(context: Any, builder: Any, kind: Any, value: Any, attr: str) -> Any:
+    physics = cgutils.create_struct_proxy(kind)(context, builder, value=value)
+    if attr == "timestep":
+        return physics.timestep
+    place = context.get_constant(types.intp, 3 * _ARRAYS.index(attr))
+    words = builder.gep(physics.table, [place])
+    return array_at(context, builder, _KINDS[attr], words)
+
+
+def _physics_of(typingctx: Any, table: Any, timestep: Any) -> Any:
+    def write(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        physics = cgutils.create_struct_proxy(signature.return_type)(context, builder)
+        physics.table = make_array(table)(context, builder, args[0]).data
+        physics.timestep = args[1]
+        return physics._getvalue()
+
+    return _PhysicsType()(table, types.float64), write
+
+
+physics_of = cast("Callable[[Indices, float], Physics]", intrinsic(_physics_of))
+"""Compiled code's view of the arrays that a `physics_table` tells."""
+
+
+@compiled
+def flags_of(table: Indices) -> int:
+    """Return the word of the model that holds its flags."""
+    return indices(table, 24)[0]
+
+
+@compiled
+def let_sense(table: Indices, flags: int, on: bool) -> None:
+    """Let MuJoCo's next step read sensors, or leave what they said.
+
+    Args:
+        table: Where the arrays are.
+        flags: The model's own, see `flags_of`.
+        on: Whether sensors are read, if the model does so at all.
+    """
+    indices(table, 24)[0] = flags if on else flags | indices(table, 25)[0]
+
+
+def _sensor_switch(model: mujoco.MjModel) -> tuple[Indices, Indices]:
+    """Return the word of the model that holds its flags, and the flag of no sensors.
+
+    It is none at all where sensors remember what they said, or are off anyway.
+    """
+    option = model.opt
+    # The flags are the ninth integer after the frictions, as mjmodel.h has it.
+    place = option.o_friction.ctypes.data + option.o_friction.nbytes + 8 * 4
+    flags = np.ctypeslib.as_array((ctypes.c_int64 * 1).from_address(place))
+    given, before = option.disableflags, int(flags[0])
+    option.disableflags |= mujoco.mjtDisableBit.mjDSBL_SENSOR
+    flag = before ^ int(flags[0])  # in whichever half of the word it is
+    option.disableflags = given
+    remembers = model.sensor_history.any() or model.sensor_interval.any()
+    return flags, np.array([0 if remembers else flag], dtype=np.int64)
+
+
+def _last_dofs(model: mujoco.MjModel) -> Indices:
+    """Return the last degree of freedom that moves each body, -1 without any."""
+    last = np.full(model.nbody, -1, dtype=np.int64)
+    for body in range(1, model.nbody):
+        count = int(model.body_dofnum[body])
+        own = int(model.body_dofadr[body]) + count - 1
+        last[body] = own if count else last[model.body_parentid[body]]
+    return last

@@ -1,0 +1,235 @@
+"""Gamepads: DualSense by its reports, any other on Linux by the kernel's files."""
+
+import errno
+import os
+import struct
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wbc_suite.devices.hid import open_hid, waiting_reports
+from wbc_suite.devices.state import DeviceState, LimbInput
+from wbc_suite.errors import DeviceError
+from wbc_suite.typing import Vector
+
+__all__ = ["DualSense", "Gamepad", "Pad", "PadJog", "parse_dualsense", "parse_joystick"]
+
+DEAD = 0.1  # of a stick's way that counts as rest
+SPEED, TURN = 0.3, 1.0  # m/s and rad/s at full deflection
+DRIVE, SPIN = 0.4, 0.6  # of the base
+SONY, DUALSENSE = (0x054C,), (0x0CE6, 0x0DF2)
+
+BUTTONS = {"north": "next", "west": "home", "east": "discard", "start": "keep"}
+BUTTONS |= {"select": "reset"}
+
+
+@dataclass(frozen=True, slots=True)
+class Pad:
+    """Where everything on a gamepad is.
+
+    Attributes:
+        left: Left stick, right and up, -1 .. 1.
+        right: Right stick.
+        triggers: Left and right, 0 .. 1.
+        cross: Right and up, -1, 0 or 1.
+        down: Names of pressed buttons: `south`, `east`, `west`, `north`, `l1`, `r1`,
+            `select`, `start`.
+    """
+
+    left: tuple[float, float] = (0.0, 0.0)
+    right: tuple[float, float] = (0.0, 0.0)
+    triggers: tuple[float, float] = (0.0, 0.0)
+    cross: tuple[int, int] = (0, 0)
+    down: frozenset[str] = frozenset()
+
+
+def parse_dualsense(report: bytes) -> Pad | None:
+    """Read a DualSense's report, of USB (1) or of Bluetooth (49); None for others.
+
+    Source: Linux, drivers/hid/hid-playstation.c, struct dualsense_input_report.
+    """
+    if len(report) >= 11 and report[0] == 0x01:
+        body = report[1:]
+    elif len(report) >= 12 and report[0] == 0x31:
+        body = report[2:]
+    else:
+        return None
+    x, y, rx, ry, left, right = body[:6]
+    hat, first, second = body[7] & 15, body[7] >> 4, body[8]
+    names = ("west", "south", "east", "north")
+    down = {name for k, name in enumerate(names) if first >> k & 1}
+    names = ("l1", "r1", "l2", "r2", "select", "start")
+    down |= {name for k, name in enumerate(names) if second >> k & 1}
+    around = [(0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1)]
+    return Pad(
+        left=(_byte(x), -_byte(y)),
+        right=(_byte(rx), -_byte(ry)),
+        triggers=(left / 255.0, right / 255.0),
+        cross=around[hat] if hat < 8 else (0, 0),
+        down=frozenset(down - {"l2", "r2"}),
+    )
+
+
+def parse_joystick(event: bytes, pad: Pad) -> Pad:
+    """Return a pad after an event of a Linux joystick file, 8 bytes.
+
+    Source: Linux, Documentation/input/joydev/joystick-api.rst; numbers as the driver
+    xpad gives them.
+    """
+    _, value, kind, number = struct.unpack("<IhBB", event)
+    if kind & 2:  # an axis; bit 7 only says that it is the first report
+        return _with_axis(pad, number, value / 32767.0)
+    names = ("south", "east", "west", "north", "l1", "r1", "select", "start")
+    if not kind & 1 or number >= len(names):
+        return pad
+    name = {names[number]}
+    return replace(pad, down=pad.down | name if value else pad.down - name)
+
+
+def _with_axis(pad: Pad, number: int, x: float) -> Pad:
+    match number:
+        case 0:
+            return replace(pad, left=(x, pad.left[1]))
+        case 1:
+            return replace(pad, left=(pad.left[0], -x))
+        case 2:
+            return replace(pad, triggers=(0.5 * (x + 1.0), pad.triggers[1]))
+        case 3:
+            return replace(pad, right=(x, pad.right[1]))
+        case 4:
+            return replace(pad, right=(pad.right[0], -x))
+        case 5:
+            return replace(pad, triggers=(pad.triggers[0], 0.5 * (x + 1.0)))
+        case 6:
+            return replace(pad, cross=(round(x), pad.cross[1]))
+        case 7:
+            return replace(pad, cross=(pad.cross[0], round(-x)))
+    return pad
+
+
+class PadJog:
+    """Turns a pad into velocities of the hand that is switched to."""
+
+    def __init__(self) -> None:
+        self._before: frozenset[str] = frozenset()
+        self._closed: bool | None = None
+
+    def state(self, time: float, pad: Pad) -> DeviceState:
+        """Return what the pad says now."""
+        if "south" in pad.down - self._before:
+            self._closed = not self._closed
+        self._before = pad.down
+        (lx, ly), (rx, ry) = _calm(pad.left), _calm(pad.right)
+        rise = pad.triggers[1] - pad.triggers[0]
+        roll = float("r1" in pad.down) - float("l1" in pad.down)
+        linear, angular = np.array([ly, -lx, rise]), np.array([roll, ry, -rx])
+        twist: Vector = np.concatenate([SPEED * linear, TURN * angular])
+        grip = None if self._closed is None else np.array(1.0 if self._closed else -1.0)
+        return DeviceState(
+            time=time,
+            limbs={"hand": LimbInput(twist=twist, grip=grip)},
+            base=np.array([DRIVE * pad.cross[1], 0.0, -SPIN * pad.cross[0]]),
+            buttons=frozenset(BUTTONS[name] for name in pad.down & BUTTONS.keys()),
+        )
+
+
+class Gamepad:
+    """Any gamepad that Linux knows, by its joystick file; needs no package.
+
+    On other systems use the page of the stream, where the browser reads the gamepad.
+
+    Args:
+        path: The joystick file.
+        clock: Source of time, s.
+    """
+
+    help = (
+        "Gamepad: left stick and triggers move the hand, right stick turns it, "
+        "south button closes, north: next hand, the cross drives.\n"
+    )
+
+    def __init__(
+        self,
+        path: str | Path = "/dev/input/js0",
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._path, self._clock = Path(path), clock
+        self._file, self._pad, self._jog = -1, Pad(), PadJog()
+
+    def start(self) -> None:
+        """Open the file; raises DeviceError when there is none."""
+        try:
+            self._file = os.open(self._path, os.O_RDONLY | os.O_NONBLOCK)
+        except OSError as error:
+            raise DeviceError(
+                f"No gamepad at '{self._path}' ({error.strerror}). Plug it in, or use "
+                "--device stream and the browser's page, which reads any gamepad."
+            ) from error
+
+    def read(self) -> DeviceState:
+        """Return what the pad says now."""
+        try:
+            while len(event := os.read(self._file, 8)) == 8:
+                self._pad = parse_joystick(event, self._pad)
+        except OSError as error:
+            if error.errno != errno.EAGAIN:  # it was pulled out: everything at rest
+                self._pad = Pad()
+        return self._jog.state(self._clock(), self._pad)
+
+    def stop(self) -> None:
+        """Close the file."""
+        if self._file >= 0:
+            os.close(self._file)
+        self._file = -1
+
+
+class DualSense:
+    """Sony's DualSense, by USB or Bluetooth, on any system.
+
+    Args:
+        find: Opens the pads that are plugged in.
+        clock: Source of time, s.
+    """
+
+    help = Gamepad.help
+
+    def __init__(
+        self,
+        find: Callable[[], list[Any]] | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._find = find or (lambda: open_hid("DualSense", SONY, DUALSENSE))
+        self._clock = clock
+        self._hid: Any = None
+        self._pad, self._jog = Pad(), PadJog()
+
+    def start(self) -> None:
+        """Open the pad; raises DeviceError when there is none."""
+        self._hid = self._find()[0]
+
+    def read(self) -> DeviceState:
+        """Return what the pad says now."""
+        for report in waiting_reports(self._hid):
+            self._pad = parse_dualsense(report) or self._pad
+        return self._jog.state(self._clock(), self._pad)
+
+    def stop(self) -> None:
+        """Close the pad."""
+        if self._hid is not None:
+            self._hid.close()
+        self._hid = None
+
+
+def _byte(x: int) -> float:
+    return min(max((x - 127.5) / 127.5, -1.0), 1.0)
+
+
+def _calm(stick: tuple[float, float]) -> tuple[float, float]:
+    """Return a stick's deflection without its dead zone, which is round."""
+    far = float(np.hypot(*stick))
+    factor = max(0.0, far - DEAD) / (1.0 - DEAD) / max(far, 1e-9)
+    return stick[0] * factor, stick[1] * factor

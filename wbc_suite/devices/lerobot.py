@@ -1,0 +1,214 @@
+"""Both ways between our devices and LeRobot's teleoperators; neither imports the other.
+
+LeRobot asks a teleoperator for a flat dictionary of numbers. Ours has these keys:
+`right.x .y .z .rx .ry .rz` for a pose (m, rotation vector in rad), `right.vx ... .wz`
+for a twist, `right.engaged`, `right.grip` (or `right.grip.0`, ... by synergy),
+`elbow.pos` for a joint, `base.forward .left .turn`, and `button.keep`.
+"""
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol
+
+import numpy as np
+import pinocchio as pin
+
+from wbc_suite.devices.device import Device
+from wbc_suite.devices.state import DeviceState, LimbInput
+from wbc_suite.errors import DeviceError
+from wbc_suite.typing import Vector
+
+__all__ = ["FromLeRobot", "Teleoperator", "ToLeRobot", "flatten", "unflatten"]
+
+POSE = ("x", "y", "z", "rx", "ry", "rz")
+TWIST = ("vx", "vy", "vz", "wx", "wy", "wz")
+BASE = ("forward", "left", "turn")
+
+
+class Teleoperator(Protocol):
+    """What is used of LeRobot's teleoperators."""
+
+    def connect(self) -> None:
+        """Open it."""
+        ...
+
+    def get_action(self) -> Mapping[str, Any]:
+        """Return numbers by name."""
+        ...
+
+    def disconnect(self) -> None:
+        """Close it."""
+        ...
+
+
+def flatten(state: DeviceState) -> dict[str, float]:
+    """Return a state as LeRobot has actions; see above."""
+    flat: dict[str, float] = {}
+    for name, limb in state.limbs.items():
+        if limb.pose is not None:
+            turn = pin.log3(limb.pose.rotation)
+            flat |= _named(name, POSE, np.concatenate([limb.pose.translation, turn]))
+        if limb.twist is not None:
+            flat |= _named(name, TWIST, limb.twist)
+        flat[f"{name}.engaged"] = float(limb.engaged)
+        if limb.grip is not None and limb.grip.ndim == 0:
+            flat[f"{name}.grip"] = float(limb.grip)
+        elif limb.grip is not None:
+            flat |= {f"{name}.grip.{k}": float(x) for k, x in enumerate(limb.grip)}
+    flat |= {f"{joint}.pos": float(x) for joint, x in state.joints.items()}
+    if state.base is not None:
+        flat |= _named("base", BASE, state.base)
+    return flat | {f"button.{name}": 1.0 for name in sorted(state.buttons)}
+
+
+def unflatten(flat: Mapping[str, Any], time: float) -> DeviceState:
+    """Return a flat action as a state; what is not named as above is left out.
+
+    Raises:
+        DeviceError: If a value is no number.
+    """
+    numbers = {name: _number(name, value) for name, value in flat.items()}
+    ends = {*POSE, *TWIST, "engaged", "grip"}
+    split = [name.split(".") for name in numbers]
+    limbs = {p[0] for p in split if len(p) > 1 and p[1] in ends}
+    base = _taken(numbers, "base", BASE)
+    return DeviceState(
+        time=time,
+        limbs={name: _limb(numbers, name) for name in sorted(limbs)},
+        joints={
+            name.removesuffix(".pos"): x
+            for name, x in numbers.items()
+            if name.endswith(".pos")
+        },
+        base=base,
+        buttons=frozenset(
+            name.removeprefix("button.")
+            for name, x in numbers.items()
+            if name.startswith("button.") and x > 0.5
+        ),
+    )
+
+
+class ToLeRobot:
+    """One of our devices, as LeRobot wants teleoperators.
+
+    Args:
+        device: The device.
+    """
+
+    name = "wbc_suite"
+    is_calibrated = True
+
+    def __init__(self, device: Device) -> None:
+        self._device = device
+        self.is_connected = False
+
+    @property
+    def action_features(self) -> dict[str, type]:
+        """Names of what the device says now, each a number."""
+        return dict.fromkeys(self.get_action(), float)
+
+    @property
+    def feedback_features(self) -> dict[str, type]:
+        """None: our devices only speak."""
+        return {}
+
+    def connect(self, calibrate: bool = True) -> None:
+        """Start the device; there is nothing to calibrate."""
+        self._device.start()
+        self.is_connected = True
+
+    def calibrate(self) -> None:
+        """Do nothing."""
+
+    def configure(self) -> None:
+        """Do nothing."""
+
+    def get_action(self) -> dict[str, float]:
+        """Return the newest state, flat."""
+        return flatten(self._device.read())
+
+    def send_feedback(self, feedback: Mapping[str, Any]) -> None:
+        """Do nothing."""
+
+    def disconnect(self) -> None:
+        """Stop the device."""
+        self.is_connected = False
+        self._device.stop()
+
+
+class FromLeRobot:
+    """One of LeRobot's teleoperators, as a device.
+
+    Args:
+        teleoperator: Connected by `start`.
+        names: Their name of a number to ours, such as `shoulder_pan.pos` to
+            `right_shoulder_yaw_joint.pos`; others keep theirs.
+        scale: Factor by our name; LeRobot's arms often say degrees: `math.pi / 180`.
+        clock: Source of time, s.
+    """
+
+    def __init__(
+        self,
+        teleoperator: Teleoperator,
+        names: Mapping[str, str] | None = None,
+        scale: Mapping[str, float] | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._teleoperator, self._clock = teleoperator, clock
+        self._names, self._scale = dict(names or {}), dict(scale or {})
+
+    def start(self) -> None:
+        """Connect it."""
+        self._teleoperator.connect()
+
+    def read(self) -> DeviceState:
+        """Return what it says now."""
+        said = self._teleoperator.get_action()
+        ours = {self._names.get(name, name): value for name, value in said.items()}
+        for name, factor in self._scale.items():
+            if name in ours:
+                ours[name] = factor * _number(name, ours[name])
+        return unflatten(ours, self._clock())
+
+    def stop(self) -> None:
+        """Disconnect it."""
+        self._teleoperator.disconnect()
+
+
+def _named(name: str, ends: tuple[str, ...], values: Vector) -> dict[str, float]:
+    return {f"{name}.{end}": float(x) for end, x in zip(ends, values, strict=True)}
+
+
+def _taken(
+    numbers: Mapping[str, float], name: str, ends: tuple[str, ...]
+) -> Vector | None:
+    """Return the values of a group, 0 where missing; None when all are missing."""
+    keys = [f"{name}.{end}" for end in ends]
+    if not any(key in numbers for key in keys):
+        return None
+    return np.array([numbers.get(key, 0.0) for key in keys])
+
+
+def _limb(numbers: Mapping[str, float], name: str) -> LimbInput:
+    place = _taken(numbers, name, POSE)
+    fingers = [x for key, x in numbers.items() if key.startswith(f"{name}.grip.")]
+    whole = numbers.get(f"{name}.grip")
+    return LimbInput(
+        pose=None if place is None else pin.SE3(pin.exp3(place[3:]), place[:3]),
+        twist=_taken(numbers, name, TWIST),
+        engaged=numbers.get(f"{name}.engaged", 1.0) > 0.5,
+        grip=None if whole is None and not fingers else np.array(fingers or whole),
+    )
+
+
+def _number(name: str, value: Any) -> float:
+    try:
+        return float(value)
+    except (TypeError, ValueError) as error:
+        raise DeviceError(f"'{name}' is no number: {value!r:.40}.") from error
+
+
+DEGREES = math.pi / 180.0
+"""Factor from degrees to rad, for `FromLeRobot`'s `scale`."""

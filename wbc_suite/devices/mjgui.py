@@ -1,0 +1,111 @@
+"""MJGUI: drag targets in MuJoCo's own window."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+
+from wbc_suite.devices.limbs import LimbKind, LimbPort
+from wbc_suite.devices.ports import limb_ports
+from wbc_suite.devices.state import DeviceState, LimbInput
+from wbc_suite.errors import DeviceError
+
+__all__ = ["MjGui"]
+
+SIZE = 0.03  # m, half the edge of a target
+COLOURS = ((0.9, 0.3, 0.2, 0.5), (0.2, 0.5, 0.9, 0.5), (0.3, 0.7, 0.3, 0.5))
+
+
+class MjGui:
+    """Boxes at the robot's limbs that a mouse drags: double click, then Ctrl and drag.
+
+    The window shows a copy of the scene that has the boxes too; the simulation itself
+    stays as it is.
+
+    Args:
+        env: Environment whose limbs are dragged.
+        launch: Opens a window on a model and its data; MuJoCo's passive viewer.
+        clock: Source of time, s.
+    """
+
+    help = "MuJoCo's window: double click a box, then Ctrl and drag.\n"
+
+    def __init__(
+        self,
+        env: Any,
+        launch: Callable[[mujoco.MjModel, mujoco.MjData], Any] | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._env, self._launch, self._clock = env.unwrapped, launch or _window, clock
+        movable = (LimbKind.POSE, LimbKind.POSITION)
+        self._ports = [p for p in limb_ports(env).values() if p.kind in movable]
+        self._viewer: Any = None
+
+    def start(self) -> None:
+        """Open the window; raises DeviceError where there is no screen."""
+        self._model = _with_targets(self._env.scene_xml, self._ports)
+        self._data = mujoco.MjData(self._model)
+        self._copy()
+        for k, port in enumerate(self._ports):
+            T = port.measure()
+            self._data.mocap_pos[k] = T.translation
+            self._data.mocap_quat[k] = np.roll(pin.Quaternion(T.rotation).coeffs(), 1)
+        mujoco.mj_forward(self._model, self._data)
+        self._viewer = self._launch(self._model, self._data)
+
+    def read(self) -> DeviceState:
+        """Return where the boxes are; a closed window says `quit`."""
+        if not self._viewer.is_running():
+            return DeviceState(time=self._clock(), buttons=frozenset({"quit"}))
+        with self._viewer.lock():
+            self._copy()
+            mujoco.mj_kinematics(self._model, self._data)
+            places = zip(self._data.mocap_pos, self._data.mocap_quat, strict=True)
+            poses = [
+                pin.XYZQUATToSE3(np.concatenate([p, np.roll(q, -1)])) for p, q in places
+            ]
+        self._viewer.sync()
+        limbs = {
+            port.name: LimbInput(pose=pose)
+            for port, pose in zip(self._ports, poses, strict=True)
+        }
+        return DeviceState(time=self._clock(), limbs=limbs)
+
+    def stop(self) -> None:
+        """Close the window."""
+        if self._viewer is not None:
+            self._viewer.close()
+        self._viewer = None
+
+    def _copy(self) -> None:
+        self._data.qpos[:] = self._env.simulation.data.qpos
+        self._data.time = self._env.simulation.data.time
+
+
+def _with_targets(scene: str, ports: list[LimbPort]) -> mujoco.MjModel:
+    spec = mujoco.MjSpec.from_string(scene)
+    for k, port in enumerate(ports):
+        body = spec.worldbody.add_body(name=f"target_{port.name}", mocap=True)
+        body.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            size=[SIZE] * 3,
+            rgba=COLOURS[k % len(COLOURS)],
+            contype=0,
+            conaffinity=0,
+        )
+    return spec.compile()
+
+
+def _window(model: mujoco.MjModel, data: mujoco.MjData) -> Any:
+    from mujoco import viewer
+
+    try:
+        return viewer.launch_passive(model, data)
+    except Exception as error:  # the window library has errors of many kinds
+        raise DeviceError(
+            f"MuJoCo's window does not open: {error}. It needs a screen; on macOS run "
+            "with mjpython. The page of `wbc-suite teleop` needs neither."
+        ) from error

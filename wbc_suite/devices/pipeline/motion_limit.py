@@ -1,0 +1,153 @@
+"""Limits of speed, acceleration and jerk: what makes any input a motion."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from wbc_suite.typing import Vector
+
+__all__ = ["LimitedMotion", "MotionLimit", "Rates"]
+
+HALVINGS = 20
+STILL = 1e-12  # units, units / s and / s^2; what is smaller is none
+
+
+@dataclass(frozen=True, slots=True)
+class Rates:
+    """Greatest magnitudes of a motion's derivatives, in units / s, / s^2 and / s^3."""
+
+    speed: float
+    acceleration: float
+    jerk: float
+
+
+class LimitedMotion:
+    """A point that follows a goal, within bounds of speed, acceleration and jerk.
+
+    Every tick chooses the next acceleration a' among those that keep
+
+        |a' - a| <= J dt,   |a'| <= A,   |v + a' dt| + |a'|^2 / 2J <= V,
+
+    in the Euclidean norm. The last says that the speed stays within V even while the
+    acceleration is taken back at full jerk. Shrinking a by J dt satisfies all three if
+    they held before, so there is always a choice; and since they are convex, the best
+    one on the line from there to the acceleration that is wanted is found by halving.
+    Differences of the positions over dt are v, a and j exactly.
+
+    Args:
+        size: Number of coordinates.
+        rates: The bounds V, A and J.
+        dt: Time between two ticks, s.
+    """
+
+    def __init__(self, size: int, rates: Rates, dt: float) -> None:
+        self._rates, self._dt = rates, dt
+        self._v, self._a, self._still = np.zeros(size), np.zeros(size), True
+
+    @property
+    def at_limit(self) -> bool:
+        """Whether the last tick moved at nearly the greatest speed."""
+        return bool(_norm(self._v) > 0.97 * self._rates.speed)
+
+    def stop(self) -> None:
+        """Stand still at once, as after a reset."""
+        self._v[:], self._a[:], self._still = 0.0, 0.0, True
+
+    def step(self, error: Vector, pace: float = 1.0) -> Vector:
+        """Return the step of this tick, shape (size,), towards a goal `error` away.
+
+        Args:
+            error: Goal less position.
+            pace: Fraction of the greatest speed that is wanted now.
+        """
+        dt = self._dt
+        if self._still and float(error @ error) < STILL**2:
+            return np.zeros_like(self._v)
+        calm = self._a * max(
+            0.0, 1.0 - self._rates.jerk * dt / (_norm(self._a) + STILL)
+        )
+        wanted = self._wanted(error, pace)
+        low, high = 0.0, 1.0
+        if not self._allowed(wanted):
+            for _ in range(HALVINGS):
+                middle = 0.5 * (low + high)
+                if self._allowed(calm + middle * (wanted - calm)):
+                    low = middle
+                else:
+                    high = middle
+            wanted = calm + low * (wanted - calm)
+        self._a = wanted
+        self._v = self._v + wanted * dt
+        self._still = float(self._v @ self._v + wanted @ wanted) < STILL**2
+        return self._v * dt
+
+    def _allowed(self, a: Vector) -> bool:
+        limit, dt = self._rates, self._dt
+        size = _norm(a)
+        return (
+            size <= limit.acceleration
+            and _norm(a - self._a) <= limit.jerk * dt
+            and _norm(self._v + a * dt) + size * size / (2.0 * limit.jerk)
+            <= limit.speed
+        )
+
+    def _wanted(self, error: Vector, pace: float) -> Vector:
+        """Return the acceleration that leads to the goal and stops there."""
+        limit, dt = self._rates, self._dt
+        far = _norm(error)
+        speed = min(pace * limit.speed, self._stoppable(far), far / (3.0 * dt))
+        change = error * (speed / (far + STILL)) - self._v
+        size = _norm(change)
+        gentle = min(
+            limit.acceleration,
+            0.8 * math.sqrt(2.0 * limit.jerk * size),
+            size / (2 * dt),
+        )
+        return change * (gentle / (size + STILL))
+
+    def _stoppable(self, distance: float) -> float:
+        """Return a speed from which `distance` is enough to stop, with a margin."""
+        A, J = 0.5 * self._rates.acceleration, 0.25 * self._rates.jerk
+        ramped = (distance * math.sqrt(J)) ** (2.0 / 3.0)
+        if ramped <= A * A / J:
+            return ramped
+        half = 0.5 * A * A / J
+        return -half + math.sqrt(half * half + 2.0 * A * distance)
+
+
+class MotionLimit:
+    """A pose that follows another one within limits: linear and angular apart."""
+
+    def __init__(self, linear: Rates, angular: Rates, dt: float) -> None:
+        self._linear = LimitedMotion(3, linear, dt)
+        self._angular = LimitedMotion(3, angular, dt)
+        self.pose: pin.SE3 = pin.SE3.Identity()
+        self.pace = 1.0
+
+    @property
+    def acting(self) -> str:
+        """What the stage does, in words; empty when it lets the target pass."""
+        if self._linear.at_limit or self._angular.at_limit:
+            return "at its top speed"
+        return ""
+
+    def reset(self, pose: pin.SE3) -> None:
+        """Stand still at a pose."""
+        self.pose = pose.copy()
+        self._linear.stop()
+        self._angular.stop()
+
+    def apply(self, target: pin.SE3, measured: pin.SE3) -> pin.SE3:
+        """Move on towards the target by one tick; return where that is."""
+        away = target.translation - self.pose.translation
+        turn = pin.log3(target.rotation @ self.pose.rotation.T)
+        step = self._linear.step(away, self.pace)
+        rotation = pin.exp3(self._angular.step(turn, self.pace)) @ self.pose.rotation
+        self.pose = pin.SE3(rotation, self.pose.translation + step)
+        return self.pose
+
+
+def _norm(x: Vector) -> float:
+    return math.sqrt(float(x @ x))

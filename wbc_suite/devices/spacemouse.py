@@ -1,0 +1,143 @@
+"""SpaceMouse: six axes under one hand; two of them, two hands."""
+
+import struct
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from wbc_suite.devices.hid import open_hid, waiting_reports
+from wbc_suite.devices.state import DeviceState, LimbInput
+from wbc_suite.typing import Vector
+
+__all__ = ["SpaceMouse", "parse_axes", "parse_buttons", "shaped"]
+
+VENDORS = (0x256F, 0x046D)  # 3Dconnexion, and Logitech for models before 2013
+PRODUCTS = (
+    0xC62E, 0xC62F, 0xC631, 0xC632, 0xC633, 0xC635, 0xC652, 0xC63A,  # 3Dconnexion
+    0xC603, 0xC605, 0xC606, 0xC621, 0xC623, 0xC625, 0xC626, 0xC627, 0xC628, 0xC629,
+    0xC62B,
+)  # fmt: skip
+FULL = 350.0  # counts at full deflection; vendor's nominal range
+DEAD = 0.06  # of full deflection that counts as rest
+EXPONENT = 1.6  # finer near rest
+SPEED, TURN = 0.35, 1.2  # m/s and rad/s at full deflection
+SILENCE = 0.3  # s; a mouse at rest says nothing, so the last report lasts that long
+
+_TO_OURS = np.array([[0, -1, 0], [-1, 0, 0], [0, 0, -1]], dtype=np.float64)
+"""The mouse's axes are right, towards the person and down; ours forward, left, up."""
+
+
+def parse_axes(report: bytes, axes: Vector) -> Vector:
+    """Return the six axes after a report, in the mouse's axes, full deflection 1.
+
+    Args:
+        report: Number 1: translation, or all six axes in newer models; 2: rotation.
+            Others change nothing. Values are little-endian, 16 bits.
+        axes: As they were, shape (6,).
+    """
+    axes = axes.copy()
+    count = 6 if len(report) >= 13 and report[0] == 1 else 3
+    if len(report) < 1 + 2 * count or report[0] not in (1, 2):
+        return axes
+    values = np.array(struct.unpack_from(f"<{count}h", report, 1)) / FULL
+    start = 0 if report[0] == 1 else 3
+    axes[start : start + count] = np.clip(values, -1.0, 1.0)
+    return axes
+
+
+def parse_buttons(report: bytes) -> frozenset[int] | None:
+    """Return the numbers of the buttons that a report says are down, or None."""
+    if len(report) < 2 or report[0] != 3:
+        return None
+    bits = int.from_bytes(report[1:5], "little")
+    return frozenset(k for k in range(32) if bits >> k & 1)
+
+
+def shaped(axes: Vector) -> Vector:
+    """Return deflections without the dead zone, finer near rest, shape (6,)."""
+    beyond = np.maximum(np.abs(axes) - DEAD, 0.0) / (1.0 - DEAD)
+    return np.sign(axes) * beyond**EXPONENT
+
+
+class _Mouse:
+    """What one mouse said last."""
+
+    def __init__(self, hid: Any) -> None:
+        self.hid = hid
+        self.axes: Vector = np.zeros(6)
+        self.buttons: frozenset[int] = frozenset()
+        self.closed = False
+        self.heard = -np.inf
+
+    def drain(self, now: float) -> frozenset[int]:
+        """Take all reports that wait; return the buttons that went down."""
+        pressed: frozenset[int] = frozenset()
+        for report in waiting_reports(self.hid):
+            self.heard = now
+            self.axes = parse_axes(report, self.axes)
+            down = parse_buttons(report)
+            if down is not None:
+                pressed |= down - self.buttons
+                self.buttons = down
+        if now - self.heard > SILENCE:
+            self.axes = np.zeros(6)
+        return pressed
+
+    def twist(self) -> Vector:
+        """Return the velocity that is asked for, our axes, m/s and rad/s."""
+        axes = shaped(self.axes)
+        linear, angular = _TO_OURS @ axes[:3], _TO_OURS @ axes[3:]
+        return np.concatenate([SPEED * linear, TURN * angular])
+
+
+class SpaceMouse:
+    """One SpaceMouse for the hand that is switched to, or one for each hand.
+
+    The left button closes and opens the gripper; the right one goes on to the next
+    hand, or home where every hand has a mouse of its own.
+
+    Args:
+        hands: Which limb each mouse moves, in the order that they are found.
+        find: Opens all mice that are plugged in.
+        clock: Source of time, s.
+    """
+
+    help = "SpaceMouse: left button closes and opens, right button: next hand.\n"
+
+    def __init__(
+        self,
+        hands: Sequence[str] = ("hand",),
+        find: Callable[[], list[Any]] | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._hands, self._clock = tuple(hands), clock
+        self._find = find or (
+            lambda: open_hid("SpaceMouse", VENDORS, PRODUCTS, len(self._hands))
+        )
+        self._mice: list[_Mouse] = []
+
+    def start(self) -> None:
+        """Open the mice; raises DeviceError when there are too few."""
+        self._mice = [_Mouse(hid) for hid in self._find()]
+
+    def read(self) -> DeviceState:
+        """Return what all mice say now."""
+        now, limbs = self._clock(), {}
+        buttons: set[str] = set()
+        for name, mouse in zip(self._hands, self._mice, strict=False):
+            pressed = mouse.drain(now)
+            if 0 in pressed:
+                mouse.closed = not mouse.closed
+            if 1 in pressed:
+                buttons.add("next" if name == "hand" else "home")
+            grip = np.array(1.0 if mouse.closed else -1.0)
+            limbs[name] = LimbInput(twist=mouse.twist(), grip=grip)
+        return DeviceState(time=now, limbs=limbs, buttons=frozenset(buttons))
+
+    def stop(self) -> None:
+        """Close the mice."""
+        for mouse in self._mice:
+            mouse.hid.close()
+        self._mice = []

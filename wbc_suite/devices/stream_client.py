@@ -1,0 +1,53 @@
+"""The reference client of the stream: twenty lines to copy into any program."""
+
+from types import TracebackType
+from typing import Any
+
+from wbc_suite.devices.frame import PoseFrame
+from wbc_suite.errors import DeviceError
+
+__all__ = ["StreamClient"]
+
+
+class StreamClient:
+    """Sends pose frames to a stream.
+
+    Args:
+        url: The address that the stream prints, `http://...`, with its token if any.
+    """
+
+    def __init__(self, url: str) -> None:
+        from websockets.exceptions import InvalidHandshake
+        from websockets.sync.client import connect
+
+        address, _, query = url.partition("?")
+        address = address.rstrip("/").replace("http", "ws", 1) + "/frames"
+        try:
+            self._socket = connect(f"{address}?{query}", compression=None)
+        except (OSError, InvalidHandshake) as error:
+            raise DeviceError(f"No stream answers at {address}: {error}.") from error
+
+    def send(self, frame: PoseFrame) -> None:
+        """Send one frame."""
+        self._socket.send(frame.model_dump_json(exclude_defaults=False))
+
+    def receive(self, timeout: float) -> dict[str, Any]:
+        """Return what the stream says: `{"error": ...}`.
+
+        Raises:
+            TimeoutError: If it says nothing in time.
+        """
+        import json
+
+        return json.loads(self._socket.recv(timeout=timeout))
+
+    def __enter__(self) -> "StreamClient":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._socket.close()

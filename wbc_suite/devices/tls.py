@@ -1,0 +1,71 @@
+"""A key and a certificate of this installation, for pages that browsers want encrypted.
+
+Headsets show WebXR only over TLS. The key is made here, once, and stays in the user's
+cache: a key that came with the package would be everybody's.
+"""
+
+import shutil
+import ssl
+import subprocess
+from pathlib import Path
+
+from wbc_suite.errors import DeviceError
+from wbc_suite.user_cache import user_cache
+
+__all__ = ["make_key", "server_context"]
+
+DAYS = 825  # of validity; the most that browsers accept
+
+
+def server_context(folder: Path | None = None) -> ssl.SSLContext:
+    """Return the server's side of TLS; the first call makes the key.
+
+    Raises:
+        DeviceError: If the key cannot be made.
+    """
+    folder = folder or user_cache() / "tls"
+    key, certificate = folder / "key.pem", folder / "certificate.pem"
+    if not (key.exists() and certificate.exists()):
+        make_key(key, certificate)
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.minimum_version = ssl.TLSVersion.TLSv1_2
+    try:
+        context.load_cert_chain(certificate, key)
+    except (OSError, ssl.SSLError) as error:
+        raise DeviceError(
+            f"The key in '{folder}' cannot be used: {error}. Delete the folder; the "
+            "next start makes a new one."
+        ) from error
+    return context
+
+
+def make_key(key: Path, certificate: Path) -> None:
+    """Make a key that only this user can read, and a certificate signed by itself.
+
+    Raises:
+        DeviceError: If the program `openssl` is missing or fails.
+    """
+    program = shutil.which("openssl")
+    if program is None:
+        raise DeviceError(
+            "TLS needs a key, and the program 'openssl' to make it: install it (apt "
+            f"install openssl), or put key.pem and certificate.pem into '{key.parent}'."
+        )
+    key.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+    key.touch(mode=0o600)
+    made = subprocess.run(
+        [
+            program, "req", "-x509", "-newkey", "ec", "-nodes", "-sha256",
+            "-pkeyopt", "ec_paramgen_curve:prime256v1",
+            "-days", str(DAYS), "-subj", "/CN=wbc-suite",
+            "-addext", "subjectAltName=DNS:localhost,IP:127.0.0.1",
+            "-keyout", str(key), "-out", str(certificate),
+        ],
+        capture_output=True,
+        text=True,
+        check=False,
+    )  # fmt: skip
+    key.chmod(0o600)
+    if made.returncode != 0:
+        key.unlink()
+        raise DeviceError(f"openssl made no key: {made.stderr.strip()[-300:]}")

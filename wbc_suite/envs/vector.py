@@ -1,0 +1,345 @@
+"""Several environments of one process, stepped in parallel threads."""
+
+import os
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.vector import AutoresetMode
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from wbc_suite.envs.env import RobotEnv, checked_seed
+from wbc_suite.errors import ActionError, ConfigError
+from wbc_suite.typing import Array, Matrix
+
+__all__ = ["VectorRobotEnv"]
+
+Observations = dict[str, Array]
+Info = dict[str, Any]
+Flags = NDArray[np.bool_]
+
+_SCALARS = (bool, int, float)
+
+
+class VectorRobotEnv(gymnasium.vector.VectorEnv[Observations, Array, NDArray[Any]]):
+    """Copies of one environment with their own states, stepped at once.
+
+    Physics and control hold no Python lock, so threads share the work; a thread that
+    is done takes the next environment. Every environment does exactly what it would do
+    alone, cameras included. Each has a model of its own, because a reset writes sizes
+    of objects into it.
+
+    Args:
+        num_envs: How many.
+        benchmark: Name of the benchmark, such as `Lift`.
+        threads: How many threads step them; as many as there are processors by default.
+            Pictures are drawn in the thread that asks: OpenGL's threads have a
+            picture's work already.
+        autoreset_mode: When an environment whose episode is over begins the next:
+            `NextStep` in the next step, whose action it does not take; `SameStep` at
+            once, with `final_obs` and `final_info`; `Disabled` when told to.
+        arguments: Of every environment; see `EnvConfig`.
+
+    Raises:
+        ConfigError: If an argument is wrong.
+        UnknownNameError: If a benchmark, robot or controller is unknown.
+
+    Attributes:
+        envs: The environments.
+    """
+
+    metadata = {
+        **RobotEnv.metadata,
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
+    }
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        benchmark: str = "Lift",
+        *,
+        threads: int | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        **arguments: Any,
+    ) -> None:
+        _check_count("num_envs", num_envs)
+        threads = _processors() if threads is None else threads
+        _check_count("threads", threads)
+        self._mode = _mode(autoreset_mode)
+        self.num_envs = num_envs
+        self.envs = tuple(RobotEnv(benchmark, **arguments) for _ in range(num_envs))
+        first = self.envs[0]
+        self.metadata = {**first.metadata, "autoreset_mode": self._mode}
+        self.render_mode = first.render_mode
+        self.single_action_space = first.action_space
+        self.action_space = batch_space(first.action_space, num_envs)
+        self.single_observation_space = first.observation_space
+        self.observation_space = batch_space(first.observation_space, num_envs)
+        self._places = first.observer.places
+        self._values: Matrix = np.zeros((num_envs, len(first.observer.values)))
+        self._rewards: Array = np.zeros(num_envs)
+        self._terminated: Flags = np.zeros(num_envs, dtype=np.bool_)
+        self._truncated: Flags = np.zeros(num_envs, dtype=np.bool_)
+        self._pictures = tuple(first.cameras.space)
+        self._helpers = min(threads, num_envs) - 1
+        self._pool = ThreadPoolExecutor(max(1, self._helpers), "wbc_suite-env")
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[Observations, Info]:
+        """Start episodes.
+
+        Args:
+            seed: The first environment's seed, and one more for each next; or one for
+                each.
+            options: `reset_mask`, which environments to reset, shape (num_envs,).
+
+        Raises:
+            ConfigError: If a seed or an option is wrong; then nothing has changed.
+        """
+        seeds = self._seeds(seed)
+        chosen = np.flatnonzero(self._mask(options))
+        infos: list[Info] = [{} for _ in self.envs]
+
+        def begin(i: int) -> None:
+            infos[i] = self._begin(i, seeds[i])
+
+        self._for_each(begin, chosen.tolist())
+        return self._observations(), self._gathered(infos)
+
+    def step(
+        self, actions: Any
+    ) -> tuple[Observations, NDArray[Any], NDArray[Any], NDArray[Any], Info]:
+        """Advance every environment one control period.
+
+        Args:
+            actions: One row per environment, shape (num_envs, size).
+
+        Raises:
+            ActionError: If an action is wrong; names the environment. Then none has
+                moved.
+            PhysicsError: If an environment's episode ended in one, and nobody reset it.
+        """
+        over = self._terminated | self._truncated
+        if self._mode is not AutoresetMode.NEXT_STEP:
+            over[:] = False
+        rows = self._checked(actions, ~over)
+        infos: list[Info] = [{} for _ in self.envs]
+
+        def advance(i: int) -> None:
+            infos[i] = self._begin(i) if over[i] else self._advance(i, rows[i])
+
+        self._for_each(advance, range(self.num_envs))
+        if self._mode is AutoresetMode.SAME_STEP:
+            self._begin_next(infos)
+        return (
+            self._observations(),
+            self._rewards.copy(),
+            self._terminated.copy(),
+            self._truncated.copy(),
+            self._gathered(infos),
+        )
+
+    def render(self) -> tuple[Any, ...]:
+        """Return a picture of each environment."""
+        return self.call("render")
+
+    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
+        """Call a method of each environment, or get its attribute, in this thread."""
+        found = [env.get_wrapper_attr(name) for env in self.envs]
+        return tuple(f(*args, **kwargs) if callable(f) else f for f in found)
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """Return an attribute of each environment."""
+        return tuple(env.get_wrapper_attr(name) for env in self.envs)
+
+    def set_attr(self, name: str, values: Any) -> None:
+        """Set an attribute of each environment: a list has a value for each.
+
+        Raises:
+            ConfigError: If there are more or fewer values than environments.
+        """
+        if not isinstance(values, list | tuple):
+            values = [values] * self.num_envs
+        if len(values) != self.num_envs:
+            raise ConfigError(
+                f"set_attr: {len(values)} values for {self.num_envs} environments."
+            )
+        for env, value in zip(self.envs, values, strict=True):
+            env.set_wrapper_attr(name, value)
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """End the threads and free what the environments hold."""
+        self._pool.shutdown()
+        for env in self.envs:
+            env.close()
+
+    @property
+    def np_random(self) -> tuple[np.random.Generator, ...]:  # pyright: ignore[reportIncompatibleMethodOverride] - as Gymnasium's own vector environments
+        """Random generators of the environments."""
+        return self.get_attr("np_random")
+
+    @property
+    def np_random_seed(self) -> tuple[int, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Seeds of the environments."""
+        return self.get_attr("np_random_seed")
+
+    def _begin(self, i: int, seed: int | None = None) -> Info:
+        env = self.envs[i]
+        info = env.begin(seed)
+        self._values[i] = env.observer.values
+        self._rewards[i], self._terminated[i], self._truncated[i] = 0.0, False, False
+        return info
+
+    def _advance(self, i: int, action: Array) -> Info:
+        env = self.envs[i]
+        reward, terminated, truncated, info = env.advance(action)
+        self._values[i], self._rewards[i] = env.observer.values, reward
+        self._terminated[i], self._truncated[i] = terminated, truncated
+        return info
+
+    def _begin_next(self, infos: list[Info]) -> None:
+        """Begin the next episodes of those that are over; see them off in this thread.
+
+        What was the end of an episode stays in rewards and flags.
+        """
+        over = np.flatnonzero(self._terminated | self._truncated).tolist()
+        finals = {
+            i: {"final_obs": self.envs[i].observation(), "final_info": infos[i]}
+            for i in over
+        }
+
+        def begin(i: int) -> None:
+            infos[i] = finals[i] | self.envs[i].begin()
+            self._values[i] = self.envs[i].observer.values
+
+        self._for_each(begin, over)
+
+    def _for_each(self, do: Callable[[int], None], indices: Iterable[int]) -> None:
+        """Call `do` with every index, on all threads.
+
+        Raises:
+            Exception: What the first environment raised, with its index; the others
+                have done their part.
+        """
+        waiting, failed = deque(indices), dict[int, Exception]()
+
+        def work() -> None:
+            while True:
+                try:
+                    i = waiting.popleft()
+                except IndexError:
+                    return
+                try:
+                    do(i)
+                except Exception as error:  # noqa: BLE001 - raised again below
+                    failed[i] = error
+
+        helpers = [self._pool.submit(work) for _ in range(self._helpers)]
+        work()
+        for helper in helpers:
+            helper.result()
+        if failed:
+            first = min(failed)
+            raise _named(failed[first], first)
+
+    def _checked(self, actions: Any, used: Flags) -> Matrix:
+        """Return actions, shape (num_envs, size), of which the used ones are right."""
+        shape = self.action_space.shape
+        if np.shape(actions) != shape:
+            raise ActionError(
+                f"Actions have shape {shape}, one row per environment, "
+                f"not {np.shape(actions)}."
+            )
+        rows = np.asarray(actions)
+        if rows.dtype.kind == "f" and np.isfinite(rows).all():
+            return rows
+        for i in np.flatnonzero(used).tolist():
+            try:
+                self.envs[i].action_layout.check(rows[i])
+            except ActionError as error:
+                raise _named(error, i) from None
+        return rows
+
+    def _observations(self) -> Observations:
+        seen = {key: self._values[:, at].copy() for key, at in self._places.items()}
+        if self._pictures:
+            all_seen = [env.observation() for env in self.envs]
+            for key in self._pictures:
+                seen[key] = np.stack([one[key] for one in all_seen])
+        return seen
+
+    def _gathered(self, infos: Sequence[Info]) -> Info:
+        """Return infos in Gymnasium's form, `_add_info`; plain numbers at once."""
+        common = [
+            key
+            for key, value in infos[0].items()
+            if type(value) in _SCALARS and all(key in info for info in infos)
+        ]
+        gathered: Info = {}
+        for key in common:
+            gathered[key] = np.array([info[key] for info in infos])
+            gathered[f"_{key}"] = np.ones(self.num_envs, dtype=np.bool_)
+        for i, info in enumerate(infos):
+            if len(info) > len(common):
+                rest = {key: info[key] for key in info if key not in common}
+                gathered = self._add_info(gathered, rest, i)
+        return gathered
+
+    def _seeds(self, seed: object) -> list[int | None]:
+        if seed is None or isinstance(seed, int | np.integer):
+            first = checked_seed(seed)
+            return [None if first is None else first + i for i in range(self.num_envs)]
+        seeds = list(seed) if isinstance(seed, Iterable) else [seed]
+        if len(seeds) != self.num_envs:
+            raise ConfigError(
+                f"reset: {len(seeds)} seeds for {self.num_envs} environments."
+            )
+        return [checked_seed(one) for one in seeds]
+
+    def _mask(self, options: dict[str, Any] | None) -> Flags:
+        if not options:
+            return np.ones(self.num_envs, dtype=np.bool_)
+        mask = np.asarray(options.get("reset_mask"))
+        known = set(options) == {"reset_mask"}
+        if not known or (mask.shape, mask.dtype) != ((self.num_envs,), np.bool_):
+            raise ConfigError(
+                f"reset: the one option is 'reset_mask', an array of {self.num_envs} "
+                f"booleans; got {options!r:.80}."
+            )
+        return mask
+
+
+def _named(error: Exception, index: int) -> Exception:
+    """Return the error with the environment's index in its message."""
+    error.args = (f"Environment {index}: {error}", *error.args[1:])
+    return error
+
+
+def _check_count(name: str, count: object) -> None:
+    if not isinstance(count, int) or isinstance(count, bool) or count < 1:
+        raise ConfigError(f"{name} is a whole number from 1 on, not {count!r}.")
+
+
+def _mode(given: object) -> AutoresetMode:
+    try:
+        return AutoresetMode(given)
+    except ValueError:
+        known = ", ".join(mode.value for mode in AutoresetMode)
+        raise ConfigError(
+            f"autoreset_mode is one of {known}, not {given!r:.60}."
+        ) from None
+
+
+def _processors() -> int:
+    """Return how many processors this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

@@ -1,0 +1,324 @@
+"""LeRobot's dataset layout, version 3.0, by `pyarrow` and (for pictures) `av` alone.
+
+    meta/info.json                                features, counts, path templates
+    meta/stats.json                               of each feature
+    meta/tasks.parquet                            task_index by task
+    meta/episodes/chunk-000/file-000.parquet      where each episode is, and its stats
+    data/chunk-000/file-000.parquet               one row per action
+    videos/KEY/chunk-000/file-000.mp4             the pictures of all episodes
+
+Source: the documentation of LeRobotDataset v3.0 (huggingface.co/docs/lerobot).
+"""
+
+import importlib
+import json
+from collections.abc import Callable, Mapping
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wbc_suite.errors import DatasetError
+from wbc_suite.recording.dataset import Dataset
+from wbc_suite.recording.episode import Episode
+from wbc_suite.recording.files import new_folder
+
+__all__ = ["write_lerobot"]
+
+CHUNK = "chunk-000/file-000"
+QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
+PICTURE = "_image"
+"""How keys of pictures end."""
+PICTURES_IN_STATS = 20
+"""Of an episode, evenly spread; all of them would take minutes."""
+
+Stats = dict[str, Any]
+
+
+def write_lerobot(
+    dataset: Dataset, out: Path, tell: Callable[[Episode], None] = lambda _: None
+) -> Path:
+    """Write a dataset into a new folder.
+
+    `observation.state` is the robots' `proprio-state`, else all observed vectors;
+    `observation.environment_state` is `object-state`; `observation.images.CAMERA` are
+    videos; `action` is the action.
+
+    Raises:
+        DatasetError: If a package is missing, the folder is not empty, or episodes
+            differ in what they hold.
+    """
+    arrow, parquet = _need("pyarrow", "lerobot"), _need("pyarrow.parquet", "lerobot")
+    if not len(dataset):
+        raise DatasetError(f"'{dataset.path}' has no episodes.")
+    new_folder(out, "a LeRobot dataset")
+    rate = round(float(dataset.header.get("control_freq", 20.0)))
+    task = str(dataset.header.get("env", "demonstration"))
+    first = dataset.episode(dataset.names[0])
+    videos = [k for k in first.observed if k.endswith(PICTURE)]
+    writers = {key: _Video(out, key, rate) for key in videos}
+    tables, rows, start = [], [], 0
+    try:
+        for number, episode in enumerate(dataset):
+            columns = _vectors(episode)
+            tables.append(_frames(arrow, columns, number, start, rate))
+            stats = {name: _stats(column) for name, column in columns.items()}
+            for key, writer in writers.items():
+                pictures = episode.columns[f"obs/{key}"]
+                writer.add(pictures)
+                stats[_feature(key)] = _picture_stats(pictures)
+            rows.append(_episode_row(number, episode.length, start, task, rate, videos))
+            rows[-1] |= {
+                f"stats/{feature}/{name}": value
+                for feature, told in stats.items()
+                for name, value in told.items()
+            }
+            start += episode.length
+            tell(episode)
+    except (KeyError, arrow.ArrowInvalid) as error:
+        raise DatasetError(f"Episodes differ in what they hold: {error}") from error
+    finally:
+        for writer in writers.values():
+            writer.close()
+    table = arrow.concat_tables(tables)
+    _write(parquet, table, out / f"data/{CHUNK}.parquet")
+    episodes = arrow.Table.from_pylist(rows)
+    _write(parquet, episodes, out / f"meta/episodes/{CHUNK}.parquet")
+    tasks = arrow.table({"task_index": arrow.array([0]), "task": [task]})
+    pandas = {
+        "index_columns": ["task"],
+        "column_indexes": [],
+        "columns": [
+            _pandas_column("task_index", "int64"),
+            _pandas_column("task", "unicode"),
+        ],
+        "creator": {"library": "pyarrow", "version": arrow.__version__},
+        "pandas_version": "2.0.0",
+    }
+    tasks = tasks.replace_schema_metadata({"pandas": json.dumps(pandas)})
+    _write(parquet, tasks, out / "meta/tasks.parquet")
+    info = _info(dataset, first, videos, rate, start)
+    _write_json(out / "meta/info.json", info)
+    _write_json(out / "meta/stats.json", _all_stats(table, rows))
+    return out
+
+
+def _need(package: str, extra: str) -> Any:
+    try:
+        return importlib.import_module(package)
+    except ImportError as error:
+        raise DatasetError(
+            f"This layout needs the package '{package.split('.')[0]}': "
+            f"pip install 'wbc-suite[{extra}]'."
+        ) from error
+
+
+def _feature(key: str) -> str:
+    return f"observation.images.{key.removesuffix(PICTURE)}"
+
+
+def _vectors(episode: Episode) -> dict[str, NDArray[np.float32]]:
+    """Return the vectors of an episode by LeRobot's names."""
+    seen = {k: episode.columns[f"obs/{k}"] for k in episode.observed}
+    flat = {k: c.reshape(len(c), -1) for k, c in seen.items() if c.ndim <= 2}
+    states = [flat[k] for k in sorted(flat) if k.endswith("proprio-state")]
+    if not states:
+        states = [flat[k] for k in sorted(flat)] or [episode.columns["states"]]
+    found = {"observation.state": np.concatenate(states, axis=1)}
+    if "object-state" in flat:
+        found["observation.environment_state"] = flat["object-state"]
+    found["action"] = episode.columns["actions"]
+    return {name: column.astype(np.float32) for name, column in found.items()}
+
+
+def _frames(
+    arrow: Any, columns: Mapping[str, Any], number: int, start: int, rate: int
+) -> Any:
+    """Return the rows of one episode."""
+    length = len(columns["action"])
+    table = {
+        name: arrow.FixedSizeListArray.from_arrays(column.ravel(), column.shape[1])
+        for name, column in columns.items()
+    }
+    frames = np.arange(length, dtype=np.int64)
+    table["timestamp"] = arrow.array((frames / rate).astype(np.float32))
+    table["frame_index"] = arrow.array(frames)
+    table["episode_index"] = arrow.array(np.full(length, number, dtype=np.int64))
+    table["index"] = arrow.array(frames + start)
+    table["task_index"] = arrow.array(np.zeros(length, dtype=np.int64))
+    return arrow.table(table)
+
+
+def _stats(column: NDArray[Any]) -> Stats:
+    values = np.asarray(column, dtype=np.float64)
+    told: Stats = {
+        "min": values.min(axis=0).tolist(),
+        "max": values.max(axis=0).tolist(),
+        "mean": values.mean(axis=0).tolist(),
+        "std": values.std(axis=0).tolist(),
+        "count": [len(values)],
+    }
+    for name, share in QUANTILES.items():
+        told[name] = np.quantile(values, share, axis=0).tolist()
+    return told
+
+
+def _picture_stats(pictures: NDArray[np.uint8]) -> Stats:
+    """Return the stats of a few pictures by colour, 0 to 1, of shape (3, 1, 1)."""
+    at = np.linspace(0, len(pictures) - 1, PICTURES_IN_STATS).round().astype(int)
+    chosen = pictures[np.unique(at)]
+    told = _stats(chosen.reshape(-1, 3) / 255.0)
+    shaped = {n: [[[v]] for v in values] for n, values in told.items() if n != "count"}
+    return {**shaped, "count": [len(chosen)]}
+
+
+def _episode_row(
+    number: int, length: int, start: int, task: str, rate: int, videos: list[str]
+) -> dict[str, Any]:
+    row: dict[str, Any] = {
+        "episode_index": number,
+        "tasks": [task],
+        "length": length,
+        "data/chunk_index": 0,
+        "data/file_index": 0,
+        "dataset_from_index": start,
+        "dataset_to_index": start + length,
+        "meta/episodes/chunk_index": 0,
+        "meta/episodes/file_index": 0,
+    }
+    for key in videos:
+        place = f"videos/{_feature(key)}"
+        row |= {f"{place}/chunk_index": 0, f"{place}/file_index": 0}
+        row[f"{place}/from_timestamp"] = start / rate
+        row[f"{place}/to_timestamp"] = (start + length) / rate
+    return row
+
+
+def _info(
+    dataset: Dataset, first: Episode, videos: list[str], rate: int, frames: int
+) -> dict[str, Any]:
+    features: dict[str, Any] = {
+        name: {"dtype": "float32", "shape": [column.shape[1]], "names": None}
+        for name, column in _vectors(first).items()
+    }
+    for key in videos:
+        height, width, channels = first.columns[f"obs/{key}"].shape[1:]
+        features[_feature(key)] = {
+            "dtype": "video",
+            "shape": [height, width, channels],
+            "names": ["height", "width", "channels"],
+            "info": {
+                "video.height": height,
+                "video.width": width,
+                "video.codec": "h264",
+                "video.pix_fmt": "yuv420p",
+                "video.is_depth_map": False,
+                "video.fps": rate,
+                "video.channels": channels,
+                "has_audio": False,
+            },
+        }
+    features["timestamp"] = {"dtype": "float32", "shape": [1], "names": None}
+    for name in ("frame_index", "episode_index", "index", "task_index"):
+        features[name] = {"dtype": "int64", "shape": [1], "names": None}
+    place = "chunk-{chunk_index:03d}/file-{file_index:03d}"
+    return {
+        "codebase_version": "v3.0",
+        "robot_type": _robot(dataset),
+        "total_episodes": len(dataset),
+        "total_frames": frames,
+        "total_tasks": 1,
+        "chunks_size": 1000,
+        "data_files_size_in_mb": 100,
+        "video_files_size_in_mb": 200,
+        "fps": rate,
+        "splits": {"train": f"0:{len(dataset)}"},
+        "data_path": f"data/{place}.parquet",
+        "video_path": f"videos/{{video_key}}/{place}.mp4" if videos else None,
+        "features": features,
+    }
+
+
+def _robot(dataset: Dataset) -> str:
+    told = json.loads(str(dataset.header.get("env_args", "{}")))
+    robots = told.get("env_kwargs", {}).get("robots", "unknown")
+    return " ".join(robots) if isinstance(robots, list) else str(robots)
+
+
+def _all_stats(table: Any, rows: list[dict[str, Any]]) -> dict[str, Stats]:
+    """Return the stats of all frames; those of pictures from those of episodes."""
+    told = {}
+    for name in table.column_names:
+        column = np.array(table[name].to_pylist(), dtype=np.float64)
+        told[name] = _stats(column.reshape(len(column), -1))
+    keys = {k.split("/")[1] for k in rows[0] if k.startswith("stats/")} - set(told)
+    for key in keys:
+        held = {
+            name: np.array([row[f"stats/{key}/{name}"] for row in rows])
+            for name in ("min", "max", "mean", "std", "count", *QUANTILES)
+        }
+        mean = held["mean"].mean(axis=0)
+        spread = held["std"] ** 2 + (held["mean"] - mean) ** 2
+        told[key] = {q: held[q].mean(axis=0).tolist() for q in QUANTILES} | {
+            "min": held["min"].min(axis=0).tolist(),
+            "max": held["max"].max(axis=0).tolist(),
+            "mean": mean.tolist(),
+            "std": np.sqrt(spread.mean(axis=0)).tolist(),
+            "count": [int(held["count"].sum())],
+        }
+    return told
+
+
+def _pandas_column(name: str, kind: str) -> dict[str, Any]:
+    return {
+        "name": name,
+        "field_name": name,
+        "pandas_type": kind,
+        "numpy_type": "int64" if kind == "int64" else "object",
+        "metadata": None,
+    }
+
+
+def _write(parquet: Any, table: Any, path: Path) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        parquet.write_table(table, path)
+    except OSError as error:
+        raise DatasetError(f"'{path}' cannot be written: {error}.") from error
+
+
+def _write_json(path: Path, told: Mapping[str, Any]) -> None:
+    path.write_text(json.dumps(told, indent=1))
+
+
+class _Video:
+    """Pictures of all episodes in one H.264 file, a key frame every other picture."""
+
+    def __init__(self, out: Path, key: str, rate: int) -> None:
+        self._av = _need("av", "lerobot")
+        path = out / f"videos/{_feature(key)}/{CHUNK}.mp4"
+        path.parent.mkdir(parents=True)
+        self._film = self._av.open(str(path), "w")
+        self._rate, self._stream, self._count = rate, None, 0
+
+    def add(self, pictures: NDArray[np.uint8]) -> None:
+        """Add the pictures of an episode."""
+        for picture in pictures:
+            if self._stream is None:
+                self._stream = self._film.add_stream(
+                    "libx264", rate=self._rate, options={"g": "2", "crf": "23"}
+                )
+                self._stream.height, self._stream.width = picture.shape[:2]
+                self._stream.pix_fmt = "yuv420p"
+            frame = self._av.VideoFrame.from_ndarray(np.ascontiguousarray(picture))
+            frame.pts, frame.time_base = self._count, Fraction(1, self._rate)
+            self._film.mux(self._stream.encode(frame))
+            self._count += 1
+
+    def close(self) -> None:
+        """Finish the file."""
+        if self._stream is not None:
+            self._film.mux(self._stream.encode())
+        self._film.close()

@@ -1,0 +1,178 @@
+"""Minari's dataset layout, by `h5py` alone.
+
+    data/metadata.json       spaces, counts, the environment
+    data/main_data.hdf5      episode_N: observations (n + 1 rows), actions, rewards,
+                             terminations, truncations, infos
+
+`minari.MinariDataset(OUT / "data")` reads it; with OUT in `MINARI_DATASETS_PATH`,
+`minari.load_dataset(name of OUT)`.
+
+Source: minari 0.5.4, `minari/dataset/_storages/hdf5_storage.py`.
+"""
+
+import json
+import re
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from wbc_suite.errors import DatasetError
+from wbc_suite.recording.dataset import Dataset
+from wbc_suite.recording.episode import Episode
+from wbc_suite.recording.files import new_folder, replace_file, write_bytes
+from wbc_suite.registration import BENCHMARKS
+
+__all__ = ["write_minari"]
+
+VERSION = "0.5.4"
+_NAME = re.compile(r"[-\w]+?-v\d+\Z")
+_INFOS = ("states", "clipped", "step_time", "stamp")
+"""Columns of ours that are Minari's `infos`."""
+
+
+def write_minari(
+    dataset: Dataset, out: Path, tell: Callable[[Episode], None] = lambda _: None
+) -> Path:
+    """Write a dataset into a new folder.
+
+    Observations are a dictionary of what was observed. The one after the last action
+    repeats the one before it where `next_obs` was not recorded. Pictures are stored as
+    they are, not as JPEG.
+
+    Raises:
+        DatasetError: If the folder is not empty or cannot be written, or episodes
+            differ in what they hold.
+    """
+    new_folder(out, "a Minari dataset")
+    if not len(dataset):
+        raise DatasetError(f"'{dataset.path}' has no episodes.")
+    first = dataset.episode(dataset.names[0])
+    steps = 0
+
+    def write(aside: Path) -> None:
+        nonlocal steps
+        with h5py.File(aside, "w", track_order=True) as file:
+            for number, episode in enumerate(dataset):
+                if set(episode.columns) != set(first.columns):
+                    raise DatasetError(f"'{episode.name}' holds other columns.")
+                _write_episode(file.create_group(f"episode_{number}"), number, episode)
+                steps += episode.length
+                tell(episode)
+
+    (out / "data").mkdir()
+    main = out / "data/main_data.hdf5"
+    replace_file(main, write)
+    told = {
+        "total_episodes": len(dataset),
+        "total_steps": steps,
+        "data_format": "hdf5",
+        "jpeg_encoding": False,
+        "observation_space": json.dumps(_observation_space(first)),
+        "action_space": json.dumps(_action_space(dataset, first)),
+        "env_spec": json.dumps(_env_spec(dataset)),
+        "dataset_id": _dataset_id(dataset, out),
+        "minari_version": VERSION,
+        "dataset_size": round(main.stat().st_size / 1e6, 1),
+        "requirements": ["wbc-suite"],
+        "description": "Converted by wbc-suite from a recording in robomimic's layout.",
+    }
+    content = json.dumps({k: v for k, v in told.items() if v != "null"}, indent=1)
+    write_bytes(out / "data/metadata.json", content.encode())
+    return out
+
+
+def _write_episode(group: h5py.Group, number: int, episode: Episode) -> None:
+    columns = episode.columns
+    group.attrs["id"] = number
+    group.attrs["total_steps"] = episode.length
+    for name in ("seed", "success", "uid"):
+        if name in episode.facts:
+            group.attrs[name] = episode.facts[name]
+    seen = group.create_group("observations")
+    for key in episode.observed:
+        before = columns[f"obs/{key}"]
+        last = columns.get(f"next_obs/{key}", before)[-1:]
+        seen[key] = np.concatenate([before, last])
+    group["actions"] = columns["actions"]
+    group["rewards"] = columns.get("rewards", np.zeros(episode.length))
+    ended = np.arange(episode.length) == episode.length - 1
+    solved = ended & bool(episode.success)
+    group["terminations"] = solved
+    group["truncations"] = ended & ~solved
+    infos = group.create_group("infos")
+    for name in _INFOS:
+        if name in columns:
+            infos[name] = _after(columns[name], episode, name)
+
+
+def _after(column: NDArray[Any], episode: Episode, name: str) -> NDArray[Any]:
+    """Return n + 1 rows, as infos have: the first is of the reset."""
+    if name == "states":
+        final = episode.final_state
+        return np.concatenate([column, column[-1:] if final is None else final[None]])
+    return np.concatenate([np.zeros_like(column[:1]), column])
+
+
+def _observation_space(first: Episode) -> dict[str, Any]:
+    spaces = {key: _box(first.columns[f"obs/{key}"]) for key in first.observed}
+    return {"type": "Dict", "subspaces": spaces}
+
+
+def _action_space(dataset: Dataset, first: Episode) -> dict[str, Any]:
+    """Return the space of actions; without bounds where the recording has none."""
+    space = _box(first.columns["actions"])
+    try:
+        low, high = json.loads(str(dataset.header["action_bounds"]))
+        bounds = np.array([low, high], dtype=np.float64)
+    except (KeyError, ValueError, TypeError):
+        return space
+    if bounds.shape != (2, *space["shape"]):
+        return space
+    return {**space, "low": bounds[0].tolist(), "high": bounds[1].tolist()}
+
+
+def _box(column: NDArray[Any]) -> dict[str, Any]:
+    shape = column.shape[1:]
+    low, high = (0, 255) if column.dtype == np.uint8 else (-np.inf, np.inf)
+    return {
+        "type": "Box",
+        "dtype": str(column.dtype),
+        "shape": list(shape),
+        "low": np.full(shape, low).tolist(),
+        "high": np.full(shape, high).tolist(),
+    }
+
+
+def _env_spec(dataset: Dataset) -> Mapping[str, Any] | None:
+    """Return Gymnasium's description of the environment, if it is registered."""
+    try:
+        told = json.loads(str(dataset.header.get("env_args", "{}")))
+        name, arguments = told["env_name"], dict(told.get("env_kwargs", {}))
+    except (ValueError, KeyError, TypeError):
+        return None
+    if told.get("package") != "wbc_suite" or name not in BENCHMARKS:
+        return None
+    return {
+        "id": f"wbc_suite/{name}-v0",
+        "entry_point": "wbc_suite.envs.env:RobotEnv",
+        "reward_threshold": None,
+        "nondeterministic": False,
+        "max_episode_steps": None,
+        "order_enforce": True,
+        "disable_env_checker": False,
+        "kwargs": {**arguments, "benchmark": name},
+        "additional_wrappers": [],
+        "vector_entry_point": "wbc_suite.envs.vector:VectorRobotEnv",
+    }
+
+
+def _dataset_id(dataset: Dataset, out: Path) -> str:
+    """Return the folder's name where it can be Minari's, else the benchmark's."""
+    if _NAME.match(out.name):
+        return out.name
+    word = re.sub(r"\W+", "-", str(dataset.header.get("env", "demonstrations")))
+    return f"{word.strip('-').lower() or 'demonstrations'}-v0"

@@ -1,0 +1,260 @@
+"""Datasets as they are read: a file, and finished episodes that are still beside it."""
+
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import h5py
+import numpy as np
+
+from wbc_suite.errors import DatasetError, UnknownNameError
+from wbc_suite.recording import hdf5
+from wbc_suite.recording.episode import PER_STEP, Column, Episode, Fact, fingerprint
+
+__all__ = ["Dataset", "part_files", "parts_folder"]
+
+_DEMO = re.compile(r"demo_?(\d{1,9})\Z")
+_GROUPS = ("obs", "next_obs")
+
+
+def parts_folder(path: Path) -> Path:
+    """Return the folder of the episodes that are not in the file yet."""
+    return path.with_name(path.name + ".parts")
+
+
+def part_files(path: Path) -> list[Path]:
+    """Return the files of finished episodes beside a dataset, in their order."""
+    return sorted(parts_folder(path).glob("episode_*.hdf5"))
+
+
+class Dataset:
+    """Episodes of a file in robomimic's layout, robosuite's raw one, or our own.
+
+    The file may come from anywhere: nothing in it is run, links out of it are not
+    followed, sizes are checked before memory is taken. A recording that was cut off
+    reads as if it had been closed.
+
+    Args:
+        path: The file.
+        alone: Whether finished episodes beside the file are left out.
+
+    Raises:
+        DatasetError: If it cannot be read.
+
+    Attributes:
+        path: The file.
+        header: Attributes of `data`: `env_args`, `schema_version`, ...
+        names: Of the episodes, in their order.
+        masks: Names of episodes by filter key.
+    """
+
+    def __init__(self, path: str | Path, *, alone: bool = False) -> None:
+        self.path = Path(path)
+        parts = [] if alone else part_files(self.path)
+        files = [self.path, *parts] if self.path.exists() or not parts else parts
+        self._open: list[h5py.File] = []
+        self._groups: dict[str, tuple[Path, h5py.Group]] = {}
+        self.header: dict[str, Fact] = {}
+        self.masks: dict[str, list[str]] = {}
+        try:
+            for file in files:
+                self._add(file)
+        except DatasetError:
+            self.close()
+            raise
+        self.names = tuple(sorted(self._groups, key=_number))
+
+    def __enter__(self) -> Self:
+        """Return the dataset."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Close it."""
+        self.close()
+
+    def __len__(self) -> int:
+        """Return the number of episodes."""
+        return len(self.names)
+
+    def __iter__(self) -> Iterator[Episode]:
+        """Read episodes one by one."""
+        return (self.episode(name) for name in self.names)
+
+    def close(self) -> None:
+        """Close the files."""
+        while self._open:
+            self._open.pop().close()
+
+    def facts(self, name: str) -> Mapping[str, Fact]:
+        """Return what is known of an episode as a whole, without reading it.
+
+        Raises:
+            UnknownNameError: If there is none of that name.
+            DatasetError: If it cannot be read.
+        """
+        path, group = self._find(name)
+        with hdf5.reading(path):
+            return _facts(group)
+
+    def length(self, name: str) -> int:
+        """Return an episode's number of actions, without reading it."""
+        path, group = self._find(name)
+        with hdf5.reading(path):
+            return _dataset(group, "actions").shape[0]
+
+    def column(self, name: str, key: str) -> Column:
+        """Return one column of an episode.
+
+        Raises:
+            UnknownNameError: If there is no such episode or column.
+            DatasetError: If it cannot be read.
+        """
+        path, group = self._find(name)
+        with hdf5.reading(path):
+            columns = _columns(group)
+            if key not in columns:
+                raise UnknownNameError("column", key, tuple(columns))
+            return hdf5.read_column(columns[key])
+
+    def episode(self, name: str) -> Episode:
+        """Read an episode.
+
+        Raises:
+            UnknownNameError: If there is none of that name.
+            DatasetError: If it cannot be read, its columns differ in length, or its
+                numbers are not those that were written.
+        """
+        path, group = self._find(name)
+        with hdf5.reading(path):
+            columns = {k: hdf5.read_column(d) for k, d in _columns(group).items()}
+            last = hdf5.child(group, "final_state", h5py.Dataset)
+            final = None if last is None else hdf5.read_column(last)
+            _check_lengths(name, columns)
+            facts = _facts(group)
+            written = facts.pop("sha256", None)
+            facts.pop("num_samples", None)
+            if written is not None and written != fingerprint(columns, final):
+                raise DatasetError(
+                    f"'{name}' is damaged: its numbers are not those recorded."
+                )
+        return Episode(name=name, columns=columns, facts=facts, final_state=final)
+
+    def _find(self, name: str) -> tuple[Path, h5py.Group]:
+        if name not in self._groups:
+            raise UnknownNameError("episode", name, self.names)
+        return self._groups[name]
+
+    def _add(self, path: Path) -> None:
+        file = hdf5.open_safely(path)
+        self._open.append(file)
+        with hdf5.reading(path):
+            data = hdf5.child(file, "data", h5py.Group)
+            if data is None:
+                raise DatasetError("there is no group 'data'; that is no dataset.")
+            known = {
+                facts["uid"]
+                for _, group in self._groups.values()
+                if "uid" in (facts := _facts(group))
+            }
+            for name in hdf5.child_names(data):
+                if not _DEMO.match(name):
+                    continue
+                group = hdf5.child(data, name, h5py.Group)
+                if group is None or _facts(group).get("uid", name) in known:
+                    continue
+                self._groups[self._free(name)] = path, group
+            if not self.header:
+                self.header = _header(data)
+            self.masks |= _masks(file)
+
+    def _free(self, name: str) -> str:
+        """Return the name, or another when a part has the name of another episode."""
+        while name in self._groups:
+            name = f"demo_{_number(name) + 1}"
+        return name
+
+
+def _number(name: str) -> int:
+    match = _DEMO.match(name)
+    return int(match[1]) if match else 0
+
+
+def _header(data: h5py.Group) -> dict[str, Fact]:
+    found = {name: hdf5.attribute(data, name) for name in _attribute_names(data)}
+    return {k: v for k, v in found.items() if v is not None and k != "total"}
+
+
+def _attribute_names(node: h5py.Group) -> list[str]:
+    if len(node.attrs) > 1000:
+        raise DatasetError(f"'{node.name}' has {len(node.attrs)} attributes.")
+    return list(node.attrs)
+
+
+def _facts(group: h5py.Group) -> dict[str, Fact]:
+    found = {name: hdf5.attribute(group, name) for name in _attribute_names(group)}
+    return {name: value for name, value in found.items() if value is not None}
+
+
+def _masks(file: h5py.File) -> dict[str, list[str]]:
+    group = hdf5.child(file, "mask", h5py.Group)
+    if group is None:
+        return {}
+    found = {n: hdf5.child(group, n, h5py.Dataset) for n in hdf5.child_names(group)}
+    return {n: hdf5.read_names(d) for n, d in found.items() if d is not None}
+
+
+def _dataset(group: h5py.Group, name: str) -> h5py.Dataset:
+    found = hdf5.child(group, name, h5py.Dataset)
+    if found is None or found.ndim < 1:
+        raise DatasetError(f"'{group.name}' has no '{name}'.")
+    return found
+
+
+def _columns(group: h5py.Group) -> dict[str, h5py.Dataset]:
+    """Return what has a row per action, by name."""
+    _dataset(group, "actions")
+    found: dict[str, h5py.Dataset] = {}
+    for name in hdf5.child_names(group):
+        if name == "final_state":
+            continue
+        if name in _GROUPS:
+            inner = hdf5.child(group, name, h5py.Group)
+            assert inner is not None, "its name was listed"
+            for key in hdf5.child_names(inner):
+                found[f"{name}/{key}"] = _dataset(inner, key)
+        elif isinstance(group.get(name, getlink=True), h5py.HardLink) and (
+            group.get(name, getclass=True) is h5py.Dataset
+        ):
+            found[name] = _dataset(group, name)
+        elif not isinstance(group.get(name, getlink=True), h5py.HardLink):
+            hdf5.child(group, name, h5py.Dataset)
+    return found
+
+
+def _check_lengths(name: str, columns: Mapping[str, Column]) -> None:
+    length = len(columns["actions"])
+    for key, column in columns.items():
+        if len(column) != length:
+            raise DatasetError(
+                f"'{name}': '{key}' has {len(column)} rows for {length} actions."
+            )
+    for key in ("states", "actions"):
+        if key in columns and columns[key].ndim != 2:
+            raise DatasetError(f"'{name}': '{key}' has the shape {columns[key].shape}.")
+    for key in PER_STEP[2:]:
+        if key in columns and columns[key].ndim != 1:
+            raise DatasetError(f"'{name}': '{key}' has the shape {columns[key].shape}.")
+    bad = [k for k in ("states", "actions") if k in columns and not _finite(columns[k])]
+    if bad:
+        raise DatasetError(f"'{name}': '{bad[0]}' holds numbers that are not finite.")
+
+
+def _finite(column: Column) -> bool:
+    return bool(np.isfinite(column).all())

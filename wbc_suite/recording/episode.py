@@ -1,0 +1,67 @@
+"""One recorded episode, as plain arrays and plain facts."""
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["PER_STEP", "Column", "Episode", "Fact", "fingerprint"]
+
+Column: TypeAlias = NDArray[Any]
+"""One row per action."""
+Fact: TypeAlias = str | int | float | bool
+"""What is known of a whole episode."""
+
+PER_STEP = ("states", "actions", "rewards", "dones")
+"""The columns that robomimic's layout asks for, besides `obs/*`."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Episode:
+    """Columns and facts of one episode.
+
+    Attributes:
+        name: `demo_0`, `demo_1`, ...
+        columns: By name, each of shape (n, ...): `states` before each action (time,
+            qpos, qvel), `actions`, `rewards`, `dones`, `obs/KEY` before each action,
+            perhaps `next_obs/KEY`, `clipped`, `step_time` s, `stamp` s.
+        facts: `success`, `seed`, `rng_state`, `model_file`, ...
+        final_state: State after the last action, if it was recorded.
+    """
+
+    name: str
+    columns: Mapping[str, Column]
+    facts: Mapping[str, Fact]
+    final_state: Column | None = None
+
+    @property
+    def length(self) -> int:
+        """Number of actions."""
+        return len(self.columns["actions"])
+
+    @property
+    def success(self) -> bool | None:
+        """Whether it succeeded; None when nobody said."""
+        told = self.facts.get("success")
+        return None if told is None else bool(told)
+
+    @property
+    def observed(self) -> tuple[str, ...]:
+        """Keys of observations."""
+        return tuple(k.removeprefix("obs/") for k in self.columns if k[:4] == "obs/")
+
+
+def fingerprint(columns: Mapping[str, Column], final_state: Column | None) -> str:
+    """Return the SHA-256 of all numbers, with their names, types and shapes."""
+    digest = hashlib.sha256()
+    named = dict(columns)
+    if final_state is not None:
+        named["final_state"] = final_state
+    for name in sorted(named):
+        column = np.ascontiguousarray(named[name])
+        digest.update(f"{name} {column.dtype.str} {column.shape}\n".encode())
+        digest.update(column.tobytes())
+    return digest.hexdigest()

@@ -1,0 +1,60 @@
+"""What a dataset looks like in numbers: one picture with a few curves."""
+
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+from wbc_suite.errors import DatasetError
+from wbc_suite.recording.dataset import Dataset
+from wbc_suite.typing import Vector
+
+__all__ = ["write_plots"]
+
+WIDTH, HEIGHT, MARGIN = 720, 150, 28  # pixels of one plot
+INK, CURVE, GOOD, BAD = "#333333", "#4a6fa5", "#3f8f5b", "#c8553d"
+MOST = 400
+"""Episodes and points that are drawn at most."""
+
+
+def write_plots(dataset: Dataset, path: Path) -> None:
+    """Draw lengths by episode, and how actions and rewards spread.
+
+    Raises:
+        DatasetError: If there are no episodes, or the file cannot be written.
+    """
+    names = dataset.names[:MOST]
+    if not names:
+        raise DatasetError(f"'{dataset.path}' has no episodes to plot.")
+    lengths = np.array([dataset.length(name) for name in names], dtype=np.float64)
+    told = [dataset.facts(name).get("success") for name in names]
+    actions = np.concatenate([dataset.column(name, "actions") for name in names])
+    sheet = Image.new("RGB", (WIDTH, 3 * HEIGHT), "white")
+    pen = ImageDraw.Draw(sheet)
+    colours = [CURVE if s is None else GOOD if s else BAD for s in told]
+    _bars(pen, 0, "Actions per episode (green: success)", lengths, colours)
+    spread = actions.std(axis=0)
+    _bars(pen, 1, "Spread of each action", spread, [CURVE] * len(spread))
+    sizes = [float(np.linalg.norm(a)) for a in actions[:: len(actions) // MOST + 1]]
+    values = np.array(sizes)
+    _bars(pen, 2, "Size of the action over time", values, [CURVE] * len(values))
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        sheet.save(path)
+    except (OSError, ValueError) as error:
+        raise DatasetError(f"'{path}' cannot be written: {error}.") from error
+
+
+def _bars(
+    pen: ImageDraw.ImageDraw, place: int, title: str, values: Vector, colours: list[str]
+) -> None:
+    """Draw a bar for each value, from 0 to the largest."""
+    top, bottom = place * HEIGHT + MARGIN, (place + 1) * HEIGHT - 8
+    most = float(values.max()) or 1.0
+    pen.text((MARGIN, top - 20), f"{title}; largest {most:.3g}", fill=INK)
+    wide = (WIDTH - 2 * MARGIN) / len(values)
+    thick = max(1.0, min(0.85 * wide, 40.0))
+    for k, (value, colour) in enumerate(zip(values, colours, strict=True)):
+        left = MARGIN + (k + 0.5) * wide - thick / 2.0
+        y = bottom - (bottom - top) * value / most
+        pen.rectangle((left, y, left + thick - 1.0, bottom), fill=colour)

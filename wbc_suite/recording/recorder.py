@@ -1,0 +1,188 @@
+"""From steps to episodes: kept, discarded, taken back."""
+
+import hashlib
+import json
+import time
+import uuid
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wbc_suite.errors import DatasetError
+from wbc_suite.recording.episode import Episode, Fact
+from wbc_suite.recording.row_log import RowLog
+from wbc_suite.recording.source import header_of
+from wbc_suite.recording.store import Store
+
+__all__ = ["Recorder"]
+
+
+class Recorder:
+    """Records one environment's episodes into a file.
+
+    Args:
+        env: One of our environments, wrapped or not.
+        path: The file; episodes are added to those in it.
+        next_obs: Whether observations after each action are stored too; they are
+            those before the next action, but for the last one.
+        later: Whether the file is opened by `open` or the first episode, not at once.
+
+    Raises:
+        DatasetError: If the environment is none of ours, or see `Store`.
+
+    Attributes:
+        path: The file.
+    """
+
+    def __init__(
+        self, env: Any, path: str | Path, *, next_obs: bool = False, later: bool = False
+    ) -> None:
+        self._inner, self._next_obs = env.unwrapped, next_obs
+        self.path = Path(path)
+        self._header, self._model_file = header_of(env), ""
+        self._store: Store | None = None
+        self._rows = RowLog(self.path.parent)
+        self._facts: dict[str, Fact] | None = None
+        self._clipped, self._succeeded = 0, False
+        if not later:
+            self.open()
+
+    def open(self) -> Store:
+        """Open the file, if it is not open yet.
+
+        Raises:
+            DatasetError: See `Store`.
+        """
+        if self._store is None:
+            self._model_file = self._inner.scene_xml
+            digest = hashlib.sha256(self._model_file.encode()).hexdigest()
+            date = datetime.now(UTC).isoformat(timespec="seconds")
+            header = self._header | {"model_hash": digest, "date": date}
+            self._store = Store(self.path, header)
+        return self._store
+
+    @property
+    def kept(self) -> int:
+        """Episodes in the file, as far as it is open."""
+        return 0 if self._store is None else len(self._store)
+
+    @property
+    def recording(self) -> bool:
+        """Whether an episode is in progress."""
+        return self._facts is not None
+
+    @property
+    def length(self) -> int:
+        """Actions of the episode in progress."""
+        return len(self._rows)
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether the benchmark counts as solved at the last action."""
+        return self._succeeded
+
+    def begin(self) -> None:
+        """Start an episode where the environment stands, right after its reset."""
+        self.discard()
+        self.open()
+        state, placed = self._inner.beginning
+        seed = self._inner.np_random_seed
+        self._facts = {
+            "uid": uuid.uuid4().hex,
+            "began": datetime.now(UTC).isoformat(timespec="milliseconds"),
+            "rng_state": json.dumps(state),
+            "model_file": self._model_file,
+        }
+        if seed is not None and seed >= 0:
+            self._facts["seed"] = int(seed)
+        if placed is not None:
+            self._facts["placed"] = json.dumps(placed.tolist())
+        self._clipped, self._succeeded, self._began = 0, False, time.monotonic()
+        self._before = self._inner.physics_state
+        self._seen: Mapping[str, Any] = self._inner.observation()
+
+    def add(
+        self,
+        action: Any,
+        observation: Mapping[str, Any],
+        reward: float,
+        *,
+        done: bool,
+        info: Mapping[str, Any],
+        step_time: float,
+    ) -> None:
+        """Record a step that the environment has just taken.
+
+        Raises:
+            DatasetError: If the disk is full; then the episode is gone.
+        """
+        success = bool(info.get("success", False))
+        clipped = int(info.get("clipped", 0))
+        row = {
+            "states": self._before,
+            "actions": np.asarray(action, dtype=np.float64),
+            "rewards": float(reward),
+            "dones": int(done or success),
+            "clipped": clipped,
+            "step_time": step_time,
+            "stamp": time.monotonic() - self._began,
+        }
+        row |= {f"obs/{key}": value for key, value in self._seen.items()}
+        if self._next_obs:
+            row |= {f"next_obs/{key}": value for key, value in observation.items()}
+        try:
+            self._rows.append(row)
+        except DatasetError:
+            self.discard()
+            raise
+        self._clipped += clipped > 0
+        self._succeeded = success
+        self._before, self._seen = self._inner.physics_state, observation
+
+    def keep(self, success: bool | None = None) -> str | None:
+        """End the episode and store it; its name, or None if there was nothing.
+
+        Args:
+            success: What a person says; by default what the benchmark said last.
+
+        Raises:
+            DatasetError: If it cannot be stored; then it is still in progress, and
+                `keep` may be tried again.
+        """
+        if self._facts is None or not len(self._rows):
+            self.discard()
+            return None
+        columns = self._rows.columns()
+        columns["dones"][-1] = 1
+        facts = self._facts | {
+            "success": self._succeeded if success is None else bool(success),
+            "clipped_steps": self._clipped,
+        }
+        name = self.open().add(
+            Episode(
+                name="",
+                columns=columns,
+                facts=facts,
+                final_state=self._before,
+            )
+        )
+        self.discard()
+        return name
+
+    def discard(self) -> None:
+        """Forget the episode in progress."""
+        self._facts = None
+        self._rows.close()
+
+    def undo(self) -> str | None:
+        """Forget the last episode that was kept; its name, or None if there is none."""
+        return None if self._store is None else self._store.undo()
+
+    def close(self) -> None:
+        """Forget what is in progress, and put all episodes into one file."""
+        self.discard()
+        if self._store is not None:
+            self._store.close()

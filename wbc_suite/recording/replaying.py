@@ -1,0 +1,133 @@
+"""Episodes played again: by their states, or by their actions."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from wbc_suite.envs import RobotEnv
+from wbc_suite.envs.states import write_physics
+from wbc_suite.errors import DatasetError, WbcError
+from wbc_suite.recording.episode import Episode
+from wbc_suite.typing import Vector
+
+__all__ = ["Divergence", "divergence", "play_actions", "play_states", "start_as"]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Divergence:
+    """How far a replay by actions went from what was recorded.
+
+    Attributes:
+        steps: Actions played.
+        largest: Largest difference of any number of the state (m, rad, m/s, rad/s).
+        first: Action after which the first difference was seen; None without any.
+        success: Whether the benchmark is solved at the end of the replay.
+    """
+
+    steps: int
+    largest: float
+    first: int | None
+    success: bool
+
+    @property
+    def exact(self) -> bool:
+        """Whether every bit of every state is as it was recorded."""
+        return self.first is None
+
+
+def start_as(env: RobotEnv, episode: Episode) -> None:
+    """Start an episode as a recorded one started.
+
+    With the state of the random generator it begins bit by bit as it did, sizes of
+    objects included; without (files from elsewhere) at the recorded physics state.
+
+    Raises:
+        DatasetError: If the recorded state does not fit the environment.
+    """
+    if "states" not in episode.columns or not episode.length:
+        raise DatasetError(f"'{episode.name}' has no states to start from.")
+    state = episode.columns["states"][0]
+    if state.size != env.physics_state.size:
+        raise DatasetError(
+            f"'{episode.name}' has states of {state.size} numbers, and this "
+            f"environment's have {env.physics_state.size}: its robot or its objects "
+            "differ, and it cannot be replayed here."
+        )
+    told = episode.facts.get("rng_state")
+    try:
+        if told is None:
+            env.reset_to(state)
+        else:
+            placed = json.loads(str(episode.facts.get("placed", "null")))
+            env.begin_at(_generator_state(str(told)), placed)
+    except (ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
+        raise DatasetError(f"'{episode.name}' has no usable start: {error}") from error
+    except WbcError as error:
+        raise DatasetError(f"'{episode.name}' cannot start here: {error}") from error
+
+
+def play_states(env: RobotEnv, episode: Episode) -> Iterator[int]:
+    """Put every recorded state into the simulation, one after the other.
+
+    Yields:
+        The number of the action that was taken there; the last one is the end.
+    """
+    start_as(env, episode)
+    simulation = env.simulation
+    states = list(episode.columns["states"])
+    if episode.final_state is not None:
+        states.append(episode.final_state)
+    for k, state in enumerate(states):
+        write_physics(simulation.model, simulation.data, state)
+        simulation.forward()
+        env.benchmark.watch()
+        env.observables.look()
+        yield k
+
+
+def play_actions(
+    env: RobotEnv, episode: Episode
+) -> Iterator[tuple[int, Vector, dict[str, Any]]]:
+    """Take the recorded actions, open loop.
+
+    Yields:
+        Number of the action, difference of the state after it from the recorded one
+        (none for the last when the dataset lacks it), and `info`.
+    """
+    start_as(env, episode)
+    if episode.columns["actions"].shape[1] != env.action_layout.size:
+        raise DatasetError(
+            f"'{episode.name}' has actions of {episode.columns['actions'].shape[1]} "
+            f"numbers, and this environment's have {env.action_layout.size}: it can "
+            "be replayed by states only."
+        )
+    states = episode.columns["states"]
+    for k, action in enumerate(episode.columns["actions"]):
+        *_, info = env.advance(action)
+        after = states[k + 1] if k + 1 < len(states) else episode.final_state
+        now = env.physics_state
+        yield k, now - (now if after is None else after), info
+        if "physics_error" in info:
+            return
+
+
+def divergence(env: RobotEnv, episode: Episode) -> Divergence:
+    """Replay an episode by its actions, and say how far it went from the recording."""
+    largest, first, steps, success = 0.0, None, 0, False
+    for k, difference, info in play_actions(env, episode):
+        worst = float(np.abs(difference).max())
+        largest, steps = max(largest, worst), k + 1
+        success = bool(info.get("success", False))
+        if worst > 0.0 and first is None:
+            first = k
+    return Divergence(steps=steps, largest=largest, first=first, success=success)
+
+
+def _generator_state(text: str) -> dict[str, Any]:
+    state = json.loads(text[:2000])
+    if not isinstance(state, dict) or state.get("bit_generator") != "PCG64":
+        raise ValueError("its random generator is not the one used here")
+    return state

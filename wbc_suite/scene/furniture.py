@@ -1,0 +1,93 @@
+"""Furniture that is fixed to the room: bins on legs, pegs, goals to be looked at."""
+
+from dataclasses import replace
+
+from pydantic import model_validator
+
+from wbc_suite.robot.component import Channel
+from wbc_suite.robot.shapes import Size, Vector3
+from wbc_suite.scene.objects.thing import Color, Part, Thing
+from wbc_suite.scene.objects.vessels import open_bin
+from wbc_suite.tomlfile import FrozenModel
+
+__all__ = ["BinConfig", "ghost", "peg", "standing_bin"]
+
+LEG: Color = (0.32, 0.33, 0.35, 1.0)
+LEG_RADIUS, INSET = 0.012, 0.03
+GHOST = 0.3
+"""Opacity of what only shows where something belongs."""
+
+
+class BinConfig(FrozenModel):
+    """A bin on legs.
+
+    Attributes:
+        size: Inner length along x, width along y, and height of the walls, m.
+        center: Middle of its floor, m.
+        wall: Thickness of walls and floor, m.
+        color: Of walls and floor.
+    """
+
+    size: tuple[Size, Size, Size]
+    center: Vector3
+    wall: Size = 0.01
+    color: tuple[Channel, Channel, Channel, Channel] = (0.80, 0.62, 0.42, 1.0)
+
+    @model_validator(mode="after")
+    def _stands_on_the_floor(self) -> "BinConfig":
+        if self.center[2] - self.wall < 0.01:
+            raise ValueError(f"a bin at {self.center[2]} m has no room for legs")
+        return self
+
+
+def standing_bin(name: str, config: BinConfig, *, quadrants: bool = False) -> Thing:
+    """Make a bin on legs; with quadrants, two walls cross in it.
+
+    Its origin is the middle of its floor.
+    """
+    (x, y, z), wall = config.size, config.wall
+    outer = (x + 2 * wall, y + 2 * wall, z + wall)
+    parts = [
+        replace(part, pos=(part.pos[0], part.pos[1], part.pos[2] - wall))
+        for part in open_bin(name, outer, wall=wall, color=config.color).parts
+    ]
+    if quadrants:
+        parts += [
+            Part(
+                kind="box",
+                size=size,
+                pos=(0.0, 0.0, z / 2),
+                color=config.color,
+                material="wood",
+            )
+            for size in ((x / 2, wall / 2, z / 2), (wall / 2, y / 2, z / 2))
+        ]
+    leg = (config.center[2] - wall) / 2
+    parts += [
+        Part(
+            kind="cylinder",
+            size=(LEG_RADIUS, leg),
+            pos=(side * (x / 2 - INSET), end * (y / 2 - INSET), -wall - leg),
+            color=LEG,
+            material="metal",
+        )
+        for side in (-1, 1)
+        for end in (-1, 1)
+    ]
+    return Thing(name=name, parts=tuple(parts)).fixed(config.center)
+
+
+def peg(name: str, part: Part, foot: Vector3) -> Thing:
+    """Stand a part upright on a foot point; its half height is its last size."""
+    x, y, z = foot
+    return Thing(name=name, parts=(part,)).fixed((x, y, z + part.size[-1]))
+
+
+def ghost(thing: Thing, name: str, pos: Vector3) -> Thing:
+    """Return a see-through likeness that touches nothing."""
+    parts = tuple(
+        replace(part, solid=False, color=(*part.color[:3], GHOST))
+        for part in thing.parts
+        if part.drawn
+    )
+    return replace(thing, name=name, parts=parts, sites={}).fixed(pos)

@@ -1,0 +1,282 @@
+"""Where things start: samplers of poses that do not touch one another.
+
+A sampler draws from the generator that it is given, and sees of a thing only the
+upright cylinder that holds it: two things are apart if their cylinders are.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from wbc_suite.errors import PlacementError
+from wbc_suite.robot.shapes import Interval, Real, Vector3
+from wbc_suite.scene.objects.state import Extent
+from wbc_suite.scene.objects.thing import STANDING, Quat
+from wbc_suite.tomlfile import FrozenModel
+
+__all__ = [
+    "Measured",
+    "OnTopSampler",
+    "PickySampler",
+    "Placed",
+    "Placements",
+    "Region",
+    "Sampler",
+    "SequentialSampler",
+    "UniformSampler",
+]
+
+TRIES = 300
+"""Poses that are drawn for one thing before all of them are placed anew."""
+LAYOUTS = 20
+"""How often all things of a sampler are placed anew before giving up."""
+ON_TOP = 1e-9
+"""m; what stands on another thing may sink in by rounding."""
+
+
+class Measured(Protocol):
+    """Something that can say how much room it takes."""
+
+    def extent(self, quat: Quat = STANDING) -> Extent:
+        """Return its room when turned by `quat`."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Placed:
+    """A thing at its place: position in m, quaternion w x y z, room it takes."""
+
+    position: Vector3
+    quat: Quat
+    extent: Extent
+
+    def touches(self, other: "Placed", gap: float) -> bool:
+        """Whether two cylinders are nearer than `gap`, side by side and in height."""
+        (ax, ay, az), (bx, by, bz) = self.position, other.position
+        beside = self.extent.radius + other.extent.radius + gap
+        if math.hypot(ax - bx, ay - by) >= beside:
+            return False
+        above = az - self.extent.bottom > bz + other.extent.top - ON_TOP
+        below = bz - other.extent.bottom > az + self.extent.top - ON_TOP
+        return not (above or below)
+
+
+Placements = dict[str, Placed]
+
+
+class Sampler(Protocol):
+    """Draws places for some things."""
+
+    def sample(
+        self,
+        rng: np.random.Generator,
+        things: Mapping[str, Measured],
+        taken: Mapping[str, Placed],
+    ) -> Placements:
+        """Return a place for each of the sampler's things.
+
+        Args:
+            rng: Generator that everything is drawn from.
+            things: What can be measured, by name.
+            taken: What has its place already.
+
+        Raises:
+            PlacementError: If there is no room; says what to relax.
+        """
+        ...
+
+
+class Region(FrozenModel):
+    """Part of a surface, and how things are turned on it.
+
+    Attributes:
+        x: Smallest and largest x from the surface's origin, m.
+        y: Smallest and largest y, m.
+        yaw: Smallest and largest turn about the vertical, rad.
+        clearance: Height above the surface, m.
+        inside: Whether a thing as a whole stays inside, or only its origin.
+        gap: Least distance between things, m.
+    """
+
+    x: Interval
+    y: Interval
+    yaw: Interval = (-math.pi, math.pi)
+    clearance: Real = 0.0
+    inside: bool = False
+    gap: Real = 0.0
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class UniformSampler:
+    """Draws places uniformly in a region, those that touch another thing excepted.
+
+    Attributes:
+        names: The things.
+        region: Where.
+        origin: Of the surface, m in the world.
+        rest: How a thing rests, before it is turned about the vertical; w x y z.
+    """
+
+    names: Sequence[str]
+    region: Region
+    origin: Vector3 = (0.0, 0.0, 0.0)
+    rest: Quat = STANDING
+
+    def sample(
+        self,
+        rng: np.random.Generator,
+        things: Mapping[str, Measured],
+        taken: Mapping[str, Placed],
+    ) -> Placements:
+        """See `Sampler`."""
+        extents = {name: things[name].extent(self.rest) for name in self.names}
+        failed: tuple[str, Extent, dict[str, Placed]] | None = None
+        for _ in range(LAYOUTS):
+            found: Placements = {}
+            for name, extent in extents.items():
+                place = self._place(rng, extent, {**taken, **found})
+                if place is None:
+                    failed = name, extent, {**taken, **found}
+                    break
+                found[name] = place
+            else:
+                return found
+        assert failed is not None
+        raise PlacementError(self._explain(*failed))
+
+    def _place(
+        self, rng: np.random.Generator, extent: Extent, taken: Mapping[str, Placed]
+    ) -> Placed | None:
+        (x0, x1), (y0, y1) = self._ends(extent)
+        if x0 <= x1 and y0 <= y1:
+            for _ in range(TRIES):
+                x, y = rng.uniform(x0, x1), rng.uniform(y0, y1)
+                yaw = rng.uniform(*self.region.yaw)
+                placed = self._at(x, y, yaw, extent)
+                if not any(placed.touches(o, self.region.gap) for o in taken.values()):
+                    return placed
+        return None
+
+    def _ends(self, extent: Extent) -> tuple[tuple[float, float], tuple[float, float]]:
+        kept = extent.radius if self.region.inside else 0.0
+        (x0, x1), (y0, y1) = self.region.x, self.region.y
+        return (x0 + kept, x1 - kept), (y0 + kept, y1 - kept)
+
+    def _at(self, x: float, y: float, yaw: float, extent: Extent) -> Placed:
+        ox, oy, oz = self.origin
+        height = oz + self.region.clearance + extent.bottom
+        turn = (math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))
+        quat = _product(turn, self.rest)
+        return Placed(position=(ox + x, oy + y, height), quat=quat, extent=extent)
+
+    def _explain(self, name: str, extent: Extent, taken: Mapping[str, Placed]) -> str:
+        region = self.region
+        beside = ", ".join(f"{n} ({p.extent.radius:.3f})" for n, p in taken.items())
+        inside = ", give it inside = false" if region.inside else ""
+        return (
+            f"No free place for '{name}' of radius {extent.radius:.3f} m in x "
+            f"{region.x[0]:g}..{region.x[1]:g}, y {region.y[0]:g}..{region.y[1]:g} m "
+            f"beside {beside or 'nothing'}, with a gap of {region.gap:g} m. Enlarge "
+            f"the region, make the gap or the things smaller{inside}, or place fewer."
+        )
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class SequentialSampler:
+    """Lets samplers draw one after the other; each sees what has its place already."""
+
+    samplers: Sequence[Sampler]
+
+    def sample(
+        self,
+        rng: np.random.Generator,
+        things: Mapping[str, Measured],
+        taken: Mapping[str, Placed],
+    ) -> Placements:
+        """See `Sampler`."""
+        found: Placements = {}
+        for sampler in self.samplers:
+            found |= sampler.sample(rng, things, {**taken, **found})
+        return found
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class OnTopSampler:
+    """Draws places on top of a thing that has its own.
+
+    Attributes:
+        names: The things.
+        support: The thing below.
+        region: Where, from the support's origin; it does not turn with it.
+    """
+
+    names: Sequence[str]
+    support: str
+    region: Region
+
+    def sample(
+        self,
+        rng: np.random.Generator,
+        things: Mapping[str, Measured],
+        taken: Mapping[str, Placed],
+    ) -> Placements:
+        """See `Sampler`."""
+        below = taken.get(self.support)
+        if below is None:
+            raise PlacementError(
+                f"Nothing can stand on '{self.support}' before it has a place: give it "
+                f"one first. Placed: {', '.join(taken) or 'nothing'}."
+            )
+        x, y, z = below.position
+        on_top = UniformSampler(
+            names=self.names,
+            region=self.region,
+            origin=(x, y, z + below.extent.top),
+        )
+        return on_top.sample(rng, things, taken)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class PickySampler:
+    """Lets a sampler draw until its places will do.
+
+    Attributes:
+        sampler: Draws places.
+        accepts: Whether they will do.
+        wanted: What is wanted of them, in words.
+    """
+
+    sampler: Sampler
+    accepts: Callable[[Placements], bool]
+    wanted: str
+
+    def sample(
+        self,
+        rng: np.random.Generator,
+        things: Mapping[str, Measured],
+        taken: Mapping[str, Placed],
+    ) -> Placements:
+        """See `Sampler`."""
+        found: Placements = {}
+        for _ in range(TRIES):
+            found = self.sampler.sample(rng, things, taken)
+            if self.accepts(found):
+                return found
+        raise PlacementError(
+            f"In {TRIES} tries there was no place for {', '.join(found)} where "
+            f"{self.wanted}. Change the region, or the things' sizes."
+        )
+
+
+def _product(a: Quat, b: Quat) -> Quat:
+    """Return the quaternion of turning by b, then by a."""
+    (aw, ax, ay, az), (bw, bx, by, bz) = a, b
+    return (
+        aw * bw - ax * bx - ay * by - az * bz,
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+    )

@@ -1,0 +1,203 @@
+"""Cameras of a scene: pictures, depths, segmentations, and where points are in them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import gymnasium
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from wbc_suite.control import RobotState
+from wbc_suite.sensing.projection import Projection, camera_id
+from wbc_suite.sensing.renderer import RenderPreset, make_renderer
+from wbc_suite.sensing.scene_renderer import SceneRenderer
+from wbc_suite.sensing.segmentation import Labels, SegmentationLevel
+from wbc_suite.typing import Array
+
+__all__ = ["CameraRequest", "Cameras"]
+
+Picture = NDArray[Any]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class CameraRequest:
+    """A camera that is observed.
+
+    Attributes:
+        name: Name of the camera; keys begin with it.
+        width: Of its pictures, pixels.
+        height: Of its pictures, pixels.
+        depth: Whether depth is observed.
+        segmentations: Levels of segmentation that are observed.
+    """
+
+    name: str
+    width: int
+    height: int
+    depth: bool = False
+    segmentations: tuple[SegmentationLevel, ...] = ()
+
+    def segmentation_key(self, level: SegmentationLevel) -> str:
+        """Return the key of a segmentation; with several levels it names its own."""
+        several = len(self.segmentations) > 1
+        return f"{self.name}_segmentation" + (f"_{level}" if several else "")
+
+
+class Cameras:
+    """Takes pictures of a simulation.
+
+    Renderers are made when they are first needed, one for each size of picture, and
+    belong to the thread that asked first. Row 0 of a picture is its upper edge.
+
+    Args:
+        model: The scene.
+        data: Its state.
+        robots: The robots in it.
+        requests: What is observed.
+        preset: How much work goes into a picture; see `make_renderer`.
+
+    Attributes:
+        labels: Numbers of segmentations, and what they stand for.
+        space: Spaces of what is observed, by key.
+
+    Raises:
+        UnknownNameError: If there is no such camera.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        robots: Sequence[RobotState],
+        requests: Sequence[CameraRequest] = (),
+        *,
+        preset: RenderPreset | str | None = None,
+    ) -> None:
+        self._model, self._data, self._preset = model, data, preset
+        self.labels = Labels(model, robots)
+        self._requests = tuple(requests)
+        for request in self._requests:
+            camera_id(model, request.name)
+        self._renderers: dict[tuple[int, int], SceneRenderer] = {}
+        self._stale: set[tuple[int, int]] = set()
+        self.space = {
+            key: space
+            for request in self._requests
+            for key, space in self._spaces(request).items()
+        }
+
+    @property
+    def far(self) -> float:
+        """Depth of the sky, m: nothing beyond it is drawn."""
+        return float(np.float32(self._model.vis.map.zfar * self._model.stat.extent))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all cameras of the scene."""
+        return tuple(self._model.camera(i).name for i in range(self._model.ncam))
+
+    def observation(self) -> dict[str, Picture]:
+        """Take what is observed, by key."""
+        seen: dict[str, Picture] = {}
+        for request in self._requests:
+            renderer = self._aim(request.name, request.width, request.height)
+            seen[f"{request.name}_image"] = renderer.render()
+            if request.depth or request.segmentations:
+                renderer.draw_surfaces()
+            if request.depth:
+                seen[f"{request.name}_depth"] = self._read_depth(renderer)
+            for level in request.segmentations:
+                key = request.segmentation_key(level)
+                seen[key] = self._read_labels(renderer, level)
+        return seen
+
+    def black(self) -> dict[str, Picture]:
+        """Return what is observed where nothing can be seen, by key."""
+        return {
+            key: np.zeros(space.shape or (), space.dtype)
+            for key, space in self.space.items()
+        }
+
+    def image(self, camera: str, *, width: int, height: int) -> NDArray[np.uint8]:
+        """Return a picture, RGB, shape (height, width, 3)."""
+        return self._aim(camera, width, height).render()
+
+    def depth(self, camera: str, *, width: int, height: int) -> NDArray[np.float32]:
+        """Return distances along the camera's axis, m, shape (height, width, 1)."""
+        renderer = self._aim(camera, width, height)
+        renderer.draw_surfaces()
+        return self._read_depth(renderer)
+
+    def segmentation(
+        self, camera: str, *, width: int, height: int, level: SegmentationLevel | str
+    ) -> NDArray[np.int32]:
+        """Return numbers of `labels`, 0 for the sky, shape (height, width, 1)."""
+        renderer = self._aim(camera, width, height)
+        renderer.draw_surfaces()
+        return self._read_labels(renderer, SegmentationLevel(level))
+
+    def projection(self, camera: str, *, width: int, height: int) -> Projection:
+        """Return intrinsics and extrinsics, which lead from the world to pixels."""
+        camera_index = camera_id(self._model, camera)
+        return Projection.of(
+            self._model, self._data, camera_index, width=width, height=height
+        )
+
+    def point_cloud(self, camera: str, *, width: int, height: int) -> Array:
+        """Return the point of the world at each pixel, m, shape (height, width, 3)."""
+        depth = self.depth(camera, width=width, height=height)
+        return self.projection(camera, width=width, height=height).point_cloud(depth)
+
+    def normals(self, camera: str, *, width: int, height: int) -> Array:
+        """Return surface normals in the world, shape (height, width, 3)."""
+        depth = self.depth(camera, width=width, height=height)
+        return self.projection(camera, width=width, height=height).normals(depth)
+
+    def upload_textures(self) -> None:
+        """Let next pictures show textures that were written into the model."""
+        self._stale = set(self._renderers)
+
+    def close(self) -> None:
+        """Free the renderers; a next picture makes them anew."""
+        while self._renderers:
+            self._renderers.popitem()[1].close()
+
+    def _aim(self, camera: str, width: int, height: int) -> SceneRenderer:
+        """Return a renderer whose scene is what the camera sees now."""
+        index, size = camera_id(self._model, camera), (width, height)
+        renderer = self._renderers.get(size)
+        if renderer is None:
+            renderer = make_renderer(
+                self._model, width=width, height=height, preset=self._preset
+            )
+            self._renderers[size] = renderer
+        elif size in self._stale:
+            renderer.upload_textures()
+        self._stale.discard(size)
+        mujoco.mj_camlight(self._model, self._data)  # else one physics step behind
+        renderer.update_scene(self._data, camera=index)
+        return renderer
+
+    def _read_labels(
+        self, renderer: SceneRenderer, level: SegmentationLevel
+    ) -> NDArray[np.int32]:
+        return renderer.read_geoms(self.labels.of_geoms(level))[..., None]
+
+    def _read_depth(self, renderer: SceneRenderer) -> NDArray[np.float32]:
+        depth = renderer.read_depth()
+        return np.minimum(depth, np.float32(self.far), out=depth)[..., None]
+
+    def _spaces(self, request: CameraRequest) -> dict[str, gymnasium.Space[Any]]:
+        box, size = gymnasium.spaces.Box, (request.height, request.width)
+        spaces: dict[str, gymnasium.Space[Any]] = {
+            f"{request.name}_image": box(0, 255, (*size, 3), np.uint8)
+        }
+        if request.depth:
+            spaces[f"{request.name}_depth"] = box(0, self.far, (*size, 1), np.float32)
+        for level in request.segmentations:
+            most = self.labels.largest(level)
+            key = request.segmentation_key(level)
+            spaces[key] = box(0, most, (*size, 1), np.int32)
+        return spaces

@@ -1,0 +1,280 @@
+"""Observations that are sampled, delayed, noisy, filtered, added or left out.
+
+While nothing is changed, all of this is one call of `Observer.look` a step.
+Observations that are changed follow physics step by step.
+"""
+
+import copy
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, TypeAlias
+
+import mujoco
+import numpy as np
+
+from wbc_suite.arguments import check_number
+from wbc_suite.errors import ConfigError, UnknownNameError
+from wbc_suite.sensing.observer import Observer
+from wbc_suite.sensing.reading import Reading
+from wbc_suite.typing import Vector
+
+__all__ = ["Change", "Observables"]
+
+Noise: TypeAlias = Callable[[Vector, np.random.Generator], Vector]
+Delay: TypeAlias = float | Callable[[np.random.Generator], float]
+Filter: TypeAlias = Callable[[Vector], Vector]
+Maker: TypeAlias = Callable[[mujoco.MjModel, mujoco.MjData], Reading]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Change:
+    """How an observation differs from the truth.
+
+    Attributes:
+        noise: Makes noisy values out of values and a generator.
+        delay: s, or what draws it for each sample.
+        filter: Makes values out of noisy ones; its `reset` is called at a reset.
+        sampling_rate: Samples a second; None for one in every physics step.
+        enabled: Whether samples are taken; else the last value stays.
+        active: Whether it is in observations and in their space.
+    """
+
+    noise: Noise | None = None
+    delay: Delay = 0.0
+    filter: Filter | None = None
+    sampling_rate: float | None = None
+    enabled: bool = True
+    active: bool = True
+
+    def __post_init__(self) -> None:
+        if not callable(self.delay):
+            check_number("An observation's delay", self.delay, least=0.0)
+        if self.sampling_rate is not None:
+            check_number("An observation's sampling_rate", self.sampling_rate, above=0)
+        for name in ("noise", "filter"):
+            value = getattr(self, name)
+            if value is not None and not callable(value):
+                raise ConfigError(
+                    f"An observation's {name} is a function or None, not {value!r:.60}."
+                )
+
+
+class Observables:
+    """All that is observed of one simulation but pictures.
+
+    Args:
+        model: The scene.
+        data: Its state.
+        groups: Readings by key, by the group's key.
+
+    Attributes:
+        observer: What was seen last; another one after keys came or went.
+        changes: What differs from the truth, by key.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        groups: Mapping[str, Mapping[str, Reading]],
+    ) -> None:
+        self._model, self._data = model, data
+        self._groups = {name: dict(group) for name, group in groups.items()}
+        self._added: dict[str, tuple[str, Maker]] = {}
+        self.changes: dict[str, Change] = {}
+        self._channels: dict[str, _Channel] = {}
+        self._rng = np.random.default_rng(0)
+        self.observer = Observer(data, self._groups)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Keys of all observations, also of those that are not active."""
+        return tuple(key for group in self._groups.values() for key in group)
+
+    def modify(self, key: str, **changes: Any) -> None:
+        """Change an observation from now on; see `Change`.
+
+        Raises:
+            UnknownNameError: If there is no such observation, or no such change.
+            ConfigError: If a value is wrong. Then nothing has changed.
+        """
+        if key not in self.names:
+            raise UnknownNameError("observation", key, self.names)
+        for name in changes:
+            if name not in Change.__slots__:
+                raise UnknownNameError("change", name, tuple(Change.__slots__))
+        before = self.changes.get(key, Change())
+        now = replace(before, **changes)
+        self.changes[key] = now
+        if now == Change():
+            del self.changes[key]
+        if now.active != before.active:
+            self._rebuild()
+        self._connect(key)
+
+    def add(self, key: str, make: Maker, *, group: str, **changes: Any) -> None:
+        """Observe something else from now on.
+
+        Args:
+            key: Its key, a new one.
+            make: Makes the reading out of model and data; copies of the environment
+                call it again.
+            group: The key of the vector that holds it too; it may be new.
+            changes: See `modify`.
+
+        Raises:
+            ConfigError: If the key is taken.
+        """
+        if key in self.names or key in self._groups or key == group:
+            raise ConfigError(f"There is an observation '{key}' already.")
+        self._groups.setdefault(group, {})[key] = make(self._model, self._data)
+        self._added[key] = group, make
+        self._rebuild()
+        if changes:
+            self.modify(key, **changes)
+
+    def start(self, rng: np.random.Generator) -> None:
+        """Begin an episode; noise is drawn from a generator that `rng` seeds."""
+        if self.changes:
+            self._rng = np.random.default_rng(rng.integers(2**63))
+        self.observer.look()
+        for channel in self._channels.values():
+            channel.start(self.observer.values, self._rng)
+        self._show()
+
+    def tick(self, tick: Callable[[int], None], n: int) -> None:
+        """Advance physics by n steps, and look at every one if anything is changed."""
+        if not self._channels:
+            tick(n)
+            return
+        for _ in range(n):
+            tick(1)
+            self.observer.look()
+            for channel in self._channels.values():
+                channel.sample(self.observer.values, self._rng)
+
+    def look(self) -> None:
+        """Read everything into `observer.values`, and put in what is changed."""
+        self.observer.look()
+        if self._channels:
+            self._show()
+
+    def state(self) -> dict[str, Any]:
+        """Return what a copy needs; see `restore`."""
+        return {
+            "added": self._added,
+            "changes": self.changes,
+            "channels": {k: c.state for k, c in self._channels.items()},
+            "rng": self._rng,
+        }
+
+    def prepare(self, state: Mapping[str, Any]) -> None:
+        """Add and change what the original has."""
+        for key, (group, make) in state["added"].items():
+            self.add(key, make, group=group)
+        for key, change in state["changes"].items():
+            if change != self.changes.get(key):
+                self.modify(key, **{k: getattr(change, k) for k in Change.__slots__})
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Go on from where the original stands."""
+        self._rng = state["rng"]
+        for key, known in state["channels"].items():
+            if key in self._channels:
+                self._channels[key].state = known
+        self.look()
+
+    def _show(self) -> None:
+        for channel in self._channels.values():
+            channel.show(self.observer.values)
+
+    def _rebuild(self) -> None:
+        """Make an observer of the active ones."""
+        groups = {
+            name: {
+                key: reading
+                for key, reading in group.items()
+                if key not in self.changes or self.changes[key].active
+            }
+            for name, group in self._groups.items()
+        }
+        self.observer = Observer(self._data, groups)
+        for channel in list(self._channels):
+            self._connect(channel)
+        self.look()
+
+    def _connect(self, key: str) -> None:
+        """Let a channel stand between truth and observation, where it is changed."""
+        change, old = self.changes.get(key), self._channels.pop(key, None)
+        if change is None or not change.active:
+            return
+        place = self.observer.places[key]
+        bound = self.observer.bounds[key]
+        channel = _Channel(change, place, bound, self._model.opt.timestep)
+        if old is None:
+            channel.start(self.observer.values, self._rng)
+        else:
+            channel.state = old.state
+        self._channels[key] = channel
+
+
+class _Channel:
+    """What stands between the truth and one observation."""
+
+    def __init__(
+        self, change: Change, place: slice, bound: float, timestep: float
+    ) -> None:
+        self._change, self._place, self._bound = change, place, bound
+        self._timestep, self._step = timestep, 0
+        rate = change.sampling_rate
+        self._period = 1 if rate is None else max(1, round(1.0 / (rate * timestep)))
+        self._filter = copy.deepcopy(change.filter)
+        self._shown: Vector = np.zeros(place.stop - place.start)
+        self._coming: deque[tuple[int, Vector]] = deque()
+
+    @property
+    def state(self) -> tuple[Any, ...]:
+        """Everything that changes, to go on with."""
+        return self._step, self._filter, self._shown, self._coming
+
+    @state.setter
+    def state(self, known: tuple[Any, ...]) -> None:
+        self._step, kept, self._shown, self._coming = known
+        if type(kept) is type(self._filter):
+            self._filter = kept
+
+    def start(self, values: Vector, rng: np.random.Generator) -> None:
+        """Take a first sample, and show it at once."""
+        self._step, self._coming = 0, deque()
+        reset = getattr(self._filter, "reset", None)
+        if reset is not None:
+            reset()
+        enabled = self._change.enabled
+        self._shown = (
+            self._taken(values, rng) if enabled else values[self._place].copy()
+        )
+
+    def sample(self, values: Vector, rng: np.random.Generator) -> None:
+        """Follow one physics step."""
+        self._step += 1
+        if self._change.enabled and self._step % self._period == 0:
+            delay = self._change.delay
+            wait = delay(rng) if callable(delay) else delay
+            due = self._step + round(wait / self._timestep)
+            self._coming.append((due, self._taken(values, rng)))
+        arrived = [k for k, (due, _) in enumerate(self._coming) if due <= self._step]
+        for _ in range(arrived[-1] + 1 if arrived else 0):
+            self._shown = self._coming.popleft()[1]
+
+    def show(self, values: Vector) -> None:
+        """Put what is observed in the place of the truth."""
+        values[self._place] = self._shown
+
+    def _taken(self, values: Vector, rng: np.random.Generator) -> Vector:
+        sample = values[self._place].copy()
+        if self._change.noise is not None:
+            sample = self._change.noise(sample, rng)
+        if self._filter is not None:
+            sample = self._filter(sample)
+        return np.clip(np.asarray(sample, np.float64), -self._bound, self._bound)

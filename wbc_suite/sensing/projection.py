@@ -1,0 +1,158 @@
+"""From the world into a picture and back: intrinsics, extrinsics, points, normals."""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike
+
+from wbc_suite.errors import UnknownNameError
+from wbc_suite.typing import Array, Matrix, Vector
+
+__all__ = ["Projection", "camera_id"]
+
+FLIP = np.diag([1.0, -1.0, -1.0])
+"""From OpenGL's camera axes, which MuJoCo has (y up, z back), to OpenCV's."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Projection:
+    """A pinhole camera at one moment.
+
+    The camera's axes are OpenCV's: x right, y down, z forward. Pixels are (u, v),
+    columns before rows; whole numbers are the middles of pixels, (0, 0) is the upper
+    left one.
+
+    Attributes:
+        K: Intrinsics, pixels, shape (3, 3): (u, v, 1) ~ K (x, y, z).
+        T_wc: Extrinsics: pose of the camera in the world, shape (4, 4).
+        width: Of the picture, pixels.
+        height: Of the picture, pixels.
+    """
+
+    K: Matrix
+    T_wc: Matrix
+    width: int
+    height: int
+
+    @classmethod
+    def of(
+        cls,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        camera: int,
+        *,
+        width: int,
+        height: int,
+    ) -> "Projection":
+        """Return how a camera of the scene projects now."""
+        mujoco.mj_camlight(model, data)  # a step leaves cameras one step behind
+        T_wc = np.eye(4)
+        T_wc[:3, :3] = data.cam_xmat[camera].reshape(3, 3) @ FLIP
+        T_wc[:3, 3] = data.cam_xpos[camera]
+        K = _intrinsics(model, camera, width, height)
+        K.flags.writeable = T_wc.flags.writeable = False
+        return cls(K=K, T_wc=T_wc, width=width, height=height)
+
+    def to_pixels(self, points: ArrayLike) -> tuple[Array, Array]:
+        """Project points of the world.
+
+        Args:
+            points: In the world, m, shape (..., 3).
+
+        Returns:
+            Pixels, shape (..., 2), and depths along the camera's axis, m, shape (...).
+            A depth that is not positive lies behind the camera; its pixel means
+            nothing.
+        """
+        seen = self._from_world(np.asarray(points, dtype=np.float64))
+        depth = seen[..., 2]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            pixels = (seen @ self.K.T)[..., :2] / depth[..., None]
+        return pixels, depth
+
+    def to_world(self, pixels: ArrayLike, depth: ArrayLike) -> Array:
+        """Return the points of the world seen at pixels.
+
+        Args:
+            pixels: (u, v), shape (..., 2).
+            depth: Distance along the camera's axis, m, shape (...).
+        """
+        rays = np.asarray(pixels, dtype=np.float64) - self.K[:2, 2]
+        rays = np.concatenate(
+            [rays / self.K.diagonal()[:2], np.ones((*rays.shape[:-1], 1))], axis=-1
+        )
+        points = rays * np.asarray(depth, dtype=np.float64)[..., None]
+        return points @ self.T_wc[:3, :3].T + self.T_wc[:3, 3]
+
+    def point_cloud(self, depth: ArrayLike) -> Array:
+        """Return the point of the world at each pixel, shape (height, width, 3), m.
+
+        Args:
+            depth: Depth picture, m, shape (height, width) or (height, width, 1).
+        """
+        flat = np.asarray(depth, dtype=np.float64).reshape(self.height, self.width)
+        pixels = np.stack(
+            np.meshgrid(np.arange(self.width), np.arange(self.height)), axis=-1
+        )
+        return self.to_world(pixels, flat)
+
+    def normals(self, depth: ArrayLike) -> Array:
+        """Return the surface's normal at each pixel, in the world, towards the camera.
+
+        They come from differences of neighbouring points, so along edges they mix two
+        surfaces.
+
+        Args:
+            depth: As `point_cloud` takes it.
+
+        Returns:
+            Unit vectors, shape (height, width, 3).
+        """
+        points = self.point_cloud(depth)
+        down, right = np.gradient(points, axis=(0, 1))
+        normals = np.cross(down, right)
+        length = np.linalg.norm(normals, axis=-1, keepdims=True)
+        normals /= np.where(length > 0.0, length, 1.0)
+        away = np.sum(normals * (points - self.T_wc[:3, 3]), axis=-1) > 0.0
+        normals[away] *= -1.0
+        return normals
+
+    def _from_world(self, points: Array) -> Array:
+        return (points - self.T_wc[:3, 3]) @ self.T_wc[:3, :3]
+
+
+def camera_id(model: mujoco.MjModel, name: str) -> int:
+    """Return the index of a camera.
+
+    A robot with one hand also answers to `robot0_eye_in_hand`, the name in datasets of
+    this field, for its `robot0_right_eye_in_hand`.
+
+    Raises:
+        UnknownNameError: If there is no such camera.
+    """
+    known = [model.camera(i).name for i in range(model.ncam)]
+    if name in known:
+        return known.index(name)
+    prefix, hand, rest = str(name).partition("eye_in_hand")
+    sides = [f"{prefix}{side}_{hand}{rest}" for side in ("right", "left")]
+    there = [known.index(side) for side in sides if hand and side in known]
+    if len(there) == 1:
+        return there[0]
+    raise UnknownNameError("camera", name, known)
+
+
+def _intrinsics(model: mujoco.MjModel, camera: int, width: int, height: int) -> Matrix:
+    """Return K: of the camera's sensor where it has one, else of its field of view."""
+    sensor = model.cam_sensorsize[camera]
+    K = np.eye(3)
+    if sensor[1] > 0.0:
+        scale: Vector = np.array([width, height]) / sensor
+        focal, offset = np.split(model.cam_intrinsic[camera] * np.tile(scale, 2), 2)
+    else:
+        f = 0.5 * height / np.tan(np.deg2rad(model.cam_fovy[camera]) / 2.0)
+        focal, offset = np.array([f, f]), np.zeros(2)
+    K[0, 0], K[1, 1] = focal
+    K[0, 2] = (width - 1) / 2.0 - offset[0]
+    K[1, 2] = (height - 1) / 2.0 - offset[1]
+    return K

@@ -1,0 +1,95 @@
+"""What pixels belong to: elements, instances and classes of a scene."""
+
+import re
+from collections.abc import Sequence
+from enum import StrEnum
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from wbc_suite.control import RobotState
+from wbc_suite.sensing.hands import hands_of
+
+__all__ = ["Labels", "SegmentationLevel"]
+
+
+class SegmentationLevel(StrEnum):
+    """How finely pixels are told apart."""
+
+    ELEMENT = "element"
+    """Each geom on its own."""
+    INSTANCE = "instance"
+    """Each robot without its grippers, each gripper, each piece of furniture and each
+    object."""
+    CLASS = "class"
+    """All robots of a kind, all grippers, all things whose names differ only by a
+    number or a capital letter at the end (`cubeA`, `cubeB`: `cube`)."""
+
+
+class Labels:
+    """Numbers of what can be seen, 1, 2, ...; 0 is the sky.
+
+    Args:
+        model: The scene.
+        robots: The robots in it.
+
+    Attributes:
+        names: What each number stands for, by level.
+    """
+
+    def __init__(self, model: mujoco.MjModel, robots: Sequence[RobotState]) -> None:
+        bodies = _instances(model, robots)
+        kinds = {state.prefix.rstrip("_"): state.robot.name for state in robots}
+        instances = [bodies[body] for body in model.geom_bodyid.tolist()]
+        classes = [_class_of(name, kinds) for name in instances]
+        elements = [
+            model.geom(i).name or f"{instances[i]}_geom{i}" for i in range(model.ngeom)
+        ]
+        self.names: dict[SegmentationLevel, dict[int, str]] = {}
+        self._numbers: dict[SegmentationLevel, NDArray[np.int32]] = {}
+        for level, found in zip(
+            SegmentationLevel, (elements, instances, classes), strict=True
+        ):
+            distinct = (
+                found if level == SegmentationLevel.ELEMENT else [*dict.fromkeys(found)]
+            )
+            number = {name: i for i, name in enumerate(distinct, 1)}
+            self.names[level] = {i: name for i, name in enumerate(distinct, 1)}
+            numbers = (
+                list(range(1, model.ngeom + 1))
+                if level == SegmentationLevel.ELEMENT
+                else [number[name] for name in found]
+            )
+            self._numbers[level] = np.array([*numbers, 0], dtype=np.int32)
+
+    def largest(self, level: SegmentationLevel) -> int:
+        """Return the largest number that a pixel may have."""
+        return max(self.names[level], default=0)
+
+    def of_geoms(self, level: SegmentationLevel) -> NDArray[np.int32]:
+        """Return the number of each geom and last the sky's 0, shape (ngeom + 1,)."""
+        return self._numbers[level]
+
+
+def _instances(model: mujoco.MjModel, robots: Sequence[RobotState]) -> list[str]:
+    """Return the instance that each body belongs to."""
+    found = [
+        model.body(int(root)).name or f"body{int(root)}" for root in model.body_rootid
+    ]
+    for state in robots:
+        for i in range(model.nbody):
+            if model.body(i).name.startswith(state.prefix):
+                found[i] = state.prefix.rstrip("_")
+        for hand in hands_of(state):
+            for body in hand.gripper_bodies:
+                found[body] = f"{state.prefix}{hand.name}_gripper"
+    return found
+
+
+def _class_of(instance: str, kinds: dict[str, str]) -> str:
+    if instance in kinds:
+        return kinds[instance]
+    if instance.endswith("_gripper") and instance.partition("_")[0] in kinds:
+        return "gripper"
+    return re.sub(r"[_\d]+$|(?<=[a-z])[A-Z]$", "", instance) or instance

@@ -1,0 +1,99 @@
+"""CPU times of environment steps, of raw physics from the same states, of pictures.
+
+Peers import this in their own environments: it needs MuJoCo and NumPy only.
+"""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import mujoco
+import numpy as np
+
+__all__ = ["Block", "Frames", "time_block", "time_frames", "times"]
+
+clock = time.process_time_ns
+_STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+
+
+def times(count: int, run: Callable[[], object]) -> list[float]:
+    """Return the CPU time of each of several runs, us."""
+    found: list[float] = []
+    for _ in range(count):
+        start = clock()
+        run()
+        found.append((clock() - start) / 1e3)
+    return found
+
+
+@dataclass(kw_only=True)
+class Block:
+    """CPU times of environment steps, and of raw physics over the same span, us."""
+
+    step: list[float] = field(default_factory=list)
+    raw: list[float] = field(default_factory=list)
+
+    def extend(self, other: "Block") -> None:
+        """Add another block's times."""
+        self.step += other.step
+        self.raw += other.raw
+
+
+@dataclass(kw_only=True)
+class Frames:
+    """Times of pictures, us: of all threads' processors, and by the wall clock."""
+
+    cpu: list[float] = field(default_factory=list)
+    wall: list[float] = field(default_factory=list)
+
+    def extend(self, other: "Frames") -> None:
+        """Add others' times."""
+        self.cpu += other.cpu
+        self.wall += other.wall
+
+    @property
+    def per_second(self) -> float:
+        """Pictures per second of the wall clock."""
+        return 1e6 / float(np.median(self.wall))
+
+
+def time_frames(count: int, draw: Callable[[], object]) -> Frames:
+    """Time pictures, one after the other."""
+    frames = Frames()
+    for _ in range(count):
+        start = time.perf_counter_ns()
+        frames.cpu += times(1, draw)
+        frames.wall.append((time.perf_counter_ns() - start) / 1e3)
+    return frames
+
+
+def time_block(
+    step: Callable[[np.ndarray], object],
+    actions: Sequence[np.ndarray],
+    *,
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    substeps: int,
+) -> Block:
+    """Time steps, then `mj_step` from the states they began in, controls held.
+
+    Args:
+        step: Takes one environment step.
+        actions: One per step.
+        model: The environment's own compiled model.
+        data: Its state.
+        substeps: Physics steps of one environment step.
+    """
+    size = mujoco.mj_stateSize(model, _STATE)
+    starts, controls = np.zeros((len(actions), size)), []
+    block = Block()
+    for action, start in zip(actions, starts, strict=True):
+        mujoco.mj_getState(model, data, start, _STATE)
+        block.step += times(1, lambda: step(action))  # noqa: B023
+        controls.append(data.ctrl.copy())
+    scratch = mujoco.MjData(model)
+    for start, control in zip(starts, controls, strict=True):
+        mujoco.mj_setState(model, scratch, start, _STATE)
+        scratch.ctrl[:] = control
+        block.raw += times(1, lambda: mujoco.mj_step(model, scratch, nstep=substeps))
+    return block
