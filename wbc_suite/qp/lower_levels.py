@@ -11,7 +11,7 @@ from wbc_suite.kinematics.array_table import ArrayTable, indices, matrix, vector
 from wbc_suite.qp.active_set import solve_warm
 from wbc_suite.qp.fallback import checked_solve
 from wbc_suite.qp.level import Level
-from wbc_suite.qp.problem import UNBOUNDED, Problem, worst_violation
+from wbc_suite.qp.problem import UNBOUNDED, Problem, clip_step, worst_violation
 from wbc_suite.qp.row_space import decided_directions
 from wbc_suite.qp.solver import QpSolver
 from wbc_suite.qp.tick import (
@@ -146,8 +146,12 @@ class LowerLevels:
             problem.lower[bounds] -= ROOM
             problem.upper[bounds] += ROOM
             result = checked_solve(solver, problem)
-        if result is None or first.violation(result[0]) > TOLERANCE:
-            return None  # rows longer than 1 feel more than their orthonormal basis
+        if result is None:
+            return None
+        # Clipped again: over a short tick, the room is a speed. Rows longer than 1 feel
+        # more than their orthonormal basis.
+        if not clip_step(result[0], first.rows, first.lower, first.upper, TOLERANCE):
+            return None
         return problem.rows, *result
 
 
