@@ -5,7 +5,6 @@ from typing import Literal
 import numpy as np
 
 from wbc_suite.control.part.config import (
-    InputScaling,
     InputType,
     Numbers,
     Span,
@@ -14,9 +13,8 @@ from wbc_suite.control.part.config import (
 from wbc_suite.control.part.controller import WHENEVER
 from wbc_suite.control.part.impedance import Gains, Impedance, ImpedanceSettings
 from wbc_suite.control.part.joint import JointLaw
+from wbc_suite.control.part.joint_input import JointInput
 from wbc_suite.control.part.joint_limits import (
-    joint_part,
-    joint_units,
     keep_within,
     position_limits,
     speed_limits,
@@ -77,33 +75,32 @@ class JointPositionController:
         self.config, self._state = config, state
         self._impedance = Impedance(name, joints, config)
         self.law = JointLaw(state, joints, kp=self._impedance.kp, kd=self._impedance.kd)
-        self._low, self._high = position_limits(state, joints, config.qpos_limits)
+        low, high = position_limits(state, joints, config.qpos_limits)
         least, greatest = speed_limits(state, joints, config.velocity_limits)
         self.law.keep_limits(state)
-        keep_within(self.law, self._low, self._high, np.minimum(-least, greatest))
+        keep_within(self.law, low, high, np.minimum(-least, greatest))
         set_torque_rules(self.law, config)
-        self._scaling = InputScaling(
-            len(joints), config, config.output_min, config.output_max
-        )
-        part = joint_part(
+        self._input = JointInput(
             name,
             "posture",
+            state,
             joints,
-            joint_units(state, joints),
-            limits=(self._low, self._high),
-            scaling=self._scaling if config.input_type == "delta" else None,
+            config=config,
+            outputs=(config.output_min, config.output_max),
+            scaled=config.input_type == "delta",
+            limits=(low, high),
         )
-        self.slices = (part, *self._impedance.slices)
+        self.slices = (self._input.part, *self._impedance.slices)
         self.goal: Vector = np.zeros(len(joints))
         self._achieved = config.goal_update_mode == "achieved"
         self._table = ArrayTable(
             StepField,
             {
                 StepField.GOAL: self.goal,
-                StepField.GAIN: self._scaling.gain,
-                StepField.OFFSET: self._scaling.offset,
-                StepField.LOW: self._low.copy(),
-                StepField.HIGH: self._high.copy(),
+                StepField.GAIN: self._input.scaling.gain,
+                StepField.OFFSET: self._input.scaling.offset,
+                StepField.LOW: low.copy(),
+                StepField.HIGH: high.copy(),
                 StepField.QPOS: state.data.qpos,
             },
         )
@@ -119,8 +116,8 @@ class JointPositionController:
         if self._impedance.slices:
             self._impedance.take(values[size:])
             self.law.set_gains(self._impedance.kp, self._impedance.kd)
-        if self.config.input_type == "absolute":
-            np.clip(values[:size], self._low, self._high, out=self.goal)
+        if not self._input.scaled:
+            self.goal[:] = self._input(values[:size])
         else:
             step_joints(
                 values[:size], self._table.table, self.law.drives, self._achieved
@@ -134,6 +131,5 @@ class JointPositionController:
     @property
     def hold_action(self) -> Vector:
         """The action that keeps the goal and the gains."""
-        delta = self.config.input_type == "delta"
-        motion = self._scaling.neutral if delta else self.goal
+        motion = self._input.neutral if self._input.scaled else self.goal
         return np.concatenate([motion, self._impedance.hold_action])

@@ -4,19 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wbc_suite.control.action import ActionPart, SliceKind
-from wbc_suite.control.part.config import InputScaling, Span, limits_of
+from wbc_suite.control.part.config import Span, limits_of
 from wbc_suite.control.part.law import Law
 from wbc_suite.control.state import RobotState
 from wbc_suite.typing import Vector
 
-__all__ = [
-    "joint_part",
-    "joint_units",
-    "keep_within",
-    "position_limits",
-    "speed_limits",
-]
+__all__ = ["keep_within", "position_limits", "speed_limits"]
 
 
 def position_limits(
@@ -54,41 +47,6 @@ def keep_within(law: Law, low: Vector, high: Vector, fastest: Vector) -> None:
     drives["lowest"] = np.maximum(drives["lowest"], low)
     drives["highest"] = np.minimum(drives["highest"], high)
     drives["fastest"] = np.minimum(drives["fastest"], fastest)
-
-
-def joint_part(
-    name: str,
-    kind: SliceKind,
-    joints: tuple[str, ...],
-    units: tuple[str, ...],
-    *,
-    limits: tuple[Vector, Vector],
-    scaling: InputScaling | None,
-) -> ActionPart:
-    """Return an action slice with one value for each joint.
-
-    Args:
-        name: The slice.
-        kind: What values mean.
-        joints: The joints.
-        units: Unit of each joint's value.
-        limits: Least and greatest values of joints.
-        scaling: What makes values of joints out of the action's, if anything.
-    """
-    if scaling is not None:
-        limits, units = (scaling.low, scaling.high), scaling.units(units)
-    low, high = (tuple(limit.tolist()) for limit in limits)
-    return ActionPart(
-        name=name, kind=kind, labels=joints, units=units, low=low, high=high
-    )
-
-
-def joint_units(
-    state: RobotState, joints: Sequence[str], *, hinge: str = "rad", slide: str = "m"
-) -> tuple[str, ...]:
-    """Return the unit of each joint's values."""
-    kinds = [state.robot.joint(j).type for j in joints]
-    return tuple(hinge if kind == "hinge" else slide for kind in kinds)
 
 
 def _numbers(values: Sequence[float | None]) -> Vector:

@@ -5,14 +5,13 @@ from typing import Literal
 import numpy as np
 
 from wbc_suite.control.part.config import (
-    InputScaling,
     InputType,
     Numbers,
     PartSettings,
     set_torque_rules,
 )
 from wbc_suite.control.part.controller import WHENEVER
-from wbc_suite.control.part.joint_limits import joint_part, joint_units
+from wbc_suite.control.part.joint_input import JointInput
 from wbc_suite.control.part.law import TorqueLaw
 from wbc_suite.control.state import RobotState
 from wbc_suite.typing import Vector
@@ -65,25 +64,23 @@ class JointTorqueController:
         self.config = config
         self.law = TorqueLaw(state, joints)
         set_torque_rules(self.law, config)
-        self._low, self._high = self.law.drives["low"], self.law.drives["high"]
-        self._low, self._high = self._low.copy(), self._high.copy()
-        output_min, output_max = (
+        limits = self.law.drives["low"].copy(), self.law.drives["high"].copy()
+        given = config.output_min, config.output_max
+        least, greatest = (
             tuple((SHARE * limit).tolist()) if output is None else output
-            for output, limit in (
-                (config.output_min, self._low),
-                (config.output_max, self._high),
-            )
+            for output, limit in zip(given, limits, strict=True)
         )
-        self._scaling = InputScaling(len(joints), config, output_min, output_max)
-        part = joint_part(
+        self._input = JointInput(
             name,
             "torque",
+            state,
             joints,
-            joint_units(state, joints, hinge="N m", slide="N"),
-            limits=(self._low, self._high),
-            scaling=self._scaling if config.input_type == "delta" else None,
+            config=config,
+            outputs=(least, greatest),
+            scaled=config.input_type == "delta",
+            limits=limits,
         )
-        self.slices = (part,)
+        self.slices = (self._input.part,)
         self.goal: Vector = np.zeros(len(joints))
 
     def reset(self, state: RobotState) -> None:
@@ -93,9 +90,7 @@ class JointTorqueController:
 
     def set_goal(self, values: Vector, period: float) -> None:
         """Take torques, shape (n,)."""
-        if self.config.input_type == "delta":
-            values = self._scaling(values)
-        self.goal = np.clip(values, self._low, self._high)
+        self.goal = self._input(values)
         self.law.move(self.goal, self.config.ramp(period))
 
     def prepare(self, state: RobotState) -> int:
@@ -105,6 +100,4 @@ class JointTorqueController:
     @property
     def hold_action(self) -> Vector:
         """The action that asks for no torque."""
-        if self.config.input_type == "delta":
-            return self._scaling.neutral
-        return np.clip(np.zeros(len(self.goal)), self._low, self._high)
+        return self._input.neutral

@@ -6,7 +6,6 @@ import numpy as np
 from pydantic import PositiveFloat
 
 from wbc_suite.control.part.config import (
-    InputScaling,
     InputType,
     Numbers,
     PartSettings,
@@ -15,9 +14,8 @@ from wbc_suite.control.part.config import (
 )
 from wbc_suite.control.part.controller import WHENEVER
 from wbc_suite.control.part.joint import VelocityLaw
+from wbc_suite.control.part.joint_input import JointInput
 from wbc_suite.control.part.joint_limits import (
-    joint_part,
-    joint_units,
     keep_within,
     position_limits,
     speed_limits,
@@ -77,7 +75,7 @@ class JointVelocityController:
         joints: tuple[str, ...],
     ) -> None:
         self.config = config
-        self._low, self._high = speed_limits(state, joints, config.velocity_limits)
+        low, high = speed_limits(state, joints, config.velocity_limits)
         self.law = VelocityLaw(
             state,
             joints,
@@ -88,20 +86,19 @@ class JointVelocityController:
         set_torque_rules(self.law, config)
         least, greatest = position_limits(state, joints, config.qpos_limits)
         self.law.keep_limits(state)
-        fastest = np.maximum(-self._low, self._high)
+        fastest = np.maximum(-low, high)
         keep_within(self.law, least, greatest, fastest)
-        self._scaling = InputScaling(
-            len(joints), config, config.output_min, config.output_max
-        )
-        part = joint_part(
+        self._input = JointInput(
             name,
             "velocity",
+            state,
             joints,
-            joint_units(state, joints, hinge="rad/s", slide="m/s"),
-            limits=(self._low, self._high),
-            scaling=self._scaling if config.input_type == "delta" else None,
+            config=config,
+            outputs=(config.output_min, config.output_max),
+            scaled=config.input_type == "delta",
+            limits=(low, high),
         )
-        self.slices = (part,)
+        self.slices = (self._input.part,)
         self.goal: Vector = np.zeros(len(joints))
 
     def reset(self, state: RobotState) -> None:
@@ -111,9 +108,7 @@ class JointVelocityController:
 
     def set_goal(self, values: Vector, period: float) -> None:
         """Take speeds, shape (n,)."""
-        if self.config.input_type == "delta":
-            values = self._scaling(values)
-        self.goal = np.clip(values, self._low, self._high)
+        self.goal = self._input(values)
         self.law.set_speed(self.goal, duration=self.config.ramp(period))
 
     def prepare(self, state: RobotState) -> int:
@@ -123,6 +118,4 @@ class JointVelocityController:
     @property
     def hold_action(self) -> Vector:
         """The action that lets the joints stand still."""
-        if self.config.input_type == "delta":
-            return self._scaling.neutral
-        return np.clip(np.zeros(len(self.goal)), self._low, self._high)
+        return self._input.neutral
