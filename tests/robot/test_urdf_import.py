@@ -1,5 +1,6 @@
 """URDF files read into descriptions, against Pinocchio's own reader and ours back."""
 
+import itertools
 import logging
 from pathlib import Path
 
@@ -528,3 +529,52 @@ def test_names_are_given_once_and_the_same_each_time(tmp_path):
     assert links == ["base", "link_1_a", "root_link", "link_1_a_link"]
     assert robot.joint_names == ("joint_1_a", "x", "joint_1_a_joint")
     assert robot == read_urdf(path)
+
+
+def test_links_that_stand_in_each_other_do_not_collide(tmp_path, caplog):
+    """Spheres of 0.25 m along a chain in steps of 0.1 m: the fifth reaches the first,
+    but over four joints, so that it stands there by its posture."""
+    ball = f'{BODY}<collision><geometry><sphere radius="0.25"/></geometry></collision>'
+    links = "".join(f'<link name="link{k}">{ball}</link>' for k in range(1, 5))
+    chain = ["base", *(f"link{k}" for k in range(1, 5))]
+    step = '<origin xyz="0.1 0 0"/>'
+    joints = "".join(
+        joint(f"joint{k}", one, other, inner=step)
+        for k, (one, other) in enumerate(itertools.pairwise(chain))
+    )
+    text = one_arm(links, joints).replace(
+        '<link name="base"/>', f'<link name="base">{ball}</link>'
+    )
+    robot = read_urdf(write(tmp_path, text))
+    assert {frozenset(pair) for pair in robot.contacts.exclude} == {
+        frozenset(pair)
+        for pair in (
+            ("base", "link2"),
+            ("base", "link3"),
+            ("link1", "link3"),
+            ("link1", "link4"),
+            ("link2", "link4"),
+        )
+    }
+    assert "'base' and 'link2'" in caplog.text
+    model = robot.to_mjspec().compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    touching = {frozenset(model.geom_bodyid[c].tolist()) for c in data.contact.geom}
+    ends = frozenset(model.body(name).id for name in ("base", "link4"))
+    assert touching == {ends}
+
+
+def test_links_that_only_touch_go_on_colliding(tmp_path):
+    ball = (
+        f'{BODY}<collision><geometry><sphere radius="0.1002"/></geometry></collision>'
+    )
+    links = "".join(f'<link name="link{k}">{ball}</link>' for k in range(1, 4))
+    step = '<origin xyz="0.1 0 0"/>'
+    joints = "".join(
+        joint(f"joint{k}", *pair, inner=step)
+        for k, pair in enumerate(
+            [("base", "link1"), ("link1", "link2"), ("link2", "link3")]
+        )
+    )
+    assert not read_urdf(write(tmp_path, one_arm(links, joints))).contacts.exclude

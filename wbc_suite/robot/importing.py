@@ -27,7 +27,7 @@ from wbc_suite.robot.validation import (
 from wbc_suite.tomlfile import parse_model
 from wbc_suite.typing import Matrix
 
-__all__ = ["LinkFields", "describe_import", "inertia_fields"]
+__all__ = ["LinkFields", "describe_import", "inertia_fields", "shortened"]
 
 LOG = logging.getLogger(__name__)
 
@@ -102,7 +102,7 @@ def _accepted(links: Sequence[Link], source: Path) -> list[Link]:
     faults = {link.name: dict(implausible(link)) for link in links}
     told = [f"link '{n}': {text}" for n, own in faults.items() for text in own.values()]
     if told:
-        LOG.warning("%s: taken as it is: %s.", source, _shortened("; ".join(told)))
+        LOG.warning("%s: taken as it is: %s.", source, shortened("; ".join(told)))
     reason = f"as it was in {source.name}"
     return [
         link.model_copy(update={"accept": dict.fromkeys(faults[link.name], reason)})
@@ -138,7 +138,7 @@ def _physical(links: Sequence[Link], source: Path, *, mend: bool) -> list[Link]:
     if faults and not mend:
         shown = "; ".join(f"link '{n}': {fault}" for n, fault in faults.items())
         raise DescriptionError(
-            f"{source}: {_shortened(shown)}. Mend these links in the file, or take the "
+            f"{source}: {shortened(shown)}. Mend these links in the file, or take the "
             "nearest tensors that a body can have: wbc-suite export FILE "
             "--mend-inertias --to toml, or read_urdf(path, mend_inertias=True)."
         )
@@ -147,7 +147,8 @@ def _physical(links: Sequence[Link], source: Path, *, mend: bool) -> list[Link]:
     return [_mended(link) if link.name in faults else link for link in links]
 
 
-def _shortened(text: str) -> str:
+def shortened(text: str) -> str:
+    """Return a message's list, cut where nobody would read on."""
     return text if len(text) <= 800 else text[:800] + " ..."
 
 

@@ -10,8 +10,15 @@ import pinocchio as pin
 
 from wbc_suite.errors import DescriptionError
 from wbc_suite.robot.description import RobotDescription
-from wbc_suite.robot.importing import LinkFields, describe_import, inertia_fields
+from wbc_suite.robot.importing import (
+    LinkFields,
+    describe_import,
+    inertia_fields,
+    shortened,
+)
 from wbc_suite.robot.naming import NameTable
+from wbc_suite.robot.overlaps import overlapping_neighbours
+from wbc_suite.robot.parts import Contacts
 from wbc_suite.robot.placing import pose_fields
 from wbc_suite.robot.urdf_export import UNLIMITED
 from wbc_suite.robot.urdf_shapes import MeshFolder, UrdfShapes
@@ -67,7 +74,21 @@ def read_urdf(
             raise
         raise DescriptionError(f"{path}: {error}") from error
     meshes.report()
-    return robot
+    return _apart(robot, path)
+
+
+def _apart(robot: RobotDescription, path: Path) -> RobotDescription:
+    """Let links not collide that stand in each other, and say so."""
+    pairs = overlapping_neighbours(robot)
+    if not pairs:
+        return robot
+    told = ", ".join(f"'{first}' and '{second}'" for first, second in pairs)
+    LOG.warning(
+        "%s: stand in each other in the posture ready, so they do not collide: %s.",
+        path,
+        shortened(told),
+    )
+    return robot.model_copy(update={"contacts": Contacts(exclude=pairs)})
 
 
 class _Importer:
