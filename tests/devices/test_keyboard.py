@@ -52,12 +52,12 @@ def test_repeats_of_a_held_key_press_its_button_once(terminal):
     assert terminal(b"\t", 0.5).buttons == {"next"}
 
 
-def test_space_closes_and_opens_and_plus_is_faster(terminal):
-    assert terminal(b"w").limbs["hand"].grip is None
-    slow = terminal(b"").limbs["hand"].twist[0]
-    assert terminal(b" +w", 0.05).limbs["hand"].grip == 1.0
+def test_space_asks_for_the_gripper_and_plus_is_faster(terminal):
+    slow = terminal(b"w").limbs["hand"].twist[0]
+    state = terminal(b" +w", 0.05)
+    assert state.buttons == {"grip"}
+    assert state.limbs["hand"].grip is None
     assert terminal(b"").limbs["hand"].twist[0] == pytest.approx(1.5 * slow)
-    assert terminal(b" ", 0.5).limbs["hand"].grip == -1.0
 
 
 def test_arrows_drive_the_base(terminal):

@@ -21,7 +21,7 @@ SAID = DeviceState(
     },
     joints={"elbow": 0.7},
     base=np.array([0.1, 0.0, -0.2]),
-    buttons=frozenset({"keep"}),
+    buttons=frozenset({"grip", "keep"}),
 )
 
 
@@ -32,6 +32,7 @@ def test_state_goes_through_a_flat_dictionary_and_back():
     assert again.limbs["right"].pose.isApprox(POSE, 1e-12)
     assert not again.limbs["right"].engaged
     assert flatten(again) == pytest.approx(flat)
+    assert again.buttons == {"grip", "keep"}
 
 
 def test_our_device_is_a_teleoperator():

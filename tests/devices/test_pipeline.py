@@ -199,6 +199,27 @@ def test_grip_closes_all_synergies_or_each(person):
     np.testing.assert_allclose(person.target("right_gripper"), [0.5, -0.5], atol=1e-4)
 
 
+def test_button_grips_with_the_hand_that_is_switched_to_and_no_other():
+    person = Person(FloatingEnv(robots=2))
+    up = LimbInput(twist=np.array([0, 0, 0.1, 0, 0, 0]))
+
+    def closed():
+        return [person.target(f"robot{i}_right_gripper")[0] > 0 for i in range(2)]
+
+    person.say(50, buttons=["grip"], hand=up)  # held: it counts once
+    assert closed() == [True, False]
+    person.say(buttons=["next"]).say(50, hand=up)  # robot 0's left hand grips nothing
+    person.say(50, buttons=["grip"], hand=up)
+    assert closed() == [True, False]
+    person.say(buttons=["next"]).say(50, hand=up)
+    assert person.pipeline.active == "robot1_right_hand"
+    assert closed() == [True, False]
+    person.say(50, buttons=["grip"], hand=up)
+    assert closed() == [True, True]
+    person.say(50, hand=up).say(50, buttons=["grip"], hand=up)
+    assert closed() == [True, False]
+
+
 def test_home_brings_every_hand_back(person):
     up = LimbInput(twist=np.array([0, 0, 0.5, 0, 0, 0]))
     person.say(50, right=up).say(buttons=["home"]).say(300)

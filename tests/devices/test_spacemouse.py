@@ -79,6 +79,16 @@ def test_two_mice_move_two_hands_and_buttons_close_and_send_home():
     assert state.buttons == {"home"}
 
 
+def test_mouse_that_goes_from_hand_to_hand_says_buttons():
+    hid = FakeHid(b"\x03\x01\x00", b"\x03\x03\x00")
+    mouse = SpaceMouse(find=lambda: [hid])
+    mouse.start()
+    state = mouse.read()
+    assert state.buttons == {"grip", "next"}
+    assert state.limbs["hand"].grip is None
+    assert mouse.read().buttons == frozenset()
+
+
 def test_mouse_that_falls_silent_or_is_pulled_out_stops_the_hand():
     now = [0.0]
     mice = [FakeHid(report(1, 350, 0, 0)), PulledOut()]

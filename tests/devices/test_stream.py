@@ -100,10 +100,21 @@ def test_bad_frames_are_refused_with_a_reason(text):
 def test_sender_of_nonsense_is_told_and_does_no_harm(stream):
     with connect(stream.url.replace("http", "ws") + "frames") as client:
         client.send('{"format": "wbc-pose-frame/1", "time": "soon"}')
-        wait_for(lambda: stream.read() and stream.refused)
+        wait_for(lambda: stream.refused)
         assert "time" in json.loads(client.recv(timeout=PATIENCE))["error"]
         client.send(frame(3.0).model_dump_json())
         said_at(stream, 3.0)
+
+
+def test_a_press_between_two_reads_is_not_lost(stream):
+    with StreamClient(stream.url) as client:
+        client.send(frame(1.0, buttons=["grip"]))
+        client.send(frame(2.0, buttons=["next"]))
+        client.send(frame(3.0))
+        wait_for(lambda: stream._newest is not None and stream._newest.time == 3.0)
+        assert stream.read().buttons == {"grip", "next"}
+        client.send(frame(4.0))
+        assert said_at(stream, 4.0).buttons == frozenset()
 
 
 def test_first_sender_holds_until_it_leaves(stream):

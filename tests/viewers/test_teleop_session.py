@@ -8,6 +8,8 @@ from fake_env import REACH, FakeEnv
 
 from wbc_suite.devices import DeviceState, LimbInput, Scripted
 from wbc_suite.errors import ConfigError, UnknownNameError
+from wbc_suite.viewers.palette import limb_colours
+from wbc_suite.viewers.teleop_panel import _limbs_html
 from wbc_suite.viewers.teleop_session import TeleopSession
 
 ALICE, BOB = 1, 2
@@ -231,3 +233,17 @@ def test_device_moves_a_hand_beside_the_page_and_presses_buttons():
     session.pause(False)
     ticks(session, 10)
     assert session.snapshot.device == ("the device is silent: holding",)
+
+
+def test_limbs_say_which_of_them_a_device_for_one_hand_moves():
+    hand = {"hand": LimbInput(twist=np.zeros(6))}
+    says = [DeviceState(time=0.02 * k, limbs=hand) for k in range(2)]
+    says.append(DeviceState(time=0.04, limbs=hand, buttons=frozenset({"next"})))
+    session = TeleopSession(FakeEnv(), period=0.02, device=Scripted(says))
+    for name in ("right_hand", "right_hand", "left_hand"):
+        session.tick()
+        assert session.snapshot.switched_to == name
+    rows = _limbs_html(session.snapshot, session.limbs, limb_colours(session.limbs))
+    right, left = rows.split("</tr>")[:2]
+    assert "switched to" in left
+    assert "switched to" not in right

@@ -9,11 +9,20 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 from wbc_suite.devices.state import DeviceState, LimbInput
 from wbc_suite.errors import DeviceError
 
-__all__ = ["FORMAT", "MAX_BYTES", "Pose", "PoseFrame", "PoseLimb", "frame_schema"]
+__all__ = [
+    "FORMAT",
+    "MAX_BUTTONS",
+    "MAX_BYTES",
+    "Pose",
+    "PoseFrame",
+    "PoseLimb",
+    "frame_schema",
+]
 
 FORMAT = "wbc-pose-frame/1"
 MAX_BYTES = 32_768
 """Of one frame; two hands with all their joints take 4 kB."""
+MAX_BUTTONS = 32
 
 FAR = 1e6
 """Greatest number that a frame may hold, in any unit."""
@@ -97,8 +106,9 @@ class PoseFrame(_Model):
         joints: Positions by joint, rad or m, as a leader arm has them.
         base: Velocity of the base: forward and left, m/s, and turn, rad/s.
         height: Velocity of the torso's height, m/s.
-        buttons: What is pressed: `next`, `mirror`, `home`, `pause`, `reset`, `quit`,
-            `keep`, `discard`, `undo`. Keep a button pressed for 50 ms at least.
+        buttons: What is pressed: `grip` (closes the gripper of the hand that is
+            switched to, or opens it), `next`, `mirror`, `home`, `pause`, `reset`,
+            `quit`, `keep`, `discard`, `undo`, `success`. Once is enough.
     """
 
     format: Literal["wbc-pose-frame/1"]
@@ -107,7 +117,7 @@ class PoseFrame(_Model):
     joints: dict[Name, Number] = Field(default={}, max_length=128)
     base: Point | None = None
     height: Number = 0.0
-    buttons: list[Name] = Field(default=[], max_length=32)
+    buttons: list[Name] = Field(default=[], max_length=MAX_BUTTONS)
 
     @classmethod
     def parse(cls, text: str | bytes) -> "PoseFrame":

@@ -4,7 +4,7 @@ import errno
 import os
 import struct
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Set
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,15 +16,24 @@ from wbc_suite.devices.state import DeviceState, LimbInput
 from wbc_suite.errors import DeviceError
 from wbc_suite.typing import Vector
 
-__all__ = ["DualSense", "Gamepad", "Pad", "PadJog", "parse_dualsense", "parse_joystick"]
+__all__ = [
+    "DualSense",
+    "Gamepad",
+    "Pad",
+    "pad_state",
+    "parse_dualsense",
+    "parse_joystick",
+]
 
 DEAD = 0.1  # of a stick's way that counts as rest
 SPEED, TURN = 0.3, 1.0  # m/s and rad/s at full deflection
 DRIVE, SPIN = 0.4, 0.6  # of the base
 SONY, DUALSENSE = (0x054C,), (0x0CE6, 0x0DF2)
 
-BUTTONS = {"north": "next", "west": "home", "east": "discard", "start": "keep"}
-BUTTONS |= {"select": "reset"}
+BUTTONS = {
+    "south": "grip", "north": "next", "west": "home", "east": "discard",
+    "start": "keep", "select": "reset",
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,30 +120,25 @@ def _with_axis(pad: Pad, number: int, x: float) -> Pad:
     return pad
 
 
-class PadJog:
-    """Turns a pad into velocities of the hand that is switched to."""
+def pad_state(time: float, pad: Pad, pressed: Set[str] = frozenset()) -> DeviceState:
+    """Return a pad as velocities of the hand that is switched to.
 
-    def __init__(self) -> None:
-        self._before: frozenset[str] = frozenset()
-        self._closed: bool | None = None
-
-    def state(self, time: float, pad: Pad) -> DeviceState:
-        """Return what the pad says now."""
-        if "south" in pad.down - self._before:
-            self._closed = not self._closed
-        self._before = pad.down
-        (lx, ly), (rx, ry) = _calm(pad.left), _calm(pad.right)
-        rise = pad.triggers[1] - pad.triggers[0]
-        roll = float("r1" in pad.down) - float("l1" in pad.down)
-        linear, angular = np.array([ly, -lx, rise]), np.array([roll, ry, -rx])
-        twist: Vector = np.concatenate([SPEED * linear, TURN * angular])
-        grip = None if self._closed is None else np.array(1.0 if self._closed else -1.0)
-        return DeviceState(
-            time=time,
-            limbs={"hand": LimbInput(twist=twist, grip=grip)},
-            base=np.array([DRIVE * pad.cross[1], 0.0, -SPIN * pad.cross[0]]),
-            buttons=frozenset(BUTTONS[name] for name in pad.down & BUTTONS.keys()),
-        )
+    Args:
+        time: s.
+        pad: Where everything is now.
+        pressed: Buttons that were down since the last state.
+    """
+    (lx, ly), (rx, ry) = _calm(pad.left), _calm(pad.right)
+    rise = pad.triggers[1] - pad.triggers[0]
+    roll = float("r1" in pad.down) - float("l1" in pad.down)
+    linear, angular = np.array([ly, -lx, rise]), np.array([roll, ry, -rx])
+    twist: Vector = np.concatenate([SPEED * linear, TURN * angular])
+    return DeviceState(
+        time=time,
+        limbs={"hand": LimbInput(twist=twist)},
+        base=np.array([DRIVE * pad.cross[1], 0.0, -SPIN * pad.cross[0]]),
+        buttons=frozenset(BUTTONS[n] for n in (pad.down | pressed) & BUTTONS.keys()),
+    )
 
 
 class Gamepad:
@@ -158,7 +162,7 @@ class Gamepad:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._path, self._clock = Path(path), clock
-        self._file, self._pad, self._jog = -1, Pad(), PadJog()
+        self._file, self._pad = -1, Pad()
 
     def start(self) -> None:
         """Open the file; raises DeviceError when there is none."""
@@ -172,13 +176,15 @@ class Gamepad:
 
     def read(self) -> DeviceState:
         """Return what the pad says now."""
+        pressed: frozenset[str] = frozenset()
         try:
             while len(event := os.read(self._file, 8)) == 8:
                 self._pad = parse_joystick(event, self._pad)
+                pressed |= self._pad.down
         except OSError as error:
             if error.errno != errno.EAGAIN:  # it was pulled out: everything at rest
                 self._pad = Pad()
-        return self._jog.state(self._clock(), self._pad)
+        return pad_state(self._clock(), self._pad, pressed)
 
     def stop(self) -> None:
         """Close the file."""
@@ -205,7 +211,7 @@ class DualSense:
         self._find = find or (lambda: open_hid("DualSense", SONY, DUALSENSE))
         self._clock = clock
         self._hid: Any = None
-        self._pad, self._jog = Pad(), PadJog()
+        self._pad = Pad()
 
     def start(self) -> None:
         """Open the pad; raises DeviceError when there is none."""
@@ -213,9 +219,11 @@ class DualSense:
 
     def read(self) -> DeviceState:
         """Return what the pad says now."""
+        pressed: frozenset[str] = frozenset()
         for report in waiting_reports(self._hid):
             self._pad = parse_dualsense(report) or self._pad
-        return self._jog.state(self._clock(), self._pad)
+            pressed |= self._pad.down
+        return pad_state(self._clock(), self._pad, pressed)
 
     def stop(self) -> None:
         """Close the pad."""

@@ -27,7 +27,7 @@ BASE_JOG: dict[str, tuple[int, float]] = {
 """Key to the component of the base's velocity, and its sign."""
 
 BUTTONS = {
-    "tab": "next", "m": "mirror", "h": "home", "p": "pause", "0": "reset",
+    " ": "grip", "tab": "next", "m": "mirror", "h": "home", "p": "pause", "0": "reset",
     "enter": "keep", "backspace": "discard", "z": "undo", "escape": "quit",
 }  # fmt: skip
 """Key to the button that it stands for."""
@@ -46,18 +46,14 @@ class KeyJog:
 
     Attributes:
         pace: Factor of all speeds.
-        closed: Whether the gripper is to be closed; None before it was ever asked for.
     """
 
     def __init__(self) -> None:
         self.pace = 1.0
-        self.closed: bool | None = None
 
     def press(self, key: str) -> None:
-        """Note a key that went down: what toggles and what steps."""
-        if key == " ":
-            self.closed = not self.closed
-        elif key in ("+", "=", "-"):
+        """Note a key that went down: what changes the pace."""
+        if key in ("+", "=", "-"):
             pace = self.pace * (1.0 / FACTOR if key == "-" else FACTOR)
             self.pace = min(max(pace, SLOWEST), FASTEST)
 
@@ -77,10 +73,9 @@ class KeyJog:
         for key in held & BASE_JOG.keys():
             index, sign = BASE_JOG[key]
             base[index] += sign * self.pace * (BASE_SPEED if index < 2 else BASE_TURN)
-        grip = None if self.closed is None else np.array(1.0 if self.closed else -1.0)
         return DeviceState(
             time=time,
-            limbs={"hand": LimbInput(twist=twist, grip=grip)},
+            limbs={"hand": LimbInput(twist=twist)},
             base=base,
             buttons=frozenset(BUTTONS[key] for key in pressed & BUTTONS.keys()),
         )

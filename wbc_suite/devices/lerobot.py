@@ -3,7 +3,7 @@
 LeRobot asks a teleoperator for a flat dictionary of numbers. Ours has these keys:
 `right.x .y .z .rx .ry .rz` for a pose (m, rotation vector in rad), `right.vx ... .wz`
 for a twist, `right.engaged`, `right.grip` (or `right.grip.0`, ... by synergy),
-`elbow.pos` for a joint, `base.forward .left .turn`, and `button.keep`.
+`elbow.pos` for a joint, `base.forward .left .turn`, and `button.keep`, `button.grip`.
 """
 
 import math
@@ -70,7 +70,7 @@ def unflatten(flat: Mapping[str, Any], time: float) -> DeviceState:
     """
     numbers = {name: _number(name, value) for name, value in flat.items()}
     ends = {*POSE, *TWIST, "engaged", "grip"}
-    split = [name.split(".") for name in numbers]
+    split = [name.split(".") for name in numbers if not name.startswith("button.")]
     limbs = {p[0] for p in split if len(p) > 1 and p[1] in ends}
     base = _taken(numbers, "base", BASE)
     return DeviceState(

@@ -23,6 +23,7 @@ FULL = 350.0  # counts at full deflection; vendor's nominal range
 DEAD = 0.06  # of full deflection that counts as rest
 EXPONENT = 1.6  # finer near rest
 SPEED, TURN = 0.35, 1.2  # m/s and rad/s at full deflection
+SHARED = {0: "grip", 1: "next"}  # buttons of a mouse that goes from hand to hand
 SILENCE = 0.3  # s; a mouse at rest says nothing, so the last report lasts that long
 
 _TO_OURS = np.array([[0, -1, 0], [-1, 0, 0], [0, 0, -1]], dtype=np.float64)
@@ -96,7 +97,8 @@ class SpaceMouse:
     """One SpaceMouse for the hand that is switched to, or one for each hand.
 
     The left button closes and opens the gripper; the right one goes on to the next
-    hand, or home where every hand has a mouse of its own.
+    hand, or home where every hand has a mouse of its own. A mouse with a hand of its
+    own says itself how far that is closed.
 
     Args:
         hands: Which limb each mouse moves, in the order that they are found.
@@ -128,10 +130,14 @@ class SpaceMouse:
         buttons: set[str] = set()
         for name, mouse in zip(self._hands, self._mice, strict=False):
             pressed = mouse.drain(now)
+            if name == "hand":
+                buttons |= {SHARED[number] for number in pressed & SHARED.keys()}
+                limbs[name] = LimbInput(twist=mouse.twist())
+                continue
             if 0 in pressed:
                 mouse.closed = not mouse.closed
             if 1 in pressed:
-                buttons.add("next" if name == "hand" else "home")
+                buttons.add("home")
             grip = np.array(1.0 if mouse.closed else -1.0)
             limbs[name] = LimbInput(twist=mouse.twist(), grip=grip)
         return DeviceState(time=now, limbs=limbs, buttons=frozenset(buttons))

@@ -30,7 +30,7 @@ class LimbInput:
         twist: Velocity that is wanted, axes of the world, m/s and rad/s, shape (6,).
         engaged: Whether the limb follows; a clutch pedal that is let go says no.
         grip: Closing of the gripper, -1 open .. 1 closed: one value for all synergies,
-            or one for each.
+            or one for each. A device that only toggles says the button `grip`.
         fingers: Joints of the person's hand, m, in any frame, shape (25, 3), in the
             order of WebXR.
     """
@@ -67,8 +67,9 @@ class DeviceState:
         base: Velocity of the base that is wanted, in its own axes: forward and left,
             m/s, turn, rad/s.
         height: Velocity of the torso's height that is wanted, m/s.
-        buttons: Names of what is pressed, or was since the last read: `quit`, `reset`,
-            `pause`, `next`, `mirror`, `home`, and of a recording `keep` (or begin),
+        buttons: Names of what is pressed, or was since the last read: `grip` (closes
+            the gripper of the hand that is switched to, or opens it), `next`, `mirror`,
+            `home`, `pause`, `reset`, `quit`, and of a recording `keep` (or begin),
             `discard`, `undo` and `success`.
     """
 

@@ -8,13 +8,14 @@ import socket
 import ssl
 import threading
 import time
+from dataclasses import replace
 from http import HTTPStatus
 from importlib import resources
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 from wbc_suite.devices.admission import Admission, Refusal, is_loopback, new_secret
-from wbc_suite.devices.frame import MAX_BYTES, PoseFrame
+from wbc_suite.devices.frame import MAX_BUTTONS, MAX_BYTES, PoseFrame
 from wbc_suite.devices.listening import listen
 from wbc_suite.devices.state import DeviceState
 from wbc_suite.devices.tls import server_context
@@ -53,7 +54,8 @@ class Stream:
         self._host, self._port, self._tls = host, port, tls
         self.token = None if is_loopback(host) else new_secret()
         self._lock = threading.Lock()
-        self._newest: str | bytes = b""
+        self._newest: PoseFrame | None = None
+        self._pressed: set[str] = set()
         self._state = DeviceState(time=0.0)
         self._holder: ServerConnection | None = None
         self._open = 0
@@ -93,15 +95,12 @@ class Stream:
         ready.wait()
 
     def read(self) -> DeviceState:
-        """Return the newest frame; what lies between two reads is never parsed."""
+        """Return the newest frame, with all buttons pressed since the last read."""
         with self._lock:
-            newest, self._newest = self._newest, b""
-        if newest:
-            try:
-                self._state = PoseFrame.parse(newest).state()
-            except DeviceError as error:
-                self.refused = str(error)
-                self._tell(self.refused)
+            newest, self._newest = self._newest, None
+            pressed, self._pressed = self._pressed, set()
+        if newest is not None:
+            self._state = replace(newest.state(), buttons=frozenset(pressed))
         return self._state
 
     def stop(self) -> None:
@@ -152,7 +151,7 @@ class Stream:
         return _response(HTTPStatus.OK, page.read_text("utf-8"), "text/html")
 
     async def _receive(self, connection: "ServerConnection") -> None:
-        """Keep the newest message of the one sender that counts."""
+        """Keep the newest frame of the one sender that counts."""
         self._open += 1
         try:
             began, count = time.monotonic(), 0
@@ -163,33 +162,31 @@ class Stream:
                 if count > FLOOD:
                     await connection.close(1008, f"More than {FLOOD} messages a second")
                 if self._holder not in (None, connection):
-                    await connection.send(_note("Somebody else moves the robot."))
+                    await _send(connection, "Somebody else moves the robot.")
                     continue
                 self._holder = connection
-                with self._lock:
-                    self._newest = message
+                try:
+                    self._note(PoseFrame.parse(message))
+                except DeviceError as error:
+                    self.refused = str(error)
+                    await _send(connection, self.refused)
         finally:
             self._open -= 1
             if self._holder is connection:
                 self._holder = None
 
-    def _tell(self, text: str) -> None:
-        """Tell the sender what is wrong with its frame."""
-        holder = self._holder
-        if holder is not None and not self._loop.is_closed():
-            with contextlib.suppress(RuntimeError):
-                asyncio.run_coroutine_threadsafe(_send(holder, text), self._loop)
+    def _note(self, frame: PoseFrame) -> None:
+        with self._lock:
+            self._newest = frame
+            if len(self._pressed) < MAX_BUTTONS:
+                self._pressed.update(frame.buttons)
 
 
 async def _send(connection: "ServerConnection", text: str) -> None:
     from websockets.exceptions import ConnectionClosed
 
     with contextlib.suppress(ConnectionClosed):
-        await connection.send(_note(text))
-
-
-def _note(text: str) -> str:
-    return json.dumps({"error": text})
+        await connection.send(json.dumps({"error": text}))
 
 
 def _response(

@@ -58,6 +58,7 @@ class Snapshot:
         success: Whether the benchmark counts as solved.
         message: What the session wants to tell people, possibly empty.
         device: What the pipeline says of the device beside the page, in words.
+        switched_to: Limb that a device for one hand moves; empty where none is used.
         recording: How the recording stands; None if nothing records.
     """
 
@@ -74,4 +75,5 @@ class Snapshot:
     success: bool
     message: str
     device: tuple[str, ...]
+    switched_to: str
     recording: DeskStatus | None

@@ -365,14 +365,21 @@ def _limbs_html(
     colours: Mapping[str, tuple[int, int, int]],
 ) -> str:
     rows = "".join(
-        _limb_row(limbs[name], css(colours[name]), status)
+        _limb_row(
+            limbs[name],
+            css(colours[name]),
+            status,
+            switched_to=name == snapshot.switched_to,
+        )
         for name, status in snapshot.limbs.items()
     )
     return f"<table style='width:100%;padding:.2em .7em;font-size:.88em'>{rows}</table>"
 
 
-def _limb_row(limb: Limb, colour: str, status: LimbStatus) -> str:
-    notes = [] if status.holder is None else [f"held by viewer {status.holder + 1}"]
+def _limb_row(limb: Limb, colour: str, status: LimbStatus, *, switched_to: bool) -> str:
+    notes = ["switched to"] if switched_to else []
+    if status.holder is not None:
+        notes.append(f"held by viewer {status.holder + 1}")
     held = html.escape(", ".join([*notes, *status.acting]))
     if limb.kind is LimbKind.ORIENTATION:
         error = f"{np.rad2deg(status.orientation_error):.0f}°"

@@ -83,6 +83,7 @@ class TeleopSession:
         self._clock = clock
         layout = env.unwrapped.action_layout  # type: ignore[attr-defined]
         self._device, self._pressed = device, frozenset[str]()
+        self._switched_to = ""
         self._simulation = env.unwrapped.simulation  # type: ignore[attr-defined]
         self.model: mujoco.MjModel = self._simulation.model
         self._lock = threading.Lock()
@@ -261,6 +262,7 @@ class TeleopSession:
     def _step(self, state: DeviceState, stamps: list[float]) -> None:
         with self._lock:
             action = self._pipeline.update(state)
+        self._switched_to = self._pipeline.active if "hand" in state.limbs else ""
         try:
             *_, info = self.env.step(action)
         except DatasetError as error:  # the disk is full; people go on without it
@@ -342,6 +344,7 @@ class TeleopSession:
             success=self._success,
             message=self._message,
             device=self._pipeline.acting.get("device", ()),
+            switched_to=self._switched_to,
             recording=None if self.desk is None else self.desk.status,
         )
         if not self._paused:

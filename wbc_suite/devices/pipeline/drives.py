@@ -33,6 +33,10 @@ class GripDrive:
         """Take one value for all synergies, or one for each."""
         self.goal[:] = np.clip(np.resize(grip, self.goal.shape), -1.0, 1.0)
 
+    def toggle(self) -> None:
+        """Open what is more closed than open, and close the other."""
+        self.aim(np.array(-1.0 if self.goal.mean() > 0.0 else 1.0))
+
     def update(self) -> Vector:
         """Move on by one tick; return the values of the slice."""
         self._values = self._values + self._motion.step(self.goal - self._values)

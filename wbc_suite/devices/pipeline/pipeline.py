@@ -117,6 +117,10 @@ class Pipeline:
                 case "next" if self.limbs:
                     self.limbs[self._switch.active].release()
                     self._switch.next()
+                case "grip":
+                    name = _gripper_of(self.active, self.grips)
+                    if name is not None:
+                        self.grips[name].toggle()
                 case "mirror":
                     self._mirror = not self._mirror
                     self._release(self.limbs)
@@ -130,10 +134,9 @@ class Pipeline:
         self._said = {}
         for name, said in state.limbs.items():
             limb = self._switch.find(name)
-            if limb is None:
-                continue
-            self._said[limb] = said
-            self._close(limb, said)
+            if limb is not None:
+                self._said[limb] = said
+            self._close(limb or name, said)  # a leader arm places joints, not a limb
         for joints in self._joints.values():
             joints.aim(state.joints)
         self._height = state.height
