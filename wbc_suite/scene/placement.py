@@ -7,9 +7,9 @@ upright cylinder that holds it: two things are apart if their cylinders are.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
-import numpy as np
+from numpy.random import Generator
 
 from wbc_suite.errors import PlacementError
 from wbc_suite.robot.shapes import Interval, Real, Vector3
@@ -64,18 +64,15 @@ class Placed:
         return not (above or below)
 
 
-Placements = dict[str, Placed]
+Things: TypeAlias = Mapping[str, Measured]
+Taken: TypeAlias = Mapping[str, Placed]
+Placements: TypeAlias = dict[str, Placed]
 
 
 class Sampler(Protocol):
     """Draws places for some things."""
 
-    def sample(
-        self,
-        rng: np.random.Generator,
-        things: Mapping[str, Measured],
-        taken: Mapping[str, Placed],
-    ) -> Placements:
+    def sample(self, rng: Generator, things: Things, taken: Taken) -> Placements:
         """Return a place for each of the sampler's things.
 
         Args:
@@ -125,12 +122,7 @@ class UniformSampler:
     origin: Vector3 = (0.0, 0.0, 0.0)
     rest: Quat = STANDING
 
-    def sample(
-        self,
-        rng: np.random.Generator,
-        things: Mapping[str, Measured],
-        taken: Mapping[str, Placed],
-    ) -> Placements:
+    def sample(self, rng: Generator, things: Things, taken: Taken) -> Placements:
         """See `Sampler`."""
         extents = {name: things[name].extent(self.rest) for name in self.names}
         failed: tuple[str, Extent, dict[str, Placed]] | None = None
@@ -147,9 +139,7 @@ class UniformSampler:
         assert failed is not None
         raise PlacementError(self._explain(*failed))
 
-    def _place(
-        self, rng: np.random.Generator, extent: Extent, taken: Mapping[str, Placed]
-    ) -> Placed | None:
+    def _place(self, rng: Generator, extent: Extent, taken: Taken) -> Placed | None:
         (x0, x1), (y0, y1) = self._ends(extent)
         if x0 <= x1 and y0 <= y1:
             for _ in range(TRIES):
@@ -190,12 +180,7 @@ class SequentialSampler:
 
     samplers: Sequence[Sampler]
 
-    def sample(
-        self,
-        rng: np.random.Generator,
-        things: Mapping[str, Measured],
-        taken: Mapping[str, Placed],
-    ) -> Placements:
+    def sample(self, rng: Generator, things: Things, taken: Taken) -> Placements:
         """See `Sampler`."""
         found: Placements = {}
         for sampler in self.samplers:
@@ -217,12 +202,7 @@ class OnTopSampler:
     support: str
     region: Region
 
-    def sample(
-        self,
-        rng: np.random.Generator,
-        things: Mapping[str, Measured],
-        taken: Mapping[str, Placed],
-    ) -> Placements:
+    def sample(self, rng: Generator, things: Things, taken: Taken) -> Placements:
         """See `Sampler`."""
         below = taken.get(self.support)
         if below is None:
@@ -253,12 +233,7 @@ class PickySampler:
     accepts: Callable[[Placements], bool]
     wanted: str
 
-    def sample(
-        self,
-        rng: np.random.Generator,
-        things: Mapping[str, Measured],
-        taken: Mapping[str, Placed],
-    ) -> Placements:
+    def sample(self, rng: Generator, things: Things, taken: Taken) -> Placements:
         """See `Sampler`."""
         found: Placements = {}
         for _ in range(TRIES):
