@@ -146,8 +146,7 @@ def test_contact_is_felt_while_the_pad_presses(env):
     env.reset(seed=0)
     assert env.observation()["robot0_contact"] == 0.0
     assert env.observation()["object-state"].shape == (8,)  # as datasets have it
-    env.benchmark.force = 1.0
-    env.observables.look()
+    press_on(env, env.benchmark.marks[50], TOP - 0.004)
     seen = env.observation()
     assert seen["robot0_contact"] == seen["robot0_proprio-state"][-1] == 1.0
 

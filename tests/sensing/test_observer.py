@@ -11,7 +11,7 @@ CHAIN = """<mujoco><worldbody>
 <body name="a"><freejoint/><geom size=".1"/><site name="s" pos=".1 .2 .3"/>
 <body name="b" pos="0 0 .5"><joint axis="0 1 0"/><joint type="slide"/>
 <geom size=".1"/><site name="t" euler="30 40 50"/></body></body>
-</worldbody></mujoco>"""
+</worldbody><size nuserdata="3"/></mujoco>"""
 A, B = 1, 2  # bodies
 S, T = 0, 1  # sites
 
@@ -37,6 +37,7 @@ def test_readings_are_what_mujoco_says(scene):
         "q_cos": reading.joint_cosines([7]),
         "q_sin": reading.joint_sines([7]),
         "v": reading.joint_velocities([6]),
+        "noted": reading.user_values([2, 0]),
         "b_pos": reading.body_position(B),
         "b_quat": reading.body_quat(B),
         "t_pos": reading.site_position(T),
@@ -46,8 +47,10 @@ def test_readings_are_what_mujoco_says(scene):
     observer = Observer(data, {"all": readings})
     for seed in range(5):
         move(scene, np.random.default_rng(seed))
+        data.userdata[:] = seed, 0.5, -1e9
         observer.look()
         seen = observer.observation()
+        assert_array_equal(seen["noted"], [-reading.LARGEST, seed])
         assert_array_equal(seen["q"], data.qpos[[8, 7]])
         assert_allclose(seen["q_cos"], np.cos(data.qpos[7]), atol=1e-15)
         assert_allclose(seen["q_sin"], np.sin(data.qpos[7]), atol=1e-15)
@@ -73,6 +76,56 @@ def test_quaternions_of_sites_are_mujocos_for_every_turn(scene):
         mujoco.mju_mat2Quat(wxyz, data.site_xmat[S])
         observer.look()
         assert_allclose(observer.values, wxyz[[1, 2, 3, 0]], atol=1e-15)
+
+
+def test_poses_seen_from_a_site_are_those_in_its_frame(scene):
+    data = scene[1]
+    readings = {
+        "pos": reading.seen_position(A, T),
+        "quat": reading.seen_quat(A, T),
+    }
+    observer = Observer(data, {"all": readings})
+    for seed in range(20):
+        move(scene, np.random.default_rng(seed))
+        observer.look()
+        seen = observer.observation()
+        R_wt = data.site_xmat[T].reshape(3, 3)
+        way = data.xpos[A] - data.site_xpos[T]
+        assert_allclose(seen["pos"], R_wt.T @ way, atol=1e-14)
+        turn = Rotation.from_quat(seen["quat"]).as_matrix()
+        assert_allclose(turn, R_wt.T @ data.xmat[A].reshape(3, 3), atol=1e-14)
+        assert seen["quat"].max() == np.abs(seen["quat"]).max()
+
+
+def test_one_of_several_readings_is_chosen_when_an_episode_starts(scene):
+    data = scene[1]
+    options, number = [reading.body_position(A), reading.body_position(B)], 0
+    readings = {
+        "pos": reading.chosen(options, lambda: number),
+        "id": reading.chosen(list(map(reading.constant, (5, 7))), lambda: number),
+    }
+    observer = Observer(data, {"all": readings})
+    move(scene, np.random.default_rng(0))
+    for number, body, told in ((0, A, 5.0), (1, B, 7.0)):  # noqa: B007 - it is asked
+        observer.start()
+        observer.look()
+        assert_array_equal(observer.observation()["pos"], data.xpos[body])
+        assert observer.observation()["id"] == told
+
+
+def test_a_function_of_several_readings_is_called_once(scene):
+    calls = []
+
+    def both():
+        calls.append(None)
+        return 1.0, 2.0
+
+    first, second = reading.computed_apart(2, both)
+    readings = {"second": second, "first": first}
+    observer = Observer(scene[1], {"all": readings})
+    observer.look()
+    assert_array_equal(observer.values, [2.0, 1.0])
+    assert len(calls) == 1
 
 
 def test_functions_are_asked_at_every_look(scene):

@@ -91,7 +91,7 @@ class CarryingBenchmark(ObjectBenchmark):
         """
         if not self._one:
             return self.hand_poses_of({name: name for name in self._names})
-        return self.picked_poses(lambda: self.active[0], lambda: self._number)
+        return self.picked_poses(self._names, lambda: self._number)
 
     def is_placed(self, name: str) -> bool:
         """Whether a thing is where it belongs, and no hand is near or holds it."""

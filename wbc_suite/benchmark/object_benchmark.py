@@ -23,8 +23,11 @@ from wbc_suite.sensing.reading import (
     Reading,
     body_position,
     body_quat,
-    computed,
+    chosen,
+    constant,
     offset,
+    seen_position,
+    seen_quat,
     site_position,
 )
 from wbc_suite.tomlfile import FrozenModel, parse_model, read_toml
@@ -260,46 +263,30 @@ class ObjectBenchmark(ABC):
         Args:
             names: Name of each thing, by its label in keys.
         """
+        bodies = {label: self.states[name].body for label, name in names.items()}
         readings: dict[str, Reading] = {}
-        for label, name in names.items():
-            readings[f"{label}_pos"] = body_position(self.states[name].body)
-            readings[f"{label}_quat"] = body_quat(self.states[name].body)
-        for label, name in names.items():
-            readings |= self.seen_by_hands(label, lambda name=name: name)
+        for label, body in bodies.items():
+            readings[f"{label}_pos"] = body_position(body)
+            readings[f"{label}_quat"] = body_quat(body)
+        for label, body in bodies.items():
+            for side, hand in self.sided_hands():
+                key = f"{label}_to_robot0_{side}eef"
+                readings[f"{key}_pos"] = seen_position(body, hand.site)
+                readings[f"{key}_quat"] = seen_quat(body, hand.site)
         return readings
 
     def picked_poses(
-        self, name: Callable[[], str], number: Callable[[], int]
+        self, names: Sequence[str], number: Callable[[], int]
     ) -> dict[str, Reading]:
         """Return what `hand_poses_of` does of the one thing that an episode has.
 
         Args:
-            name: Says which thing it is.
-            number: Its place among all, as `obj_id`.
+            names: The things that it may be.
+            number: Says which of them it is, as `obj_id`.
         """
-
-        def pose() -> ThingState:
-            return self.states[name()]
-
-        def quat() -> Vector:
-            return self.data.xquat[pose().body][[1, 2, 3, 0]]
-
-        return {
-            "obj_pos": computed(3, lambda: pose().position),
-            "obj_quat": computed(4, quat),
-            **self.seen_by_hands("obj", name),
-            "obj_id": computed(1, lambda: [float(number())]),
-        }
-
-    def seen_by_hands(self, label: str, name: Callable[[], str]) -> dict[str, Reading]:
-        """Return a thing's pose in the frame of each hand."""
-        readings: dict[str, Reading] = {}
-        for side, hand in self.sided_hands():
-            pose = _SeenPose(self.data, hand.site, lambda: self.states[name()])
-            key = f"{label}_to_robot0_{side}eef"
-            readings[f"{key}_pos"] = computed(3, pose.position)
-            readings[f"{key}_quat"] = computed(4, pose.quat_xyzw)
-        return readings
+        each = [self.hand_poses_of({"obj": name}) for name in names]
+        each = [poses | {"obj_id": constant(k)} for k, poses in enumerate(each)]
+        return {key: chosen([poses[key] for poses in each], number) for key in each[0]}
 
     def sided_hands(self) -> list[tuple[str, Any]]:
         """Return the hands, with a prefix for keys where there are several."""
@@ -340,28 +327,6 @@ class ObjectBenchmark(ABC):
             (x in a and y in b) or (x in b and y in a)
             for x, y in self.data.contact.geom.tolist()
         )
-
-
-class _SeenPose:
-    """The pose of a thing in the frame of a site."""
-
-    def __init__(
-        self, data: mujoco.MjData, site: int, thing: Callable[[], ThingState]
-    ) -> None:
-        self._data, self._thing = data, thing
-        self._at = data.site_xpos[site]
-        self._turn = data.site_xmat[site].reshape(3, 3)
-        self._quat = np.empty(4)
-
-    def position(self) -> Vector:
-        """Return R_wh^T (p_wo - p_wh), m."""
-        return self._turn.T @ (self._thing().position - self._at)
-
-    def quat_xyzw(self) -> Vector:
-        """Return the quaternion of R_wh^T R_wo, x y z w."""
-        seen = self._turn.T @ self._thing().rotation
-        mujoco.mju_mat2Quat(self._quat, seen.ravel())
-        return self._quat[[1, 2, 3, 0]]
 
 
 TRIES = 50

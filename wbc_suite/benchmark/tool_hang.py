@@ -19,7 +19,7 @@ from wbc_suite.robot.shapes import Vector3
 from wbc_suite.scene import TableConfig, add_camera, add_table, objects
 from wbc_suite.scene.objects import Thing
 from wbc_suite.scene.placement import Region, SequentialSampler, UniformSampler
-from wbc_suite.sensing.reading import Reading, computed
+from wbc_suite.sensing.reading import Reading, computed_apart
 from wbc_suite.tomlfile import FrozenModel
 
 __all__ = ["ToolHang", "ToolHangConfig"]
@@ -108,23 +108,26 @@ class ToolHang(ObjectBenchmark):
 
         Keys are those of this field's datasets; quaternions are x y z w.
         """
+        inserted, hanging = computed_apart(2, self.done)
         return {
             **self.hand_poses_of({name: name for name in (STAND, FRAME, TOOL)}),
-            "frame_is_assembled": computed(1, lambda: [float(self.is_inserted())]),
-            "tool_on_frame": computed(1, lambda: [float(self.is_hanging())]),
+            "frame_is_assembled": inserted,
+            "tool_on_frame": hanging,
         }
+
+    def done(self) -> tuple[bool, bool]:
+        """Return whether the frame is inserted, and whether the wrench hangs."""
+        return self.is_inserted(), self.is_hanging()
 
     def is_inserted(self) -> bool:
         """Whether the frame stands in the socket, upright and down to its floor."""
-        rod = self.states[FRAME].rotation[:, 2]
+        upright = self.states[FRAME].rotation.item(2, 2)
+        if upright <= math.cos(self.config.inserted.tilt):
+            return False
         tip, floor = self.site(f"{FRAME}_tip"), self.site(f"{STAND}_floor")
         x, y, z = (tip - floor).tolist()
-        wide = SOCKET
-        return (
-            rod.item(2) > math.cos(self.config.inserted.tilt)
-            and max(abs(x), abs(y)) < wide
-            and -0.005 < z < self.config.inserted.depth
-        )
+        within = max(abs(x), abs(y)) < SOCKET
+        return within and -0.005 < z < self.config.inserted.depth
 
     def is_hanging(self) -> bool:
         """Whether the wrench hangs free on the frame's arm, which goes through its eye.
@@ -132,13 +135,14 @@ class ToolHang(ObjectBenchmark):
         It touches the frame and not the stand, no hand holds it, it is above the table,
         and the arm passes through one of its holes.
         """
-        centre = min(self.site(f"{TOOL}_hole{k}")[2] for k in (1, 2))
+        holes = [self.site(f"{TOOL}_hole{k}") for k in (1, 2)]
+        lowest = min(hole.item(2) for hole in holes)
         return (
-            self.touching(TOOL, FRAME)
+            lowest > self.config.table.center[2] + self.config.clear
+            and any(map(self._passes, holes))
+            and self.touching(TOOL, FRAME)
             and not self.touching(TOOL, STAND)
             and not self.grasped(TOOL)
-            and centre > self.config.table.center[2] + self.config.clear
-            and any(self._passes(self.site(f"{TOOL}_hole{k}")) for k in (1, 2))
         )
 
     def _passes(self, hole: np.ndarray) -> bool:

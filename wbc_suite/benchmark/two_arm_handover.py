@@ -175,8 +175,8 @@ class TwoArmHandover(TwoArmBenchmark):
 
     def success(self) -> bool:
         """Whether arm 1 alone holds the handle in the air, after a handover."""
-        alone = self.held_by_second and not self.held_by_first
-        return alone and self.raised and self.handed
+        over = self.handed and self.raised
+        return over and self.held_by_second and not self.held_by_first
 
     def progress(self) -> float:
         """Return the shaped reward.

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import mujoco
-import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat, field_validator
 
 from wbc_suite.benchmark.object_benchmark import add_table_cameras, load_config
@@ -174,8 +173,8 @@ class TwoArmLift(TwoArmBenchmark):
         """
         numbers, reward = self.config.reward, 0.0
         if self.level:
-            raised = np.clip(self.height - numbers.lift_from, 0.0, numbers.lift_most)
-            reward += numbers.lift_scale * float(raised)
+            raised = min(max(self.height - numbers.lift_from, 0.0), numbers.lift_most)
+            reward += numbers.lift_scale * raised
         for arm, hand in enumerate(self.hands):
             distance = self.reach(arm, self.site(HANDLES[arm]))
             near = 1.0 - math.tanh(numbers.reach_scale * distance)

@@ -1,7 +1,7 @@
 """TwoArmTransport: clear a bin, and bring a hammer into it from another."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,6 +10,7 @@ from pydantic import Field, NonNegativeFloat, model_validator
 
 from wbc_suite.benchmark.object_benchmark import add_table_cameras, load_config
 from wbc_suite.benchmark.two_arms import TwoArmBenchmark, TwoArmConfig
+from wbc_suite.control import RobotState
 from wbc_suite.robot.component import Rgba
 from wbc_suite.robot.shapes import Size, Vector3
 from wbc_suite.scene import TableConfig, add_tables
@@ -20,7 +21,7 @@ from wbc_suite.sensing.reading import (
     Reading,
     body_position,
     body_quat,
-    computed,
+    computed_apart,
     site_position,
 )
 from wbc_suite.tomlfile import FrozenModel
@@ -177,12 +178,20 @@ class TwoArmTransport(TwoArmBenchmark):
         whole = Thing(name=name, parts=(floor, *glass))
         return whole.fixed(at)
 
+    def bind(
+        self, model: mujoco.MjModel, data: mujoco.MjData, robots: Sequence[RobotState]
+    ) -> None:
+        """Look up the bins' floors too, which are their first parts."""
+        super().bind(model, data, robots)
+        self._floors = {n: model.geom(f"{n}_0").id for n in self._bin_places()}
+
     def observables(self) -> dict[str, Reading]:
         """Return poses, the hands' ways to what they move, and what is done."""
         bodies = {name: self.states[name].body for name in self.states}
         handle_site = self.model.site(f"{LID}_handle").id
         payload, trash = body_position(bodies[PAYLOAD]), body_position(bodies[TRASH])
         handle = site_position(handle_site)
+        payload_done, trash_done = computed_apart(2, self.done)
         return {
             "payload_pos": payload,
             "payload_quat": body_quat(bodies[PAYLOAD]),
@@ -196,8 +205,8 @@ class TwoArmTransport(TwoArmBenchmark):
             "gripper0_to_lid_handle": self.arm_to(0, handle),
             "gripper1_to_payload": self.arm_to(1, payload),
             "gripper1_to_trash": self.arm_to(1, trash),
-            "payload_in_target_bin": computed(1, self._told(PAYLOAD, TARGET_BIN)),
-            "trash_in_trash_bin": computed(1, self._told(TRASH, TRASH_BIN)),
+            "payload_in_target_bin": payload_done,
+            "trash_in_trash_bin": trash_done,
         }
 
     def inside(self, name: str, where: str) -> bool:
@@ -206,18 +215,19 @@ class TwoArmTransport(TwoArmBenchmark):
         x, y, z = (thing.position - bin_.position).tolist()
         length, width, height = self.config.bin.size
         between = abs(x) < length / 2 and abs(y) < width / 2 and 0.0 < z < height
-        floor = self.model.geom(f"{where}_0").id
+        floor = self._floors[where]
         return between and any(
             (a == floor and b in thing.geoms) or (b == floor and a in thing.geoms)
             for a, b in self.data.contact.geom.tolist()
         )
 
-    def _told(self, name: str, where: str) -> Callable[[], list[float]]:
-        return lambda: [float(self.inside(name, where))]
+    def done(self) -> list[bool]:
+        """Return whether the payload and the trash are in their bins."""
+        return [self.inside(name, where) for name, where in GOALS.items()]
 
     def success(self) -> bool:
         """Whether the payload is in the target bin and the trash in the trash bin."""
-        return all(self.inside(name, where) for name, where in GOALS.items())
+        return all(self.done())
 
     def progress(self) -> float:
         """Return the shaped reward, which robosuite has not.

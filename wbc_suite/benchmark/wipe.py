@@ -19,7 +19,7 @@ from wbc_suite.control import RobotState
 from wbc_suite.robot.component import Channel
 from wbc_suite.scene import TableConfig, add_table
 from wbc_suite.scene.objects import Thing
-from wbc_suite.sensing.reading import Reading, computed
+from wbc_suite.sensing.reading import Reading, offset, site_position, user_values
 from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Matrix, Vector
 
@@ -106,16 +106,13 @@ class Wipe(ObjectBenchmark):
         super().__init__(self.config)
         count = self.config.stroke.marks
         self.marks: Matrix = np.zeros((count, 3))
-        self._fresh, self.force, self.collided = 0, 0.0, False
-        self._seen = b""
-        self._centroid: Vector = np.zeros(3)
-        self._radius, self._portion = 0.0, 0.0
+        self._fresh, self.force, self.collided, self._seen = 0, 0.0, False, b""
 
     def furnish(self, spec: mujoco.MjSpec) -> None:
         """Add table, dirt and cameras."""
         table, stroke = self.config.table, self.config.stroke
         add_table(spec, table)
-        spec.nuserdata += stroke.marks
+        spec.nuserdata += stroke.marks + FIGURES
         spec.add_material(name="dirt", specular=0.0, shininess=0.0)
         body = spec.worldbody.add_body(name="dirt")
         for i in range(stroke.marks):
@@ -147,7 +144,9 @@ class Wipe(ObjectBenchmark):
         self._geoms = slice(first, first + len(self.marks))
         model.geom_sameframe[self._geoms] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
         self._wrench = np.zeros(6)
-        self._notes: Vector = data.userdata[-len(self.marks) :]
+        self._first = model.nuserdata - FIGURES
+        self._figures: Vector = data.userdata[self._first :]
+        self._notes: Vector = data.userdata[self._first - len(self.marks) : self._first]
 
     @property
     def wiped(self) -> NDArray[np.bool_]:
@@ -159,7 +158,7 @@ class Wipe(ObjectBenchmark):
         x, y, z = self.config.table.center
         self.marks[:, :2] = np.array([x, y]) + self._stroke(rng)
         self.marks[:, 2] = z
-        self._notes[:] = 0.0
+        self._notes[:] = self._figures[PRESSES] = 0.0
         self._fresh, self.force, self.collided, self._seen = 0, 0.0, False, b""
         self.model.geom_pos[self._geoms] = self.marks
         self._look()
@@ -185,15 +184,18 @@ class Wipe(ObjectBenchmark):
         """Wipe off what the hands press on now."""
         points, self.force, self.collided = self._touches()
         self._fresh = 0
-        if self.force < self.config.reward.least_force:
+        presses = self.force >= self.config.reward.least_force
+        self._figures[PRESSES] = presses
+        if not presses:
             return
-        near = _distances(points, self.marks[:, :2]) <= self.config.margin
+        near = _distances(np.array(points), self.marks[:, :2]) <= self.config.margin
         fresh = near & ~self.wiped
         self._fresh = int(fresh.sum())
         self._notes[fresh] = 1.0
+        self._look()
 
-    def _touches(self) -> tuple[Matrix, float, bool]:
-        """Return where hands touch the table, (n, 2), their force, and a collision."""
+    def _touches(self) -> tuple[list[Vector], float, bool]:
+        """Return where hands touch the table, (2,) each, their force, a collision."""
         points: list[Vector] = []
         force, collided = 0.0, False
         for i, (a, b) in enumerate(self.data.contact.geom.tolist()):
@@ -206,7 +208,7 @@ class Wipe(ObjectBenchmark):
                 points.append(self.data.contact.pos[i, :2])
             else:
                 collided = True
-        return np.array(points).reshape(-1, 2), force, collided
+        return points, force, collided
 
     def observables(self) -> dict[str, Reading]:
         """Return how much is done, and where the rest is.
@@ -214,58 +216,62 @@ class Wipe(ObjectBenchmark):
         Keys are those of this field's datasets: the part that is wiped, the rest's
         centroid and its radius about that, m, and the way there from each hand.
         """
+        centroid = self._figure(CENTROID, 3)
         readings = {
-            "proportion_wiped": computed(1, lambda: [self.portion]),
-            "wipe_radius": computed(1, lambda: [self.radius]),
-            "wipe_centroid": computed(3, lambda: self.centroid),
+            "proportion_wiped": self._figure(PORTION),
+            "wipe_radius": self._figure(RADIUS),
+            "wipe_centroid": centroid,
         }
         for side, hand in self.sided_hands():
-            readings[f"{side}gripper_to_wipe_centroid"] = computed(
-                3, lambda hand=hand: self.centroid - hand.position
-            )
+            way = offset(centroid, site_position(hand.site))
+            readings[f"{side}gripper_to_wipe_centroid"] = way
         return readings
 
     def felt(self) -> dict[str, dict[str, Reading]]:
         """Return whether the robot presses on the table, 1 or 0: `robot0_contact`."""
-        least = self.config.reward.least_force
-        contact = computed(1, lambda: [float(self.force >= least)])
-        return {self._wiping: {f"{self._wiping}contact": contact}}
+        return {self._wiping: {f"{self._wiping}contact": self._figure(PRESSES)}}
+
+    def _figure(self, place: int, size: int = 1) -> Reading:
+        start = self._first + place
+        return user_values(range(start, start + size))
 
     def _look(self) -> None:
         """Measure the marks that are left and draw only these, where some are new.
 
         With none left, the centroid is that of all. Most steps wipe nothing, and ask
-        for these numbers several times.
+        for these numbers several times; so they are noted beside the marks.
         """
         notes = self._notes.tobytes()
         if notes == self._seen:
             return
         self._seen, wiped = notes, self.wiped
-        self._portion, done = float(wiped.mean()), bool(wiped.all())
+        done = bool(wiped.all())
         rest = self.marks if done else self.marks[~wiped]
-        self._centroid = rest.mean(axis=0)
-        away = np.linalg.norm(rest - self._centroid, axis=1)
-        self._radius = 0.0 if done else float(away.max())
+        centroid = rest.mean(axis=0)
+        away = np.linalg.norm(rest - centroid, axis=1)
+        self._figures[PORTION] = wiped.mean()
+        self._figures[RADIUS] = 0.0 if done else away.max()
+        self._figures[:3] = centroid
         alpha = np.where(wiped, 0.0, self.config.stroke.color[3])
         self.model.geom_rgba[self._geoms, 3] = alpha
 
     @property
     def centroid(self) -> Vector:
-        """Middle of the marks that are left, m."""
+        """Middle of the marks that are left, m. A view."""
         self._look()
-        return self._centroid
+        return self._figures[:3]
 
     @property
     def portion(self) -> float:
         """How much is wiped off, from 0 to 1."""
         self._look()
-        return self._portion
+        return self._figures.item(PORTION)
 
     @property
     def radius(self) -> float:
         """How far the marks that are left are from their middle at most, m."""
         self._look()
-        return self._radius
+        return self._figures.item(RADIUS)
 
     def success(self) -> bool:
         """Whether all marks are wiped off."""
@@ -300,6 +306,8 @@ class Wipe(ObjectBenchmark):
         return float(reward * self.horizon / most)
 
 
+CENTROID, PORTION, RADIUS, PRESSES, FIGURES = 0, 3, 4, 5, 6
+"""Places of what is measured, behind the marks' notes, and how many there are."""
 THICK = 0.0004
 """Half of a mark's height, m: seen from above, and nowhere else."""
 

@@ -138,6 +138,7 @@ class Observables:
         """Begin an episode; noise is drawn from a generator that `rng` seeds."""
         if self.changes:
             self._rng = np.random.default_rng(rng.integers(2**63))
+        self.observer.start()
         self.observer.look()
         for channel in self._channels.values():
             channel.start(self.observer.values, self._rng)

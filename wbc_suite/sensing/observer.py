@@ -1,13 +1,15 @@
 """Observations of an environment: one buffer, filled at once and handed out by key."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
+from operator import itemgetter
+from typing import Any
 
 import gymnasium
 import mujoco
 import numpy as np
 
 from wbc_suite.kinematics.array_table import ArrayTable
-from wbc_suite.sensing.reading import LARGEST, Reading, SeenField, fill
+from wbc_suite.sensing.reading import BOUNDED, LARGEST, Reading, SeenField, fill
 from wbc_suite.typing import Indices, Vector
 
 __all__ = ["Observer"]
@@ -42,52 +44,70 @@ class Observer:
         readings = {
             key: reading for group in groups.values() for key, reading in group.items()
         }
-        self._rows: Indices = np.array(
-            [
-                (kind, index, self.places[key].start + at)
-                for key, reading in readings.items()
-                for kind, index, at in reading.rows
-            ],
-            dtype=np.int64,
-        ).reshape(-1, 3)
+        self._readings = readings
+        self._chooses = any(r.choose is not None for r in readings.values())
+        self._rows = self._ask_rows()
         self._computed = [
             (self.places[key], r.function)
             for key, r in readings.items()
-            if r.function is not None
+            if r.function is not None and r.part is None
         ]
+        self._apart: dict[Callable[[], Any], list[tuple[int, int]]] = {}
+        for key, r in readings.items():
+            if r.function is not None and r.part is not None:
+                parts = self._apart.setdefault(r.function, [])
+                parts.append((self.places[key].start, r.part))
         self._table = ArrayTable(
             SeenField, {f: getattr(data, f.name.lower()) for f in SeenField}
         )
         self.values: Vector = np.zeros(end)
-        self._most = np.zeros(end)
-        for key, place in self.places.items():
-            if key not in groups:
-                self._most[place] = self.bounds[key]
-        self._least = -self._most
         self._keys = tuple(self.places)
         # Of groups from a second copy: those of single readings are others' arrays.
-        self._slices = [
+        slices = [
             slice(end + place.start, end + place.stop) if key in groups else place
             for key, place in self.places.items()
         ]
+        self._cut = itemgetter(*slices) if slices else lambda _: ()
         self.space: gymnasium.spaces.Dict = gymnasium.spaces.Dict(
             {key: _box(key, place) for key, place in self.places.items()}
         )
 
+    def start(self) -> None:
+        """Begin an episode: ask what is seen in it."""
+        if self._chooses:
+            self._rows = self._ask_rows()
+
+    def _ask_rows(self) -> Indices:
+        """Return what `fill` is to do, shape (n, 3)."""
+        rows = [
+            (kind, index, self.places[key].start + at)
+            for key, reading in self._readings.items()
+            for kind, index, at in self._rows_of(key, reading)
+        ]
+        return np.array(rows, dtype=np.int64).reshape(-1, 3)
+
+    def _rows_of(self, key: str, reading: Reading) -> Iterable[tuple[int, int, int]]:
+        if reading.choose is not None:
+            return reading.choose()
+        if reading.function is None:
+            return reading.rows
+        return [(BOUNDED, int(self.bounds[key]), at) for at in range(reading.size)]
+
     def look(self) -> None:
         """Read everything out of the simulation into `values`."""
         values = self.values
-        fill(self._rows, self._table.table, values)
         for place, function in self._computed:
             values[place] = function()
-        if self._computed:  # all at once: a clip each takes 5 us
-            np.minimum(values, self._most, out=values)
-            np.maximum(values, self._least, out=values)
+        for function, parts in self._apart.items():
+            found = function()
+            for place, part in parts:
+                values[place] = found[part]
+        fill(self._rows, self._table.table, values)
 
     def observation(self) -> dict[str, Vector]:
         """Return what was seen last, by key; nobody else holds these arrays."""
         both = np.concatenate((self.values, self.values))
-        return dict(zip(self._keys, map(both.__getitem__, self._slices), strict=True))
+        return dict(zip(self._keys, self._cut(both), strict=True))
 
 
 def _lay_out(groups: Mapping[str, Mapping[str, Reading]]) -> dict[str, slice]:

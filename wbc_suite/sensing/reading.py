@@ -7,7 +7,7 @@ other function. All readings of an environment are filled in by one compiled cal
 A new kind of reading is a number, a branch in `fill` and a function that makes it.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -24,22 +24,30 @@ __all__ = [
     "actuator_forces",
     "body_position",
     "body_quat",
+    "chosen",
     "computed",
+    "computed_apart",
+    "constant",
     "fill",
     "joint_cosines",
     "joint_positions",
     "joint_sines",
     "joint_velocities",
     "offset",
+    "seen_position",
+    "seen_quat",
     "sensor_values",
     "site_position",
     "site_quat",
+    "user_values",
 ]
 
 POSITION, COSINE, SINE, VELOCITY = 0, 1, 2, 3
 BODY_POSITION, BODY_QUAT, SITE_POSITION, SITE_QUAT = 4, 5, 6, 7
 LESS_BODY_POSITION, LESS_SITE_POSITION = 8, 9
 SENSOR, LESS_SENSOR, ACTUATOR_FORCE = 10, 11, 12
+USER, CONSTANT, TURNED_POSITION, TURNED_QUAT = 13, 14, 15, 16
+BOUNDED = 17  # what is there already, within plus and minus the index
 
 LARGEST = 1e4
 """Bound of sensors and forces, SI units: a blow may exceed it, an observation not."""
@@ -56,11 +64,15 @@ class Reading:
         rows: What `fill` does for them: (kind, index in MuJoCo's array, place among
             these numbers).
         function: What else computes them, from the simulation as it stands.
+        part: Which of the function's numbers it is, where it is one of them.
+        choose: Returns the rows in their place, where each episode has its own.
     """
 
     size: int
     rows: tuple[tuple[int, int, int], ...] = ()
     function: Callable[[], ArrayLike] | None = None
+    part: int | None = None
+    choose: Callable[[], tuple[tuple[int, int, int], ...]] | None = None
 
 
 def joint_positions(addresses: Iterable[int]) -> Reading:
@@ -119,9 +131,50 @@ def offset(to: Reading, start: Reading) -> Reading:
     return Reading(size=to.size, rows=to.rows + minus)
 
 
+def seen_position(body: int, site: int) -> Reading:
+    """Read where a body is in the frame of a site, R_ws^T (p_wb - p_ws), m."""
+    way = offset(body_position(body), site_position(site))
+    return Reading(size=3, rows=(*way.rows, (TURNED_POSITION, site, 0)))
+
+
+def seen_quat(body: int, site: int) -> Reading:
+    """Read a body's orientation in the frame of a site, x y z w.
+
+    Its largest entry is positive.
+    """
+    return Reading(size=4, rows=((BODY_QUAT, body, 0), (TURNED_QUAT, site, 0)))
+
+
+def user_values(addresses: Iterable[int]) -> Reading:
+    """Read entries of userdata, what a benchmark notes there."""
+    return _each(USER, addresses)
+
+
+def constant(number: int) -> Reading:
+    """Read always the same whole number."""
+    return _each(CONSTANT, [number])
+
+
+def chosen(options: Sequence[Reading], number: Callable[[], int]) -> Reading:
+    """Read one of several, the same throughout an episode.
+
+    Args:
+        options: Equally many numbers each, none of them `computed`.
+        number: Says which one; it is asked when an episode starts.
+    """
+    return Reading(size=options[0].size, choose=lambda: options[number()].rows)
+
+
 def computed(size: int, function: Callable[[], ArrayLike]) -> Reading:
     """Let a function compute the numbers, shape (size,), after every step."""
     return Reading(size=size, function=function)
+
+
+def computed_apart(
+    count: int, function: Callable[[], Sequence[float]]
+) -> tuple[Reading, ...]:
+    """Let a function compute several readings of one number each, called once."""
+    return tuple(Reading(size=1, function=function, part=k) for k in range(count))
 
 
 def _each(kind: int, addresses: Iterable[int]) -> Reading:
@@ -140,6 +193,7 @@ class SeenField(IntEnum):
     SITE_XMAT = 5
     SENSORDATA = 6
     QFRC_ACTUATOR = 7
+    USERDATA = 8
 
 
 @compiled_short
@@ -156,6 +210,7 @@ def fill(rows: Indices, table: Indices, out: Vector) -> None:  # noqa: C901 - a 
     qpos, qvel, xpos = vector(table, 0), vector(table, 1), matrix(table, 2)
     xquat, site_xpos, site_xmat = matrix(table, 3), matrix(table, 4), matrix(table, 5)
     sensordata, qfrc_actuator = vector(table, 6), vector(table, 7)
+    userdata = vector(table, 8)
     for row in range(rows.shape[0]):
         kind, i, at = rows[row, 0], rows[row, 1], rows[row, 2]
         if kind == POSITION:
@@ -185,6 +240,16 @@ def fill(rows: Indices, table: Indices, out: Vector) -> None:  # noqa: C901 - a 
             out[at] = min(max(-sensordata[i], -LARGEST), LARGEST)
         elif kind == ACTUATOR_FORCE:
             out[at] = min(max(qfrc_actuator[i], -LARGEST), LARGEST)
+        elif kind == USER:
+            out[at] = min(max(userdata[i], -LARGEST), LARGEST)
+        elif kind == CONSTANT:
+            out[at] = i
+        elif kind == TURNED_POSITION:
+            _turn_back(site_xmat[i], out[at : at + 3])
+        elif kind == TURNED_QUAT:
+            _turn_quat_back(site_xmat[i], out[at : at + 4])
+        elif kind == BOUNDED:
+            out[at] = min(max(out[at], -float(i)), float(i))
 
 
 @inlined
@@ -220,3 +285,33 @@ def _quat_xyzw(R: Vector, out: Vector) -> None:
     length = np.sqrt(out[0] ** 2 + out[1] ** 2 + out[2] ** 2 + out[3] ** 2)
     for k in range(4):  # rounding may take it to 1 + 2e-16
         out[k] = min(max(out[k] / length, -1.0), 1.0)
+
+
+@inlined
+def _turn_back(R: Vector, way: Vector) -> None:
+    """Put R^T way in the place of `way`, (3,); R is (9,) row by row."""
+    x, y, z = way[0], way[1], way[2]
+    for k in range(3):
+        way[k] = R[k] * x + R[3 + k] * y + R[6 + k] * z
+
+
+@inlined
+def _turn_quat_back(R: Vector, quat: Vector) -> None:
+    """Put the quaternion of R^T R(quat) in the place of `quat`, x y z w.
+
+    With p that of R, it is conj(p) quat; the largest entry becomes positive.
+    """
+    x, y, z, w = quat[0], quat[1], quat[2], quat[3]
+    p = np.empty(4)
+    _quat_xyzw(R, p)
+    quat[0] = p[3] * x - p[0] * w - p[1] * z + p[2] * y
+    quat[1] = p[3] * y - p[1] * w - p[2] * x + p[0] * z
+    quat[2] = p[3] * z - p[2] * w - p[0] * y + p[1] * x
+    quat[3] = p[3] * w + p[0] * x + p[1] * y + p[2] * z
+    largest = 0
+    for k in range(1, 4):
+        if abs(quat[k]) > abs(quat[largest]):
+            largest = k
+    sign = 1.0 if quat[largest] > 0.0 else -1.0
+    for k in range(4):  # rounding may take it to 1 + 4e-16
+        quat[k] = min(max(sign * quat[k], -1.0), 1.0)
