@@ -43,7 +43,7 @@ class NutAssemblyConfig(CarryingConfig):
         table: The table.
         pegs: The pegs on it.
         regions: Where each nut starts, from the middle of the table's top.
-        aside: Distance of a nut's middle from its peg's axis at most, m; per axis.
+        aside: Distance of a nut's middle from its peg's axis at most, m.
         height: Of a nut's middle above the table at most, m.
     """
 
@@ -121,13 +121,8 @@ class NutAssembly(CarryingBenchmark):
 
     def lies(self, name: str) -> bool:
         """Whether a nut lies around its peg."""
-        x, y, z = self.states[name].position.tolist()
-        gx, gy = self.goal(name)
-        return (
-            max(abs(x - gx), abs(y - gy)) < self.config.aside
-            and z - self.config.table.center[2] < self.config.height
-            and z > self.config.table.center[2]
-        )
+        height = self.states[name].position.item(2) - self.config.table.center[2]
+        return 0.0 < height < self.config.height and self.is_over(name)
 
     def is_over(self, name: str) -> bool:
         """Whether a nut's middle is near its peg's axis."""
