@@ -20,6 +20,8 @@ from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.robot import load_robot
 from wbc_suite.tomlfile import load_model
 
+SIDES = ("right", "left")
+
 ROBOTS = ("Panda", "GR1", "Tiago", "SpotWithArm")
 STEP = np.array([0.03, 0.04, -0.03, 0.0, 0.1, 0.1])
 
@@ -269,6 +271,15 @@ def test_a_robot_without_joints_is_refused_in_words():
 def test_a_free_robot_that_nothing_holds_is_refused(alone):
     with pytest.raises(ConfigError, match="UR5e: it is free to fall"):
         alone(load_robot("UR5e", base="NoActuationBase"))
+
+
+def test_a_biped_of_unknown_soles_is_warned_of(alone, caplog):
+    held = [{"frame": f"{side}_foot", "contact": "surface"} for side in SIDES]
+    alone("GR1FreeBody", held=held)
+    assert "stands on 2 feet whose soles nobody has told" in caplog.text
+    caplog.clear()
+    alone("SpotWithArm")
+    assert not caplog.records
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """Whole-body inverse kinematics over joint-position control, for any robot."""
 
+import logging
 import time
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -39,6 +40,11 @@ from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["WholeBodyIK"]
+
+LOG = logging.getLogger(__name__)
+
+LEAST_LEGS = 3
+"""So many points of support are a stool; with fewer, pressure must move under soles."""
 
 BackendFactory = Callable[[RobotDescription, WholeBodyIKConfig], IkBackend]
 
@@ -337,6 +343,14 @@ def _stance_law(
         for held in config.held
     ]
     soles = soles_of(config)
+    if not soles and len(contacts) < LEAST_LEGS:
+        LOG.warning(
+            "%s: it stands on %d feet whose soles nobody has told ([[held]] sole), so "
+            "nothing keeps it from tipping over when its hands move: see 'On its own "
+            "feet' in docs/robots.md.",
+            state.robot.name,
+            len(contacts),
+        )
     if soles:
         return BalanceLaw(state, joints, contacts, config.joint_law, soles)
     return StanceLaw(state, joints, contacts, config.joint_law)
