@@ -88,6 +88,18 @@ def test_states_go_out_and_in_as_in_datasets(env):
         env.reset_from_xml_string("<mujoco/>")
 
 
+@pytest.mark.parametrize(("robot", "size"), [("Panda", 7), ("Tiago", 20)])
+def test_basic_without_a_robot_fits_any(robot, size):
+    config = robosuite.load_composite_controller_config(controller="BASIC")
+    config["body_parts"]["arms"]["right"]["kp"] = 100.0
+    assert config["body_parts"]["arms"]["left"]["kp"] != 100.0
+    env = robosuite.make(
+        "Lift", robots=robot, controller_configs=config, use_camera_obs=False
+    )
+    assert env.action_dim == size
+    env.close()
+
+
 def test_a_datasets_env_args_make_its_environment(tmp_path):
     config = robosuite.load_composite_controller_config(
         controller="BASIC", robot="Panda"

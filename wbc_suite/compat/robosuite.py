@@ -5,6 +5,7 @@ controllers and scenes are ours, so states and XML of robosuite's own datasets d
 fit; actions, keys of observations, rewards and the calls around them do.
 """
 
+import copy
 import json
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from wbc_suite.catalogue import Catalogue
 from wbc_suite.compat.robosuite_gym import GymWrapper
 from wbc_suite.compat.robosuite_robot import RobotView
 from wbc_suite.compat.robosuite_sim import Model, Sim
-from wbc_suite.control import load_composite_controller_config
+from wbc_suite.control import load_composite_controller_config as _load_composite
 from wbc_suite.control.composite import composite_names
 from wbc_suite.control.composite.parts import part_models
 from wbc_suite.envs import RobotEnv
@@ -67,6 +68,30 @@ def __getattr__(name: str) -> Any:
     if name == "ALL_GRIPPERS":
         return (*Catalogue().called("robots/gripper"), None)
     raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
+
+
+def load_composite_controller_config(
+    controller: str | Path | None = None, robot: str | None = None
+) -> dict[str, Any]:
+    """Return a composite controller's config; see `wbc_suite.control`'s.
+
+    BASIC without a robot is one for all: of its parts, `make` leaves out what a robot
+    does not have.
+    """
+    if robot is not None or str(controller).upper() != "BASIC":
+        return _load_composite(controller, robot)
+    arm = load_part_controller_config(default_controller="OSC_POSE")
+    arm["gripper"] = {"type": "GRIP"}
+    posture = {"type": "JOINT_POSITION"}
+    return {
+        "type": "BASIC",
+        "body_parts": {
+            "arms": {"right": arm, "left": copy.deepcopy(arm)},
+            "torso": posture,
+            "head": posture.copy(),
+            "base": {"type": "JOINT_VELOCITY"},
+        },
+    }
 
 
 def load_part_controller_config(
