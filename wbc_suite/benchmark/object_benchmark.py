@@ -18,7 +18,7 @@ from wbc_suite.robot.shapes import Real, Vector3
 from wbc_suite.scene import add_camera, place_robot
 from wbc_suite.scene.objects import Thing, ThingState
 from wbc_suite.scene.placement import Placed, Sampler
-from wbc_suite.sensing.hands import hands_of
+from wbc_suite.sensing.hands import hands_of, pairs_in_contact
 from wbc_suite.sensing.reading import (
     Reading,
     body_position,
@@ -213,7 +213,7 @@ class ObjectBenchmark(ABC):
         return any(
             (a in placed and b in self._robot_geoms)
             or (b in placed and a in self._robot_geoms)
-            for a, b in self.data.contact.geom.tolist()
+            for a, b in pairs_in_contact(self.data)
         )
 
     def park(self, names: Iterable[str]) -> None:
@@ -325,7 +325,7 @@ class ObjectBenchmark(ABC):
         a, b = self.states[first].geoms, self.states[second].geoms
         return any(
             (x in a and y in b) or (x in b and y in a)
-            for x, y in self.data.contact.geom.tolist()
+            for x, y in pairs_in_contact(self.data)
         )
 
 

@@ -17,6 +17,7 @@ from wbc_suite.scene import TableConfig, add_tables
 from wbc_suite.scene.objects import Thing, box, hammer, lid, open_bin
 from wbc_suite.scene.objects.tools import HAMMER_LYING
 from wbc_suite.scene.placement import Region, SequentialSampler, UniformSampler
+from wbc_suite.sensing.hands import pairs_in_contact
 from wbc_suite.sensing.reading import (
     Reading,
     body_position,
@@ -218,7 +219,7 @@ class TwoArmTransport(TwoArmBenchmark):
         floor = self._floors[where]
         return between and any(
             (a == floor and b in thing.geoms) or (b == floor and a in thing.geoms)
-            for a, b in self.data.contact.geom.tolist()
+            for a, b in pairs_in_contact(self.data)
         )
 
     def done(self) -> list[bool]:

@@ -19,6 +19,7 @@ from wbc_suite.control import RobotState
 from wbc_suite.robot.component import Channel
 from wbc_suite.scene import TableConfig, add_table
 from wbc_suite.scene.objects import Thing
+from wbc_suite.sensing.hands import pairs_in_contact
 from wbc_suite.sensing.reading import Reading, offset, site_position, user_values
 from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Matrix, Vector
@@ -198,7 +199,7 @@ class Wipe(ObjectBenchmark):
         """Return where hands touch the table, (2,) each, their force, a collision."""
         points: list[Vector] = []
         force, collided = 0.0, False
-        for i, (a, b) in enumerate(self.data.contact.geom.tolist()):
+        for i, (a, b) in enumerate(pairs_in_contact(self.data)):
             if self._table not in (a, b):
                 continue
             other = b if a == self._table else a

@@ -158,9 +158,9 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
     def observation(self) -> Observation:
         """Return what is seen now; after a physics error pictures are black."""
         seen: Observation = self.observer.observation()
-        if self._broken:
-            return seen | self.cameras.black()
-        return seen | self.cameras.observation()
+        pictures = self.cameras
+        seen |= pictures.black() if self._broken else pictures.observation()
+        return seen
 
     @property
     def observer(self) -> Observer:

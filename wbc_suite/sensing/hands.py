@@ -2,11 +2,18 @@
 
 from collections.abc import Collection, Sequence
 
+import mujoco
+
 from wbc_suite.control import RobotState
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Vector
 
-__all__ = ["Hand", "gripper_links", "hands_of"]
+__all__ = ["Hand", "gripper_links", "hands_of", "pairs_in_contact"]
+
+
+def pairs_in_contact(data: mujoco.MjData) -> list[list[int]]:
+    """Return the two geoms of each contact; where there is none, at no cost."""
+    return data.contact.geom.tolist() if data.ncon else []
 
 
 class Hand:
@@ -51,7 +58,7 @@ class Hand:
         """Whether two different links of the gripper touch geoms of a thing."""
         touching = {
             self._body_of.get(b if a in geoms else a)
-            for a, b in self._data.contact.geom.tolist()
+            for a, b in pairs_in_contact(self._data)
             if a in geoms or b in geoms
         }
         return len(touching - {None}) >= 2
