@@ -18,8 +18,8 @@ from harness.stand import Stand, arms_config
 import mujoco  # isort: skip  (after harness: it sets the number of threads)
 import numba
 
-from wbc_suite.control.loop import bind_physics, gather, physics_table
-from wbc_suite.control.loop.kernels import control
+from wbc_suite.control.loop import bind_physics, gather, needed, physics_table
+from wbc_suite.control.loop.kernels import Needed, control
 from wbc_suite.control.loop.physics import mj_step1, mj_step2
 from wbc_suite.control.loop.table import Records
 from wbc_suite.typing import Indices
@@ -43,11 +43,17 @@ def physics_only(model: int, data: int, steps: int) -> None:
 
 @numba.njit(nogil=True)
 def control_only(
-    timestep: float, table: Indices, laws: Records, drives: Records, steps: int
+    timestep: float,
+    table: Indices,
+    laws: Records,
+    drives: Records,
+    hands: Needed,
+    feet: Needed,
+    steps: int,
 ) -> None:
     """Compute the control of one instant again and again."""
     for _ in range(steps):
-        control(timestep, table, laws, drives)
+        control(timestep, table, laws, drives, hands, feet)
 
 
 class Law:
@@ -91,8 +97,9 @@ class Law:
         return found
 
     def _kernel(self, steps: int) -> None:
-        step = self.physics.timestep
-        control_only(step, self.arrays.table, self.laws, self.drives, steps)
+        step, laws = self.physics.timestep, self.laws
+        hands, feet = needed(laws)
+        control_only(step, self.arrays.table, laws, self.drives, hands, feet, steps)
 
     def _physics(self, steps: int) -> None:
         physics_only(self.physics.model, self.physics.data, steps)

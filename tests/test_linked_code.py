@@ -3,6 +3,7 @@ from typing import Any
 
 import numba
 import pytest
+from numba.core import event
 
 from wbc_suite.compiling import compiled, compiled_inner, inlined
 
@@ -65,6 +66,25 @@ def test_constants_share_one_form_of_a_function():
         kinds = [numba.float64, numba.types.literal(count)]
         dispatcher.get_call_template(kinds, {})
     assert dispatcher.signatures == [(numba.float64, numba.int64)]
+
+
+@inlined
+def inlined_larger(x, y):
+    return max(x, y)
+
+
+@compiled_inner
+def larger(x, y, z):
+    return max(inlined_larger(x, y), z)
+
+
+def test_functions_of_all_kinds_share_one_form_of_what_numba_brings():
+    dispatcher: Any = larger
+    with event.install_recorder("numba:compile") as recorder:
+        dispatcher.compile(3 * (numba.float32,))  # which nothing else here is of
+    functions = [made.data["dispatcher"].py_func for _, made in recorder.buffer]
+    theirs = [f for f in functions if f.__module__.startswith("numba.")]
+    assert len(theirs) == 2  # the start and the end of one
 
 
 @compiled

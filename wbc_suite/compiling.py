@@ -22,7 +22,7 @@ from typing import Any, TypeVar, cast
 import numba
 from numba.core import config, types
 
-from wbc_suite.linked_code import LinkedCompiler
+from wbc_suite.linked_code import EntryCompiler, LinkedCompiler
 from wbc_suite.user_cache import user_cache
 
 __all__ = ["announced", "cache_folder", "compiled"]
@@ -81,7 +81,9 @@ def _with_entry(function: Function, *, nogil: bool) -> Function:
     previous = _numba.CACHE_DIR
     _numba.CACHE_DIR = str(cache_folder(Path(function.__code__.co_filename)))
     try:
-        entry = _njit(cache=True, nogil=nogil, error_model="numpy")(function)
+        entry = _njit(
+            cache=True, nogil=nogil, error_model="numpy", pipeline_class=EntryCompiler
+        )(function)
     finally:
         _numba.CACHE_DIR = previous
     inner = _linked(function)

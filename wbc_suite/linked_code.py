@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from numba._dynfunc import make_function
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler import CompilerBase, DefaultPassBuilder, Flags
 from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.typed_passes import NativeLowering
 
@@ -51,12 +51,54 @@ class LinkedLowering(NativeLowering):
         return True
 
 
-class LinkedCompiler(CompilerBase):
-    """Numba's compiler of such functions."""
+class _HandedOn(Flags):
+    """Options that functions hand on to numba's own which they call, once and for all.
+
+    Numba finds its functions by these, 45,000 times for GR1, comparing each option;
+    one object is equal to itself at once.
+    """
+
+    def __eq__(self, other: object) -> bool:
+        return self is other
+
+    def __hash__(self) -> int:
+        return id(self)
+
+
+HANDED_ON: Any = _HandedOn()
+HANDED_ON.nrt, HANDED_ON.error_model = True, "numpy"
+
+
+class _Own(Flags):
+    """Options of one function, which are its alone.
+
+    What it calls takes the same form whether or not the caller holds a lock, has an
+    entry from Python, or is inlined.
+    """
+
+    def copy(self) -> Flags:
+        """Return what numba hands on in their place."""
+        return HANDED_ON
+
+
+class EntryCompiler(CompilerBase):
+    """Numba's compiler, of functions that call the same forms of others."""
+
+    def __init__(self, *args: Any) -> None:
+        super().__init__(*args)
+        self.state.flags = _Own(self.state.flags)
+
+    def define_pipelines(self) -> list[PassManager]:
+        """Return numba's own passes."""
+        return [DefaultPassBuilder.define_nopython_pipeline(self.state)]
+
+
+class LinkedCompiler(EntryCompiler):
+    """The same for functions that are linked into their callers."""
 
     def define_pipelines(self) -> list[PassManager]:
         """Return numba's own passes, with lowering into a `LinkedLibrary`."""
-        manager = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        (manager,) = super().define_pipelines()
         manager.passes = [
             (LinkedLowering if step is NativeLowering else step, text)
             for step, text in manager.passes

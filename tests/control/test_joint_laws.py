@@ -7,6 +7,7 @@ import pytest
 
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.control.composite.parts import parts_of
+from wbc_suite.control.loop import advance
 from wbc_suite.control.part.law import commands
 from wbc_suite.robot import load_robot
 
@@ -87,7 +88,7 @@ def test_kernels_give_what_the_readable_forms_give(alone, name):
         plain = commands(state, rig.controller.laws)
         moved = drives["position"].copy()
         laws[:], drives[:] = told
-        simulation._run(*simulation._bound, 1)
+        advance(*simulation._bound, 1)
         compiled = state.data.ctrl[state.actuator_ids]
         np.testing.assert_allclose(compiled, plain, rtol=1e-10, atol=1e-10)
         np.testing.assert_allclose(drives["position"], moved, rtol=0.0, atol=1e-12)

@@ -8,7 +8,7 @@ import qpsolvers
 from osc_rig import OscRig
 
 from wbc_suite.catalogue import Catalogue
-from wbc_suite.control.loop import bind_physics, physics_table
+from wbc_suite.control.loop import bind_physics, needed, physics_table
 from wbc_suite.control.loop.kernels import control
 from wbc_suite.control.loop.least_change import least_change
 from wbc_suite.control.loop.straight import POSTURE_COST, SHORTENING_COST
@@ -55,7 +55,8 @@ def disagreement(rig, seed):
     asked = rig.law.drives["asked"].copy()
     simulation._laws[:], simulation._drives[:] = tables
     arrays = physics_table(rig.state.model, bind_physics(rig.state.model, data))
-    control(simulation.timestep, arrays.table, simulation._laws, simulation._drives)
+    laws, drives = simulation._laws, simulation._drives
+    control(simulation.timestep, arrays.table, laws, drives, *needed(laws))
     compiled = data.ctrl[rig.state.actuator_ids]
     size = 1.0 + np.abs(asked).max()
     apart = np.abs(rig.law.drives["asked"] - asked).max() / size

@@ -6,11 +6,11 @@ import pinocchio as pin
 import pytest
 import qpsolvers
 
-from wbc_suite.control.loop import bind_physics, physics_table
+from wbc_suite.control.loop import bind_physics, needed, physics_table
 from wbc_suite.control.loop.balance import SHARE_COST, TRUNK_COST
+from wbc_suite.control.loop.kernels import control
 from wbc_suite.control.loop.linear import pseudo_inverse, solve
 from wbc_suite.control.loop.stance import LEAST_PRESSURE
-from wbc_suite.control.loop.standing import control_standing
 from wbc_suite.control.part.balance import BalanceLaw
 from wbc_suite.control.part.stance import RootMotion
 
@@ -58,9 +58,8 @@ def disagreement(scene, home, seed):
     asked = simulation._drives["asked"].copy()
     simulation._laws[:], simulation._drives[:] = tables
     arrays = physics_table(scene.state.model, bind_physics(scene.state.model, data))
-    control_standing(
-        simulation.timestep, arrays.table, simulation._laws, simulation._drives
-    )
+    laws, drives = simulation._laws, simulation._drives
+    control(simulation.timestep, arrays.table, laws, drives, *needed(laws))
     compiled = data.ctrl[scene.state.actuator_ids]
     found = stance_of(scene).record["stance"]["force"]
     size = 1.0 + max(np.abs(asked).max(), np.abs(force).max())

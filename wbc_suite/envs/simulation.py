@@ -8,9 +8,10 @@ import mujoco
 from wbc_suite.compiling import announced
 from wbc_suite.control import CompositeController, RobotState
 from wbc_suite.control.loop import (
+    advance,
     bind_physics,
     gather,
-    loop_of,
+    needed,
     physics_table,
 )
 from wbc_suite.envs.watch import PhysicsWatch
@@ -68,8 +69,8 @@ class Simulation:
             first, last = self._laws["first"][k], self._laws["last"][k]
             law.adopt(self._laws[k : k + 1], self._drives[first:last])
         tables = self._table.table, self._watch.sound
-        self._bound = (*physics[:3], *tables, self._laws, self._drives)
-        self._run = loop_of(self._laws)
+        records = self._laws, self._drives, *needed(self._laws)
+        self._bound = (*physics[:3], *tables, *records)
         if self.compiled:
             with announced("the control loop"):
                 self._advance_compiled(0)
@@ -145,7 +146,7 @@ class Simulation:
             self._advance_plainly(steps)
 
     def _advance_compiled(self, steps: int) -> None:
-        if not math.isfinite(self.data.time) or not self._run(*self._bound, steps):
+        if not math.isfinite(self.data.time) or not advance(*self._bound, steps):
             self._watch.check()
 
     def _advance_plainly(self, steps: int) -> None:

@@ -1,11 +1,6 @@
 """The control loop: laws as data, and the compiled step over them."""
 
-from wbc_suite.control.loop.advance import (
-    advance,
-    advance_joints,
-    advance_standing,
-    loop_of,
-)
+from wbc_suite.control.loop.advance import advance, needed
 from wbc_suite.control.loop.physics import bind_physics, physics_table
 from wbc_suite.control.loop.sound import (
     LARGEST,
@@ -24,13 +19,11 @@ __all__ = [
     "Records",
     "SoundField",
     "advance",
-    "advance_joints",
-    "advance_standing",
     "begins_sound",
     "bind_physics",
     "bind_sound",
     "ends_sound",
     "gather",
-    "loop_of",
+    "needed",
     "physics_table",
 ]

@@ -1,9 +1,7 @@
 """The compiled control loop: physics and laws, n steps in one call."""
 
-from collections.abc import Callable
-
 from wbc_suite.compiling import compiled
-from wbc_suite.control.loop.kernels import command, command_joints
+from wbc_suite.control.loop.kernels import Needed, command
 from wbc_suite.control.loop.physics import (
     flags_of,
     let_sense,
@@ -14,19 +12,16 @@ from wbc_suite.control.loop.physics import (
     physics_of,
 )
 from wbc_suite.control.loop.sound import begins_sound, ends_sound
-from wbc_suite.control.loop.standing import command_standing
 from wbc_suite.control.loop.table import CompiledRecords, LawKind, Records
 from wbc_suite.typing import Indices
 
-__all__ = ["advance", "advance_joints", "advance_standing", "loop_of"]
+__all__ = ["advance", "needed"]
 
 
-def loop_of(laws: Records) -> Callable[..., bool]:
-    """Return the loop that knows these laws and takes the least time to compile."""
-    kinds = laws["kind"]
-    if (kinds >= LawKind.STANCE).any():
-        return advance_standing
-    return advance if (kinds == LawKind.OSC).any() else advance_joints
+def needed(laws: Records) -> tuple[Needed, Needed]:
+    """Return which laws of hands and of feet `advance` is to know: those of a table."""
+    hands, feet = laws["kind"] == LawKind.OSC, laws["kind"] >= LawKind.STANCE
+    return bool(hands.any()) or None, bool(feet.any()) or None
 
 
 @compiled
@@ -38,6 +33,8 @@ def advance(
     sound: Indices,
     laws: CompiledRecords,
     drives: CompiledRecords,
+    hands: Needed,
+    feet: Needed,
     steps: int,
 ) -> bool:
     """Advance physics under all laws; holds no lock, so threads run side by side.
@@ -54,6 +51,8 @@ def advance(
         sound: Where what may be broken is, see `bind_sound`.
         laws: `LAW` records.
         drives: `DRIVE` records.
+        hands: Whether a law is in operational space, see `needed`.
+        feet: Whether a law is of feet.
         steps: How many steps of physics.
 
     Returns:
@@ -67,59 +66,7 @@ def advance(
     for k in range(steps):
         let_sense(table, flags, k == steps - 1)
         mj_step1(model, data)
-        command(physics, laws, drives)
-        mj_step2(model, data)
-    mj_kinematics(model, data)
-    mj_comPos(model, data)
-    return ends_sound(sound)
-
-
-@compiled
-def advance_standing(
-    model: int,
-    data: int,
-    timestep: float,
-    table: Indices,
-    sound: Indices,
-    laws: CompiledRecords,
-    drives: CompiledRecords,
-    steps: int,
-) -> bool:
-    """Do what `advance` does, with laws of feet among the others."""
-    if not begins_sound(sound):
-        return False
-    physics = physics_of(table, timestep)
-    flags = flags_of(table)
-    for k in range(steps):
-        let_sense(table, flags, k == steps - 1)
-        mj_step1(model, data)
-        command_standing(physics, laws, drives)
-        mj_step2(model, data)
-    mj_kinematics(model, data)
-    mj_comPos(model, data)
-    return ends_sound(sound)
-
-
-@compiled
-def advance_joints(
-    model: int,
-    data: int,
-    timestep: float,
-    table: Indices,
-    sound: Indices,
-    laws: CompiledRecords,
-    drives: CompiledRecords,
-    steps: int,
-) -> bool:
-    """Do what `advance` does, without laws in operational space."""
-    if not begins_sound(sound):
-        return False
-    physics = physics_of(table, timestep)
-    flags = flags_of(table)
-    for k in range(steps):
-        let_sense(table, flags, k == steps - 1)
-        mj_step1(model, data)
-        command_joints(physics, laws, drives)
+        command(physics, laws, drives, hands, feet)
         mj_step2(model, data)
     mj_kinematics(model, data)
     mj_comPos(model, data)

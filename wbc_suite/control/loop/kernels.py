@@ -1,60 +1,74 @@
 """Compiled control laws.
 
-Each kernel writes the joint accelerations that a law asks for; `write_commands` then
-turns all of them into actuator commands by one inverse dynamics of the whole scene. The
+Each kernel writes the joint accelerations that a law asks for; `command` then turns
+all of them into actuator commands by one inverse dynamics of the whole scene. The
 readable forms are the `acceleration` methods of the laws in `control.part`; a test
 holds the two together.
 """
 
+from typing import TypeAlias
+
 from wbc_suite.compiling import compiled, compiled_inner
+from wbc_suite.control.loop.balance import balance_law
 from wbc_suite.control.loop.joints import base_law, joint_law, velocity_law
 from wbc_suite.control.loop.motion import target_of
 from wbc_suite.control.loop.observer import inertia_times_acceleration, observe
 from wbc_suite.control.loop.osc import osc_law
 from wbc_suite.control.loop.physics import Physics, physics_of
+from wbc_suite.control.loop.stance import stance_law, take_contact_forces
 from wbc_suite.control.loop.table import CompiledRecords, LawKind
 from wbc_suite.control.loop.window import keep_window
 from wbc_suite.typing import Indices
 
-__all__ = ["ask", "ask_joints", "command", "command_joints", "control"]
-__all__ += ["write_commands", "write_forces"]
+__all__ = ["Needed", "command", "control"]
 
 _JOINT, _OSC = int(LawKind.JOINT), int(LawKind.OSC)
 _BASE, _TORQUE, _SERVO = int(LawKind.BASE), int(LawKind.TORQUE), int(LawKind.SERVO)
-_VELOCITY, _STANCE = int(LawKind.VELOCITY), int(LawKind.STANCE)
+_VELOCITY = int(LawKind.VELOCITY)
+_STANCE, _BALANCE = int(LawKind.STANCE), int(LawKind.BALANCE)
+
+
+Needed: TypeAlias = bool | None
+"""True, or None to leave a kind of law out of the compiled code: numba drops what is
+done only where an argument is not None. Operational space, and feet, take as long to
+compile as all others."""
 
 
 @compiled
 def control(
-    timestep: float, table: Indices, laws: CompiledRecords, drives: CompiledRecords
+    timestep: float,
+    table: Indices,
+    laws: CompiledRecords,
+    drives: CompiledRecords,
+    hands: Needed,
+    feet: Needed,
 ) -> None:
     """Do what `command` does, for one step; see `advance` for the arguments."""
-    command(physics_of(table, timestep), laws, drives)
+    command(physics_of(table, timestep), laws, drives, hands, feet)
 
 
 @compiled_inner
-def command(physics: Physics, laws: CompiledRecords, drives: CompiledRecords) -> None:
-    """Write all actuator commands; runs between `mj_step1` and `mj_step2`."""
-    ask(physics, laws, drives)
-    write_commands(physics, laws, drives)
-
-
-@compiled_inner
-def command_joints(
-    physics: Physics, laws: CompiledRecords, drives: CompiledRecords
+def command(
+    physics: Physics,
+    laws: CompiledRecords,
+    drives: CompiledRecords,
+    hands: Needed,
+    feet: Needed,
 ) -> None:
-    """Do what `command` does where no law is in operational space."""
-    ask_joints(physics, laws, drives)
-    write_commands(physics, laws, drives)
+    """Write all actuator commands; runs between `mj_step1` and `mj_step2`.
 
-
-@compiled_inner
-def ask(physics: Physics, laws: CompiledRecords, drives: CompiledRecords) -> None:
-    """Write the accelerations that all laws of joints and hands ask for."""
+    Each kind of law builds on what those before it ask for: hands on the joints that
+    carry them, roots and legs on all that feet carry.
+    """
     ask_joints(physics, laws, drives)
-    for k in range(laws.shape[0]):  # after joints that carry the arms
-        if laws[k].kind == _OSC:
-            osc_law(physics, laws[k], drives)
+    if hands is not None:
+        ask_hands(physics, laws, drives)
+    if feet is not None:
+        ask_feet(physics, laws, drives)
+    inertia_times_acceleration(physics)
+    if feet is not None:
+        take_contact_forces(physics, laws, drives)
+    write_forces(physics, laws, drives)
 
 
 @compiled_inner
@@ -78,19 +92,31 @@ def ask_joints(
 
 
 @compiled_inner
-def write_commands(
-    physics: Physics, laws: CompiledRecords, drives: CompiledRecords
-) -> None:
-    """Write `M a + h - d` of torque-driven joints, and the set points of servos."""
-    inertia_times_acceleration(physics)
-    write_forces(physics, laws, drives)
+def ask_hands(physics: Physics, laws: CompiledRecords, drives: CompiledRecords) -> None:
+    """Write the accelerations that all laws in operational space ask for."""
+    for k in range(laws.shape[0]):
+        if laws[k].kind == _OSC:
+            osc_law(physics, laws[k], drives)
+
+
+@compiled_inner
+def ask_feet(physics: Physics, laws: CompiledRecords, drives: CompiledRecords) -> None:
+    """Write the accelerations of roots and legs, and what feet should give."""
+    for k in range(laws.shape[0]):
+        if laws[k].kind == _STANCE:
+            stance_law(physics, laws[k], drives)
+        elif laws[k].kind == _BALANCE:
+            balance_law(physics, laws[k], drives)
 
 
 @compiled_inner
 def write_forces(
     physics: Physics, laws: CompiledRecords, drives: CompiledRecords
 ) -> None:
-    """Write the commands once `physics.force` holds M a, less what feet carry."""
+    """Write `M a + h - d` of torque-driven joints, and the set points of servos.
+
+    `physics.force` holds M a, less what feet carry.
+    """
     for k in range(laws.shape[0]):
         law = laws[k]
         if law.kind >= _STANCE:
