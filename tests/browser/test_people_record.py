@@ -4,8 +4,9 @@ import sys
 import time
 
 import numpy as np
+import pinocchio as pin
 import pytest
-from conftest import RATE, Viewer, note, wait_until
+from conftest import PATIENCE, RATE, Viewer, note, wait_until
 
 import wbc_suite
 from wbc_suite.cli.by_hand import SWITCH_INTERVAL, stages_of
@@ -20,14 +21,24 @@ from wbc_suite.wrappers import DataCollection
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
-PAIRS = (("w", "s"), ("a", "d"), ("r", "f"))
+MOVES = (("w", "s"), ("a", "d"), ("r", "f"))
+TURNS = (("o", "u"), ("i", "k"), ("j", "l"))
 GLANCE = 0.02  # s; between looks at the screen
 
 
 class Room:
-    """A session with its page, its page of keys, and a file."""
+    """A session with its page, its page of keys, and a file.
 
-    def __init__(self, context, path, benchmark, robot):
+    Args:
+        context: Browser context.
+        path: File to record into.
+        benchmark: Its name.
+        robot: Its name.
+        seed: Of what is recorded.
+        watching: See `Viewer`.
+    """
+
+    def __init__(self, context, path, benchmark, robot, *, seed=0, watching=True):
         env = wbc_suite.make(
             benchmark,
             robots=robot,
@@ -36,7 +47,7 @@ class Room:
             horizon=10**7,
         )
         collection = DataCollection(env, path, automatic=False)
-        self.env, self.desk = collection, RecordingDesk(collection.recorder)
+        self.env, self.desk = collection, RecordingDesk(collection.recorder, seed=seed)
         self.stream = Stream(port=0)
         self.stream.start()
         self.session = TeleopSession(
@@ -50,7 +61,7 @@ class Room:
         self.page = TeleopPage(self.session, Site(port=0), label=f"{robot} records")
         self.page.start()
         self.session.start()
-        self.viewer = Viewer(context, self.page.site)
+        self.viewer = Viewer(context, self.page.site, watching=watching)
         self.keys = context.new_page()
         self.keys.goto(self.stream.url)
         self.keys.get_by_text("connected").wait_for()
@@ -67,12 +78,51 @@ class Room:
         number = self.session.model.body(body).id
         return self.session.snapshot.body_positions[number]
 
-    def hand(self, name):
-        return self.session.snapshot.limbs[name].measured.translation
+    def site(self, name):
+        """Where a site is seen."""
+        site, snapshot = self.session.model.site(name), self.session.snapshot
+        body = site.bodyid[0]
+        quat = pin.Quaternion(np.roll(snapshot.body_quaternions[body], -1))
+        return snapshot.body_positions[body] + quat.matrix() @ site.pos
+
+    def limb(self, name):
+        return self.session.snapshot.limbs[name]
 
     def click(self, button):
+        """Click on the robot's page."""
         self.viewer.page.bring_to_front()
         self.viewer.page.get_by_role("button", name=button).click()
+
+    def record(self):
+        self.click("Record")
+        wait_until(lambda: self.session.snapshot.recording.recording, "the recording")
+        self.keys.bring_to_front()
+
+    def keep(self):
+        self.click("Keep")
+        wait_until(lambda: self.session.snapshot.recording.kept == 1, "it is kept")
+
+    def press(self, key):
+        """Press a key, for as long as a finger does."""
+        self.keys.keyboard.press(key, delay=80)
+
+    def change_pace(self, key, times):
+        for _ in range(times):
+            self.press(key)
+
+    def switch_to(self, name):
+        while (before := self.session.snapshot.switched_to) != name:
+            self.press("Tab")
+            wait_until(
+                lambda before=before: self.session.snapshot.switched_to != before,
+                "the next hand",
+            )
+
+    def grip(self, name):
+        """Close a gripper, and let its fingers press."""
+        self.press("Space")
+        wait_until(lambda: self.session.grippers[name].min() > 0.9, "it closes")
+        self.let_pass(1.0)
 
     def hold(self, keys):
         """Have these keys down, and no others."""
@@ -82,21 +132,51 @@ class Room:
             self.keys.keyboard.down(key)
         self.held = set(keys)
 
-    def steer(self, name, goal, *, within, patience=60.0):
-        """Hold keys until a hand is where it should be; the goal may move."""
-        deadline = time.monotonic() + patience
+    def steer(self, name, goal, *, within, turned=None, near=0.08):
+        """Hold keys until a hand is where it should be.
+
+        Args:
+            name: The hand's limb, which is switched to.
+            goal: Returns where it should be, m; it may move.
+            within: How near is enough, along each axis, m.
+            turned: How it should be turned, as a matrix; left out, as it is.
+            near: How near is enough, about each axis, rad.
+        """
+        deadline = time.monotonic() + PATIENCE
         while True:
-            away = goal() - self.hand(name)
-            keys = {
-                pair[int(x < 0.0)]
-                for pair, x in zip(PAIRS, away, strict=True)
-                if abs(x) > within
-            }
+            hand = self.limb(name).measured
+            away = goal() - hand.translation
+            keys = wanted(MOVES, away, within)
+            if turned is not None:
+                keys |= wanted(TURNS, pin.log3(turned @ hand.rotation.T), near)
             self.hold(keys)
             if not keys:
                 return
             assert time.monotonic() < deadline, f"{name} is {away} m away"
             time.sleep(GLANCE)
+
+    def raise_to(self, name, height):
+        """Hold the key until a hand's target is this high, m."""
+        self.hold({"r"} if self.limb(name).target.translation[2] < height else set())
+        wait_until(
+            lambda: self.limb(name).target.translation[2] >= height, "the hand rises"
+        )
+        self.hold(set())
+        self.let_pass(0.2)
+
+    def let_pass(self, seconds):
+        """Wait for some time of the simulation, which may run slowly."""
+        until = self.session.snapshot.time + seconds
+        wait_until(lambda: self.session.snapshot.time > until, "time passes")
+
+
+def wanted(pairs, away, within):
+    """Which key of each pair is to be held, for what is further away than `within`."""
+    return {
+        pair[int(x < 0.0)]
+        for pair, x in zip(pairs, away, strict=True)
+        if abs(x) > within
+    }
 
 
 @pytest.fixture
@@ -105,8 +185,9 @@ def room(context, tmp_path):
     sys.setswitchinterval(SWITCH_INTERVAL)  # as the command does
     rooms = []
 
-    def enter(benchmark, robot):
-        rooms.append(Room(context, tmp_path / "made.hdf5", benchmark, robot))
+    def enter(benchmark, robot, **options):
+        path = tmp_path / "made.hdf5"
+        rooms.append(Room(context, path, benchmark, robot, **options))
         return rooms[-1]
 
     yield enter
@@ -128,27 +209,75 @@ def assert_replays(path):
 
 def test_a_person_lifts_the_cube_and_records_it(room, tmp_path):
     lift = room("Lift", "Panda")
-    lift.click("Record")
-    wait_until(lambda: lift.session.snapshot.recording.recording, "the recording")
-    lift.keys.bring_to_front()
+    lift.record()
     cube = lift.session.env.unwrapped.benchmark.states["cube"].body
     name = lift.session.model.body(cube).name
     above = np.array([0.0, 0.0, 0.08])
     lift.steer("right_hand", lambda: lift.place(name) + above, within=0.015)
-    for _ in range(3):
-        lift.keys.keyboard.press("-", delay=80)
+    lift.change_pace("-", 3)
     lift.steer("right_hand", lambda: lift.place(name), within=0.006)
-    lift.keys.keyboard.press("Space", delay=80)
-    wait_until(lambda: lift.session.grippers["right_gripper"][0] > 0.9, "it closes")
-    begun = lift.session.snapshot.time
-    wait_until(lambda: lift.session.snapshot.time > begun + 0.6, "the fingers press")
+    lift.grip("right_gripper")
     lift.hold({"r"})
     wait_until(lambda: lift.session.snapshot.success, "the cube is lifted")
     lift.hold(set())
-    lift.click("Keep")
-    wait_until(lambda: lift.session.snapshot.recording.kept == 1, "it is kept")
+    lift.keep()
     lift.viewer.screenshot("people_lift_panda")
     lift.session.stop()
     lift.env.recorder.close()
     length = assert_replays(tmp_path / "made.hdf5")
     note(actions_of_a_persons_lift=length)
+
+
+PALM_DOWN = np.array([[0.0, 0, 1], [0, -1, 0], [1, 0, 0]])
+SEED = 52  # with it the handles point to the robot's sides
+STEP = 0.02  # m; by which one hand may be higher than the other
+OUTWARDS = {"right": -1.0, "left": 1.0}
+HANDLES = {"right": "pot_handle0", "left": "pot_handle1"}
+
+
+def about(axis, angle):
+    return pin.exp3(angle * np.eye(3)[axis])
+
+
+def take_handle(pot, side):
+    """Bring a hand over its handle from beside, palm down, and close it."""
+    hand, out = f"{side}_hand", OUTWARDS[side]
+    turned = about(2, -out * np.pi / 4) @ about(0, out * np.pi / 2) @ PALM_DOWN
+
+    def over(up, outwards, forward=0.03):
+        offset = np.array([forward, out * outwards, up])
+        return lambda: pot.site(HANDLES[side]) + offset
+
+    pot.switch_to(hand)
+    aside = over(0.15, 0.15, forward=-0.05)
+    pot.steer(hand, aside, within=0.04)
+    pot.steer(hand, aside, within=0.04, turned=turned, near=0.15)
+    pot.steer(hand, over(0.05, 0.12), within=0.025, turned=turned, near=0.1)
+    pot.change_pace("-", 1)
+    pot.steer(hand, over(0.04, 0.01), within=0.01, turned=turned)
+    pot.steer(hand, over(0.02, 0.01), within=0.008, turned=turned, near=0.05)
+    pot.grip(f"{side}_gripper")
+    pot.change_pace("+", 1)
+
+
+def test_a_person_raises_the_pot_with_both_hands_and_records_it(room, tmp_path):
+    pot = room("TwoArmLift", "GR1", seed=SEED, watching=False)
+    pot.record()
+    pot.change_pace("-", 2)
+    for side in HANDLES:
+        take_handle(pot, side)
+    pot.change_pace("-", 1)
+    hands = [f"{side}_hand" for side in HANDLES]
+    heights = [pot.limb(hand).target.translation[2] for hand in hands]
+    while not pot.session.snapshot.success:
+        heights = [height + STEP for height in heights]
+        assert max(heights) < 1.3, "the hands rose without the pot"
+        for hand, height in zip(hands, heights, strict=True):
+            pot.switch_to(hand)
+            pot.raise_to(hand, height)
+    pot.keep()
+    pot.viewer.screenshot("people_raise_pot_gr1")
+    pot.session.stop()
+    pot.env.recorder.close()
+    length = assert_replays(tmp_path / "made.hdf5")
+    note(actions_of_a_persons_pot=length)
