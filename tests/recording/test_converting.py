@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from wbc_suite.errors import DatasetError, UnknownNameError
+from wbc_suite.executors import Processes
 from wbc_suite.recording import Dataset, editing, rebuild
 from wbc_suite.recording.converting import convert
 from wbc_suite.recording.extracting import extract
-from wbc_suite.recording.replaying import play_states
+from wbc_suite.recording.replaying import divergence, play_states
 
 
 def test_robomimics_layout_holds_its_columns_and_nothing_else(lift_recording, tmp_path):
@@ -83,22 +84,107 @@ def test_extracting_sees_the_same_and_more(lift_recording, tmp_path):
     assert other.columns["rewards"].max() > one.columns["rewards"].max()
 
 
-def test_raw_files_of_robosuite_replay_by_states(lift_recording, tmp_path):
-    raw = tmp_path / "raw.hdf5"
-    with h5py.File(lift_recording) as ours, h5py.File(raw, "w") as file:
+@pytest.mark.slow
+def test_extracting_is_shared_out_to_processes(lift_recording, tmp_path):
+    told, path = [], tmp_path / "out.hdf5"
+    count = extract(
+        lift_recording,
+        path,
+        executor=Processes(2),
+        workers=2,
+        tell=told.append,
+        reward_shaping=True,
+    )
+    assert (count, told) == (2, [1, 1])
+    alone = tmp_path / "alone.hdf5"
+    extract(lift_recording, alone, reward_shaping=True)
+    with Dataset(path) as shared, Dataset(alone) as serial:
+        assert shared.names == serial.names
+        for one, other in zip(shared, serial, strict=True):
+            assert one.columns.keys() == other.columns.keys()
+            for name, column in one.columns.items():
+                np.testing.assert_array_equal(column, other.columns[name])
+    assert list(tmp_path.glob("out.hdf5.work")) == []
+
+
+ROBOSUITES_PART = {
+    "type": "OSC_POSE",
+    "input_max": 1,
+    "input_min": -1,
+    "output_max": [0.05, 0.05, 0.05, 0.5, 0.5, 0.5],
+    "output_min": [-0.05, -0.05, -0.05, -0.5, -0.5, -0.5],
+    "kp": 150,
+    "damping_ratio": 1,
+    "impedance_mode": "fixed",
+    "input_type": "delta",
+    "input_ref_frame": "base",
+    "gripper": {"type": "GRIP"},
+}
+
+
+def robosuites_demonstrations(path, ours, **changes):
+    """Write what robosuite's `collect_human_demonstrations.py` writes.
+
+    Source of the layout: its documentation, "Human Demonstrations".
+    """
+    info = {
+        "env_name": "Lift",
+        "robots": ["Panda"],
+        "controller_configs": {
+            "type": "BASIC",
+            "body_parts": {"right": ROBOSUITES_PART},
+        },
+        **changes,
+    }
+    with h5py.File(ours) as recorded, h5py.File(path, "w") as file:
         data = file.create_group("data")
+        data.attrs["date"] = "6-11-2025"
+        data.attrs["time"] = "14:3:21"
+        data.attrs["repository_version"] = "1.5.1"
         data.attrs["env"] = "Lift"
-        data.attrs["env_info"] = json.dumps({"env_name": "Lift", "robots": ["Panda"]})
-        demo = data.create_group("demo_1")
-        demo.attrs["model_file"] = "<mujoco/>"
-        for name in ("states", "actions"):
-            demo[name] = ours[f"data/demo_0/{name}"][()]
+        data.attrs["env_info"] = json.dumps(info)
+        for number, name in enumerate(recorded["data"], start=1):
+            demo = data.create_group(f"demo_{number}")
+            demo.attrs["model_file"] = '<mujoco model="base"><worldbody/></mujoco>'
+            for column in ("states", "actions"):
+                demo[column] = recorded[f"data/{name}/{column}"][()]
+    return path
+
+
+def test_robosuites_own_demonstrations_are_imported(lift_recording, tmp_path):
+    raw = robosuites_demonstrations(tmp_path / "demo.hdf5", lift_recording)
     with Dataset(raw) as dataset:
+        assert dataset.names == ("demo_1", "demo_2")
         episode = dataset.episode("demo_1")
         env = rebuild(dataset)
         last = list(play_states(env, episode))[-1]
-    assert last == episode.length - 1
-    np.testing.assert_array_equal(env.physics_state, episode.columns["states"][-1])
+        assert last == episode.length - 1
+        np.testing.assert_array_equal(env.physics_state, episode.columns["states"][-1])
+        again = rebuild(dataset)
+        figures = divergence(again, episode)  # open loop, by controllers of ours
+    assert figures.steps == episode.length
+    assert np.isfinite(figures.largest)
+    seen = tmp_path / "seen.hdf5"
+    assert extract(raw, seen) == 2
+    with Dataset(seen) as dataset, Dataset(lift_recording) as recorded:
+        for one, other in zip(dataset, recorded, strict=True):
+            np.testing.assert_allclose(
+                one.columns["obs/cube_pos"], other.columns["obs/cube_pos"], atol=1e-9
+            )
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"robots": ["UR5e"]}, r"states of \d+ numbers, and this"),
+        ({"robots": ["PandaX"]}, r"cannot be made here.*PandaX"),
+        ({"robots": ["/etc/robot.xml"]}, "names a file"),
+    ],
+)
+def test_what_cannot_be_imported_is_said(lift_recording, tmp_path, changes, words):
+    raw = robosuites_demonstrations(tmp_path / "demo.hdf5", lift_recording, **changes)
+    with Dataset(raw) as dataset, pytest.raises(DatasetError, match=words):
+        list(play_states(rebuild(dataset), dataset.episode("demo_1")))
 
 
 def test_states_of_another_robot_are_refused(small_recording):

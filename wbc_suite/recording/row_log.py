@@ -87,7 +87,9 @@ class RowLog:
         try:
             if self._file is None:
                 self._file = tempfile.TemporaryFile(dir=self._folder, buffering=0)  # noqa: SIM115 - closed by close()
-            self._file.write(self._block[: self._filled].tobytes())
+            rest = memoryview(self._block[: self._filled].tobytes())
+            while rest:  # a disk that fills up takes a part, and says so only then
+                rest = rest[self._file.write(rest) :]
         except OSError as error:
             raise DatasetError(
                 f"'{self._folder}' cannot be written: {error.strerror}. The episode in "
