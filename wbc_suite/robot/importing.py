@@ -18,6 +18,7 @@ from wbc_suite.robot.guessing import (
 )
 from wbc_suite.robot.naming import NameTable
 from wbc_suite.robot.parts import Frame, Link
+from wbc_suite.robot.standing import standing_legs
 from wbc_suite.robot.validation import (
     implausible,
     inertia_matrix,
@@ -82,9 +83,16 @@ def describe_import(
         "groups": {limb.name: limb.joints for limb in limbs if limb.joints},
         "keyframes": {"ready": guess_ready(checked)} | keyframes,
     }
-    return parse_model(
+    robot = parse_model(
         RobotDescription, data | others, source=str(source), error=DescriptionError
     )
+    return robot if "ready" in keyframes else _on_bent_legs(robot)
+
+
+def _on_bent_legs(robot: RobotDescription) -> RobotDescription:
+    ready = robot.keyframes["ready"]
+    ready = ready | standing_legs(robot, ready)
+    return robot.model_copy(update={"keyframes": robot.keyframes | {"ready": ready}})
 
 
 def _robot_name(name: str) -> str:

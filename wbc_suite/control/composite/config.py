@@ -222,6 +222,10 @@ def default_whole_body_config(robot: RobotDescription) -> dict[str, Any]:
     config: dict[str, Any] = {"format": 1, "frame": frames}
     contact = "surface" if len(held) < 3 else "point"  # a biped balances on its soles
     config["held"] = [{"frame": name, "contact": contact} for name in held]
+    if held:  # no faster than pressure under the feet can follow
+        config["limits"] = {"acceleration": 12.0, "base_acceleration": (1.0, 2.0)}
+        for frame in frames:
+            frame |= {"linear_braking": 1.0, "angular_braking": 2.0}
     if keyframe:
         config["posture"] = {"keyframe": keyframe}
     return config
@@ -262,4 +266,5 @@ def _foremost(robot: RobotDescription) -> str:
         raise ConfigError(f"{robot.name}: it has no joint, so nothing can be moved.")
     frames = {f.role: f.name for f in robot.frames if f.link in moving}
     roles = ("torso", "base", "head")
-    return next((frames[r] for r in roles if r in frames), moving[-1])
+    last = robot.links[0].name if robot.root.kind == "free" else moving[-1]
+    return next((frames[r] for r in roles if r in frames), last)
