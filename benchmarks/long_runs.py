@@ -149,7 +149,7 @@ def book(report: Report, trial: Trial, found: Found) -> list[str]:
     for name, value in found.figures.items():
         limit = CYCLES_MB if (trial.kind, name) == ("cycles", "grown_mb") else None
         limit = LIMITS.get(name) if limit is None else limit
-        if limit is None or (name == "reset_ms" and len(trial.case.robots) == 2):
+        if limit is None or (name == "reset_ms" and trial.case.has_two_arms):
             continue
         if limit:
             report.ratios[f"{trial.name}/{name}/{limit:g}"] = value / limit

@@ -59,6 +59,11 @@ class Case:
         parts = (self.benchmark, robots, way, self.controller)
         return "/".join(filter(None, parts))
 
+    @property
+    def has_two_arms(self) -> bool:
+        """Whether the benchmark is for two arms, whoever acts in it."""
+        return self.benchmark.startswith(ARMS_OF_TWO)
+
     def make(self, **more: Any) -> RobotEnv:
         """Make the environment."""
         if self.robots:
