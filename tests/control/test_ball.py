@@ -58,8 +58,13 @@ def run(scene, seconds):
         pytest.param("GR1", 95, marks=pytest.mark.slow),
         # The waist's motors would have been asked for 1.2 of what they have.
         pytest.param("GR1", 88, marks=pytest.mark.slow),
-        # The hand presses on the floor, which no model of the controller knows.
+        # Below the floor, which the hand must not lean on.
         ("SpotWithArm", 41),
+        # A finger leant on the floor, a foot lifted, and the robot fell.
+        ("SpotWithArm", 396),
+        pytest.param("SpotWithArm", 256, marks=pytest.mark.slow),
+        # The waist, slow to speed up, stayed behind to the end of the way.
+        pytest.param("GR1", 574, marks=pytest.mark.slow),
     ],
 )
 def test_hands_are_back_two_seconds_after_a_goal_out_of_reach(alone, robot, trial):

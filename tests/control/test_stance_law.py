@@ -6,6 +6,7 @@ import pinocchio as pin
 import pytest
 import qpsolvers
 
+from wbc_suite.control import load_composite_controller_config
 from wbc_suite.control.loop import bind_physics, needed, physics_table
 from wbc_suite.control.loop.balance import SHARE_COST, TRUNK_COST
 from wbc_suite.control.loop.kernels import control
@@ -186,8 +187,12 @@ def test_arms_swing_no_harder_than_feet_can_bear(alone):
 
 
 def test_a_hand_that_presses_on_the_floor_does_not_lift_the_feet(alone):
-    """It pressed with 140 N, and three feet left the ground."""
-    scene = alone("SpotWithArm")
+    """It pressed with 140 N, and three feet left the ground.
+
+    The floor is higher than the controller was told: else no hand presses on it.
+    """
+    config = load_composite_controller_config("WHOLE_BODY_IK", "SpotWithArm")
+    scene = alone("SpotWithArm", limits={**config["limits"], "floor": -1.0})
     model, data = scene.state.model, scene.state.data
     feet = [f.name for f in scene.robot.frames if f.role == "foot"]
     start, hardest = np.array([scene.site(foot) for foot in feet]), 0.0

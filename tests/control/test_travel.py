@@ -55,6 +55,16 @@ def test_a_way_out_of_what_is_too_near_must_lead_away():
     assert through.direct(at(0.0), at(1.0).q) is None
 
 
+def test_a_joint_that_gathers_speed_slowly_has_more_to_make_up():
+    rate = np.where(np.arange(9) == 1, 0.5, RATE)
+    model = load_robot("Panda").to_pinocchio()
+    plan = Router(model, lambda q: 1.0, speed=SPEED, rate=rate)
+    way = plan.direct(at(0.0), at(1.0).q)
+    assert plan.late(way, at(0.02)) == pytest.approx(0.01)
+    assert plan.recovery(way, at(0.02)) == pytest.approx(0.05)
+    assert plan.recovery(way, at(0.0, 0.02)) == pytest.approx(0.2)
+
+
 def test_the_way_back_is_the_way_that_came():
     trail = [
         at(np.cos(angle), -1.2 * np.sin(angle), time=2.0 - 0.05 * k)

@@ -45,6 +45,17 @@ def test_the_hand_arrives_in_simulation(alone, robot, controller):
     np.testing.assert_allclose(moved, STEP[:3], atol=bound)
 
 
+def test_a_hand_that_creeps_past_a_singularity_takes_another_way(alone):
+    """It came 4 cm a second nearer: 7 mm were left after two seconds."""
+    scene = alone("SpotWithArm")
+    goal = np.array([0.64872, 0.05719, 0.99177, 1.14274, 1.34491, 1.13593])
+    part = scene.controller.layout["right_hand"]
+    now = scene.controller.hold_action[part.start : part.stop]
+    report = scene.act({"right_hand": goal - now}, 1.0)["frames"]["right_hand"]
+    assert report["position_error"] < 1e-3
+    assert report["orientation_error"] < 3e-3
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_a_goal_out_of_reach_is_reported_and_forgotten(alone, robot):

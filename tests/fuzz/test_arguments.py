@@ -12,6 +12,7 @@ from wbc_suite.qp import (
     AccelerationLimit,
     ComTask,
     DampingTask,
+    FloorLimit,
     FrameEquality,
     FrameTask,
     JointCouplingTask,
@@ -53,6 +54,9 @@ POSITIVE = {
     "dt": lambda x: stack().solve(x),
     "nearest": lambda x: SelfCollisionLimit((), (), nearest=x),
     "rate": lambda x: SelfCollisionLimit((), (), rate=x),
+    "floor rows": lambda x: FloorLimit({}, nearest=x),
+    "floor rate": lambda x: FloorLimit({}, rate=x),
+    "floor braking": lambda x: FloorLimit({}, braking=x),
 }
 NOT_NEGATIVE = {
     "level": lambda x: FrameTask(HAND, level=x),

@@ -30,6 +30,7 @@ def status(**changes):
         ("joint limit: arm_1_joint", "arm 1 is at its limit"),
         ("velocity limit: waist_yaw_joint (lower)", "waist yaw is at its top speed"),
         ("self-collision: right_forearm - torso", "right forearm would touch torso"),
+        ("floor: arm_link_fngr", "arm link fngr would touch the floor"),
         ("conflict: left_hand", "it pulls against left hand"),
         ("contact: left_pad - table", "left pad presses on table"),
         ("motor limit: waist_yaw_joint", "waist yaw has no more force"),

@@ -10,6 +10,7 @@ from wbc_suite.qp.bounds import LimitKind
 from wbc_suite.qp.com_task import ComTask
 from wbc_suite.qp.damping_task import DampingTask
 from wbc_suite.qp.equality import Equality, FrameEquality, LinearEquality
+from wbc_suite.qp.floor_limit import FloorLimit
 from wbc_suite.qp.frame_task import FrameTask
 from wbc_suite.qp.joint_coupling_task import JointCouplingTask
 from wbc_suite.qp.limit import BoxLimit, Limit, RowLimit
@@ -36,6 +37,7 @@ __all__ = [
     "DiagonalTask",
     "Equality",
     "Fallback",
+    "FloorLimit",
     "FrameEquality",
     "FrameTask",
     "JointCouplingTask",

@@ -21,6 +21,7 @@ class LimitKind(IntEnum):
     EQUALITY = 5
     BALANCE = 6
     EFFORT = 7
+    FLOOR = 8
 
 
 @compiled

@@ -58,6 +58,7 @@ class ActiveLimit:
             LimitKind.SELF_COLLISION,
             LimitKind.BALANCE,
             LimitKind.EFFORT,
+            LimitKind.FLOOR,
         ):
             return f"{words}: {self.name}"
         words = "joint" if self.kind is LimitKind.POSITION else words

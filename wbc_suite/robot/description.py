@@ -169,6 +169,10 @@ class RobotDescription(FrozenModel):
                 return frame
         raise UnknownNameError("frame", name, [f.name for f in self.frames])
 
+    def link_of(self, frame: str) -> str:
+        """Return the link that a frame, or a link's own name, belongs to."""
+        return next((f.link for f in self.frames if f.name == frame), frame)
+
     def group(self, name: str) -> tuple[str, ...]:
         """Return the joints of a group; raises UnknownNameError."""
         if name not in tuple(self.groups):

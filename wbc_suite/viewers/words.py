@@ -14,6 +14,7 @@ _ON_ITS_WAY = ("moving", "acceleration limit")
 _JOINT_LIMIT = re.compile(r"joint limit: (?P<joint>.+?)(?: \((?P<side>\w+)\))?$")
 _SPEED_LIMIT = re.compile(r"velocity limit: (?P<joint>.+?)(?: \(\w+\))?$")
 _COLLISION = re.compile(r"self-collision: (?P<one>.+?) - (?P<other>.+)$")
+_FLOOR = re.compile(r"floor: (?P<link>.+)$")
 _CONTACT = re.compile(r"contact: (?P<link>.+?) - (?P<thing>.+)$")
 _WEAK = re.compile(r"motor limit: (?P<joint>.+)$")
 _LAG = re.compile(r"lag: (?P<joint>.+)$")
@@ -34,6 +35,8 @@ def describe_reason(reason: str) -> str:
         return f"{plain(match['joint'])} is at its top speed"
     if match := _COLLISION.match(reason):
         return f"{plain(match['one'])} would touch {plain(match['other'])}"
+    if match := _FLOOR.match(reason):
+        return f"{plain(match['link'])} would touch the floor"
     if match := _CONTACT.match(reason):
         return f"{plain(match['link'])} presses on {plain(match['thing'])}"
     if match := _WEAK.match(reason):

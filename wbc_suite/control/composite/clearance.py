@@ -1,16 +1,17 @@
-"""Keep links apart: which pairs, and whether a configuration does."""
+"""Keep links apart and off the floor: which ones, and whether a configuration does."""
 
 import numpy as np
 
 from wbc_suite.control.composite.config import WholeBodyIKConfig
 from wbc_suite.control.part.postures import random_posture
 from wbc_suite.kinematics import Configuration
-from wbc_suite.qp import SelfCollisionLimit
+from wbc_suite.qp import FloorLimit, SelfCollisionLimit
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.capsules import collision_pairs, enclosing_capsules
+from wbc_suite.robot.spheres import spanning_spheres
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["Clearance", "self_collision_limit"]
+__all__ = ["Clearance", "apart_limits"]
 
 NEIGHBOURS = 1
 """Links with at most this many joints between them are kept apart by joint limits."""
@@ -20,7 +21,47 @@ OFTEN = 0.4
 """Pairs that touch in this part of random configurations enclose too generously."""
 
 
-def self_collision_limit(
+def apart_limits(
+    robot: RobotDescription, config: WholeBodyIKConfig
+) -> list[SelfCollisionLimit | FloorLimit]:
+    """Return the rows that keep a robot's links from all that they could touch."""
+    limits: list[SelfCollisionLimit | FloorLimit] = []
+    if config.limits.self_collision:
+        limits.append(_self_collision_limit(robot, config))
+    if config.held:
+        limits.append(_floor_limit(robot, config))
+    return limits
+
+
+def _floor_limit(robot: RobotDescription, config: WholeBodyIKConfig) -> FloorLimit:
+    """Return the rows that keep all but the legs off the floor.
+
+    What leans on the floor takes weight off the feet, which lift, slip, and let the
+    robot fall.
+    """
+    spheres = spanning_spheres(robot)
+    for link in _legs(robot, config):
+        spheres.pop(link, None)
+    return FloorLimit(
+        spheres,
+        height=config.limits.floor,
+        nearest=config.limits.collision_pairs,
+        margin=config.limits.collision_distance,
+    )
+
+
+def _legs(robot: RobotDescription, config: WholeBodyIKConfig) -> set[str]:
+    """Return the links between the root and what is held."""
+    found: set[str] = set()
+    for held in config.held:
+        link = robot.link(robot.link_of(held.frame))
+        while link.parent is not None:
+            found.add(link.name)
+            link = robot.link(link.parent)
+    return found
+
+
+def _self_collision_limit(
     robot: RobotDescription, config: WholeBodyIKConfig
 ) -> SelfCollisionLimit:
     """Return the rows that keep a robot's links apart.
@@ -80,33 +121,35 @@ def _joints_between(configuration: Configuration, first: str, second: str) -> in
 
 
 class Clearance:
-    """Tells whether a configuration keeps the distance that the QP's rows keep.
+    """Tells whether a configuration keeps the distances that the QP's rows keep.
 
     Args:
         robot: The reduced robot.
         config: Limits.
 
     Attributes:
-        limit: The rows.
+        limits: The rows.
     """
 
     def __init__(self, robot: RobotDescription, config: WholeBodyIKConfig) -> None:
         self._configuration = Configuration(robot.to_pinocchio())
-        self.limit = self_collision_limit(robot, config)
-        self.limit.bind(self._configuration)
-        self._G: Matrix = np.zeros((self.limit.dim, self._configuration.nv))
-        self._h: Vector = np.zeros(self.limit.dim)
-
-    def distance(self, q: Vector) -> float:
-        """Return the least distance of links that are kept apart, m; inf when far."""
-        self._configuration.update(q)
-        self.limit.rows(self._configuration, 1.0, self._G, self._h)
-        return float(self.limit.distances.min())
+        self.limits = apart_limits(robot, config)
+        for limit in self.limits:
+            limit.bind(self._configuration)
+        rows = max((limit.dim for limit in self.limits), default=0)
+        self._G: Matrix = np.zeros((rows, self._configuration.nv))
+        self._h: Vector = np.zeros(rows)
 
     def room(self, q: Vector) -> float:
-        """Return how much farther than the margin all links are apart, m."""
-        return self.distance(q) - self.limit.margin
+        """Return how much farther than the margins all links are, m; inf when far."""
+        self._configuration.update(q)
+        return min((self._room(limit) for limit in self.limits), default=np.inf)
 
     def is_kept(self, q: Vector) -> bool:
-        """Whether all links are farther apart than the margin."""
+        """Whether all links are farther away than the margins."""
         return self.room(q) > 0.0
+
+    def _room(self, limit: SelfCollisionLimit | FloorLimit) -> float:
+        rows = slice(limit.dim)
+        limit.rows(self._configuration, 1.0, self._G[rows], self._h[rows])
+        return float(limit.distances.min()) - limit.margin

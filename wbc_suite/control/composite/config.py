@@ -130,6 +130,8 @@ class LimitsConfig(FrozenModel):
         self_collision: Whether links are kept apart.
         collision_pairs: How many of the nearest pairs of links are watched.
         collision_distance: Distance kept between links, m.
+        floor: Height in the world of what a robot on its feet stands on, m; all but its
+            legs keep the same distance from it.
         weight_shares: Part of a joint's effort that holding still may take, by joint.
         balance_margin: Distance kept from the edges of the soles, m.
     """
@@ -144,6 +146,7 @@ class LimitsConfig(FrozenModel):
     self_collision: bool = True
     collision_pairs: int = Field(default=20, ge=1, le=200)
     collision_distance: PositiveFloat = 0.005
+    floor: float = 0.0
     weight_shares: dict[Name, PositiveFloat] = {}
     balance_margin: NonNegativeFloat = 0.03
 

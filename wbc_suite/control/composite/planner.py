@@ -22,6 +22,8 @@ __all__ = ["Planner", "Waypoint"]
 
 STANDING = 0.02  # rad/s or m/s
 STUCK_AFTER = 0.1  # s of standing
+WATCHED = 0.2  # s; over which progress is judged
+CRAWL = 2.0  # s; what would need longer at the present rate gets no nearer
 BRISK = 0.95  # of the acceleration limits on a way
 CHASE = 0.98  # of them for catching up
 LATE = 0.15  # s; so far behind the clock runs slowest, so that the robot catches up
@@ -73,7 +75,7 @@ class Planner:
         frames: ControlledFrames,
         *,
         room: Callable[[Vector], float],
-        apart: Limit,
+        apart: Sequence[Limit],
         dt: float,
     ) -> None:
         self._config, self._dt = config, dt
@@ -99,6 +101,7 @@ class Planner:
         self._search.stop()
         self._still, self._is_new, self._answered = 0.0, False, False
         self._has_arrived = False
+        self._offs: deque[float] = deque(maxlen=round(WATCHED / self._dt) + 1)
 
     def renew(self) -> None:
         """Say that goals have changed."""
@@ -131,15 +134,27 @@ class Planner:
         if self._is_new:
             self._is_new = self._answered = self._has_arrived = False
             self._still, self._way = 0.0, None
+            self._offs.clear()
             self._search.stop()
             if self._is_far(goals, self._config.far):
                 self._rest = self._posture
                 self._begin(goals)
-        elif self._still > STUCK_AFTER and not self._search.is_running:
-            if self._way is not None:
-                self._way = None
-            elif not self._answered and self._is_far(goals, self._config.tolerance):
-                self._begin(goals)
+        elif self._search.is_running:
+            return
+        elif self._way is not None:
+            self._way = self._way if self._still <= STUCK_AFTER else None
+        elif not self._answered and self._is_stuck(goals):
+            self._begin(goals)
+
+    def _is_stuck(self, goals: Sequence[pin.SE3]) -> bool:
+        """Tell whether the robot stands short of its goals, or gets hardly nearer.
+
+        Near a singularity it creeps, faster than what counts as standing.
+        """
+        offs = self._offs
+        slow = len(offs) == offs.maxlen and offs[-1] > offs[0] * (1 - WATCHED / CRAWL)
+        waits = slow or self._still > STUCK_AFTER
+        return waits and self._is_far(goals, self._config.tolerance)
 
     def _begin(self, goals: Sequence[pin.SE3]) -> None:
         self._answered = True
@@ -151,11 +166,12 @@ class Planner:
 
     def _along(self, way: Way, now: Passed) -> Waypoint:
         """Return the next configuration on the way; the clock waits for the robot."""
-        if self._search.router.late(way, now) > HELD_UP:
-            self._search.router.rejoin(way, now)
+        router = self._search.router
+        if router.recovery(way, now) > HELD_UP:
+            router.rejoin(way, now)
             if self._still <= STUCK_AFTER and not self._search.is_running:
                 self._search.again(way)
-        pace = max(SLOWEST, 1.0 - self._search.router.late(way, now) / LATE)
+        pace = max(SLOWEST, 1.0 - router.late(way, now) / LATE)
         wanted = self._pursuit(way, pace, now.v)
         way.clock += self._dt * pace
         after = way.configuration()
@@ -175,6 +191,7 @@ class Planner:
 
     def _straight(self, goals: Sequence[pin.SE3]) -> Waypoint:
         self._frames.measure(goals)
+        self._offs.append(self._frames.off)
         pace = self._pace_below(self._frames.off)
         step = self._approach(
             self._configuration.difference(self._rest),

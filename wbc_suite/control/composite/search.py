@@ -73,7 +73,7 @@ class GoalSearch:
         robot: RobotDescription,
         config: WholeBodyIKConfig,
         room: Callable[[Vector], float],
-        apart: Limit,
+        apart: Sequence[Limit],
         accelerations: Vector,
     ) -> None:
         self._room = room
@@ -107,7 +107,7 @@ class GoalSearch:
                 curvature_damping=0.02,
                 escape=False,
             )
-            for tasks, rows in (((self._start,), ()), ((), ()), ((), (apart,)))
+            for tasks, rows in (((self._start,), ()), ((), ()), ((), apart))
         )
         self._speeds = joint_speeds(robot, self._configuration)
         self.router = Router(
@@ -204,9 +204,13 @@ class GoalSearch:
 
     @property
     def _left(self) -> float:
-        """How long the best way still takes, and how late the robot is on it, s."""
+        """How long the best way still takes, and what is to be made up on it, s."""
         best = self._best
-        return np.inf if best is None else best.left + self.router.late(best, self._now)
+        return (
+            np.inf
+            if best is None
+            else best.left + self.router.recovery(best, self._now)
+        )
 
     def _judge(self, found: Vector) -> Iterator[Way | None]:
         """Yield the way to a configuration that has been found, if it is the best."""

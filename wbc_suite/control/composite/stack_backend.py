@@ -32,7 +32,12 @@ from wbc_suite.typing import Matrix, Vector
 
 __all__ = ["StackBackend"]
 
-_ROWS = (LimitKind.SELF_COLLISION, LimitKind.BALANCE, LimitKind.EFFORT)
+_ROWS = (
+    LimitKind.SELF_COLLISION,
+    LimitKind.BALANCE,
+    LimitKind.EFFORT,
+    LimitKind.FLOOR,
+)
 """Limits of no single joint."""
 
 

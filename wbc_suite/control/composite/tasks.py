@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from wbc_suite.control.composite.clearance import self_collision_limit
+from wbc_suite.control.composite.clearance import apart_limits
 from wbc_suite.control.composite.config import (
     ControlledFrame,
     HeldFrame,
@@ -120,8 +120,7 @@ def make_limits(robot: RobotDescription, config: WholeBodyIKConfig) -> list[Limi
             base_angular=base_angular,
         ),
     ]
-    if limits.self_collision:
-        made.append(self_collision_limit(robot, config))
+    made += apart_limits(robot, config)
     if limits.weight_shares:
         made.append(WeightLimit(_greatest_weights(robot, limits.weight_shares)))
     soles = soles_of(config)

@@ -24,7 +24,7 @@ __all__ = ["HELD_UP", "Passed", "Router", "Way"]
 CHECKS = 1500  # configurations that the search for a way round may look at
 SHORTCUTS = 600
 ROOM = 0.015  # m; nearer to each other links are slowed, and a short way takes long
-HELD_UP = 0.03  # s; so far behind, the robot looks for a shorter way
+HELD_UP = 0.03  # s; with so much to make up, the robot looks for a shorter way
 LEAD = 0.03  # s; how far ahead of the robot its way may still change
 NEARER = 3e-3  # m; links that are too near at the start may come so much nearer
 AHEAD = (0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0)  # s; where to rejoin a way
@@ -131,10 +131,11 @@ class Router:
             now: Where the robot is.
         """
         self._leap(way, now)
-        if self.late(way, now) < HELD_UP:
+        delay = self.recovery(way, now)
+        if delay < HELD_UP:
             return
         start = self._from(way, now.q), now.v
-        best, least = None, REJOINED * self.late(way, now)
+        best, least = None, REJOINED * delay
         for ahead in AHEAD:
             time = min(way.clock + ahead, way.motion.duration)
             end = way.motion.state(time)
@@ -160,9 +161,17 @@ class Router:
             way.clock = min(float(clocks[nearest]), way.motion.duration)
 
     def late(self, way: Way, now: Passed) -> float:
-        """Return how far the robot is from where it should be, s."""
-        behind = pin.difference(self._model, now.q, way.configuration())
-        return float((np.abs(behind) / self._speed).max())
+        """Return how far the robot is from where it should be, s at full speed."""
+        return float((self._behind(way, now) / self._speed).max())
+
+    def recovery(self, way: Way, now: Passed) -> float:
+        """Return how long the robot needs to get to where it should be, s.
+
+        A joint of great speed and small acceleration is hardly late for a long time.
+        """
+        behind = self._behind(way, now)
+        times = np.maximum(behind / self._speed, np.sqrt(behind / self._rate))
+        return float(times.max())
 
     def back(
         self, now: Passed, goal: Vector, trail: Iterable[Passed]
@@ -248,6 +257,9 @@ class Router:
                     break
         found = positions(ramp, begin=begin)
         return all(self._room(way.place(x)) > 0.0 for x in found)
+
+    def _behind(self, way: Way, now: Passed) -> Vector:
+        return np.abs(pin.difference(self._model, now.q, way.configuration()))
 
     def _from(self, way: Way, q: Vector) -> Vector:
         return pin.difference(self._model, way.origin, q)

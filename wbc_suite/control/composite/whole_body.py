@@ -118,13 +118,13 @@ class WholeBodyIK:
             self._configuration,
             self.frames,
             room=lambda q: min(clearance.room(q), check.room(q)),
-            apart=clearance.limit,
+            apart=clearance.limits,
             dt=self._dt,
         )
         servos = tuple(gripper.law for gripper in self._grippers)
         stances = () if self._stance is None else (self._stance,)
         self.laws: tuple[Law, ...] = (self._law, *servos, *stances)
-        self._feet = {self._link(held.frame) for held in self.config.held}
+        self._feet = {self.robot.link_of(held.frame) for held in self.config.held}
         kind = self.robot.root.kind
         self._follows_root = kind == "free" or (kind == "planar" and self._in_base())
         self._report = IkReport(self.config, Configuration(model))
@@ -279,10 +279,6 @@ class WholeBodyIK:
 
     def _gripper_joints(self) -> set[str]:
         return {joint for gripper in self._grippers for joint in gripper.law.joints}
-
-    def _link(self, frame: str) -> str:
-        """Return the link that a frame, or a link's own name, belongs to."""
-        return next((f.link for f in self.robot.frames if f.name == frame), frame)
 
     def _frames(self) -> range:
         return range(len(self.config.frames))
