@@ -2,11 +2,12 @@
 
 import sys
 import time
+from contextlib import suppress
 
 import numpy as np
 import pinocchio as pin
 import pytest
-from conftest import PATIENCE, RATE, Viewer, note, wait_until
+from conftest import PATIENCE, RATE, TRIES, Viewer, note, wait_until
 
 import wbc_suite
 from wbc_suite.cli.by_hand import SWITCH_INTERVAL, stages_of
@@ -88,19 +89,27 @@ class Room:
     def limb(self, name):
         return self.session.snapshot.limbs[name]
 
-    def click(self, button):
-        """Click on the robot's page."""
+    def click(self, button, took, what):
+        """Click on the robot's page; again where the click was lost, as people do."""
         self.viewer.page.bring_to_front()
-        self.viewer.page.get_by_role("button", name=button).click()
+        for _ in range(TRIES):
+            self.viewer.draw()
+            self.viewer.page.get_by_role("button", name=button).click()
+            with suppress(AssertionError):
+                wait_until(took, what, patience=PATIENCE / TRIES)
+                return
+        raise AssertionError(f"clicked {TRIES} times in vain: {what}")
 
     def record(self):
-        self.click("Record")
-        wait_until(lambda: self.session.snapshot.recording.recording, "the recording")
+        self.click("Record", lambda: self.recording.recording, "it is recorded")
         self.keys.bring_to_front()
 
     def keep(self):
-        self.click("Keep")
-        wait_until(lambda: self.session.snapshot.recording.kept == 1, "it is kept")
+        self.click("Keep", lambda: self.recording.kept == 1, "it is kept")
+
+    @property
+    def recording(self):
+        return self.session.snapshot.recording
 
     def press(self, key):
         """Press a key, for as long as a finger does."""
@@ -269,12 +278,15 @@ def test_a_person_raises_the_pot_with_both_hands_and_records_it(room, tmp_path):
     pot.change_pace("-", 1)
     hands = [f"{side}_hand" for side in HANDLES]
     heights = [pot.limb(hand).target.translation[2] for hand in hands]
-    while not pot.session.snapshot.success:
+    solved = False
+    while not solved:  # the last round leaves room to sag
+        solved = pot.session.snapshot.success
         heights = [height + STEP for height in heights]
         assert max(heights) < 1.3, "the hands rose without the pot"
         for hand, height in zip(hands, heights, strict=True):
             pot.switch_to(hand)
             pot.raise_to(hand, height)
+    assert pot.session.snapshot.success
     pot.keep()
     pot.viewer.screenshot("people_raise_pot_gr1")
     pot.session.stop()
