@@ -105,7 +105,9 @@ class Room:
         self.keys.bring_to_front()
 
     def keep(self):
-        self.click("Keep", lambda: self.recording.kept == 1, "it is kept")
+        """Press the key, which is quicker than to find the button."""
+        self.press("Enter")
+        wait_until(lambda: self.recording.kept == 1, "it is kept")
 
     @property
     def recording(self):
@@ -240,6 +242,7 @@ def test_a_person_lifts_the_cube_and_records_it(room, tmp_path):
 PALM_DOWN = np.array([[0.0, 0, 1], [0, -1, 0], [1, 0, 0]])
 SEED = 52  # with it the handles point to the robot's sides
 STEP = 0.02  # m; by which one hand may be higher than the other
+SPARE = 3  # steps above the height that counts: what is held slips and sags
 OUTWARDS = {"right": -1.0, "left": 1.0}
 HANDLES = {"right": "pot_handle0", "left": "pot_handle1"}
 
@@ -278,9 +281,9 @@ def test_a_person_raises_the_pot_with_both_hands_and_records_it(room, tmp_path):
     pot.change_pace("-", 1)
     hands = [f"{side}_hand" for side in HANDLES]
     heights = [pot.limb(hand).target.translation[2] for hand in hands]
-    solved = False
-    while not solved:  # the last round leaves room to sag
-        solved = pot.session.snapshot.success
+    rounds = SPARE
+    while rounds:
+        rounds -= pot.session.snapshot.success
         heights = [height + STEP for height in heights]
         assert max(heights) < 1.3, "the hands rose without the pot"
         for hand, height in zip(hands, heights, strict=True):
