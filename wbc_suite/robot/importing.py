@@ -90,8 +90,7 @@ def describe_import(
 
 
 def _on_bent_legs(robot: RobotDescription) -> RobotDescription:
-    ready = robot.keyframes["ready"]
-    ready = ready | standing_legs(robot, ready)
+    ready = robot.keyframes["ready"] | standing_legs(robot)
     return robot.model_copy(update={"keyframes": robot.keyframes | {"ready": ready}})
 
 

@@ -1,7 +1,5 @@
 """Guess a posture in which legs stand: knees bent, feet below the hips."""
 
-from collections.abc import Mapping
-
 import numpy as np
 import pinocchio as pin
 from scipy.optimize import least_squares
@@ -23,23 +21,21 @@ BENT = {2: ((0.55, -1.1), 0.85), 3: ((-0.3, 0.6, -0.3), 0.95)}
 the leg's length that is left. A dog's knees point back, a human's forward."""
 
 
-def standing_legs(
-    robot: RobotDescription, posture: Mapping[str, float]
-) -> dict[str, float]:
+def standing_legs(robot: RobotDescription) -> dict[str, float]:
     """Return positions for the joints that bend legs, by name, rad.
 
     Only hinges about y are moved, at most one leg's at a time: the foot comes below the
-    uppermost of them, and its sole stays as level as in the given posture. A leg that
+    uppermost of them, and its sole stays as level as in the posture `ready`. A leg that
     cannot stand so has no entry.
 
     Args:
-        robot: Its `foot` frames tell which chains are legs.
-        posture: Positions of all joints, by name.
+        robot: Its `foot` frames tell which chains are legs; its `ready` says where all
+            other joints are.
     """
     model = robot.to_pinocchio()
     data = model.createData()
     q = pin.neutral(model)
-    for name, value in posture.items():
+    for name, value in robot.keyframe("ready").items():
         q[model.joints[model.getJointId(name)].idx_q] = value
     found: dict[str, float] = {}
     for frame in robot.frames:
@@ -93,10 +89,8 @@ def _bent_leg(
 def _along_y(
     robot: RobotDescription, model: pin.Model, data: pin.Data, joint: int
 ) -> float:
-    """Return the cosine between a hinge's axis and y; 0 for what is no hinge."""
-    if model.names[joint] not in robot.joint_names:
-        return 0.0  # the root
-    described = robot.joint(model.names[joint])
-    if described.type != "hinge" or described.mimic is not None:
-        return 0.0
-    return float(data.oMi[joint].rotation[1] @ np.asarray(described.axis))
+    """Return the cosine between a hinge's axis and y; 0 for what nobody can bend."""
+    name = model.names[joint]
+    if name not in robot.keyframes["ready"] or robot.joint(name).type != "hinge":
+        return 0.0  # the root, or a joint that follows others
+    return float(data.oMi[joint].rotation[1] @ np.asarray(robot.joint(name).axis))
