@@ -12,6 +12,7 @@ process than this one, some of them in one of their own. `--only` takes one kind
 Usage: python benchmarks/long_runs.py [--quick] [--json FILE] [--only KIND] [--jobs N]
 """
 
+import itertools
 import multiprocessing
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -98,14 +99,14 @@ def _of_one(case: Case, *, quick: bool) -> Iterator[Trial]:
 
 def _of_bad_inputs(*, quick: bool) -> Iterator[Trial]:
     cases = bad_inputs.controlled("Lift")
-    numbers = {"actions": -(-(100 if quick else 10_000) // len(cases))}
-    for case in cases[-1:] if quick else cases:
-        yield Trial(
-            kind="bad actions", run=bad_inputs.refuse, case=case, numbers=numbers
-        )
-    numbers = {"count": 10 if quick else 200}
-    case = pandas("Lift")
-    yield Trial(kind="bad physics", run=bad_inputs.inject, case=case, numbers=numbers)
+    cases = cases[-1:] if quick else cases
+    kinds = {
+        "bad actions": (bad_inputs.refuse, "actions", 100 if quick else 10_000),
+        "bad physics": (bad_inputs.inject, "count", 10 if quick else 200),
+    }
+    for (kind, (run, number, total)), case in itertools.product(kinds.items(), cases):
+        numbers = {number: -(-total // len(cases))}
+        yield Trial(kind=kind, run=run, case=case, numbers=numbers)
 
 
 def _of_memory(case: Case, *, quick: bool) -> Iterator[Trial]:

@@ -222,6 +222,16 @@ def test_the_horizon_truncates():
     assert flags == [(False, False), (False, False), (False, True)]
 
 
+def test_reward_and_info_ask_for_success_once(env, monkeypatch):
+    env.reset(seed=0)
+    answers = [True, False]
+    monkeypatch.setattr(env.benchmark, "success", answers.pop)
+    for _ in range(2):
+        _, reward, _, _, info = env.step(env.hold_action)
+        assert reward == float(info["success"])
+    assert answers == []
+
+
 def test_users_own_samplers_place_the_things():
     region = Region(x=(0.1, 0.1), y=(0.2, 0.2), yaw=(0.0, 0.0))
     sampler = UniformSampler(names=["cube"], region=region, origin=(0.0, 0.0, 0.8))

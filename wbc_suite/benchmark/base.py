@@ -92,8 +92,13 @@ class Benchmark(Protocol):
         """Whether the benchmark is solved now."""
         ...
 
-    def reward(self, *, shaped: bool) -> float:
-        """Return a reward in [0, 1]; 1 on success."""
+    def reward(self, *, shaped: bool, success: bool | None = None) -> float:
+        """Return a reward in [0, 1]; 1 on success.
+
+        Args:
+            shaped: Whether it also says how far a state that is no success has come.
+            success: What `success` says now, where that is known.
+        """
         ...
 
 

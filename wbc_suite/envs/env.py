@@ -131,7 +131,7 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         """Do what `reset` does, but leave what is seen in `observer`."""
         super().reset(seed=checked_seed(seed))
         self._start(self.np_random)
-        return self._info(0)
+        return self._info(0, self.benchmark.success())
 
     def advance(self, action: Any) -> tuple[float, bool, bool, dict[str, Any]]:
         """Do what `step` does, but leave what is seen in `observer`."""
@@ -149,9 +149,11 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
             return 0.0, True, False, info
         self.benchmark.watch()
         self.observables.look()
-        reward = self.benchmark.reward(shaped=self.config.reward_shaping)
-        info = self._info(clipped)
-        terminated = self.config.terminate_on_success and info["success"]
+        success = self.benchmark.success()
+        shaped = self.config.reward_shaping
+        reward = self.benchmark.reward(shaped=shaped, success=success)
+        info = self._info(clipped, success)
+        terminated = self.config.terminate_on_success and success
         truncated = self._steps >= self.horizon
         return reward * self.config.reward_scale, terminated, truncated, info
 
@@ -344,8 +346,7 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
             controller.set_goal(action[start:stop], self._period)
             start = stop
 
-    def _info(self, clipped: int) -> dict[str, Any]:
-        success = self.benchmark.success()
+    def _info(self, clipped: int, success: bool) -> dict[str, Any]:
         info = {"success": success, "is_success": success, "clipped": clipped}
         several = len(self.controllers) > 1
         for k, state in enumerate(self.simulation.robots):
