@@ -12,6 +12,7 @@ from pydantic import Field, PositiveFloat, model_validator
 from wbc_suite.benchmark.object_benchmark import add_table_cameras, load_config
 from wbc_suite.benchmark.two_arms import TwoArmBenchmark, TwoArmConfig
 from wbc_suite.compiling import compiled_short
+from wbc_suite.control import RobotState
 from wbc_suite.errors import ConfigError
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.component import Rgba
@@ -130,6 +131,14 @@ class TwoArmPegInHole(TwoArmBenchmark):
         for frame, thing in zip(frames, self.things(), strict=True):
             fix_to_frame(spec, thing, frame)
 
+    def bind(
+        self, model: mujoco.MjModel, data: mujoco.MjData, robots: Sequence[RobotState]
+    ) -> None:
+        """Look up peg and plate, and where their poses will be."""
+        super().bind(model, data, robots)
+        peg, plate = self.states[PEG], self.states[PLATE]
+        self._poses = peg.position, peg.rotation, plate.position, plate.rotation
+
     def reset(self, rng: np.random.Generator) -> None:
         """Draw the peg's radius."""
         radius = rng.uniform(*self.config.peg.radius)
@@ -170,8 +179,7 @@ class TwoArmPegInHole(TwoArmBenchmark):
         With p the peg's middle, v its axis away from the wrist, h the hole's middle and
         n the plate's normal: t = (h - p) . v, d = |(h - p) - t v|, cosine = |n . v|.
         """
-        peg, plate = self.states[PEG], self.states[PLATE]
-        return _alignment(peg.position, peg.rotation, plate.position, plate.rotation)
+        return _alignment(*self._poses)
 
     def observables(self) -> dict[str, Reading]:
         """Return where hole and peg are, and how they lie (`alignment`)."""

@@ -31,6 +31,7 @@ SliceKind = Literal[
 
 CELL = 40
 """Letters in a line of a printed layout's cell."""
+FLOAT64 = np.dtype(np.float64)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -207,7 +208,7 @@ class ActionLayout:
         Raises:
             ActionError: See `check`.
         """
-        if isinstance(action, np.ndarray) and action.dtype == np.float64:
+        if isinstance(action, np.ndarray) and action.dtype == FLOAT64:
             vector = action.copy()
             if vector.shape == self.low.shape:
                 outside = _clip(vector, self.low, self.high)

@@ -60,6 +60,8 @@ class OscController:
         site: str,
     ) -> None:
         self.config, self._state = config, state
+        self._size, self._absolute = config.size, config.input_type == "absolute"
+        self._ramp = config.ramp(1.0)
         self._impedance = Impedance(name, AXES, config)
         self._scaling = InputScaling(config.size, config, *config.outputs())
         self._limits = GoalLimits(
@@ -89,13 +91,12 @@ class OscController:
 
     def set_goal(self, values: Vector, period: float) -> None:
         """Take a step or a goal, shape (6,) or (3,), and gains as the mode has them."""
-        size = self.config.size
+        size, ramp = self._size, self._ramp * period
         if self._impedance.slices:
             self._impedance.take(values[size:])
             self._write_gains()
-        ramp = self.config.ramp(period)
         start = self.law.target_pose()[0] if ramp > 0.0 else None
-        if self.config.input_type == "absolute":
+        if self._absolute:
             self._go_to(values[:size])
             self.law.jump(self._goal)
         else:
