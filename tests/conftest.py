@@ -1,7 +1,17 @@
 """What all tests share."""
 
 import pytest
+from hypothesis import HealthCheck, settings
 from xdist.scheduler import LoadScopeScheduling
+
+settings.register_profile(
+    "suite",
+    deadline=None,  # a busy machine is no failure
+    suppress_health_check=list(HealthCheck),
+    derandomize=True,
+    database=None,
+)
+settings.load_profile("suite")
 
 
 class BrowserOnOneWorker(LoadScopeScheduling):

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import wbc_suite
@@ -91,11 +91,7 @@ def run(env, story):
     return np.array(sampled), dt
 
 
-@settings(
-    max_examples=12,
-    deadline=None,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
-)
+@settings(max_examples=12)
 @given(story=st.lists(SAID, min_size=2, max_size=8))
 def test_joint_targets_keep_every_limit_whatever_the_device_says(env, story):
     sampled, dt = run(env, story)

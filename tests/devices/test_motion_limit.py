@@ -22,7 +22,7 @@ def worst(path, order, dt):
     return np.linalg.norm(differences, axis=1).max()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     goals=st.lists(
         st.tuples(*[st.floats(-1e3, 1e3)] * 2, st.integers(1, 20)), max_size=12

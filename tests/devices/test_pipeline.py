@@ -62,7 +62,7 @@ def test_hand_repeats_the_motion_of_the_input(person):
     np.testing.assert_allclose(person.target("left_hand")[:3], [0.4, 0.2, 1.0])
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(
     places=st.lists(
         st.tuples(*[st.floats(-2.0, 2.0)] * 3, *[st.floats(-2.0, 2.0)] * 3),
@@ -248,7 +248,7 @@ def said(kind, numbers, engaged):
     return {"right": LimbInput(twist=np.tile(numbers, 2), engaged=engaged)}
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(messages=st.lists(MESSAGES, min_size=1, max_size=8), absolute=st.booleans())
 def test_no_device_makes_a_target_exceed_its_limits(messages, absolute):
     """It jumps, stalls, repeats, goes back in time, says NaN, or floods."""

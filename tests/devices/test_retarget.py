@@ -38,7 +38,7 @@ def test_straight_hand_is_open_and_a_fist_is_closed():
     assert 0.3 < halfway < 0.7
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     size=st.floats(0.5, 2.0),
     turn=st.tuples(*[st.floats(-2.0, 2.0)] * 3),

@@ -5,7 +5,7 @@ import copy
 import numpy as np
 import pytest
 from damage import parent_of, places
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wbc_suite.catalogue import Catalogue
@@ -75,13 +75,7 @@ def outcome(data):
     assert len(text) < 4000
 
 
-@settings(
-    max_examples=100,
-    deadline=None,
-    derandomize=True,
-    suppress_health_check=list(HealthCheck),
-    database=None,
-)
+@settings(max_examples=100)
 @given(damaged())
 def test_damaged_components_are_answered_in_words(data):
     outcome(data)
@@ -93,13 +87,7 @@ def test_undamaged_components_build():
 
 
 @pytest.mark.slow
-@settings(
-    max_examples=1000,
-    deadline=None,
-    derandomize=True,
-    suppress_health_check=list(HealthCheck),
-    database=None,
-)
+@settings(max_examples=1000)
 @given(damaged())
 def test_many_damaged_components_are_answered_in_words(data):
     outcome(data)

@@ -72,7 +72,7 @@ ANYTHING = st.one_of(
 )
 
 
-@settings(max_examples=30, deadline=None, derandomize=True, database=None)
+@settings(max_examples=30)
 @given(bad=ANYTHING, place=st.integers(0, 6), value=st.sampled_from([np.nan, np.inf]))
 def test_a_bad_action_changes_nothing(env, bad, place, value):
     before = state_of(env)

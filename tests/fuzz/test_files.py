@@ -5,7 +5,7 @@ import copy
 import numpy as np
 import pytest
 from damage import parent_of, places
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import wbc_suite
@@ -37,13 +37,7 @@ VALUES = st.one_of(
     st.lists(NUMBERS, max_size=5),
     st.dictionaries(NAMES, NUMBERS, max_size=2),
 )
-FAST = settings(
-    max_examples=60,
-    deadline=None,
-    derandomize=True,
-    database=None,
-    suppress_health_check=list(HealthCheck),
-)
+FAST = settings(max_examples=60)
 
 
 def damage(draw, data):

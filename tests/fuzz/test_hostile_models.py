@@ -7,7 +7,7 @@ import struct
 import time
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wbc_suite.catalogue import Catalogue
@@ -165,13 +165,7 @@ def outcome(text, file):
     assert megabytes - before[1] < MEGABYTES
 
 
-FUZZ = settings(
-    max_examples=EXAMPLES,
-    deadline=None,
-    derandomize=True,
-    database=None,
-    suppress_health_check=list(HealthCheck),
-)
+FUZZ = settings(max_examples=EXAMPLES)
 
 
 @pytest.mark.parametrize("value", ["[" * 5000, "{a=" * 5000, "9" * 5000])

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wbc_suite.kinematics import Configuration, Conversion
@@ -14,8 +14,6 @@ from wbc_suite.robot.component import Component
 from wbc_suite.tomlfile import parse_model
 
 TOLERANCE = 1e-9  # two independent loaders of one robot agree to 1e-13
-QUIET = {"deadline": None, "derandomize": True, "database": None}
-QUIET["suppress_health_check"] = list(HealthCheck)
 
 
 def unit(rng, size):
@@ -205,14 +203,14 @@ def check(seed):
     check_ik(robot, rng)
 
 
-@settings(max_examples=25, **QUIET)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 2**32))
 def test_random_robots_agree_everywhere(seed):
     check(seed)
 
 
 @pytest.mark.slow
-@settings(max_examples=500, **QUIET)
+@settings(max_examples=500)
 @given(seed=st.integers(0, 2**32))
 def test_many_random_robots_agree_everywhere(seed):
     check(seed)

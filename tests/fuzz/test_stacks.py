@@ -3,7 +3,7 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import wbc_suite
@@ -188,26 +188,24 @@ def tick(stack, dt):
     assert (robot.q[places] >= np.minimum(before, low) - 1e-9).all()
 
 
-QUIET = {"deadline": None, "derandomize": True, "database": None}
-QUIET["suppress_health_check"] = list(HealthCheck)
 SEEDS = st.integers(0, 2**32)
 
 
-@settings(max_examples=50, **QUIET)
+@settings(max_examples=50)
 @given(seed=SEEDS)
 def test_a_tick_never_raises_and_keeps_the_limits(seed):
     check(seed)
 
 
 @pytest.mark.slow
-@settings(max_examples=1500, **QUIET)
+@settings(max_examples=1500)
 @given(seed=SEEDS)
 def test_many_ticks_never_raise(seed):
     check(seed)
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-@settings(max_examples=3, **QUIET)
+@settings(max_examples=3)
 @given(seed=SEEDS)
 def test_other_solvers_keep_the_same_promises(solver, seed):
     check(seed, solver, ticks=2)
@@ -215,7 +213,7 @@ def test_other_solvers_keep_the_same_promises(solver, seed):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("solver", SOLVERS)
-@settings(max_examples=40, **QUIET)
+@settings(max_examples=40)
 @given(seed=SEEDS)
 def test_other_solvers_keep_the_same_promises_often(solver, seed):
     check(seed, solver, ticks=2)

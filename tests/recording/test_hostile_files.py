@@ -7,7 +7,7 @@ import resource
 import h5py
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wbc_suite.errors import DatasetError
@@ -138,12 +138,7 @@ def test_numbers_that_compress_well_are_read(small_recording, tmp_path):
     assert read_all(small_recording)[1].length == 2**17
 
 
-@settings(
-    max_examples=25,
-    deadline=None,
-    derandomize=True,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
-)
+@settings(max_examples=25)
 @given(data=st.data())
 def test_damaged_bytes_are_refused_or_change_nothing(
     small_recording, tmp_path, same_numbers, data
