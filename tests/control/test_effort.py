@@ -2,12 +2,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from wbc_suite.control.composite.effort import SHARE, EffortGuard
+from wbc_suite.control.composite.effort import LEAST, SHARE, EffortGuard
 from wbc_suite.control.composite.reduced import lock_groups
 from wbc_suite.kinematics import Configuration
 from wbc_suite.robot import load_robot
 
 DT = 0.01
+RATE = 5.0  # rad/s^2
 
 
 @pytest.fixture(scope="module")
@@ -37,15 +38,23 @@ def efforts(robot, configuration):
     return found
 
 
+def guard_of(robot, configuration):
+    return EffortGuard(robot, configuration, np.full(configuration.nv, RATE))
+
+
+def index(configuration, name):
+    return configuration.model.joints[configuration.joint_id(name)].idx_v
+
+
 def test_what_motors_can_give_is_left_alone(robot, configuration):
-    guard = EffortGuard(robot, configuration)
+    guard = guard_of(robot, configuration)
     before = np.zeros(configuration.nv)
     v = np.full(configuration.nv, 0.01)
     assert guard.able(before, v, DT) is v
 
 
 def test_no_motor_is_asked_for_more_than_it_has(robot, configuration):
-    guard = EffortGuard(robot, configuration)
+    guard = guard_of(robot, configuration)
     most = efforts(robot, configuration)
     rng = np.random.default_rng(0)
     before = np.zeros(configuration.nv)
@@ -60,9 +69,34 @@ def test_no_motor_is_asked_for_more_than_it_has(robot, configuration):
         slowed += 1
         # Coriolis terms change a little with the velocity that is given up.
         assert got.max() < SHARE + 0.03
-        part = found / v
-        np.testing.assert_allclose(part, part[0], rtol=1e-9)  # the same direction
     assert slowed > 20
+
+
+def test_a_weak_motor_slows_its_own_joint_alone(robot, configuration):
+    v = np.zeros(configuration.nv)
+    v[index(configuration, "waist_pitch_joint")] = 0.45  # more than the neck can follow
+    found = guard_of(robot, configuration).able(np.zeros_like(v), v, DT)
+    neck = index(configuration, "head_pitch_joint")
+    got = torque(configuration, np.zeros_like(v), found)[neck]
+    assert found[neck] < -0.005
+    assert got == pytest.approx(SHARE * efforts(robot, configuration)[neck], rel=0.01)
+    np.testing.assert_array_equal(np.delete(found, neck), np.delete(v, neck))
+
+
+def test_all_joints_are_slowed_where_one_could_not_stop(robot, configuration):
+    model = configuration.model
+    waist = index(configuration, "waist_pitch_joint")
+    q = configuration.q.copy()
+    k = model.joints[configuration.joint_id("waist_pitch_joint")].idx_q
+    q[k] = model.upperPositionLimit[k] - 0.01
+    configuration.update(q)
+    before, v = np.zeros(configuration.nv), np.zeros(configuration.nv)
+    before[waist], v[waist] = 1.0, 0.4  # to brake with 60 rad/s^2, where it can with 20
+    v[index(configuration, "left_elbow_pitch_joint")] = 0.1
+    found = guard_of(robot, configuration).able(before, v, DT)
+    change = (found - before)[v != before] / (v - before)[v != before]
+    np.testing.assert_allclose(change, change[0], rtol=1e-9)  # the same direction
+    assert LEAST <= change[0] < 0.5
 
 
 def test_slowed_joints_stay_within_their_limits(robot, configuration):
@@ -74,5 +108,5 @@ def test_slowed_joints_stay_within_their_limits(robot, configuration):
     before = np.zeros(configuration.nv)
     before[joint.idx_v] = 1.0  # too late to brake: 100 rad/s^2
     v = np.zeros(configuration.nv)
-    found = EffortGuard(robot, configuration).able(before, v, DT)
+    found = guard_of(robot, configuration).able(before, v, DT)
     assert found[joint.idx_v] * DT <= 1e-4 + 1e-12

@@ -12,6 +12,8 @@ __all__ = ["EffortGuard"]
 
 SHARE = 0.95  # of the effort; the rest is for errors of tracking
 LEAST = 0.2  # of a change of velocity; so much is asked for in any case
+ROUNDS = 3  # in which further motors may become too weak
+SLACK = 1e-9  # N m or N
 
 
 class EffortGuard:
@@ -24,21 +26,32 @@ class EffortGuard:
 
     Torques are linear in the acceleration a,
 
-        tau = M a + h,  |tau| <= share * effort,
+        tau = M a + h,  |tau| <= share * effort.
 
-    so that the greatest part of a that every motor can give follows at once. With a
-    free root contact forces are unknown, and nothing is changed.
+    Joints whose motors are asked for too much accelerate as those motors let them,
+    with M and tau of these joints alone,
+
+        M da = (tau cut to its bounds) - tau,
+
+    and all others as they were asked to, for they may have to brake. Where a joint
+    could then not stop before its end, or its motor cannot even hold it, all changes of
+    velocity are made smaller by one factor instead.
+    With a free root contact forces are unknown, and nothing is changed.
 
     Args:
         robot: The reduced robot.
         configuration: Its configuration; read.
+        rate: What velocities can accelerate and brake, shape (nv,).
     """
 
-    def __init__(self, robot: RobotDescription, configuration: Configuration) -> None:
+    def __init__(
+        self, robot: RobotDescription, configuration: Configuration, rate: Vector
+    ) -> None:
         self._configuration = configuration
         self._data = configuration.model.createData()
         self._knows_all = robot.root.kind != "free"
         self._most = SHARE * _efforts(robot, configuration)
+        self._rate = rate
         self._still: Vector = np.zeros(configuration.nv)
         model = configuration.model
         low, high = model.lowerPositionLimit, model.upperPositionLimit
@@ -55,19 +68,49 @@ class EffortGuard:
         """
         if not self._knows_all:
             return v
-        part = self._part(v, (v - before) / dt)
-        if part == 1.0:
-            return v
-        q = self._configuration.q
-        slowed = before + part * (v - before)
-        return np.clip(slowed, (self._low - q) / dt, (self._high - q) / dt)
-
-    def _part(self, v: Vector, a: Vector) -> float:
         model, data, q = self._configuration.model, self._data, self._configuration.q
+        a = (v - before) / dt
         tau = pin.rnea(model, data, q, v, a).copy()
         if (np.abs(tau) <= self._most).all():
-            return 1.0
-        rest = pin.rnea(model, data, q, v, self._still)
+            return v
+        rest = pin.rnea(model, data, q, v, self._still).copy()
+        found = self._yielding(v, tau, rest, dt)
+        if found is None:
+            found = before + self._part(tau, rest) * (v - before)
+        return np.clip(found, (self._low - q) / dt, (self._high - q) / dt)
+
+    def _yielding(
+        self, v: Vector, tau: Vector, rest: Vector, dt: float
+    ) -> Vector | None:
+        """Return velocities with joints of weak motors alone slower, if that helps."""
+        M = pin.crba(self._configuration.model, self._data, self._configuration.q)
+        M = np.triu(M) + np.triu(M, 1).T
+        weak = np.zeros(len(v), dtype=bool)
+        torque, change = tau, self._still
+        for _ in range(ROUNDS):
+            weak |= np.abs(torque) > self._most
+            if (np.abs(rest) >= self._most)[weak].any():
+                return None
+            short = np.clip(tau, -self._most, self._most) - tau
+            change = self._still.copy()
+            change[weak] = np.linalg.solve(M[np.ix_(weak, weak)], short[weak])
+            if (change * tau > 0.0).any():
+                return None  # one of them would be faster than asked
+            torque = tau + M @ change
+            if (np.abs(torque) <= self._most + SLACK).all():
+                found = v + dt * change
+                return found if self._can_stop(found, v) else None
+        return None
+
+    def _can_stop(self, found: Vector, asked: Vector) -> bool:
+        """Tell whether joints stop before their ends, or are as slow as was asked."""
+        q = self._configuration.q
+        room = np.where(found > 0.0, self._high - q, q - self._low)
+        most = np.sqrt(2.0 * self._rate * np.maximum(room, 0.0))
+        return bool((np.abs(found) <= np.maximum(most, np.abs(asked))).all())
+
+    def _part(self, tau: Vector, rest: Vector) -> float:
+        """Return the greatest part of all changes that every motor can give."""
         change = tau - rest
         room = self._most - np.sign(change) * rest
         # A motor that cannot even hold has none to give; the others decide.

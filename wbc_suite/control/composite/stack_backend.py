@@ -9,6 +9,7 @@ from wbc_suite.control.composite.effort import EffortGuard
 from wbc_suite.control.composite.tasks import (
     FOLLOW,
     HURRY,
+    accelerations,
     held_equality,
     make_limits,
     make_task,
@@ -75,7 +76,11 @@ class StackBackend:
             equalities=equalities,
             escape=False,
         )
-        self._guard = EffortGuard(robot, self.configuration)
+        self._guard = EffortGuard(
+            robot,
+            self.configuration,
+            accelerations(robot, config, self.configuration),
+        )
         self._joints = PostureTask(
             1.0,
             costs=travel_costs(robot, FOLLOW),
