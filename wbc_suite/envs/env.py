@@ -348,12 +348,12 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
 
     def _info(self, clipped: int, success: bool) -> dict[str, Any]:
         info = {"success": success, "is_success": success, "clipped": clipped}
-        several = len(self.controllers) > 1
-        for k, state in enumerate(self.simulation.robots):
-            told = self.controllers[k].info(state)
-            if several:
-                told = {state.prefix + key: value for key, value in told.items()}
-            info |= told
+        prefixed = len(self.controllers) > 1
+        robots = self.simulation.robots
+        for state, controller in zip(robots, self.controllers, strict=True):
+            if told := controller.info(state):
+                before = state.prefix if prefixed else ""
+                info |= {before + key: value for key, value in told.items()}
         return info
 
 

@@ -1,7 +1,6 @@
 """Observations of an environment: one buffer, filled at once and handed out by key."""
 
 from collections.abc import Callable, Iterable, Mapping
-from operator import itemgetter
 from typing import Any
 
 import gymnasium
@@ -61,13 +60,9 @@ class Observer:
             SeenField, {f: getattr(data, f.name.lower()) for f in SeenField}
         )
         self.values: Vector = np.zeros(end)
-        self._keys = tuple(self.places)
         # Of groups from a second copy: those of single readings are others' arrays.
-        slices = [
-            slice(end + place.start, end + place.stop) if key in groups else place
-            for key, place in self.places.items()
-        ]
-        self._cut = itemgetter(*slices) if slices else lambda _: ()
+        places = self.places.items()
+        self._cuts = [(key, int(key in groups), place) for key, place in places]
         self.space: gymnasium.spaces.Dict = gymnasium.spaces.Dict(
             {key: _box(key, place) for key, place in self.places.items()}
         )
@@ -106,8 +101,8 @@ class Observer:
 
     def observation(self) -> dict[str, Vector]:
         """Return what was seen last, by key; nobody else holds these arrays."""
-        both = np.concatenate((self.values, self.values))
-        return dict(zip(self._keys, self._cut(both), strict=True))
+        copies = self.values.copy(), self.values.copy()
+        return {key: copies[which][place] for key, which, place in self._cuts}
 
 
 def _lay_out(groups: Mapping[str, Mapping[str, Reading]]) -> dict[str, slice]:
