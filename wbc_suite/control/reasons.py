@@ -1,10 +1,30 @@
 """Why a frame is not at its goal: words that are sought when somebody asks."""
 
 from collections.abc import Callable, Sequence
-from functools import cache
-from typing import overload
+from typing import Generic, TypeVar, overload
 
-__all__ = ["Reasons"]
+__all__ = ["Once", "Reasons"]
+
+Told = TypeVar("Told")
+
+
+class Once(Generic[Told]):
+    """Something that is found out when it is first asked for, and then known.
+
+    `functools.cache` does that too, and takes 5 us to make for each step.
+
+    Args:
+        tell: Says it, the same at any time.
+    """
+
+    def __init__(self, tell: Callable[[], Told]) -> None:
+        self._tell = tell
+
+    def __call__(self) -> Told:
+        """Return what is told."""
+        if not hasattr(self, "_told"):
+            self._told = self._tell()
+        return self._told
 
 
 class Reasons(Sequence[str]):
@@ -17,7 +37,7 @@ class Reasons(Sequence[str]):
     """
 
     def __init__(self, tell: Callable[[], Sequence[str]]) -> None:
-        self._tell = cache(tell)
+        self._tell = Once(tell)
 
     @overload
     def __getitem__(self, index: int) -> str: ...

@@ -1,11 +1,29 @@
 """Compiled search for the nearest pairs of capsules, and their distance's Jacobian."""
 
+from enum import IntEnum
+
 import numpy as np
 
-from wbc_suite.compiling import compiled
+from wbc_suite.compiling import compiled, compiled_inner
+from wbc_suite.kinematics.array_table import indices, matrix, vector
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["nearest_pairs", "segment_parameters"]
+__all__ = ["CapsuleField", "nearest_pairs", "segment_parameters"]
+
+
+class CapsuleField(IntEnum):
+    """Arrays of capsules that are kept apart.
+
+    Joint of each; both ends of each one's segment in its joint, shape (n, 6); radii;
+    pairs of capsules, shape (p, 2); 1 where a velocity moves a joint, shape
+    (njoints, nv).
+    """
+
+    JOINTS = 0
+    ENDS = 1
+    RADII = 2
+    PAIRS = 3
+    MOVES = 4
 
 
 @compiled
@@ -46,11 +64,7 @@ def segment_parameters(
 def nearest_pairs(  # noqa: C901, one flat loop is what compiles well
     placements: Matrix,
     joint_jacobians: Matrix,
-    joints: Indices,
-    ends: Matrix,
-    radii: Vector,
-    pairs: Indices,
-    moves: Matrix,
+    capsules: Indices,
     influence: float,
     found: Indices,
     distances: Vector,
@@ -61,11 +75,7 @@ def nearest_pairs(  # noqa: C901, one flat loop is what compiles well
     Args:
         placements: Joint poses, shape (njoints, 12).
         joint_jacobians: Joint Jacobians, transposed, shape (nv, 6).
-        joints: Joint of each capsule, shape (n,).
-        ends: Both ends of each capsule's segment in its joint, shape (n, 2, 3).
-        radii: Radius of each capsule, shape (n,).
-        pairs: Pairs of capsules, shape (p, 2).
-        moves: 1 where a velocity moves a joint, shape (njoints, nv).
+        capsules: Table of `CapsuleField`.
         influence: Pairs further apart are left out, m.
         found: Output, pair of each row, nearest first, -1 where there is none.
         distances: Output, distance of each row's pair, m; inf where there is none.
@@ -74,7 +84,15 @@ def nearest_pairs(  # noqa: C901, one flat loop is what compiles well
     Returns:
         The number of pairs within the influence among the rows.
     """
-    count = joints.shape[0]
+    joints, ends = (
+        indices(capsules, CapsuleField.JOINTS),
+        matrix(capsules, CapsuleField.ENDS),
+    )
+    radii, pairs = (
+        vector(capsules, CapsuleField.RADII),
+        indices(capsules, CapsuleField.PAIRS),
+    )
+    moves, count = matrix(capsules, CapsuleField.MOVES), joints.shape[0]
     world = np.empty((count, 2, 3))
     middle = np.empty((count, 3))
     reach = np.empty(count)
@@ -83,7 +101,7 @@ def nearest_pairs(  # noqa: C901, one flat loop is what compiles well
         length = 0.0
         for i in range(3):
             for end in range(2):
-                x = ends[c, end]
+                x = ends[c, 3 * end : 3 * end + 3]
                 world[c, end, i] = (
                     T[9 + i] + T[i] * x[0] + T[3 + i] * x[1] + T[6 + i] * x[2]
                 )
@@ -94,8 +112,8 @@ def nearest_pairs(  # noqa: C901, one flat loop is what compiles well
     for row in range(rows):
         found[row], distances[row] = -1, np.inf
     total = 0
-    for p in range(pairs.shape[0]):
-        a, b = pairs[p]
+    for p in range(pairs.shape[0] // 2):
+        a, b = pairs[2 * p], pairs[2 * p + 1]
         limit = min(influence, distances[rows - 1])
         apart = 0.0
         for i in range(3):
@@ -118,7 +136,7 @@ def nearest_pairs(  # noqa: C901, one flat loop is what compiles well
             total = min(total + 1, rows)
     for row in range(rows):
         if row < total:
-            a, b = pairs[found[row]]
+            a, b = pairs[2 * found[row]], pairs[2 * found[row] + 1]
             _distance_row(
                 world[a],
                 world[b],
@@ -133,7 +151,7 @@ def nearest_pairs(  # noqa: C901, one flat loop is what compiles well
     return total
 
 
-@compiled
+@compiled_inner
 def _distance_row(
     A: Matrix,
     B: Matrix,

@@ -101,7 +101,9 @@ class Constraints:
         """
         tell, nv = partial(self.pressure, levels, kinds), len(self._names)
         rows = slice(nv, nv + self.inequalities)
-        if not self.inequalities or not any(level[rows].any() for level in levels):
+        if not self.inequalities or not any(
+            np.count_nonzero(level[rows]) for level in levels
+        ):
             return tell
         pressure = tell()
         return lambda: pressure

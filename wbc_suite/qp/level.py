@@ -183,7 +183,7 @@ class Level:
         return LevelRecord(
             names=tuple(task.name for task in self.row_tasks),
             slices=self.slices,
-            errors=[self.error_of(task) for task in self.row_tasks],
+            errors=self._errors_of_all(),
             held=self.held,
             W=self.W.copy(),
             e=self.e.copy(),
@@ -231,21 +231,21 @@ class Level:
             if not np.isfinite(task.target[used]).all():
                 self.held += (task.name,)
 
-    def error_of(self, task: RowTask) -> tuple[float, float]:
-        """Return position (m) and orientation error (rad) of a task at the last tick.
+    def _errors_of_all(self) -> list[tuple[float, float]]:
+        """Return position (m) and orientation error (rad) of each task with rows.
 
-        Tasks with fewer than six rows have one error, in their own unit.
+        They are those of the last tick. Tasks with fewer than six rows have one error,
+        in their own unit.
         """
-        for frame, (position, angle) in zip(
-            self._frames, self._frame_errors, strict=True
-        ):
-            if frame is task:
-                return float(position), float(angle)
-        for com, distance in zip(self._coms, self._com_errors, strict=True):
-            if com is task:
-                return float(distance), 0.0
-        error = self._errors[task]
-        return float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:]))
+        known: dict[RowTask, tuple[float, float]] = {
+            task: (float(np.linalg.norm(e[:3])), float(np.linalg.norm(e[3:])))
+            for task, e in self._errors.items()
+        }
+        frames = zip(self._frames, self._frame_errors.tolist(), strict=True)
+        known |= {task: (position, angle) for task, (position, angle) in frames}
+        coms = zip(self._coms, self._com_errors.tolist(), strict=True)
+        known |= {task: (distance, 0.0) for task, distance in coms}
+        return [known[task] for task in self.row_tasks]
 
 
 def _concatenate(lists: Sequence[Indices]) -> tuple[Indices, Indices]:

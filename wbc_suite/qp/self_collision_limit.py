@@ -9,7 +9,8 @@ import numpy as np
 from wbc_suite.arguments import check_count, check_number
 from wbc_suite.compiling import compiled
 from wbc_suite.kinematics import Configuration
-from wbc_suite.qp.capsule_distance import nearest_pairs
+from wbc_suite.kinematics.array_table import ArrayTable
+from wbc_suite.qp.capsule_distance import CapsuleField, nearest_pairs
 from wbc_suite.qp.limit import RowLimit
 from wbc_suite.qp.problem import UNBOUNDED
 from wbc_suite.robot.capsules import EnclosingCapsule
@@ -111,6 +112,7 @@ class SelfCollisionLimit(RowLimit):
         distances, normals = np.full(count, np.inf), np.zeros((count, configuration.nv))
         touching = self._nearest(configuration, self.margin, found, distances, normals)
         self._pairs = np.delete(self._pairs, found[:touching], axis=0)
+        self.bind(configuration)
 
     def bind(self, configuration: Configuration) -> None:
         """Resolve links to joints.
@@ -119,19 +121,27 @@ class SelfCollisionLimit(RowLimit):
             UnknownNameError: If a link is no frame of the model.
         """
         model = configuration.model
-        joints: list[int] = []
-        ends = np.empty((len(self._capsules), 2, 3))
+        joints: Indices = np.zeros(len(self._capsules), dtype=np.int64)
+        ends = np.empty((len(self._capsules), 6))
         for k, capsule in enumerate(self._capsules):
             frame = model.frames[configuration.frame_id(capsule.link)]
-            joints.append(frame.parentJoint)
-            ends[k, 0] = frame.placement.act(np.asarray(capsule.start))
-            ends[k, 1] = frame.placement.act(np.asarray(capsule.end))
-        self._joints: Indices = np.array(joints, dtype=np.int64)
-        self._ends: Matrix = ends
-        self._radii: Vector = np.array([c.radius for c in self._capsules])
-        self._moves: Matrix = np.zeros((len(model.joints), configuration.nv))
-        for joint in set(joints):
-            self._moves[joint, configuration.joint_support(joint)] = 1.0
+            joints[k] = frame.parentJoint
+            ends[k, :3] = frame.placement.act(np.asarray(capsule.start))
+            ends[k, 3:] = frame.placement.act(np.asarray(capsule.end))
+        moves = np.zeros((len(model.joints), configuration.nv))
+        for joint in set(joints.tolist()):
+            moves[joint, configuration.joint_support(joint)] = 1.0
+        f = CapsuleField
+        self._arrays = ArrayTable(
+            CapsuleField,
+            {
+                f.JOINTS: joints,
+                f.ENDS: ends,
+                f.RADII: np.array([c.radius for c in self._capsules], dtype=float),
+                f.PAIRS: self._pairs,
+                f.MOVES: moves,
+            },
+        )
 
     def rows(
         self, configuration: Configuration, dt: float, G: Matrix, h: Vector
@@ -152,11 +162,7 @@ class SelfCollisionLimit(RowLimit):
         return nearest_pairs(
             configuration.placements,
             configuration.joint_jacobians,
-            self._joints,
-            self._ends,
-            self._radii,
-            self._pairs,
-            self._moves,
+            self._arrays.table,
             within,
             found,
             distances,

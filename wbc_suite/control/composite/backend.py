@@ -1,8 +1,7 @@
 """What a whole-body composite asks of an inverse-kinematics solver."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Protocol, TypeAlias
+from typing import NamedTuple, Protocol, TypeAlias
 
 from wbc_suite.typing import Matrix, Vector
 
@@ -12,9 +11,8 @@ Limits: TypeAlias = tuple[tuple[str | None, str], ...]
 Explanation: TypeAlias = Callable[[], Mapping[str, Sequence[str]]]
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class IkStep:
-    """The answer to one solve.
+class IkStep(NamedTuple):
+    """The answer to one solve, made anew each time: see `qp.solution`.
 
     Attributes:
         v: Velocity, Pinocchio's conventions, shape (nv,).
@@ -32,13 +30,14 @@ class IkStep:
 
 
 class IkBackend(Protocol):
-    """Differential inverse kinematics of one robot.
+    """Differential inverse kinematics of one robot at its commanded configuration.
 
-    Configurations and velocities are Pinocchio's, of the reduced robot.
+    It is made with that configuration, which its owner moves. Configurations and
+    velocities are Pinocchio's, of the reduced robot.
     """
 
-    def reset(self, q: Vector) -> None:
-        """Forget the past; held frames are held where q puts them."""
+    def reset(self) -> None:
+        """Forget the past; held frames are held where they are."""
         ...
 
     def set_targets(self, targets: Matrix) -> None:
@@ -54,11 +53,11 @@ class IkBackend(Protocol):
         """Set the posture to prefer."""
         ...
 
-    def solve(self, q: Vector, dt: float) -> IkStep:
+    def solve(self, dt: float) -> IkStep:
         """Return the velocity towards the targets for dt seconds; never raises."""
         ...
 
-    def solve_posture(self, q: Vector, posture: Vector, dt: float) -> IkStep:
+    def solve_posture(self, posture: Vector, dt: float) -> IkStep:
         """Return the velocity that takes joints to a configuration within dt.
 
         Limits and held frames are kept, controlled frames are left out.

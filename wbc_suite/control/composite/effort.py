@@ -70,9 +70,10 @@ class EffortGuard:
             return v
         model, data, q = self._configuration.model, self._data, self._configuration.q
         a = (v - before) / dt
-        tau = pin.rnea(model, data, q, v, a).copy()
-        if (np.abs(tau) <= self._most).all():
+        tau = pin.rnea(model, data, q, v, a)
+        if np.count_nonzero(np.abs(tau) <= self._most) == len(tau):
             return v
+        tau = tau.copy()  # of data's own
         rest = pin.rnea(model, data, q, v, self._still).copy()
         found = self._yielding(v, tau, rest, dt)
         if found is None:

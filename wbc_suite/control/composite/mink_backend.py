@@ -8,7 +8,7 @@ import numpy as np
 from wbc_suite.control.composite.backend import IkStep, Limits
 from wbc_suite.control.composite.config import ControlledFrame, WholeBodyIKConfig
 from wbc_suite.control.composite.tasks import FOLLOW, frame_costs, travel_costs
-from wbc_suite.kinematics import Conversion
+from wbc_suite.kinematics import Configuration, Conversion
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Matrix, Vector
 
@@ -28,12 +28,18 @@ class MinkBackend:
         robot: The reduced robot.
         config: Tasks, limits and contacts; levels become weights, and there is no
             acceleration limit.
+        commanded: The commanded configuration; read, and moved by the owner.
     """
 
-    def __init__(self, robot: RobotDescription, config: WholeBodyIKConfig) -> None:
-        self._config = config
+    def __init__(
+        self,
+        robot: RobotDescription,
+        config: WholeBodyIKConfig,
+        commanded: Configuration,
+    ) -> None:
+        self._config, self._commanded = config, commanded
         self._model = robot.to_mjspec().compile()
-        self._conversion = Conversion(self._model, robot.to_pinocchio())
+        self._conversion = Conversion(self._model, commanded.model)
         self._configuration = mink.Configuration(self._model)
         self._sites = {self._model.site(i).name for i in range(self._model.nsite)}
         self._tasks = [self._task(frame) for frame in config.frames]
@@ -44,9 +50,9 @@ class MinkBackend:
         self._held = [self._hold(held.frame, held.contact) for held in config.held]
         self._limits = self._make_limits(robot)
 
-    def reset(self, q: Vector) -> None:
-        """Hold feet where q puts them."""
-        self._configuration.update(self._conversion.q_to_mujoco(q))
+    def reset(self) -> None:
+        """Hold feet where they are."""
+        self._place()
         for task in self._held:
             task.set_target_from_configuration(self._configuration)
 
@@ -66,17 +72,21 @@ class MinkBackend:
         """Set the posture to prefer."""
         self._posture.set_target(self._conversion.q_to_mujoco(q))
 
-    def solve(self, q: Vector, dt: float) -> IkStep:
+    def solve(self, dt: float) -> IkStep:
         """Solve one tick; hold still where mink finds no solution."""
-        return self._solve(q, [*self._tasks, self._posture], dt)
+        return self._solve([*self._tasks, self._posture], dt)
 
-    def solve_posture(self, q: Vector, posture: Vector, dt: float) -> IkStep:
+    def solve_posture(self, posture: Vector, dt: float) -> IkStep:
         """Solve one tick without frames."""
         self._joints.set_target(self._conversion.q_to_mujoco(posture))
-        return self._solve(q, [self._joints], dt)
+        return self._solve([self._joints], dt)
 
-    def _solve(self, q: Vector, tasks: list[mink.Task], dt: float) -> IkStep:
-        self._configuration.update(self._conversion.q_to_mujoco(q))
+    def _place(self) -> None:
+        """Move mink's robot to the commanded configuration."""
+        self._configuration.update(self._conversion.q_to_mujoco(self._commanded.q))
+
+    def _solve(self, tasks: list[mink.Task], dt: float) -> IkStep:
+        self._place()
         try:
             v = mink.solve_ik(
                 self._configuration,

@@ -2,7 +2,7 @@
 
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -35,9 +35,8 @@ HURRIED = 2  # times as many iterations where the robot stands and waits
 ARRIVED = 5e-3  # rad or m; from here on goals are approached straight
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Waypoint:
-    """What the IK is asked for in one solve.
+class Waypoint(NamedTuple):
+    """What the IK is asked for in one solve, made anew each time: see `qp.solution`.
 
     Attributes:
         posture: Configuration to prefer; without targets, to go to at once.
@@ -116,12 +115,15 @@ class Planner:
         """
         self._watch(goals, v)
         self._solves += 1
+        is_kept = self._solves % TRAIL_STEP == 0
+        if self._way is None and not self._search.is_running and not is_kept:
+            return self._straight(goals)
         now = Passed(self._solves * self._dt, self._configuration.q.copy(), v)
         if self._search.is_running:
             hurry = HURRIED if self._still > 0.0 else 1
             found = self._search.advance(hurry * self._config.search_iterations, now)
             self._way = found or self._way
-        if self._solves % TRAIL_STEP == 0:
+        if is_kept:
             self._trail.appendleft(now)
         if self._way is not None:
             return self._along(self._way, now)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from wbc_suite.control.composite.backend import Explanation, IkStep
 from wbc_suite.control.composite.config import ControlledFrame, WholeBodyIKConfig
 from wbc_suite.control.composite.frames import ControlledFrames
 from wbc_suite.control.composite.hindrance import Touch
-from wbc_suite.control.reasons import Reasons
+from wbc_suite.control.reasons import Once, Reasons
 from wbc_suite.kinematics import Configuration
 from wbc_suite.typing import Vector
 
@@ -94,7 +94,7 @@ class IkReport:
         errors, reached = self._compare(q, goals)
         tell: Callable[[], Sequence[Sequence[str]]] = tuple
         if not all(reached):
-            tell = cache(self._reasons(reached, answer, body))
+            tell = Once(self._reasons(reached, answer, body))
         return {
             frame.name: {
                 "reached": there,

@@ -3,6 +3,9 @@
 from collections.abc import Callable
 from functools import partial
 
+import numpy as np
+
+from wbc_suite.compiling import compiled
 from wbc_suite.control.composite.backend import Explanation, IkStep
 from wbc_suite.control.composite.config import WholeBodyIKConfig
 from wbc_suite.control.composite.effort import EffortGuard
@@ -16,8 +19,8 @@ from wbc_suite.control.composite.tasks import (
     travel_costs,
 )
 from wbc_suite.kinematics import Configuration
+from wbc_suite.kinematics.array_table import vector_at
 from wbc_suite.qp import (
-    ComTask,
     Equality,
     FrameEquality,
     FrameTask,
@@ -29,7 +32,7 @@ from wbc_suite.qp import (
     TickRecord,
 )
 from wbc_suite.robot import RobotDescription
-from wbc_suite.typing import Matrix, Vector
+from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["StackBackend"]
 
@@ -41,6 +44,9 @@ _ROWS = (
 )
 """Limits of no single joint."""
 
+POSE, POSITION = 12, 3
+"""How many numbers a task keeps of its target, which come first in what it packs."""
+
 
 class StackBackend:
     """`IkBackend` over a `TaskStack`.
@@ -48,11 +54,16 @@ class StackBackend:
     Args:
         robot: The reduced robot.
         config: Tasks, limits and contacts.
+        commanded: The commanded configuration; read, and moved by the owner.
     """
 
-    def __init__(self, robot: RobotDescription, config: WholeBodyIKConfig) -> None:
-        self._config = config
-        self.configuration = Configuration(robot.to_pinocchio())
+    def __init__(
+        self,
+        robot: RobotDescription,
+        config: WholeBodyIKConfig,
+        commanded: Configuration,
+    ) -> None:
+        self._config, self._commanded = config, commanded
         self._posture = PostureTask(
             config.posture.cost,
             costs=config.posture.costs,
@@ -60,7 +71,10 @@ class StackBackend:
             level=config.posture.level,
         )
         self._tasks = [make_task(frame) for frame in config.frames]
-        self._places = [_place_of_target(task) for task in self._tasks]
+        places = [task.packed.ctypes.data for task in self._tasks]
+        sizes = [POSE if isinstance(t, FrameTask) else POSITION for t in self._tasks]
+        self._places: Indices = np.array(places, dtype=np.int64)
+        self._sizes: Indices = np.array(sizes, dtype=np.int64)
         self._held = [held_equality(held) for held in config.held]
         equalities: list[Equality] = list(self._held)
         if robot.root.kind == "planar" and robot.root.drive == "differential":
@@ -70,17 +84,14 @@ class StackBackend:
         limits = make_limits(robot, config)
         self._support = [x for x in limits if isinstance(x, SupportLimit)]
         self._stack = TaskStack(
-            self.configuration,
+            commanded,
             [*self._tasks, self._posture],
             limits=limits,
             equalities=equalities,
             escape=False,
         )
-        self._guard = EffortGuard(
-            robot,
-            self.configuration,
-            accelerations(robot, config, self.configuration),
-        )
+        able = accelerations(robot, config, commanded)
+        self._guard = EffortGuard(robot, commanded, able)
         self._joints = PostureTask(
             1.0,
             costs=travel_costs(robot, FOLLOW),
@@ -88,18 +99,17 @@ class StackBackend:
             name="configuration",
         )
         self._joint_stack = TaskStack(
-            self.configuration,
+            commanded,
             [self._joints],
             limits=limits,
             equalities=equalities,
             escape=False,
         )
 
-    def reset(self, q: Vector) -> None:
-        """Forget the past; hold feet and centre of mass where q puts them."""
-        self.configuration.update(q)
+    def reset(self) -> None:
+        """Forget the past; hold feet and centre of mass where they are."""
         for held in self._held:
-            held.set_target(self.configuration.frame_pose(held.frame))
+            held.set_target(self._commanded.frame_pose(held.frame))
         for limit in self._support:
             limit.reset()
         self._stack.reset()
@@ -107,21 +117,18 @@ class StackBackend:
 
     def set_targets(self, targets: Matrix) -> None:
         """Set the targets of all controlled frames."""
-        for (place, part), target in zip(self._places, targets, strict=True):
-            place[:] = target[part]
+        _hand_on(self._places, self._sizes, targets)
 
     def set_posture(self, q: Vector) -> None:
         """Set the posture to prefer."""
         self._posture.set_target(q)
 
-    def solve(self, q: Vector, dt: float) -> IkStep:
+    def solve(self, dt: float) -> IkStep:
         """Solve one tick of the stack."""
-        self.configuration.update(q)
         return self._step(self._stack, self._joint_stack, dt, record=self._record)
 
-    def solve_posture(self, q: Vector, posture: Vector, dt: float) -> IkStep:
+    def solve_posture(self, posture: Vector, dt: float) -> IkStep:
         """Solve one tick of the stack without frames."""
-        self.configuration.update(q)
         self._joints.set_target(posture)
         return self._step(self._joint_stack, self._stack, dt)
 
@@ -142,11 +149,19 @@ class StackBackend:
         return IkStep(v=v, limits=limits, ok=solution.ok, record=record)
 
 
-def _place_of_target(task: FrameTask | ComTask) -> tuple[Vector, slice]:
-    """Return where a task keeps its target, and which part of a pose that is."""
-    if isinstance(task, FrameTask):
-        return task.packed[:12], slice(12)
-    return task.packed[:3], slice(3, 12, 4)
+@compiled
+def _hand_on(places: Indices, sizes: Indices, targets: Matrix) -> None:
+    """Write targets where tasks keep them.
+
+    Args:
+        places: Address of each task's target.
+        sizes: Length of it: `POSE`, or `POSITION`.
+        targets: Poses, [R p] row by row, shape (n, 12).
+    """
+    for k in range(places.shape[0]):
+        target = vector_at(places[k], sizes[k])
+        for i in range(sizes[k]):
+            target[i] = targets[k, i if sizes[k] == POSE else 4 * i + 3]
 
 
 def _reasons(tick: TickRecord) -> dict[str, tuple[str, ...]]:

@@ -46,7 +46,9 @@ LOG = logging.getLogger(__name__)
 LEAST_LEGS = 3
 """So many points of support are a stool; with fewer, pressure must move under soles."""
 
-BackendFactory = Callable[[RobotDescription, WholeBodyIKConfig], IkBackend]
+BackendFactory = Callable[
+    [RobotDescription, WholeBodyIKConfig, Configuration], IkBackend
+]
 
 
 class WholeBodyIK:
@@ -78,8 +80,8 @@ class WholeBodyIK:
         name = str(config.get("type"))
         self.config = read_whole_body(config, state.robot, name)
         self.robot = lock_groups(state.robot, self.config.locked)
-        self._backend = backend(self.robot, self.config)
         self._configuration = Configuration(self.robot.to_pinocchio())
+        self._backend = backend(self.robot, self.config, self._configuration)
         model = self._configuration.model
         self.frames = ControlledFrames(self.config, self._configuration)
         self._conversion = Conversion(state.model, model, prefix=state.prefix)
@@ -142,7 +144,7 @@ class WholeBodyIK:
         self.goals = [self._to_input(self.frames.pose(k)) for k in self._frames()]
         self._homes = [self._to_world(goal) for goal in self.goals]
         self._aims = self._bounded_goals()
-        self._backend.reset(self.q)
+        self._backend.reset()
         self._planner.reset(self._preferred_posture())
         for gripper in self._grippers:
             gripper.reset(state)
@@ -259,10 +261,10 @@ class WholeBodyIK:
 
     def _step_towards(self, waypoint: Waypoint) -> IkStep:
         if waypoint.targets is None:
-            return self._backend.solve_posture(self.q, waypoint.posture, self._dt)
+            return self._backend.solve_posture(waypoint.posture, self._dt)
         self._backend.set_targets(waypoint.targets)
         self._backend.set_posture(waypoint.posture)
-        return self._backend.solve(self.q, self._dt)
+        return self._backend.solve(self._dt)
 
     def _corrected(self, goals: list[pin.SE3], state: RobotState) -> list[pin.SE3]:
         """Return poses in the world of the commanded root."""
