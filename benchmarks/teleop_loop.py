@@ -1,15 +1,15 @@
 """Teleoperation in time: from a person's input to joint targets, and the loop's beat.
 
 A session runs at 100 Hz as `wbc-suite teleop` does, with its page served, two viewers
-connected and an episode being recorded, while a hand is dragged: an input every 4 to 20
-milliseconds, at random times, from another thread, as the page's come. Viewers are
-clients that take all that the page sends, in a process of their own: a browser without
-a graphics card would take the processors that are measured.
+connected and an episode being recorded, while one of them drags a hand: an input every
+4 to 20 milliseconds, at random times. Viewers are clients that take all that the page
+sends, in a process of their own: a browser without a graphics card would take the
+processors that are measured.
 
 Reported, in ms:
 
-- latency: from an input's arrival to the joint targets that follow from it (bounds:
-  median 20, 99th percentile 50)
+- latency: from an input's arrival at the page to the joint targets that follow from it
+  (bounds: median 20, 99th percentile 50)
 - jitter: by how much a period differs from 10 ms (bound: 99th percentile 1)
 - behind: how late a tick begins, which does not add up
 - load: what waits for a processor, per processor, when the run begins; above 1 the
@@ -19,11 +19,10 @@ Usage: python benchmarks/teleop_loop.py [--quick] [--json FILE] [--seconds S]
 """
 
 import asyncio
+import contextlib
 import multiprocessing
 import os
-import sys
 import tempfile
-import threading
 import time
 from pathlib import Path
 
@@ -31,11 +30,12 @@ from harness.report import Report, options
 
 import numpy as np  # isort: skip  (after harness: it sets the number of BLAS threads)
 
+import pinocchio as pin
+
 import wbc_suite
-from wbc_suite.cli.by_hand import SWITCH_INTERVAL
 from wbc_suite.recording.desk import RecordingDesk, Wish
-from wbc_suite.viewers.site import Site
-from wbc_suite.viewers.teleop_page import TeleopPage
+from wbc_suite.viewers.keeping_time import calm_python
+from wbc_suite.viewers.page_process import PageProcess
 from wbc_suite.viewers.teleop_session import TeleopSession
 from wbc_suite.wrappers import DataCollection
 
@@ -87,44 +87,76 @@ class Clock:
         env.step, session._latencies.append = noted_step, noted_latency
 
 
-def watch(url, ready, stop):
-    """Be a viewer: take what the page sends, and throw it away."""
-    import msgspec
-    import viser
-    from websockets.asyncio.client import connect
-    from websockets.typing import Subprotocol
+class Viewer:
+    """A client of the page, in a process of its own: what a browser would be."""
 
-    async def run():
-        origin = url.rstrip("/")
+    def __init__(self, page, number):
+        make = multiprocessing.get_context("spawn")
+        self.ready, self.stop = make.Event(), make.Event()
+        self.number, self.url = number, page.url.rstrip("/")
+
+    def start(self, T_hand=None):
+        """Connect, and wait until the page answers; drag the hand if it is given."""
+        make = multiprocessing.get_context("spawn")
+        self.process = make.Process(target=self.run, args=(T_hand,), daemon=True)
+        self.process.start()
+        if not self.ready.wait(60.0):
+            raise RuntimeError(f"viewer {self.number} did not connect")
+
+    def run(self, T_hand):
+        """Be the viewer, in its own process."""
+        asyncio.run(self.view(T_hand))
+
+    async def view(self, T_hand):
+        """Take what the page sends, and throw it away; drag meanwhile."""
+        import viser
+        from websockets.asyncio.client import connect
+        from websockets.typing import Subprotocol
+
         async with connect(
-            origin.replace("http", "ws"),
-            origin=origin,
+            self.url.replace("http", "ws"),
+            origin=self.url,
             max_size=None,
             subprotocols=[Subprotocol(f"viser-v{viser.__version__}")],
         ) as socket:
-            await socket.send(msgspec.msgpack.encode(CAMERA))
-            ready.set()
-            while not stop.is_set():
-                try:
+            await say(socket, CAMERA)
+            dragging = asyncio.ensure_future(self.drag(socket, T_hand))
+            while not self.stop.is_set():
+                with contextlib.suppress(TimeoutError):
                     await asyncio.wait_for(socket.recv(), 0.2)
-                except TimeoutError:
-                    continue
+            await dragging
 
-    asyncio.run(run())
+    async def drag(self, socket, T_hand):
+        """Drag a hand about where it is, at random times."""
+        await asyncio.sleep(SETTLE)  # until the page has made this client's handles
+        self.ready.set()
+        if T_hand is None:
+            return
+        rng = np.random.default_rng(0)
+        handle = {"name": "/gizmos/right_hand", "owner": str(self.number)}
+        await say(socket, handle | {"type": "TransformControlsDragStartMessage"})
+        begun = time.perf_counter()
+        while not self.stop.is_set():
+            await asyncio.sleep(rng.uniform(0.004, 0.02))
+            since = time.perf_counter() - begun
+            place = T_hand.translation.copy()
+            place[2] += 0.05 * np.sin(2.0 * since)
+            pose = {"position": place.tolist(), "wxyz": wxyz(T_hand)}
+            moved = {"type": "TransformControlsUpdateMessage"}
+            await say(socket, handle | pose | moved)
+        await say(socket, handle | {"type": "TransformControlsDragEndMessage"})
 
 
-def drag(session, stop, rng):
-    """Drag a hand about where it is, at random times."""
-    name = "right_hand"
-    start = session.snapshot.limbs[name].target.copy()
-    session.grab(name, 1, start)
-    begun = time.perf_counter()
-    while not stop.wait(rng.uniform(0.004, 0.02)):
-        since = time.perf_counter() - begun
-        pose = start.copy()
-        pose.translation[2] += 0.05 * np.sin(2.0 * since)
-        session.drag(name, 1, pose)
-    session.release(name, 1)
+async def say(socket, message):
+    """Send a message as a browser packs it."""
+    import msgspec
+
+    await socket.send(msgspec.msgpack.encode(message))
+
+
+def wxyz(T):
+    """Return a pose's quaternion."""
+    return np.roll(pin.Quaternion(T.rotation).coeffs(), 1).tolist()
 
 
 def measure(robot, seconds, folder):
@@ -140,40 +172,28 @@ def measure(robot, seconds, folder):
     desk = RecordingDesk(collection.recorder)
     session = TeleopSession(collection, period=1.0 / RATE, desk=desk)
     clock = Clock(collection, session)
+    page = PageProcess(session, "127.0.0.1", 0, label=robot)
     session.tick()
-    page = TeleopPage(session, Site(port=0), label=robot)
-    page.start()
-    stop, make = threading.Event(), multiprocessing.get_context("spawn")
-    left, ready = make.Event(), [make.Event() for _ in range(VIEWERS)]
-    viewers = [
-        make.Process(target=watch, args=(page.site.url, r, left), daemon=True)
-        for r in ready
-    ]
+    page.wait()
+    calm_python()
+    session.start(urgent=True)
+    viewers = [Viewer(page, number) for number in range(VIEWERS)]
+    hand = session.snapshot.limbs["right_hand"].target
     for viewer in viewers:
-        viewer.start()
-    session.start()
-    for number, event in enumerate(ready):
-        if not event.wait(60.0):
-            raise RuntimeError(f"viewer {number} did not connect")
-    while len(page.server.get_clients()) < VIEWERS:
-        time.sleep(0.05)
+        viewer.start(hand if viewer.number == 0 else None)
     desk.ask(Wish.RECORD)
     while not session.snapshot.recording.recording:
         time.sleep(0.01)
-    hand = threading.Thread(target=drag, args=(session, stop, np.random.default_rng(0)))
     load = os.getloadavg()[0] / (os.cpu_count() or 1)
-    hand.start()
     time.sleep(SETTLE)
     first = len(clock.begun), len(clock.latencies)
     time.sleep(seconds)
     begun = np.array(clock.begun[first[0] :])
     latencies = clock.latencies[first[1] :]
-    stop.set()
-    hand.join()
-    session.stop()
-    left.set()
     for viewer in viewers:
-        viewer.join()
+        viewer.stop.set()
+        viewer.process.join()
+    session.stop()
     page.stop()
     collection.close()
     periods = np.diff(begun)
@@ -201,7 +221,6 @@ def main():
     parser.add_argument("--robots", nargs="+", default=list(ROBOTS))
     arguments = parser.parse_args()
     seconds = 4.0 if arguments.quick else arguments.seconds
-    sys.setswitchinterval(SWITCH_INTERVAL)
     report = Report()
     with tempfile.TemporaryDirectory() as folder:
         for robot in arguments.robots:

@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 
 import wbc_suite
-from wbc_suite.cli.by_hand import SWITCH_INTERVAL
+from wbc_suite.viewers.keeping_time import SWITCH_INTERVAL
 from wbc_suite.viewers.site import Site
 from wbc_suite.viewers.teleop_page import TeleopPage
 from wbc_suite.viewers.teleop_session import TeleopSession

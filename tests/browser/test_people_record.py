@@ -10,11 +10,12 @@ import pytest
 from conftest import PATIENCE, RATE, TRIES, Viewer, note, wait_until
 
 import wbc_suite
-from wbc_suite.cli.by_hand import SWITCH_INTERVAL, stages_of
+from wbc_suite.cli.by_hand import stages_of
 from wbc_suite.devices.stream import Stream
 from wbc_suite.recording import Dataset, rebuild
 from wbc_suite.recording.desk import RecordingDesk
 from wbc_suite.recording.replaying import divergence
+from wbc_suite.viewers.keeping_time import SWITCH_INTERVAL
 from wbc_suite.viewers.site import Site
 from wbc_suite.viewers.teleop_page import TeleopPage
 from wbc_suite.viewers.teleop_session import TeleopSession

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from conftest import RATE, Viewer, note, served, wait_until
 
+from wbc_suite.viewers.page_process import PageProcess
+
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 HAND, OTHER = "right_hand", "left_hand"
@@ -249,4 +251,20 @@ def test_page_for_others_asks_for_its_token(context):
         assert "token" not in viewer.page.url
     finally:
         session.stop()
+        page.stop()
+
+
+def test_page_of_another_process_shows_and_pauses_the_session(settled, context):
+    session, _ = settled
+    page = PageProcess(session, "127.0.0.1", 0, label="Panda · Lift")
+    try:
+        page.wait()
+        tab = context.new_page()
+        tab.goto(page.url)
+        tab.get_by_text("input to joint target").wait_for()
+        for button, paused in (("Pause", True), ("Go on", False)):
+            tab.get_by_role("button", name=button).click()
+            wait_until(lambda now=paused: session.snapshot.paused is now, button)
+    finally:
+        session.pause(False)
         page.stop()

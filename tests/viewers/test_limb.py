@@ -5,6 +5,7 @@ import pytest
 from wbc_suite.devices import PipelineConfig
 from wbc_suite.devices.limbs import LimbKind, LimbPort, command
 from wbc_suite.devices.pipeline.limb import LimbPipeline
+from wbc_suite.viewers.drivable import LimbTraits
 from wbc_suite.viewers.limb import Limb, Ownership
 
 
@@ -50,7 +51,14 @@ def test_silent_holder_loses_it_after_the_timeout():
 def test_command_holds_what_the_kind_commands(kind, expected):
     T = pin.SE3(pin.exp3(np.array([0, 0, 0.5])), np.array([1.0, 2.0, 3.0]))
     np.testing.assert_allclose(command(kind, T), expected, atol=1e-12)
-    assert limb("right_hand", kind, T).title == "Right hand"
+
+
+def test_limbs_have_titles_for_people():
+    titles = {
+        name: LimbTraits(name=name, kind=LimbKind.POSE, body=-1).title
+        for name in ("right_hand", "com")
+    }
+    assert titles == {"right_hand": "Right hand", "com": "Centre of mass"}
 
 
 def test_seen_target_takes_what_is_not_commanded_from_the_measured_pose():

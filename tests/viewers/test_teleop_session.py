@@ -243,7 +243,9 @@ def test_limbs_say_which_of_them_a_device_for_one_hand_moves():
     for name in ("right_hand", "right_hand", "left_hand"):
         session.tick()
         assert session.snapshot.switched_to == name
-    rows = _limbs_html(session.snapshot, session.limbs, limb_colours(session.limbs))
+    rows = _limbs_html(
+        session.snapshot, session.traits.limbs, limb_colours(session.limbs)
+    )
     right, left = rows.split("</tr>")[:2]
     assert "switched to" in left
     assert "switched to" not in right

@@ -1,6 +1,5 @@
 """What `teleop` and `record --device` share: a session, its device, its page."""
 
-import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -12,12 +11,10 @@ if TYPE_CHECKING:
 
     from wbc_suite.devices import Device, PipelineConfig
     from wbc_suite.recording.desk import RecordingDesk
-    from wbc_suite.viewers.site import Site
 
 __all__ = ["DeviceMaker", "device_maker", "drive", "stages_of"]
 
 ONE_DAY = 86_400  # s; nobody's session is cut off by the benchmark's horizon
-SWITCH_INTERVAL = 1e-4  # s; at 1 ms, or Python's own 5, the page holds the loop up
 GLANCE = 0.2  # s; between looks at whether a session without a page still runs
 
 DeviceMaker = Callable[["gymnasium.Env[Any, Any]"], "Device"]
@@ -59,7 +56,7 @@ def drive(
     names: tuple[str, str],
     rate: float,
     seed: int,
-    site: "Site | None",
+    address: tuple[str, int | None] | None,
     device: "Device | None",
     stages: "PipelineConfig",
     desk: "RecordingDesk | None",
@@ -71,40 +68,43 @@ def drive(
         names: Robot and benchmark, for people.
         rate: Actions per second, Hz.
         seed: Of every reset but those of recordings.
-        site: Where the page is served; None for a device alone.
+        address: Where the page is served, host and port; None for a device alone.
         device: What people move beside the page.
         stages: Between people and the controller.
         desk: What records.
     """
-    from wbc_suite.viewers.teleop_page import TeleopPage
+    from wbc_suite.viewers.keeping_time import calm_python
+    from wbc_suite.viewers.page_process import PageProcess
     from wbc_suite.viewers.teleop_session import TeleopSession
 
-    sys.setswitchinterval(SWITCH_INTERVAL)
     session = TeleopSession(
         env, period=1.0 / rate, seed=seed, device=device, pipeline=stages, desk=desk
     )
+    robots, benchmark = names
+    page = None
     try:
+        if address is not None:  # it gets ready while the controllers are compiled
+            label = f"{robots} · {benchmark}"
+            page = PageProcess(session, *address, label=label)
         if device is not None:
             device.start()
         print("Compiling; this takes a few seconds the first time ...", flush=True)
         session.tick()
-        robots, benchmark = names
-        page = None
-        if site is not None:
-            page = TeleopPage(session, site, label=f"{robots} · {benchmark}")
-            page.start()
-        session.start()
+        if page is not None:
+            page.wait()
+        calm_python()
+        session.start(urgent=True)
         print(getattr(device, "help", ""), end="", flush=True)
         if page is None:
             while session.running and not session.quit.wait(GLANCE):
                 pass
         else:
             title = f"Teleoperation of {robots}, {benchmark}:"
-            serve_until_interrupted(page.site, title, until=session.quit)
+            serve_until_interrupted(page, title, until=session.quit)
+            page.check()
+    finally:
         session.stop()
         if page is not None:
             page.stop()
-    finally:
-        session.stop()
         if device is not None:
             device.stop()

@@ -86,7 +86,6 @@ def record(
     import wbc_suite
     from wbc_suite.devices import is_device
     from wbc_suite.recording.desk import RecordingDesk, RecordingPlan
-    from wbc_suite.viewers.site import Site
     from wbc_suite.wrappers import DataCollection
 
     by_hand = is_device(device)
@@ -122,7 +121,7 @@ def record(
                 names=(" and ".join(robots or ["Panda"]), benchmark),
                 rate=rate,
                 seed=seed,
-                site=Site(host, port) if page else None,
+                address=(host, port) if page else None,
                 device=make(env),
                 stages=stages_of(device=True, scale=scale, mirror=mirror),
                 desk=desk,

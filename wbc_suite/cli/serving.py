@@ -2,14 +2,11 @@
 
 import signal
 import threading
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated, Protocol
 
 import typer
 
-if TYPE_CHECKING:
-    from wbc_suite.viewers.site import Site
-
-__all__ = ["HostOption", "PortOption", "serve_until_interrupted"]
+__all__ = ["HostOption", "PortOption", "Served", "serve_until_interrupted"]
 
 HostOption = Annotated[
     str,
@@ -29,8 +26,22 @@ PortOption = Annotated[
 ]
 
 
+class Served(Protocol):
+    """Something that people open, at an address, with a token or none."""
+
+    @property
+    def url(self) -> str:
+        """The address, with its token."""
+        ...
+
+    @property
+    def token(self) -> str | None:
+        """What people must bring."""
+        ...
+
+
 def serve_until_interrupted(
-    site: "Site", title: str, until: threading.Event | None = None
+    site: Served, title: str, until: threading.Event | None = None
 ) -> None:
     """Print where the page is, and wait for Ctrl-C or a request to terminate.
 

@@ -58,7 +58,6 @@ def teleop(
     """Move a robot's hands, head, feet and base by dragging them in a web page."""
     import wbc_suite
     from wbc_suite.recording.desk import RecordingDesk
-    from wbc_suite.viewers.site import Site
     from wbc_suite.wrappers import DataCollection
 
     make = None if device is None else device_maker(device, device_option)
@@ -85,7 +84,7 @@ def teleop(
             names=(robots, benchmark),
             rate=rate,
             seed=seed,
-            site=Site(host, port),
+            address=(host, port),
             device=chosen_device,
             stages=stages,
             desk=desk,

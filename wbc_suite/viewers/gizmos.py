@@ -15,10 +15,9 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.devices.limbs import LimbKind
+from wbc_suite.viewers.drivable import Drivable, LimbTraits
 from wbc_suite.viewers.ghosts import place
-from wbc_suite.viewers.limb import Limb
-from wbc_suite.viewers.snapshot import Snapshot
-from wbc_suite.viewers.teleop_session import TeleopSession
+from wbc_suite.viewers.snapshot import LimbStatus, Snapshot
 
 if TYPE_CHECKING:
     import viser
@@ -62,19 +61,21 @@ class Gizmos:
         scales: Size of each limb's handle, in m.
     """
 
-    def __init__(self, session: TeleopSession, scales: Mapping[str, float]) -> None:
-        self._session = session
+    def __init__(self, session: Drivable, scales: Mapping[str, float]) -> None:
+        self._session, self._limbs = session, session.traits.limbs
         self._scales = scales
         self._lock = threading.Lock()
         self._sets: dict[int, dict[str, _Gizmo]] = {}
         self._modes: dict[int, GizmoMode] = {}
         self._hidden: dict[int, set[str]] = {}
-        self._epoch = session.snapshot.epoch
+        self._seen = session.snapshot
 
     def add_client(self, client: "viser.ClientHandle") -> None:
         """Give a new client its handles."""
+        limbs = self._session.snapshot.limbs
         gizmos = {
-            name: self._add(client, limb) for name, limb in self._session.limbs.items()
+            name: self._add(client, limb, limbs[name])
+            for name, limb in self._limbs.items()
         }
         with self._lock:
             self._sets[client.client_id] = gizmos
@@ -105,7 +106,7 @@ class Gizmos:
             self._modes[client] = mode
             gizmos = dict(self._sets.get(client, {}))
         for name, gizmo in gizmos.items():
-            moves, turns = _offers(self._session.limbs[name].kind, mode)
+            moves, turns = _offers(self._limbs[name].kind, mode)
             gizmo.handle.disable_axes = gizmo.handle.disable_sliders = not moves
             gizmo.handle.disable_rotations = not turns
 
@@ -123,7 +124,7 @@ class Gizmos:
 
     def update(self, snapshot: Snapshot) -> None:
         """Put every handle that nobody drags at its target."""
-        fresh, self._epoch = snapshot.epoch != self._epoch, snapshot.epoch
+        fresh, self._seen = snapshot.epoch != self._seen.epoch, snapshot
         with self._lock:
             sets = list(self._sets.items())
         for client, gizmos in sets:
@@ -143,7 +144,9 @@ class Gizmos:
         if not gizmo.dragging and not gizmo.apart:
             place(gizmo.handle, status.target)
 
-    def _add(self, client: "viser.ClientHandle", limb: Limb) -> _Gizmo:
+    def _add(
+        self, client: "viser.ClientHandle", limb: LimbTraits, status: LimbStatus
+    ) -> _Gizmo:
         moves, turns = _offers(limb.kind, GizmoMode.MOVE)
         handle = client.scene.add_transform_controls(
             f"/gizmos/{limb.name}",
@@ -155,7 +158,7 @@ class Gizmos:
             disable_rotations=not turns,
             active_axes=(True, True, limb.kind is not LimbKind.PLANAR),
         )
-        place(handle, limb.asked)
+        place(handle, status.target)
         gizmo = _Gizmo(handle)
 
         @handle.on_update
@@ -167,7 +170,7 @@ class Gizmos:
     def _on_event(
         self,
         client: "viser.ClientHandle",
-        limb: Limb,
+        limb: LimbTraits,
         gizmo: _Gizmo,
         event: "viser.TransformControlsEvent",
     ) -> None:
@@ -183,7 +186,7 @@ class Gizmos:
                 )
         elif event.phase == "update" and gizmo.dragging:
             self._session.drag(name, number, T_input)
-            gizmo.apart |= not limb.enabled
+            gizmo.apart |= not self._seen.limbs[name].enabled
         elif event.phase == "end":
             self._session.release(name, number)
             gizmo.dragging = False

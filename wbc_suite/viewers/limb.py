@@ -61,11 +61,6 @@ class Limb:
     enabled: bool = True
 
     @property
-    def name(self) -> str:
-        """Name of its slice of the action."""
-        return self.stages.port.name
-
-    @property
     def kind(self) -> LimbKind:
         """Which part of a pose is commanded."""
         return self.stages.port.kind
@@ -74,13 +69,6 @@ class Limb:
     def asked(self) -> pin.SE3:
         """The pose that people ask for, which the target heads for."""
         return self.stages.clutch.target
-
-    @property
-    def title(self) -> str:
-        """The name as a person writes it: `right_hand` becomes `Right hand`."""
-        if self.name == "com":
-            return "Centre of mass"
-        return self.name.replace("_", " ").capitalize()
 
     def seen_target(self, measured: pin.SE3) -> pin.SE3:
         """Return the target, with what it does not command as it is measured."""

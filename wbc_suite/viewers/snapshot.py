@@ -1,12 +1,12 @@
 """What a teleoperation session shows at one tick."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import pinocchio as pin
 
 from wbc_suite.recording.desk import DeskStatus
-from wbc_suite.typing import Matrix
+from wbc_suite.typing import Matrix, Vector
 
 __all__ = ["LimbStatus", "Snapshot"]
 
@@ -51,6 +51,7 @@ class Snapshot:
         body_positions: Positions of all bodies in the world, shape (nbody, 3).
         body_quaternions: Their orientations (wxyz), shape (nbody, 4).
         limbs: Status per limb name.
+        grippers: How far each gripper's synergies shall close, -1 open .. 1 closed.
         solve_time: Time of the controller's last solve, in s.
         latency: Median time from an input to its joint target, in s; nan before any.
         speed: Simulated seconds per second of wall time.
@@ -67,7 +68,8 @@ class Snapshot:
     time: float
     body_positions: Matrix
     body_quaternions: Matrix
-    limbs: MappingProxyType[str, LimbStatus]
+    limbs: Mapping[str, LimbStatus]
+    grippers: Mapping[str, Vector]
     solve_time: float
     latency: float
     speed: float

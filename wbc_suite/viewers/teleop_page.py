@@ -6,6 +6,7 @@ import time
 from typing import TYPE_CHECKING
 
 from wbc_suite.devices.limbs import LimbKind
+from wbc_suite.viewers.drivable import Drivable
 from wbc_suite.viewers.ghosts import Ghosts
 from wbc_suite.viewers.gizmos import Gizmos
 from wbc_suite.viewers.palette import limb_colours
@@ -13,7 +14,6 @@ from wbc_suite.viewers.scene_mirror import SceneMirror, robot_box
 from wbc_suite.viewers.site import Site
 from wbc_suite.viewers.stage import set_camera, set_stage
 from wbc_suite.viewers.teleop_panel import TeleopPanel
-from wbc_suite.viewers.teleop_session import TeleopSession
 from wbc_suite.viewers.words import explain
 
 if TYPE_CHECKING:
@@ -34,24 +34,24 @@ class TeleopPage:
 
     Args:
         session: Session to show; it need not run yet.
-        model: Model that it simulates.
         label: What the panel is called.
         site: Where the page is served; the page closes it when it stops.
     """
 
-    def __init__(self, session: TeleopSession, site: Site, *, label: str) -> None:
+    def __init__(self, session: Drivable, site: Site, *, label: str) -> None:
         self.session, self.site = session, site
-        model = session.model
+        model, limbs = session.traits.model, session.traits.limbs
         self.server = site.server
         set_stage(self.server, label=label)
         snapshot = session.snapshot
-        colours = limb_colours(session.limbs)
+        colours = limb_colours(limbs)
         self.mirror = SceneMirror(self.server, model)
         self.mirror.update(snapshot.body_positions, snapshot.body_quaternions)
         self.gizmos = Gizmos(
-            session, {n: _scale(n, limb.kind) for n, limb in session.limbs.items()}
+            session, {n: _scale(n, limb.kind) for n, limb in limbs.items()}
         )
-        self.ghosts = Ghosts(self.server, model, session.bodies, snapshot, colours)
+        bodies = {name: limb.body for name, limb in limbs.items()}
+        self.ghosts = Ghosts(self.server, model, bodies, snapshot, colours)
         box = robot_box(model, snapshot.body_positions, snapshot.body_quaternions)
         self.panel = TeleopPanel(self.server, session, self.gizmos, colours, box)
         set_camera(self.server, *box)
@@ -84,6 +84,7 @@ class TeleopPage:
             }
             self.ghosts.update(snapshot, notes)
         self.gizmos.update(snapshot)
+        self.panel.note(snapshot)
         if count % PANEL_EVERY == 0:
             self.panel.update(snapshot)
         if count % PLOT_EVERY == 0:

@@ -1,7 +1,9 @@
 """The panel beside the scene: how things stand, and everything that is pressed."""
 
 import html
-from collections.abc import Callable, Mapping
+import threading
+import time
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,13 +11,14 @@ import numpy as np
 from wbc_suite.devices.limbs import LimbKind
 from wbc_suite.recording.desk import Wish
 from wbc_suite.typing import Vector
+from wbc_suite.viewers.drivable import Drivable, LimbTraits
 from wbc_suite.viewers.gizmos import GizmoMode, Gizmos
-from wbc_suite.viewers.limb import Limb
+from wbc_suite.viewers.gripper_sliders import GripperSliders
+from wbc_suite.viewers.history import History
 from wbc_suite.viewers.palette import css
 from wbc_suite.viewers.snapshot import LimbStatus, Snapshot
 from wbc_suite.viewers.stage import VIEWS, look_from
-from wbc_suite.viewers.teleop_session import TeleopSession
-from wbc_suite.viewers.words import explain, plain
+from wbc_suite.viewers.words import explain
 
 if TYPE_CHECKING:
     import viser
@@ -24,6 +27,7 @@ __all__ = ["TeleopPanel"]
 
 PLOT_SECONDS = 10.0
 PLOT_POINTS = 150
+WINDOW = 300  # rows: PLOT_SECONDS at the rate at which the page is drawn, and more
 RECORD_NOTE = (
     "This session was started without a file to record into. "
     "`wbc-suite teleop --record FILE` records."
@@ -57,7 +61,7 @@ class TeleopPanel:
     def __init__(
         self,
         server: "viser.ViserServer",
-        session: TeleopSession,
+        session: Drivable,
         gizmos: Gizmos,
         colours: Mapping[str, tuple[int, int, int]],
         box: tuple[Vector, Vector],
@@ -65,8 +69,10 @@ class TeleopPanel:
         self._server, self._session, self._gizmos = server, session, gizmos
         self._box = box
         self._colours = colours
-        self._epoch = session.snapshot.epoch
-        self._closing: list[viser.GuiSliderHandle[float]] = []
+        traits = self._traits = session.traits
+        # Columns: wall time, solve time, then the position error of every limb.
+        self._history, self._noted = History(2 + len(traits.limbs), WINDOW), -1
+        self._adding = threading.Lock()
         self._status = server.gui.add_html("")
         self._shown = ""
         self._add_buttons()
@@ -74,12 +80,15 @@ class TeleopPanel:
             self._limbs = server.gui.add_html("")
         self._handles = server.gui.add_folder("Handles")
         with server.gui.add_folder("Clutches", expand_by_default=False):
-            for name, limb in session.limbs.items():
+            for name, limb in traits.limbs.items():
                 self._add_clutch(name, limb.title)
-        if session.grippers:
+        self._grippers: dict[str, GripperSliders] = {}
+        if traits.grippers:
             with server.gui.add_folder("Grippers"):
-                for name in session.grippers:
-                    self._add_gripper(name)
+                self._grippers = {
+                    name: GripperSliders(server, session, name)
+                    for name in traits.grippers
+                }
         with server.gui.add_folder("Tracking and timing"):
             self._error_plot = self._add_error_plot()
             self._time_plot = self._add_time_plot()
@@ -90,7 +99,7 @@ class TeleopPanel:
         from viser import Icon
 
         number = client.client_id
-        with self._handles:
+        with self._adding, self._handles:  # viser takes one thread at a time in it
             mode = client.gui.add_button_group(
                 "Drag to",
                 _marked(GizmoMode.MOVE),
@@ -104,7 +113,7 @@ class TeleopPanel:
             )
             view = client.gui.add_button_group("See from", tuple(VIEWS))
             with client.gui.add_folder("Show", expand_by_default=False):
-                for name, limb in self._session.limbs.items():
+                for name, limb in self._traits.limbs.items():
                     self._add_show(client, name, limb.title)
 
         def set_mode(chosen: GizmoMode) -> None:
@@ -123,22 +132,29 @@ class TeleopPanel:
 
     def update(self, snapshot: Snapshot) -> None:
         """Write down how things stand."""
-        text = _status_html(snapshot, self._session.limbs, self._colours)
+        text = _status_html(snapshot, self._traits.limbs, self._colours)
         if text != self._shown:
             self._status.content = self._shown = text
-        limbs = _limbs_html(snapshot, self._session.limbs, self._colours)
+        limbs = _limbs_html(snapshot, self._traits.limbs, self._colours)
         if limbs != self._limbs_shown:
             self._limbs.content = self._limbs_shown = limbs
-        if snapshot.epoch != self._epoch:  # a reset opens the grippers
-            self._epoch = snapshot.epoch
-            for slider in self._closing:
-                slider.value = -1.0
+        for name, sliders in self._grippers.items():
+            sliders.update(snapshot.grippers[name])
         if self._buttons.options != (buttons := _buttons(snapshot)):
             self._buttons.options = buttons
 
+    def note(self, snapshot: Snapshot) -> None:
+        """Keep what the plots show, once per tick."""
+        if snapshot.tick == self._noted:
+            return
+        self._noted = snapshot.tick
+        errors = [status.position_error for status in snapshot.limbs.values()]
+        row = [time.monotonic(), snapshot.solve_time, *errors]
+        self._history.append(np.array(row))
+
     def update_plots(self) -> None:
         """Draw the last seconds of errors and solve times."""
-        rows = np.asarray(self._session.history.rows(), dtype=np.float64)
+        rows = np.asarray(self._history.rows(), dtype=np.float64)
         if len(rows) < 2:
             return
         ago = rows[:, 0] - rows[-1, 0]
@@ -177,8 +193,8 @@ class TeleopPanel:
             command.on_trigger(lambda event, w=wish: self._wish(w, event.client))
 
     def _wish(self, wish: Wish, client: "viser.ClientHandle | None") -> None:
-        if self._session.desk is not None:
-            self._session.desk.ask(wish)
+        if self._traits.records:
+            self._session.wish(wish)
         elif client is not None:
             client.add_notification("Record", RECORD_NOTE, auto_close_seconds=8.0)
 
@@ -199,53 +215,8 @@ class TeleopPanel:
             lambda _: self._gizmos.show(client.client_id, name, shown=box.value)
         )
 
-    def _add_gripper(self, name: str) -> None:
-        """Add a slider for the whole gripper and, below it, one per synergy."""
-        labels = self._session.gripper_labels[name]
-        start = self._session.grippers[name]
-        whole = self._add_closing(plain(name).capitalize(), float(np.mean(start)))
-        fingers: list[viser.GuiSliderHandle[float]] = []
-        if len(labels) > 1:
-            with self._server.gui.add_folder("Fingers", expand_by_default=False):
-                fingers = [
-                    self._add_closing(plain(label), float(value))
-                    for label, value in zip(labels, start, strict=True)
-                ]
-
-        def move_all(event: "viser.GuiEvent[viser.GuiSliderHandle[float]]") -> None:
-            if event.client is None:  # a reset moved it
-                return
-            for index in range(len(labels)):
-                self._session.set_gripper(name, index, whole.value)
-            for finger in fingers:
-                finger.value = whole.value
-
-        whole.on_update(move_all)
-        self._closing.extend([whole, *fingers])
-        for index, finger in enumerate(fingers):
-            finger.on_update(self._mover(name, index, finger))
-
-    def _mover(
-        self, name: str, index: int, slider: "viser.GuiSliderHandle[float]"
-    ) -> "Callable[[viser.GuiEvent[viser.GuiSliderHandle[float]]], None]":
-        def move(event: "viser.GuiEvent[viser.GuiSliderHandle[float]]") -> None:
-            if event.client is not None:  # not when the whole gripper's slider moved it
-                self._session.set_gripper(name, index, slider.value)
-
-        return move
-
-    def _add_closing(self, label: str, value: float) -> "viser.GuiSliderHandle[float]":
-        return self._server.gui.add_slider(
-            label,
-            min=-1.0,
-            max=1.0,
-            step=0.02,
-            initial_value=float(np.clip(value, -1.0, 1.0)),
-            marks=((-1.0, "open"), (1.0, "closed")),
-        )
-
     def _add_error_plot(self) -> "viser.GuiUplotHandle":
-        limbs = self._session.limbs
+        limbs = self._traits.limbs
         return self._server.gui.add_uplot(
             data=tuple(np.zeros(2) for _ in range(1 + len(limbs))),
             series=(
@@ -292,7 +263,7 @@ def _unmarked(label: str) -> GizmoMode:
 
 def _status_html(
     snapshot: Snapshot,
-    limbs: Mapping[str, Limb],
+    limbs: Mapping[str, LimbTraits],
     colours: Mapping[str, tuple[int, int, int]],
 ) -> str:
     state, dot = _state(snapshot)
@@ -345,7 +316,7 @@ def _state(snapshot: Snapshot) -> tuple[str, str]:
 
 def _why_html(
     snapshot: Snapshot,
-    limbs: Mapping[str, Limb],
+    limbs: Mapping[str, LimbTraits],
     colours: Mapping[str, tuple[int, int, int]],
 ) -> str:
     lines = [
@@ -361,7 +332,7 @@ def _why_html(
 
 def _limbs_html(
     snapshot: Snapshot,
-    limbs: Mapping[str, Limb],
+    limbs: Mapping[str, LimbTraits],
     colours: Mapping[str, tuple[int, int, int]],
 ) -> str:
     rows = "".join(
@@ -376,7 +347,9 @@ def _limbs_html(
     return f"<table style='width:100%;padding:.2em .7em;font-size:.88em'>{rows}</table>"
 
 
-def _limb_row(limb: Limb, colour: str, status: LimbStatus, *, switched_to: bool) -> str:
+def _limb_row(
+    limb: LimbTraits, colour: str, status: LimbStatus, *, switched_to: bool
+) -> str:
     notes = ["switched to"] if switched_to else []
     if status.holder is not None:
         notes.append(f"held by viewer {status.holder + 1}")

@@ -9,7 +9,6 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import Any
 
 import gymnasium
@@ -20,15 +19,16 @@ import pinocchio as pin
 from wbc_suite.devices import Device, DeviceState, LimbInput, Pipeline, PipelineConfig
 from wbc_suite.devices.pipeline.config import RatesConfig
 from wbc_suite.errors import DatasetError, UnknownNameError
-from wbc_suite.recording.desk import RecordingDesk
+from wbc_suite.recording.desk import RecordingDesk, Wish
 from wbc_suite.typing import Vector
+from wbc_suite.viewers.drivable import SessionTraits
 from wbc_suite.viewers.history import History
+from wbc_suite.viewers.keeping_time import run_first
 from wbc_suite.viewers.limb import Limb, Ownership
 from wbc_suite.viewers.snapshot import LimbStatus, Snapshot
 
 __all__ = ["DRAGGED", "TeleopSession"]
 
-WINDOW = 600  # rows of history: 12 s at 50 Hz
 LEAD_POSITION = 0.03  # m; a released target that is further than this from its limb ...
 LEAD_ORIENTATION = 0.2  # rad; ... or turned by more than this, goes back to it ...
 REST_SPEED = 0.02  # m/s; ... when the limb has been slower than this ...
@@ -105,12 +105,8 @@ class TeleopSession:
         stages = self._pipeline.limbs
         self.limbs = {name: Limb(limb, Ownership()) for name, limb in stages.items()}
         self._open_grippers()
-        self.gripper_labels = {
-            s.name: tuple(s.labels) for s in layout.slices if s.kind == "gripper"
-        }
-        self.bodies = {name: limb.port.body for name, limb in stages.items()}
-        # Columns: wall time, solve time, then the position error of every limb.
-        self.history = History(2 + len(self.limbs), WINDOW)
+        ports = [limb.port for limb in stages.values()]
+        self.traits = SessionTraits.of(self.model, layout, ports, records=bool(desk))
         self._publish()
 
     # What people do. Any thread.
@@ -126,15 +122,24 @@ class TeleopSession:
                 limb.stages.follow(LimbInput(pose=T_world_input))
             return True
 
-    def drag(self, name: str, client: int, T_world_input: pin.SE3) -> bool:
-        """Move a limb's target with the input; False when another holds it."""
+    def drag(
+        self,
+        name: str,
+        client: int,
+        T_world_input: pin.SE3,
+        arrived: float | None = None,
+    ) -> bool:
+        """Move a limb's target with the input; False when another holds it.
+
+        `arrived` is when the input came, by the session's clock; None for now.
+        """
         limb, now = self._limb(name), self._clock()
         with self._lock:
             if not limb.ownership.take(client, now):
                 return False
             if limb.enabled:
                 limb.stages.follow(LimbInput(pose=T_world_input))
-                self._inbox.stamps.append(now)
+                self._inbox.stamps.append(now if arrived is None else arrived)
             return True
 
     def release(self, name: str, client: int) -> None:
@@ -180,12 +185,23 @@ class TeleopSession:
         with self._lock:
             self._inbox.reset = True
 
+    def wish(self, wish: Wish) -> None:
+        """Ask something of the recording; nobody hears it where nothing records."""
+        if self.desk is not None:
+            self.desk.ask(wish)
+
     # The loop.
 
-    def start(self) -> None:
-        """Run the loop in a thread of its own, at the session's rate."""
+    def start(self, *, urgent: bool = False) -> None:
+        """Run the loop in a thread of its own, at the session's rate.
+
+        Args:
+            urgent: Whether it runs before other programs, where the system lets it.
+        """
         self._stopping.clear()
-        self._thread = threading.Thread(target=self._run, name="teleop", daemon=True)
+        self._thread = threading.Thread(
+            target=self._run, args=(urgent,), name="teleop", daemon=True
+        )
         self._thread.start()
 
     @property
@@ -239,7 +255,9 @@ class TeleopSession:
             self.desk.press(pressed)
         return state
 
-    def _run(self) -> None:
+    def _run(self, urgent: bool) -> None:
+        if urgent:
+            run_first(rank=2)
         try:
             self._tick_on_time()
         finally:
@@ -329,6 +347,7 @@ class TeleopSession:
         data, now = self._simulation.data, self._clock()
         with self._lock:
             limbs = {name: self._status(name, now) for name in self.limbs}
+            grippers = {name: goal.copy() for name, goal in self.grippers.items()}
         latencies = self.latencies()
         self.snapshot = Snapshot(
             tick=self._tick,
@@ -336,7 +355,8 @@ class TeleopSession:
             time=float(data.time),
             body_positions=data.xpos.copy(),
             body_quaternions=data.xquat.copy(),
-            limbs=MappingProxyType(limbs),
+            limbs=limbs,
+            grippers=grippers,
             solve_time=float(self._ik.get("solve_time", np.nan)),
             latency=float(np.median(latencies)) if len(latencies) else float("nan"),
             speed=self.period / max(self._spent, 1e-9),
@@ -347,9 +367,6 @@ class TeleopSession:
             switched_to=self._switched_to,
             recording=None if self.desk is None else self.desk.status,
         )
-        if not self._paused:
-            errors = [status.position_error for status in limbs.values()]
-            self.history.append(np.array([now, self.snapshot.solve_time, *errors]))
 
     def _status(self, name: str, now: float) -> LimbStatus:
         limb = self.limbs[name]

@@ -1,0 +1,174 @@
+"""The page in a process of its own: driven through it, closed, killed, refused."""
+
+import multiprocessing
+import os
+import signal
+import socket
+import threading
+import time
+
+import msgspec
+import pinocchio as pin
+import pytest
+import viser
+from fake_env import FakeEnv
+from websockets.sync.client import connect
+from websockets.typing import Subprotocol
+
+from wbc_suite.errors import DeviceError
+from wbc_suite.recording.desk import Wish
+from wbc_suite.viewers.page_process import PageProcess, RemoteSession
+from wbc_suite.viewers.teleop_session import TeleopSession
+
+PATIENCE = 120.0  # s
+HAND = "right_hand"
+CAMERA = {
+    "type": "ViewerCameraMessage",
+    "wxyz": (1.0, 0.0, 0.0, 0.0),
+    "position": (2.0, 0.0, 1.5),
+    "fov": 1.0,
+    "near": 0.01,
+    "far": 100.0,
+    "image_height": 600,
+    "image_width": 960,
+    "look_at": (0.0, 0.0, 1.0),
+    "up_direction": (0.0, 0.0, 1.0),
+}
+"""What a browser says first; it is a client from then on."""
+
+
+def wait_until(condition):
+    deadline = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < deadline, "waited in vain"
+        time.sleep(0.01)
+
+
+def holder(session):
+    session.tick()
+    return session.snapshot.limbs[HAND].holder
+
+
+def pages():
+    return [p for p in multiprocessing.active_children() if p.name == "page"]
+
+
+@pytest.fixture
+def session():
+    return TeleopSession(FakeEnv(), period=0.02)
+
+
+@pytest.fixture
+def page(session):
+    made = PageProcess(session, "127.0.0.1", 0, label="test")
+    made.wait()
+    yield made
+    made.stop()
+    assert pages() == []
+
+
+class Person:
+    """A client of the page that drags the hand by messages, as a browser sends them."""
+
+    def __init__(self, page):
+        origin = page.url.rstrip("/")
+        self.socket = connect(
+            origin.replace("http", "ws"),
+            origin=origin,
+            max_size=None,
+            subprotocols=[Subprotocol(f"viser-v{viser.__version__}")],
+            open_timeout=PATIENCE,
+        )
+        self.say(CAMERA)
+
+    def say(self, message):
+        self.socket.send(msgspec.msgpack.encode(message))
+
+    def drag(self, phase, **pose):
+        handle = {"name": f"/gizmos/{HAND}", "owner": "0"}
+        self.say(handle | {"type": f"TransformControls{phase}Message"} | pose)
+
+    def grab(self, session):
+        """Grab again until the page has made the handles of this client."""
+
+        def grabbed():
+            self.drag("DragStart")
+            return holder(session) == 0
+
+        wait_until(grabbed)
+
+
+def test_a_person_drags_through_the_page_and_lets_go_by_leaving(session, page):
+    start = session.snapshot.limbs[HAND].target
+    person = Person(page)
+    person.grab(session)
+    up = (start.translation + [0.0, 0.0, 0.1]).tolist()  # noqa: RUF005 - a sum
+    person.drag("Update", position=up, wxyz=[1.0, 0.0, 0.0, 0.0])
+    wait_until(lambda: len(session.latencies()) == 1 or holder(session) is None)
+    session.tick()
+    moved = session.snapshot.limbs[HAND].target.translation - start.translation
+    assert moved == pytest.approx([0.0, 0.0, 0.1], abs=1e-6)
+    person.socket.close()
+    wait_until(lambda: holder(session) is None)
+
+
+def test_page_that_is_killed_lets_go_ends_the_session_and_is_reported(session):
+    page = PageProcess(session, "127.0.0.1", 0, label="test")
+    page.wait()
+    Person(page).grab(session)
+    (process,) = pages()
+    os.kill(process.pid, signal.SIGKILL)
+    assert session.quit.wait(PATIENCE)
+    assert holder(session) is None
+    with pytest.raises(DeviceError, match=r"ended by itself \(exit code -9\)"):
+        page.check()
+    page.stop()
+
+
+def test_taken_port_is_reported_where_the_page_was_asked_for(session):
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        page = PageProcess(session, "127.0.0.1", port, label="test")
+        with pytest.raises(DeviceError, match=str(port)):
+            page.wait()
+        page.stop()
+
+
+def test_remote_session_asks_for_what_the_session_does_and_stands_a_loss(session):
+    ours, theirs = multiprocessing.Pipe()
+    asked = []
+
+    def answer():
+        for _ in range(9):
+            asked.append(ours.recv())
+            match asked[-1][0]:
+                case "look":
+                    ours.send(session.snapshot)
+                case "grab":
+                    ours.send(True)
+        ours.close()
+
+    thread = threading.Thread(target=answer)
+    thread.start()
+    remote, here = RemoteSession(theirs, session.traits), pin.SE3.Identity()
+    assert remote.grab(HAND, 3, here)
+    remote.release(HAND, 3)
+    remote.leave(3)
+    remote.enable(HAND, False)
+    remote.set_gripper("right_gripper", 1, 0.5)
+    remote.pause(True)
+    remote.reset()
+    remote.wish(Wish.RECORD)
+    thread.join()
+    names = [name for name, _ in asked]
+    assert names == [
+        *("look", "grab", "release", "leave", "enable", "set_gripper"),
+        *("pause", "reset", "wish"),
+    ]
+    assert asked[5][1] == ("right_gripper", 1, 0.5)
+    assert not remote.lost.is_set()
+    remote.drag(HAND, 3, here)
+    assert remote.lost.is_set()
+    assert remote.snapshot.limbs.keys() == session.traits.limbs.keys()
