@@ -3,15 +3,19 @@
 """Recordings seen anew, and in the layouts of others."""
 
 import json
+import os
+import signal
+from dataclasses import replace
 
 import h5py
 import numpy as np
 import pytest
 
 from wbc_suite.errors import DatasetError, UnknownNameError
-from wbc_suite.executors import Processes
+from wbc_suite.executors import Processes, Serial
 from wbc_suite.recording import Dataset, editing, rebuild
 from wbc_suite.recording.converting import convert
+from wbc_suite.recording.converting.shared import convert_piece
 from wbc_suite.recording.extracting import extract
 from wbc_suite.recording.replaying import divergence, play_states
 
@@ -59,6 +63,72 @@ def test_lerobots_layout_or_what_to_install(small_recording, tmp_path):
     assert table["frame_index"].to_pylist() == 4 * list(range(5))
     with pytest.raises(DatasetError, match="not empty"):
         convert(small_recording, out, "lerobot")
+
+
+def killed_once(item, folder):
+    """Convert a piece; the first one kills its worker in the middle, the first time."""
+    begun = folder / "begun"
+    result = convert_piece(item, folder)
+    if item.name.startswith("000000") and not begun.exists():
+        begun.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return result
+
+
+class Killing(Processes):
+    """Processes, one of which is killed."""
+
+    def run(self, work, items, folder):
+        return super().run(killed_once, items, folder)
+
+
+@pytest.mark.slow
+def test_converting_is_shared_out_and_stands_a_killed_worker(small_recording, tmp_path):
+    told, alone, shared = [], tmp_path / "alone", tmp_path / "shared"
+    convert(small_recording, alone, "npz")
+    executor = Killing(2)
+    convert(small_recording, shared, "npz", told.append, executor=executor, workers=2)
+    assert told == [2, 2]
+    assert not (tmp_path / "shared.work").exists()
+    files = sorted(alone.iterdir())
+    assert [file.name for file in sorted(shared.iterdir())] == [f.name for f in files]
+    for file in files:
+        assert (shared / file.name).read_bytes() == file.read_bytes()
+
+
+@pytest.mark.parametrize("layout", ["robomimic", "mcap", "minari"])
+def test_layouts_of_one_file_are_one_piece_of_work(small_recording, tmp_path, layout):
+    told, alone, shared = [], tmp_path / "alone-v0", tmp_path / "shared-v0"
+    convert(small_recording, alone, layout)
+    convert(small_recording, shared, layout, told.append, executor=Serial(), workers=2)
+    assert told == [4]
+    if layout == "mcap":
+        assert shared.read_bytes() == alone.read_bytes()
+    elif layout == "robomimic":
+        assert not any(f.problem for f in editing.verify(shared))
+    else:
+        names = [sorted(p.name for p in o.rglob("*")) for o in (alone, shared)]
+        assert names[0] == names[1]
+
+
+def test_converting_goes_on_where_it_was_stopped(small_recording, tmp_path):
+    class Stopped(Serial):
+        def run(self, work, items, folder):
+            yield from super().run(work, items[:1], folder)
+            raise KeyboardInterrupt
+
+    out, told = tmp_path / "out", []
+    with pytest.raises(KeyboardInterrupt):
+        convert(small_recording, out, "npz", executor=Stopped(), workers=4)
+    assert [path.name for path in out.iterdir()] == []
+    (first,) = (tmp_path / "out.work/made").iterdir()
+    written = first.stat().st_mtime_ns
+    convert(small_recording, out, "npz", told.append, executor=Serial(), workers=4)
+    assert told == [1, 1, 1, 1]
+    assert sorted(path.name for path in out.iterdir()) == [
+        f"demo_{k}.npz" for k in range(4)
+    ]
+    assert (out / first.name).stat().st_mtime_ns == written
 
 
 def test_unknown_layouts_are_named(small_recording, tmp_path):
@@ -192,3 +262,24 @@ def test_states_of_another_robot_are_refused(small_recording):
         env = rebuild(dataset, robots="Panda")
         with pytest.raises(DatasetError, match="states of 4 numbers, and this"):
             list(play_states(env, dataset.episode("demo_0")))
+
+
+@pytest.mark.parametrize("ours", [True, False])
+def test_states_of_another_robot_with_as_many_joints_are_told(
+    lift_recording, caplog, ours
+):
+    with Dataset(lift_recording) as dataset:
+        env = rebuild(dataset)
+        episode = dataset.episode("demo_1")
+        facts = dict(episode.facts)
+        facts["model_file"] = str(facts["model_file"]).replace('_joint2"', '_elbow"')
+        if not ours:
+            del facts["uid"]
+        other = replace(episode, facts=facts)
+        if ours:
+            with pytest.raises(DatasetError, match=r"another robot.*'.*elbow' is '.*"):
+                next(play_states(env, other))
+        else:
+            assert next(play_states(env, other)) == 0
+            assert "elbow' is '" in caplog.text
+        assert next(play_states(env, episode)) == 0

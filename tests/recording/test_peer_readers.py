@@ -19,8 +19,13 @@ pytestmark = [pytest.mark.peer, pytest.mark.slow]
 
 CONVERT = """
 import sys
+from wbc_suite.executors import Serial
 from wbc_suite.recording.converting import convert
-convert(*sys.argv[1:])
+source, out, layout, pieces = sys.argv[1:]
+if int(pieces) == 1:
+    convert(source, out, layout)
+else:
+    convert(source, out, layout, executor=Serial(), workers=int(pieces))
 """
 """LeRobot's layout needs pyarrow and av, which its own environment has."""
 
@@ -92,11 +97,13 @@ def test_robomimics_dataset_class_loads_what_was_recorded(
     assert told["items"] == sum(told["lengths"])
 
 
+@pytest.mark.parametrize("pieces", [1, 2])
 def test_lerobots_dataset_class_loads_frames_and_videos(
-    with_pictures, episodes, tmp_path
+    with_pictures, episodes, tmp_path, pieces
 ):
     out = tmp_path / "lift"
-    peer("-c", CONVERT, with_pictures, out, "lerobot")
+    peer("-c", CONVERT, with_pictures, out, "lerobot", pieces)
+    assert len(list(out.glob("videos/*/chunk-000/file-*.mp4"))) == pieces
     told = read("lerobot", out)
     check(told, episodes)
     assert told["environment"] == "Lift"

@@ -19,15 +19,24 @@ def convert(
     out: Annotated[
         Path, typer.Option("--out", "-o", help="File, or folder, to write.")
     ],
+    executor: ExecutorOption = "serial",
+    workers: Annotated[
+        int, typer.Option(min=1, help="At once, for lerobot and npz; others are one.")
+    ] = 1,
 ) -> None:
-    """Write a recording in another layout."""
+    """Write a recording in another layout.
+
+    Stopped, all but `serial` go on when the same command is given again.
+    """
+    from wbc_suite.executors import make_executor
     from wbc_suite.recording import Dataset
     from wbc_suite.recording.converting import convert as write
 
+    asked = None if executor == "serial" else make_executor(executor, workers=workers)
     with Dataset(file) as dataset:
         total = len(dataset)
     with progress("Converting", total) as advance:
-        written = write(file, out, to, lambda _: advance(1))
+        written = write(file, out, to, advance, executor=asked, workers=workers)
     print(f"Wrote {written}.")
 
 

@@ -1,6 +1,5 @@
 """Other observations and rewards of episodes that were recorded long ago."""
 
-import hashlib
 import json
 import math
 import shutil
@@ -13,11 +12,11 @@ import numpy as np
 
 from wbc_suite.envs import RobotEnv
 from wbc_suite.errors import DatasetError
-from wbc_suite.executors import Executor, Item, Serial, work_off
+from wbc_suite.executors import Executor, Item
 from wbc_suite.recording.dataset import Dataset
 from wbc_suite.recording.episode import Episode
-from wbc_suite.recording.files import check_folder
 from wbc_suite.recording.replaying import play_states
+from wbc_suite.recording.sharing import share_out, work_folder
 from wbc_suite.recording.source import EnvSource, rebuild
 from wbc_suite.recording.writing import write_dataset
 
@@ -58,25 +57,25 @@ def extract(
         DatasetError: If the environment cannot be made, or states do not fit.
     """
     path, out = Path(path), Path(out)
-    folder = out.with_name(out.name + ".work")
     with Dataset(path) as dataset:
         if not len(dataset):
             raise DatasetError(f"'{path}' has no episodes.")
         names, masks = dataset.names, dataset.masks
-    check_folder(folder)
-    items = _items(path, names, trust_files, workers, changes)
-    outcomes = work_off(
+    size = min(PART, math.ceil(len(names) / workers))
+    common = {"trust_files": trust_files, "changes": json.loads(json.dumps(changes))}
+    done = share_out(
         extract_part,
-        items,
-        folder=folder,
-        executor=executor or Serial(),
-        tell=lambda item, outcome: tell(len(_names(item)) * (outcome.error is None)),
+        [
+            {**common, "names": list(names[k : k + size])}
+            for k in range(0, len(names), size)
+        ],
+        source=path,
+        out=out,
+        executor=executor,
+        tell=lambda item: tell(len(_names(item))),
     )
-    failed = [outcome.error for outcome in outcomes if outcome.error is not None]
-    if failed:
-        told = failed[0].removeprefix("DatasetError: ")
-        raise DatasetError(f"{len(failed)} of {len(items)} pieces failed: {told}")
-    parts = [folder / f"{item.name}.hdf5" for item in items]
+    folder = work_folder(out)
+    parts = [folder / f"{item.name}.hdf5" for item, _ in done]
 
     def episodes() -> Iterator[Episode]:
         for part in parts:
@@ -103,34 +102,6 @@ def extract_part(item: Item, folder: Path) -> dict[str, Any]:
         finally:
             env.close()
     return {"episodes": len(told["names"])}
-
-
-def _items(
-    path: Path,
-    names: tuple[str, ...],
-    trust_files: bool,
-    workers: int,
-    changes: dict[str, Any],
-) -> list[Item]:
-    """Share episodes out; items are others when the recording is another."""
-    stat = path.stat() if path.exists() else None
-    common = {
-        "source": str(path.resolve()),
-        "written": None if stat is None else [stat.st_size, stat.st_mtime_ns],
-        "trust_files": trust_files,
-        "changes": json.loads(json.dumps(changes)),
-    }
-    size = min(PART, math.ceil(len(names) / workers))
-    groups = [list(names[k : k + size]) for k in range(0, len(names), size)]
-    payloads = [{**common, "names": group} for group in groups]
-    return [
-        Item(name=f"{k:06d}-{_digest(payload)}", payload=payload)
-        for k, payload in enumerate(payloads)
-    ]
-
-
-def _digest(payload: dict[str, Any]) -> str:
-    return hashlib.sha256(json.dumps(payload, sort_keys=True).encode()).hexdigest()[:12]
 
 
 def _names(item: Item) -> list[Any]:

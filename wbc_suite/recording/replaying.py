@@ -1,8 +1,11 @@
 """Episodes played again: by their states, or by their actions."""
 
 import json
+import logging
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -14,6 +17,10 @@ from wbc_suite.recording.episode import Episode
 from wbc_suite.typing import Vector
 
 __all__ = ["Divergence", "divergence", "play_actions", "play_states", "start_as"]
+
+log = logging.getLogger(__name__)
+
+_JOINT = re.compile(r'<(?:free)?joint\b[^<>]*?\bname="([^"<>]{1,200})"')
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -45,7 +52,8 @@ def start_as(env: RobotEnv, episode: Episode) -> None:
     objects included; without (files from elsewhere) at the recorded physics state.
 
     Raises:
-        DatasetError: If the recorded state does not fit the environment.
+        DatasetError: If the recorded state does not fit the environment, or its joints
+            have other names here. In files from elsewhere they may have.
     """
     if "states" not in episode.columns or not episode.length:
         raise DatasetError(f"'{episode.name}' has no states to start from.")
@@ -56,6 +64,7 @@ def start_as(env: RobotEnv, episode: Episode) -> None:
             f"environment's have {env.physics_state.size}: its robot or its objects "
             "differ, and it cannot be replayed here."
         )
+    _check_joints(env, episode)
     told = episode.facts.get("rng_state")
     try:
         if told is None:
@@ -124,6 +133,30 @@ def divergence(env: RobotEnv, episode: Episode) -> Divergence:
         if worst > 0.0 and first is None:
             first = k
     return Divergence(steps=steps, largest=largest, first=first, success=success)
+
+
+def _check_joints(env: RobotEnv, episode: Episode) -> None:
+    """Refuse the states of another robot, which may be as many numbers."""
+    recorded = _joints_named(str(episode.facts.get("model_file", "")))
+    model = env.simulation.model
+    here = [model.joint(number).name for number in range(model.njnt)]
+    if not recorded or recorded == here:
+        return
+    pairs = zip_longest(recorded, here, fillvalue="nothing")
+    differing = [f"'{one}' is '{other}' here" for one, other in pairs if one != other]
+    words = f"{len(differing)} joints have other names: {', '.join(differing[:3])}"
+    if "uid" in episode.facts:  # it was recorded by us
+        raise DatasetError(
+            f"'{episode.name}' is of another robot or other objects, though its states "
+            f"have as many numbers; {words}."
+        )
+    log.warning("'%s': %s; states are taken in order", episode.name, words)
+
+
+def _joints_named(mjcf: str) -> list[str]:
+    """Return the names of a scene's joints, found without parsing what is untrusted."""
+    world = mjcf[mjcf.find("<worldbody") : mjcf.rfind("</worldbody>") + 1]
+    return _JOINT.findall(world)
 
 
 def _generator_state(text: str) -> dict[str, Any]:

@@ -1,48 +1,53 @@
 """Recordings in the layouts of others."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
-from typing import TypeAlias
 
-from wbc_suite.errors import UnknownNameError
-from wbc_suite.recording.converting.lerobot import write_lerobot
-from wbc_suite.recording.converting.mcap import write_mcap
-from wbc_suite.recording.converting.minari import write_minari
-from wbc_suite.recording.converting.plain import write_npz, write_robomimic
+from wbc_suite.errors import DatasetError, UnknownNameError
+from wbc_suite.executors import Executor
+from wbc_suite.recording.converting.layouts import LAYOUTS
+from wbc_suite.recording.converting.shared import convert_shared
 from wbc_suite.recording.dataset import Dataset
-from wbc_suite.recording.episode import Episode
 
 __all__ = ["LAYOUTS", "convert"]
 
-Tell: TypeAlias = Callable[[Episode], None]
-
-LAYOUTS: Mapping[str, Callable[[Dataset, Path, Tell], Path]] = {
-    "robomimic": write_robomimic,
-    "npz": write_npz,
-    "lerobot": write_lerobot,
-    "minari": write_minari,
-    "mcap": write_mcap,
-}
-"""What writes a dataset to a path, by the layout's name."""
-
 
 def convert(
-    source: str | Path, out: str | Path, layout: str, tell: Tell = lambda _: None
+    source: str | Path,
+    out: str | Path,
+    layout: str,
+    tell: Callable[[int], None] = lambda _: None,
+    *,
+    executor: Executor | None = None,
+    workers: int = 1,
 ) -> Path:
     """Write a recording in another layout; what was written is returned.
+
+    With an executor, pieces wait in `OUT.work` until all are done: stopped, it goes on
+    when called again. A layout that is one file is one piece.
 
     Args:
         source: The recording.
         out: File, or folder, to write.
         layout: One of `LAYOUTS`.
-        tell: Called with every episode when it is written.
+        tell: Called with the number of episodes that were written since the last call.
+        executor: Who does the work; this process, in one go, when left out.
+        workers: How many it has: episodes are shared out among them.
 
     Raises:
         UnknownNameError: If there is no such layout.
         DatasetError: If the recording cannot be read, a package is missing, or the
             path cannot be written.
     """
+    source, out = Path(source), Path(out)
     if layout not in LAYOUTS:
         raise UnknownNameError("layout", layout, LAYOUTS)
     with Dataset(source) as dataset:
-        return LAYOUTS[layout](dataset, Path(out), tell)
+        if not len(dataset):
+            raise DatasetError(f"'{source}' has no episodes.")
+        if executor is None:
+            return LAYOUTS[layout].write(dataset, out, lambda _: tell(1))
+        convert_shared(
+            dataset, out, layout, executor=executor, workers=workers, tell=tell
+        )
+    return out

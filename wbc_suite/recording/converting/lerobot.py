@@ -5,29 +5,33 @@
     meta/tasks.parquet                            task_index by task
     meta/episodes/chunk-000/file-000.parquet      where each episode is, and its stats
     data/chunk-000/file-000.parquet               one row per action
-    videos/KEY/chunk-000/file-000.mp4             the pictures of all episodes
+    videos/KEY/chunk-000/file-000.mp4             pictures, episode after episode
+
+Where the work is shared out, each piece writes a `file-N` of its own.
 
 Source: the documentation of LeRobotDataset v3.0 (huggingface.co/docs/lerobot).
 """
 
 import importlib
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wbc_suite.errors import DatasetError
+from wbc_suite.executors.item import Json
+from wbc_suite.recording.converting.piece import Piece, whole
 from wbc_suite.recording.dataset import Dataset
 from wbc_suite.recording.episode import Episode
 from wbc_suite.recording.files import new_folder
 
-__all__ = ["write_lerobot"]
+__all__ = ["begin_lerobot", "finish_lerobot", "write_lerobot", "write_lerobot_piece"]
 
-CHUNK = "chunk-000/file-000"
+CHUNK = 1000  # files in a folder
 QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
 PICTURE = "_image"
 """How keys of pictures end."""
@@ -50,18 +54,42 @@ def write_lerobot(
         DatasetError: If a package is missing, the folder is not empty, or episodes
             differ in what they hold.
     """
-    arrow, parquet = _need("pyarrow", "lerobot"), _need("pyarrow.parquet", "lerobot")
-    if not len(dataset):
-        raise DatasetError(f"'{dataset.path}' has no episodes.")
+    begin_lerobot(out)
+    finish_lerobot(
+        dataset, out, [write_lerobot_piece(dataset, whole(dataset), out, tell)]
+    )
+    return out
+
+
+def begin_lerobot(out: Path) -> None:
+    """Make the new folder, where the packages are there."""
+    for package in ("pyarrow", "pyarrow.parquet"):
+        _need(package, "lerobot")
     new_folder(out, "a LeRobot dataset")
-    rate = round(float(dataset.header.get("control_freq", 20.0)))
-    task = str(dataset.header.get("env", "demonstration"))
-    first = dataset.episode(dataset.names[0])
-    videos = [k for k in first.observed if k.endswith(PICTURE)]
-    writers = {key: _Video(out, key, rate) for key in videos}
-    tables, rows, start = [], [], 0
+
+
+def write_lerobot_piece(
+    dataset: Dataset,
+    piece: Piece,
+    out: Path,
+    tell: Callable[[Episode], None] = lambda _: None,
+) -> dict[str, Json]:
+    """Write frames and videos of some episodes as files of their own.
+
+    Returns:
+        `rows`: what the table of episodes says of them.
+    """
+    arrow, parquet = _need("pyarrow", "lerobot"), _need("pyarrow.parquet", "lerobot")
+    rate, place = _rate(dataset), _place(piece.number)
+    first = dataset.episode(piece.names[0])
+    writers = {
+        key: _Video(out / f"videos/{_feature(key)}/{place}.mp4", rate)
+        for key in _pictures(first)
+    }
+    tables, rows, start = [], [], piece.start
     try:
-        for number, episode in enumerate(dataset):
+        for number, name in enumerate(piece.names, start=piece.before):
+            episode = dataset.episode(name)
             columns = _vectors(episode)
             tables.append(_frames(arrow, columns, number, start, rate))
             stats = {name: _stats(column) for name, column in columns.items()}
@@ -69,7 +97,7 @@ def write_lerobot(
                 pictures = episode.columns[f"obs/{key}"]
                 writer.add(pictures)
                 stats[_feature(key)] = _picture_stats(pictures)
-            rows.append(_episode_row(number, episode.length, start, task, rate, videos))
+            rows.append(_episode_row(dataset, piece, number, episode, start, writers))
             rows[-1] |= {
                 f"stats/{feature}/{name}": value
                 for feature, told in stats.items()
@@ -77,16 +105,27 @@ def write_lerobot(
             }
             start += episode.length
             tell(episode)
+        table = arrow.concat_tables(tables)
     except (KeyError, arrow.ArrowInvalid) as error:
         raise DatasetError(f"Episodes differ in what they hold: {error}") from error
     finally:
         for writer in writers.values():
             writer.close()
-    table = arrow.concat_tables(tables)
-    _write(parquet, table, out / f"data/{CHUNK}.parquet")
+    _write(parquet, table, out / f"data/{place}.parquet")
+    return {"rows": rows}
+
+
+def finish_lerobot(
+    dataset: Dataset, out: Path, pieces: Sequence[Mapping[str, Json]]
+) -> None:
+    """Write what is said of all pieces together, in the order of the episodes."""
+    arrow, parquet = _need("pyarrow", "lerobot"), _need("pyarrow.parquet", "lerobot")
+    rows: list[Any] = [row for piece in pieces for row in cast(list, piece["rows"])]
+    frames = [out / f"data/{_place(number)}.parquet" for number in range(len(pieces))]
+    table = arrow.concat_tables([parquet.ParquetFile(path).read() for path in frames])
     episodes = arrow.Table.from_pylist(rows)
-    _write(parquet, episodes, out / f"meta/episodes/{CHUNK}.parquet")
-    tasks = arrow.table({"task_index": arrow.array([0]), "task": [task]})
+    _write(parquet, episodes, out / f"meta/episodes/{_place(0)}.parquet")
+    tasks = arrow.table({"task_index": arrow.array([0]), "task": [_task(dataset)]})
     pandas = {
         "index_columns": ["task"],
         "column_indexes": [],
@@ -99,10 +138,26 @@ def write_lerobot(
     }
     tasks = tasks.replace_schema_metadata({"pandas": json.dumps(pandas)})
     _write(parquet, tasks, out / "meta/tasks.parquet")
-    info = _info(dataset, first, videos, rate, start)
-    _write_json(out / "meta/info.json", info)
+    first = dataset.episode(dataset.names[0])
+    _write_json(out / "meta/info.json", _info(dataset, first, len(table)))
     _write_json(out / "meta/stats.json", _all_stats(table, rows))
-    return out
+
+
+def _rate(dataset: Dataset) -> int:
+    return round(float(dataset.header.get("control_freq", 20.0)))
+
+
+def _task(dataset: Dataset) -> str:
+    return str(dataset.header.get("env", "demonstration"))
+
+
+def _pictures(episode: Episode) -> list[str]:
+    return [key for key in episode.observed if key.endswith(PICTURE)]
+
+
+def _place(number: int) -> str:
+    """Return where the files of a piece are, without their ends."""
+    return f"chunk-{number // CHUNK:03d}/file-{number % CHUNK:03d}"
 
 
 def _need(package: str, extra: str) -> Any:
@@ -175,30 +230,35 @@ def _picture_stats(pictures: NDArray[np.uint8]) -> Stats:
 
 
 def _episode_row(
-    number: int, length: int, start: int, task: str, rate: int, videos: list[str]
+    dataset: Dataset,
+    piece: Piece,
+    number: int,
+    episode: Episode,
+    start: int,
+    videos: Iterable[str],
 ) -> dict[str, Any]:
+    length, rate = episode.length, _rate(dataset)
+    place = {"chunk_index": piece.number // CHUNK, "file_index": piece.number % CHUNK}
     row: dict[str, Any] = {
         "episode_index": number,
-        "tasks": [task],
+        "tasks": [_task(dataset)],
         "length": length,
-        "data/chunk_index": 0,
-        "data/file_index": 0,
         "dataset_from_index": start,
         "dataset_to_index": start + length,
         "meta/episodes/chunk_index": 0,
         "meta/episodes/file_index": 0,
     }
+    row |= {f"data/{name}": value for name, value in place.items()}
     for key in videos:
-        place = f"videos/{_feature(key)}"
-        row |= {f"{place}/chunk_index": 0, f"{place}/file_index": 0}
-        row[f"{place}/from_timestamp"] = start / rate
-        row[f"{place}/to_timestamp"] = (start + length) / rate
+        film, shown = f"videos/{_feature(key)}", start - piece.start
+        row |= {f"{film}/{name}": value for name, value in place.items()}
+        row[f"{film}/from_timestamp"] = shown / rate
+        row[f"{film}/to_timestamp"] = (shown + length) / rate
     return row
 
 
-def _info(
-    dataset: Dataset, first: Episode, videos: list[str], rate: int, frames: int
-) -> dict[str, Any]:
+def _info(dataset: Dataset, first: Episode, frames: int) -> dict[str, Any]:
+    videos, rate = _pictures(first), _rate(dataset)
     features: dict[str, Any] = {
         name: {"dtype": "float32", "shape": [column.shape[1]], "names": None}
         for name, column in _vectors(first).items()
@@ -230,7 +290,7 @@ def _info(
         "total_episodes": len(dataset),
         "total_frames": frames,
         "total_tasks": 1,
-        "chunks_size": 1000,
+        "chunks_size": CHUNK,
         "data_files_size_in_mb": 100,
         "video_files_size_in_mb": 200,
         "fps": rate,
@@ -294,12 +354,11 @@ def _write_json(path: Path, told: Mapping[str, Any]) -> None:
 
 
 class _Video:
-    """Pictures of all episodes in one H.264 file, a key frame every other picture."""
+    """Pictures of episodes in one H.264 file, a key frame every other picture."""
 
-    def __init__(self, out: Path, key: str, rate: int) -> None:
+    def __init__(self, path: Path, rate: int) -> None:
         self._av = _need("av", "lerobot")
-        path = out / f"videos/{_feature(key)}/{CHUNK}.mp4"
-        path.parent.mkdir(parents=True)
+        path.parent.mkdir(parents=True, exist_ok=True)
         self._film = self._av.open(str(path), "w")
         self._rate, self._stream, self._count = rate, None, 0
 

@@ -7,12 +7,14 @@ from pathlib import Path
 import numpy as np
 
 from wbc_suite.errors import DatasetError
+from wbc_suite.executors.item import Json
+from wbc_suite.recording.converting.piece import Piece, whole
 from wbc_suite.recording.dataset import Dataset
 from wbc_suite.recording.episode import Episode
 from wbc_suite.recording.files import check_folder
 from wbc_suite.recording.writing import write_dataset
 
-__all__ = ["write_npz", "write_robomimic"]
+__all__ = ["write_npz", "write_npz_piece", "write_robomimic"]
 
 _OURS = ("clipped", "step_time", "stamp")
 
@@ -63,8 +65,19 @@ def write_npz(
 
     Keys are the columns' names, with `.` for `/`, and `final_state`, `success`, `seed`.
     """
+    write_npz_piece(dataset, whole(dataset), out, tell)
+    return out
+
+
+def write_npz_piece(
+    dataset: Dataset,
+    piece: Piece,
+    out: Path,
+    tell: Callable[[Episode], None] = lambda _: None,
+) -> dict[str, Json]:
+    """Write some of the episodes."""
     check_folder(out)
-    for episode in dataset:
+    for episode in map(dataset.episode, piece.names):
         arrays = {n.replace("/", "."): c for n, c in episode.columns.items()}
         if episode.final_state is not None:
             arrays["final_state"] = episode.final_state
@@ -76,4 +89,4 @@ def write_npz(
         except OSError as error:
             raise DatasetError(f"'{out}' cannot be written: {error}.") from error
         tell(episode)
-    return out
+    return {}
