@@ -26,3 +26,11 @@ def test_robots_start_clear_of_everything_and_act(name, robots, way):
         assert penetration(env) < 5e-4
     act_at_random(env, 20, seed=0)
     env.close()
+
+
+@pytest.mark.parametrize("robot", ["PandaDexLH", "PandaDexRH"])
+def test_long_hands_start_clear_of_the_pot(robot):
+    env = wbc_suite.make("TwoArmLift", robots=[robot, robot])
+    for seed in range(20):
+        env.reset(seed=seed)  # else a PlacementError
+        assert not any(map(env.benchmark.grasped, env.benchmark.states))
