@@ -43,6 +43,7 @@ def test_the_readme_shows_the_catalogue(gallery):
     assert gallery.table() in text, "run `make gallery`"
 
 
+@pytest.mark.slow
 def test_every_subject_has_a_small_picture(gallery):
     names = [name for rows in gallery.subjects().values() for _, name in rows]
     assert len(names) > 30
@@ -51,6 +52,7 @@ def test_every_subject_has_a_small_picture(gallery):
     assert len(list(gallery.FOLDER.iterdir())) == len(names)
 
 
+@pytest.mark.slow
 def test_every_benchmark_has_a_picture_and_a_place_on_the_page(benchmarks):
     names = benchmark_names()
     assert benchmarks.PAGE.read_text(encoding="utf-8") == benchmarks.page()

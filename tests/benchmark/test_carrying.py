@@ -20,6 +20,7 @@ def env(request):
     return made(request.param)
 
 
+@pytest.mark.slow
 def test_everything_in_its_place_is_a_success(env):
     benchmark = put_at(env, goals(env))
     assert benchmark.success()

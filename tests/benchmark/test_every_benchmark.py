@@ -25,6 +25,7 @@ def test_every_benchmark_has_an_id():
         assert f"wbc_suite/{name}-v0" in gymnasium.registry
 
 
+@pytest.mark.slow
 def test_random_actions_leave_everything_in_bounds(env):
     env.reset(seed=0)
     env.action_space.seed(0)

@@ -74,6 +74,7 @@ def test_the_cube_rests_on_the_table(env):
     assert env.benchmark.cube_position[2] == pytest.approx(0.8 + half, abs=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", MOVING, ids=lambda robot: robot.name)
 def test_robots_that_move_have_room_before_the_table(robot):
     env = wbc_suite.make("Lift", robots=robot, initialization_noise=None)

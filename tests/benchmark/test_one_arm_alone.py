@@ -30,6 +30,7 @@ def test_a_pot_is_lifted_by_both(robots, way, monkeypatch):
         assert task.reward(shaped=False) == float(all(holding))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("robots", "way"), WAYS)
 def test_a_hammer_is_handed_over_before_the_second_arm_has_it(robots, way, monkeypatch):
     env = wbc_suite.make("TwoArmHandover", robots=robots, env_configuration=way)

@@ -139,6 +139,7 @@ def test_the_hammer_lies_before_arm_0_and_keys_are_those_of_datasets():
     np.testing.assert_allclose(seen["gripper1_to_handle"], wanted, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_long_hammer_does_not_start_with_its_head_beyond_the_table():
     env = wbc_suite.make("TwoArmHandover")
     half = np.array(env.benchmark.config.table.size[:2]) / 2

@@ -110,6 +110,7 @@ def test_handle_0_starts_towards_arm_0_and_the_pot_stays_where_it_is(env):
         assert penetration(env) < 5e-4
 
 
+@pytest.mark.slow
 def test_robots_stand_as_they_are_told():
     def bases(**arguments):
         env = wbc_suite.make("TwoArmLift", **arguments)

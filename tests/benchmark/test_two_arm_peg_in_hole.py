@@ -109,6 +109,7 @@ def test_random_actions_leave_everything_in_bounds(robots):
     act_at_random(env, 500)
 
 
+@pytest.mark.slow
 def test_nothing_touches_at_reset():
     for robots in (["Panda", "Panda"], ["UR5e", "Sawyer"], "Baxter", "Tiago"):
         env = wbc_suite.make("TwoArmPegInHole", robots=robots)

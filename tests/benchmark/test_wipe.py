@@ -53,6 +53,7 @@ def press_on(env, place, height, steps=40):
             assert "physics_error" not in info
 
 
+@pytest.mark.slow
 def test_pressing_wipes_what_lies_under_the_pad(env):
     observation, _ = env.reset(seed=0)
     wipe = env.benchmark
@@ -142,6 +143,7 @@ def test_robots_wipe_with_a_pad_unless_told_otherwise():
     assert not wbc_suite.make("Wipe", robots="UR5e").robots[0].synergies
 
 
+@pytest.mark.slow
 def test_contact_is_felt_while_the_pad_presses(env):
     env.reset(seed=0)
     assert env.observation()["robot0_contact"] == 0.0

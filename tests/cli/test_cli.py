@@ -37,6 +37,7 @@ def wbc_suite_command(monkeypatch, capsys):
     return run
 
 
+@pytest.mark.slow
 def test_help_imports_nothing_heavy():
     heavy = ["mujoco", "numpy", "pinocchio", "mink", "scipy", "viser", "numba", "PIL"]
     code = f"""
@@ -66,6 +67,7 @@ def test_version_is_printed(wbc_suite_command):
     assert wbc_suite_command("--version")[:2] == (0, "wbc-suite 0.1.0\n")
 
 
+@pytest.mark.slow
 def test_list_names_every_robot_and_component(wbc_suite_command):
     code, out, _ = wbc_suite_command("list")
     assert code == 0
@@ -107,6 +109,7 @@ def test_a_urdf_comes_in_and_is_edited_as_toml(wbc_suite_command, tmp_path):
     assert "8 dof" in out
 
 
+@pytest.mark.slow
 def test_a_folder_of_ones_own_is_seen(wbc_suite_command, tmp_path):
     robots = tmp_path / "robots"
     robots.mkdir()
@@ -118,6 +121,7 @@ def test_a_folder_of_ones_own_is_seen(wbc_suite_command, tmp_path):
     assert str(tmp_path) in os.environ[ENVIRONMENT_VARIABLE]
 
 
+@pytest.mark.slow
 def test_render_writes_a_picture_of_the_size_asked_for(wbc_suite_command, tmp_path):
     file = tmp_path / "panda.png"
     size = ("--width", 120, "--height", 80)
@@ -156,6 +160,7 @@ def test_a_typo_in_any_file_is_told_in_one_line(wbc_suite_command, tmp_path, dam
     assert word in err
 
 
+@pytest.mark.slow
 def test_describe_action_shows_every_slice_with_its_unit(wbc_suite_command):
     code, out, _ = wbc_suite_command("describe-action", "Panda")
     assert code == 0
@@ -195,6 +200,7 @@ def test_the_list_names_part_controllers_and_what_files_control(wbc_suite_comman
     assert "pandaomron_basic" in out
 
 
+@pytest.mark.slow
 def test_grippers_and_bases_are_chosen_on_the_command_line(wbc_suite_command, tmp_path):
     parts = ("--gripper", "right=InspireRightHand, left=none", "--base", "NullMount")
     code, out, _ = wbc_suite_command("describe-action", "Baxter", *parts)
@@ -233,6 +239,7 @@ def _frame(film: Image.Image, number: int) -> Image.Image:
     return film.convert("RGB")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -264,6 +271,7 @@ def test_a_mistake_gets_one_line_and_exit_code_2(wbc_suite_command, arguments, w
         assert word in err
 
 
+@pytest.mark.slow
 def test_bench_times_steps_beside_raw_physics(wbc_suite_command, tmp_path):
     file = tmp_path / "bench.json"
     code, out, _ = wbc_suite_command(

@@ -7,6 +7,7 @@ from wbc_suite.cli.diagnosis import State, diagnose
 from wbc_suite.sensing import gl_backend
 
 
+@pytest.mark.slow
 def test_this_machine_is_explained():
     findings = {finding.topic: finding for finding in diagnose()}
     assert "ms for a 256x256 frame" in findings["pictures"].text

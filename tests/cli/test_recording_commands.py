@@ -24,6 +24,7 @@ def command(monkeypatch, capsys):
     return run
 
 
+@pytest.mark.slow
 def test_a_recording_is_made_inspected_and_replayed(command, tmp_path):
     file = tmp_path / "lift.hdf5"
     arguments = ("Lift", "--robots", "Panda", "--horizon", 70, "--out", file)
@@ -57,6 +58,7 @@ def test_a_film_that_cannot_be_written_is_said_before_anything_is_played(
     assert ".mp4, .webp or .gif" in err
 
 
+@pytest.mark.slow
 def test_a_scripted_hand_says_what_it_knows(command, tmp_path):
     code, _, err = command(
         "record", "Stack", "--robots", "Panda", "--out", tmp_path / "a.hdf5"
@@ -66,6 +68,7 @@ def test_a_scripted_hand_says_what_it_knows(command, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_random_actions_of_any_robot_are_recorded(command, tmp_path):
     file = tmp_path / "a.hdf5"
     arguments = ("--robots", "UR5e", "--device", "random", "--horizon", 3)
@@ -107,6 +110,7 @@ class Hand:
 '''
 
 
+@pytest.mark.slow
 def test_a_person_with_a_device_records(command, tmp_path, monkeypatch):
     (tmp_path / "waving.py").write_text(HAND)
     monkeypatch.syspath_prepend(tmp_path)

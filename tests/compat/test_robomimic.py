@@ -106,6 +106,7 @@ def driver():
     driver.env.close()
 
 
+@pytest.mark.slow
 def test_a_trainer_steps_records_and_goes_back(driver):
     first = driver.reset()
     assert {"object", "agentview_image", "robot0_eye_in_hand_image"} <= set(first)
@@ -139,6 +140,7 @@ def test_old_controllers_mean_what_they_did(driver):
     assert np.all(np.asarray(right.kp) == 150)
 
 
+@pytest.mark.slow
 def test_robots_answer_scripts(driver):
     (robot,) = driver.env.robots
     assert (robot.name, robot.robot_model.naming_prefix) == ("Panda", "robot0_")
@@ -156,6 +158,7 @@ def test_robots_answer_scripts(driver):
     )
 
 
+@pytest.mark.slow
 def test_model_and_state_answer_by_name(driver):
     sim = driver.env.sim
     raw = driver.env.env.simulation.data

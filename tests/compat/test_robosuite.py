@@ -51,6 +51,7 @@ def test_a_script_runs_with_four_tuples():
         env.step(np.zeros(7))
 
 
+@pytest.mark.slow
 def test_pictures_are_as_robomimic_expects_them(env):
     observation = env.reset()
     cameras, view = env.env.cameras, {"width": 40, "height": 32}
@@ -70,6 +71,7 @@ def test_pictures_are_as_robomimic_expects_them(env):
     np.testing.assert_array_equal(shown, observation["agentview_image"])
 
 
+@pytest.mark.slow
 def test_states_go_out_and_in_as_in_datasets(env):
     env.reset()
     env.step(np.zeros(env.action_dim))

@@ -60,6 +60,7 @@ def test_zero_steps_hold_every_robot_for_two_seconds(name, alone):
     np.testing.assert_allclose(one.state.root_pose.translation, height, atol=3e-4)
 
 
+@pytest.mark.slow
 def test_spot_stands_on_four_feet_and_moves_its_arm(alone):
     """robosuite's goes from 0.48 m to 0.11 m in these 4 s."""
     one = alone("SpotWithArm", "BASIC")

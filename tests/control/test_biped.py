@@ -53,6 +53,7 @@ def pelvis(env: Any) -> np.ndarray:
     return env.simulation.data.body("robot0_base_link").xpos.copy()
 
 
+@pytest.mark.slow
 def test_it_stands_where_it_stood():
     env = make()
     start = pelvis(env)
@@ -61,6 +62,7 @@ def test_it_stands_where_it_stood():
     assert upright(env) > np.cos(np.radians(0.5))
 
 
+@pytest.mark.slow
 def test_a_near_hand_target_moves_the_arm_and_not_the_pelvis():
     """Without balance, the pelvis went 17 mm in 50 ms, and the robot fell."""
     env = make()

@@ -90,6 +90,7 @@ def test_changing_the_mode_never_moves_the_target(frame, alone):
         drive(one, 1, mode, [0.5, 0.2, 0.4])
 
 
+@pytest.mark.slow
 def test_steps_keep_their_axes_in_both_modes(alone):
     """A step forward is the base's forward, also after the base has turned."""
     for mode in (-1.0, 1.0):

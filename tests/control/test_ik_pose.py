@@ -115,6 +115,7 @@ def test_a_turn_is_limited_and_its_quaternion_may_have_any_length(alone):
     assert turned == pytest.approx([0.0, 0.0, 0.2], abs=1e-4)
 
 
+@pytest.mark.slow
 def test_a_goal_out_of_reach_gives_a_reason_and_no_chatter(alone):
     rig = arm(alone, input_type="absolute", input_ref_frame="world")
     action = rig.controller.hold_action

@@ -81,6 +81,7 @@ def test_a_json_file_makes_an_environment_and_says_what_it_leaves_out(tmp_path, 
     np.testing.assert_allclose(site.xpos - before, [0.04, 0.0, 0.0], atol=5e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("robot", "size"), [("GR1", 24), ("GR1FixedLowerBody", 24), ("Tiago", 17)]
 )

@@ -92,6 +92,7 @@ def test_the_observer_does_not_wind_up_while_a_motor_is_at_its_limit(panda):
     assert isinstance(law, JointLaw)
 
 
+@pytest.mark.slow
 def test_compiled_and_readable_observer_and_window_agree(alone):
     ends = []
     for compiled in (True, False):

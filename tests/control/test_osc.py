@@ -65,6 +65,7 @@ def test_the_input_range_scales_steps(rig):
     np.testing.assert_allclose(one.part.goal.translation - start, [0.1, 0, 0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ARMS)
 @pytest.mark.parametrize("frame", ["world", "base", "eef"])
 @pytest.mark.parametrize("mode", ["achieved", "desired"])
@@ -226,6 +227,7 @@ def test_torques_are_limited(rig):
     assert (np.abs(one.law.drives["high"][-3:]) == 12.0).all()  # the motors' own
 
 
+@pytest.mark.slow
 def test_the_arm_stops_at_its_joints_limits(rig):
     for saturation in ("clip", "qp"):
         one = rig(goal_update_mode="desired", saturation=saturation)
@@ -241,6 +243,7 @@ def test_the_arm_stops_at_its_joints_limits(rig):
                 assert (q < high + 1e-2).all()
 
 
+@pytest.mark.slow
 def test_joints_keep_their_speeds_and_the_hand_its_way(rig):
     """Two joints of Baxter would have to go too fast: the hand goes slower instead."""
     one = rig("Baxter", input_type="absolute", input_ref_frame="world")
@@ -301,6 +304,7 @@ def test_zero_stiffness_lets_the_hand_float(rig):
     assert one.position[0] - start[0] > 0.05
 
 
+@pytest.mark.slow
 def test_the_posture_moves_the_arm_but_not_the_hand(rig):
     start = rig()
     q = start.data.qpos[start.law.drives["qpos"]].copy()

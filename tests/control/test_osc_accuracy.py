@@ -50,6 +50,7 @@ def needed(one, before):
     return float(np.max(np.abs(q - before) / one.law.drives["fastest"]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EVERY_ARM)
 def test_a_step_settles_within_half_a_second(rig, name):
     """All six directions, but those that a joint's own top speed rules out."""
@@ -78,6 +79,7 @@ def test_a_step_settles_within_half_a_second(rig, name):
     assert possible >= 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EVERY_ARM)
 def test_axes_are_decoupled(rig, name):
     """A step along or about one axis moves the others by less than 2 % of it."""
@@ -107,6 +109,7 @@ def test_a_circle_is_followed(rig, name):
     assert max(away[10:]) < 2e-3  # asked for: 5 mm
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kp", [100.0, 200.0, 300.0])
 @pytest.mark.parametrize("name", EVERY_ARM)
 def test_a_push_moves_the_hand_as_its_stiffness_says(rig, name, kp):
@@ -120,6 +123,7 @@ def test_a_push_moves_the_hand_as_its_stiffness_says(rig, name, kp):
         assert np.linalg.norm(moved - expected) < 0.05 * np.linalg.norm(expected)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["OSC_POSE", "OSC_POSITION"])
 @pytest.mark.parametrize("name", EVERY_ARM)
 def test_an_unknown_payload_sags_as_predicted_and_is_found_out(rig, name, kind):

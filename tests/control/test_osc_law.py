@@ -63,6 +63,7 @@ def disagreement(rig, seed):
     return max(apart, np.abs(compiled - readable).max() / size)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("saturation", ["clip", "qp"])
 @pytest.mark.parametrize("name", FEW)
 def test_compiled_and_readable_law_agree(alone, name, saturation):
@@ -164,6 +165,7 @@ def test_torques_are_those_of_pinocchio_s_dynamics(alone):
         np.testing.assert_allclose(found, tau, atol=1e-8 * (1 + np.abs(tau).max()))
 
 
+@pytest.mark.slow
 def test_at_limits_the_readable_law_solves_the_stated_qp(alone):
     at = in_the_world(alone, saturation="qp")
     active = 0

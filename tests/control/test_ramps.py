@@ -24,6 +24,7 @@ def random_ramps(count):
         yield fastest_ramp(*ends, speed=speed, rate=rate), ends, speed, rate
 
 
+@pytest.mark.slow
 def test_ramps_lead_from_state_to_state_within_limits():
     found = 0
     for ramp, (start, end), speed, rate in random_ramps(300):

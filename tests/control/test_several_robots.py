@@ -58,6 +58,7 @@ def joints(state):
     return state.data.qpos[q]
 
 
+@pytest.mark.slow
 def test_two_pandas_and_a_third_on_wheels_reach_their_own_targets():
     states, reports = simulate(robots(["Panda", "Panda", "PandaOmron"]))
     assert [state.prefix for state in states] == ["robot0_", "robot1_", "robot2_"]
@@ -68,6 +69,7 @@ def test_two_pandas_and_a_third_on_wheels_reach_their_own_targets():
     assert lift > 0.25  # from 0.17: the target is 0.35 m up
 
 
+@pytest.mark.slow
 def test_a_robot_moves_as_if_it_were_alone():
     first, second = robots(["Panda", "Panda"])
     together, _ = simulate([first, second], seconds=1.0)

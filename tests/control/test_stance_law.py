@@ -73,6 +73,7 @@ def worst_disagreement(scene, count):
     return max(disagreement(scene, home, seed) for seed in range(count))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ROBOTS)
 def test_compiled_and_readable_law_agree(alone, name):
     assert worst_disagreement(alone(name), 100) < 1e-10
@@ -112,6 +113,7 @@ class Truth:
         self.a[:6] = stance["asked"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ROBOTS)
 def test_torques_and_contact_forces_move_the_robot_as_asked(alone, name):
     """The equations of motion hold, root included, and feet stay where they are."""
@@ -133,6 +135,7 @@ def test_torques_and_contact_forces_move_the_robot_as_asked(alone, name):
         assert np.abs(feet).max() < 0.02 * (1.0 + np.abs(truth.a).max())
 
 
+@pytest.mark.slow
 def test_the_readable_law_of_soles_solves_the_stated_qp(alone):
     scene = alone("GR1FreeBody")
     law, home, changed = stance_of(scene), scene.state.data.qpos.copy(), 0
@@ -166,6 +169,7 @@ def test_the_readable_law_of_soles_solves_the_stated_qp(alone):
     assert changed > 5
 
 
+@pytest.mark.slow
 def test_arms_swing_no_harder_than_feet_can_bear(alone):
     """Each foot is left 10 N, exactly so where the arm is held back."""
     scene = alone("SpotWithArm")
@@ -186,6 +190,7 @@ def test_arms_swing_no_harder_than_feet_can_bear(alone):
     np.testing.assert_allclose(pressed[-1], LEAST_PRESSURE, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_hand_that_presses_on_the_floor_does_not_lift_the_feet(alone):
     """It pressed with 140 N, and three feet left the ground.
 
@@ -215,6 +220,7 @@ def test_a_hand_that_presses_on_the_floor_does_not_lift_the_feet(alone):
     assert hardest > 10.0
 
 
+@pytest.mark.slow
 def test_an_arm_on_legs_learns_what_pulls_at_its_hand(alone):
     """10 N at the hand: 25 mm without the observer, 4 mm with it.
 

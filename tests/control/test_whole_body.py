@@ -26,6 +26,7 @@ ROBOTS = ("Panda", "GR1", "Tiago", "SpotWithArm")
 STEP = np.array([0.03, 0.04, -0.03, 0.0, 0.1, 0.1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", ROBOTS)
 @pytest.mark.parametrize(
     "controller",
@@ -45,6 +46,7 @@ def test_the_hand_arrives_in_simulation(alone, robot, controller):
     np.testing.assert_allclose(moved, STEP[:3], atol=bound)
 
 
+@pytest.mark.slow
 def test_a_hand_that_creeps_past_a_singularity_takes_another_way(alone):
     """It came 4 cm a second nearer: 7 mm were left after two seconds."""
     scene = alone("SpotWithArm")
@@ -75,6 +77,7 @@ def test_a_goal_out_of_reach_is_reported_and_forgotten(alone, robot):
     assert back["frames"]["right_hand"]["position_error"] < 1e-3
 
 
+@pytest.mark.slow
 def test_reasons_say_what_is_in_the_way(alone):
     scene = alone("Panda")
     down = scene.act({"right_hand": np.array([-0.4, 0, 0.9, 0, 1.5, 0])}, 2.0)
@@ -82,6 +85,7 @@ def test_reasons_say_what_is_in_the_way(alone):
     assert "limit: panda_joint" in words or "out of reach" in words
 
 
+@pytest.mark.slow
 def test_what_the_hand_presses_on_is_named(alone):
     scene = alone(load_robot("Panda", base="NullMount"))
     height = scene.site("right_tcp")[2]
@@ -97,6 +101,7 @@ def test_what_the_hand_presses_on_is_named(alone):
     )
 
 
+@pytest.mark.slow
 def test_a_limb_that_gives_way_is_no_goal_out_of_reach(alone):
     scene = alone("UR5e")
     state = scene.state
@@ -111,6 +116,7 @@ def test_a_limb_that_gives_way_is_no_goal_out_of_reach(alone):
     assert lagging_joint(state, joints, elsewhere) == f"motor limit: {joints[1]}"
 
 
+@pytest.mark.slow
 def test_each_hand_is_told_its_own_collisions(alone):
     scene = alone("GR1")
     back = np.array([-1.0, 0.0, 0.3, 0.0, 0.0, 0.0])
@@ -137,6 +143,7 @@ def test_deltas_are_along_the_axes_of_their_reference(alone, reference):
     np.testing.assert_allclose(moved, axes @ [0, 0, 0.04], atol=2e-4)
 
 
+@pytest.mark.slow
 def test_zero_deltas_never_move_the_hand(alone):
     scene = alone("GR1", input_type="delta")
     before = scene.site("left_tcp")
@@ -145,6 +152,7 @@ def test_zero_deltas_never_move_the_hand(alone):
     assert np.linalg.norm(scene.site("left_tcp") - before) < 1e-4
 
 
+@pytest.mark.slow
 def test_base_goals_of_tiago_move_the_base(alone):
     scene = alone("Tiago")
     before = scene.site("base")
@@ -169,6 +177,7 @@ def test_bases_that_glide_move_beneath_the_hands(alone, robot):
     np.testing.assert_allclose(scene.site("right_tcp"), before, atol=1e-3)
 
 
+@pytest.mark.slow
 def test_spot_stands_and_keeps_its_feet_while_the_body_moves(alone):
     scene = alone("SpotWithArm")
     feet = [f.name for f in scene.robot.frames if f.role == "foot"]
@@ -192,6 +201,7 @@ def test_grippers_open_and_close(alone):
         assert finger.qpos[0] == pytest.approx(where, abs=2e-3)
 
 
+@pytest.mark.slow
 def test_the_hold_action_holds(alone):
     scene = alone("GR1")
     before = scene.site("right_tcp")
@@ -284,6 +294,7 @@ def test_a_free_robot_that_nothing_holds_is_refused(alone):
         alone(load_robot("UR5e", base="NoActuationBase"))
 
 
+@pytest.mark.slow
 def test_a_biped_of_unknown_soles_is_warned_of(alone, caplog):
     held = [{"frame": f"{side}_foot", "contact": "surface"} for side in SIDES]
     alone("GR1FreeBody", held=held)
@@ -322,6 +333,7 @@ def test_unknown_names_get_suggestions(alone):
         load_composite_controller_config({"frame": []})
 
 
+@pytest.mark.slow
 def test_a_composite_of_ones_own_can_be_registered(alone):
     made = []
 
@@ -342,6 +354,7 @@ def test_a_composite_of_ones_own_can_be_registered(alone):
         register_composite("my_own", build, family="x", default=lambda _: {})
 
 
+@pytest.mark.slow
 def test_reasons_stay_those_of_their_own_step():
     env = wbc_suite.make("Lift", robots="Panda", controller_configs="WHOLE_BODY_IK")
     told = []

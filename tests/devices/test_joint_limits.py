@@ -91,6 +91,7 @@ def run(env, story):
     return np.array(sampled), dt
 
 
+@pytest.mark.slow
 @settings(max_examples=12)
 @given(story=st.lists(SAID, min_size=2, max_size=8))
 def test_joint_targets_keep_every_limit_whatever_the_device_says(env, story):

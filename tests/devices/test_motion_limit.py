@@ -22,6 +22,7 @@ def worst(path, order, dt):
     return np.linalg.norm(differences, axis=1).max()
 
 
+@pytest.mark.slow
 @settings(max_examples=60)
 @given(
     goals=st.lists(

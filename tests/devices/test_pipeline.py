@@ -62,6 +62,7 @@ def test_hand_repeats_the_motion_of_the_input(person):
     np.testing.assert_allclose(person.target("left_hand")[:3], [0.4, 0.2, 1.0])
 
 
+@pytest.mark.slow
 @settings(max_examples=8)
 @given(
     places=st.lists(
@@ -199,6 +200,7 @@ def test_grip_closes_all_synergies_or_each(person):
     np.testing.assert_allclose(person.target("right_gripper"), [0.5, -0.5], atol=1e-4)
 
 
+@pytest.mark.slow
 def test_button_grips_with_the_hand_that_is_switched_to_and_no_other():
     person = Person(FloatingEnv(robots=2))
     up = LimbInput(twist=np.array([0, 0, 0.1, 0, 0, 0]))
@@ -248,6 +250,7 @@ def said(kind, numbers, engaged):
     return {"right": LimbInput(twist=np.tile(numbers, 2), engaged=engaged)}
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(messages=st.lists(MESSAGES, min_size=1, max_size=8), absolute=st.booleans())
 def test_no_device_makes_a_target_exceed_its_limits(messages, absolute):

@@ -133,6 +133,7 @@ def test_first_sender_holds_until_it_leaves(stream):
         wait_for(taken_over)
 
 
+@pytest.mark.slow
 def test_hundred_connects_and_disconnects_and_a_flood_leave_it_working(
     stream, monkeypatch
 ):

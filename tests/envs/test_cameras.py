@@ -32,6 +32,7 @@ def env():
     env.close()
 
 
+@pytest.mark.slow
 def test_observations_are_what_the_space_says(env):
     observation, _ = env.reset(seed=0)
     assert env.observation_space.contains(observation)
@@ -66,6 +67,7 @@ def test_the_cube_is_seen_where_it_is(env):
     assert red[0] > 1.5 * red[1]
 
 
+@pytest.mark.slow
 def test_segmentation_tells_robots_grippers_furniture_and_objects_apart(env):
     observation, _ = env.reset(seed=0)
     names = env.cameras.labels.names
@@ -88,6 +90,7 @@ def test_segmentation_tells_robots_grippers_furniture_and_objects_apart(env):
     )
 
 
+@pytest.mark.slow
 def test_pictures_move_with_the_robot_and_not_behind_it():
     env = wbc_suite.make("Lift", robots="Panda", **SEEN | {"camera_depths": False})
     env.reset(seed=0)
@@ -118,6 +121,7 @@ def test_drawing_changes_no_state(env):
     np.testing.assert_array_equal(*states)
 
 
+@pytest.mark.slow
 def test_a_copy_sees_the_same(env):
     env.reset(seed=2)
     env.step(env.hold_action)
@@ -135,6 +139,7 @@ def test_physics_that_fails_is_seen_black(env):
     assert not observation["agentview_image"].any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
 def test_vectors_draw_what_each_sees_alone(mode):
     few = {k: v for k, v in SEEN.items() if "seg" not in k and "depths" not in k}
@@ -173,6 +178,7 @@ def test_vectors_draw_what_each_sees_alone(mode):
     alone.close()
 
 
+@pytest.mark.slow
 def test_render_modes_give_what_they_are_called():
     for mode, shape, kind in (
         ("rgb_array", (24, 32, 3), np.uint8),
@@ -188,6 +194,7 @@ def test_render_modes_give_what_they_are_called():
     assert 0.3 < picture.min() < picture.max() <= env.cameras.far
 
 
+@pytest.mark.slow
 def test_people_watch_a_page_that_follows_and_goes_when_closed(caplog):
 
     env = wbc_suite.make("Lift", robots="Panda", render_mode="human")
@@ -221,6 +228,7 @@ def test_an_unknown_camera_is_named():
         wbc_suite.make("Lift", use_camera_obs=True, camera_names="agentviw")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", ["Panda", "GR1", "SpotWithArm", "Tiago", "Baxter"])
 def test_a_robots_own_view_shows_the_robot_and_the_table(robot):
     env = wbc_suite.make("Lift", robots=robot)
@@ -237,6 +245,7 @@ def test_a_robots_own_view_shows_the_robot_and_the_table(robot):
     assert shares["table"] > 0.01
 
 
+@pytest.mark.slow
 def test_a_closed_renderer_is_gone_without_the_collector():
     def alive():
         return [x for x in gc.get_objects() if isinstance(x, SceneRenderer)]

@@ -61,6 +61,7 @@ def test_after_resets_copies_and_a_disturbed_global_generator(env):
     assert run(env, 40, seed=12) != first
 
 
+@pytest.mark.slow
 def test_with_pictures_and_without():
     plain = wbc_suite.make("Lift", **ARGUMENTS)
     seeing = wbc_suite.make(

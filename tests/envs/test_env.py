@@ -121,6 +121,7 @@ def test_a_controller_that_fails_in_a_broken_state_ends_the_episode(env, monkeyp
     assert "SVD did not converge" in info["physics_error"]
 
 
+@pytest.mark.slow
 def test_a_robot_measured_from_its_pelvis_is_lifted_out_of_the_floor(caplog):
     own = load_robot("gr1_fixed_lower_body")
     robot = own.with_root("fixed", pos=(0.0, 0.0, 0.0))
@@ -135,6 +136,7 @@ def test_a_robot_measured_from_its_pelvis_is_lifted_out_of_the_floor(caplog):
     assert wbc_suite.make("Lift", robots=arm).robots[0].root.pos[2] == 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [{"type": "uniform", "magnitude": 0.5}, "default"])
 def test_noise_moves_arms_and_nothing_else_and_stays_within_ranges(noise):
     quiet = wbc_suite.make("Lift", robots="Tiago", initialization_noise=None)
@@ -191,6 +193,7 @@ def test_copies_go_on_from_where_the_original_stands(env, copied):
     np.testing.assert_array_equal(first["cube_pos"], second["cube_pos"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", ["GR1", "Tiago", "SpotWithArm"])
 def test_every_robot_stands_at_the_table_and_holds(robot):
     env = wbc_suite.make("Lift", robots=robot, controller_configs="WHOLE_BODY_IK")
@@ -204,6 +207,7 @@ def test_every_robot_stands_at_the_table_and_holds(robot):
     assert np.abs(cube.qvel).max() < 0.01
 
 
+@pytest.mark.slow
 def test_pictures_show_the_scene():
     env = wbc_suite.make(
         "Lift", robots="Panda", render_mode="rgb_array", render_size=(96, 64)
@@ -244,6 +248,7 @@ def test_users_own_samplers_place_the_things():
         wbc_suite.make("Lift", placement_initializer="here")
 
 
+@pytest.mark.slow
 def test_wrong_arguments_say_what_is_legal():
     with pytest.raises(ConfigError, match="Did you mean 'robots'"):
         wbc_suite.make("Lift", robot="Panda")
@@ -310,6 +315,7 @@ def test_a_state_is_gone_on_from_bit_by_bit(env):
     np.testing.assert_array_equal(runs[1], runs[3])
 
 
+@pytest.mark.slow
 def test_an_episode_can_begin_at_a_recorded_place(env):
     env.reset(seed=1)
     action = env.hold_action

@@ -25,6 +25,7 @@ def env():
     env.close()
 
 
+@pytest.mark.slow
 def test_checkers_say_nothing_of_the_raw_environment(env):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -50,6 +51,7 @@ def test_spaces_are_those_that_learners_take(env):
             assert np.isfinite([space.low, space.high]).all()
 
 
+@pytest.mark.slow
 def test_steps_return_plain_types_and_exactly_the_spaces_keys(env):
     observation, info = env.reset(seed=1)
     assert type(info) is dict
@@ -62,6 +64,7 @@ def test_steps_return_plain_types_and_exactly_the_spaces_keys(env):
     assert not hasattr(env.unwrapped, "compute_reward")  # means goals there
 
 
+@pytest.mark.slow
 def test_actions_inside_of_the_space_are_never_clipped():
     env = wbc_suite.make("Lift", robots="GR1", controller_configs="WHOLE_BODY_IK")
     env.reset(seed=0)

@@ -51,6 +51,7 @@ def listed(info):
     return info.tolist() if isinstance(info, np.ndarray) else info
 
 
+@pytest.mark.slow
 def test_gymnasium_makes_ours_and_knows_how_it_resets(envs):
     assert isinstance(envs, VectorRobotEnv)
     assert envs.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
@@ -61,6 +62,7 @@ def test_gymnasium_makes_ours_and_knows_how_it_resets(envs):
     assert isinstance(gymnasium.make_vec("wbc_suite/Lift-v0"), VectorRobotEnv)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("controller", ["BASIC", "WHOLE_BODY_IK"])
 @pytest.mark.parametrize("threads", [1, 2, 5])
 def test_each_environment_does_what_it_does_alone(threads, controller):
@@ -83,6 +85,7 @@ def test_each_environment_does_what_it_does_alone(threads, controller):
     envs.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES, ids=lambda mode: mode.value)
 def test_episodes_follow_each_other_as_in_gymnasiums_own_vectors(mode):
     ours = make(2, autoreset_mode=mode)
@@ -108,6 +111,7 @@ def test_episodes_follow_each_other_as_in_gymnasiums_own_vectors(mode):
     theirs.close()
 
 
+@pytest.mark.slow
 def test_a_disabled_autoreset_leaves_resets_to_the_caller():
     envs = make(2, autoreset_mode="Disabled", horizon=1)
     envs.reset(seed=0)
@@ -122,6 +126,7 @@ def test_a_disabled_autoreset_leaves_resets_to_the_caller():
     assert envs.envs[1].simulation.data.time == times[1]
 
 
+@pytest.mark.slow
 def test_infos_are_arrays_with_masks(envs):
     envs.reset(seed=0)
     actions = np.stack(envs.get_attr("hold_action"))
@@ -158,6 +163,7 @@ def test_physics_that_fails_in_one_leaves_the_others_alone(envs):
     assert "physics_error" not in info
 
 
+@pytest.mark.slow
 def test_an_error_names_its_environment_when_all_others_are_done():
     envs = make(3, autoreset_mode="Disabled", horizon=100)
     envs.reset(seed=0)
@@ -190,6 +196,7 @@ def test_observations_are_the_callers_own(envs):
     assert_equal(first, kept)
 
 
+@pytest.mark.slow
 def test_pictures_come_from_each():
     envs = make(2, render_mode="rgb_array", render_size=(32, 24))
     envs.reset(seed=0)
@@ -230,6 +237,7 @@ def test_a_wrong_reset_changes_nothing(envs, arguments, message):
     assert_array_equal([states_of(env) for env in envs.envs], before)
 
 
+@pytest.mark.slow
 def test_closing_ends_the_threads_and_can_be_said_twice():
     before = set(threading.enumerate())  # others' may end meanwhile
     envs = make(3, threads=3)

@@ -102,6 +102,7 @@ def test_threads_leave_no_log_file(tmp_path, monkeypatch, caplog):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_handler_of_the_users_stays(tmp_path):
     code = f"""
 import mujoco

@@ -103,6 +103,7 @@ def test_errors_are_told_and_tried_again_next_time(tmp_path):
     assert calls(tmp_path) == list("abcd")
 
 
+@pytest.mark.slow
 def test_a_killed_workers_item_is_done_again_and_a_killer_is_given_up(tmp_path):
     executor = Processes(2, attempts=2)
     outcomes = work_off(

@@ -75,12 +75,14 @@ def outcome(data):
     assert len(text) < 4000
 
 
+@pytest.mark.slow
 @settings(max_examples=100)
 @given(damaged())
 def test_damaged_components_are_answered_in_words(data):
     outcome(data)
 
 
+@pytest.mark.slow
 def test_undamaged_components_build():
     for data in COMPONENTS:
         build(copy.deepcopy(data))

@@ -72,6 +72,7 @@ ANYTHING = st.one_of(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=30)
 @given(bad=ANYTHING, place=st.integers(0, 6), value=st.sampled_from([np.nan, np.inf]))
 def test_a_bad_action_changes_nothing(env, bad, place, value):
@@ -102,6 +103,7 @@ def test_a_bad_seed_changes_nothing(env, seed):
     assert str(env.np_random.bit_generator.state) == rng
 
 
+@pytest.mark.slow
 def test_copies_play_the_same_episodes(env):
     env.reset(seed=9)
     copies = copy.deepcopy(env), pickle.loads(pickle.dumps(env))

@@ -177,6 +177,7 @@ def test_toml_that_never_ends_is_refused(value, tmp_path):
     assert len(str(caught.value)) < 500
 
 
+@pytest.mark.slow
 @FUZZ
 @given(text=damaged([MJCF]))
 def test_damaged_mjcf_is_a_robot_or_an_error(text, tmp_path_factory):

@@ -101,6 +101,7 @@ def parts_in(config):
     return parts.get("arms", parts).values()
 
 
+@pytest.mark.slow
 @FAST
 @given(data=st.data())
 def test_a_damaged_config_makes_a_controller_or_is_refused_in_words(data):

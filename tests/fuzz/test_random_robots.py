@@ -203,6 +203,7 @@ def check(seed):
     check_ik(robot, rng)
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(seed=st.integers(0, 2**32))
 def test_random_robots_agree_everywhere(seed):

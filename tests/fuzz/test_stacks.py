@@ -191,6 +191,7 @@ def tick(stack, dt):
 SEEDS = st.integers(0, 2**32)
 
 
+@pytest.mark.slow
 @settings(max_examples=50)
 @given(seed=SEEDS)
 def test_a_tick_never_raises_and_keeps_the_limits(seed):
@@ -219,6 +220,7 @@ def test_other_solvers_keep_the_same_promises_often(solver, seed):
     check(seed, solver, ticks=2)
 
 
+@pytest.mark.slow
 def test_feet_pulled_apart_stand_still():
     """Rows that cannot all be kept are relaxed without flutter, see `fallback`."""
     model, robot = MODELS[3], ROBOTS[3]

@@ -89,6 +89,7 @@ def worst_deviation(robot, count, seed) -> tuple[float, int]:
     return worst, compared
 
 
+@pytest.mark.slow
 def test_optimum_is_exact_on_random_stacks(humanoid):
     worst, compared = worst_deviation(humanoid, 200, seed=1)
     assert worst <= 1e-8
@@ -125,6 +126,7 @@ def test_solvers_by_name_agree(humanoid, name, tolerance):
         np.testing.assert_allclose(gradient, 0.0, atol=100 * tolerance)
 
 
+@pytest.mark.slow
 def test_warm_active_set_answers_exactly_or_not_at_all(rng):
     answers = 0
     for _ in range(300):

@@ -85,6 +85,7 @@ def test_arm_stands_still_before_an_unreachable_target(arm, level, dt):
     assert "out of reach" in report.reasons[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", [0, 1])
 def test_humanoid_stands_still_before_an_unreachable_target(humanoid, level):
     stack = humanoid_stack(humanoid, level)
@@ -164,6 +165,7 @@ def task_direction(stack):
     return arm / np.linalg.norm(arm)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", [0, 1])
 def test_hands_pulled_apart_stand_still_and_are_told(humanoid, level):
     stack = humanoid_stack(humanoid, level)
@@ -185,6 +187,7 @@ def test_conflicting_tasks_are_named(arm):
     assert "conflict: one" in stack.explain()["two"].reasons
 
 
+@pytest.mark.slow
 def test_contradicting_rows_are_relaxed_and_named(arm):
     row = np.eye(7)[:1]
     stack = arm_stack(
@@ -200,6 +203,7 @@ def test_contradicting_rows_are_relaxed_and_named(arm):
     assert chatter <= CHATTER
 
 
+@pytest.mark.slow
 def test_rows_against_the_joint_limits_are_relaxed(arm):
     rows = LinearEquality(np.eye(7)[:1], rate=np.array([9.0]), name="too fast")
     solution, chatter = run(arm_stack(arm, equalities=[rows]), 4.0)

@@ -68,6 +68,7 @@ def test_nearest_points_beat_a_grid(rng):
         assert ours <= best + 1e-12
 
 
+@pytest.mark.slow
 def test_rows_are_the_nearest_pairs_and_the_derivative_of_their_distance(rng):
     robot, configuration = gr1()
     capsules, pairs = enclosing_capsules(robot), collision_pairs(robot)
@@ -150,6 +151,7 @@ def default_limits():
     return [PositionLimit(), VelocityLimit(), AccelerationLimit()]
 
 
+@pytest.mark.slow
 def test_hands_never_touch_the_body():
     least, kinds = attack(6.0, seed=1)
     assert least > 0.0

@@ -85,6 +85,7 @@ def test_damping_is_drawn_where_joints_have_any():
     np.testing.assert_array_equal(damping, 2.0)
 
 
+@pytest.mark.slow
 def test_the_seed_says_all_and_the_next_episode_starts_from_nominal():
     env = wbc_suite.make("Lift", robots="Panda", randomisation=Randomisation.default())
     runs = []
@@ -116,6 +117,7 @@ def test_it_can_be_put_back(nominal):
         np.testing.assert_array_equal(values, before[name])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "copied", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))]
 )
@@ -130,6 +132,7 @@ def test_copies_live_in_the_same_world(copied):
     np.testing.assert_array_equal(env.physics_state, twin.physics_state)
 
 
+@pytest.mark.slow
 def test_textures_are_seen():
     env = wbc_suite.make(
         "Lift", robots="Panda", randomisation=Randomisation(texture=True)
@@ -159,6 +162,7 @@ def test_latency_holds_actions_back():
     assert moved[0.04] < 0.3 * moved[0.0]
 
 
+@pytest.mark.slow
 def test_a_latency_of_several_periods_is_a_queue_of_actions():
     late = wbc_suite.make(
         "Lift", robots="Panda", randomisation=Randomisation(latency=(0.11, 0.11))

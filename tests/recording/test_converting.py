@@ -20,6 +20,7 @@ from wbc_suite.recording.extracting import extract
 from wbc_suite.recording.replaying import divergence, play_states
 
 
+@pytest.mark.slow
 def test_robomimics_layout_holds_its_columns_and_nothing_else(lift_recording, tmp_path):
     out = convert(lift_recording, tmp_path / "out.hdf5", "robomimic")
     with h5py.File(out) as file:
@@ -136,6 +137,7 @@ def test_unknown_layouts_are_named(small_recording, tmp_path):
         convert(small_recording, tmp_path / "out", "lerobott")
 
 
+@pytest.mark.slow
 def test_extracting_sees_the_same_and_more(lift_recording, tmp_path):
     out = tmp_path / "out.hdf5"
     changes = {"camera_heights": 16, "camera_widths": 24, "reward_shaping": True}
@@ -221,6 +223,7 @@ def robosuites_demonstrations(path, ours, **changes):
     return path
 
 
+@pytest.mark.slow
 def test_robosuites_own_demonstrations_are_imported(lift_recording, tmp_path):
     raw = robosuites_demonstrations(tmp_path / "demo.hdf5", lift_recording)
     with Dataset(raw) as dataset:

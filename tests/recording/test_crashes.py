@@ -20,6 +20,7 @@ KILLS = int(os.environ.get("WBC_SUITE_KILLS", "4"))
 """200 of them take about three minutes."""
 
 
+@pytest.mark.slow
 def test_every_finished_episode_outlives_kills(tmp_path):
     script = Path(__file__).with_name("kill_recordings.py")
     command = [sys.executable, str(script), str(tmp_path), str(KILLS)]
@@ -89,6 +90,7 @@ def test_another_environments_episodes_are_not_added(small_recording):
         Store(small_recording, {"env_args": '{"env_name": "Stack"}'})
 
 
+@pytest.mark.slow
 def test_a_close_that_was_cut_off_before_it_cleared_up_counts_episodes_once(
     small_recording, tmp_path
 ):

@@ -37,6 +37,7 @@ def test_repair_restores_parts_beside_a_file_that_cannot_be_opened(small_recordi
         assert [e.facts["uid"] for e in dataset] == ["9"]
 
 
+@pytest.mark.slow
 def test_merging_twice_changes_nothing(small_recording, tmp_path):
     other, merged = tmp_path / "other.hdf5", tmp_path / "merged.hdf5"
     with Store(other, HEADER) as store:

@@ -129,6 +129,7 @@ def test_a_file_that_lies_is_refused(small_recording, tmp_path, lie):
     assert grown < 100_000  # kB
 
 
+@pytest.mark.slow
 def test_numbers_that_compress_well_are_read(small_recording, tmp_path):
     with h5py.File(small_recording, "r+") as file:
         swollen(file, tmp_path)
@@ -138,6 +139,7 @@ def test_numbers_that_compress_well_are_read(small_recording, tmp_path):
     assert read_all(small_recording)[1].length == 2**17
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(data=st.data())
 def test_damaged_bytes_are_refused_or_change_nothing(

@@ -77,6 +77,7 @@ def test_facts_tell_seed_success_clipping_versions_and_controller(lift_recording
     assert len(str(header["model_hash"])) == 64
 
 
+@pytest.mark.slow
 def test_a_step_belongs_to_what_was_seen_before_it(lift_env, tmp_path):
     recorder = Recorder(lift_env, tmp_path / "a.hdf5", next_obs=True)
     seen, _ = lift_env.reset(seed=5)
@@ -104,6 +105,7 @@ def test_a_step_belongs_to_what_was_seen_before_it(lift_env, tmp_path):
     )
 
 
+@pytest.mark.slow
 def test_keep_discard_and_undo_leave_what_they_say(lift_env, tmp_path):
     path = tmp_path / "a.hdf5"
     recorder = Recorder(lift_env, path)

@@ -144,6 +144,7 @@ def test_a_table_without_a_kind_is_explained(load):
         load("format = 1")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "hint"),
     [("Pnda", "'Panda'"), ("GR2", "'GR1'"), ("Spot_Arm", "arm/Spot_Arm")],

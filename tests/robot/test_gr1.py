@@ -113,6 +113,7 @@ def test_soles_meet_the_floor_below_the_centre_of_mass():
     assert heel + 0.04 < com[0] - feet[0].xpos[0] < toes - 0.04
 
 
+@pytest.mark.slow
 def test_free_robot_stands_on_its_soles_under_a_joint_law():
     """Joint PD and gravity torques hold it for 5 s.
 

@@ -51,6 +51,7 @@ def shaken(name, thing):
     return hold
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", GRIPPERS)
 def test_gripper_picks_a_cube_and_holds_it_when_shaken(name):
     hold = shaken(name, CUBE)

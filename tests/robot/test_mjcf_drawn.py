@@ -34,6 +34,7 @@ def volume(mesh):
     return np.sum(np.cross(a, b) * c) / 6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ROBOTS)
 def test_merged_links_have_the_surface_of_their_shapes(name):
     robot = load_robot(name)

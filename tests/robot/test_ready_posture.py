@@ -95,6 +95,7 @@ class Lone:
         return SAG * (high - low)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     [

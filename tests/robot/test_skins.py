@@ -75,6 +75,7 @@ def same_dynamics(one, other):
         ]
 
 
+@pytest.mark.slow
 def test_a_skin_changes_what_is_drawn_and_nothing_else(package):
     write_meshes(package, ["panda", "panda_gripper", "rethink_mount"])
     plain, dressed = (

@@ -88,6 +88,7 @@ def test_ready_stands_on_four_feet_and_touches_nothing_else(name):
     np.testing.assert_allclose(heights, FOOT_RADIUS, atol=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LEGGED)
 def test_stands_for_five_seconds_under_joint_control(name):
     """Stiff joints with the weight fed forward: no slip, little sag."""
@@ -202,6 +203,7 @@ def test_left_and_right_legs_mirror_each_other():
         np.testing.assert_allclose(left * [1, -1, 1], right, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_no_pair_of_links_always_collides():
     robot = wbc_suite.load_robot("SpotWithArm")
     model, data = compiled(robot.to_mjspec())

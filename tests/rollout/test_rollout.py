@@ -53,6 +53,7 @@ def test_nothing_to_do_is_refused(seeds, chunk):
         plan([CASE], seeds=seeds, chunk=chunk)
 
 
+@pytest.mark.slow
 def test_processes_play_the_same_episodes_as_this_one(tmp_path):
     items = plan([CASE], seeds=range(4), chunk=2)
     here = work_off(roll_out, items, folder=tmp_path / "a", executor=Serial())
@@ -64,6 +65,7 @@ def test_processes_play_the_same_episodes_as_this_one(tmp_path):
     assert [line["seed"] for line in lines] == [0, 1, 2, 3]
 
 
+@pytest.mark.slow
 def test_recorded_episodes_are_those_that_were_counted(tmp_path):
     case = Case(**{**_fields(CASE), "record": True})
     items = plan([case], seeds=range(3), chunk=2)
@@ -116,6 +118,7 @@ def test_interval_is_wilsons():
     assert wilson(10, 10)[1] == 1.0
 
 
+@pytest.mark.slow
 def test_command_plays_writes_and_goes_on(tmp_path):
     command = ["rollout", "Lift", "--controller", "JOINT_POSITION", "--episodes", "3"]
     command += ["--horizon", "4", "--chunk", "2", "--executor", "serial"]
@@ -138,6 +141,7 @@ def test_command_says_what_failed(tmp_path):
     assert "1 of 1 items failed" in result.output
 
 
+@pytest.mark.slow
 def test_command_knows_at_once_that_a_robot_is_missing(tmp_path):
     command = ["rollout", "Lift", "--robots", "Panda,Panada", "-o", str(tmp_path)]
     result = CliRunner().invoke(app, command)

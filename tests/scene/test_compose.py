@@ -42,6 +42,7 @@ def contacts(model, postures):
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["Panda", "GR1", "Tiago", "SpotWithArm"])
 def test_a_lean_scene_finds_every_contact(name, monkeypatch):
     robot = load_robot(name)

@@ -31,6 +31,7 @@ def touching(model: mujoco.MjModel, qpos: np.ndarray) -> list[tuple[int, int]]:
     return sorted((int(c.geom1), int(c.geom2)) for c in data.contact)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", ["Panda", "Tiago", "GR1", "UR5e"])
 def test_contacts_are_those_of_a_scene_without_bits(robot: str) -> None:
     """Random postures: arms touch themselves, mounts, and the floor where they can."""

@@ -76,6 +76,7 @@ def test_a_sampling_rate_holds_values_between_samples():
     assert_allclose(found, expected, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_noise_has_its_size_and_follows_the_seed():
     slide = Slide(noise=GaussianNoise(0.01, bias=0.5), sampling_rate=20)
     first = slide.step(400)

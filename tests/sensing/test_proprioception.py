@@ -34,6 +34,7 @@ def test_two_hands_have_a_key_each():
         assert f"robot0_{side}_gripper_qpos" in seen
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("robot", "size"), [("Tiago", 3), ("SpotWithArm", 6)])
 def test_moving_bases_feel_their_pose_and_speed(robot, size):
     env = wbc_suite.make("Lift", robots=robot)

@@ -62,6 +62,7 @@ def indices(model):
     return np.array([*range(model.ngeom), -1], dtype=np.int32)
 
 
+@pytest.mark.slow
 def test_less_work_gives_the_same_pictures(scene, theirs):
     model, data = scene
     sizes = model.geom_size.copy()

@@ -44,6 +44,7 @@ def test_the_subject_fills_the_picture_and_stays_inside(view, size):
     assert rows[-1] - rows[0] > 0.85 * size[1]
 
 
+@pytest.mark.slow
 def test_the_front_view_sees_the_wide_face_from_plus_x():
     model, data = _studio()
     widths = {}
@@ -74,6 +75,7 @@ def test_an_unknown_view_is_answered_with_the_nearest():
         render_model(model, data, camera="fornt")
 
 
+@pytest.mark.slow
 def test_a_robot_stands_on_the_ground_in_its_ready_posture():
     robot = load_robot("Panda")
     image = render_robot(robot, size=(96, 96), view="side", preset="fast")

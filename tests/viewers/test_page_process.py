@@ -98,6 +98,7 @@ class Person:
         wait_until(grabbed)
 
 
+@pytest.mark.slow
 def test_a_person_drags_through_the_page_and_lets_go_by_leaving(session, page):
     start = session.snapshot.limbs[HAND].target
     person = Person(page)
@@ -112,6 +113,7 @@ def test_a_person_drags_through_the_page_and_lets_go_by_leaving(session, page):
     wait_until(lambda: holder(session) is None)
 
 
+@pytest.mark.slow
 def test_page_that_is_killed_lets_go_ends_the_session_and_is_reported(session):
     page = PageProcess(session, "127.0.0.1", 0, label="test")
     page.wait()
@@ -125,6 +127,7 @@ def test_page_that_is_killed_lets_go_ends_the_session_and_is_reported(session):
     page.stop()
 
 
+@pytest.mark.slow
 def test_taken_port_is_reported_where_the_page_was_asked_for(session):
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))

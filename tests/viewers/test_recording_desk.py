@@ -31,6 +31,7 @@ def ticks(session, count, *wishes):
     return session.snapshot.recording
 
 
+@pytest.mark.slow
 def test_episodes_of_a_session_are_kept_discarded_taken_back_and_replay(
     session, tmp_path
 ):
@@ -65,6 +66,7 @@ def test_episodes_of_a_session_are_kept_discarded_taken_back_and_replay(
         assert divergence(rebuild(dataset), episode).exact
 
 
+@pytest.mark.slow
 def test_a_disk_that_is_full_is_said_and_the_session_goes_on(session, monkeypatch):
     ticks(session, 1, Wish.RECORD)
 

@@ -64,6 +64,7 @@ def test_only_what_moved_is_sent(mirror, model):
     assert mirror.update(*posed(model, 0.5 + 1e-5, -0.5)) == 0
 
 
+@pytest.mark.slow
 def test_slow_motion_is_not_lost_below_the_tolerance(mirror, model):
     mirror.update(*posed(model, 0, 0))
     sent = sum(mirror.update(*posed(model, k * 1e-6, 0)) for k in range(1, 501))

@@ -83,6 +83,7 @@ def test_episodes_begin_in_demonstrations_by_the_seed(env):
         DemoStart(env, [np.zeros((3, 4))])
 
 
+@pytest.mark.slow
 def test_marks_are_in_pictures_only(env):
     env.reset(seed=0)
     marked = Indicators(env)
