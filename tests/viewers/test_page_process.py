@@ -8,6 +8,7 @@ import threading
 import time
 
 import msgspec
+import numpy as np
 import pinocchio as pin
 import pytest
 import viser
@@ -103,7 +104,7 @@ def test_a_person_drags_through_the_page_and_lets_go_by_leaving(session, page):
     start = session.snapshot.limbs[HAND].target
     person = Person(page)
     person.grab(session)
-    up = (start.translation + [0.0, 0.0, 0.1]).tolist()  # noqa: RUF005 - a sum
+    up = (start.translation + np.array([0.0, 0.0, 0.1])).tolist()
     person.drag("Update", position=up, wxyz=[1.0, 0.0, 0.0, 0.0])
     wait_until(lambda: len(session.latencies()) == 1 or holder(session) is None)
     session.tick()

@@ -110,9 +110,8 @@ class PageProcess:
             self._process.join()
 
     def _run(self) -> None:
-        run_first(
-            rank=1
-        )  # stopped by others with Python's lock, it would stop the loop
+        # Were it stopped while it holds Python's lock, the loop would be too.
+        run_first(rank=1)
         try:
             with contextlib.suppress(EOFError, OSError):
                 self._answer_until_stopped()
@@ -174,32 +173,40 @@ class RemoteSession:
         return self._last
 
     def grab(self, name: str, client: int, T_world_input: pin.SE3) -> bool:
-        """See `Drivable`, as of all that follow."""
+        """See `Drivable`."""
         return bool(self.ask("grab", name, client, T_world_input))
 
-    def drag(self, name: str, client: int, T_world_input: pin.SE3) -> None:  # noqa: D102
+    def drag(self, name: str, client: int, T_world_input: pin.SE3) -> None:
+        """Move a limb's target; whether another holds it is not waited for."""
         arrived = time.perf_counter()  # a clock that all processes share
         self.tell("drag", name, client, T_world_input, arrived)
 
-    def release(self, name: str, client: int) -> None:  # noqa: D102
+    def release(self, name: str, client: int) -> None:
+        """See `Drivable`."""
         self.tell("release", name, client)
 
-    def leave(self, client: int) -> None:  # noqa: D102
+    def leave(self, client: int) -> None:
+        """See `Drivable`."""
         self.tell("leave", client)
 
-    def enable(self, name: str, enabled: bool) -> None:  # noqa: D102
+    def enable(self, name: str, enabled: bool) -> None:
+        """See `Drivable`."""
         self.tell("enable", name, enabled)
 
-    def set_gripper(self, name: str, index: int, value: float) -> None:  # noqa: D102
+    def set_gripper(self, name: str, index: int, value: float) -> None:
+        """See `Drivable`."""
         self.tell("set_gripper", name, index, value)
 
-    def pause(self, paused: bool) -> None:  # noqa: D102
+    def pause(self, paused: bool) -> None:
+        """See `Drivable`."""
         self.tell("pause", paused)
 
-    def reset(self) -> None:  # noqa: D102
+    def reset(self) -> None:
+        """See `Drivable`."""
         self.tell("reset")
 
-    def wish(self, wish: Wish) -> None:  # noqa: D102
+    def wish(self, wish: Wish) -> None:
+        """See `Drivable`."""
         self.tell("wish", wish)
 
     def ask(self, request: str, *arguments: Any) -> Any:
