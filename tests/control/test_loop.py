@@ -110,6 +110,17 @@ def test_positions_after_a_step_are_those_of_the_joints():
     np.testing.assert_array_equal(observation["robot0_eef_pos"], data.site_xpos[site])
 
 
+def test_loop_takes_no_time_for_the_profiler_and_leaves_it_on():
+    env = made("Panda", "BASIC")
+    env.reset(seed=0)
+    model, data = env.simulation.model, env.simulation.data
+    before = data.timer.duration.copy()
+    env.step(env.hold_action)
+    np.testing.assert_array_equal(data.timer.duration, before)
+    mujoco.mj_step(model, data)
+    assert (data.timer.duration > before).any()
+
+
 def test_full_physics_reads_sensors_of_the_new_state_and_changes_none():
     lite, full = (made("Panda", "BASIC", lite_physics=x) for x in (True, False))
     actions = moves(lite)

@@ -43,7 +43,7 @@ def test_the_action_has_the_table_s_size_and_order(rig, name, kind, mode, size):
     assert motion.kind == ("pose" if kind == "OSC_POSE" else "position")
     assert motion.labels == ("x", "y", "z", "rx", "ry", "rz")[: len(motion.labels)]
     assert motion.units == (("0.05 m",) * 3 + ("0.5 rad",) * 3)[: len(motion.labels)]
-    for gains, high in zip(slices[1:], (300.0, 100.0), strict=False):
+    for gains, high in zip(slices[1:], (500.0, 100.0), strict=False):
         assert (gains.low, gains.high) == ((0.0,) * 6, (high,) * 6)
 
 

@@ -10,6 +10,8 @@ from wbc_suite.control.loop.physics import (
     mj_step1,
     mj_step2,
     physics_of,
+    start_profiler,
+    stop_profiler,
 )
 from wbc_suite.control.loop.sound import begins_sound, ends_sound
 from wbc_suite.control.loop.table import CompiledRecords, LawKind, Records
@@ -41,7 +43,7 @@ def advance(
 
     Positions of bodies and sites are brought up to date at the end: MuJoCo's own step
     leaves them one step behind the joints. Sensors are read in the last step: nobody
-    sees what they say in others.
+    sees what they say in others. Nor does anybody see how long MuJoCo's parts take.
 
     Args:
         model: Address of the model.
@@ -62,7 +64,7 @@ def advance(
     if not begins_sound(sound):
         return False
     physics = physics_of(table, timestep)
-    flags = flags_of(table)
+    flags, clock = flags_of(table), stop_profiler(table)
     for k in range(steps):
         let_sense(table, flags, k == steps - 1)
         mj_step1(model, data)
@@ -70,4 +72,5 @@ def advance(
         mj_step2(model, data)
     mj_kinematics(model, data)
     mj_comPos(model, data)
+    start_profiler(table, clock)
     return ends_sound(sound)

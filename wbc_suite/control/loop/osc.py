@@ -52,7 +52,8 @@ def osc_law(physics: Physics, law: CompiledRecords, drives: CompiledRecords) -> 
     wanted, pull, p = work[WANTED], work[PULL], work[PLACE]
     rest, change = work[REST], work[CHANGE]
     task_acceleration(physics, law, p, wanted, pull)
-    site_jacobian(physics, law, drives, p, J, wanted)
+    number_joints(physics, law, drives)
+    site_jacobian(physics, law, p, J, wanted)
     inertia_block(physics, law, drives, L)
     cholesky(L, n)
     for j in range(n):
@@ -95,13 +96,18 @@ def factorise(Y: Matrix, n: int, C: Matrix, Q: Matrix, scratch: Vector) -> None:
 
 
 @inlined
+def number_joints(
+    physics: Physics, law: CompiledRecords, drives: CompiledRecords
+) -> None:
+    """Write the slots of a law's joints."""
+    physics.slots[:] = -1
+    for j in range(law.first, law.last):
+        physics.slots[drives[j].dof] = j - law.first
+
+
+@inlined
 def site_jacobian(
-    physics: Physics,
-    law: CompiledRecords,
-    drives: CompiledRecords,
-    p: Vector,
-    J: Matrix,
-    wanted: Vector,
+    physics: Physics, law: CompiledRecords, p: Vector, J: Matrix, wanted: Vector
 ) -> None:
     """Write the site's Jacobian; take what other joints give it off the wanted."""
     for i in range(6):
@@ -112,10 +118,7 @@ def site_jacobian(
     column = physics.work[COLUMN]
     dof = int(physics.body_last_dof[body])
     while dof >= 0:
-        place = -1
-        for j in range(law.first, law.last):
-            if drives[j].dof == dof:
-                place = j - law.first
+        place = physics.slots[dof]
         if place >= 0:
             point_column(physics, dof, root, p, column)
             for i in range(6):
@@ -226,13 +229,12 @@ def inertia_block(
     """
     n = law.last - law.first
     for i in range(n):
-        for j in range(n):
+        for j in range(i + 1):
             M[i, j] = 0.0
     for i in range(n):
         row = drives[law.first + i].dof
         first = physics.M_rowadr[row]
         for k in range(first, first + physics.M_rownnz[row]):
-            column = physics.M_colind[k]
-            for j in range(n):
-                if drives[law.first + j].dof == column:
-                    M[max(i, j), min(i, j)] = physics.M[k]
+            j = physics.slots[physics.M_colind[k]]
+            if j >= 0:
+                M[max(i, j), min(i, j)] = physics.M[k]

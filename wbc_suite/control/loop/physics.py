@@ -28,7 +28,7 @@ from wbc_suite.kinematics.array_table import (
 from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["Physics", "bind_physics", "physics_of", "physics_table"]
-__all__ += ["flags_of", "let_sense"]
+__all__ += ["flags_of", "let_sense", "start_profiler", "stop_profiler"]
 __all__ += ["mj_comPos", "mj_kinematics", "mj_step1", "mj_step2"]
 
 WANTED, PULL, PLACE, REST, CHANGE, COLUMN = 18, 19, 20, 21, 22, 23
@@ -38,6 +38,7 @@ rows each, the inertia, then what `straight` needs."""
 
 _LIBRARY = next(Path(mujoco.__file__).parent.glob("libmujoco*"))
 llvmlite.binding.load_library_permanently(str(_LIBRARY))
+_PROFILER_CLOCK = llvmlite.binding.address_of_symbol("mjcb_time")
 _OF_MODEL_AND_DATA = types.void(types.intp, types.intp)
 
 mj_step1 = types.ExternalFunction("mj_step1", _OF_MODEL_AND_DATA)
@@ -80,16 +81,20 @@ class Physics(NamedTuple):
     """What laws ask of each degree of freedom, shape (nv,): scratch of the loop."""
     force: Vector
     """M times that, shape (nv,): scratch of the loop."""
+    slots: Indices
+    """Place of each degree of freedom in one law, -1 of those it does not drive, shape
+    (nv,): scratch of that law."""
     work: Matrix
     """Scratch of one law, shape (70 + 6 nv, 2 nv + 8); see its rows above."""
 
 
 _NUMBERS = ("model", "data", "timestep")
 _ARRAYS = tuple(name for name in Physics._fields if name not in _NUMBERS)
-_SWITCH = ("flags", "no_sensors")
-_TABLE = (*_ARRAYS, *_SWITCH)
+_SWITCHES = ("flags", "no_sensors", "profiler")
+_TABLE = (*_ARRAYS, *_SWITCHES)
+_FLAGS, _NO_SENSORS, _PROFILER = map(_TABLE.index, _SWITCHES)
 _INDICES = ("M_rownnz", "M_rowadr", "M_colind", "site_bodyid", "body_rootid")
-_INDICES += ("body_last_dof", "dof_parentid")
+_INDICES += ("body_last_dof", "dof_parentid", "slots")
 _MATRICES = ("site_xpos", "site_xmat", "xpos", "xmat", "cdof", "cdof_dot", "cvel")
 _MATRICES += ("subtree_com", "work")
 _KINDS: dict[str, Any] = (
@@ -102,8 +107,8 @@ PhysicsField = cast(
     "type[IntEnum]",
     IntEnum("PhysicsField", [name.upper() for name in _TABLE], start=0),
 )
-"""Places of the arrays in a `physics_table`: those of `Physics`, and the switch of
-`let_sense`."""
+"""Places of the arrays in a `physics_table`: those of `Physics`, and the switches of
+sensors and profiler."""
 
 
 def bind_physics(model: mujoco.MjModel, data: mujoco.MjData) -> Physics:
@@ -112,6 +117,7 @@ def bind_physics(model: mujoco.MjModel, data: mujoco.MjData) -> Physics:
         "body_last_dof": _last_dofs(model),
         "acceleration": np.zeros(model.nv),
         "force": np.zeros(model.nv),
+        "slots": np.full(model.nv, -1, dtype=np.int64),
         "work": np.zeros((70 + 6 * model.nv, 2 * model.nv + 8)),
     }
     views = {
@@ -134,7 +140,8 @@ def bind_physics(model: mujoco.MjModel, data: mujoco.MjData) -> Physics:
 
 def physics_table(model: mujoco.MjModel, physics: Physics) -> ArrayTable:
     """Return where the arrays are: one argument of compiled calls in place of all."""
-    arrays = physics._asdict() | dict(zip(_SWITCH, _sensor_switch(model), strict=True))
+    switches = (*_sensor_switch(model), _word_at(_PROFILER_CLOCK))
+    arrays = physics._asdict() | dict(zip(_SWITCHES, switches, strict=True))
     return ArrayTable(
         PhysicsField, {field: arrays[_TABLE[field]] for field in PhysicsField}
     )
@@ -193,7 +200,7 @@ physics_of = cast("Callable[[Indices, float], Physics]", intrinsic(_physics_of))
 @compiled
 def flags_of(table: Indices) -> int:
     """Return the word of the model that holds its flags."""
-    return indices(table, 24)[0]
+    return indices(table, _FLAGS)[0]
 
 
 @compiled
@@ -205,7 +212,27 @@ def let_sense(table: Indices, flags: int, on: bool) -> None:
         flags: The model's own, see `flags_of`.
         on: Whether sensors are read, if the model does so at all.
     """
-    indices(table, 24)[0] = flags if on else flags | indices(table, 25)[0]
+    flag = indices(table, _NO_SENSORS)[0]
+    indices(table, _FLAGS)[0] = flags if on else flags | flag
+
+
+@compiled
+def stop_profiler(table: Indices) -> int:
+    """Let MuJoCo not time what it does; return the function that it asks the time.
+
+    Its Python package sets one, which is asked twenty times a step: a twentieth of all.
+    """
+    clock = indices(table, _PROFILER)
+    function = clock[0]
+    clock[0] = 0
+    return function
+
+
+@compiled
+def start_profiler(table: Indices, function: int) -> None:
+    """Let MuJoCo time what it does again, if it did; another thread may have begun."""
+    if function != 0:
+        indices(table, _PROFILER)[0] = function
 
 
 def _sensor_switch(model: mujoco.MjModel) -> tuple[Indices, Indices]:
@@ -216,13 +243,18 @@ def _sensor_switch(model: mujoco.MjModel) -> tuple[Indices, Indices]:
     option = model.opt
     # The flags are the ninth integer after the frictions, as mjmodel.h has it.
     place = option.o_friction.ctypes.data + option.o_friction.nbytes + 8 * 4
-    flags = np.ctypeslib.as_array((ctypes.c_int64 * 1).from_address(place))
+    flags = _word_at(place)
     given, before = option.disableflags, int(flags[0])
     option.disableflags |= mujoco.mjtDisableBit.mjDSBL_SENSOR
     flag = before ^ int(flags[0])  # in whichever half of the word it is
     option.disableflags = given
     remembers = model.sensor_history.any() or model.sensor_interval.any()
     return flags, np.array([0 if remembers else flag], dtype=np.int64)
+
+
+def _word_at(address: int) -> Indices:
+    """Return a view of one integer, shape (1,)."""
+    return np.ctypeslib.as_array((ctypes.c_int64 * 1).from_address(address))
 
 
 def _last_dofs(model: mujoco.MjModel) -> Indices:

@@ -18,7 +18,7 @@ class OscConfig(ImpedanceSettings):
     """The hand follows poses in operational space; see `OscLaw`.
 
     Critically damped, a step is within 2 % of its end after `5.83 / sqrt(kp)` seconds:
-    0.37 s at the default of 250 /s^2, unless a joint reaches its top speed on the way.
+    0.29 s at the default of 400 /s^2, unless a joint reaches its top speed on the way.
 
     Attributes:
         type: `OSC_POSE`, or `OSC_POSITION`, which holds the orientation that the hand
@@ -42,7 +42,8 @@ class OscConfig(ImpedanceSettings):
     """
 
     type: Literal["OSC_POSE", "OSC_POSITION"] = "OSC_POSE"
-    kp: Gains = 250.0
+    kp: Gains = 400.0
+    kp_limits: tuple[Gains, Gains] = (0.0, 500.0)
     input_type: InputType = "delta"
     input_ref_frame: InputFrame = "base"
     output_min: Numbers = tuple(-x for x in STEP)
