@@ -22,6 +22,7 @@ BASE = (
     "user_cache",
     "linked_code",
     "compiling",
+    "compiling_ahead",
 )
 ORDER = (
     "robot",

@@ -11,8 +11,10 @@ size of the rows, not of the robot:
 with F the free and K the kept joints. Joints that leave their bounds are kept, joints
 whose multiplier has the wrong sign are freed, until nothing changes: then the KKT
 conditions hold, and x is the one optimum if it keeps `A x = b`, which the caller
-checks: rows that the kept joints leave nothing to are left out. Where that takes too
-long nothing is answered, and a general solver takes over.
+checks: rows that the kept joints leave nothing to are left out. All at once is quick
+from a set that is nearly right, and else may go in circles; then it begins again with
+none kept, and of the joints beyond their bounds keeps the farthest alone. Where that
+takes too long nothing is answered, and a general solver takes over.
 
 Source: Hintermueller, Ito, Kunisch (2002), "The Primal-Dual Active Set Strategy as a
 Semismooth Newton Method", SIAM J. Optim. 13(3); the small system is the matrix
@@ -27,7 +29,8 @@ from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["solve_warm"]
 
-_ROUNDS = 12  # changes of the set before a general solver is asked
+_QUICK = 8  # rounds in which all joints beyond their bounds are kept at once
+_CAREFUL = 16  # rounds after those, in which one more is kept
 _DEPENDENT = 1e-12  # part of a row's square that is left by the rows above
 _TOLERANCE = 1e-13  # m, rad: how far a free joint may pass its bound by rounding
 
@@ -75,7 +78,10 @@ def solve_warm(  # noqa: C901, one flat loop is what compiles well
         ends[row] = _end(W[row] if row < m else A[row - m])
     for i in range(n):
         root[i] = 1.0 / np.sqrt(diagonal[0, i] + mu)
-    for _ in range(_ROUNDS):
+    for count in range(_QUICK + _CAREFUL):
+        if count == _QUICK:
+            for i in range(n):
+                side[i] = 0
         for i in range(n):
             loose[i], kept[i] = root[i], 0.0
             if side[i] != 0:
@@ -98,7 +104,8 @@ def solve_warm(  # noqa: C901, one flat loop is what compiles well
         for row in range(m + k):
             for i in range(ends[row]):
                 x[i] -= scaled[row, i] * y[row]
-        if _settle(W, A, y, diagonal, mu, root, lb, ub, side, x, multipliers):
+        same = _free(W, A, y, diagonal, mu, root, lb, ub, side, x, multipliers)
+        if _keep(lb, ub, side, x, count >= _QUICK) and same:
             for row in range(k):
                 row_multipliers[row] = y[m + row]
             return True
@@ -142,7 +149,7 @@ def _solve_in_place(S: Matrix, y: Vector) -> None:
 
 
 @compiled
-def _settle(
+def _free(
     W: Matrix,
     A: Matrix,
     y: Vector,
@@ -155,7 +162,7 @@ def _settle(
     x: Vector,
     multipliers: Vector,
 ) -> bool:
-    """Put kept joints on their bounds, change the set; True if nothing changed.
+    """Finish x; free joints that are pulled off their bounds; True if there are none.
 
     Comes in with `x = root^2 r` less the rows' part on free joints scaled by one root.
     """
@@ -164,11 +171,6 @@ def _settle(
         multipliers[i] = 0.0
         if side[i] == 0:
             x[i] *= root[i]
-            if not x[i] <= ub[i] + _TOLERANCE:
-                side[i], same = 1, False
-            elif not x[i] >= lb[i] - _TOLERANCE:
-                side[i], same = -1, False
-            x[i] = min(max(x[i], lb[i]), ub[i])
             continue
         x[i] = ub[i] if side[i] > 0 else lb[i]
         force = diagonal[1, i] - (diagonal[0, i] + mu) * x[i]
@@ -178,3 +180,23 @@ def _settle(
         if force * side[i] < 0.0 and lb[i] < ub[i]:
             side[i], same = 0, False
     return same
+
+
+@compiled
+def _keep(lb: Vector, ub: Vector, side: Indices, x: Vector, only_one: bool) -> bool:
+    """Keep joints beyond their bounds, or the farthest; True if there are none."""
+    found, worst = -1, _TOLERANCE
+    for i in range(x.shape[0]):
+        over, under = x[i] - ub[i], lb[i] - x[i]
+        beyond = over if over > under else under
+        if beyond <= worst:  # False for what is not a number
+            x[i] = min(max(x[i], lb[i]), ub[i])
+            continue
+        found = i
+        if only_one:
+            worst = beyond
+        else:
+            side[i] = 1 if over > under else -1
+    if only_one and found >= 0:
+        side[found] = 1 if x[found] > ub[found] else -1
+    return found < 0

@@ -35,14 +35,14 @@ class Body:
     Attributes:
         commanded: Commanded configuration.
         goals: Goals in the world of the commanded robot.
-        speed: Speed of the fastest joint, rad/s or m/s.
+        speed: Tells the speed of the fastest joint now, rad/s or m/s.
         touches: Tells what the robot presses on now.
         lagging: Tells which joint is farthest from its command now.
     """
 
     commanded: Vector
     goals: Sequence[pin.SE3]
-    speed: float
+    speed: Callable[[], float]
     touches: Callable[[], Sequence[Touch]]
     lagging: Callable[[], str]
 
@@ -124,26 +124,25 @@ class IkReport:
         Where the commanded robot is at its goal, what counts is why the body is not;
         else the solver's reasons, or some of our own where it has none.
         """
-        _, commanded = self._compare(body.commanded, body.goals)
+        there = Once(partial(self._compare, body.commanded, body.goals))
         standing = float(np.abs(answer.v).max(initial=0.0)) < STANDING
         explain = answer.record() if answer.record is not None else dict
         held_back: Sequence[Sequence[str]] = [()] * len(reached)
-        if standing and any(commanded) and body.speed <= RATTLING:
+        if standing and any(there()[1]):
             held_back = self._held_back(body)
-        return partial(
-            self._tell, reached, commanded, standing, held_back, explain, answer
-        )
+        return partial(self._tell, reached, there, standing, held_back, explain, answer)
 
     def _tell(
         self,
         reached: Sequence[bool],
-        commanded: Sequence[bool],
+        there: Callable[[], tuple[object, Sequence[bool]]],
         standing: bool,
         held_back: Sequence[Sequence[str]],
         explain: Explanation,
         answer: IkStep,
     ) -> Sequence[Sequence[str]]:
         known, whys = explain(), list[Sequence[str]]()
+        _, commanded = there()
         for k, frame in enumerate(self._config.frames):
             why = known.get(frame.name) or ()
             if commanded[k]:
@@ -157,8 +156,11 @@ class IkReport:
 
     def _held_back(self, body: Body) -> Sequence[Sequence[str]]:
         """Return what each frame's limb presses on, or else the joint that lags."""
+        speed = body.speed()
+        if speed > RATTLING:
+            return [()] * len(self._support)
         touches = [(self._names(touch.link), str(touch)) for touch in body.touches()]
-        lagging = [body.lagging()] if body.speed < STANDING_BODY else []
+        lagging = [body.lagging()] if speed < STANDING_BODY else []
         return [
             [words for names, words in touches if support & names] or lagging
             for support in self._support

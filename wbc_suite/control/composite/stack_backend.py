@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 
 from wbc_suite.compiling import compiled
+from wbc_suite.compiling_ahead import compile_ahead
 from wbc_suite.control.composite.backend import Explanation, IkStep
 from wbc_suite.control.composite.config import WholeBodyIKConfig
 from wbc_suite.control.composite.effort import EffortGuard
@@ -31,6 +32,8 @@ from wbc_suite.qp import (
     TaskStack,
     TickRecord,
 )
+from wbc_suite.qp.lower_levels import lower_tick
+from wbc_suite.qp.tick import tick
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Indices, Matrix, Vector
 
@@ -63,6 +66,7 @@ class StackBackend:
         config: WholeBodyIKConfig,
         commanded: Configuration,
     ) -> None:
+        compile_ahead(tick, lower_tick)  # half of the first compiling, needed last
         self._config, self._commanded = config, commanded
         self._posture = PostureTask(
             config.posture.cost,

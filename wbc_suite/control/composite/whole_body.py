@@ -219,11 +219,10 @@ class WholeBodyIK:
         """Return `{"ik": ...}`: what is reached, by how much it is missed, and why."""
         q = self._conversion.q_to_pinocchio(state.data.qpos)
         goals = list(self.goals_in_world.values())
-        v = self._conversion.v_to_pinocchio(state.data.qpos, state.data.qvel)
         body = Body(
             commanded=self.q,
             goals=self._corrected(goals, state),
-            speed=float(np.abs(v).max(initial=0.0)),
+            speed=lambda: self._speed(state),
             touches=lambda: touches(state, apart_from=self._feet),
             lagging=lambda: lagging_joint(
                 state, self._law.joints, np.fromiter(self.joint_targets.values(), float)
@@ -237,6 +236,11 @@ class WholeBodyIK:
                 "frames": frames,
             }
         }
+
+    def _speed(self, state: RobotState) -> float:
+        """Return the speed of the fastest joint, rad/s or m/s."""
+        v = self._conversion.v_to_pinocchio(state.data.qpos, state.data.qvel)
+        return float(np.abs(v).max(initial=0.0))
 
     def _solve(self, state: RobotState) -> None:
         began = time.perf_counter()
