@@ -1,5 +1,10 @@
 """What all tests share."""
 
+import json
+import os
+import subprocess
+from pathlib import Path
+
 import pytest
 from hypothesis import HealthCheck, settings
 from xdist.scheduler import LoadScopeScheduling
@@ -12,6 +17,55 @@ settings.register_profile(
     database=None,
 )
 settings.load_profile("suite")
+
+
+ROOT = Path(__file__).parents[1]
+PATIENCE = 900.0  # s; torch takes minutes to be imported for the first time
+CONVERT = """
+import sys
+from wbc_suite.executors import Serial
+from wbc_suite.recording.converting import convert
+source, out, layout, pieces = sys.argv[1:]
+if int(pieces) == 1:
+    convert(source, out, layout)
+else:
+    convert(source, out, layout, executor=Serial(), workers=int(pieces))
+"""
+
+
+class PeerReaders:
+    """Packages that read datasets, in an environment of their own."""
+
+    python = ROOT / ".venv-datasets/bin/python"
+
+    @property
+    def installed(self):
+        return self.python.exists()
+
+    def run(self, *arguments):
+        """Run their Python, which finds our modules too; return what it prints last."""
+        environment = {**os.environ, "PYTHONPATH": str(ROOT), "HF_HUB_OFFLINE": "1"}
+        command = [self.python, *map(str, arguments)]
+        output = subprocess.run(
+            command, capture_output=True, text=True, timeout=PATIENCE, env=environment
+        )
+        assert output.returncode == 0, output.stderr[-3000:]
+        return output.stdout.splitlines()[-1] if output.stdout else ""
+
+    def read(self, kind, path):
+        """Return what `benchmarks/peers/datasets_side.py` tells of a dataset."""
+        side = ROOT / "benchmarks/peers/datasets_side.py"
+        return json.loads(self.run(side, kind, path))
+
+    def convert(self, source, out, layout, *, pieces=1):
+        """Convert there: LeRobot's layout needs pyarrow and av."""
+        self.run("-c", CONVERT, source, out, layout, pieces)
+        return out
+
+
+@pytest.fixture(scope="session")
+def peer_readers():
+    return PeerReaders()
 
 
 class BrowserOnOneWorker(LoadScopeScheduling):

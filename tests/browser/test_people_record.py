@@ -219,7 +219,23 @@ def assert_replays(path):
     return episode.length
 
 
-def test_a_person_lifts_the_cube_and_records_it(room, tmp_path):
+def assert_peers_load(readers, path, tmp_path):
+    """robomimic's and LeRobot's dataset classes hold the same, where they are there."""
+    if not readers.installed:
+        return
+    with Dataset(path) as dataset:
+        (episode,) = dataset
+    actions = episode.columns["actions"].astype(float).sum()
+    robomimic = readers.read("robomimic", path)
+    found = readers.convert(path, tmp_path / "lerobot", "lerobot")
+    for told in (robomimic, readers.read("lerobot", found)):
+        assert told["lengths"] == [episode.length]
+        np.testing.assert_allclose(told["actions"], [actions], rtol=1e-5, atol=1e-3)
+    assert robomimic["items"] == episode.length
+    note(loaded_by_peers=robomimic["environment"])
+
+
+def test_a_person_lifts_the_cube_and_records_it(room, peer_readers, tmp_path):
     lift = room("Lift", "Panda")
     lift.record()
     cube = lift.session.env.unwrapped.benchmark.states["cube"].body
@@ -237,6 +253,7 @@ def test_a_person_lifts_the_cube_and_records_it(room, tmp_path):
     lift.session.stop()
     lift.env.recorder.close()
     length = assert_replays(tmp_path / "made.hdf5")
+    assert_peers_load(peer_readers, tmp_path / "made.hdf5", tmp_path)
     note(actions_of_a_persons_lift=length)
 
 
@@ -273,7 +290,9 @@ def take_handle(pot, side):
     pot.change_pace("+", 1)
 
 
-def test_a_person_raises_the_pot_with_both_hands_and_records_it(room, tmp_path):
+def test_a_person_raises_the_pot_with_both_hands_and_records_it(
+    room, peer_readers, tmp_path
+):
     pot = room("TwoArmLift", "GR1", seed=SEED, watching=False)
     pot.record()
     pot.change_pace("-", 2)
@@ -296,4 +315,5 @@ def test_a_person_raises_the_pot_with_both_hands_and_records_it(room, tmp_path):
     pot.session.stop()
     pot.env.recorder.close()
     length = assert_replays(tmp_path / "made.hdf5")
+    assert_peers_load(peer_readers, tmp_path / "made.hdf5", tmp_path)
     note(actions_of_a_persons_pot=length)

@@ -1,10 +1,5 @@
 """What we write is loaded by the packages whose layout it is, in their environment."""
 
-import json
-import os
-import subprocess
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -12,28 +7,13 @@ from wbc_suite.recording import Dataset
 from wbc_suite.recording.converting import convert
 from wbc_suite.recording.extracting import extract
 
-ROOT = Path(__file__).parents[2]
-PYTHON = ROOT / ".venv-datasets/bin/python"
-
 pytestmark = [pytest.mark.peer, pytest.mark.slow]
-
-CONVERT = """
-import sys
-from wbc_suite.executors import Serial
-from wbc_suite.recording.converting import convert
-source, out, layout, pieces = sys.argv[1:]
-if int(pieces) == 1:
-    convert(source, out, layout)
-else:
-    convert(source, out, layout, executor=Serial(), workers=int(pieces))
-"""
-"""LeRobot's layout needs pyarrow and av, which its own environment has."""
 
 
 @pytest.fixture(scope="module")
-def with_pictures(lift_recording, tmp_path_factory):
+def with_pictures(lift_recording, peer_readers, tmp_path_factory):
     """The shared recording, with pictures of one camera."""
-    if not PYTHON.exists():
+    if not peer_readers.installed:
         pytest.skip("Readers of datasets are not installed: make bench-peers")
     out = tmp_path_factory.mktemp("pictures") / "lift.hdf5"
     seen = {"camera_names": ("agentview",), "camera_heights": 64, "camera_widths": 64}
@@ -45,21 +25,6 @@ def with_pictures(lift_recording, tmp_path_factory):
 def episodes(with_pictures):
     with Dataset(with_pictures) as dataset:
         return list(dataset)
-
-
-def peer(*arguments):
-    """Run Python as the readers have it; return what it prints last."""
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "HF_HUB_OFFLINE": "1"}
-    command = [PYTHON, *map(str, arguments)]
-    output = subprocess.run(
-        command, capture_output=True, text=True, timeout=300, env=environment
-    )
-    assert output.returncode == 0, output.stderr[-3000:]
-    return output.stdout.splitlines()[-1] if output.stdout else ""
-
-
-def read(kind, path):
-    return json.loads(peer(ROOT / "benchmarks/peers/datasets_side.py", kind, path))
 
 
 def sums(episodes, column):
@@ -74,9 +39,9 @@ def check(told, episodes):
 
 @pytest.mark.parametrize("kind", ["minari", "mcap"])
 def test_logs_and_minari_datasets_hold_what_was_recorded(
-    with_pictures, episodes, tmp_path, kind
+    with_pictures, episodes, peer_readers, tmp_path, kind
 ):
-    told = read(kind, convert(with_pictures, tmp_path / "lift-v0", kind))
+    told = peer_readers.read(kind, convert(with_pictures, tmp_path / "lift-v0", kind))
     check(told, episodes)
     np.testing.assert_allclose(told["cube"], sums(episodes, "obs/cube_pos"), 1e-12)
     assert told["ended"] == [e.success for e in episodes]
@@ -85,26 +50,29 @@ def test_logs_and_minari_datasets_hold_what_was_recorded(
 
 @pytest.mark.parametrize("converted", [False, True])
 def test_robomimics_dataset_class_loads_what_was_recorded(
-    lift_recording, with_pictures, episodes, tmp_path, converted
+    with_pictures, episodes, peer_readers, tmp_path, converted
 ):
     out = with_pictures
     if converted:
         out = convert(with_pictures, tmp_path / "out.hdf5", "robomimic")
-    told = read("robomimic", out)
+    told = peer_readers.read("robomimic", out)
     check(told, episodes)
-    np.testing.assert_allclose(told["cube"], sums(episodes, "obs/cube_pos"), atol=1e-4)
+    seen = told["observations"]
+    np.testing.assert_allclose(
+        seen["cube_pos"], sums(episodes, "obs/cube_pos"), atol=1e-4
+    )
     assert (told["environment"], told["ended"]) == ("Lift", [True, True])
     assert told["items"] == sum(told["lengths"])
 
 
 @pytest.mark.parametrize("pieces", [1, 2])
 def test_lerobots_dataset_class_loads_frames_and_videos(
-    with_pictures, episodes, tmp_path, pieces
+    with_pictures, episodes, peer_readers, tmp_path, pieces
 ):
     out = tmp_path / "lift"
-    peer("-c", CONVERT, with_pictures, out, "lerobot", pieces)
+    peer_readers.convert(with_pictures, out, "lerobot", pieces=pieces)
     assert len(list(out.glob("videos/*/chunk-000/file-*.mp4"))) == pieces
-    told = read("lerobot", out)
+    told = peer_readers.read("lerobot", out)
     check(told, episodes)
     assert told["environment"] == "Lift"
     for shown, episode in zip(told["pictures"], episodes, strict=True):
@@ -112,4 +80,4 @@ def test_lerobots_dataset_class_loads_frames_and_videos(
         error = np.abs(np.moveaxis(np.array(shown), 0, -1) - first)
         assert error.mean() < 0.03  # H.264 and 4:2:0 colours
     mean = np.concatenate([e.columns["obs/agentview_image"] for e in episodes]).mean()
-    assert told["mean"] == pytest.approx(mean / 255.0, abs=0.01)
+    assert told["means"] == pytest.approx([mean / 255.0], abs=0.01)

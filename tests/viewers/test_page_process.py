@@ -23,6 +23,7 @@ from wbc_suite.viewers.teleop_session import TeleopSession
 
 PATIENCE = 120.0  # s
 HAND = "right_hand"
+VISITS, FLOOD = 100, 5_000
 CAMERA = {
     "type": "ViewerCameraMessage",
     "wxyz": (1.0, 0.0, 0.0, 0.0),
@@ -69,9 +70,15 @@ def page(session):
 
 
 class Person:
-    """A client of the page that drags the hand by messages, as a browser sends them."""
+    """A client of the page that drags the hand by messages, as a browser sends them.
 
-    def __init__(self, page):
+    Args:
+        page: The page.
+        number: How many clients it had before.
+    """
+
+    def __init__(self, page, number=0):
+        self.number = number
         origin = page.url.rstrip("/")
         self.socket = connect(
             origin.replace("http", "ws"),
@@ -86,7 +93,7 @@ class Person:
         self.socket.send(msgspec.msgpack.encode(message))
 
     def drag(self, phase, **pose):
-        handle = {"name": f"/gizmos/{HAND}", "owner": "0"}
+        handle = {"name": f"/gizmos/{HAND}", "owner": str(self.number)}
         self.say(handle | {"type": f"TransformControls{phase}Message"} | pose)
 
     def grab(self, session):
@@ -94,7 +101,7 @@ class Person:
 
         def grabbed():
             self.drag("DragStart")
-            return holder(session) == 0
+            return holder(session) == self.number
 
         wait_until(grabbed)
 
@@ -112,6 +119,34 @@ def test_a_person_drags_through_the_page_and_lets_go_by_leaving(session, page):
     assert moved == pytest.approx([0.0, 0.0, 0.1], abs=1e-6)
     person.socket.close()
     wait_until(lambda: holder(session) is None)
+
+
+@pytest.mark.slow
+def test_page_outlives_a_hundred_visits_and_a_flood(session, page):
+    start = session.snapshot.limbs[HAND].target.translation
+    for number in range(VISITS):
+        visitor = Person(page, number)
+        if number % 2:
+            visitor.drag("DragStart")
+            visitor.socket.close()
+        else:
+            visitor.socket.socket.shutdown(socket.SHUT_RDWR)  # rudely
+    person = Person(page, VISITS)
+    person.grab(session)
+    for share in np.linspace(0.0, 1.0, FLOOD):
+        place = start + np.array([0.0, 0.0, 0.1 * share])
+        person.drag("Update", position=place.tolist(), wxyz=[1.0, 0.0, 0.0, 0.0])
+
+    def arrived():
+        assert holder(session) == VISITS
+        rise = session.snapshot.limbs[HAND].target.translation - start
+        return rise[2] == pytest.approx(0.1, abs=1e-6)
+
+    wait_until(arrived)
+    page.check()
+    other = Person(page, VISITS + 1)
+    person.socket.close()
+    other.grab(session)
 
 
 @pytest.mark.slow

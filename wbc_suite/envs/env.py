@@ -80,6 +80,12 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
             self.benchmark, self.robots, self.config
         )
         self.controllers = self.simulation.controllers
+        self._driven = [
+            (state.prefix if len(self.controllers) > 1 else "", controller, state)
+            for controller, state in zip(
+                self.controllers, self.simulation.robots, strict=True
+            )
+        ]
         self.action_layout = _joint_layout(self.controllers)
         self.action_space = _action_space(self.action_layout)
         self._period = 1.0 / self.config.control_freq
@@ -348,12 +354,9 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
 
     def _info(self, clipped: int, success: bool) -> dict[str, Any]:
         info = {"success": success, "is_success": success, "clipped": clipped}
-        prefixed = len(self.controllers) > 1
-        robots = self.simulation.robots
-        for state, controller in zip(robots, self.controllers, strict=True):
-            if told := controller.info(state):
-                before = state.prefix if prefixed else ""
-                info |= {before + key: value for key, value in told.items()}
+        for before, controller, state in self._driven:
+            for key, value in controller.info(state).items():
+                info[before + key] = value
         return info
 
 

@@ -59,14 +59,17 @@ class RowLog:
             self._spill()
 
     def columns(self) -> dict[str, NDArray[Any]]:
-        """Return all rows by name, each with a row per entry."""
+        """Return all rows by name, each with a row per entry.
+
+        They are apart from what is appended later; those on disk are read from there
+        when they are used, and take no memory until then.
+        """
         if self._file is None:
-            rows = self._block[: self._filled]
+            rows = self._block[: self._filled].copy()
         else:
             self._spill()
-            self._file.seek(0)
-            rows = np.frombuffer(self._file.read(), dtype=self._block.dtype)
-        return {name: np.ascontiguousarray(rows[name]) for name, _ in self._fields}
+            rows = np.memmap(self._file, dtype=self._block.dtype, mode="c")
+        return {name: rows[name] for name, _ in self._fields}
 
     def close(self) -> None:
         """Forget everything."""

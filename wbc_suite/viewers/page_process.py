@@ -124,6 +124,7 @@ class PageProcess:
     def _answer_until_stopped(self) -> None:
         while not self._stopping.is_set():
             if self._pipe.poll(GLANCE):
+                self._session.beat.resting.wait(GLANCE)  # or both want Python's lock
                 request, arguments = self._pipe.recv()
                 if request in self._answers:
                     self._pipe.send(self._answers[request](*arguments))

@@ -21,6 +21,7 @@ from wbc_suite.devices.pipeline.config import RatesConfig
 from wbc_suite.errors import DatasetError, UnknownNameError
 from wbc_suite.recording.desk import RecordingDesk, Wish
 from wbc_suite.typing import Vector
+from wbc_suite.viewers.beat import Beat
 from wbc_suite.viewers.drivable import SessionTraits
 from wbc_suite.viewers.history import History
 from wbc_suite.viewers.keeping_time import run_first
@@ -64,6 +65,9 @@ class TeleopSession:
         device: A device that people use beside the page; it has been started.
         pipeline: Stages between people and the controller.
         desk: Where people ask for episodes to be recorded; None if nothing records.
+
+    Attributes:
+        beat: When the loop steps, and when it rests.
     """
 
     def __init__(
@@ -78,7 +82,7 @@ class TeleopSession:
         desk: RecordingDesk | None = None,
     ) -> None:
         self.env, self.desk = env, desk
-        self.period = period
+        self.period, self.beat = period, Beat(period, clock=clock)
         self._seed = seed
         self._clock = clock
         layout = env.unwrapped.action_layout  # type: ignore[attr-defined]
@@ -258,29 +262,23 @@ class TeleopSession:
     def _run(self, urgent: bool) -> None:
         if urgent:
             run_first(rank=2)
+        self.beat.start()
         try:
-            self._tick_on_time()
+            while not self._stopping.is_set():
+                self.tick()
+                self.beat.rest()
         finally:
+            self.beat.stop()
             if not self._stopping.is_set():  # an error ends the loop; people must know
                 self._message = "Stopped by an error: see the terminal."
                 self._paused = True
                 self._publish()
 
-    def _tick_on_time(self) -> None:
-        due = self._clock()
-        while not self._stopping.is_set():
-            self.tick()
-            due += self.period
-            wait = due - self._clock()
-            if wait > 0:
-                time.sleep(wait)
-            elif wait < -5 * self.period:
-                due = self._clock()  # too slow for real time: do not race after it
-
     def _step(self, state: DeviceState, stamps: list[float]) -> None:
         with self._lock:
             action = self._pipeline.update(state)
         self._switched_to = self._pipeline.active if "hand" in state.limbs else ""
+        self.beat.await_step()
         try:
             *_, info = self.env.step(action)
         except DatasetError as error:  # the disk is full; people go on without it
