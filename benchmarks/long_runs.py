@@ -1,15 +1,17 @@
 """What environments hold in the long run: steps, resets, memory, seeds, placements.
 
-Every benchmark with every robot that makes sense takes 500 random actions, the nine
-with Panda 5,000 with each of three seeds; after each step observations must be finite
-and inside their space, rewards inside [0, 1], and MuJoCo without a warning. Episodes of
-the same seed are taken in this process, in spawned and forked ones, by copies, with
-pictures and after 100 resets. All controllers refuse bad actions and go on as without
-them, and bad numbers in the simulation are told at once. Then resets, environments
-made and closed, many of them at once, and 200 placements. Every trial runs in another
-process than this one, some of them in one of their own. `--only` takes one kind.
+Every benchmark with every robot that makes sense starts with eight seeds and takes 500
+random actions, the nine with Panda 5,000 with each of three seeds; after each step
+observations must be finite and inside their space, rewards inside [0, 1], and MuJoCo
+without a warning. Episodes of the same seed are taken in this process, in spawned and
+forked ones, by copies, with pictures and after 100 resets. All controllers refuse bad
+actions and go on as without them, and bad numbers in the simulation are told at once.
+Then resets, environments made and closed, many of them at once, and 200 placements.
+Every trial runs in another process than this one, some of them in one of their own.
+`--only` takes trials whose names hold a word, such as `speed/` or `GR1`. The JSON file
+is written as results come, so that a run that is stopped is not lost.
 
-Usage: python benchmarks/long_runs.py [--quick] [--json FILE] [--only KIND] [--jobs N]
+Usage: python benchmarks/long_runs.py [--quick] [--json F] [--only WORD ...] [--jobs N]
 """
 
 import itertools
@@ -74,6 +76,8 @@ def all_trials(*, quick: bool) -> Iterator[Trial]:
             if quick and (robots[0] not in FEW or way == "parallel"):
                 continue
             case = Case(benchmark=name, robots=robots, way=way)
+            seeds = {"seeds": 8}
+            yield Trial(kind="start", run=trials.start, case=case, numbers=seeds)
             numbers = {"steps": 30 if quick else 500, "seed": 0}
             yield Trial(kind="robots", run=trials.act, case=case, numbers=numbers)
     for case in map(pandas, () if quick else NINE):
@@ -173,10 +177,16 @@ def show(report: Report) -> None:
 
 def main() -> None:
     parser = options(__doc__, "three benchmarks and robots, few of everything")
-    parser.add_argument("--only", default="", help="trials whose name holds this")
+    parser.add_argument(
+        "--only", nargs="+", default=[""], help="trials whose names hold one of these"
+    )
     parser.add_argument("--jobs", type=int, default=1, help="trials at a time")
     arguments = parser.parse_args()
-    wanted = [t for t in all_trials(quick=arguments.quick) if arguments.only in t.name]
+    wanted = [
+        trial
+        for trial in all_trials(quick=arguments.quick)
+        if any(words in trial.name for words in arguments.only)
+    ]
     report, missed = Report(), []
     with Progress() as progress:
         bar = progress.add_task("trials", total=len(wanted))
@@ -186,6 +196,7 @@ def main() -> None:
                 progress.console.print(line, soft_wrap=True, markup=False)
             missed += wrong
             progress.update(bar, advance=1, description=trial.name)
+            report.write(arguments.json)
     show(report)
     print(f"{len(wanted)} trials, {len(missed)} things that do not hold")
     print(*missed, sep="\n")

@@ -20,13 +20,13 @@ Usage: python benchmarks/scaling.py [--quick] [--json FILE] [--rounds N] [--case
 
 import hashlib
 import multiprocessing
-import os
 import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
 
 from env_step import Case, controller_config
+from harness.memory import resident
 from harness.report import Report, options
 
 import numpy as np  # isort: skip  (after harness: it sets the number of BLAS threads)
@@ -210,12 +210,6 @@ def add_times(case: Case, report: Report, found: dict[str, list[float]]) -> None
     for key, (ours, theirs) in RATIOS.items():
         quotients = np.array(found[theirs]) / np.array(found[ours])
         report.ratios[f"{case.name}/{key}"] = float(np.median(quotients))
-
-
-def resident() -> float:
-    """Return the resident set of this process, MB."""
-    pages = int(Path("/proc/self/statm").read_text().split()[1])
-    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
 def weigh(pipe, case: Case, count: int) -> None:

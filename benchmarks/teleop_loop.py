@@ -10,10 +10,19 @@ Reported, in ms:
 
 - latency: from an input's arrival at the page to the joint targets that follow from it
   (bounds: median 20, 99th percentile 50)
-- jitter: by how much a period differs from 10 ms (bound: 99th percentile 1)
-- behind: how late a tick begins, which does not add up
+- jitter: by how much a period differs from 10 ms, from one step's beginning to the next
+  one's (bound: 99th percentile 1)
+- targets: the same from one step's joint targets to the next one's, which are found at
+  the end of the controller's work
+- behind: how late a step begins, which does not add up (in the JSON)
+- bare: jitter of a process at the same rate that does nothing else, meanwhile: what the
+  machine can do
 - load: what waits for a processor, per processor, when the run begins; above 1 the
   machine is not the session's own, and wall times say more of others than of it
+- grown: memory that the processes of session and page hold more at the end than at the
+  beginning, MB (bound: 50 in ten minutes, `--seconds 600`)
+- kept: the same once the episode is in its file
+- stolen: of the processors' time, what went to other machines on the same one, per cent
 
 Usage: python benchmarks/teleop_loop.py [--quick] [--json FILE] [--seconds S]
 """
@@ -26,6 +35,7 @@ import tempfile
 import time
 from pathlib import Path
 
+from harness.memory import resident
 from harness.report import Report, options
 
 import numpy as np  # isort: skip  (after harness: it sets the number of BLAS threads)
@@ -34,7 +44,8 @@ import pinocchio as pin
 
 import wbc_suite
 from wbc_suite.recording.desk import RecordingDesk, Wish
-from wbc_suite.viewers.keeping_time import calm_python
+from wbc_suite.viewers.beat import Beat
+from wbc_suite.viewers.keeping_time import calm_python, run_first
 from wbc_suite.viewers.page_process import PageProcess
 from wbc_suite.viewers.teleop_session import TeleopSession
 from wbc_suite.wrappers import DataCollection
@@ -46,11 +57,13 @@ COLUMNS = (
     "case",
     "latency_median_ms",
     "latency_p99_ms",
-    "jitter_median_ms",
     "jitter_p99_ms",
-    "behind_p99_ms",
-    "inputs",
+    "targets_p99_ms",
+    "bare_p99_ms",
+    "grown_mb",
+    "kept_mb",
     "load",
+    "stolen",
 )
 CAMERA = {
     "type": "ViewerCameraMessage",
@@ -66,25 +79,61 @@ CAMERA = {
 }
 """What a browser says first; viser's clients count from then on."""
 
+STOLEN = 7
+"""Which of the processors' times went to other machines; see proc_stat(5)."""
 SETTLE = 1.0  # s; the first ticks fill caches
 
 
 class Clock:
-    """A session's clock, which notes when steps begin and what inputs took."""
+    """Notes when a session's steps begin and have targets, and what inputs took."""
 
     def __init__(self, env, session):
-        self.begun, self.latencies = [], []
+        self.begun, self.found, self.latencies = [], [], []
         step, append = env.step, session._latencies.append
+        (controller,) = env.unwrapped.controllers
 
         def noted_step(action):
             self.begun.append(time.perf_counter())
-            return step(action)
+            result = step(action)
+            self.found.append(controller.solved_at)
+            return result
 
         def noted_latency(row):
             self.latencies.append(float(row[0]))
             append(row)
 
         env.step, session._latencies.append = noted_step, noted_latency
+
+
+class Metronome:
+    """A process that sleeps at the session's rate, and notes how well it is woken."""
+
+    def __init__(self):
+        make = multiprocessing.get_context("spawn")
+        self.pipe, theirs = make.Pipe()
+        self.process = make.Process(target=self.run, args=(theirs,), daemon=True)
+        self.process.start()
+        self.pipe.recv()  # it is there
+
+    def stop(self):
+        """Return when it was woken."""
+        self.pipe.send("stop")
+        woken = self.pipe.recv()
+        self.process.join()
+        return np.array(woken)
+
+    @staticmethod
+    def run(pipe):
+        """Be the metronome, in its own process."""
+        run_first(rank=2)
+        pipe.send("ready")
+        beat, woken = Beat(1.0 / RATE), []
+        beat.start()
+        while not pipe.poll():
+            beat.await_step()
+            woken.append(time.perf_counter())
+            beat.rest()
+        pipe.send(woken)
 
 
 class Viewer:
@@ -184,25 +233,50 @@ def measure(robot, seconds, folder):
     desk.ask(Wish.RECORD)
     while not session.snapshot.recording.recording:
         time.sleep(0.01)
-    load = os.getloadavg()[0] / (os.cpu_count() or 1)
+    metronome, load = Metronome(), os.getloadavg()[0] / (os.cpu_count() or 1)
     time.sleep(SETTLE)
-    first = len(clock.begun), len(clock.latencies)
+    first, before = (len(clock.begun), len(clock.latencies)), processor_times()
+    held = memory()
     time.sleep(seconds)
-    begun = np.array(clock.begun[first[0] :])
-    latencies = clock.latencies[first[1] :]
+    begun, found = (np.array(times[first[0] :]) for times in (clock.begun, clock.found))
+    latencies, spent = clock.latencies[first[1] :], processor_times() - before
+    woken, grown = metronome.stop(), memory() - held
+    desk.ask(Wish.RECORD)
+    while session.snapshot.recording.recording:
+        time.sleep(0.01)
+    kept = memory() - held
     for viewer in viewers:
         viewer.stop.set()
         viewer.process.join()
     session.stop()
     page.stop()
     collection.close()
-    periods = np.diff(begun)
     behind = begun - begun[0] - np.arange(len(begun)) / RATE
     row = {"case": f"Lift/{robot}", "side": "ours", "inputs": len(latencies)}
     row |= figures("latency", latencies)
-    row |= figures("jitter", np.abs(periods - 1.0 / RATE))
+    row |= figures("jitter", jitter(begun))
+    row |= figures("targets", jitter(found))
     row |= figures("behind", behind - behind.min())
-    return row | {"load": load, "seconds": seconds}
+    row |= figures("bare", jitter(woken[woken > begun[0]]))
+    row |= {"grown_mb": grown, "kept_mb": kept, "load": load, "seconds": seconds}
+    return row | {"stolen": 100.0 * spent[STOLEN] / spent.sum()}
+
+
+def jitter(times):
+    """Return by how much each period differs from the nominal one, s."""
+    return np.abs(np.diff(times) - 1.0 / RATE)
+
+
+def memory():
+    """Return the memory that this process and the page's hold, MB."""
+    (page,) = (p for p in multiprocessing.active_children() if p.name == "page")
+    return resident() + resident(page.pid)
+
+
+def processor_times():
+    """Return what processors did since the start, in Linux's order and units."""
+    (_, *times), *_ = map(str.split, Path("/proc/stat").read_text().splitlines())
+    return np.array(times[: STOLEN + 1], dtype=float)
 
 
 def figures(name, times):

@@ -6,18 +6,19 @@ in a process of its own.
 
 import gc
 import itertools
-import os
 import time
 import weakref
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import wbc_suite
+from harness.memory import resident
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.envs.env import RobotEnv
 from wbc_suite.timing import Block, time_block, times
@@ -33,6 +34,7 @@ __all__ = [
     "place",
     "reset_often",
     "robots_of",
+    "start",
 ]
 
 ARMS_OF_TWO = "TwoArm"
@@ -189,6 +191,17 @@ def place(case: Case, *, seeds: int) -> Found:
     return found
 
 
+def start(case: Case, *, seeds: int) -> Found:
+    """Reset with many seeds; tell overlaps."""
+    env, found, deepest = case.make(), Found(), 0.0
+    for seed in range(seeds):
+        found.times += times(1, partial(env.reset, seed=seed))
+        deepest = max(deepest, _overlap(env))
+    env.close()
+    found.figures = {"overlap_mm": 1e3 * deepest}
+    return found
+
+
 def _overlap(env: RobotEnv) -> float:
     """Return how deep things overlap with anything, m."""
     things = {g for state in _things(env) for g in state.geoms}
@@ -220,9 +233,9 @@ def reset_often(case: Case, *, count: int) -> Found:
     env = case.make()
     for seed in range(20):
         env.reset(seed=seed)
-    before = _memory_mb()
+    before = resident()
     found = Found(times=times(count, env.reset))
-    found.figures = {"grown_mb": _memory_mb() - before}
+    found.figures = {"grown_mb": resident() - before}
     env.close()
     return found
 
@@ -247,11 +260,11 @@ def make_and_close(case: Case, *, cycles: int) -> Found:
     gc.collect()
     gc.disable()
     try:
-        before = _memory_mb(), _files(), _threads()
+        before = resident(), _files(), _threads()
         found, alive = Found(), []
         for _ in range(cycles):
             found.times += times(1, lambda: alive.extend(cycle()))
-        after = _memory_mb(), _files(), _threads()
+        after = resident(), _files(), _threads()
         found.faults["environments that live on"] = sum(r() is not None for r in alive)
         left = _garbage()
     finally:
@@ -277,7 +290,7 @@ def _garbage() -> int:
 def keep_many(case: Case, *, count: int) -> Found:
     """Keep many environments in one process, and step all of them."""
     first = case.make()
-    before, found = _memory_mb(), Found()
+    before, found = resident(), Found()
     envs = [case.make() for _ in range(count - 1)] + [first]
     for env in envs:
         env.reset(seed=1)
@@ -286,7 +299,7 @@ def keep_many(case: Case, *, count: int) -> Found:
     states = {env.physics_state.tobytes() for env in envs}
     found.faults["equal seeds, other states"] = len(states) - 1
     found.faults = +found.faults
-    found.figures = {"each_mb": (_memory_mb() - before) / max(count - 1, 1)}
+    found.figures = {"each_mb": (resident() - before) / max(count - 1, 1)}
     return found
 
 
@@ -296,12 +309,6 @@ def alone(trial: Callable[..., Found], case: Case, numbers: dict[str, int]) -> F
         return trial(case, **numbers)
     except Exception as error:  # noqa: BLE001 - to be told beside all other trials
         return Found(faults=Counter([f"{type(error).__name__}: {error}"]))
-
-
-def _memory_mb() -> float:
-    """Return resident memory; freed blocks count as long as the process keeps them."""
-    pages = Path("/proc/self/statm").read_text("utf-8").split()[1]
-    return int(pages) * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
 def _files() -> int:

@@ -85,13 +85,15 @@ def read_robomimic(path):
     from robomimic.utils.dataset import SequenceDataset
     from torch.utils.data import DataLoader
 
-    low_dim = ["cube_pos", "robot0_joint_pos"]
-    obs_utils.initialize_obs_utils_with_obs_specs(
-        {"obs": {"low_dim": low_dim, "rgb": ["agentview_image"]}}
-    )
-    keys = [*low_dim, "agentview_image"]
     with h5py.File(path) as file:
         has_next = "data/demo_0/next_obs" in file
+        shapes = {key: obs.shape[1:] for key, obs in file["data/demo_0/obs"].items()}
+    low_dim = [key for key, shape in shapes.items() if len(shape) == 1]
+    pictures = [key for key, shape in shapes.items() if len(shape) == 3]
+    obs_utils.initialize_obs_utils_with_obs_specs(
+        {"obs": {"low_dim": low_dim, "rgb": pictures}}
+    )
+    keys = [*low_dim, *pictures]
     dataset = SequenceDataset(
         hdf5_path=str(path),
         obs_keys=keys,
@@ -104,15 +106,18 @@ def read_robomimic(path):
         hdf5_cache_mode=None,
     )
     meta = file_utils.get_env_metadata_from_dataset(str(path))
-    shapes = file_utils.get_shape_metadata_from_dataset(str(path), all_obs_keys=keys)
+    told = file_utils.get_shape_metadata_from_dataset(str(path), all_obs_keys=keys)
     batch = next(iter(DataLoader(dataset, batch_size=4)))
-    assert tuple(batch["actions"].shape) == (4, 5, shapes["ac_dim"])
-    assert tuple(batch["obs"]["agentview_image"].shape) == (4, 5, 64, 64, 3)
+    assert tuple(batch["actions"].shape) == (4, 5, told["ac_dim"])
+    for key in keys:
+        assert tuple(batch["obs"][key].shape) == (4, 5, *shapes[key])
     whole = [dataset.get_trajectory_at_index(k) for k in range(dataset.n_demos)]
     return {
         "lengths": [len(t["actions"]) for t in whole],
         "actions": [digest(t["actions"]) for t in whole],
-        "cube": [digest(t["obs"]["cube_pos"]) for t in whole],
+        "observations": {
+            key: [digest(t["obs"][key]) for t in whole] for key in low_dim
+        },
         "ended": [bool(t["dones"][-1]) for t in whole],
         "environment": meta["env_name"],
         "items": len(dataset),
@@ -124,21 +129,22 @@ def read_lerobot(path):
 
     dataset = LeRobotDataset("local/recording", root=path, video_backend="pyav")
     lengths, actions, pictures = [], [], []
+    cameras = dataset.meta.camera_keys
     for k in range(dataset.num_frames):
         row = dataset[k]
         if int(row["frame_index"]) == 0:
             lengths.append(0)
             actions.append(0.0)
-            pictures.append(row["observation.images.agentview"].numpy().tolist())
+            pictures += [row[camera].numpy().tolist() for camera in cameras]
         lengths[-1] += 1
         actions[-1] += digest(row["action"])
-    stats = dataset.meta.stats["observation.images.agentview"]
+    stats = [np.mean(dataset.meta.stats[camera]["mean"]) for camera in cameras]
     return {
         "lengths": lengths,
         "actions": actions,
         "pictures": pictures,
         "environment": dataset.meta.tasks.index[0],
-        "mean": float(np.mean(stats["mean"])),
+        "means": [float(mean) for mean in stats],
     }
 
 
