@@ -63,7 +63,8 @@ class Viewer:
         context: Browser context.
         site: Site to open.
         size: Of the page, in pixels.
-        dots: Drawn per pixel; fewer cost a browser without graphics card less.
+        dots: Drawn per pixel; fewer cost a browser without graphics card less. Below
+            one there are no shadows either: two thirds of what a picture costs.
         watching: Whether anybody looks at the robot; else it is drawn seldom.
     """
 
@@ -74,7 +75,6 @@ class Viewer:
         self.page = context.new_page()
         if not watching:
             self.page.add_init_script(SELDOM)
-        self.page.set_default_timeout(1e3 * PATIENCE)
         self.page.set_viewport_size({"width": size[0], "height": size[1]})
         self.page.on("request", lambda request: self.requests.append(request.url))
         began = time.monotonic()
@@ -84,6 +84,7 @@ class Viewer:
         ).pop()
         self.load_time = time.monotonic() - began
         self.client = site.server.get_clients()[number]
+        self.client.scene.configure_default_lights(cast_shadow=dots >= 1.0)
         wait_until(
             lambda: self.client.camera.image_width > 0, "the page tells its camera"
         )
@@ -187,7 +188,8 @@ def browser(tmp_path_factory):
 
 @pytest.fixture
 def context(browser):
-    context = browser.new_context()
+    context = browser.new_context(viewport={"width": 960, "height": 600})
+    context.set_default_timeout(1e3 * PATIENCE)
     yield context
     context.close()
 

@@ -262,6 +262,7 @@ SEED = 52  # with it the handles point to the robot's sides
 STEP = 0.02  # m; by which one hand may be higher than the other
 SPARE = 3  # steps above the height that counts: what is held slips and sags
 OUTWARDS = {"right": -1.0, "left": 1.0}
+HIGHEST = 1.3  # m; no pot is up there
 HANDLES = {"right": "pot_handle0", "left": "pot_handle1"}
 
 
@@ -290,10 +291,8 @@ def take_handle(pot, side):
     pot.change_pace("+", 1)
 
 
-def test_a_person_raises_the_pot_with_both_hands_and_records_it(
-    room, peer_readers, tmp_path
-):
-    pot = room("TwoArmLift", "GR1", seed=SEED, watching=False)
+def raise_pot(pot):
+    """Take both handles and lift; return whether the pot came along."""
     pot.record()
     pot.change_pace("-", 2)
     for side in HANDLES:
@@ -302,13 +301,26 @@ def test_a_person_raises_the_pot_with_both_hands_and_records_it(
     hands = [f"{side}_hand" for side in HANDLES]
     heights = [pot.limb(hand).target.translation[2] for hand in hands]
     rounds = SPARE
-    while rounds:
+    while rounds and max(heights) < HIGHEST:
         rounds -= pot.session.snapshot.success
         heights = [height + STEP for height in heights]
-        assert max(heights) < 1.3, "the hands rose without the pot"
         for hand, height in zip(hands, heights, strict=True):
             pot.switch_to(hand)
             pot.raise_to(hand, height)
+    return pot.session.snapshot.success
+
+
+def test_a_person_raises_the_pot_with_both_hands_and_records_it(
+    room, peer_readers, tmp_path
+):
+    for attempt in range(TRIES):  # a handle may slip out of a hand
+        pot = room("TwoArmLift", "GR1", seed=SEED, watching=False)
+        if raise_pot(pot):
+            break
+        pot.viewer.screenshot(f"people_raise_pot_gr1_in_vain_{attempt}")
+        pot.press("Backspace")
+        wait_until(lambda pot=pot: not pot.recording.recording, "it is discarded")
+        pot.close()
     assert pot.session.snapshot.success
     pot.keep()
     pot.viewer.screenshot("people_raise_pot_gr1")
@@ -316,4 +328,4 @@ def test_a_person_raises_the_pot_with_both_hands_and_records_it(
     pot.env.recorder.close()
     length = assert_replays(tmp_path / "made.hdf5")
     assert_peers_load(peer_readers, tmp_path / "made.hdf5", tmp_path)
-    note(actions_of_a_persons_pot=length)
+    note(actions_of_a_persons_pot=length, attempts_at_the_pot=attempt + 1)

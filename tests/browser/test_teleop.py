@@ -104,7 +104,7 @@ def quietest_latencies(viewer, session, first):
 
 def test_humanoids_hand_follows_the_mouse_in_time(gr1, context):
     session, page = gr1
-    viewer = Viewer(context, page.site, size=(1280, 800), dots=1.0)
+    viewer = Viewer(context, page.site, size=(1280, 800), dots=0.7)
     viewer.page.get_by_text("input to joint target").wait_for()
     own = (page.site.url, f"blob:{page.site.url}", "data:")
     assert [url for url in viewer.requests if not url.startswith(own)] == []
@@ -225,7 +225,7 @@ def test_buttons_pause_and_reset(settled, context):
 def test_hand_of_every_robot_follows_the_mouse(robot, context):
     session, page = served(robot)
     try:
-        viewer = Viewer(context, page.site, dots=1.0)
+        viewer = Viewer(context, page.site, dots=0.7)
         drag_until(viewer, session)
         start_error = session.snapshot.limbs[HAND].position_error
         wait_until(
