@@ -5,6 +5,7 @@ What no law can beat: accelerations and torques, and the way between, count for 
 
 import mujoco
 import numpy as np
+import pinocchio as pin
 from scipy.optimize import least_squares
 
 from harness.motion import BAND
@@ -38,20 +39,30 @@ def soonest(stand: Stand, goal: np.ndarray, *, site: str, drives: np.ndarray) ->
     start, turned = hand.xpos.copy(), hand.xmat.reshape(3, 3).copy()
     band = BAND * np.repeat([np.linalg.norm(half) for half in np.split(goal, 2)], 3)
 
-    def off(q: np.ndarray) -> np.ndarray:
+    def turn_at(q: np.ndarray) -> np.ndarray:
         scratch.qpos[drives["qpos"]] = q
         mujoco.mj_kinematics(stand.model, scratch)
-        turn, quat = np.empty(3), np.empty(4)
-        mujoco.mju_mat2Quat(quat, (hand.xmat.reshape(3, 3) @ turned.T).ravel())
-        mujoco.mju_quat2Vel(turn, quat, 1.0)
+        return hand.xmat.reshape(3, 3) @ turned.T
+
+    def off(q: np.ndarray) -> np.ndarray:
+        turn = pin.log3(turn_at(q))
         return (np.concatenate([hand.xpos - start, turn]) - goal) / band
+
+    def slope(q: np.ndarray) -> np.ndarray:
+        R, J = turn_at(q), np.zeros((2, 3, stand.model.nv))
+        mujoco.mj_comPos(stand.model, scratch)
+        mujoco.mj_jacSite(stand.model, scratch, J[0], J[1], hand.id)
+        J[1] = pin.Jlog3(R) @ R.T @ J[1]
+        return J.reshape(6, -1)[:, drives["dof"]] / band[:, None]
 
     def is_possible(time: float) -> bool:
         rng, reach = np.random.default_rng(0), time * drives["fastest"]
         low, high = np.maximum(lowest, q0 - reach), np.minimum(highest, q0 + reach)
         for k in range(STARTS):
             first = rng.uniform(low, high) if k else (low + high) / 2.0
-            found = least_squares(off, first, bounds=(low, high), xtol=1e-12).x
+            found = least_squares(
+                off, first, slope, bounds=(low, high), method="dogbox"
+            ).x
             if np.linalg.norm(np.split(off(found), 2), axis=1).max() <= 1.0:
                 return True
         return False

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-HURRIED = {"Sawyer": 1, "Baxter": 2}
+HURRIED = {"Baxter": 1}
 """Of six steps, how many take longer than half a second: joints at their top speed."""
 
 ROOT = Path(__file__).parent.parent.parent
