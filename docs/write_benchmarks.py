@@ -54,6 +54,7 @@ GOALS = (
     ),
     ("Lift/GR1/WHOLE_BODY_IK/raw", 2.0, "environment step over its own raw physics"),
     ("Lift/Panda/reset/1ms", 1.0, "reset over 1 ms"),
+    ("Lift/Panda/recording/thread", 1.1, "recorded step over one that is not"),
     ("GR1/mink", 0.2, "tick of whole-body IK over mink's"),
     ("Tiago/mink", 0.2, "tick of whole-body IK over mink's"),
     ("GR1/placo", 1.3, "tick of whole-body IK over placo's"),

@@ -15,6 +15,7 @@ from random_episodes import HEADER, make_episode
 
 from wbc_suite.errors import DatasetError
 from wbc_suite.recording import Dataset, Store, editing, files
+from wbc_suite.wrappers import DataCollection
 
 KILLS = int(os.environ.get("WBC_SUITE_KILLS", "4"))
 """200 of them take about three minutes."""
@@ -50,11 +51,11 @@ def test_a_full_disk_loses_nothing_that_is_finished(tmp_path, monkeypatch):
     store = Store(path, HEADER)
     store.add(make_episode(0))
 
-    def no_room(self, content):
+    def no_room(file, content, place):
         raise OSError(errno.ENOSPC, "No space left on device")
 
     with monkeypatch.context() as patched:
-        patched.setattr(Path, "write_bytes", no_room)
+        patched.setattr(os, "pwrite", no_room)
         with pytest.raises(DatasetError, match="No space left"):
             store.add(make_episode(1))
     usage = shutil.disk_usage(tmp_path)._replace(free=1000)
@@ -70,6 +71,30 @@ def test_a_full_disk_loses_nothing_that_is_finished(tmp_path, monkeypatch):
         assert again.add(make_episode(1)) == "demo_1"
     with Dataset(path, alone=True) as dataset:
         assert [e.facts["uid"] for e in dataset] == ["0", "1"]
+
+
+@pytest.mark.slow
+def test_an_episode_that_could_not_be_kept_goes_on(lift_env, tmp_path, monkeypatch):
+    recorded = DataCollection(lift_env, tmp_path / "a.hdf5", automatic=False)
+    recorded.reset(seed=0)
+    recorded.recorder.begin()
+    usage = shutil.disk_usage(tmp_path)._replace(free=1000)
+    for steps in (1, 300):  # in memory, then partly on disk
+        for _ in range(steps):
+            recorded.step(lift_env.hold_action)
+        with monkeypatch.context() as patched:
+            patched.setattr(files.shutil, "disk_usage", lambda _: usage)
+            with pytest.raises(DatasetError, match=r"0\.0 MB left"):
+                recorded.recorder.keep()
+    recorded.step(lift_env.hold_action)
+    assert recorded.recorder.keep(success=False) == "demo_0"
+    recorded.close()
+    with Dataset(tmp_path / "a.hdf5") as dataset:
+        columns = dataset.episode("demo_0").columns
+    over = np.arange(302) >= lift_env.horizon - 1  # and not where it was not kept
+    np.testing.assert_array_equal(columns["dones"], over)
+    assert (np.diff(columns["states"][:, 0]) > 0.0).all()
+    assert (np.diff(columns["stamp"]) > 0.0).all()
 
 
 def test_a_folder_that_cannot_be_written_is_said_before_anything_is_recorded():

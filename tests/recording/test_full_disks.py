@@ -10,6 +10,7 @@ from random_episodes import HEADER, make_episode
 
 from wbc_suite.errors import DatasetError
 from wbc_suite.recording import Dataset, Store, files, store, writing
+from wbc_suite.recording.late_errors import late_errors
 from wbc_suite.recording.row_log import BLOCK_BYTES, RowLog
 
 SIZE = 24 << 20  # bytes; a recording begins with 20 MB free
@@ -63,10 +64,11 @@ def write_forever(file):
         file.write(bytes(1 << 16))
 
 
-def append_rows(rows):
-    """Append two blocks of rows."""
-    for _ in range(2 * BLOCK_BYTES // 4096):
-        rows.append({"states": np.ones(512)})
+def append_rows(rows, count):
+    """Append so many bytes of rows."""
+    rows.begin(np.dtype([("states", "f8", (512,))]))
+    for _ in range(count // 4096):
+        rows.advance()
 
 
 def uids(path):
@@ -121,7 +123,7 @@ def test_rows_of_an_episode_that_no_longer_fit_are_said_to_be_lost(disk):
     rows = RowLog(disk.folder)
     disk.fill(leave=BLOCK_BYTES + BLOCK_BYTES // 2)  # the second block goes halfway
     with pytest.raises(DatasetError, match=r"No space left.*finished ones are safe"):
-        append_rows(rows)
+        append_rows(rows, 2 * BLOCK_BYTES)
     rows.close()
 
 
@@ -158,6 +160,25 @@ def test_files_that_may_not_grow_further_are_said_and_old_ones_stay(
         writing.write_dataset(path, [big], HEADER)
     rows = RowLog(tmp_path)
     with pytest.raises(DatasetError, match="File too large"):
-        append_rows(rows)
+        append_rows(rows, 2 << 20)
     assert uids(path) == ["0"]
     assert left_aside(tmp_path) == []
+
+
+def test_hdf5_never_sees_an_error_and_writing_one_says_it_at_the_end(
+    tmp_path, short_files
+):
+    def write(file):
+        assert file.write(b"abc") == 3
+        file.seek(BIG)
+        assert file.write(b"def") == 3
+        file.seek(0)
+        assert file.read(4) == b"abc\0"
+        assert file.seek(0, 2) == BIG + 3
+
+    with (
+        pytest.raises(OSError, match="File too large"),
+        late_errors(tmp_path / "a") as file,
+    ):
+        write(file)
+    assert (tmp_path / "a").stat().st_size == 3

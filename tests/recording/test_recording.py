@@ -4,6 +4,7 @@
 
 import json
 
+import gymnasium
 import h5py
 import numpy as np
 import pytest
@@ -13,6 +14,8 @@ from wbc_suite.errors import DatasetError, UnknownNameError
 from wbc_suite.recording import Dataset, EnvSource, rebuild
 from wbc_suite.recording.recorder import Recorder
 from wbc_suite.recording.replaying import divergence, play_states
+from wbc_suite.recording.row_log import BLOCK_BYTES
+from wbc_suite.wrappers import DataCollection
 
 
 def test_episodes_replay_bit_by_bit_by_their_actions(lift_recording):
@@ -131,6 +134,67 @@ def test_keep_discard_and_undo_leave_what_they_say(lift_env, tmp_path):
     with Dataset(path) as dataset:
         seeds = [dataset.facts(name)["seed"] for name in dataset.names]
     assert seeds == [0, 3]
+
+
+@pytest.mark.slow
+def test_what_was_observed_is_recorded_over_many_blocks(lift_env, tmp_path):
+    path, rng, expected = tmp_path / "a.hdf5", np.random.default_rng(0), []
+    recorded = DataCollection(lift_env, path, automatic=False, next_obs=True)
+    seen, _ = recorded.reset(seed=3)
+    recorded.recorder.begin()
+    for _ in range(BLOCK_BYTES // 300):
+        state, action = lift_env.physics_state, rng.uniform(-0.1, 0.1, 7)
+        after, reward, _, ended, info = recorded.step(action)
+        row = {"states": state, "actions": action, "rewards": reward}
+        row |= {"clipped": info["clipped"], "dones": int(ended or info["success"])}
+        row |= {f"obs/{key}": value for key, value in seen.items()}
+        expected.append(row | {f"next_obs/{key}": v for key, v in after.items()})
+        seen = after
+    recorded.recorder.keep()
+    recorded.close()
+    with Dataset(path) as dataset:
+        episode = dataset.episode("demo_0")
+    expected[-1]["dones"] = 1
+    assert set(episode.columns) == {*expected[0], "step_time", "stamp"}
+    for name in expected[0]:
+        column = np.array([row[name] for row in expected])
+        np.testing.assert_array_equal(episode.columns[name], column)
+    np.testing.assert_array_equal(episode.final_state, lift_env.physics_state)
+
+
+class Blurred(gymnasium.ObservationWrapper):
+    """Somebody's own: shifts what is seen."""
+
+    def observation(self, observation):
+        return {key: value + 1.0 for key, value in observation.items()}
+
+
+@pytest.mark.slow
+def test_what_a_wrapper_made_of_observations_is_recorded(lift_env, tmp_path):
+    recorded = DataCollection(Blurred(lift_env), tmp_path / "a.hdf5")
+    recorded.reset(seed=3)
+    seen, *_ = recorded.step(lift_env.hold_action)
+    recorded.step(lift_env.hold_action)
+    recorded.close()
+    with Dataset(tmp_path / "a.hdf5") as dataset:
+        positions = dataset.column("demo_0", "obs/cube_pos")
+    np.testing.assert_array_equal(positions[1], seen["cube_pos"])
+
+
+@pytest.mark.slow
+def test_other_keys_within_an_episode_are_told(tmp_path):
+    env = wbc_suite.make("Lift", robots="Panda")
+    recorded = DataCollection(env, tmp_path / "a.hdf5")
+    recorded.reset(seed=3)
+    recorded.step(env.hold_action)
+    env.observables.modify("cube_pos", active=False)
+    env.observables.modify("cube_pos", active=True)  # another observer, the same keys
+    recorded.step(env.hold_action)
+    assert recorded.recorder.length == 2
+    env.observables.modify("cube_pos", active=False)
+    with pytest.raises(DatasetError, match="other keys are observed"):
+        recorded.step(env.hold_action)
+    assert not recorded.recorder.recording
 
 
 def test_a_robot_of_ones_own_is_what_a_file_cannot_tell():

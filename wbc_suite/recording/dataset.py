@@ -4,14 +4,21 @@ import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Self, cast
 
 import h5py
 import numpy as np
 
 from wbc_suite.errors import DatasetError, UnknownNameError
 from wbc_suite.recording import hdf5
-from wbc_suite.recording.episode import PER_STEP, Column, Episode, Fact, fingerprint
+from wbc_suite.recording.episode import (
+    PER_STEP,
+    Column,
+    Episode,
+    Fact,
+    fingerprint,
+    pieces,
+)
 
 __all__ = ["Dataset", "part_files", "parts_folder"]
 
@@ -131,9 +138,26 @@ class Dataset:
             DatasetError: If it cannot be read, its columns differ in length, or its
                 numbers are not those that were written.
         """
+        return self._episode(name)
+
+    def streamed(self) -> Iterator[Episode]:
+        """Read episodes one by one, for writing: each column piece by piece, twice.
+
+        Of columns there are length, shape, type and slices, as long as this is open.
+
+        Raises:
+            DatasetError: See `episode`.
+        """
+        return (self._episode(name, later=True) for name in self.names)
+
+    def _episode(self, name: str, *, later: bool = False) -> Episode:
         path, group = self._find(name)
         with hdf5.reading(path):
-            columns = {k: hdf5.read_column(d) for k, d in _columns(group).items()}
+            stored = {k: hdf5.StoredColumn(d, path) for k, d in _columns(group).items()}
+            columns = {
+                k: cast("Column", column) if later and column.sliced else column[:]
+                for k, column in stored.items()
+            }
             last = hdf5.child(group, "final_state", h5py.Dataset)
             final = None if last is None else hdf5.read_column(last)
             _check_lengths(name, columns)
@@ -257,4 +281,4 @@ def _check_lengths(name: str, columns: Mapping[str, Column]) -> None:
 
 
 def _finite(column: Column) -> bool:
-    return bool(np.isfinite(column).all())
+    return all(bool(np.isfinite(piece).all()) for _, piece in pieces(column))

@@ -1,14 +1,15 @@
 """One recorded episode, as plain arrays and plain facts."""
 
 import hashlib
-from collections.abc import Mapping
+import mmap
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["PER_STEP", "Column", "Episode", "Fact", "fingerprint"]
+__all__ = ["PER_STEP", "Column", "Episode", "Fact", "fingerprint", "pieces"]
 
 Column: TypeAlias = NDArray[Any]
 """One row per action."""
@@ -17,6 +18,8 @@ Fact: TypeAlias = str | int | float | bool
 
 PER_STEP = ("states", "actions", "rewards", "dones")
 """The columns that robomimic's layout asks for, besides `obs/*`."""
+PIECE = 1 << 20
+"""Bytes that are read at once while a column is written, those beside it included."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -61,7 +64,33 @@ def fingerprint(columns: Mapping[str, Column], final_state: Column | None) -> st
     if final_state is not None:
         named["final_state"] = final_state
     for name in sorted(named):
-        column = np.ascontiguousarray(named[name])
-        digest.update(f"{name} {column.dtype.str} {column.shape}\n".encode())
-        digest.update(column.tobytes())
+        column = named[name]
+        digest.update(f"{name} {column.dtype.str} {column.shape or (1,)}\n".encode())
+        for _, piece in pieces(column):
+            digest.update(piece.tobytes())
     return digest.hexdigest()
+
+
+def pieces(column: Column) -> Iterator[tuple[int, Column]]:
+    """Cut a column into contiguous arrays of a megabyte at most, and tell their rows.
+
+    What was read from a mapped file is let go of: it would count as this process's
+    memory until the whole column was there.
+    """
+    if not column.ndim:
+        column = np.reshape(column, 1)
+    wide = abs(column.strides[0]) if isinstance(column, np.ndarray) else 0
+    rows = max(1, PIECE // max(column[:1].nbytes, wide, 1))
+    for begin in range(0, len(column), rows):
+        yield begin, np.ascontiguousarray(column[begin : begin + rows])
+        _let_go(column)
+
+
+def _let_go(column: Column) -> None:
+    if getattr(column, "flags", None) is None or column.flags.writeable:
+        return
+    held: Any = column
+    while isinstance(held, np.ndarray):
+        held = held.base
+    if isinstance(held, mmap.mmap) and hasattr(mmap, "MADV_DONTNEED"):
+        held.madvise(mmap.MADV_DONTNEED)

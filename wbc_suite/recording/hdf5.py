@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from wbc_suite.errors import DatasetError, UnknownNameError
 
 __all__ = [
+    "StoredColumn",
     "attribute",
     "child",
     "child_names",
@@ -35,6 +36,8 @@ MAX_RATIO = 1100
 """Bytes that one stored byte can stand for; deflate's limit is 1032."""
 FILTERS = {1: "gzip", 2: "shuffle", 3: "fletcher32", 32000: "lzf"}
 """By HDF5's numbers; others load libraries from a search path."""
+LARGEST_CHUNK = 1 << 20
+"""Larger chunks are unpacked for each slice, since HDF5's cache does not hold them."""
 SPARSE_FROM, SPARSE = 1 << 30, 20
 """A file this large, with less than one in so many bytes on disk, is a bomb."""
 _PLAIN = re.compile(r"[^/\x00]+\Z")
@@ -163,16 +166,54 @@ def attribute(
     return value
 
 
+class StoredColumn:
+    """Numbers that are read when they are asked for, slice by slice.
+
+    Args:
+        dataset: Where they are.
+        path: The file, for messages.
+
+    Attributes:
+        shape, dtype, ndim, nbytes: NumPy's.
+        sliced: Whether a slice is read without reading much else.
+
+    Raises:
+        DatasetError: If they are no numbers, too many, or not in this file; or later,
+            if they cannot be read.
+    """
+
+    def __init__(self, dataset: h5py.Dataset, path: Path) -> None:
+        _check_numbers(dataset)
+        self._dataset, self._path = dataset, path
+        self.shape, self.dtype, self.ndim = dataset.shape, dataset.dtype, dataset.ndim
+        self.nbytes = int(np.prod(self.shape, dtype=object)) * self.dtype.itemsize
+        chunk = int(np.prod(dataset.chunks or (0,), dtype=object))
+        self.sliced = chunk * self.dtype.itemsize <= LARGEST_CHUNK
+
+    def __len__(self) -> int:
+        """Return the number of rows."""
+        return self.shape[0]
+
+    def __getitem__(self, rows: slice) -> NDArray[Any]:
+        """Read some rows."""
+        with reading(self._path):
+            return np.asarray(self._dataset[rows])
+
+
 def read_column(dataset: h5py.Dataset, rows: slice = slice(None)) -> NDArray[Any]:
     """Return numbers, after a look at their type, size and place.
 
     Raises:
         DatasetError: If they are no numbers, too many, or not in this file.
     """
+    _check_numbers(dataset)
+    return np.asarray(dataset[rows])
+
+
+def _check_numbers(dataset: h5py.Dataset) -> None:
     _check_storage(dataset)
     if dataset.dtype.kind not in "fiub" or dataset.dtype.itemsize > 8:
         raise DatasetError(f"'{dataset.name}' holds {dataset.dtype}, not numbers.")
-    return np.asarray(dataset[rows])
 
 
 def read_names(dataset: h5py.Dataset) -> list[str]:

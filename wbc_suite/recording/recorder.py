@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from wbc_suite.errors import DatasetError
-from wbc_suite.recording.episode import Episode, Fact
-from wbc_suite.recording.row_log import RowLog
+from wbc_suite.recording.episode import Episode, Fact, pieces
 from wbc_suite.recording.source import header_of
+from wbc_suite.recording.step_rows import StepRows
 from wbc_suite.recording.store import Store
 
 __all__ = ["Recorder"]
@@ -44,7 +44,7 @@ class Recorder:
         self.path = Path(path)
         self._header, self._model_file = header_of(env), ""
         self._store: Store | None = None
-        self._rows = RowLog(self.path.parent)
+        self._rows = StepRows(env, self.path.parent)
         self._facts: dict[str, Fact] | None = None
         self._clipped, self._succeeded = 0, False
         if not later:
@@ -101,8 +101,7 @@ class Recorder:
         if placed is not None:
             self._facts["placed"] = json.dumps(placed.tolist())
         self._clipped, self._succeeded, self._began = 0, False, time.monotonic()
-        self._before = self._inner.physics_state
-        self._seen: Mapping[str, Any] = self._inner.observation()
+        self._rows.begin()
 
     def add(
         self,
@@ -121,26 +120,15 @@ class Recorder:
         """
         success = bool(info.get("success", False))
         clipped = int(info.get("clipped", 0))
-        row = {
-            "states": self._before,
-            "actions": np.asarray(action, dtype=np.float64),
-            "rewards": float(reward),
-            "dones": int(done or success),
-            "clipped": clipped,
-            "step_time": step_time,
-            "stamp": time.monotonic() - self._began,
-        }
-        row |= {f"obs/{key}": value for key, value in self._seen.items()}
-        if self._next_obs:
-            row |= {f"next_obs/{key}": value for key, value in observation.items()}
+        stamp = time.monotonic() - self._began
+        outcome = float(reward), int(done or success), clipped, step_time, stamp
         try:
-            self._rows.append(row)
+            self._rows.add(action, observation, outcome)
         except DatasetError:
             self.discard()
             raise
         self._clipped += clipped > 0
         self._succeeded = success
-        self._before, self._seen = self._inner.physics_state, observation
 
     def keep(self, success: bool | None = None) -> str | None:
         """End the episode and store it; its name, or None if there was nothing.
@@ -155,8 +143,9 @@ class Recorder:
         if self._facts is None or not len(self._rows):
             self.discard()
             return None
-        columns = self._rows.columns()
-        columns["dones"][-1] = 1
+        columns, final_state = self._rows.columns(next_obs=self._next_obs)
+        dones = np.concatenate([piece for _, piece in pieces(columns["dones"])])
+        dones[-1] = 1
         facts = self._facts | {
             "success": self._succeeded if success is None else bool(success),
             "clipped_steps": self._clipped,
@@ -164,9 +153,9 @@ class Recorder:
         name = self.open().add(
             Episode(
                 name="",
-                columns=columns,
+                columns=columns | {"dones": dones},
                 facts=facts,
-                final_state=self._before,
+                final_state=final_state,
             )
         )
         self.discard()

@@ -1,7 +1,7 @@
-"""Rows of numbers that grow on disk, so that a long episode costs no memory."""
+"""Rows that grow on disk, so that a long episode costs no memory."""
 
+import mmap
 import tempfile
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,85 +12,90 @@ from wbc_suite.errors import DatasetError
 
 __all__ = ["RowLog"]
 
-BLOCK_BYTES = 1 << 20
+BLOCK_BYTES = 1 << 16
 """Rows are written when so many bytes have come together."""
 MAX_ROWS = 512
 """... or so many rows."""
 
 
 class RowLog:
-    """Appends rows of named numbers; the first row says their types and shapes.
+    """Rows of one structured type, written into a block that goes to disk when full.
+
+    The row at `at` is in progress, and so may be the one after it: there is always room
+    for both. `advance` says that the first is complete.
 
     Args:
         folder: Where the rows that no longer fit into memory go. Their file has no
             name, so that nothing is left of it whatever happens.
+
+    Attributes:
+        block: Rows in memory, shape (n + 1,); another one after each `begin`.
+        at: Which of them is in progress, less than n.
     """
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._file: Any = None
-        self._block: NDArray[Any] = np.empty(0)
-        self._fields: list[tuple[str, NDArray[Any]]] = []
-        self._filled = self._written = 0
+        self.close()
 
     def __len__(self) -> int:
-        """Return the number of rows."""
-        return self._written + self._filled
+        """Return the number of complete rows."""
+        return self._written + self.at
 
-    def append(self, row: Mapping[str, Any]) -> None:
-        """Add a row.
+    def begin(self, kind: np.dtype[Any]) -> None:
+        """Forget everything, and take rows of a type."""
+        self.close()
+        rows = int(np.clip(BLOCK_BYTES // max(kind.itemsize, 1), 1, MAX_ROWS))
+        self.block, self._full = np.zeros(rows + 1, dtype=kind), rows
+
+    def advance(self) -> None:
+        """Say that the row in progress is complete, and the next one begins.
 
         Raises:
-            DatasetError: If a name is missing, a shape differs from the first row's,
-                or the disk is full.
+            DatasetError: If the disk is full.
         """
-        if not self._fields:
-            self._begin(row)
-        at, name = self._filled, ""
-        try:
-            for name, field in self._fields:
-                field[at] = row[name]
-        except (KeyError, ValueError) as error:
-            raise DatasetError(
-                f"A step's '{name}' differs from the first step's: {error}."
-            ) from error
-        self._filled += 1
-        if self._filled == len(self._block):
+        self.at += 1
+        if self.at == self._full:
             self._spill()
 
-    def columns(self) -> dict[str, NDArray[Any]]:
-        """Return all rows by name, each with a row per entry.
+    def rows(self) -> NDArray[Any]:
+        """Return all complete rows and the one in progress, read-only.
 
-        They are apart from what is appended later; those on disk are read from there
-        when they are used, and take no memory until then.
+        Those on disk are read from there when they are used. What is appended later
+        does not change them, but for the last.
+
+        Raises:
+            DatasetError: If the disk is full.
         """
         if self._file is None:
-            rows = self._block[: self._filled].copy()
-        else:
-            self._spill()
-            rows = np.memmap(self._file, dtype=self._block.dtype, mode="c")
-        return {name: rows[name] for name, _ in self._fields}
+            rows = self.block[: self.at + 1].copy()
+            rows.flags.writeable = False
+            return rows
+        self._spill()
+        self._write(1)
+        self._file.seek(self._written * self.block.itemsize)
+        held = mmap.mmap(self._file.fileno(), 0, access=mmap.ACCESS_READ)
+        return np.ndarray((self._written + 1,), self.block.dtype, buffer=held)
 
     def close(self) -> None:
         """Forget everything."""
-        if self._file is not None:
+        if getattr(self, "_file", None) is not None:
             self._file.close()
-        self._file, self._fields, self._filled, self._written = None, [], 0, 0
-        self._block = np.empty(0)
-
-    def _begin(self, row: Mapping[str, Any]) -> None:
-        arrays = {name: np.asarray(value) for name, value in row.items()}
-        kind = np.dtype([(n, a.dtype, a.shape) for n, a in arrays.items()])
-        rows = int(np.clip(BLOCK_BYTES // max(kind.itemsize, 1), 1, MAX_ROWS))
-        self._block = np.zeros(rows, dtype=kind)
-        self._fields = [(name, self._block[name]) for name in arrays]
+        self._file: Any = None
+        self.block: NDArray[Any] = np.empty(0)
+        self.at = self._written = self._full = 0
 
     def _spill(self) -> None:
-        """Move the block to the file."""
+        """Move complete rows to the file."""
+        self._write(self.at)
+        self._written += self.at
+        self.block[0] = self.block[self.at]
+        self.at = 0
+
+    def _write(self, count: int) -> None:
+        rest = self.block.view(np.uint8).data[: count * self.block.itemsize]
         try:
             if self._file is None:
                 self._file = tempfile.TemporaryFile(dir=self._folder, buffering=0)  # noqa: SIM115 - closed by close()
-            rest = memoryview(self._block[: self._filled].tobytes())
             while rest:  # a disk that fills up takes a part, and says so only then
                 rest = rest[self._file.write(rest) :]
         except OSError as error:
@@ -98,5 +103,3 @@ class RowLog:
                 f"'{self._folder}' cannot be written: {error.strerror}. The episode in "
                 "progress is lost; finished ones are safe."
             ) from error
-        self._written += self._filled
-        self._filled = 0

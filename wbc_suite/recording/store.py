@@ -16,8 +16,8 @@ from typing import IO, Self
 from wbc_suite.errors import DatasetError
 from wbc_suite.recording.dataset import Dataset, part_files, parts_folder
 from wbc_suite.recording.episode import Episode, Fact
-from wbc_suite.recording.files import check_folder, write_bytes
-from wbc_suite.recording.writing import episode_bytes, write_dataset
+from wbc_suite.recording.files import check_folder
+from wbc_suite.recording.writing import plain_bytes, write_dataset
 
 __all__ = ["Store", "locked"]
 
@@ -86,10 +86,8 @@ class Store:
             facts=episode.facts,
             final_state=episode.final_state,
         )
-        content = episode_bytes(named, self._header)
-        check_folder(self._parts, len(content))
         file = self._parts / f"episode_{self._next:09d}.hdf5"
-        write_bytes(file, content)
+        write_dataset(file, [named], self._header, needed=plain_bytes(named))
         self._own.append(file)
         self._next += 1
         return name
@@ -145,13 +143,9 @@ class Store:
         files = [self.path, *part_files(self.path)]
         needed = sum(file.stat().st_size for file in files if file.exists())
         with Dataset(self.path) as dataset:
-
-            def all_of_them() -> Iterator[Episode]:
-                yield from dataset
-
             write_dataset(
                 self.path,
-                all_of_them(),
+                dataset.streamed(),
                 {**self._header, **dataset.header},
                 masks=dataset.masks,
                 needed=needed,

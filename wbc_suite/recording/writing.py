@@ -4,7 +4,6 @@ Layout: https://robomimic.github.io/docs/datasets/overview.html. What it does no
 of is added beside it: readers of the layout do not look there.
 """
 
-import io
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,22 +12,21 @@ import h5py
 import numpy as np
 
 from wbc_suite.errors import DatasetError
-from wbc_suite.recording.episode import Column, Episode, Fact, fingerprint
+from wbc_suite.recording.episode import Column, Episode, Fact, fingerprint, pieces
 from wbc_suite.recording.files import check_folder, replace_file
+from wbc_suite.recording.late_errors import late_errors
 
-__all__ = ["SCHEMA_VERSION", "episode_bytes", "write_dataset"]
+__all__ = ["SCHEMA_VERSION", "plain_bytes", "write_dataset"]
 
 SCHEMA_VERSION = 1
 PICTURE_BYTES = 10_000
 """Rows of bytes of at least this size are pictures, and are compressed."""
 
 
-def episode_bytes(episode: Episode, header: Mapping[str, Fact]) -> bytes:
-    """Return a file with one episode; HDF5 never sees the disk, so never a full one."""
-    memory = io.BytesIO()
-    with h5py.File(memory, "w") as file:
-        _write(file, [episode], header, {})
-    return memory.getvalue()
+def plain_bytes(episode: Episode) -> int:
+    """Return how many bytes of an episode are stored as they are."""
+    columns = episode.columns.values()
+    return sum(column.nbytes for column in columns if not _compression(column))
 
 
 def write_dataset(
@@ -43,7 +41,7 @@ def write_dataset(
 
     Args:
         path: File to write.
-        episodes: Read one by one, so that one at a time is in memory.
+        episodes: Read one by one; a piece of a column at a time is copied.
         header: Attributes of `data`, such as `env_args`.
         masks: Names of episodes by filter key.
         needed: Bytes that it will take, if known.
@@ -54,11 +52,8 @@ def write_dataset(
     check_folder(path.parent, needed)
 
     def write(aside: Path) -> None:
-        try:
-            with h5py.File(aside, "w") as file:
-                _write(file, episodes, header, masks or {})
-        except RuntimeError as error:  # HDF5's word for a full disk at closing
-            raise OSError(str(error)[:200]) from error
+        with late_errors(aside) as disk, h5py.File(disk, "w") as file:
+            _write(file, episodes, header, masks or {})
 
     replace_file(path, write)
 
@@ -86,7 +81,11 @@ def _write(
 
 def _write_episode(group: h5py.Group, episode: Episode) -> None:
     for name, column in episode.columns.items():
-        group.create_dataset(name, data=column, **_compression(column))
+        stored = group.create_dataset(
+            name, column.shape, column.dtype, **_compression(column)
+        )
+        for begin, piece in pieces(column):
+            stored[begin : begin + len(piece)] = piece
     if episode.final_state is not None:
         group.create_dataset("final_state", data=episode.final_state)
     for name, fact in episode.facts.items():
