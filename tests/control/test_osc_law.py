@@ -76,9 +76,7 @@ def test_compiled_and_readable_law_agree(alone, name, saturation):
 @pytest.mark.parametrize("name", ARMS)
 def test_compiled_and_readable_law_agree_everywhere(alone, name, saturation):
     rig = OscRig(alone, name, saturation=saturation)
-    apart = sorted(disagreement(rig, seed) for seed in range(1000))
-    assert apart[950] < 1e-10
-    assert apart[-1] < (1e-10 if saturation == "clip" else 1e-8)
+    assert max(disagreement(rig, seed) for seed in range(1000)) < 1e-10
 
 
 class Truth:

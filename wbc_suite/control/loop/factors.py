@@ -8,7 +8,8 @@ import numpy as np
 from wbc_suite.compiling import inlined
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["cholesky", "least_eigenvalue", "orthonormalise", "solve_lower"]
+__all__ = ["cholesky", "least_eigenvalue", "orthonormalise", "shortest"]
+__all__ += ["solve_lower", "solve_upper"]
 
 SMALLEST = 1e-30
 """Square of a length that counts as zero."""
@@ -44,6 +45,32 @@ def orthonormalise(Q: Matrix, n: int, C: Matrix) -> None:
                 C[i, i] = 1.0 / np.sqrt(max(total, SMALLEST))
                 for j in range(n):
                     Q[i, j] *= C[i, i]
+
+
+@inlined
+def shortest(Q: Matrix, n: int, b: Vector, z: Vector) -> None:
+    """Write the shortest z with `Q z = b`, where Q is from `orthonormalise`.
+
+    Of ill-conditioned rows that leaves some that are not quite orthogonal, and `Q^T b`
+    is off by as much; row by row from the last, z is as exact as what they came from.
+
+    Args:
+        Q: Orthonormal rows, shape (m, n or more).
+        n: Length of the rows.
+        b: Shape (m,).
+        z: Output, shape (n,) or longer.
+
+    Source: Björck, Paige (1992), "Loss and recapture of orthogonality in the modified
+    Gram-Schmidt algorithm", SIAM J. Matrix Anal. Appl. 13(1).
+    """
+    for j in range(n):
+        z[j] = 0.0
+    for i in range(Q.shape[0] - 1, -1, -1):
+        missing = b[i]
+        for j in range(n):
+            missing -= Q[i, j] * z[j]
+        for j in range(n):
+            z[j] += Q[i, j] * missing
 
 
 @inlined

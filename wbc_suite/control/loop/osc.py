@@ -7,6 +7,7 @@ from wbc_suite.control.loop.factors import (
     cholesky,
     least_eigenvalue,
     orthonormalise,
+    shortest,
     solve_lower,
     solve_upper,
 )
@@ -64,12 +65,9 @@ def osc_law(physics: Physics, law: CompiledRecords, drives: CompiledRecords) -> 
             wanted[i] -= J[i, j] * rest[j]
     for i in range(6):  # J becomes Y = J L^-T
         solve_lower(L, J[i], n)
-    factorise(J, n, C, Q, change)
+    columns = factorise(J, n, C, Q, change)
     solve_lower(C, wanted, 6)
-    for j in range(n):
-        change[j] = 0.0
-        for i in range(6):
-            change[j] += Q[i, j] * wanted[i]
+    shortest(Q, columns, wanted, change)
     solve_upper(L, change, n)
     for j in range(n):
         physics.acceleration[drives[law.first + j].dof] = rest[j] + change[j]
@@ -80,19 +78,21 @@ def osc_law(physics: Physics, law: CompiledRecords, drives: CompiledRecords) -> 
 
 
 @inlined
-def factorise(Y: Matrix, n: int, C: Matrix, Q: Matrix, scratch: Vector) -> None:
-    """Write the factors of `OscLaw.factors`."""
+def factorise(Y: Matrix, n: int, C: Matrix, Q: Matrix, scratch: Vector) -> int:
+    """Write the factors of `OscLaw.factors`; return how many columns Q has."""
     for i in range(6):
         for j in range(n + 6):
             Q[i, j] = Y[i, j] if j < n else 0.0
     orthonormalise(Q, n, C)
     missing = SINGULAR - least_eigenvalue(C, scratch)
-    if missing > 0.0:
-        for i in range(6):
-            for j in range(n + 6):
-                Q[i, j] = Y[i, j] if j < n else 0.0
-            Q[i, n + i] = np.sqrt(missing)
-        orthonormalise(Q, n + 6, C)
+    if missing <= 0.0:
+        return n
+    for i in range(6):
+        for j in range(n + 6):
+            Q[i, j] = Y[i, j] if j < n else 0.0
+        Q[i, n + i] = np.sqrt(missing)
+    orthonormalise(Q, n + 6, C)
+    return n + 6
 
 
 @inlined
