@@ -221,6 +221,19 @@ def test_buttons_pause_and_reset(settled, context):
     viewer.page.get_by_text("started without a file").wait_for()
 
 
+def test_shadows_are_for_whom_they_are_cheap(settled, context, monkeypatch):
+    viewer = Viewer(context, settled[1].site, size=(960, 900))
+    asked = []
+    monkeypatch.setattr(
+        viewer.client.scene,
+        "configure_default_lights",
+        lambda **wish: asked.append(wish),
+    )
+    viewer.page.get_by_text("Show", exact=True).click()
+    viewer.page.get_by_label("Shadows").click()
+    wait_until(lambda: asked == [{"cast_shadow": False}], "the shadows go")
+
+
 @pytest.mark.parametrize("robot", ["Tiago", "SpotWithArm"])
 def test_hand_of_every_robot_follows_the_mouse(robot, context):
     session, page = served(robot)

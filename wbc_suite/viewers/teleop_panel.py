@@ -115,6 +115,7 @@ class TeleopPanel:
             with client.gui.add_folder("Show", expand_by_default=False):
                 for name, limb in self._traits.limbs.items():
                     self._add_show(client, name, limb.title)
+                _add_shadows(client)
 
         def set_mode(chosen: GizmoMode) -> None:
             self._gizmos.set_mode(number, chosen)
@@ -244,6 +245,17 @@ class TeleopPanel:
             legend={"show": False},
             height=120,
         )
+
+
+def _add_shadows(client: "viser.ClientHandle") -> None:
+    box = client.gui.add_checkbox(
+        "Shadows",
+        initial_value=True,
+        hint="Two thirds of the work where a browser draws without a graphics card.",
+    )
+    box.on_update(
+        lambda _: client.scene.configure_default_lights(cast_shadow=box.value)
+    )
 
 
 def _buttons(snapshot: Snapshot) -> tuple[str, ...]:
