@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from wbc_suite.errors import DatasetError
 from wbc_suite.recording import Dataset, EnvSource
+from wbc_suite.recording.episode import fingerprint
 
 EXAMPLES = int(os.environ.get("WBC_SUITE_FUZZ", "25"))
 """Damaged recordings; 1,000 of them take about 100 s."""
@@ -115,6 +116,12 @@ LIES = [
 ]  # fmt: skip
 
 
+def sums_of_pieces(path):
+    """Read all episodes as closing a recording does, and tell their sums."""
+    with Dataset(path) as dataset:
+        return [fingerprint(e.columns, e.final_state) for e in dataset.streamed()]
+
+
 def read_all(path):
     with Dataset(path) as dataset:
         for name in dataset.names:
@@ -129,6 +136,8 @@ def test_a_file_that_lies_is_refused(small_recording, tmp_path, lie):
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     with pytest.raises(DatasetError, match=str(small_recording)):
         read_all(small_recording)
+    with pytest.raises(DatasetError, match=str(small_recording)):
+        sums_of_pieces(small_recording)
     grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
     assert grown < 100_000  # kB
 
@@ -163,6 +172,9 @@ def test_damaged_bytes_are_refused_or_change_nothing(
         event("refused")
         return
     event("read")
+    assert sums_of_pieces(damaged) == [
+        fingerprint(episode.columns, episode.final_state) for episode in episodes
+    ]
     for episode in episodes:
         if episode.name in originals and "uid" in episode.facts:
             same_numbers(originals[episode.name], episode)

@@ -80,7 +80,8 @@ def pieces(column: Column) -> Iterator[tuple[int, Column]]:
     if not column.ndim:
         column = np.reshape(column, 1)
     wide = abs(column.strides[0]) if isinstance(column, np.ndarray) else 0
-    rows = max(1, PIECE // max(column[:1].nbytes, wide, 1))
+    wide = max(column[:1].nbytes, wide)
+    rows = max(1, PIECE // wide if wide else len(column))
     for begin in range(0, len(column), rows):
         yield begin, np.ascontiguousarray(column[begin : begin + rows])
         _let_go(column)

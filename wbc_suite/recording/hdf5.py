@@ -36,8 +36,8 @@ MAX_RATIO = 1100
 """Bytes that one stored byte can stand for; deflate's limit is 1032."""
 FILTERS = {1: "gzip", 2: "shuffle", 3: "fletcher32", 32000: "lzf"}
 """By HDF5's numbers; others load libraries from a search path."""
-LARGEST_CHUNK = 1 << 20
-"""Larger chunks are unpacked for each slice, since HDF5's cache does not hold them."""
+HIGHEST_CHUNK = 1 << 20
+"""Bytes of rows; higher chunks would be unpacked anew for each slice of them."""
 SPARSE_FROM, SPARSE = 1 << 30, 20
 """A file this large, with less than one in so many bytes on disk, is a bomb."""
 _PLAIN = re.compile(r"[^/\x00]+\Z")
@@ -187,8 +187,9 @@ class StoredColumn:
         self._dataset, self._path = dataset, path
         self.shape, self.dtype, self.ndim = dataset.shape, dataset.dtype, dataset.ndim
         self.nbytes = int(np.prod(self.shape, dtype=object)) * self.dtype.itemsize
-        chunk = int(np.prod(dataset.chunks or (0,), dtype=object))
-        self.sliced = chunk * self.dtype.itemsize <= LARGEST_CHUNK
+        row = self.nbytes // max(self.shape[0], 1)
+        high = dataset.chunks[0] if dataset.chunks else 1
+        self.sliced = row > 0 and (high == 1 or high * row <= HIGHEST_CHUNK)
 
     def __len__(self) -> int:
         """Return the number of rows."""

@@ -115,6 +115,9 @@ class Recorder:
     ) -> None:
         """Record a step that the environment has just taken.
 
+        Numbers that it observed are taken from the environment itself; `observation`
+        tells pictures, and everything where a wrapper may have changed it.
+
         Raises:
             DatasetError: If the disk is full; then the episode is gone.
         """
