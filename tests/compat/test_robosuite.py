@@ -120,8 +120,12 @@ def test_a_datasets_env_args_make_its_environment(tmp_path):
     assert env.control_freq == 20
     env.reset()
     assert env.step(np.zeros(env.action_dim))[2] is False
-    with pytest.raises(DatasetError, match="no env_args"):
+    with pytest.raises(DatasetError, match="no file"):
         robosuite.make_from_dataset(tmp_path / "none.hdf5")
+    with h5py.File(path, "w") as file:
+        file.create_group("data")
+    with pytest.raises(DatasetError, match="no env_args"):
+        robosuite.make_from_dataset(path)
 
 
 def test_gym_wrapper_is_one_vector_and_five_tuples():

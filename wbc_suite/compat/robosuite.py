@@ -155,12 +155,14 @@ def make_from_dataset(path: str | Path) -> "RobosuiteEnv":
     """
     import h5py
 
-    try:
-        with h5py.File(path) as file:
-            told = file["data"].attrs["env_args"]
-    except (OSError, KeyError) as error:
-        raise DatasetError(f"{path}: no env_args in it: {error}") from error
-    return make_from_env_args(told.decode() if isinstance(told, bytes) else str(told))
+    from wbc_suite.recording import hdf5
+
+    with hdf5.open_safely(Path(path)) as file, hdf5.reading(Path(path)):
+        data = hdf5.child(file, "data", h5py.Group)
+        told = None if data is None else hdf5.attribute(data, "env_args")
+    if told is None:
+        raise DatasetError(f"{path}: no env_args in it.")
+    return make_from_env_args(str(told))
 
 
 class RobosuiteEnv:

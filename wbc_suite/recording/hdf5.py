@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc_suite.errors import DatasetError, UnknownNameError
+from wbc_suite.recording.heaps import check_heaps
 
 __all__ = [
     "StoredColumn",
@@ -97,6 +98,7 @@ def open_safely(path: Path) -> h5py.File:
             "recorded, `wbc-suite repair` restores what is beside it."
         )
     with reading(path):
+        check_heaps(path)
         return h5py.File(path, "r")
 
 
