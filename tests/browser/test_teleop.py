@@ -50,11 +50,11 @@ def wait_until_still(session):
 
 
 def drag_until(viewer, session, sign=1.0, *, pixels=70, least=0.03, steps=6):
-    """Drag the hand's best arrow until its target has moved by `least`, in m."""
+    """Drag the hand's best arrow until its target has moved by `least` along it, m."""
     pose = target(session)
     axis, _, _ = viewer.arrow(pose, SCALE)
     viewer.drag_until(
-        lambda: moved(session, pose.translation) > least,
+        lambda: abs((target(session).translation - pose.translation) @ axis) > least,
         lambda: viewer.arrow(target(session), SCALE),
         pixels,
         sign=sign,

@@ -198,7 +198,9 @@ class TaskStack:
         if len(problem.rows):
             kept = fallback is Fallback.NONE  # what is relaxed has its own damping
             pressing = multipliers[problem.nv :]
-            self._bending.note(problem.rows, pressing, dt, kept=kept)
+            first = self._levels[0]
+            pulls = first.W, first.e, first.diagonal[1]
+            self._bending.note(problem.rows, pressing, pulls, dt, kept=kept)
         if len(self._levels) > 1:
             x, fallback = self._solve_lower(x, fallback, dt)
             v, residual = x / dt, problem.violation(x)
