@@ -23,6 +23,8 @@ Reported, in ms:
   beginning, MB (bound: 50 in ten minutes, `--seconds 600`)
 - kept: the same once the episode is in its file
 - stolen: of the processors' time, what went to other machines on the same one, per cent
+- quiet: jitter in those seconds in which nothing was stolen, and their number: what is
+  the session's own, where `stolen` is above 1 and `bare` as large as `jitter`
 
 Usage: python benchmarks/teleop_loop.py [--quick] [--json FILE] [--seconds S]
 """
@@ -60,6 +62,8 @@ COLUMNS = (
     "jitter_p99_ms",
     "targets_p99_ms",
     "bare_p99_ms",
+    "quiet_p99_ms",
+    "quiet_seconds",
     "grown_mb",
     "kept_mb",
     "load",
@@ -106,7 +110,10 @@ class Clock:
 
 
 class Metronome:
-    """A process that sleeps at the session's rate, and notes how well it is woken."""
+    """A process that sleeps at the session's rate, and notes how well it is woken.
+
+    Once a second it notes what was stolen from the processors.
+    """
 
     def __init__(self):
         make = multiprocessing.get_context("spawn")
@@ -116,24 +123,26 @@ class Metronome:
         self.pipe.recv()  # it is there
 
     def stop(self):
-        """Return when it was woken."""
+        """Return when it was woken, and rows of a time and what was stolen so far."""
         self.pipe.send("stop")
-        woken = self.pipe.recv()
+        woken, stolen = map(np.array, self.pipe.recv())
         self.process.join()
-        return np.array(woken)
+        return woken, stolen
 
     @staticmethod
     def run(pipe):
         """Be the metronome, in its own process."""
         run_first(rank=2)
         pipe.send("ready")
-        beat, woken = Beat(1.0 / RATE), []
+        beat, woken, stolen = Beat(1.0 / RATE), [], []
         beat.start()
         while not pipe.poll():
             beat.await_step()
             woken.append(time.perf_counter())
+            if len(woken) % int(RATE) == 0:
+                stolen.append((time.perf_counter(), processor_times()[STOLEN]))
             beat.rest()
-        pipe.send(woken)
+        pipe.send((woken, stolen))
 
 
 class Viewer:
@@ -240,7 +249,7 @@ def measure(robot, seconds, folder):
     time.sleep(seconds)
     begun, found = (np.array(times[first[0] :]) for times in (clock.begun, clock.found))
     latencies, spent = clock.latencies[first[1] :], processor_times() - before
-    woken, grown = metronome.stop(), memory() - held
+    (woken, stolen), grown = metronome.stop(), memory() - held
     desk.ask(Wish.RECORD)
     while session.snapshot.recording.recording:
         time.sleep(0.01)
@@ -258,6 +267,7 @@ def measure(robot, seconds, folder):
     row |= figures("targets", jitter(found))
     row |= figures("behind", behind - behind.min())
     row |= figures("bare", jitter(woken[woken > begun[0]]))
+    row |= quiet_figures(begun, stolen)
     row |= {"grown_mb": grown, "kept_mb": kept, "load": load, "seconds": seconds}
     return row | {"stolen": 100.0 * spent[STOLEN] / spent.sum()}
 
@@ -265,6 +275,18 @@ def measure(robot, seconds, folder):
 def jitter(times):
     """Return by how much each period differs from the nominal one, s."""
     return np.abs(np.diff(times) - 1.0 / RATE)
+
+
+def quiet_figures(begun, stolen):
+    """Return the jitter of periods in seconds without stolen time, and these seconds.
+
+    The times are kept in hundredths of a second: less than one may go unseen.
+    """
+    seconds = np.searchsorted(stolen[:, 0], begun) - 1  # in which each period ends
+    quiet = np.append(np.diff(stolen[:, 1]) == 0.0, False)  # the last is not whole
+    counts = (seconds[:-1] >= 0) & quiet[seconds[1:]]
+    found = figures("quiet", jitter(begun)[counts]) if counts.any() else {}
+    return found | {"quiet_seconds": int(counts.sum() / RATE)}
 
 
 def memory():

@@ -73,8 +73,9 @@ class Report:
         self.tables.append({"title": title, "columns": list(columns)})
         table = Table(title=title, title_justify="left")
         for name in columns:
-            side = "left" if name in ("case", "side") else "right"
-            table.add_column(heading(name), justify=side, no_wrap=True)
+            words = name in ("case", "side")
+            side = "left" if words else "right"
+            table.add_column(heading(name), justify=side, no_wrap=words)
         for row in rows_with(self.rows, columns):
             table.add_row(*(cell(look_up(row, name)) for name in columns))
         Console(width=max(120, Console().width)).print(table)
