@@ -4,9 +4,11 @@ Lift at 20 Hz over 500 Hz: 25 physics steps an action, observations without came
 random actions (parts: +-0.1 of their range; whole-body: +-5 mm and rad around the poses
 that hold). Each side is also timed against its own raw physics: `mj_step` of its own
 compiled model from the states its steps began in, controls held. Blocks of 24 steps of
-both sides alternate in one run; robosuite runs in its own environment (.venv-robosuite,
-`make bench-peers`) and is left out where it is missing. Times are CPU times of the
-process. Resets change no structure; robosuite's "hard" one, its default, compiles anew.
+both sides alternate in one run, and a ratio is the median of those of the blocks: a
+processor that changes its speed meanwhile does so for both. robosuite runs in its own
+environment (.venv-robosuite, `make bench-peers`) and is left out where it is missing.
+Times are CPU times of the process. Resets change no structure; robosuite's "hard" one,
+its default, compiles anew.
 
 Usage: python benchmarks/env_step.py [--quick] [--json FILE] [--blocks N] [--cases TEXT]
 """
@@ -115,23 +117,32 @@ def run_case(
     ours = Ours(case)
     theirs = None if peer is None else Theirs(case, peer)
     sides = {"ours": ours} if theirs is None else {"ours": ours, "robosuite": theirs}
-    found = {name: Block() for name in sides}
+    found: dict[str, list[Block]] = {name: [] for name in sides}
     for side in sides.values():
         side.block()  # compiles and warms up
     for k in range(blocks):
         for name in list(sides)[:: 1 if k % 2 else -1]:
-            found[name].extend(sides[name].block())
-    rows = {}
-    for name, block in found.items():
-        raw = float(np.median(block.raw))
-        rows[name] = report.add(case.name, name, block.step, raw_us=raw)
-        rows[name]["over_raw"] = rows[name]["median_us"] / raw
-    report.ratios[f"{case.name}/raw"] = rows["ours"]["over_raw"]
-    if "robosuite" in rows:
-        report.compare(f"{case.name}/robosuite", rows["ours"], rows["robosuite"])
-        report.ratios[f"{case.name}/robosuite/raw"] = rows["robosuite"]["over_raw"]
+            found[name].append(sides[name].block())
+    for name, turns in found.items():
+        whole = Block()
+        for block in turns:
+            whole.extend(block)
+        row = report.add(case.name, name, whole.step)
+        row["raw_us"] = float(np.median(whole.raw))
+        row["over_raw"] = ratio([(block.step, block.raw) for block in turns])
+        key = "raw" if name == "ours" else f"{name}/raw"
+        report.ratios[f"{case.name}/{key}"] = row["over_raw"]
+    if theirs is not None:
+        turns = zip(found["ours"], found["robosuite"], strict=True)
+        pairs = [(own.step, other.step) for own, other in turns]
+        report.ratios[f"{case.name}/robosuite"] = ratio(pairs)
     if resets:
         add_resets(f"Lift/{case.robot}/reset", ours, theirs, report, count=resets)
+
+
+def ratio(turns: list[tuple[list[float], list[float]]]) -> float:
+    """Return one side's times over the other's: medians of each turn, then of turns."""
+    return float(np.median([np.median(one) / np.median(two) for one, two in turns]))
 
 
 def add_resets(
