@@ -50,33 +50,56 @@ def needed(one, before):
     return float(np.max(np.abs(q - before) / one.law.drives["fastest"]))
 
 
+def steps():
+    """Yield 5 cm and 20 degrees at once, in all six directions."""
+    for k in range(6):
+        change, sign = np.zeros(6), 1.0 if k < 3 else -1.0
+        change[k % 3], change[3 + (k + 1) % 3] = sign * STEP, sign * TURN
+        yield change
+
+
+def assert_settles(one, change, found):
+    """Within 2 % in half a second, without overshoot, and in the end exactly there."""
+    wrong = found - change
+    outside = (np.linalg.norm(wrong[:, :3], axis=1) > 0.02 * STEP) | (
+        np.linalg.norm(wrong[:, 3:], axis=1) > 0.02 * TURN
+    )
+    settled = (np.flatnonzero(outside)[-1] + 1) * one.simulation.timestep
+    assert settled < 0.5, (change, settled)
+    for part, size in ((slice(0, 3), STEP), (slice(3, 6), TURN)):
+        along = found[:, part] @ change[part] / size**2
+        assert along.max() < 1.02, change
+    assert np.linalg.norm(wrong[-1, :3]) < 5e-5
+    assert np.linalg.norm(wrong[-1, 3:]) < np.deg2rad(0.01)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", EVERY_ARM)
 def test_a_step_settles_within_half_a_second(rig, name):
     """All six directions, but those that a joint's own top speed rules out."""
     possible = 0
-    for k in range(6):
+    for change in steps():
         one = rig(name)
         before = one.data.qpos[one.law.drives["qpos"]].copy()
-        sign = 1.0 if k < 3 else -1.0
-        change = np.zeros(6)
-        change[k % 3], change[3 + (k + 1) % 3] = sign * STEP, sign * TURN
         found = step(one, change)
-        if needed(one, before) > 0.26:
+        if needed(one, before) > 0.5:
             continue
         possible += 1
-        wrong = found - change
-        outside = (np.linalg.norm(wrong[:, :3], axis=1) > 0.02 * STEP) | (
-            np.linalg.norm(wrong[:, 3:], axis=1) > 0.02 * TURN
-        )
-        settled = (np.flatnonzero(outside)[-1] + 1) * one.simulation.timestep
-        assert settled < 0.5, (k, settled)
-        for part, size in ((slice(0, 3), STEP), (slice(3, 6), TURN)):
-            along = found[:, part] @ change[part] / size**2
-            assert along.max() < 1.02, k
-        assert np.linalg.norm(wrong[-1, :3]) < 5e-5
-        assert np.linalg.norm(wrong[-1, 3:]) < np.deg2rad(0.01)
-    assert possible >= 3
+        assert_settles(one, change, found)
+    assert possible >= 5
+
+
+@pytest.mark.slow
+def test_baxter_settles_in_all_directions_where_its_arm_is_not_nearly_stretched(rig):
+    """The one step of thirty that is late from `ready` is in time from 15 cm nearer."""
+    for change in steps():
+        one = rig("Baxter")
+        near = one.pose
+        out = np.array([*near.translation[:2], 0.0])
+        near.translation -= 0.15 * out / np.linalg.norm(out)
+        one.controller.set_goal(one.action(one.values(near)))
+        one.run(2.0)
+        assert_settles(one, change, step(one, change))
 
 
 @pytest.mark.slow
