@@ -64,7 +64,7 @@ class Law:
         self.stand.reset()
         stand = self.stand
         self.physics = bind_physics(stand.model, stand.data)
-        self.arrays = physics_table(stand.model, self.physics)
+        self.arrays = physics_table(self.physics)
         laws = [(law.record, law.drives) for law in stand.controller.laws]
         self.laws, self.drives = gather(laws)
         mujoco.mj_step1(stand.model, stand.data)

@@ -14,7 +14,7 @@ import pytest
 import wbc_suite
 from wbc_suite import compiling
 from wbc_suite.control.loop import advance
-from wbc_suite.control.loop.physics import PhysicsField
+from wbc_suite.control.loop.haste import Haste, begin_haste, end_haste
 
 CASES = [
     ("Panda", "BASIC"),
@@ -132,20 +132,45 @@ def test_full_physics_reads_sensors_of_the_new_state_and_changes_none():
     assert not np.allclose(lite.simulation.data.qacc, before, rtol=1e-6, atol=1e-6)
 
 
-def test_sensors_that_are_read_once_an_action_say_what_they_always_do():
-    seldom, always = made("Panda", "BASIC"), made("Panda", "BASIC")
-    always.simulation._table[PhysicsField["NO_SENSORS"]][:] = 0
-    given = seldom.simulation.model.opt.disableflags
-    assert not given & int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
-    actions = moves(seldom)
-    np.testing.assert_array_equal(
-        states_of(seldom, actions), states_of(always, actions)
-    )
-    data, other = seldom.simulation.data, always.simulation.data
+SPANS = ("body_geomadr", "body_geomnum")
+
+
+def test_hasty_steps_change_nothing_that_is_seen():
+    """A hand that runs into the table: states, contacts and sensors, bit for bit."""
+    hasty, never = made("Panda", "BASIC"), made("Panda", "BASIC")
+    never.simulation._haste[Haste.MAY][:] = False
+    model, data = hasty.simulation.model, hasty.simulation.data
+    flags, spans = model.opt.disableflags, [getattr(model, s).copy() for s in SPANS]
+    assert not flags & int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
+    actions = moves(hasty, count=24)
+    actions[:, 2] = -1.0  # down
+    np.testing.assert_array_equal(states_of(hasty, actions), states_of(never, actions))
+    other = never.simulation.data
     assert data.sensordata.any()
     np.testing.assert_array_equal(data.sensordata, other.sensordata)
     np.testing.assert_array_equal(data.cfrc_int, other.cfrc_int)
-    assert seldom.simulation.model.opt.disableflags == given
+    touching = {model.geom(g).name for g in data.contact.geom.ravel()}
+    assert any("hand" in name or "finger" in name for name in touching)
+    np.testing.assert_array_equal(data.contact.geom, other.contact.geom)
+    assert model.opt.disableflags == flags
+    for name, span in zip(SPANS, spans, strict=True):
+        np.testing.assert_array_equal(getattr(model, name), span)
+
+
+def test_hasty_steps_show_the_broadphase_what_collides_alone():
+    """Bodies hide geoms that are only drawn, and none that is made to collide later."""
+    env = made("Panda", "BASIC")
+    model, table = env.simulation.model, env.simulation._haste.table
+    hand = model.body("robot0_panda_hand").id
+    geoms = np.flatnonzero(model.geom_bodyid == hand)
+    solid = geoms[model.geom_contype[geoms] > 0]
+    assert len(solid) < len(geoms)
+    for expected in (solid, geoms):
+        begin_haste(table)
+        first, count = model.body_geomadr[hand], model.body_geomnum[hand]
+        end_haste(table)
+        assert list(range(first, first + count)) == list(expected)
+        model.geom_contype[geoms] = 1
 
 
 def test_sensors_that_are_switched_off_stay_off():

@@ -54,7 +54,7 @@ def disagreement(rig, seed):
     readable = rig.controller.compute(rig.state).copy()
     asked = rig.law.drives["asked"].copy()
     simulation._laws[:], simulation._drives[:] = tables
-    arrays = physics_table(rig.state.model, bind_physics(rig.state.model, data))
+    arrays = physics_table(bind_physics(rig.state.model, data))
     laws, drives = simulation._laws, simulation._drives
     control(simulation.timestep, arrays.table, laws, drives, *needed(laws))
     compiled = data.ctrl[rig.state.actuator_ids]

@@ -58,7 +58,7 @@ def disagreement(scene, home, seed):
     force = stance_of(scene).record["stance"]["force"].copy()
     asked = simulation._drives["asked"].copy()
     simulation._laws[:], simulation._drives[:] = tables
-    arrays = physics_table(scene.state.model, bind_physics(scene.state.model, data))
+    arrays = physics_table(bind_physics(scene.state.model, data))
     laws, drives = simulation._laws, simulation._drives
     control(simulation.timestep, arrays.table, laws, drives, *needed(laws))
     compiled = data.ctrl[scene.state.actuator_ids]

@@ -9,6 +9,7 @@ from wbc_suite.compiling import announced
 from wbc_suite.control import CompositeController, RobotState
 from wbc_suite.control.loop import (
     advance,
+    bind_haste,
     bind_physics,
     gather,
     needed,
@@ -62,13 +63,13 @@ class Simulation:
         self._left, self._prepared = [0] * len(pairs), False
         self.compiled = compiled and all(c.laws for c in self.controllers)
         physics = bind_physics(model, data)
-        self._table = physics_table(model, physics)
+        self._table, self._haste = physics_table(physics), bind_haste(model, data)
         laws = [law for controller in self.controllers for law in controller.laws]
         self._laws, self._drives = gather([(law.record, law.drives) for law in laws])
         for k, law in enumerate(laws):
             first, last = self._laws["first"][k], self._laws["last"][k]
             law.adopt(self._laws[k : k + 1], self._drives[first:last])
-        tables = self._table.table, self._watch.sound
+        tables = self._table.table, self._haste.table, self._watch.sound
         records = self._laws, self._drives, *needed(self._laws)
         self._bound = (*physics[:3], *tables, *records)
         if self.compiled:

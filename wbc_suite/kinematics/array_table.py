@@ -25,7 +25,7 @@ from wbc_suite.compiling import compiled
 from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["INDICES", "MATRIX", "VECTOR", "ArrayTable"]
-__all__ += ["array_at", "indices", "matrix", "vector", "vector_at"]
+__all__ += ["array_at", "indices", "matrix", "short_indices", "vector", "vector_at"]
 
 
 _numba: Any = arrayobj  # it has no types
@@ -36,7 +36,7 @@ class ArrayTable:
 
     Args:
         fields: Names the arrays; its values count from 0.
-        arrays: One for each field: float64 or int64, C-contiguous.
+        arrays: One for each field: float64, int64 or int32, C-contiguous.
 
     Attributes:
         table: Address, rows and columns by field, shape (n, 3); vectors are one row.
@@ -50,7 +50,7 @@ class ArrayTable:
         self._arrays = dict(arrays)
         for field, array in self._arrays.items():
             assert array.flags.c_contiguous, field
-            assert array.dtype in (np.float64, np.int64), field
+            assert array.dtype in (np.float64, np.int64, np.int32), field
             rows = array.shape if array.ndim == 2 else (1, array.size)
             self.table[field] = array.ctypes.data, *rows
 
@@ -114,11 +114,14 @@ def _view(kind: Any) -> Callable[..., Any]:
 VECTOR: Any = types.Array(types.float64, 1, "C")
 MATRIX: Any = types.Array(types.float64, 2, "C")
 INDICES: Any = types.Array(types.int64, 1, "C")
+_SHORT: Any = types.Array(types.int32, 1, "C")
 
 # Written where they are called: each function would be compiled for each field.
 matrix = cast("Callable[[Indices, int], Matrix]", intrinsic(_view(MATRIX)))
 vector = cast("Callable[[Indices, int], Vector]", intrinsic(_view(VECTOR)))
 indices = cast("Callable[[Indices, int], Indices]", intrinsic(_view(INDICES)))
+short_indices = cast("Callable[[Indices, int], Indices]", intrinsic(_view(_SHORT)))
+"""Of int32, as MuJoCo has them."""
 
 
 def _float_pointer(typingctx: Any, address: Any) -> Any:

@@ -9,7 +9,7 @@ import pinocchio as pin
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.placing import pose_fields, se3_of
 from wbc_suite.robot.shapes import Vector3
-from wbc_suite.scene.objects.thing import Thing
+from wbc_suite.scene.objects.thing import TORSION, Thing
 from wbc_suite.scene.reach import let_floors_ignore_far_links
 
 __all__ = [
@@ -91,6 +91,9 @@ def attach_robot(
 ) -> None:
     """Add a robot at its own root pose; every name of it gets the prefix.
 
+    Fingers keep what they hold from turning about the line between them: they have
+    torsional friction, whatever their description says.
+
     Args:
         spec: The scene.
         robot: The robot.
@@ -100,6 +103,9 @@ def attach_robot(
     own = robot.to_mjspec()
     for key in list(own.keys):
         own.delete(key)
+    for joint in (j for gripper in robot.synergies for j in robot.groups[gripper]):
+        for geom in own.joint(joint).parent.find_all(mujoco.mjtObj.mjOBJ_GEOM):
+            geom.condim = max(geom.condim, TORSION)
     spec.attach(own, prefix=prefix, frame=frame or spec.worldbody.add_frame())
 
 
@@ -125,14 +131,35 @@ def compile_scene(spec: mujoco.MjSpec) -> mujoco.MjModel:
     that are only drawn; without these GR1 has 115 pairs of bodies to look into and not
     191. Geoms that collide keep their spheres, so the same contacts are found. Links
     that cannot reach the floor are not looked at there. In small scenes all constraints
-    are solved at once: to find what is independent takes longer.
+    are solved at once: to find what is independent takes longer. And where no force but
+    that of joints' own damping depends on speeds, the explicit integrator, which takes
+    that implicitly as well, does what the implicit one does, with less work.
     """
     model = spec.compile()
     model.geom_rbound[(model.geom_contype | model.geom_conaffinity) == 0] = 0.0
     let_floors_ignore_far_links(model)
     if model.nv <= SMALL:
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ISLAND
+    implicit = model.opt.integrator == mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    if implicit and not _speeds_matter(model):
+        model.opt.integrator = mujoco.mjtIntegrator.mjINT_EULER
     return model
+
+
+def _speeds_matter(model: mujoco.MjModel) -> bool:
+    """Whether forces depend on speeds, other than those of joints' linear damping."""
+    gains, biases = model.actuator_gaintype, model.actuator_biastype
+    fixed = gains == mujoco.mjtGain.mjGAIN_FIXED
+    affine = biases == mujoco.mjtBias.mjBIAS_AFFINE
+    slow = affine & (model.actuator_biasprm[:, 2] == 0.0)
+    slow |= biases == mujoco.mjtBias.mjBIAS_NONE
+    damped = (model.tendon_damping, model.actuator_damping, model.dof_dampingpoly)
+    return (
+        not np.all(fixed & slow)
+        or any(array.any() for array in damped)
+        or max(model.opt.density, model.opt.viscosity) > 0.0
+        or model.nflex + model.nplugin > 0
+    )
 
 
 def add_camera(

@@ -1,6 +1,7 @@
 """The control loop: laws as data, and the compiled step over them."""
 
 from wbc_suite.control.loop.advance import advance, needed
+from wbc_suite.control.loop.haste import bind_haste
 from wbc_suite.control.loop.physics import bind_physics, physics_table
 from wbc_suite.control.loop.sound import (
     LARGEST,
@@ -20,6 +21,7 @@ __all__ = [
     "SoundField",
     "advance",
     "begins_sound",
+    "bind_haste",
     "bind_physics",
     "bind_sound",
     "ends_sound",

@@ -1,23 +1,34 @@
 """The compiled control loop: physics and laws, n steps in one call."""
 
+import numpy as np
+
 from wbc_suite.compiling import compiled
+from wbc_suite.control.loop.haste import (
+    begin_haste,
+    end_haste,
+    let_fixed_rest,
+    may_hide,
+    show_bodies,
+    start_profiler,
+    stop_profiler,
+)
 from wbc_suite.control.loop.kernels import Needed, command
+from wbc_suite.control.loop.neighbours import SKIN, hide_far_bodies, way
 from wbc_suite.control.loop.physics import (
-    flags_of,
-    let_sense,
     mj_comPos,
     mj_kinematics,
     mj_step1,
     mj_step2,
     physics_of,
-    start_profiler,
-    stop_profiler,
 )
 from wbc_suite.control.loop.sound import begins_sound, ends_sound
 from wbc_suite.control.loop.table import CompiledRecords, LawKind, Records
 from wbc_suite.typing import Indices
 
 __all__ = ["advance", "needed"]
+
+WORTH = 4
+"""Steps that must be left for it to pay to look which bodies are far."""
 
 
 def needed(laws: Records) -> tuple[Needed, Needed]:
@@ -32,6 +43,7 @@ def advance(
     data: int,
     timestep: float,
     table: Indices,
+    haste: Indices,
     sound: Indices,
     laws: CompiledRecords,
     drives: CompiledRecords,
@@ -42,14 +54,15 @@ def advance(
     """Advance physics under all laws; holds no lock, so threads run side by side.
 
     Positions of bodies and sites are brought up to date at the end: MuJoCo's own step
-    leaves them one step behind the joints. Sensors are read in the last step: nobody
-    sees what they say in others. Nor does anybody see how long MuJoCo's parts take.
+    leaves them one step behind the joints. All steps but the last are hasty, since
+    nobody looks: see `haste` and `neighbours`.
 
     Args:
         model: Address of the model.
         data: Address of its data.
         timestep: Duration of a step, s.
         table: Where their arrays are, see `physics_table`.
+        haste: Where is what a step may leave out, see `bind_haste`.
         sound: Where what may be broken is, see `bind_sound`.
         laws: `LAW` records.
         drives: `DRIVE` records.
@@ -64,13 +77,25 @@ def advance(
     if not begins_sound(sound):
         return False
     physics = physics_of(table, timestep)
-    flags, clock = flags_of(table), stop_profiler(table)
+    clock = stop_profiler(haste)
+    moved, hides = np.inf, False  # since bodies were looked at; whether some are hidden
     for k in range(steps):
-        let_sense(table, flags, k == steps - 1)
+        if k == 0:
+            begin_haste(haste)
+        if k == steps - 1:
+            end_haste(haste)
+        elif moved > SKIN and hides:
+            show_bodies(haste)
+        if 0 < k < steps - 1:
+            let_fixed_rest(haste)
         mj_step1(model, data)
         command(physics, laws, drives, hands, feet)
+        if moved > SKIN and steps - k > WORTH and may_hide(haste):
+            hide_far_bodies(haste)
+            moved, hides = 0.0, True
         mj_step2(model, data)
+        moved += way(haste, timestep)
     mj_kinematics(model, data)
     mj_comPos(model, data)
-    start_profiler(table, clock)
+    start_profiler(haste, clock)
     return ends_sound(sound)

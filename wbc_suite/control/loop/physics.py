@@ -1,12 +1,9 @@
 """MuJoCo as compiled code sees it: its step functions, and views of its arrays."""
 
-import ctypes
 from collections.abc import Callable
 from enum import IntEnum
-from pathlib import Path
 from typing import Any, NamedTuple, cast
 
-import llvmlite.binding
 import mujoco
 import numpy as np
 from numba import types
@@ -16,19 +13,17 @@ from numba.core.typing.templates import AttributeTemplate
 from numba.extending import infer_getattr, intrinsic, models, register_model
 from numba.np.arrayobj import make_array
 
-from wbc_suite.compiling import compiled
+from wbc_suite.control.loop.haste import load_mujoco
 from wbc_suite.kinematics.array_table import (
     INDICES,
     MATRIX,
     VECTOR,
     ArrayTable,
     array_at,
-    indices,
 )
 from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["Physics", "bind_physics", "physics_of", "physics_table"]
-__all__ += ["flags_of", "let_sense", "start_profiler", "stop_profiler"]
 __all__ += ["mj_comPos", "mj_kinematics", "mj_step1", "mj_step2"]
 
 WANTED, PULL, PLACE, REST, CHANGE, COLUMN = 18, 19, 20, 21, 22, 23
@@ -36,9 +31,7 @@ VECTORS, LIMITS, ROTATIONS, INERTIA = 24, 33, 35, 56
 """Rows of a law's scratch after three matrices of six rows: vectors, rotations of three
 rows each, the inertia, then what `straight` needs."""
 
-_LIBRARY = next(Path(mujoco.__file__).parent.glob("libmujoco*"))
-llvmlite.binding.load_library_permanently(str(_LIBRARY))
-_PROFILER_CLOCK = llvmlite.binding.address_of_symbol("mjcb_time")
+load_mujoco()
 _OF_MODEL_AND_DATA = types.void(types.intp, types.intp)
 
 mj_step1 = types.ExternalFunction("mj_step1", _OF_MODEL_AND_DATA)
@@ -90,9 +83,6 @@ class Physics(NamedTuple):
 
 _NUMBERS = ("model", "data", "timestep")
 _ARRAYS = tuple(name for name in Physics._fields if name not in _NUMBERS)
-_SWITCHES = ("flags", "no_sensors", "profiler")
-_TABLE = (*_ARRAYS, *_SWITCHES)
-_FLAGS, _NO_SENSORS, _PROFILER = map(_TABLE.index, _SWITCHES)
 _INDICES = ("M_rownnz", "M_rowadr", "M_colind", "site_bodyid", "body_rootid")
 _INDICES += ("body_last_dof", "dof_parentid", "slots")
 _MATRICES = ("site_xpos", "site_xmat", "xpos", "xmat", "cdof", "cdof_dot", "cvel")
@@ -105,10 +95,9 @@ _KINDS: dict[str, Any] = (
 
 PhysicsField = cast(
     "type[IntEnum]",
-    IntEnum("PhysicsField", [name.upper() for name in _TABLE], start=0),
+    IntEnum("PhysicsField", [name.upper() for name in _ARRAYS], start=0),
 )
-"""Places of the arrays in a `physics_table`: those of `Physics`, and the switches of
-sensors and profiler."""
+"""Places of the arrays of `Physics` in a `physics_table`."""
 
 
 def bind_physics(model: mujoco.MjModel, data: mujoco.MjData) -> Physics:
@@ -138,12 +127,11 @@ def bind_physics(model: mujoco.MjModel, data: mujoco.MjData) -> Physics:
     )
 
 
-def physics_table(model: mujoco.MjModel, physics: Physics) -> ArrayTable:
+def physics_table(physics: Physics) -> ArrayTable:
     """Return where the arrays are: one argument of compiled calls in place of all."""
-    switches = (*_sensor_switch(model), _word_at(_PROFILER_CLOCK))
-    arrays = physics._asdict() | dict(zip(_SWITCHES, switches, strict=True))
+    arrays = physics._asdict()
     return ArrayTable(
-        PhysicsField, {field: arrays[_TABLE[field]] for field in PhysicsField}
+        PhysicsField, {field: arrays[_ARRAYS[field]] for field in PhysicsField}
     )
 
 
@@ -195,66 +183,6 @@ def _physics_of(typingctx: Any, table: Any, timestep: Any) -> Any:
 
 physics_of = cast("Callable[[Indices, float], Physics]", intrinsic(_physics_of))
 """Compiled code's view of the arrays that a `physics_table` tells."""
-
-
-@compiled
-def flags_of(table: Indices) -> int:
-    """Return the word of the model that holds its flags."""
-    return indices(table, _FLAGS)[0]
-
-
-@compiled
-def let_sense(table: Indices, flags: int, on: bool) -> None:
-    """Let MuJoCo's next step read sensors, or leave what they said.
-
-    Args:
-        table: Where the arrays are.
-        flags: The model's own, see `flags_of`.
-        on: Whether sensors are read, if the model does so at all.
-    """
-    flag = indices(table, _NO_SENSORS)[0]
-    indices(table, _FLAGS)[0] = flags if on else flags | flag
-
-
-@compiled
-def stop_profiler(table: Indices) -> int:
-    """Let MuJoCo not time what it does; return the function that it asks the time.
-
-    Its Python package sets one, which is asked twenty times a step: a twentieth of all.
-    """
-    clock = indices(table, _PROFILER)
-    function = clock[0]
-    clock[0] = 0
-    return function
-
-
-@compiled
-def start_profiler(table: Indices, function: int) -> None:
-    """Let MuJoCo time what it does again, if it did; another thread may have begun."""
-    if function != 0:
-        indices(table, _PROFILER)[0] = function
-
-
-def _sensor_switch(model: mujoco.MjModel) -> tuple[Indices, Indices]:
-    """Return the word of the model that holds its flags, and the flag of no sensors.
-
-    It is none at all where sensors remember what they said, or are off anyway.
-    """
-    option = model.opt
-    # The flags are the ninth integer after the frictions, as mjmodel.h has it.
-    place = option.o_friction.ctypes.data + option.o_friction.nbytes + 8 * 4
-    flags = _word_at(place)
-    given, before = option.disableflags, int(flags[0])
-    option.disableflags |= mujoco.mjtDisableBit.mjDSBL_SENSOR
-    flag = before ^ int(flags[0])  # in whichever half of the word it is
-    option.disableflags = given
-    remembers = model.sensor_history.any() or model.sensor_interval.any()
-    return flags, np.array([0 if remembers else flag], dtype=np.int64)
-
-
-def _word_at(address: int) -> Indices:
-    """Return a view of one integer, shape (1,)."""
-    return np.ctypeslib.as_array((ctypes.c_int64 * 1).from_address(address))
 
 
 def _last_dofs(model: mujoco.MjModel) -> Indices:

@@ -12,7 +12,7 @@ from wbc_suite.robot.shapes import Box, Cylinder, Hull, Loft, Vector3
 from wbc_suite.robot.surfaces import mesh_of
 from wbc_suite.scene.materials import material_named, use_material
 
-__all__ = ["Color", "Hinge", "Part", "Quat", "Thing"]
+__all__ = ["TORSION", "Color", "Hinge", "Part", "Quat", "Thing"]
 
 Color: TypeAlias = tuple[float, float, float, float]
 Quat: TypeAlias = tuple[float, float, float, float]
@@ -24,6 +24,10 @@ DRAWN_GROUP, DRAWN_ONLY_GROUP, HIDDEN_GROUP, SITE_GROUP = 0, 2, 3, 4
 CONTACT_SOLREF = (0.02, 2.0)
 """Time constant, s, and damping ratio of contacts: twice critical, so that what is put
 down stays down instead of rattling."""
+
+SLIDING, TORSION = 3, 4
+"""Dimensions of contacts. A box touches with its corners, which keep it from turning by
+sliding alone; what touches at one point needs torsional friction for that."""
 
 _KINDS = {
     "box": (mujoco.mjtGeom.mjGEOM_BOX, 3),
@@ -88,7 +92,7 @@ class Part:
         geom.friction = self.friction or material.friction
         geom.group = DRAWN_GROUP if self.drawn else HIDDEN_GROUP
         if self.solid:
-            geom.condim = 4
+            geom.condim = SLIDING if self.kind == "box" else TORSION
             geom.solref[:2] = CONTACT_SOLREF
         else:
             geom.contype = geom.conaffinity = 0
