@@ -3,9 +3,10 @@
 Lift at 20 Hz over 500 Hz: 25 physics steps an action, observations without cameras,
 random actions (parts: +-0.1 of their range; whole-body: +-5 mm and rad around the poses
 that hold). Each side is also timed against its own raw physics: `mj_step` of its own
-compiled model from the states its steps began in, controls held. Blocks of 24 steps of
-both sides alternate in one run, and a ratio is the median of those of the blocks: a
-processor that changes its speed meanwhile does so for both. robosuite runs in its own
+compiled model from the states its steps began in, controls held. Both sides share one
+processor and take turns of 8 steps, three to a block, which begins with a reset; a
+ratio is the median of those of the turns: a processor that changes its speed, as those
+of shared machines do, does so for both. robosuite runs in its own
 environment (.venv-robosuite, `make bench-peers`) and is left out where it is missing.
 Times are CPU times of the process. Resets change no structure; robosuite's "hard" one,
 its default, compiles anew.
@@ -13,6 +14,7 @@ its default, compiles anew.
 Usage: python benchmarks/env_step.py [--quick] [--json FILE] [--blocks N] [--cases TEXT]
 """
 
+import os
 import sys
 from dataclasses import dataclass
 
@@ -26,7 +28,7 @@ import numpy as np  # isort: skip  (after harness: it sets the number of BLAS th
 
 import wbc_suite
 
-STEPS = 24  # of one block
+STEPS, TURNS = 24, 3  # of one block; a turn is short beside changes of the clock
 PART_SIZE, WHOLE_BODY_SIZE = 0.1, 0.005
 COLUMNS = ("case", "side", "median_us", "p99_us", "raw_us", "over_raw", "n")
 
@@ -71,15 +73,20 @@ class Ours:
         self.size, self.rng = case.size, np.random.default_rng(0)
         self.env.reset(seed=0)
 
-    def block(self) -> Block:
-        """Reset, then time steps."""
-        env = self.env
-        env.reset()
-        hold = env.hold_action
+    def begin(self) -> None:
+        """Reset, and draw the actions of a block."""
+        self.env.reset()
+        hold = self.env.hold_action
         offsets = self.rng.uniform(-self.size, self.size, (STEPS, hold.size))
+        self.actions = list(hold + offsets)
+
+    def turn(self) -> Block:
+        """Time the next steps of the block."""
+        env, count = self.env, STEPS // TURNS
+        actions, self.actions = self.actions[:count], self.actions[count:]
         return time_block(
             env.step,
-            list(hold + offsets),
+            actions,
             model=env.simulation.model,
             data=env.simulation.data,
             substeps=round(1.0 / (env.config.control_freq * env.simulation.timestep)),
@@ -103,8 +110,11 @@ class Theirs:
         self.peer, self.size = peer, case.size
         peer.ask("make", robot=case.robot, controller=case.controller)
 
-    def block(self) -> Block:
-        return Block(**self.peer.ask("block", count=STEPS, size=self.size))
+    def begin(self) -> None:
+        self.peer.ask("begin", count=STEPS, size=self.size)
+
+    def turn(self) -> Block:
+        return Block(**self.peer.ask("turn", count=STEPS // TURNS))
 
     def resets(self, count: int, *, hard: bool = False) -> list[float]:
         return self.peer.ask("reset", hard=hard, count=count)
@@ -113,16 +123,20 @@ class Theirs:
 def run_case(
     case: Case, peer: Robosuite | None, report: Report, *, blocks: int, resets: int
 ) -> None:
-    """Time both sides, block by block in turns; then resets, where any are asked."""
+    """Time both sides in turns, block by block; then resets, where any are asked."""
     ours = Ours(case)
     theirs = None if peer is None else Theirs(case, peer)
     sides = {"ours": ours} if theirs is None else {"ours": ours, "robosuite": theirs}
     found: dict[str, list[Block]] = {name: [] for name in sides}
     for side in sides.values():
-        side.block()  # compiles and warms up
-    for k in range(blocks):
-        for name in list(sides)[:: 1 if k % 2 else -1]:
-            found[name].append(sides[name].block())
+        side.begin()
+        side.turn()  # compiles and warms up
+    for _ in range(blocks):
+        for side in sides.values():
+            side.begin()
+        for k in range(TURNS):
+            for name in list(sides)[:: 1 if k % 2 else -1]:
+                found[name].append(sides[name].turn())
     for name, turns in found.items():
         whole = Block()
         for block in turns:
@@ -160,11 +174,18 @@ def add_resets(
     report.compare(f"{name}/robosuite_hard", own, hard)
 
 
+def stay_on_one_processor() -> None:
+    """Let this process and its children share a processor, where the system can."""
+    if sys.platform == "linux":
+        os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
+
+
 def main() -> None:
     parser = options(__doc__, "3 blocks of 24 steps, without the last case")
     parser.add_argument("--blocks", type=int, default=20, help="of each side")
     parser.add_argument("--cases", default="", help="only those whose names hold this")
     arguments = parser.parse_args()
+    stay_on_one_processor()
     blocks = 3 if arguments.quick else arguments.blocks
     cases = CASES[:-1] if arguments.quick else CASES
     cases = [case for case in cases if arguments.cases in case.name]

@@ -116,13 +116,18 @@ class Side:
                 action[first:last] = self.data.qpos[controller.qpos_index]
         return action
 
-    def block(self, count, size):
-        """Reset, then time steps with random actions around the one that holds."""
+    def begin(self, count, size):
+        """Reset, and draw random actions around the one that holds."""
         self.env.reset()
         offsets = self.rng.uniform(-size, size, (count, self.env.action_dim))
+        self.actions = list(self.hold() + offsets)
+
+    def turn(self, count):
+        """Time the next steps."""
+        actions, self.actions = self.actions[:count], self.actions[count:]
         block = time_block(
             self.env.step,
-            list(self.hold() + offsets),
+            actions,
             model=self.model,
             data=self.data,
             substeps=self.substeps,

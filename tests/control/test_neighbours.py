@@ -60,7 +60,9 @@ def room(seed):
     for _ in range(2):
         link = spec.worldbody.add_body(pos=rng.uniform((-1, -1, 0.8), (1, 1, 1.6)))
         for _ in range(4):
-            joint = link.add_joint(type=JOINTS[rng.integers(3)], armature=0.1, damping=(0.05, 0, 0))
+            joint = link.add_joint(
+                type=JOINTS[rng.integers(3)], armature=0.1, damping=(0.05, 0, 0)
+            )
             joint.axis, joint.pos = rng.normal(size=3), rng.normal(0.0, 0.02, 3)
             some_geom(rng, link, drawn=True)
             some_geom(rng, link)
