@@ -149,6 +149,7 @@ def test_hasty_steps_change_nothing_that_is_seen():
     assert data.sensordata.any()
     np.testing.assert_array_equal(data.sensordata, other.sensordata)
     np.testing.assert_array_equal(data.cfrc_int, other.cfrc_int)
+    np.testing.assert_array_equal(data.geom_xpos, other.geom_xpos)
     touching = {model.geom(g).name for g in data.contact.geom.ravel()}
     assert any("hand" in name or "finger" in name for name in touching)
     np.testing.assert_array_equal(data.contact.geom, other.contact.geom)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from wbc_suite.control.loop import bind_haste
-from wbc_suite.control.loop.haste import Haste
+from wbc_suite.control.loop.haste import Haste, begin_haste, end_haste
 from wbc_suite.control.loop.neighbours import (
     SKIN,
     between_balls,
@@ -89,7 +89,8 @@ def thrown(seed, *, compiled):
         model.body_pos[1:5] += rng.normal(0.0, 0.02, (4, 3))  # the walls
         data.mocap_pos[:] += rng.normal(0.0, 0.02, 3)
         simulation.tick(STEPS)
-        states.append(np.concatenate([data.qpos, data.qvel]))
+        poses = data.geom_xpos.ravel(), data.geom_xmat.ravel()
+        states.append(np.concatenate([data.qpos, data.qvel, *poses]))
         touching += [data.contact.geom.copy(), data.contact.dist.copy()]
         near.append(simulation._haste[Haste.NEAR].mean())
     return np.array(states), touching, np.array(near)
@@ -105,6 +106,46 @@ def test_no_contact_is_missed(seed):
         np.testing.assert_array_equal(own, other)
     assert near.min() < 1.0  # some were hidden
     assert sum(map(len, contacts))
+
+
+WOUND = """
+<mujoco>
+  <worldbody>
+    <site name="above" pos="-0.2 0 1"/>
+    <body pos="0 0 0.8">
+      <joint axis="0 1 0"/>
+      <geom name="reel" type="cylinder" size="0.05 0.02" contype="0" conaffinity="0"
+            pos="0.02 0 0" zaxis="0 1 0"/>
+      <geom type="sphere" size="0.02" pos="0 0 -0.2"/>
+    </body>
+    <body pos="0.2 0 0.7">
+      <freejoint/>
+      <geom type="sphere" size="0.03"/>
+      <site name="below"/>
+    </body>
+  </worldbody>
+  <tendon>
+    <spatial stiffness="40" springlength="0.3">
+      <site site="above"/>
+      <geom geom="reel"/>
+      <site site="below"/>
+    </spatial>
+  </tendon>
+</mujoco>
+"""
+
+
+def test_tendons_wind_around_what_does_not_collide():
+    found = []
+    for compiled in (True, False):
+        model = mujoco.MjModel.from_xml_string(WOUND)
+        data = mujoco.MjData(model)
+        simulation = Simulation(model, data, compiled=compiled)
+        simulation.start()
+        simulation.tick(200)
+        found.append(data.qpos.copy())
+    np.testing.assert_array_equal(*found)
+    assert abs(found[0]).max() > 0.1  # it moved
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -140,7 +181,9 @@ def test_no_joint_has_a_longer_lever(seed):
     data.qpos[slides] = 1.0
     mujoco.mj_kinematics(model, data)
     table = bind_haste(model, data)
+    begin_haste(table.table)
     hide_far_bodies(table.table)
+    end_haste(table.table)
     levers, longest = table[Haste.LEVERS].copy(), np.zeros(model.nv)
     jacobian = np.zeros((3, model.nv))
     for _ in range(300):

@@ -88,7 +88,7 @@ class Haste(IntEnum):
     LEVERS = 40
     """How far a unit of each degree of freedom moves a geom at most, shape (nv,)."""
     NEAR = 41
-    """Whether something is near a body: scratch."""
+    """Whether something is near each geom: scratch."""
     PAUSE = 42
     """For how many actions nobody looks which bodies are far."""
 
@@ -110,8 +110,8 @@ def bind_haste(model: mujoco.MjModel, data: mujoco.MjData) -> ArrayTable:
     }
     for name in ("GIVEN_GEOMADR", "GIVEN_GEOMNUM", "GIVEN_CONTYPE"):
         arrays[name] = np.zeros(nbody, dtype=np.int32)
-    for name in ("GIVEN_CONAFFINITY", "NEAR"):
-        arrays[name] = np.zeros(nbody, dtype=np.int32)
+    arrays["GIVEN_CONAFFINITY"] = np.zeros(nbody, dtype=np.int32)
+    arrays["NEAR"] = np.zeros(model.ngeom, dtype=np.int32)
     arrays["GIVEN_POLICY"] = np.zeros(model.ntree, dtype=np.int32)
     for field in Haste:
         if field.name not in arrays:
@@ -123,12 +123,15 @@ def bind_haste(model: mujoco.MjModel, data: mujoco.MjData) -> ArrayTable:
 def _may(model: mujoco.MjModel) -> tuple[bool, bool]:
     """Return whether there may be haste, and whether far bodies may be hidden.
 
-    Sensors that remember are read in every step, and fluids drag at drawn geoms. What
-    is soft has no bounds that are known ahead, and margins that prevail over all others
-    are left alone.
+    Sensors that remember are read in every step; fluids, tendons and plugins ask for
+    geoms that do not collide. What is soft has no bounds that are known ahead, and
+    margins that prevail over all others are left alone.
     """
     remembers = model.sensor_history.any() or model.sensor_interval.any()
-    haste = not remembers and not model.geom_fluid[:, 0].any()
+    drags = model.geom_fluid[:, 0].any()
+    wraps = (mujoco.mjtWrap.mjWRAP_SPHERE, mujoco.mjtWrap.mjWRAP_CYLINDER)
+    wound = np.isin(model.wrap_type, [int(w) for w in wraps]).any()
+    haste = not (remembers or drags or wound or model.nplugin)
     prevail = model.opt.enableflags & int(mujoco.mjtEnableBit.mjENBL_OVERRIDE)
     return haste, haste and model.nflex == 0 and not prevail
 
@@ -175,8 +178,7 @@ def _word_at(address: int) -> Indices:
 def begin_haste(table: Indices) -> None:
     """Let MuJoCo's next steps leave out what nobody sees of them, until `end_haste`.
 
-    No sensor is read. And each body shows the broadphase those of its geoms alone that
-    lie between its first and its last that collide: it bounds drawn ones like others.
+    No sensor is read, and geoms that are only drawn are neither placed nor bounded.
     """
     if not indices(table, Haste.MAY)[0]:
         return
@@ -185,6 +187,18 @@ def begin_haste(table: Indices) -> None:
     for field in range(Haste.FLAGS, Haste.GIVEN_FLAGS):
         copy(table, field, field + _GIVEN)
     short_indices(table, Haste.FLAGS)[0] |= _NO_SENSORS
+    show_bodies(table)
+
+
+@compiled
+def show_bodies(table: Indices) -> None:
+    """Show the broadphase all bodies, with all their geoms that collide.
+
+    Those are a span of a body's geoms, and all of these that MuJoCo knows of; between
+    them may be others.
+    """
+    for field in range(Haste.BODY_GEOMADR, Haste.TREE_SLEEP_POLICY):
+        copy(table, field + _GIVEN, field)
     kind = short_indices(table, Haste.GEOM_CONTYPE)
     affinity = short_indices(table, Haste.GEOM_CONAFFINITY)
     first = short_indices(table, Haste.BODY_GEOMADR)
@@ -228,13 +242,6 @@ def end_haste(table: Indices) -> None:
 def may_hide(table: Indices) -> bool:
     """Tell whether far bodies may be hidden, and it is worth it."""
     return indices(table, Haste.MAY)[1] != 0 and indices(table, Haste.PAUSE)[0] == 0
-
-
-@compiled
-def show_bodies(table: Indices) -> None:
-    """Show the broadphase all bodies again."""
-    copy(table, Haste.GIVEN_CONTYPE, Haste.BODY_CONTYPE)
-    copy(table, Haste.GIVEN_CONAFFINITY, Haste.BODY_CONAFFINITY)
 
 
 @compiled

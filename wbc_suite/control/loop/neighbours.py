@@ -23,8 +23,8 @@ __all__ = ["SKIN", "hide_far_bodies", "way"]
 SKIN = 0.05
 """m; what moves slowly takes many actions of 20 Hz for it, a fast arm a few steps."""
 
-FEW, PAUSE = 4, 100
-"""Where less than a fifth of all bodies can be hidden, to look takes longer than it
+FEW, PAUSE = 2, 100
+"""Where less than a third of all geoms can be hidden, to look takes longer than it
 saves: it is done once in so many actions."""
 
 _PLANE = int(mujoco.mjtGeom.mjGEOM_PLANE)
@@ -35,46 +35,53 @@ _SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
 
 @compiled
 def hide_far_bodies(table: Indices) -> None:
-    """Hide bodies from the broadphase that have nothing near them, see above.
+    """Hide bodies, and geoms at either end of others', that have nothing near them.
 
     Poses of geoms are those of the present positions: what `mj_step1` leaves.
     """
     kind = short_indices(table, Haste.BODY_CONTYPE)
     affinity = short_indices(table, Haste.BODY_CONAFFINITY)
+    first = short_indices(table, Haste.BODY_GEOMADR)
+    count = short_indices(table, Haste.BODY_GEOMNUM)
     near = short_indices(table, Haste.NEAR)
     find_near(table)
     measure_levers(table)
     hidden, shown = 0, 0
     for body in range(kind.shape[0]):
-        if near[body]:
-            shown += 1
-        elif kind[body] != 0 or affinity[body] != 0:
+        if kind[body] == 0 and affinity[body] == 0:
+            continue
+        geom, end = first[body], first[body] + count[body]
+        while geom < end and not near[geom]:
+            geom += 1
+        while geom < end and not near[end - 1]:
+            end -= 1
+        hidden, shown = hidden + count[body] - (end - geom), shown + (end - geom)
+        if geom < end:
+            first[body], count[body] = geom, end - geom
+        else:
             kind[body] = affinity[body] = 0
-            hidden += 1
     if FEW * hidden < shown:
         indices(table, Haste.PAUSE)[0] = PAUSE
 
 
 @compiled
 def find_near(table: Indices) -> None:
-    """Note which bodies may have something nearer to them than `SKIN`."""
+    """Note which geoms may have something nearer to them than `SKIN`."""
     kind = short_indices(table, Haste.BODY_CONTYPE)
     affinity = short_indices(table, Haste.BODY_CONAFFINITY)
     low, high = matrix(table, Haste.LOW), matrix(table, Haste.HIGH)
     near = short_indices(table, Haste.NEAR)
+    for geom in range(near.shape[0]):
+        near[geom] = 0
     for body in range(kind.shape[0]):
-        near[body] = 0
         if kind[body] != 0 or affinity[body] != 0:
             enclose(table, body, low, high)
     pairs = indices(table, Haste.PAIRS)
     for k in range(0, pairs.shape[0], 2):
         a, b = pairs[k], pairs[k + 1]
-        if near[a] and near[b]:
-            continue
-        if kind[a] & affinity[b] == 0 and kind[b] & affinity[a] == 0:
-            continue
-        if not are_apart(low, high, a, b) and are_near(table, a, b):
-            near[a] = near[b] = 1
+        meet = kind[a] & affinity[b] != 0 or kind[b] & affinity[a] != 0
+        if meet and not are_apart(low, high, a, b):
+            note_near(table, a, b)
 
 
 @inlined
@@ -119,16 +126,18 @@ def margin_of(table: Indices, geom: int) -> float:
 
 
 @compiled
-def are_near(table: Indices, a: int, b: int) -> bool:
-    """Tell whether a geom of one body may be nearer than `SKIN` to one of the other."""
+def note_near(table: Indices, a: int, b: int) -> None:
+    """Note which geoms of two bodies may be nearer than `SKIN` to each other."""
     first = short_indices(table, Haste.BODY_GEOMADR)
     count = short_indices(table, Haste.BODY_GEOMNUM)
     kind = short_indices(table, Haste.GEOM_CONTYPE)
     affinity = short_indices(table, Haste.GEOM_CONAFFINITY)
     weld = short_indices(table, Haste.BODY_WELDID)
+    near = short_indices(table, Haste.NEAR)
     for g in range(first[a], first[a] + count[a]):
         for h in range(first[b], first[b] + count[b]):
-            if kind[g] & affinity[h] == 0 and kind[h] & affinity[g] == 0:
+            known = near[g] and near[h]
+            if known or (kind[g] & affinity[h] == 0 and kind[h] & affinity[g] == 0):
                 continue
             distance = max(
                 between_balls(table, g, h),
@@ -136,8 +145,7 @@ def are_near(table: Indices, a: int, b: int) -> bool:
                 from_fixed(table, h, g) if weld[b] == 0 else -np.inf,
             )
             if distance < SKIN:
-                return True
-    return False
+                near[g] = near[h] = 1
 
 
 @compiled
