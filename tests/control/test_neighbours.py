@@ -136,16 +136,67 @@ WOUND = """
 
 
 def test_tendons_wind_around_what_does_not_collide():
-    found = []
-    for compiled in (True, False):
-        model = mujoco.MjModel.from_xml_string(WOUND)
-        data = mujoco.MjData(model)
-        simulation = Simulation(model, data, compiled=compiled)
-        simulation.start()
-        simulation.tick(200)
-        found.append(data.qpos.copy())
-    np.testing.assert_array_equal(*found)
-    assert abs(found[0]).max() > 0.1  # it moved
+    expected, found = (
+        after_200_steps(mujoco.MjModel.from_xml_string(WOUND), compiled=c)
+        for c in (False, True)
+    )
+    np.testing.assert_array_equal(found, expected)
+    assert abs(found).max() > 0.1  # it moved
+
+
+def after_200_steps(model, *, compiled, change=None):
+    """Return positions; `change` is done to the model when the loop is bound."""
+    data = mujoco.MjData(model)
+    simulation = Simulation(model, data, compiled=compiled)
+    if change is not None:
+        change(model)
+    simulation.start()
+    for _ in range(8):
+        simulation.tick(STEPS)
+    return data.qpos.copy()
+
+
+def ghost_that_meets(pairs):
+    """Return two balls that collide only as a pair, one of them behind a wall."""
+    spec = mujoco.MjSpec()
+    for k, name in enumerate("ab"):
+        ball = spec.worldbody.add_body(pos=(0.0, 0.0, 0.5 + 0.5 * k))
+        ball.add_geom(size=(0.05, 0.0, 0.0), pos=(0.4, 0.0, 0.0))
+        ghost = ball.add_geom(name=name, size=(0.1, 0.0, 0.0))
+        ghost.contype = ghost.conaffinity = 0
+        if k:
+            ball.add_freejoint()
+    if pairs:
+        spec.add_pair(geomname1="a", geomname2="b")
+    return spec.compile()
+
+
+def test_pairs_that_somebody_wrote_down_collide():
+    expected, found, without = (
+        after_200_steps(ghost_that_meets(pairs), compiled=compiled)
+        for pairs, compiled in ((True, False), (True, True), (False, False))
+    )
+    np.testing.assert_array_equal(found, expected)
+    assert abs(found - without).max() > 0.1
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_switches_that_are_turned_later_count(seed):
+    """Children begin to collide with their parents; margins prevail over all others."""
+
+    def children_collide(model):
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_FILTERPARENT
+
+    def wide_margins(model):
+        model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_OVERRIDE
+        model.opt.o_margin = 0.3
+
+    for change in (children_collide, wide_margins):
+        expected, found = (
+            after_200_steps(room(seed)[0], compiled=c, change=change)
+            for c in (False, True)
+        )
+        np.testing.assert_array_equal(found, expected)
 
 
 @pytest.mark.parametrize("seed", range(10))

@@ -7,6 +7,7 @@ from wbc_suite.control.loop.haste import (
     begin_haste,
     end_haste,
     let_fixed_rest,
+    may_haste,
     may_hide,
     show_bodies,
     start_profiler,
@@ -78,19 +79,20 @@ def advance(
         return False
     physics = physics_of(table, timestep)
     clock = stop_profiler(haste)
-    moved, hides = np.inf, False  # since bodies were looked at; whether some are hidden
+    hasty, hides = steps > 1 and may_haste(haste), False
+    moved = np.inf  # by how much two geoms may be nearer than when bodies were hidden
+    if hasty:
+        begin_haste(haste)
     for k in range(steps):
-        if k == 0:
-            begin_haste(haste)
-        if k == steps - 1:
+        if hasty and k == steps - 1:
             end_haste(haste)
-        elif moved > SKIN and hides:
-            show_bodies(haste)
-        if 0 < k < steps - 1:
+        elif hasty and k > 0:
             let_fixed_rest(haste)
+            if hides and moved > SKIN:
+                show_bodies(haste)
         mj_step1(model, data)
         command(physics, laws, drives, hands, feet)
-        if moved > SKIN and steps - k > WORTH and may_hide(haste):
+        if hasty and moved > SKIN and steps - k > WORTH and may_hide(haste):
             hide_far_bodies(haste)
             moved, hides = 0.0, True
         mj_step2(model, data)

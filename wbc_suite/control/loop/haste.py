@@ -18,7 +18,14 @@ from wbc_suite.kinematics.array_table import ArrayTable, indices, short_indices
 from wbc_suite.typing import Indices
 
 __all__ = ["Haste", "begin_haste", "bind_haste", "end_haste", "let_fixed_rest"]
-__all__ += ["load_mujoco", "may_hide", "show_bodies", "start_profiler", "stop_profiler"]
+__all__ += [
+    "load_mujoco",
+    "may_haste",
+    "may_hide",
+    "show_bodies",
+    "start_profiler",
+    "stop_profiler",
+]
 
 
 def load_mujoco() -> None:
@@ -30,6 +37,8 @@ def load_mujoco() -> None:
 load_mujoco()
 _PROFILER_CLOCK = llvmlite.binding.address_of_symbol("mjcb_time")
 _NO_SENSORS = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
+_PARENTS = int(mujoco.mjtDisableBit.mjDSBL_FILTERPARENT)
+_MARGINS = int(mujoco.mjtEnableBit.mjENBL_OVERRIDE)
 _SLEEP = int(mujoco.mjtEnableBit.mjENBL_SLEEP)
 _NEVER = int(mujoco.mjtSleepPolicy.mjSLEEP_NEVER)
 _GIVEN = 6
@@ -39,7 +48,7 @@ class Haste(IntEnum):
     """Places of arrays in a `bind_haste` table: MuJoCo's own, and the loop's notes."""
 
     MAY = 0
-    """Whether there may be haste; whether far bodies may be hidden."""
+    """Whether there may be haste, whether far bodies may be hidden; see `_may`."""
     PROFILER = 1
     """MuJoCo's clock."""
     FLAGS = 2
@@ -120,20 +129,19 @@ def bind_haste(model: mujoco.MjModel, data: mujoco.MjData) -> ArrayTable:
     return ArrayTable(Haste, {field: arrays[field.name] for field in Haste})
 
 
-def _may(model: mujoco.MjModel) -> tuple[bool, bool]:
-    """Return whether there may be haste, and whether far bodies may be hidden.
+def _may(model: mujoco.MjModel) -> tuple[bool, bool, int]:
+    """Return whether there may be haste, whether far bodies may be hidden, and a flag.
 
-    Sensors that remember are read in every step; fluids, tendons and plugins ask for
-    geoms that do not collide. What is soft has no bounds that are known ahead, and
-    margins that prevail over all others are left alone.
+    Sensors that remember are read in every step; fluids, tendons, plugins and pairs
+    that somebody wrote down ask for geoms that do not collide. What is soft has no
+    bounds that are known ahead. The flag is that of parents and children which collide.
     """
     remembers = model.sensor_history.any() or model.sensor_interval.any()
     drags = model.geom_fluid[:, 0].any()
     wraps = (mujoco.mjtWrap.mjWRAP_SPHERE, mujoco.mjtWrap.mjWRAP_CYLINDER)
     wound = np.isin(model.wrap_type, [int(w) for w in wraps]).any()
-    haste = not (remembers or drags or wound or model.nplugin)
-    prevail = model.opt.enableflags & int(mujoco.mjtEnableBit.mjENBL_OVERRIDE)
-    return haste, haste and model.nflex == 0 and not prevail
+    haste = not (remembers or drags or wound or model.nplugin or model.npair)
+    return haste, haste and not model.nflex, model.opt.disableflags & _PARENTS
 
 
 def _flags(option: Any) -> NDArray[np.int32]:
@@ -162,7 +170,7 @@ def _pairs(model: mujoco.MjModel) -> Indices:
     first, second = np.triu_indices(model.nbody, 1)
     own, other = weld[first], weld[second]
     good = own != other
-    if not model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_FILTERPARENT):
+    if not model.opt.disableflags & _PARENTS:
         child = (own == above[second]) | (other == above[first])
         good &= ~(child & (own != 0) & (other != 0))
     good &= ~np.isin((first << 16) + second, model.exclude_signature)
@@ -175,13 +183,21 @@ def _word_at(address: int) -> Indices:
 
 
 @compiled
+def may_haste(table: Indices) -> bool:
+    """Tell whether steps may leave something out.
+
+    Not where margins prevail over all others: MuJoCo bounds geoms without these.
+    """
+    flags = short_indices(table, Haste.FLAGS)
+    return indices(table, Haste.MAY)[0] != 0 and flags[1] & _MARGINS == 0
+
+
+@compiled
 def begin_haste(table: Indices) -> None:
     """Let MuJoCo's next steps leave out what nobody sees of them, until `end_haste`.
 
     No sensor is read, and geoms that are only drawn are neither placed nor bounded.
     """
-    if not indices(table, Haste.MAY)[0]:
-        return
     pause = indices(table, Haste.PAUSE)
     pause[0] = max(pause[0] - 1, 0)
     for field in range(Haste.FLAGS, Haste.GIVEN_FLAGS):
@@ -221,7 +237,7 @@ def let_fixed_rest(table: Indices) -> None:
     To MuJoCo it sleeps then; nothing else does.
     """
     flags = short_indices(table, Haste.FLAGS)
-    if not indices(table, Haste.MAY)[0] or flags[1] & _SLEEP:
+    if flags[1] & _SLEEP:
         return
     flags[1] |= _SLEEP
     policies = short_indices(table, Haste.TREE_SLEEP_POLICY)
@@ -232,8 +248,6 @@ def let_fixed_rest(table: Indices) -> None:
 @compiled
 def end_haste(table: Indices) -> None:
     """Let MuJoCo's steps be whole again."""
-    if not indices(table, Haste.MAY)[0]:
-        return
     for field in range(Haste.FLAGS, Haste.GIVEN_FLAGS):
         copy(table, field + _GIVEN, field)
 
@@ -241,7 +255,9 @@ def end_haste(table: Indices) -> None:
 @compiled
 def may_hide(table: Indices) -> bool:
     """Tell whether far bodies may be hidden, and it is worth it."""
-    return indices(table, Haste.MAY)[1] != 0 and indices(table, Haste.PAUSE)[0] == 0
+    may, flags = indices(table, Haste.MAY), short_indices(table, Haste.FLAGS)
+    usual = may[1] != 0 and flags[0] & _PARENTS == may[2]
+    return usual and indices(table, Haste.PAUSE)[0] == 0
 
 
 @compiled
