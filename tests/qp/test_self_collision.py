@@ -98,6 +98,33 @@ def test_rows_are_the_nearest_pairs_and_the_derivative_of_their_distance(rng):
         configuration.update(q)
 
 
+def test_pairs_remembered_from_tick_to_tick_are_those_sought_anew(rng):
+    robot, configuration = gr1()
+    capsules, pairs = enclosing_capsules(robot), collision_pairs(robot)
+    limit = SelfCollisionLimit(capsules, pairs)
+    limit.bind(configuration)
+    anew = SelfCollisionLimit(capsules, pairs)
+    model = configuration.model
+    q, listed = configuration.q.copy(), set()
+    for k in range(400):
+        stride = 1.0 if k % 50 == 49 else 0.02  # a jump among small steps
+        q = q + stride * rng.normal(size=model.nq)
+        q = np.clip(q, model.lowerPositionLimit, model.upperPositionLimit)
+        configuration.update(q)
+        G, h = np.zeros((limit.dim, model.nv)), np.zeros(limit.dim)
+        limit.rows(configuration, DT, G, h)
+        anew.bind(configuration)  # forgets
+        G_anew, h_anew = np.zeros_like(G), np.zeros_like(h)
+        anew.rows(configuration, DT, G_anew, h_anew)
+        np.testing.assert_array_equal(limit.found, anew.found)
+        np.testing.assert_array_equal(limit.distances, anew.distances)
+        np.testing.assert_array_equal(G, G_anew)
+        np.testing.assert_array_equal(h, h_anew)
+        listed.add(limit.listed_count)
+    assert 3 < len(listed) < 200  # lists were made anew at times, not at every step
+    assert max(listed) < limit.pair_count
+
+
 def test_pairs_that_overlap_in_a_keyframe_are_left_out():
     robot, configuration = gr1()
     crossed = {"left_hip_roll_joint": -0.3, "right_hip_roll_joint": 0.3}

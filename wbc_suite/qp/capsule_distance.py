@@ -4,11 +4,15 @@ from enum import IntEnum
 
 import numpy as np
 
-from wbc_suite.compiling import compiled, compiled_inner
+from wbc_suite.compiling import compiled, compiled_inner, inlined
 from wbc_suite.kinematics.array_table import indices, matrix, vector
 from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["CapsuleField", "nearest_pairs", "segment_parameters"]
+
+SKIN = 0.1
+"""m; pairs farther apart than the influence and this are looked at again when a capsule
+has moved by half of it, as molecular dynamics does with its lists (Verlet, 1967)."""
 
 
 class CapsuleField(IntEnum):
@@ -17,6 +21,9 @@ class CapsuleField(IntEnum):
     Joint of each; both ends of each one's segment in its joint, shape (n, 6); radii;
     pairs of capsules, shape (p, 2); 1 where a velocity moves a joint, shape
     (njoints, nv).
+    What is kept between ticks: pairs that were near, shape (p,); how many; the
+    influence for which they were sought, NaN for none; where middles were then, shape
+    (n, 3).
     """
 
     JOINTS = 0
@@ -24,6 +31,10 @@ class CapsuleField(IntEnum):
     RADII = 2
     PAIRS = 3
     MOVES = 4
+    NEAR = 5
+    NEAR_COUNT = 6
+    NEAR_WITHIN = 7
+    NEAR_MIDDLES = 8
 
 
 @compiled
@@ -112,13 +123,12 @@ def nearest_pairs(  # noqa: C901, one flat loop is what compiles well
     for row in range(rows):
         found[row], distances[row] = -1, np.inf
     total = 0
-    for p in range(pairs.shape[0] // 2):
+    near = indices(capsules, CapsuleField.NEAR)
+    for k in range(_look_around(capsules, middle, reach, influence)):
+        p = near[k]
         a, b = pairs[2 * p], pairs[2 * p + 1]
         limit = min(influence, distances[rows - 1])
-        apart = 0.0
-        for i in range(3):
-            apart += (middle[a, i] - middle[b, i]) ** 2
-        if apart > (reach[a] + reach[b] + limit) ** 2:
+        if _square(middle[a], middle[b]) > (reach[a] + reach[b] + limit) ** 2:
             continue
         s, t = segment_parameters(world[a, 0], world[a, 1], world[b, 0], world[b, 1])
         square = 0.0
@@ -134,6 +144,7 @@ def nearest_pairs(  # noqa: C901, one flat loop is what compiles well
                 row -= 1
             distances[row], found[row] = distance, p
             total = min(total + 1, rows)
+    scratch = np.empty((3, 3))
     for row in range(rows):
         if row < total:
             a, b = pairs[2 * found[row]], pairs[2 * found[row] + 1]
@@ -143,6 +154,7 @@ def nearest_pairs(  # noqa: C901, one flat loop is what compiles well
                 joint_jacobians,
                 moves[joints[a]],
                 moves[joints[b]],
+                scratch,
                 G[row],
             )
         else:
@@ -152,21 +164,63 @@ def nearest_pairs(  # noqa: C901, one flat loop is what compiles well
 
 
 @compiled_inner
+def _look_around(
+    capsules: Indices, middle: Matrix, reach: Vector, influence: float
+) -> int:
+    """Return how many pairs may be within the influence; list them anew if need be.
+
+    Args:
+        capsules: Table of `CapsuleField`.
+        middle: Of each capsule, shape (n, 3).
+        reach: Radii of balls around them, shape (n,).
+        influence: Distance, m.
+    """
+    within = vector(capsules, CapsuleField.NEAR_WITHIN)
+    known = matrix(capsules, CapsuleField.NEAR_MIDDLES)
+    count = indices(capsules, CapsuleField.NEAR_COUNT)
+    same = within[0] == influence
+    for c in range(middle.shape[0]):
+        same = same and _square(middle[c], known[c]) < (0.49 * SKIN) ** 2
+    if same:
+        return count[0]
+    pairs = indices(capsules, CapsuleField.PAIRS)
+    near = indices(capsules, CapsuleField.NEAR)
+    count[0], within[0] = 0, influence
+    for c in range(middle.shape[0]):
+        for i in range(3):
+            known[c, i] = middle[c, i]
+    for p in range(near.shape[0]):
+        a, b = pairs[2 * p], pairs[2 * p + 1]
+        far = reach[a] + reach[b] + influence + SKIN
+        if not _square(middle[a], middle[b]) > far * far:
+            near[count[0]] = p
+            count[0] += 1
+    return count[0]
+
+
+@inlined
+def _square(a: Vector, b: Vector) -> float:
+    """Return the squared distance of two points."""
+    return (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2
+
+
+@compiled_inner
 def _distance_row(
     A: Matrix,
     B: Matrix,
     joint_jacobians: Matrix,
     of_a: Vector,
     of_b: Vector,
+    scratch: Matrix,
     row: Vector,
 ) -> None:
     """Write `-n . (J_a - J_b)` at the nearest points of two segments.
 
     Velocities that move both bodies turn them together and leave the distance as it
-    is, so only those that move one of them count.
+    is, so only those that move one of them count. The scratch has shape (3, 3).
     """
     s, t = segment_parameters(A[0], A[1], B[0], B[1])
-    x, y, n = np.empty(3), np.empty(3), np.empty(3)
+    x, y, n = scratch[0], scratch[1], scratch[2]
     norm = 0.0
     for i in range(3):
         x[i] = A[0, i] + s * (A[1, i] - A[0, i])

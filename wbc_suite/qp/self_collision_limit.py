@@ -34,7 +34,8 @@ class SelfCollisionLimit(RowLimit):
 
     and where d has fallen under the margin, separation at no more than 0.2 m/s. One
     compiled kernel places all capsules, discards pairs by their bounding spheres, and
-    measures the rest; the rows follow from the joint Jacobians.
+    measures the rest; the rows follow from the joint Jacobians. Pairs that are far are
+    left alone until something has moved far enough to bring them near.
 
     Args:
         capsules: Capsules on the robot's links; link names are frames of the model.
@@ -140,6 +141,10 @@ class SelfCollisionLimit(RowLimit):
                 f.RADII: np.array([c.radius for c in self._capsules], dtype=float),
                 f.PAIRS: self._pairs,
                 f.MOVES: moves,
+                f.NEAR: np.zeros(len(self._pairs), dtype=np.int64),
+                f.NEAR_COUNT: np.zeros(1, dtype=np.int64),
+                f.NEAR_WITHIN: np.full(1, np.nan),
+                f.NEAR_MIDDLES: np.zeros((len(self._capsules), 3)),
             },
         )
 
@@ -173,6 +178,11 @@ class SelfCollisionLimit(RowLimit):
     def pair_count(self) -> int:
         """Number of capsule pairs that are kept apart."""
         return len(self._pairs)
+
+    @property
+    def listed_count(self) -> int:
+        """Number of capsule pairs that a tick measures: near when last sought."""
+        return int(self._arrays[CapsuleField.NEAR_COUNT][0])
 
     def label(self, row: int) -> str:
         """Return the two links of a row of the last tick."""
