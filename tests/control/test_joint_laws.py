@@ -88,7 +88,7 @@ def test_kernels_give_what_the_readable_forms_give(alone, name):
         plain = commands(state, rig.controller.laws)
         moved = drives["position"].copy()
         laws[:], drives[:] = told
-        advance(*simulation._bound, 1)
+        advance(*simulation._bound, 1, True)
         compiled = state.data.ctrl[state.actuator_ids]
         np.testing.assert_allclose(compiled, plain, rtol=1e-10, atol=1e-10)
         np.testing.assert_allclose(drives["position"], moved, rtol=0.0, atol=1e-12)

@@ -13,6 +13,7 @@ import pytest
 
 import wbc_suite
 from wbc_suite import compiling
+from wbc_suite.control.composite.whole_body import WholeBodyIK
 from wbc_suite.control.loop import advance
 from wbc_suite.control.loop.haste import Haste, begin_haste, end_haste
 
@@ -88,12 +89,41 @@ def test_an_action_is_one_call_per_solve(controller, calls, monkeypatch):
     counted = []
 
     def count(*arguments):
-        counted.append(arguments[-1])
+        counted.append(arguments[-2:])
         return advance(*arguments)
 
     monkeypatch.setattr("wbc_suite.envs.simulation.advance", count)
     env.step(env.hold_action)
-    assert counted == [25 // calls] * calls
+    assert [steps for steps, _ in counted] == [25 // calls] * calls
+    assert [seen for _, seen in counted] == [False] * (calls - 1) + [True]
+
+
+def test_what_nobody_sees_between_solves_changes_nothing(monkeypatch):
+    """Poses and sensors are brought up to date at the end of an action alone."""
+    seen = made("Panda", "WHOLE_BODY_IK")
+    monkeypatch.setattr(WholeBodyIK, "looks", True)
+    looked_at = made("Panda", "WHOLE_BODY_IK")
+    monkeypatch.undo()
+    rng = np.random.default_rng(0)
+    for env in (seen, looked_at):
+        env.reset(seed=0)
+    for _ in range(10):
+        action = seen.hold_action + rng.uniform(-0.02, 0.02, seen.hold_action.size)
+        one, other = seen.step(action)[0], looked_at.step(action)[0]
+        for key in one:
+            np.testing.assert_array_equal(one[key], other[key], err_msg=key)
+        for name in ("qpos", "qvel", "qacc", "xpos", "geom_xpos", "sensordata"):
+            ours, theirs = (getattr(e.simulation.data, name) for e in (seen, looked_at))
+            np.testing.assert_array_equal(ours, theirs, err_msg=name)
+
+
+def test_a_subclass_that_prepares_otherwise_sees_poses():
+    class Own(WholeBodyIK):
+        def prepare(self, state):
+            return super().prepare(state)
+
+    assert object.__new__(Own).looks
+    assert not object.__new__(WholeBodyIK).looks
 
 
 def test_positions_after_a_step_are_those_of_the_joints():

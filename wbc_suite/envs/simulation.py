@@ -61,6 +61,7 @@ class Simulation:
         self.controllers = tuple(controller for _, controller in pairs)
         self._pairs = tuple(pairs)
         self._left, self._prepared = [0] * len(pairs), False
+        self._look = any(getattr(c, "looks", True) for c in self.controllers)
         self.compiled = compiled and all(c.laws for c in self.controllers)
         physics = bind_physics(model, data)
         self._table, self._haste = physics_table(physics), bind_haste(model, data)
@@ -129,9 +130,9 @@ class Simulation:
                     if self._left[k] <= 0:
                         self._left[k] = controller.prepare(state)
                     span = min(span, self._left[k])
-                self._advance(span)
-                self._left = [left - span for left in self._left]
                 n -= span
+                self._advance(span, seen=n == 0 or self._look)
+                self._left = [left - span for left in self._left]
 
     def _refresh(self) -> None:
         """Compute what follows from the state; physics goes on as if it had not."""
@@ -140,14 +141,14 @@ class Simulation:
             mujoco.mj_forward(self.model, self.data)
         self.data.qacc_warmstart[:] = start
 
-    def _advance(self, steps: int) -> None:
+    def _advance(self, steps: int, *, seen: bool) -> None:
         if self.compiled:
-            self._advance_compiled(steps)
+            self._advance_compiled(steps, seen=seen)
         else:
             self._advance_plainly(steps)
 
-    def _advance_compiled(self, steps: int) -> None:
-        if not math.isfinite(self.data.time) or not advance(*self._bound, steps):
+    def _advance_compiled(self, steps: int, *, seen: bool = True) -> None:
+        if not math.isfinite(self.data.time) or not advance(*self._bound, steps, seen):
             self._watch.check()
 
     def _advance_plainly(self, steps: int) -> None:

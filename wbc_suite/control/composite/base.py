@@ -40,6 +40,8 @@ class CompositeController(Protocol):
         layout: Slices of the action.
         laws: What the compiled loop acts by. None at all: `compute` is called at every
             step instead, and the loop is a plain one.
+        looks: Whether `prepare` reads more of the state than positions and velocities
+            of joints, such as poses and sensors. Optional; without it, it does.
     """
 
     layout: ActionLayout

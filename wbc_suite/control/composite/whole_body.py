@@ -182,6 +182,11 @@ class WholeBodyIK:
             self._stance.lead(self._reference.root_motion())
         return self._steps_per_solve
 
+    @property
+    def looks(self) -> bool:
+        """Whether `prepare` reads more than joints: a subclass's own may."""
+        return type(self).prepare is not WholeBodyIK.prepare
+
     def compute(self, state: RobotState) -> Vector:
         """Return actuator commands by the readable forms of the laws."""
         return commands(state, self.laws)

@@ -28,7 +28,7 @@ from wbc_suite.typing import Indices
 
 __all__ = ["advance", "needed"]
 
-WORTH = 4
+WORTH = 8
 """Steps that must be left for it to pay to look which bodies are far."""
 
 
@@ -51,12 +51,13 @@ def advance(
     hands: Needed,
     feet: Needed,
     steps: int,
+    seen: bool,
 ) -> bool:
     """Advance physics under all laws; holds no lock, so threads run side by side.
 
     Positions of bodies and sites are brought up to date at the end: MuJoCo's own step
-    leaves them one step behind the joints. All steps but the last are hasty, since
-    nobody looks: see `haste` and `neighbours`.
+    leaves them one step behind the joints. All steps are hasty but one that somebody
+    looks at, the last: see `haste` and `neighbours`.
 
     Args:
         model: Address of the model.
@@ -70,6 +71,7 @@ def advance(
         hands: Whether a law is in operational space, see `needed`.
         feet: Whether a law is of feet.
         steps: How many steps of physics.
+        seen: Whether somebody looks at more than joints afterwards: at poses, sensors.
 
     Returns:
         Whether all numbers were and are usable, and MuJoCo did not warn. Where they are
@@ -79,12 +81,12 @@ def advance(
         return False
     physics = physics_of(table, timestep)
     clock = stop_profiler(haste)
-    hasty, hides = steps > 1 and may_haste(haste), False
+    hasty, hides = (steps > 1 or not seen) and may_haste(haste), False
     moved = np.inf  # by how much two geoms may be nearer than when bodies were hidden
     if hasty:
         begin_haste(haste)
     for k in range(steps):
-        if hasty and k == steps - 1:
+        if hasty and seen and k == steps - 1:
             end_haste(haste)
         elif hasty and k > 0:
             let_fixed_rest(haste)
@@ -97,7 +99,10 @@ def advance(
             moved, hides = 0.0, True
         mj_step2(model, data)
         moved += way(haste, timestep)
-    mj_kinematics(model, data)
-    mj_comPos(model, data)
+    if seen:
+        mj_kinematics(model, data)
+        mj_comPos(model, data)
+    elif hasty:
+        end_haste(haste)
     start_profiler(haste, clock)
     return ends_sound(sound)
