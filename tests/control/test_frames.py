@@ -8,10 +8,15 @@ import pinocchio as pin
 import pytest
 
 from wbc_suite.control.composite.config import WholeBodyIKConfig
-from wbc_suite.control.composite.frames import ControlledFrames, approach_joints
+from wbc_suite.control.composite.frames import (
+    ControlledFrames,
+    JointField,
+    approach_joints,
+)
 from wbc_suite.control.part.approach import approach_pose, approach_posture
 from wbc_suite.control.reasons import Reasons
 from wbc_suite.kinematics import Configuration
+from wbc_suite.kinematics.array_table import ArrayTable
 from wbc_suite.robot import load_robot
 
 DT = 0.01
@@ -76,13 +81,31 @@ def test_distances_count_what_the_kind_of_frame_says(standing):
             np.testing.assert_allclose(found, expected, atol=1e-10)
 
 
+def few_joints():
+    rng = np.random.default_rng(3)
+    return ArrayTable(JointField, {f: rng.uniform(0.1, 2.0, 4) for f in JointField})
+
+
 def test_targets_are_those_of_the_readable_approach(standing):
     rng = np.random.default_rng(1)
     config, configuration, frames = standing
     for _ in range(100):
-        goals, pace = draw(standing, rng), rng.uniform()
-        frames.measure(goals)
-        for k, found in enumerate(frames.approach(DT, pace)):
+        goals, stray, joints = draw(standing, rng), rng.uniform(0.1, 9.0), few_joints()
+        off = frames.measure(goals)[[f.level == 0 for f in config.frames]]
+        off = float((off / config.tolerance).max())
+        pace = 1.0 / (1.0 + (off / stray) ** 2)
+        targets = frames.lead(
+            goals, joints.table, DT, settling=DT, stray=stray, arrived=True
+        )
+        assert frames.off == pytest.approx(off)
+        expected = approach_posture(
+            joints[JointField.DIFFERENCE],
+            dt=DT,
+            speed=pace * joints[JointField.SPEED],
+            acceleration=joints[JointField.BRAKING],
+        )
+        np.testing.assert_allclose(joints[JointField.STEP], DT * expected, atol=1e-10)
+        for k, found in enumerate(targets):
             frame = config.frames[k]
             share = pace if frame.level else 1.0
             expected = approach_pose(

@@ -16,6 +16,7 @@ from wbc_suite.kinematics.forward import (
     place_joints,
     weigh_joints,
 )
+from wbc_suite.kinematics.tangent import TangentSpace
 from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["Axes", "Configuration"]
@@ -58,6 +59,7 @@ class Configuration:
         self.model = model
         self._data: pin.Data = model.createData()
         self.nq, self.nv = int(model.nq), int(model.nv)
+        self._tangent = TangentSpace(model)
         self.q: Vector = pin.neutral(model)
         self.root_linear, self.root_angular = _root_indices(model)
         self._frame_ids = {f.name: i for i, f in enumerate(model.frames)}
@@ -142,14 +144,11 @@ class Configuration:
 
     def integrate(self, dq: Vector) -> Vector:
         """Return `q (+) dq`: the configuration reached by the tangent step dq (nv,)."""
-        dq = self._checked("dq", dq, self.nv)
-        if self.nq == self.nv:  # a vector space
-            return self.q + dq
-        return pin.integrate(self.model, self.q, dq)
+        return self._tangent.integrate(self.q, self._checked("dq", dq, self.nv))
 
     def difference(self, q: Vector) -> Vector:
         """Return `q (-) self.q`, shape (nv,): the tangent step from here to q."""
-        return pin.difference(self.model, self.q, self._checked("q", q, self.nq))
+        return self._tangent.difference(self.q, self._checked("q", q, self.nq))
 
     def frame_id(self, name: str) -> int:
         """Return the index of a frame.

@@ -2,6 +2,8 @@
 
 import math
 
+import numpy as np
+
 from wbc_suite.compiling import compiled
 from wbc_suite.typing import Matrix, Vector
 
@@ -53,7 +55,7 @@ class RowBending:
             kept: Whether the rows were; those that are relaxed count as not pressing.
         """
         self.value *= math.exp(-dt / _MEMORY)
-        if kept:
+        if kept and np.count_nonzero(multipliers):
             bending = _bending(rows, multipliers, *pulls)
             self.value = max(self.factor * bending, self.value)
 

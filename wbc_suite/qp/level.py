@@ -1,6 +1,7 @@
 """The rows of all tasks that share one strict level."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -178,16 +179,52 @@ class Level:
         if not finite:
             self._name_held()
 
-    def record(self) -> LevelRecord:
-        """Return a copy of what is known of the last tick."""
+    def record(self) -> Callable[[], LevelRecord]:
+        """Return what tells of the last tick, also after the next ones.
+
+        Few are ever asked, so the present only costs copies.
+        """
+        return partial(
+            self._record,
+            self.W.copy(),
+            self.e.copy(),
+            self.diagonal.copy(),
+            self._frame_errors.copy(),
+            self._com_errors.copy(),
+            self._errors.copy(),
+            self.held,
+        )
+
+    def _record(
+        self,
+        W: Matrix,
+        e: Vector,
+        diagonal: Matrix,
+        of_frames: Matrix,
+        of_coms: Vector,
+        of_others: Mapping[RowTask, Vector],
+        held: tuple[str, ...],
+    ) -> LevelRecord:
+        """Return the record of a tick from copies; errors are m and rad.
+
+        Tasks with fewer than six rows have one error, in their own unit.
+        """
+        known: dict[RowTask, tuple[float, float]] = {
+            task: (float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:])))
+            for task, error in of_others.items()
+        }
+        frames = zip(self._frames, of_frames.tolist(), strict=True)
+        known |= {task: (position, angle) for task, (position, angle) in frames}
+        coms = zip(self._coms, of_coms.tolist(), strict=True)
+        known |= {task: (distance, 0.0) for task, distance in coms}
         return LevelRecord(
             names=tuple(task.name for task in self.row_tasks),
             slices=self.slices,
-            errors=self._errors_of_all(),
-            held=self.held,
-            W=self.W.copy(),
-            e=self.e.copy(),
-            diagonal=self.diagonal.copy(),
+            errors=[known[task] for task in self.row_tasks],
+            held=held,
+            W=W,
+            e=e,
+            diagonal=diagonal,
         )
 
     def stiffness(self) -> float:
@@ -230,22 +267,6 @@ class Level:
             used = self._q_index[costs > 0.0]
             if not np.isfinite(task.target[used]).all():
                 self.held += (task.name,)
-
-    def _errors_of_all(self) -> list[tuple[float, float]]:
-        """Return position (m) and orientation error (rad) of each task with rows.
-
-        They are those of the last tick. Tasks with fewer than six rows have one error,
-        in their own unit.
-        """
-        known: dict[RowTask, tuple[float, float]] = {
-            task: (float(np.linalg.norm(e[:3])), float(np.linalg.norm(e[3:])))
-            for task, e in self._errors.items()
-        }
-        frames = zip(self._frames, self._frame_errors.tolist(), strict=True)
-        known |= {task: (position, angle) for task, (position, angle) in frames}
-        coms = zip(self._coms, self._com_errors.tolist(), strict=True)
-        known |= {task: (distance, 0.0) for task, distance in coms}
-        return [known[task] for task in self.row_tasks]
 
 
 def _concatenate(lists: Sequence[Indices]) -> tuple[Indices, Indices]:

@@ -96,7 +96,7 @@ class TickRecord:
         levels: Each level that was solved, with its step and what tells its opponents.
     """
 
-    levels: Sequence[tuple[LevelRecord, Vector, Callable[[], Opponents]]]
+    levels: Sequence[tuple[Callable[[], LevelRecord], Vector, Callable[[], Opponents]]]
 
     def explain(
         self, *, position_tolerance: float, orientation_tolerance: float
@@ -104,7 +104,7 @@ class TickRecord:
         """See `TaskStack.explain`."""
         found: dict[str, TaskReport] = {}
         for level, x, opponents in self.levels:
-            found |= level.reports(
+            found |= level().reports(
                 x, list(opponents()), position_tolerance, orientation_tolerance
             )
         return found

@@ -3,6 +3,7 @@
 import numpy as np
 
 from wbc_suite.compiling import compiled
+from wbc_suite.qp.sums import dot
 from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["decided_directions", "row_space"]
@@ -13,9 +14,7 @@ _RANK_TOLERANCE = 1e-6  # rows of an upper level shorter than this bind nothing
 
 
 @compiled
-def row_space(  # noqa: C901, one flat loop is what compiles well
-    W: Matrix, tolerance: float, V: Matrix, lengths: Vector
-) -> int:
+def row_space(W: Matrix, tolerance: float, V: Matrix, lengths: Vector) -> int:
     """Write an orthonormal basis of the rows of W, largest first; return its size.
 
     Gram-Schmidt with pivoting, each vector orthogonalised twice ("twice is enough",
@@ -35,9 +34,7 @@ def row_space(  # noqa: C901, one flat loop is what compiles well
     for _ in range(min(m, V.shape[0])):
         best, pivot = 0.0, -1
         for i in range(m):
-            length = 0.0
-            for j in range(n):
-                length += W[i, j] * W[i, j]
+            length = dot(W[i], W[i], n)
             if length > best:
                 best, pivot = length, i
         if best <= tolerance * tolerance:
@@ -48,21 +45,16 @@ def row_space(  # noqa: C901, one flat loop is what compiles well
         for j in range(n):
             v[j] = row[j] * scale
         _remove(V, rank, v)
-        norm = 0.0
-        for j in range(n):
-            norm += v[j] * v[j]
-        scale = 1.0 / np.sqrt(norm)
+        scale = 1.0 / np.sqrt(dot(v, v, n))
         for j in range(n):
             v[j] *= scale
             row[j] = 0.0
         rank += 1
         for i in range(m):
-            dot = 0.0
-            for j in range(n):
-                dot += W[i, j] * v[j]
-            if dot != 0.0:
+            along = dot(W[i], v, n)
+            if along != 0.0:
                 for j in range(n):
-                    W[i, j] -= dot * v[j]
+                    W[i, j] -= along * v[j]
     return rank
 
 
@@ -70,11 +62,9 @@ def row_space(  # noqa: C901, one flat loop is what compiles well
 def _remove(V: Matrix, count: int, v: Vector) -> None:
     """Take from v, in place, its components along the first rows of V."""
     for i in range(count):
-        dot = 0.0
+        along = dot(V[i], v, v.shape[0])
         for j in range(v.shape[0]):
-            dot += V[i, j] * v[j]
-        for j in range(v.shape[0]):
-            v[j] -= dot * V[i, j]
+            v[j] -= along * V[i, j]
 
 
 @compiled

@@ -14,7 +14,7 @@ from wbc_suite.kinematics.forward import RobotField, place_joints, weigh_joints
 from wbc_suite.qp.lie import exp3, log3
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["ControlledFrames", "approach_joints"]
+__all__ = ["ControlledFrames", "JointField", "approach_joints"]
 
 _COM = -1
 """Stands for the joint of the centre of mass, which has none."""
@@ -48,6 +48,18 @@ class FrameField(IntEnum):
     ERROR = 8
     DISTANCE = 9
     TOLERANCE = 10
+
+
+class JointField(IntEnum):
+    """Arrays of joints on their way to a posture, shape (nv,); see `approach_joints`.
+
+    How far they are from it, greatest speeds, decelerations; the step to take.
+    """
+
+    DIFFERENCE = 0
+    SPEED = 1
+    BRAKING = 2
+    STEP = 3
 
 
 class ControlledFrames:
@@ -118,29 +130,83 @@ class ControlledFrames:
         Returns:
             Distances, m and rad, shape (n, 2). A buffer.
         """
+        self._know(goals)
+        self.off = _measure(self._configuration.table, self._table)
+        return self._distances
+
+    def lead(
+        self,
+        goals: Sequence[pin.SE3],
+        joints: Indices,
+        dt: float,
+        *,
+        settling: float,
+        stray: float,
+        arrived: bool,
+    ) -> Matrix:
+        """Return the poses to ask for now, and write the steps of joints; measures too.
+
+        Args:
+            goals: See `measure`.
+            joints: Table of `JointField`.
+            dt: Step, s.
+            settling: Time constant of the last part of the joints' way, s.
+            stray: See `pace_below`.
+            arrived: Whether level 0 has been at its goals before.
+
+        Returns:
+            Rows of [R p] of each frame, shape (n, 12), see `approach_pose`. A buffer.
+        """
+        self._know(goals)
+        robot = self._configuration.table
+        self.off = _lead(robot, self._table, joints, dt, settling, stray, arrived)
+        return self._targets
+
+    def _know(self, goals: Sequence[pin.SE3]) -> None:
         if goals is not self._known:
             for row, goal in zip(self._goals, goals, strict=True):
                 row[:] = _rows(goal)
             self._known = goals
-        self.off = _measure(self._configuration.table, self._table)
-        return self._distances
-
-    def approach(self, dt: float, pace: float) -> Matrix:
-        """Return the poses to ask for now, by the last `measure`; see `approach_pose`.
-
-        Args:
-            dt: Step, s.
-            pace: Part of its speed that a frame below level 0 may take.
-
-        Returns:
-            Rows of [R p] of each frame, shape (n, 12). A buffer.
-        """
-        _approach(self._table, dt, pace)
-        return self._targets
 
 
 def _rows(T: pin.SE3) -> Vector:
     return T.homogeneous.ravel()[:12]
+
+
+@compiled
+def _lead(
+    robot: Indices,
+    frames: Indices,
+    joints: Indices,
+    dt: float,
+    settling: float,
+    stray: float,
+    arrived: bool,
+) -> float:
+    """Do what `ControlledFrames.lead` does; return `ControlledFrames.off`."""
+    off = _measure(robot, frames)
+    pace = pace_below(off, stray) if arrived or off < 1.0 else 1.0
+    _approach(frames, dt, pace)
+    approach_joints(
+        vector(joints, JointField.DIFFERENCE),
+        settling,
+        pace,
+        vector(joints, JointField.SPEED),
+        vector(joints, JointField.BRAKING),
+        vector(joints, JointField.STEP),
+    )
+    return off
+
+
+@compiled
+def pace_below(off: float, stray: float) -> float:
+    """Return how much of its speed a lower level may take, 0 to 1.
+
+    Args:
+        off: How far level 0 is from its goals, as a multiple of the tolerances.
+        stray: So far off it has half its speed; 0: always all of it.
+    """
+    return 1.0 / (1.0 + (off / stray) ** 2) if stray > 0.0 else 1.0
 
 
 @compiled

@@ -8,12 +8,13 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.control.composite.config import WholeBodyIKConfig
-from wbc_suite.control.composite.frames import ControlledFrames, approach_joints
+from wbc_suite.control.composite.frames import ControlledFrames, JointField
 from wbc_suite.control.composite.pursuit import HORIZONS, pursue
 from wbc_suite.control.composite.search import GoalSearch
 from wbc_suite.control.composite.tasks import accelerations, joint_speeds
 from wbc_suite.control.composite.travel import HELD_UP, Passed, Way
 from wbc_suite.kinematics import Configuration
+from wbc_suite.kinematics.array_table import ArrayTable
 from wbc_suite.qp import Limit
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Matrix, Vector
@@ -81,10 +82,19 @@ class Planner:
         self._configuration, self._frames = configuration, frames
         self._first = np.flatnonzero([f.level == 0 for f in config.frames])
         able = accelerations(robot, config, configuration)
-        self._able, self._braking = able, config.posture.braking * able
+        self._able = able
         self._search = GoalSearch(robot, config, room, apart, BRISK * able)
         self._speed = joint_speeds(robot, configuration)
-        self._posture_speed: Vector = np.full(configuration.nv, config.posture.speed)
+        nv, f = configuration.nv, JointField
+        self._joints = ArrayTable(
+            JointField,
+            {
+                f.DIFFERENCE: np.zeros(nv),
+                f.SPEED: np.full(nv, config.posture.speed),
+                f.BRAKING: config.posture.braking * able,
+                f.STEP: np.zeros(nv),
+            },
+        )
         self.reset(configuration.q)
 
     def reset(self, posture: Vector) -> None:
@@ -131,7 +141,8 @@ class Planner:
 
     def _watch(self, goals: Sequence[pin.SE3], v: Vector) -> None:
         """Begin a search, or give a plan up, when it is time to."""
-        standing = float(np.abs(v).max(initial=0.0)) < STANDING
+        slow = v.dot(v) < len(v) * STANDING**2  # known soon where the robot moves
+        standing = slow and float(np.abs(v).max(initial=0.0)) < STANDING
         self._still = self._still + self._dt if standing else 0.0
         if self._is_new:
             self._is_new = self._answered = self._has_arrived = False
@@ -192,36 +203,24 @@ class Planner:
         return pursue(v, np.array(ahead), motion, times, rate=CHASE * self._able)
 
     def _straight(self, goals: Sequence[pin.SE3]) -> Waypoint:
-        self._frames.measure(goals)
-        self._offs.append(self._frames.off)
-        pace = self._pace_below(self._frames.off)
-        step = self._approach(
-            self._configuration.difference(self._rest),
-            self._dt / self._config.posture.gain,
-            pace,
-            self._posture_speed,
-        )
-        return Waypoint(
-            targets=self._frames.approach(self._dt, pace),
-            posture=self._configuration.integrate(step),
-        )
-
-    def _approach(
-        self, difference: Vector, dt: float, pace: float, speed: Vector
-    ) -> Vector:
-        """Return the step that takes a difference away; see `approach_joints`."""
-        step: Vector = np.empty_like(difference)
-        approach_joints(difference, dt, pace, speed, self._braking, step)
-        return step
-
-    def _pace_below(self, off: float) -> float:
-        """Return how much of its speed a lower level may take, 0 to 1.
+        """Return targets on the way to the goals, and joints on that to the posture.
 
         Once frames of level 0 have arrived, motion below must not take them off again
         where joints cannot follow it. What stands on its feet balances by that motion
         and must not stop it.
         """
-        if self._config.held:
-            return 1.0
-        self._has_arrived |= off < 1.0
-        return 1.0 / (1.0 + (off / STRAY) ** 2) if self._has_arrived else 1.0
+        joints, here = self._joints, self._configuration
+        joints[JointField.DIFFERENCE][:] = here.difference(self._rest)
+        settling = self._dt / self._config.posture.gain
+        targets = self._frames.lead(
+            goals,
+            joints.table,
+            self._dt,
+            settling=settling,
+            stray=0.0 if self._config.held else STRAY,
+            arrived=self._has_arrived,
+        )
+        self._offs.append(self._frames.off)
+        self._has_arrived = self._has_arrived or self._frames.off < 1.0
+        posture = here.integrate(joints[JointField.STEP])
+        return Waypoint(targets=targets, posture=posture)

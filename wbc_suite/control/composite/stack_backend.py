@@ -125,7 +125,7 @@ class StackBackend:
 
     def set_posture(self, q: Vector) -> None:
         """Set the posture to prefer."""
-        self._posture.set_target(q)
+        self._posture.target[:] = q
 
     def solve(self, dt: float) -> IkStep:
         """Solve one tick of the stack."""

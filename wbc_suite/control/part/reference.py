@@ -8,6 +8,7 @@ import pinocchio as pin
 
 from wbc_suite.control.part.joint_step import write_motion
 from wbc_suite.control.part.stance import RootMotion
+from wbc_suite.kinematics.tangent import TangentSpace
 from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["Reference", "mean_over"]
@@ -64,7 +65,7 @@ class Reference:
         *,
         mean: int = 1,
     ) -> None:
-        self._model, self._period = model, period
+        self._tangent, self._period = TangentSpace(model), period
         self._q_index, self._v_index = q_index, v_index
         self._window: deque[Vector] = deque(maxlen=mean)
         self._points: deque[Vector] = deque(maxlen=3)
@@ -80,7 +81,7 @@ class Reference:
 
     def extend(self, v: Vector) -> Vector:
         """Move on by one period at v; return the configuration that leads to."""
-        self.solved = pin.integrate(self._model, self.solved, self._period * v)
+        self.solved = self._tangent.integrate(self.solved, self._period * v)
         self._window.append(self.solved)
         self._rates[:-1] = self._rates[1:]
         if len(self._window) == 1:
@@ -89,7 +90,7 @@ class Reference:
         else:
             before, point = self._points[-1], self._mean()
             self._points.append(point)
-            step = pin.difference(self._model, before, point)
+            step = self._tangent.difference(before, point)
             self._rates[2] = step / self._period
         return self.solved
 
@@ -127,7 +128,7 @@ class Reference:
 
     def _mean(self) -> Vector:
         """Return the mean of the window, in the tangent space of its oldest."""
-        oldest, steps = self._window[0], np.zeros(self._model.nv)
+        oldest, steps = self._window[0], np.zeros(self._rates.shape[1])
         for q in self._window:
-            steps += pin.difference(self._model, oldest, q)
-        return pin.integrate(self._model, oldest, steps / len(self._window))
+            steps += self._tangent.difference(oldest, q)
+        return self._tangent.integrate(oldest, steps / len(self._window))
