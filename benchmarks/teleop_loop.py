@@ -38,6 +38,7 @@ import time
 from pathlib import Path
 
 from harness.memory import resident
+from harness.processors import processor_times, stolen_time
 from harness.report import Report, options
 
 import numpy as np  # isort: skip  (after harness: it sets the number of BLAS threads)
@@ -83,8 +84,6 @@ CAMERA = {
 }
 """What a browser says first; viser's clients count from then on."""
 
-STOLEN = 7
-"""Which of the processors' times went to other machines; see proc_stat(5)."""
 SETTLE = 1.0  # s; the first ticks fill caches
 
 
@@ -140,7 +139,7 @@ class Metronome:
             beat.await_step()
             woken.append(time.perf_counter())
             if len(woken) % int(RATE) == 0:
-                stolen.append((time.perf_counter(), processor_times()[STOLEN]))
+                stolen.append((time.perf_counter(), stolen_time()))
             beat.rest()
         pipe.send((woken, stolen))
 
@@ -269,7 +268,7 @@ def measure(robot, seconds, folder):
     row |= figures("bare", jitter(woken[woken > begun[0]]))
     row |= quiet_figures(begun, stolen)
     row |= {"grown_mb": grown, "kept_mb": kept, "load": load, "seconds": seconds}
-    return row | {"stolen": 100.0 * spent[STOLEN] / spent.sum()}
+    return row | {"stolen": 100.0 * spent[-1] / spent.sum()}
 
 
 def jitter(times):
@@ -293,12 +292,6 @@ def memory():
     """Return the memory that this process and the page's hold, MB."""
     (page,) = (p for p in multiprocessing.active_children() if p.name == "page")
     return resident() + resident(page.pid)
-
-
-def processor_times():
-    """Return what processors did since the start, in Linux's order and units."""
-    (_, *times), *_ = map(str.split, Path("/proc/stat").read_text().splitlines())
-    return np.array(times[: STOLEN + 1], dtype=float)
 
 
 def figures(name, times):

@@ -22,6 +22,7 @@ def test_threads_stand_beside_processes(tmp_path):
     assert set(rows) == {"1 process", "2 processes", "2 threads", "vector"}
     for row in rows.values():
         assert row["case"] == CASE
+        assert row["quiet"] in (0, 1)
         assert row["steps_per_s"] == pytest.approx(1e6 / row["median_us"])
     steps = {side: row["steps_per_s"] for side, row in rows.items()}
     for ratio, (ours, theirs) in {
@@ -29,7 +30,7 @@ def test_threads_stand_beside_processes(tmp_path):
         "vector/processes": ("vector", "2 processes"),
         "processes/one": ("2 processes", "1 process"),
     }.items():
-        found = report["ratios"][f"{CASE}/{ratio}"]
+        found = report["ratios"][f"{CASE}/{ratio}/all"]
         assert found == pytest.approx(steps[ours] / steps[theirs])  # of one round
     weights = {row["side"]: row["megabytes"] for row in report["rows"][4:]}
     assert 0.5 < weights["each more"] < weights["the first"]
