@@ -26,7 +26,7 @@ from wbc_suite.linked_code import EntryCompiler, LinkedCompiler
 from wbc_suite.user_cache import user_cache
 
 __all__ = ["announced", "cache_folder", "compiled"]
-__all__ += ["compiled_inner", "compiled_short", "inlined"]
+__all__ += ["compiled_inner", "compiled_unlocked", "inlined"]
 
 log = logging.getLogger(__name__)
 
@@ -47,16 +47,17 @@ KEPT = 7 * 24 * 3600.0
 
 
 def compiled(function: Function) -> Function:
-    """Compile a function on its first call; it runs without the interpreter's lock."""
-    return _with_entry(function, nogil=True)
+    """Compile a function on its first call.
 
-
-def compiled_short(function: Function) -> Function:
-    """Compile a function that takes less time than another thread the lock it gives up.
-
-    It keeps the interpreter's lock.
+    It keeps the interpreter's lock: another thread that wants it takes 50 us to wake up
+    when it is given up, longer than most kernels take.
     """
     return _with_entry(function, nogil=False)
+
+
+def compiled_unlocked(function: Function) -> Function:
+    """Compile a function that takes long; other threads run meanwhile."""
+    return _with_entry(function, nogil=True)
 
 
 def compiled_inner(function: Function) -> Function:

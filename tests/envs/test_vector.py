@@ -86,6 +86,42 @@ def test_each_environment_does_what_it_does_alone(threads, controller):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("more", "expected"),
+    [
+        ({"controller_configs": "BASIC"}, 2),
+        ({"controller_configs": "WHOLE_BODY_IK"}, 1),
+        ({"controller_configs": "BASIC", "compiled": False}, 1),
+        ({"controller_configs": "WHOLE_BODY_IK", "threads": 2}, 2),
+    ],
+    ids=["laws", "planning", "plain", "planning, but told to"],
+)
+def test_threads_share_what_holds_no_lock_unless_told_otherwise(
+    monkeypatch, more, expected
+):
+    monkeypatch.setattr("wbc_suite.envs.vector._processors", lambda: 2)
+    envs = make(2, **more)
+    envs.reset(seed=0)
+    hold = np.stack(envs.get_attr("hold_action"))
+    envs.step(hold)
+    met, here = threading.Barrier(expected), set()
+    for env in envs.envs:
+        monkeypatch.setattr(env, "advance", noting(env.advance, met, here))
+    envs.step(hold)
+    assert len(here) == expected
+    envs.close()
+
+
+def noting(advance, met, here):
+    def noted(action):
+        met.wait(timeout=10.0)
+        here.add(threading.get_ident())
+        return advance(action)
+
+    return noted
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES, ids=lambda mode: mode.value)
 def test_episodes_follow_each_other_as_in_gymnasiums_own_vectors(mode):
     ours = make(2, autoreset_mode=mode)

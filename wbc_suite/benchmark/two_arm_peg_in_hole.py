@@ -11,7 +11,7 @@ from pydantic import Field, PositiveFloat, model_validator
 
 from wbc_suite.benchmark.object_benchmark import add_table_cameras, load_config
 from wbc_suite.benchmark.two_arms import TwoArmBenchmark, TwoArmConfig
-from wbc_suite.compiling import compiled_short
+from wbc_suite.compiling import compiled
 from wbc_suite.control import RobotState
 from wbc_suite.errors import ConfigError
 from wbc_suite.robot import RobotDescription
@@ -218,7 +218,7 @@ class TwoArmPegInHole(TwoArmBenchmark):
         return (near + cosine) / 5.0
 
 
-@compiled_short
+@compiled
 def _alignment(
     p: Vector, R_peg: Matrix, h: Vector, R_plate: Matrix
 ) -> tuple[float, float, float]:

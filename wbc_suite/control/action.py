@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wbc_suite.compiling import compiled_short
+from wbc_suite.compiling import compiled
 from wbc_suite.errors import ActionError, ConfigError, UnknownNameError
 from wbc_suite.typing import Vector
 
@@ -254,7 +254,7 @@ def _table(rows: list[tuple[str, ...]]) -> str:
     return "\n".join(lines)
 
 
-@compiled_short
+@compiled
 def _clip(values: Vector, low: Vector, high: Vector) -> int:
     """Clip in place; return how many values were outside, or -1 if one is not finite.
 

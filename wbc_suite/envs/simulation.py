@@ -43,6 +43,8 @@ class Simulation:
         robots: The robots in the scene.
         controllers: Their controllers.
         compiled: Whether the compiled loop runs.
+        spans: How many calls of the loop the last tick was: controllers plan before
+            each.
     """
 
     def __init__(
@@ -61,6 +63,7 @@ class Simulation:
         self.controllers = tuple(controller for _, controller in pairs)
         self._pairs = tuple(pairs)
         self._left, self._prepared = [0] * len(pairs), False
+        self.spans = 1
         self._look = any(getattr(c, "looks", True) for c in self.controllers)
         self.compiled = compiled and all(c.laws for c in self.controllers)
         physics = bind_physics(model, data)
@@ -112,6 +115,7 @@ class Simulation:
         if self.compiled and n <= min(self._left, default=n):
             self._left = [left - n for left in self._left]
             self._advance_compiled(n)
+            self.spans = 1
         elif self._prepared:
             self._advance_by_parts(n)
         else:
@@ -123,6 +127,7 @@ class Simulation:
 
     def _advance_by_parts(self, n: int) -> None:
         """Advance n steps; controllers do in between what is due."""
+        self.spans = 0
         with self._watch:
             while n > 0:
                 span = n
@@ -131,6 +136,7 @@ class Simulation:
                         self._left[k] = controller.prepare(state)
                     span = min(span, self._left[k])
                 n -= span
+                self.spans += 1
                 self._advance(span, seen=n == 0 or self._look)
                 self._left = [left - span for left in self._left]
 

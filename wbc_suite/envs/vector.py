@@ -28,17 +28,19 @@ _SCALARS = (bool, int, float)
 class VectorRobotEnv(gymnasium.vector.VectorEnv[Observations, Array, NDArray[Any]]):
     """Copies of one environment with their own states, stepped at once.
 
-    Physics and control hold no Python lock, so threads share the work; a thread that
-    is done takes the next environment. Every environment does exactly what it would do
+    Physics and control laws hold no Python lock, so threads share the work; a thread
+    that is done takes the next environment. Controllers that plan in Python between
+    physics steps (inverse kinematics, whole-body ones) would wait for each other's
+    lock: then one thread does all. Every environment does exactly what it would do
     alone, cameras included. Each has a model of its own, because a reset writes sizes
     of objects into it.
 
     Args:
         num_envs: How many.
         benchmark: Name of the benchmark, such as `Lift`.
-        threads: How many threads step them; as many as there are processors by default.
-            Pictures are drawn in the thread that asks: OpenGL's threads have a
-            picture's work already.
+        threads: How many threads step them; by default as many as there are
+            processors, or one where controllers plan in Python. Pictures are drawn in
+            the thread that asks: OpenGL's threads have a picture's work already.
         autoreset_mode: When an environment whose episode is over begins the next:
             `NextStep` in the next step, whose action it does not take; `SameStep` at
             once, with `final_obs` and `final_info`; `Disabled` when told to.
@@ -67,8 +69,7 @@ class VectorRobotEnv(gymnasium.vector.VectorEnv[Observations, Array, NDArray[Any
         **arguments: Any,
     ) -> None:
         _check_count("num_envs", num_envs)
-        threads = _processors() if threads is None else threads
-        _check_count("threads", threads)
+        _check_count("threads", 1 if threads is None else threads)
         self._mode = _mode(autoreset_mode)
         self.num_envs = num_envs
         self.envs = tuple(RobotEnv(benchmark, **arguments) for _ in range(num_envs))
@@ -85,7 +86,8 @@ class VectorRobotEnv(gymnasium.vector.VectorEnv[Observations, Array, NDArray[Any
         self._terminated: Flags = np.zeros(num_envs, dtype=np.bool_)
         self._truncated: Flags = np.zeros(num_envs, dtype=np.bool_)
         self._pictures = tuple(first.cameras.space)
-        self._helpers = min(threads, num_envs) - 1
+        self._may_choose = threads is None
+        self._helpers = min(threads or _processors(), num_envs) - 1
         self._pool = ThreadPoolExecutor(max(1, self._helpers), "wbc_suite-env")
 
     def reset(
@@ -242,13 +244,20 @@ class VectorRobotEnv(gymnasium.vector.VectorEnv[Observations, Array, NDArray[Any
                 except Exception as error:  # noqa: BLE001 - raised again below
                     failed[i] = error
 
-        helpers = [self._pool.submit(work) for _ in range(self._helpers)]
+        count = 0 if self._may_choose and self._plans else self._helpers
+        helpers = [self._pool.submit(work) for _ in range(count)]
         work()
         for helper in helpers:
             helper.result()
         if failed:
             first = min(failed)
             raise _named(failed[first], first)
+
+    @property
+    def _plans(self) -> bool:
+        """Whether Python had a say between physics steps of the last actions."""
+        simulations = (env.simulation for env in self.envs)
+        return any(s.spans > 1 or not s.compiled for s in simulations)
 
     def _checked(self, actions: Any, used: Flags) -> Matrix:
         """Return actions, shape (num_envs, size), of which the used ones are right."""

@@ -14,7 +14,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wbc_suite.compiling import compiled_short, inlined
+from wbc_suite.compiling import compiled, inlined
 from wbc_suite.kinematics.array_table import matrix, vector
 from wbc_suite.typing import Indices, Vector
 
@@ -196,7 +196,7 @@ class SeenField(IntEnum):
     USERDATA = 8
 
 
-@compiled_short
+@compiled
 def fill(rows: Indices, table: Indices, out: Vector) -> None:  # noqa: C901 - a branch for each kind of reading
     """Do what rows say, in their order, each from its place in `out` on.
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wbc_suite.compiling import compiled
+from wbc_suite.compiling import compiled_unlocked
 from wbc_suite.control.loop.haste import (
     begin_haste,
     end_haste,
@@ -38,7 +38,7 @@ def needed(laws: Records) -> tuple[Needed, Needed]:
     return bool(hands.any()) or None, bool(feet.any()) or None
 
 
-@compiled
+@compiled_unlocked
 def advance(
     model: int,
     data: int,

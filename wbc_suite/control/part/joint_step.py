@@ -4,7 +4,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from wbc_suite.compiling import compiled_short
+from wbc_suite.compiling import compiled
 from wbc_suite.control.loop.table import CompiledRecords
 from wbc_suite.kinematics.array_table import vector
 from wbc_suite.typing import Indices, Matrix, Vector
@@ -26,7 +26,7 @@ class StepField(IntEnum):
     QPOS = 5
 
 
-@compiled_short
+@compiled
 def step_joints(
     values: Vector, table: Indices, drives: CompiledRecords, achieved: bool
 ) -> None:
@@ -50,7 +50,7 @@ def step_joints(
             goal[j] = min(max(start + step, low[j]), high[j])
 
 
-@compiled_short
+@compiled
 def rest_at(record: CompiledRecords, drives: CompiledRecords, position: Vector) -> None:
     """Let the targets of a law stand still at a position; see `Law.aim`."""
     for j in range(drives.shape[0]):
@@ -61,7 +61,7 @@ def rest_at(record: CompiledRecords, drives: CompiledRecords, position: Vector) 
     law.since, law.duration = 0.0, np.inf
 
 
-@compiled_short
+@compiled
 def grip(
     record: CompiledRecords,
     drives: CompiledRecords,
@@ -89,7 +89,7 @@ def grip(
     law.since, law.duration = 0.0, np.inf
 
 
-@compiled_short
+@compiled
 def follow(record: CompiledRecords, drives: CompiledRecords, motion: Matrix) -> None:
     """Let the targets of a law move on from now on; see `Law.aim`.
 
@@ -106,7 +106,7 @@ def follow(record: CompiledRecords, drives: CompiledRecords, motion: Matrix) -> 
     law.since, law.duration = 0.0, np.inf
 
 
-@compiled_short
+@compiled
 def write_motion(
     q: Vector,
     rates: Matrix,

@@ -7,7 +7,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from wbc_suite.compiling import compiled, compiled_inner, compiled_short
+from wbc_suite.compiling import compiled, compiled_inner
 from wbc_suite.control.loop.motion import rotate
 from wbc_suite.control.loop.table import CompiledRecords
 from wbc_suite.kinematics.array_table import indices, matrix, vector
@@ -36,7 +36,7 @@ class GoalField(IntEnum):
     RULES = 10
 
 
-@compiled_short
+@compiled
 def move_goal(values: Vector, table: Indices, record: CompiledRecords) -> None:
     """Move a goal by an action's step, and let its law jump there.
 
