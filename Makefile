@@ -1,6 +1,6 @@
 # Everything a newcomer or a build machine types. `make` alone lists it.
 .DEFAULT_GOAL := help
-.PHONY: help teleop demo test check format bench bench-peers pictures gallery wheel clean
+.PHONY: help teleop demo test test-versions check format docs bench bench-peers pictures gallery wheel clean
 
 VENV := .venv
 PY := $(VENV)/bin/python
@@ -9,7 +9,7 @@ FAST := -m "not slow and not browser and not peer"
 export PYTHON
 
 help: ## list the commands
-	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-12s %s\n", $$1, $$2}' Makefile
+	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-14s %s\n", $$1, $$2}' Makefile
 
 teleop: $(VENV)/.installed ## move a humanoid's hands in a web page (ARGS="--robots Panda")
 	@$(PY) -m wbc_suite.cli teleop $(ARGS)
@@ -19,6 +19,9 @@ demo: $(VENV)/.installed ## the same without a browser: prints figures, writes p
 
 test: $(VENV)/.installed-dev ## run the whole test suite
 	$(PYTEST) -n auto --durations=20 $(ARGS)
+
+test-versions: $(VENV)/.installed-dev ## fast tests with the lowest and the newest packages, and without JIT
+	.ci/test-versions $(ARGS)
 
 check: $(VENV)/.installed-dev ## format, lint, types, import direction, fast tests
 	$(PY) -m ruff format --check .
@@ -31,7 +34,11 @@ format: $(VENV)/.installed-dev ## let ruff format and mend what it can
 	$(PY) -m ruff format .
 	$(PY) -m ruff check --fix .
 
-bench: $(VENV)/.installed-dev ## run every benchmark, write docs/benchmarks.md (ARGS=--quick)
+docs: $(VENV)/.installed-dev ## build the documentation into artifacts/site, offline
+	@NO_MKDOCS_2_WARNING=1 $(PY) -m mkdocs build --quiet
+	@echo "Open artifacts/site/index.html"
+
+bench: $(VENV)/.installed-dev ## run every benchmark: docs/benchmarks.md, artifacts/benchmarks (ARGS=--quick)
 	$(PY) docs/write_benchmarks.py $(ARGS)
 
 # Peers get environments of their own where they ask for other versions than ours.

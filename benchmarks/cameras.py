@@ -1,4 +1,4 @@
-"""What one picture costs: against robosuite.
+"""Cost of one camera image, compared with robosuite.
 
 Pictures of one camera of Lift, 84 x 84 and 256 x 256: colours, depth (metres) and
 segmentation, each with its own default quality, drawn by the same OpenGL backend.

@@ -1,10 +1,11 @@
-"""What each control law costs in a physics step: its kernel, and its readable form.
+"""Cost of each control law in a physics step.
 
 Robots stand alone on a floor; one kind of part controller drives every arm, grippers
 and the rest are held. "kernel" is the whole compiled control of a step, all laws of the
-robot, between `mj_step1` and `mj_step2`; "readable" is the same in NumPy; "physics" is
-`mj_step1` and `mj_step2` without control. Blocks alternate; times are CPU times of the
-thread, in microseconds a step. The ratio "physics" is (physics + kernel) / physics.
+robot, between `mj_step1` and `mj_step2`; "plain" is the same function in plain Python;
+"physics" is `mj_step1` and `mj_step2` without control. Blocks alternate; times are CPU
+times of the thread, in microseconds a step. The ratio "physics" is (physics + kernel) /
+physics.
 
 Usage: python benchmarks/control_law.py [--quick] [--json FILE] [--robots NAME ...]
 """
@@ -17,43 +18,40 @@ from harness.stand import Stand, arms_config
 
 import mujoco  # isort: skip  (after harness: it sets the number of threads)
 import numba
+import numpy as np
 
-from wbc_suite.control.loop import bind_physics, gather, needed, physics_table
-from wbc_suite.control.loop.kernels import Needed, control
-from wbc_suite.control.loop.physics import mj_step1, mj_step2
-from wbc_suite.control.loop.table import Records
-from wbc_suite.typing import Indices
+from wbc_suite.compiling import as_argument, plain
+from wbc_suite.control.loop.inverse_dynamics import (
+    CustomLaw,
+    Needed,
+    needed_kernels,
+    write_commands,
+)
+from wbc_suite.control.loop.physics import Physics, bind_physics
+from wbc_suite.control.loop.records import Records, gather
 
 ROBOTS = ("Panda", "Sawyer", "UR5e", "Baxter", "Tiago", "GR1")
 KINDS = ("OSC_POSE", "OSC_POSITION")
 KINDS += ("JOINT_POSITION", "JOINT_VELOCITY", "JOINT_TORQUE")
 STEPS = 200  # of one block of compiled code
-READABLE_STEPS = 10
-COLUMNS = ("case", "kernel_us", "readable_us", "physics_us", "over_physics")
+PLAIN_STEPS = 10
+COLUMNS = ("case", "kernel_us", "plain_us", "physics_us", "over_physics")
 clock = time.thread_time_ns
 
 
 @numba.njit(nogil=True)
-def physics_only(model: int, data: int, steps: int) -> None:
-    """Advance physics, controls held."""
-    for _ in range(steps):
-        mj_step1(model, data)
-        mj_step2(model, data)
-
-
-@numba.njit(nogil=True)
 def control_only(
-    timestep: float,
-    table: Indices,
+    physics: Physics,
     laws: Records,
     drives: Records,
     hands: Needed,
     feet: Needed,
+    custom_law: CustomLaw,
     steps: int,
 ) -> None:
     """Compute the control of one instant again and again."""
     for _ in range(steps):
-        control(timestep, table, laws, drives, hands, feet)
+        write_commands(physics, laws, drives, hands, feet, custom_law)
 
 
 class Law:
@@ -64,24 +62,23 @@ class Law:
         self.stand.reset()
         stand = self.stand
         self.physics = bind_physics(stand.model, stand.data)
-        self.arrays = physics_table(self.physics)
-        laws = [(law.record, law.drives) for law in stand.controller.laws]
-        self.laws, self.drives = gather(laws)
+        pieces = [(law.record, law.drives) for law in stand.controller.laws]
+        laws, drives = gather(pieces)
+        self.records = laws, drives, *needed_kernels(laws)
         mujoco.mj_step1(stand.model, stand.data)
 
-    def readable(self, steps: int) -> None:
-        """Compute the control of one instant again and again, in NumPy."""
-        stand = self.stand
+    def plain(self, steps: int) -> None:
+        """Compute the control of one instant again and again, in plain Python."""
+        write, (laws, drives, *kernels) = plain(write_commands), self.records
+        laws, drives = laws.view(np.recarray), drives.view(np.recarray)
         for _ in range(steps):
-            stand.data.ctrl[stand.state.actuator_ids] = stand.controller.compute(
-                stand.state
-            )
+            write(self.physics, laws, drives, *kernels)
 
     def run(self, blocks: int) -> dict[str, list[float]]:
         """Return times of one step by side, us."""
         runs: dict[str, tuple[int, Callable[[int], None]]] = {
             "kernel": (STEPS, self._kernel),
-            "readable": (READABLE_STEPS, self.readable),
+            "plain": (PLAIN_STEPS, self.plain),
             "physics": (STEPS, self._physics),
         }
         found: dict[str, list[float]] = {side: [] for side in runs}
@@ -97,12 +94,10 @@ class Law:
         return found
 
     def _kernel(self, steps: int) -> None:
-        step, laws = self.physics.timestep, self.laws
-        hands, feet = needed(laws)
-        control_only(step, self.arrays.table, laws, self.drives, hands, feet, steps)
+        control_only(as_argument(self.physics), *self.records, steps)
 
     def _physics(self, steps: int) -> None:
-        physics_only(self.physics.model, self.physics.data, steps)
+        mujoco.mj_step(self.stand.model, self.stand.data, steps)
 
 
 def run_case(robot: str, kind: str, report: Report, *, blocks: int) -> None:
@@ -114,7 +109,7 @@ def run_case(robot: str, kind: str, report: Report, *, blocks: int) -> None:
     ratio = 1.0 + medians["kernel_us"] / medians["physics_us"]
     rows["kernel"] |= {**medians, "over_physics": ratio}
     report.ratios[f"{name}/physics"] = ratio
-    report.compare(f"{name}/readable", rows["kernel"], rows["readable"])
+    report.compare(f"{name}/plain", rows["kernel"], rows["plain"])
 
 
 def main() -> None:

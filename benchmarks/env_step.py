@@ -1,4 +1,4 @@
-"""What one environment step costs: against raw physics, and against robosuite.
+"""Cost of one environment step, compared with raw physics and with robosuite.
 
 Lift at 20 Hz over 500 Hz: 25 physics steps an action, observations without cameras,
 random actions (parts: +-0.1 of their range; whole-body: +-5 mm and rad around the poses

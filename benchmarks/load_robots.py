@@ -1,4 +1,4 @@
-"""Loading every robot of the catalogue and exporting it to both engines: what it costs.
+"""Cost of loading every robot and exporting it to both engines.
 
 Each robot is loaded from its TOML files, built as `MjSpec` and as `pinocchio.Model`,
 in a process that has read the files and computed the hulls before ("warm"); "first" is

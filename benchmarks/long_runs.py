@@ -1,4 +1,4 @@
-"""What environments hold in the long run: steps, resets, memory, seeds, placements.
+"""Long runs: steps, resets, memory, seeds and placements.
 
 Every benchmark with every robot that makes sense starts with eight seeds and takes 500
 random actions, the nine with Panda 5,000 with each of three seeds; after each step

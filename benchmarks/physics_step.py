@@ -1,4 +1,4 @@
-"""One step of physics in Lift: lean, and with every drawn shape a geom of its own.
+"""Cost of one physics step in Lift, with and without merged visual shapes.
 
 Both models hold the same robot at its ready posture without gravity, for no controller
 holds it, and the cube just above the table. They step in turns in one run. Times are
@@ -15,7 +15,7 @@ from harness.report import Report, options
 import mujoco  # isort: skip  (after harness: it sets the number of BLAS threads)
 import wbc_suite
 from wbc_suite.benchmark import load_benchmark
-from wbc_suite.robot.mjcf import build_mjspec
+from wbc_suite.robot.mjcf_export import build_mjspec
 from wbc_suite.scene import compile_scene, empty_arena, robot_prefix
 
 ROBOTS = ("Panda", "UR5e", "Baxter", "PandaOmron", "Tiago", "SpotWithArm", "GR1")
@@ -28,7 +28,7 @@ class Scene:
 
     def __init__(self, name: str, *, lean: bool) -> None:
         benchmark, spec = load_benchmark("Lift"), empty_arena()
-        robot = benchmark.place(wbc_suite.load_robot(name), 0)
+        (robot,) = benchmark.arrange([wbc_suite.load_robot(name)], "default")
         benchmark.build(spec)
         own = build_mjspec(robot, merged=lean)
         for key in list(own.keys):

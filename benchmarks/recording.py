@@ -1,4 +1,4 @@
-"""What recording costs: CPU time of a step with and without, and memory of a session.
+"""Cost of recording: CPU time of a step, and memory of a session.
 
 Lift with Panda and random actions, no cameras. Turns of 20 steps that record and turns
 that do not follow each other; then the same episode is run again with turns exchanged,

@@ -1,4 +1,4 @@
-"""How environments share processors: threads of one process against processes.
+"""Environments on two processors: threads of one process against processes.
 
 Lift at 20 Hz over 500 Hz, two environments with random actions. Sides take turns, block
 by block, in one run, each in processes of its own that wait while others work:
@@ -42,6 +42,7 @@ CASES = (
     Case(robot="Panda", controller="OSC_POSE"),
     Case(robot="Panda", controller="JOINT_POSITION"),
     Case(robot="Panda", controller="WHOLE_BODY_IK"),
+    Case(robot="GR1", controller="WHOLE_BODY_IK"),
 )
 SECONDS = 0.2  # of one block, about; few have nothing stolen in longer ones
 SIDES = {"1 process": 1, "2 processes": 2, "2 threads": 2, "vector": 8}

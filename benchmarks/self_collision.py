@@ -1,4 +1,4 @@
-"""Self-collision rows on a humanoid: what finding the nearest pairs costs.
+"""Cost of finding the nearest pairs of capsules on a humanoid.
 
 GR1 with its own collision shapes as capsules; hands chase targets inside and beside the
 body, so that rows are active. Times are CPU times of the thread, in microseconds.

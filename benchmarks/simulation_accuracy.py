@@ -1,4 +1,4 @@
-"""How exactly whole-body IK brings hands to targets, in simulation.
+"""Accuracy of whole-body IK in simulation.
 
 Each robot stands alone on a floor, its own collisions on. Two experiments:
 
@@ -30,9 +30,10 @@ import pinocchio as pin
 from harness.report import Report, options
 from harness.stand import Stand
 
-from wbc_suite.control.composite.clearance import Clearance
-from wbc_suite.control.composite.tasks import joint_accelerations
+from wbc_suite.control.composite.distance_limits import distance_limits
+from wbc_suite.control.composite.qp_tasks import joint_accelerations
 from wbc_suite.control.composite.whole_body import WholeBodyIK
+from wbc_suite.planning import LinkDistanceChecker
 
 ROBOTS = ("Panda", "GR1", "Tiago", "SpotWithArm")
 REACH_TIME = 0.6  # s
@@ -66,7 +67,10 @@ class Bench(Stand):
             for k, frame in enumerate(self.controller.config.frames)
             if frame.name.endswith("hand")
         ]
-        self.clearance = Clearance(self.controller.robot, self.controller.config)
+        self.links = LinkDistanceChecker(
+            self.controller.robot.to_pinocchio(),
+            distance_limits(self.controller.robot, self.controller.config),
+        )
         self.accelerations = joint_accelerations(
             self.controller.robot, self.controller.config
         )
@@ -84,7 +88,7 @@ class Bench(Stand):
             q = self._random_configuration(model, q0, rng)
             self.free.qpos[:] = self.data.qpos
             self.controller._conversion.q_to_mujoco(q, self.free.qpos)
-            apart = self.clearance.is_kept(q)
+            apart = self.links.clearance(q) > 0.0
             if apart and self._touching(self.free.qpos) <= resting:
                 self.controller._configuration.update(q)
                 return [self.controller.frames.pose(k) for k in self.hands]

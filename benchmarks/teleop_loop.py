@@ -1,4 +1,4 @@
-"""Teleoperation in time: from a person's input to joint targets, and the loop's beat.
+"""Timing of teleoperation: latency from input to joint targets, and jitter.
 
 A session runs at 100 Hz as `wbc-suite teleop` does, with its page served, two viewers
 connected and an episode being recorded, while one of them drags a hand: an input every
@@ -35,6 +35,7 @@ import multiprocessing
 import os
 import tempfile
 import time
+from collections import deque
 from pathlib import Path
 
 from harness.memory import resident
@@ -46,9 +47,12 @@ import numpy as np  # isort: skip  (after harness: it sets the number of BLAS th
 import pinocchio as pin
 
 import wbc_suite
-from wbc_suite.recording.desk import RecordingDesk, Wish
-from wbc_suite.viewers.beat import Beat
-from wbc_suite.viewers.keeping_time import calm_python, run_first
+from wbc_suite.recording.episode_control import EpisodeCommand, EpisodeControl
+from wbc_suite.viewers.loop_timing import (
+    LoopTimer,
+    prepare_interpreter,
+    raise_priority,
+)
 from wbc_suite.viewers.page_process import PageProcess
 from wbc_suite.viewers.teleop_session import TeleopSession
 from wbc_suite.wrappers import DataCollection
@@ -92,20 +96,30 @@ class Clock:
 
     def __init__(self, env, session):
         self.begun, self.found, self.latencies = [], [], []
-        step, append = env.step, session._latencies.append
-        (controller,) = env.unwrapped.controllers
+        step = env.step
 
         def noted_step(action):
             self.begun.append(time.perf_counter())
             result = step(action)
-            self.found.append(controller.solved_at)
+            self.found.append(time.perf_counter())
             return result
 
-        def noted_latency(row):
-            self.latencies.append(float(row[0]))
-            append(row)
+        env.step = noted_step
+        session._latencies = Latencies(self.latencies)
 
-        env.step, session._latencies.append = noted_step, noted_latency
+
+class Latencies(deque):
+    """The session's newest latencies, which are copied to a list of all."""
+
+    def __init__(self, copies):
+        super().__init__(maxlen=512)
+        self.copies = copies
+
+    def extend(self, latencies):
+        """Append latencies of one tick, s."""
+        found = list(latencies)
+        self.copies.extend(found)
+        super().extend(found)
 
 
 class Metronome:
@@ -131,16 +145,16 @@ class Metronome:
     @staticmethod
     def run(pipe):
         """Be the metronome, in its own process."""
-        run_first(rank=2)
+        raise_priority(rank=2)
         pipe.send("ready")
-        beat, woken, stolen = Beat(1.0 / RATE), [], []
-        beat.start()
+        timer, woken, stolen = LoopTimer(1.0 / RATE), [], []
+        timer.start()
         while not pipe.poll():
-            beat.await_step()
+            timer.wait_for_step()
             woken.append(time.perf_counter())
             if len(woken) % int(RATE) == 0:
                 stolen.append((time.perf_counter(), stolen_time()))
-            beat.rest()
+            timer.finish_step()
         pipe.send((woken, stolen))
 
 
@@ -226,19 +240,21 @@ def measure(robot, seconds, folder):
         horizon=10**7,
     )
     collection = DataCollection(env, folder / f"{robot}.hdf5", automatic=False)
-    desk = RecordingDesk(collection.recorder)
-    session = TeleopSession(collection, period=1.0 / RATE, desk=desk)
+    episode_control = EpisodeControl(collection.recorder)
+    session = TeleopSession(
+        collection, period=1.0 / RATE, episode_control=episode_control
+    )
     clock = Clock(collection, session)
     page = PageProcess(session, "127.0.0.1", 0, label=robot)
     session.tick()
     page.wait()
-    calm_python()
+    prepare_interpreter()
     session.start(urgent=True)
     viewers = [Viewer(page, number) for number in range(VIEWERS)]
     hand = session.snapshot.limbs["right_hand"].target
     for viewer in viewers:
         viewer.start(hand if viewer.number == 0 else None)
-    desk.ask(Wish.RECORD)
+    episode_control.request(EpisodeCommand.RECORD)
     while not session.snapshot.recording.recording:
         time.sleep(0.01)
     metronome, load = Metronome(), os.getloadavg()[0] / (os.cpu_count() or 1)
@@ -249,7 +265,7 @@ def measure(robot, seconds, folder):
     begun, found = (np.array(times[first[0] :]) for times in (clock.begun, clock.found))
     latencies, spent = clock.latencies[first[1] :], processor_times() - before
     (woken, stolen), grown = metronome.stop(), memory() - held
-    desk.ask(Wish.RECORD)
+    episode_control.request(EpisodeCommand.RECORD)
     while session.snapshot.recording.recording:
         time.sleep(0.01)
     kept = memory() - held

@@ -1,4 +1,4 @@
-"""How well a hand follows in operational space: steps, a circle, an unknown payload.
+"""Tracking in operational space: steps, a circle, an unknown payload.
 
 Each robot stands at `ready`; its right hand follows OSC_POSE with absolute goals in
 world axes at 20 Hz, with its default stiffness, critically damped.
@@ -94,7 +94,7 @@ class Ours:
                 self.hang(force)
                 stand.simulation.tick(1)
                 found.append(offset(start, stand.pose(self.frame)))
-                speeds = abs(stand.data.qvel[drives["dof"]]) / drives["fastest"]
+                speeds = abs(stand.data.qvel[drives["dof"]]) / drives["velocity_max"]
                 self.haste = max(self.haste, float(speeds.max()))
         self.hang(0.0)
         return np.array(found)

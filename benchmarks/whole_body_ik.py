@@ -1,4 +1,4 @@
-"""Whole-body inverse kinematics, side by side with pink, mink and placo.
+"""Whole-body inverse kinematics, compared with pink, mink and placo.
 
 Each robot has the tasks that fit it: hands, feet, centre of mass, posture; position and
 velocity limits; hands on Lissajous paths. Ours, pink and mink take turns tick by tick
@@ -150,7 +150,8 @@ class Ours:
             warm=warm,
             **({} if defaults else options),
         )
-        self.solver = self.stack._solver = Timed(self.stack._solver)
+        ladder = self.stack._ladder
+        self.solver = ladder.solver = Timed(ladder.solver)
         self.targets = [[pin.SE3(T) for T in tick] for tick in targets]
         self.q = case.q.copy()
 
@@ -173,24 +174,9 @@ class Ours:
 
     def once_more(self) -> int:
         """Solve the tick's QP again, ns: inside the compiled tick there is no clock."""
-        stack, level = self.stack, self.stack._levels[0]
-        problem, side = stack._problem, stack._side.copy()
-        x, bounds = np.empty(problem.nv), np.zeros(problem.nv)
+        qp = self.stack.levels[0].arrays.qp
         start = clock()
-        solve_warm(
-            level.W,
-            level.e,
-            problem.A,
-            problem.b,
-            level.diagonal,
-            level.mu,
-            problem.lb,
-            problem.ub,
-            side,
-            x,
-            bounds,
-            np.zeros(problem.equalities),
-        )
+        solve_warm(qp)
         return clock() - start
 
 

@@ -42,23 +42,23 @@ ROBOTS: dict[str, str | list[str]] = {
     "TwoArmHandover": "Tiago",
     "TwoArmTransport": ["PandaDexRH", "PandaDexLH"],
 }
-"""Who is seen at which benchmark."""
+"""Robots that are drawn at each benchmark."""
 
 HEAD = """# Benchmarks
 
 Each is `wbc_suite.make(NAME, robots=...)`, or `wbc_suite/NAME-v0` for gymnasium, and
-works with every robot that has the hands for it. Numbers are in `tasks/`, formulas of
+works with every robot that has enough hands. Parameters are in `tasks/`, formulas of
 success and reward in `wbc_suite/benchmark/`. Written by `make gallery`.
 """
 
 
 def robot_of(name: str) -> str | list[str]:
-    """Return who is drawn at a benchmark."""
+    """Return the robots that are drawn at a benchmark."""
     return ROBOTS.get(name, list(load_benchmark(name).robots))
 
 
 def title_of(name: str) -> str:
-    """Return what a benchmark is, in a few words."""
+    """Return the title of a benchmark."""
     path = Catalogue().find("tasks", name, kind="benchmark file")
     return str(read_toml(path)["title"])
 

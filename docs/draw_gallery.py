@@ -1,24 +1,34 @@
-"""Draw robots, grippers and bases, and the README's table of them: `make gallery`."""
+"""Draw robots, grippers and bases, their page and the strip of the README."""
 
 import argparse
-import re
 from pathlib import Path
 
 from PIL import Image
 
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.robot import RobotDescription, load_robot
-from wbc_suite.robot.component import Component, read_robot_file
+from wbc_suite.robot.robot_file import Component, read_robot_file
 from wbc_suite.viewers.offscreen import render_robot
 
 HERE = Path(__file__).parent
 FOLDER = HERE / "images" / "gallery"
-README = HERE.parent / "README.md"
-SIZE = 240  # pixels; drawn twice as large: smooth edges
-COLUMNS = 6
+PAGE = HERE / "gallery.md"
+STRIP = HERE / "images" / "strip.jpg"
+SIZE = 240  # pixels; drawn twice as large for smooth edges
+IN_STRIP = (
+    *("GR1", "SpotWithArm", "Tiago", "PandaOmron", "Baxter", "Sawyer"),
+    *("UR5e", "Jaco", "InspireRightHand", "RobotiqThreeFingerGripper"),
+)
 DOWN = (0.0, 1.0, 0.0, 0.0)  # grippers reach along +z, and are shown reaching down
 SHORT = {"bd": "BD", "pal": "PAL", "xarm7": "XArm7"}
-MARKS = ("<!-- gallery: written by `make gallery` -->\n", "<!-- gallery ends -->\n")
+HEAD = """# Gallery
+
+Any gripper goes on any arm, and any arm on any base:
+`wbc_suite.load_robot("UR5e", gripper="PandaGripper", base="OmronMobileBase")`.
+`wbc-suite view NAME` shows one in the browser. Written by `make gallery`.
+"""
+FIGURE = """\
+<figure><img src="{source}" alt="{name}"><figcaption>{name}</figcaption></figure>"""
 
 
 def subjects() -> dict[str, list[tuple[str, str]]]:
@@ -73,22 +83,29 @@ def picture_of(name: str) -> Path:
     return FOLDER / f"{name.rpartition('/')[2].casefold()}.jpg"
 
 
-def table() -> str:
-    """Write the README's tables."""
-    lines: list[str] = []
+def page() -> str:
+    """Return the text of the page."""
+    parts = [HEAD]
     for heading, rows in subjects().items():
-        lines += [f"**{heading}**", ""]
-        for k in range(0, len(rows), COLUMNS):
-            row = rows[k : k + COLUMNS]
-            images = [
-                f"![{shown}]({picture_of(name).relative_to(README.parent)})"
-                for shown, name in row
-            ]
-            names = [f"`{shown}`" for shown, _ in row]
-            head = [images, ["---"] * len(row), names] if k == 0 else [images, names]
-            lines += ["| " + " | ".join(cells) + " |" for cells in head]
-        lines.append("")
-    return "\n".join(lines)
+        parts.append(f'## {heading}\n\n<div class="gallery">')
+        for shown, name in rows:
+            source = picture_of(name).relative_to(HERE).as_posix()
+            parts.append(FIGURE.format(source=source, name=shown))
+        parts.append("</div>\n")
+    return "\n".join(parts)
+
+
+def draw_strip(path: Path) -> None:
+    """Put pictures of some subjects side by side, for the README."""
+    named = {shown: name for rows in subjects().values() for shown, name in rows}
+    strip = Image.new("RGB", (SIZE * len(IN_STRIP), SIZE))
+    for k, shown in enumerate(IN_STRIP):
+        with Image.open(picture_of(named[shown])) as picture:
+            strip.paste(picture, (k * SIZE, 0))
+    width = 1600
+    height = round(SIZE * width / strip.width)
+    small = strip.resize((width, height), Image.Resampling.LANCZOS)
+    small.save(path, quality=88, optimize=True)
 
 
 def main() -> None:
@@ -101,10 +118,8 @@ def main() -> None:
         if not only or shown.casefold() in only:
             print(f"drawing {shown}", flush=True)
             draw(name, picture_of(name))
-    begin, end = MARKS
-    pattern = re.compile(re.escape(begin) + ".*?" + re.escape(end), re.DOTALL)
-    text = README.read_text(encoding="utf-8")
-    README.write_text(pattern.sub(lambda _: begin + "\n" + table() + end, text))
+    draw_strip(STRIP)
+    PAGE.write_text(page(), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -47,7 +47,7 @@ def follow(saturation: str) -> Matrix:
     controller.set_goal(action)
     for _ in range(round(SECONDS / simulation.timestep)):
         carried = data.qfrc_bias[drives["dof"]]
-        drives["low"], drives["high"] = carried - SPARE, carried + SPARE
+        drives["command_min"], drives["command_max"] = carried - SPARE, carried + SPARE
         simulation.tick(1)
         places.append(hand.xpos - start)
     return np.array(places)

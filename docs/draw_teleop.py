@@ -11,7 +11,7 @@ from PIL import Image
 from playwright.sync_api import sync_playwright
 
 import wbc_suite
-from wbc_suite.viewers.site import Site
+from wbc_suite.viewers.page_server import PageServer
 from wbc_suite.viewers.teleop_page import TeleopPage
 from wbc_suite.viewers.teleop_session import TeleopSession
 
@@ -26,7 +26,7 @@ def main() -> None:
     """Move both of GR1's hands far, and keep what the browser shows."""
     env = wbc_suite.make("Lift", robots="GR1", control_freq=RATE, horizon=10**7)
     session = TeleopSession(env, period=1.0 / RATE)
-    page = TeleopPage(session, Site(port=0), label="GR1 · Lift")
+    page = TeleopPage(session, PageServer(port=0), label="GR1 · Lift")
     page.start()
     session.start()
     for name, offset in MOVES.items():

@@ -1,8 +1,8 @@
-"""Run the benchmarks and write docs/benchmarks.md: tables and plots on one page.
+"""Run the benchmarks; write the table of goals to docs/benchmarks.md.
 
-`make bench` runs all of them; `ARGS=--quick` takes under a minute each. A script's JSON
-file stays in artifacts/bench; `--only env_step` runs one and takes the others' files as
-they are.
+`make bench` runs all scripts in `benchmarks/`; with `ARGS=--quick` each takes under a
+minute, and `--only env_step` runs one. Everything that they measure is written to
+artifacts/benchmarks: NAME.json and NAME.md with all tables, and plots.
 """
 
 import argparse
@@ -18,8 +18,8 @@ sys.path.insert(0, str(ROOT / "benchmarks"))
 
 from harness.report import cell, heading, look_up, rows_with  # noqa: E402
 
-FOUND = ROOT / "artifacts" / "bench"
-IMAGES = ROOT / "docs" / "images"
+FOUND = ROOT / "artifacts" / "benchmarks"
+PAGE = ROOT / "docs" / "benchmarks.md"
 ORDER = (
     "env_step",
     "control_law",
@@ -28,46 +28,40 @@ ORDER = (
     "whole_body_ik",
     "cameras",
 )
-ALWAYS = {"tracking": ["--plot", str(IMAGES / "tracking.png")]}
+ALWAYS = {"tracking": ["--plot", str(FOUND / "tracking.png")]}
 FULL = {"simulation_accuracy": ["--trials", "50"], "long_runs": ["--quick"]}
 """More arguments of some scripts: in every run, and in full ones.
 
-All of `long_runs` takes an hour, so the page shows the quick one.
+All of `long_runs` takes an hour, so a full run takes its quick form.
 """
 
-HEAD = """# Benchmarks
+HEAD = """# Measurements
 
-Written by `make bench` (`docs/write_benchmarks.py`), which runs every script in
-`benchmarks/`; `make bench-peers` installs what they compare with. Times are CPU times,
-so other work on the machine counts less, but compare ratios, not microseconds: both
-sides of a ratio took turns in one run. A ratio is ours over theirs, smaller is better.
+Written by `make bench`. Each ratio is ours over theirs, from one run in which both
+sides took turns; times are CPU times. `make bench-peers` installs the peers. All tables
+and plots are written to `artifacts/benchmarks/`.
 """
 
+STEP, RAW = "environment step over robosuite's", "environment step over its raw physics"
 GOALS = (
-    ("Lift/Panda/OSC_POSE/raw", 1.3, "environment step over its own raw physics"),
-    ("Lift/Panda/OSC_POSE/robosuite", 1 / 15, "environment step over robosuite's"),
-    ("Lift/Panda/JOINT_POSITION/raw", 1.3, "environment step over its own raw physics"),
-    (
-        "Lift/Panda/JOINT_POSITION/robosuite",
-        1 / 15,
-        "environment step over robosuite's",
-    ),
-    ("Lift/GR1/WHOLE_BODY_IK/raw", 2.0, "environment step over its own raw physics"),
+    ("Lift/Panda/OSC_POSE/raw", 1.35, RAW),
+    ("Lift/Panda/OSC_POSE/robosuite", 0.09, STEP),
+    ("Lift/Panda/JOINT_POSITION/raw", 1.2, RAW),
+    ("Lift/Panda/JOINT_POSITION/robosuite", 0.09, STEP),
+    ("Lift/GR1/WHOLE_BODY_IK/raw", 2.0, RAW),
     ("Lift/Panda/reset/1ms", 1.0, "reset over 1 ms"),
     ("Lift/Panda/recording/thread", 1.1, "recorded step over one that is not"),
     ("GR1/mink", 0.2, "tick of whole-body IK over mink's"),
     ("Tiago/mink", 0.2, "tick of whole-body IK over mink's"),
-    ("GR1/placo", 1.3, "tick of whole-body IK over placo's"),
-    ("Tiago/placo", 1.3, "tick of whole-body IK over placo's"),
+    ("GR1/placo", 1.0, "tick of whole-body IK over placo's"),
+    ("Tiago/placo", 1.0, "tick of whole-body IK over placo's"),
 )
 """Ratios that this project sets itself as goals, at most."""
 
+THREADS = "steps of two threads over those of two processes"
 AT_LEAST = (
-    (
-        "Lift/Panda/OSC_POSE/threads/processes",
-        0.95,
-        "steps of two threads over those of two processes",
-    ),
+    ("Lift/Panda/OSC_POSE/threads/processes", 0.95, THREADS),
+    ("Lift/GR1/WHOLE_BODY_IK/threads/processes", 0.9, THREADS),
 )
 
 
@@ -127,22 +121,30 @@ def about(found: dict[Path, dict[str, Any]]) -> str:
 
 
 def goals(found: dict[Path, dict[str, Any]]) -> str:
-    """Return the goals beside what was found."""
+    """Return the goals beside what was found; not measured is empty."""
     ratios = {n: r for report in found.values() for n, r in report["ratios"].items()}
     rows = [
-        [f"`{name}`", text, f"{words} {limit:.3g}", f"{ratios[name]:.3g}"]
+        [f"`{name}`", text, f"{words} {limit:.3g}", cell(ratios.get(name))]
         for words, wanted in (("at most", GOALS), ("at least", AT_LEAST))
         for name, limit, text in wanted
-        if name in ratios
     ]
     return table(["ratio", "what", "goal", "found"], rows)
 
 
+def contents() -> str:
+    """Return the list of scripts."""
+    lines = ["## Scripts", ""]
+    for script in scripts():
+        title = script.read_text("utf-8").split('"""')[1].strip().splitlines()[0]
+        lines.append(f"- `benchmarks/{script.name}`: {title}")
+    return "\n".join(lines) + "\n"
+
+
 def section(script: Path, report: dict[str, Any]) -> str:
-    """Return one benchmark's part of the page."""
+    """Return everything that one benchmark measured, as a page."""
     words = script.read_text("utf-8").split('"""')[1].strip().splitlines()
     text = "\n".join(words[1:]).partition("\nUsage:")[0].strip()
-    parts = [f"## {words[0].rstrip('.')}\n", f"`benchmarks/{script.name}`\n", text, ""]
+    parts = [f"# {words[0].rstrip('.')}\n", f"`benchmarks/{script.name}`\n", text, ""]
     for shown in report["tables"]:
         columns = shown["columns"]
         rows = [
@@ -150,12 +152,12 @@ def section(script: Path, report: dict[str, Any]) -> str:
             for row in rows_with(report["rows"], columns)
         ]
         parts += [f"**{shown['title']}**\n", table([*map(heading, columns)], rows)]
-    for image in sorted(IMAGES.glob(f"{script.stem}*.png")):
-        parts.append(f"![{words[0]}](images/{image.name})\n")
+    for image in sorted(FOUND.glob(f"{script.stem}*.png")):
+        parts.append(f"![{words[0]}]({image.name})\n")
     if report["ratios"]:
         rows = [[f"`{name}`", cell(value)] for name, value in report["ratios"].items()]
         ratios = table(["ratio", "ours / theirs"], rows)
-        parts.append(f"<details><summary>Ratios</summary>\n\n{ratios}\n</details>\n")
+        parts.append(f"**Ratios**\n\n{ratios}")
     return "\n".join(parts)
 
 
@@ -204,11 +206,11 @@ def main() -> None:
     found = reports()
     for script, report in found.items():
         if script.stem == "env_step":
-            draw_env_step(report, IMAGES / "env_step.png")
-    parts = [HEAD, about(found), goals(found)]
-    parts += [section(script, report) for script, report in found.items()]
-    page = ROOT / "docs" / "benchmarks.md"
-    page.write_text("\n".join(parts), encoding="utf-8")
+            draw_env_step(report, FOUND / "env_step.png")
+        text = section(script, report)
+        (FOUND / f"{script.stem}.md").write_text(text, encoding="utf-8")
+    parts = [HEAD, about(found), goals(found), contents()]
+    PAGE.write_text("\n".join(parts), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -7,18 +7,18 @@ project's environment.
 from pathlib import Path
 
 from wbc_suite.catalogue import Catalogue
-from wbc_suite.robot.component import Component, read_robot_file
+from wbc_suite.robot.robot_file import Component, read_robot_file
 
-HEAD = """# Where our figures differ from their source
+HEAD = """# Deviations from sources
 
 Written by `docs/write_deviations.py` from the `deviations` and `accept` entries of the
-robot files. Everything else agrees with the source: frame poses to 1e-8 m, gravity
+robot files. All other figures agree with the source: frame poses to 1e-8 m, gravity
 torques to 1e-7 N m (`tests/robot/test_vendor_figures.py`).
 """
 
 
 def rows(path: Path) -> list[str]:
-    """Return one file's rows of the table."""
+    """Return the rows of one file."""
     component = read_robot_file(path)
     if isinstance(component, Component):
         header, links = component.component, component.links

@@ -1,4 +1,4 @@
-"""One description, two engines: MuJoCo and Pinocchio agree about a robot."""
+"""Load a robot, and compare its MuJoCo model with its Pinocchio model."""
 
 import mujoco
 import numpy as np
@@ -10,14 +10,14 @@ robot = wbc_suite.load_robot("Panda")
 print(f"{robot.title}: {robot.dof} degrees of freedom, {robot.mass:.1f} kg")
 print("groups:", ", ".join(robot.groups))
 
-# MuJoCo simulates it ...
+# MuJoCo model: simulation
 model = robot.to_mjspec().compile()
 data = mujoco.MjData(model)
 for joint, value in robot.keyframe("ready").items():
     data.joint(joint).qpos[:] = value
 mujoco.mj_forward(model, data)
 
-# ... and Pinocchio computes with it: same joints, same order, same numbers.
+# Pinocchio model: kinematics and dynamics, with the same joints in the same order
 pin_model = robot.to_pinocchio()
 pin_data = pin_model.createData()
 q = pin_model.referenceConfigurations["ready"]

@@ -1,4 +1,4 @@
-"""A stack of QP tasks moves a humanoid's hand while everything else stays in place."""
+"""Move a humanoid's hand with a stack of QP tasks; the other hand stays in place."""
 
 import numpy as np
 
@@ -31,4 +31,4 @@ for _ in range(300):
 for task in (right, left):
     error = np.linalg.norm(task.error(configuration)[:3])
     print(f"{task.frame}: {1e3 * error:.3f} mm from its target")
-print("limits that hold joints back:", ", ".join(map(str, solution.active)) or "none")
+print("active limits:", ", ".join(map(str, solution.active)) or "none")

@@ -1,4 +1,4 @@
-"""A mobile manipulator follows two targets; what it cannot reach it says in words."""
+"""Move a mobile manipulator to a target in reach and to one out of reach."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ start = layout.unpack(env.hold_action)
 
 
 def move(offset: list[float], seconds: float) -> dict:
-    """Move the right hand from where it started and return what the robot says."""
+    """Move the right hand by an offset from its start; return its report."""
     hand = start["right_hand"] + np.array([*offset, 0.0, 0.0, 0.0])
     action = layout.pack({"right_hand": hand}, base=env.hold_action)
     info = {}
@@ -28,4 +28,4 @@ near = move([0.10, 0.05, 0.10], seconds=3.0)
 print(f"within reach: {1e3 * near['position_error']:.2f} mm away")
 
 far = move([0.0, 0.0, 3.0], seconds=3.0)
-print(f"3 m up: {far['position_error']:.2f} m away, because of", *far["reasons"][:2])
+print(f"3 m up: {far['position_error']:.2f} m away:", *far["reasons"][:2])

@@ -1,4 +1,4 @@
-"""The loop that every reinforcement-learning library knows."""
+"""Run the standard Gymnasium loop with random actions."""
 
 import gymnasium
 

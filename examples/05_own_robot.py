@@ -1,4 +1,4 @@
-"""A robot of your own: from a URDF to a hand that goes where it is told."""
+"""Load a robot from a URDF and control its hand."""
 
 import logging
 import tempfile
@@ -34,7 +34,7 @@ LINK = """
 
 
 def link(name: str, length: float, mass: float) -> str:
-    """Return a rod's link; its inertia is mass length^2 / 12 about the middle."""
+    """Return the link of a rod, with inertia mass length^2 / 12 about its middle."""
     i = mass * length**2 / 12 + 0.001
     return LINK.format(name=name, middle=length / 2, length=length, mass=mass, i=i)
 
@@ -54,7 +54,7 @@ print(env.action_layout)
 
 
 def move_for(seconds: float, goals: dict) -> dict:
-    """Keep the goals for a while; return what the robot says about its hand."""
+    """Apply the goals for some time; return the report on the hand."""
     action = env.action_layout.pack(goals)
     info = {}
     for _ in range(round(20 * seconds)):
@@ -63,11 +63,11 @@ def move_for(seconds: float, goals: dict) -> dict:
 
 
 goals = env.action_layout.unpack(env.hold_action)
-goals["right_hand"][:3] += [0.10, 0.0, -0.15]  # m, within the plane it can move in
+goals["right_hand"][:3] += [0.10, 0.0, -0.15]  # m, within the plane of motion
 hand = move_for(3.0, goals)
 print(f"the hand is {1e3 * hand['position_error']:.2f} mm from its goal")
 
-goals["right_hand"][1] += 0.10  # to the side, where it cannot go
+goals["right_hand"][1] += 0.10  # out of the plane
 hand = move_for(3.0, goals)
-reasons = "; ".join(hand["reasons"])
+reasons = "; ".join(map(str, hand["reasons"]))
 print(f"a step to the side: {1e3 * hand['position_error']:.0f} mm short; {reasons}")

@@ -1,4 +1,4 @@
-"""Eight environments in one process, stepped in parallel threads."""
+"""Step eight environments of one process in parallel threads."""
 
 import gymnasium
 import numpy as np
@@ -17,7 +17,7 @@ observations, infos = envs.reset(seed=1)  # seeds 1 to 8
 envs.action_space.seed(1)
 
 total, episodes = np.zeros(envs.num_envs), 0
-for _ in range(42):  # an episode that is over begins anew in the next step
+for _ in range(42):  # a finished episode is reset in the next step
     actions = envs.action_space.sample()
     observations, rewards, terminated, truncated, infos = envs.step(actions)
     total += rewards

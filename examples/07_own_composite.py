@@ -1,4 +1,4 @@
-"""A composite controller of your own: one action moves both hands, mirrored."""
+"""Register a composite controller: one action moves both hands, mirrored."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -16,7 +16,7 @@ from wbc_suite.control import (
 
 
 class Mirrored(BasicController):
-    """BASIC whose left hand and gripper do what the right ones do, mirrored."""
+    """BASIC in which the left hand and gripper mirror the right ones."""
 
     MIRROR = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])  # at the plane y = 0
 
@@ -28,7 +28,7 @@ class Mirrored(BasicController):
         )
 
     def set_goal(self, action: np.ndarray, period: float = 0.05) -> None:
-        """Take the right side's values, and give them to both sides."""
+        """Apply the values of the right side to both sides."""
         values = self.layout.unpack(action)
         values["left"] = self.MIRROR * values["right"]
         values["left_gripper"] = values["right_gripper"]
@@ -36,7 +36,7 @@ class Mirrored(BasicController):
 
     @property
     def hold_action(self) -> np.ndarray:
-        """The right side's part of what holds."""
+        """The right side of the action that holds the robot."""
         held = self.full.unpack(super().hold_action)
         return self.layout.pack(
             {part.name: held[part.name] for part in self.layout.slices}

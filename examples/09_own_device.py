@@ -1,8 +1,8 @@
-"""A device of your own: three numbers in a UDP packet move the hand of a robot.
+"""Define a device: three numbers in a UDP packet move the hand of a robot.
 
-Anything that sends such packets will do: a phone, a microcontroller with a joystick, a
-spreadsheet. A device has three methods and inherits from nothing. With this file on the
-PYTHONPATH, `wbc-suite teleop --robots Panda --device own_device:UdpStick` uses it.
+Any program can send such packets. A device has three methods and needs no base class.
+With this file on the PYTHONPATH,
+`wbc-suite teleop --robots Panda --device own_device:UdpStick` uses it.
 """
 
 import contextlib
@@ -18,7 +18,7 @@ SPEED = 0.2  # m/s at full deflection
 
 
 class UdpStick:
-    """Takes packets like `b"0.5 0 -1"`: forward, left and up, each from -1 to 1."""
+    """Receives packets like `b"0.5 0 -1"`: forward, left and up, each from -1 to 1."""
 
     def start(self) -> None:
         """Listen on this machine."""
@@ -28,7 +28,7 @@ class UdpStick:
         self.state = DeviceState(time=0.0)
 
     def read(self) -> DeviceState:
-        """Take the newest packet; without one, say what was said before."""
+        """Read the newest packet; without one, return the last state."""
         with contextlib.suppress(BlockingIOError):
             while True:
                 values = [float(word) for word in self.socket.recv(64).split()]
@@ -43,25 +43,25 @@ class UdpStick:
 
 
 def main() -> None:
-    """Lift the hand for a second, then fall silent: the watchdog holds it."""
+    """Lift the hand for a second, then stop sending: the watchdog holds it."""
     env = wbc_suite.make("Lift", robots="Panda", controller_configs="OSC_POSE")
     stick, pipeline = UdpStick(), Pipeline(env, PipelineConfig(ramp=0.0))
     sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    steps, told = 0, ""
+    steps, report = 0, ""
 
     def act(_: DeviceState, __: dict[str, object]) -> None:
-        nonlocal steps, told
+        nonlocal steps, report
         steps += 1
         if steps <= 20:  # one second at 20 Hz
             sender.sendto(b"0 0 1", stick.socket.getsockname())
-        told = ", ".join(pipeline.acting.get("device", ()))
+        report = ", ".join(pipeline.acting.get("device", ()))
 
-    drive(env, stick, pipeline, steps=40, real_time=False, tell=act)
+    drive(env, stick, pipeline, steps=40, real_time=False, on_step=act)
     sender.close()
     hand = pipeline.limbs["right"]
     rise = hand.port.measure().translation[2] - hand.home.translation[2]
     print(f"The hand rose by {100 * rise:.0f} cm.")
-    print(f"Then the pipeline said: {told}.")
+    print(f"Then the pipeline reported: {report}.")
     env.close()
 
 

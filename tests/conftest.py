@@ -2,7 +2,9 @@
 
 import json
 import os
+import signal
 import subprocess
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -66,6 +68,36 @@ class PeerReaders:
 @pytest.fixture(scope="session")
 def peer_readers():
     return PeerReaders()
+
+
+INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT") == "1"
+INTERPRETED_LIMIT = 1.0  # s of CPU time
+
+
+def _too_slow(*_: object) -> None:
+    pytest.skip(f"takes more than {INTERPRETED_LIMIT} s without compilation")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol() -> Iterator[None]:
+    """Under NUMBA_DISABLE_JIT, run the tests that take little time without it."""
+    if not INTERPRETED:
+        return (yield)
+    previous = signal.signal(signal.SIGPROF, _too_slow)
+    try:
+        return (yield)
+    finally:
+        signal.signal(signal.SIGPROF, previous)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call() -> Iterator[None]:
+    """Skip a test that exceeds the limit."""
+    signal.setitimer(signal.ITIMER_PROF, INTERPRETED_LIMIT if INTERPRETED else 0.0)
+    try:
+        return (yield)
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
 
 
 class BrowserOnOneWorker(LoadScopeScheduling):

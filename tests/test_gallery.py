@@ -1,4 +1,4 @@
-"""The README shows every robot, gripper and base, a page every benchmark."""
+"""The gallery shows every robot, gripper and base, and every benchmark."""
 
 import importlib.util
 from pathlib import Path
@@ -38,9 +38,19 @@ def check_picture(path, size, name):
     assert len(np.unique(pixels, axis=0)) > 500  # something is drawn
 
 
-def test_the_readme_shows_the_catalogue(gallery):
+def test_the_page_shows_the_catalogue(gallery):
+    assert gallery.PAGE.read_text(encoding="utf-8") == gallery.page()
+    for robot in ("GR1", "Panda", "OmronMobileBase", "InspireRightHand"):
+        assert f'alt="{robot}"' in gallery.page()
+
+
+def test_the_readme_has_one_strip_of_pictures(gallery):
     text = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert gallery.table() in text, "run `make gallery`"
+    assert "](docs/images/strip.jpg)" in text
+    assert text.count("![") <= 2
+    with Image.open(gallery.STRIP) as strip:
+        assert strip.width == 10 * strip.height
+        assert gallery.STRIP.stat().st_size < 120_000
 
 
 @pytest.mark.slow

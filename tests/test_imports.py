@@ -19,15 +19,14 @@ BASE = (
     "tomlfile",
     "catalogue",
     "registration",
-    "user_cache",
-    "linked_code",
     "compiling",
-    "compiling_ahead",
+    "linear_algebra",
 )
 ORDER = (
     "robot",
     "kinematics",
     "qp",
+    "planning",
     "control",
     "scene",
     "sensing",
@@ -36,12 +35,11 @@ ORDER = (
 )
 TOP = (
     "executors",
-    "policies",
     "randomisation",
     "devices",
     "recording",
     "wrappers",
-    "rollout",
+    "evaluation",
     "compat",
     "viewers",
     "teleoperation",

@@ -14,17 +14,33 @@ from wbc_suite.cli.app import app
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(ROOT.glob("docs/*.md"))]
+PAGES = [
+    ROOT / "README.md",
+    ROOT / "CONTRIBUTING.md",
+    *sorted(ROOT.glob("docs/**/*.md")),
+]
+IN_ORDER = "<!-- snippets run in order -->"
+"""Snippets of a page with this mark are one program; `<!-- check: ... -->` asserts."""
 
 
 def blocks(text: str, language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
 
 
+def programs(text: str) -> list[str]:
+    """Return what is run by itself: each snippet, or all of a page in order."""
+    if IN_ORDER not in text:
+        return blocks(text, "python")
+    steps = re.findall(
+        r"^```python\n(.*?)^```|<!-- check: (.*?) -->", text, re.S | re.M
+    )
+    return ["".join(code or f"assert {check}\n" for code, check in steps)]
+
+
 SNIPPETS = [
     pytest.param(snippet, id=f"{page.stem}-{k}")
     for page in PAGES
-    for k, snippet in enumerate(blocks(page.read_text(encoding="utf-8"), "python"))
+    for k, snippet in enumerate(programs(page.read_text(encoding="utf-8")))
 ]
 
 
@@ -32,6 +48,13 @@ SNIPPETS = [
 def test_python_snippets_run(snippet, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)  # some write files
     exec(compile(snippet, "snippet", "exec"), {"__name__": "__main__"})
+
+
+def test_snippets_in_order_share_names_and_are_checked():
+    text = f"{IN_ORDER}\n```python\nx = 1\n```\n<!-- check: x == 2 -->\n"
+    (program,) = programs(text)
+    with pytest.raises(AssertionError):
+        exec(program, {})
 
 
 def test_the_first_snippet_is_short_and_what_it_prints_is_true():

@@ -1,41 +1,40 @@
-"""Check numbers and arrays at the public edge, so that nothing is checked further in.
+"""Checks of numbers and arrays that callers pass in.
 
-What a caller passes may be anything. These functions return float64, or raise one
-`ConfigError` that names the owner, the argument, the value and the rule; NumPy's and
-Pinocchio's own messages would name none of them, and a C++ library may simply crash.
+Public functions check their arguments here, so that no inner code has to. A check
+returns float64, or raises a `ConfigError` that names owner, argument, value and rule.
 """
 
 import math
 
 import numpy as np
 
-from wbc_suite.errors import ConfigError
+from wbc_suite.errors import ConfigError, shortened
 from wbc_suite.typing import Array
 
 __all__ = ["check_array", "check_count", "check_number"]
 
-_KINDS = "fiu"  # NumPy's letters for real numbers
+_REAL = "fiu"  # NumPy's kinds of real numbers
 
 
 def check_array(what: str, value: object, shape: tuple[int, ...] | None) -> Array:
-    """Return real numbers as a float64 array, a copy only where one is needed.
+    """Return real numbers as a float64 array, copied only if needed.
 
     Args:
         what: Owner and argument, for the message: "Task 'hand': the target".
         value: Anything.
-        shape: The shape it must have; None for any.
+        shape: Required shape; None for any.
 
     Raises:
-        ConfigError: If it holds anything but real numbers, or has another shape.
+        ConfigError: If the value is not an array of real numbers of that shape.
     """
     try:
         array = np.asarray(value)
     except ValueError as error:  # rows of different lengths
-        raise ConfigError(f"{what} is no array: {_shorten(value)}.") from error
-    if array.dtype.kind not in _KINDS and array.size:
-        raise ConfigError(f"{what} must hold real numbers, not {_shorten(value)}.")
+        raise ConfigError(f"{what} is not an array: {_shown(value)}.") from error
+    if array.dtype.kind not in _REAL and array.size:
+        raise ConfigError(f"{what} must hold real numbers, not {_shown(value)}.")
     if shape is not None and array.shape != shape:
-        raise ConfigError(f"{what} has shape {array.shape}, and needs {shape}.")
+        raise ConfigError(f"{what} has shape {array.shape}, but must have {shape}.")
     return array.astype(np.float64, copy=False)
 
 
@@ -46,50 +45,45 @@ def check_number(
     above: float = -math.inf,
     least: float = -math.inf,
     most: float = math.inf,
-    endless: bool = False,
+    allow_inf: bool = False,
 ) -> float:
     """Return a real number as a float.
 
     Args:
         what: Owner and argument, for the message.
         value: Anything.
-        above: It must be greater than this.
-        least: It must not be less than this.
-        most: It must not be greater than this.
-        endless: Whether infinity is allowed, as in "no limit".
+        above: Exclusive lower bound.
+        least: Inclusive lower bound.
+        most: Inclusive upper bound.
+        allow_inf: Whether positive infinity is allowed, as in "no limit".
 
     Raises:
-        ConfigError: If it is no number, or breaks a rule.
+        ConfigError: If it is not a number, or violates a bound.
     """
     number = float(check_array(what, value, ()))
-    inside = above < number and least <= number <= most
-    if endless:
-        inside = inside or (number == math.inf == most)
-    elif not math.isfinite(number):
-        inside = False
-    if not inside:
+    valid = above < number and least <= number <= most
+    if not (valid and (math.isfinite(number) or allow_inf)):
         rules = [
-            *(() if endless else ("finite",)),
+            *(() if allow_inf else ("finite",)),
             *((f"greater than {above:g}",) if above > -math.inf else ()),
             *((f"at least {least:g}",) if least > -math.inf else ()),
             *((f"at most {most:g}",) if most < math.inf else ()),
         ]
-        raise ConfigError(f"{what} is {value}, and must be {', '.join(rules)}.")
+        raise ConfigError(f"{what} is {value}, but must be {', '.join(rules)}.")
     return number
 
 
 def check_count(what: str, value: object, *, least: int = 0) -> int:
-    """Return a whole number.
+    """Return an integer.
 
     Raises:
-        ConfigError: If it is no whole number, or is less than `least`.
+        ConfigError: If it is not an integer, or is less than `least`.
     """
     number = check_number(what, value, least=least)
     if number != int(number):
-        raise ConfigError(f"{what} is {value}, and must be a whole number.")
+        raise ConfigError(f"{what} is {value}, but must be an integer.")
     return int(number)
 
 
-def _shorten(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+def _shown(value: object) -> str:
+    return shortened(repr(value), 60)

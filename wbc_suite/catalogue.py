@@ -1,9 +1,9 @@
-"""Find the catalogue: the folders `robots/`, `tasks/` and `controllers/` of TOML files.
+"""Find the package's folders: the catalogue of TOML files, and the user's cache.
 
-An installed wheel carries them as `wbc_suite/_catalogue/`; in a checkout they lie at
-the top of the repository. A laboratory adds a folder of its own of the same shape with
-`Catalogue(extra=[...])`, with `--catalogue DIR` on the command line, or by setting
-`WBC_SUITE_CATALOGUE`; its files win over ours.
+The catalogue has the folders `robots/`, `tasks/` and `controllers/`. An installed wheel
+holds it as `wbc_suite/_catalogue/`, a checkout at the top of the repository. Users add
+a folder with the same layout by `Catalogue(extra=[...])`, `--catalogue DIR` on the
+command line or the variable `WBC_SUITE_CATALOGUE`; its files take precedence.
 """
 
 import os
@@ -14,9 +14,19 @@ from pathlib import Path
 
 from wbc_suite.errors import ConfigError, UnknownNameError
 
-__all__ = ["Catalogue"]
+__all__ = ["Catalogue", "user_cache", "user_cache_root"]
 
 ENVIRONMENT_VARIABLE = "WBC_SUITE_CATALOGUE"
+
+
+def user_cache_root() -> Path:
+    """Return the user's cache folder, shared by all programs."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+
+
+def user_cache() -> Path:
+    """Return this package's folder in the user's cache; it may not exist yet."""
+    return user_cache_root() / "wbc_suite"
 
 
 def _default_root() -> Path:
@@ -31,15 +41,16 @@ def _default_extra() -> tuple[Path, ...]:
 
 
 def _key(name: str) -> str:
-    """Fold a name so that `SpotWithArm`, `spot_with_arm` and `spotwitharm` agree."""
+    """Normalise a name: `SpotWithArm`, `spot_with_arm` and `spotwitharm` are equal."""
     return name.casefold().replace("_", "").replace("-", "")
 
 
 def _own_name(path: Path) -> str:
+    """Return the name that a file declares, or its stem."""
     try:
         content = tomllib.loads(path.read_text("utf-8"))
     except (OSError, ValueError):
-        return path.stem  # the error is about another name than this one
+        return path.stem  # listing names must not fail because of one file
     headers = (content, *map(content.get, ("assembly", "component")))
     names = (header.get("name") for header in headers if isinstance(header, dict))
     return next((name for name in names if isinstance(name, str)), path.stem)
@@ -47,11 +58,11 @@ def _own_name(path: Path) -> str:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Catalogue:
-    """A set of folders of one shape, searched from the last to the first.
+    """A list of folders with one layout; files of later folders take precedence.
 
     Attributes:
         root: The folder that holds `robots/`, `tasks/` and `controllers/`.
-        extra: Further folders of the same shape; a later one wins.
+        extra: Further folders with the same layout.
     """
 
     root: Path = field(default_factory=_default_root)
@@ -60,7 +71,7 @@ class Catalogue:
     def __post_init__(self) -> None:
         if isinstance(self.extra, str | Path) or not isinstance(self.extra, Iterable):
             raise ConfigError(
-                f"Catalogue: extra is a list of folders, not {self.extra!r:.60}."
+                f"Catalogue: 'extra' must be a list of folders, not {self.extra!r:.60}."
             )
         for folder in (self.root, *self.extra):
             if not isinstance(folder, str | Path) or not Path(folder).is_dir():
@@ -71,38 +82,39 @@ class Catalogue:
         return tuple(sorted({p.stem for p in self._files(folder)}))
 
     def files(self, folder: str) -> tuple[Path, ...]:
-        """Return the files that `names` names, in the same order."""
+        """Return the files of `names`, in the same order."""
         found = {p.stem: p for p in self._files(folder)}
         return tuple(found[name] for name in self.names(folder))
 
     def called(self, folder: str) -> tuple[str, ...]:
-        """Return what files call themselves, such as `Robotiq85Gripper`, as `names`.
+        """Return the names that files declare, such as `Robotiq85Gripper`.
 
-        A file that says no name, or cannot be read, is called by its stem.
+        A file without a name, or one that cannot be read, is listed by its stem.
         """
         return tuple(_own_name(path) for path in self.files(folder))
 
     def holds(self, folder: str, name: str) -> bool:
-        """Whether a folder has a file of a name, as `find` looks for it."""
+        """Whether `find` finds a file with this name."""
         return _key(name) in map(_key, self.names(folder))
 
     def find(
         self, folder: str, name: str, *, kind: str, side: str | None = None
     ) -> Path:
-        """Return the file of a name, without regard to case and underscores.
+        """Return the file with a name, ignoring case and underscores.
 
         Args:
             folder: Folder relative to a root, such as `robots` or `robots/arm`.
             name: Name to look up.
-            kind: What the name is, for the error: "robot", "gripper".
-            side: The side of a pair of files that a name without side stands for:
-                `InspireHand` is `inspire_right_hand` on the right.
+            kind: Kind of item for the error, such as "robot" or "gripper".
+            side: Side to insert into a name that lacks it: on the right, `InspireHand`
+                is the file `inspire_right_hand`.
 
         Raises:
-            UnknownNameError: If no root has such a file.
+            UnknownNameError: If no folder has such a file.
+            ConfigError: If the folder leads out of the catalogue.
         """
         if ".." in Path(str(folder)).parts:
-            raise ConfigError(f"'{folder}/{name}' leaves the catalogue.")
+            raise ConfigError(f"'{folder}/{name}' lies outside the catalogue.")
         found = {_key(p.stem): p for p in self._files(folder)}
         wanted = _key(str(name))
         path = found.get(wanted)
@@ -114,7 +126,7 @@ class Catalogue:
         return path
 
     def is_ours(self, file: Path) -> bool:
-        """Whether a file came with this package, or from one of the extra folders."""
+        """Whether a file came with this package and not from an extra folder."""
         return file.is_relative_to(self.root)
 
     def _files(self, folder: str) -> Iterable[Path]:

@@ -1,212 +1,225 @@
-"""`compiled`: numba's decorator with a disk cache that never serves stale code.
+"""Compile kernels with numba: the decorator `compiled`, and `struct` for arguments.
 
-Numba keeps the machine code of a function as long as the function's own file is the
-same; a function that it calls from another file may have changed meanwhile. Here the
-cache has a folder for each state of a file and of what it imports from this package.
+Machine code is kept on disk, in one folder for each state of the package's kernels.
 """
 
-import gc
 import hashlib
 import logging
-import re
 import shutil
 import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
+from types import FunctionType
 from typing import Any, TypeVar, cast
 
 import numba
-from numba.core import config, types
+from numba import types
+from numba.experimental import structref
 
-from wbc_suite.linked_code import EntryCompiler, LinkedCompiler
-from wbc_suite.user_cache import user_cache
+from wbc_suite.catalogue import user_cache
 
-__all__ = ["announced", "cache_folder", "compiled"]
-__all__ += ["compiled_inner", "compiled_unlocked", "inlined"]
+__all__ = ["announced", "as_argument", "cache_folder", "compiled"]
+__all__ += ["compiled_nogil", "is_compiling", "plain", "struct"]
 
 log = logging.getLogger(__name__)
 
-_numba: Any = config  # its attributes are made at import
-_njit: Any = numba.njit
+_untyped: Any = numba
+_numba, _njit = _untyped.config, _untyped.njit
+_structref: Any = structref
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-
-_PACKAGE = Path(__file__).parent
-_COMPILES = re.compile(r"^@(compiled|inlined|numba|lower_)|\bintrinsic\(", re.MULTILINE)
-_IMPORT = re.compile(rf"^from ({_PACKAGE.name}[.\w]*) import", re.MULTILINE)
+Fields = TypeVar("Fields", bound=tuple[Any, ...])
 
 PATIENCE = 1.5
 """s; compiling that takes longer is announced. Reading machine code takes 0.2."""
 
+INTERVAL = 5.0
+"""s between two messages about the progress of compiling."""
+
 KEPT = 7 * 24 * 3600.0
 """s; machine code that no process has asked for in this time is deleted."""
 
+_KERNELS: list[Any] = []
+"""All kernels of imported modules, to report how many are compiled."""
+
 
 def compiled(function: Function) -> Function:
-    """Compile a function on its first call.
+    """Compile a function on its first call, and keep its machine code on disk.
 
-    It keeps the interpreter's lock: another thread that wants it takes 50 us to wake up
-    when it is given up, longer than most kernels take.
+    The function also runs as plain Python: see `plain`, or everything under
+    `NUMBA_DISABLE_JIT=1`. Division by zero gives infinity or NaN, as in NumPy.
+
+    Args:
+        function: Takes numbers, arrays, tuples, and what `as_argument` returns.
     """
-    return _with_entry(function, nogil=False)
+    return _compile(function)
 
 
-def compiled_unlocked(function: Function) -> Function:
-    """Compile a function that takes long; other threads run meanwhile."""
-    return _with_entry(function, nogil=True)
+def compiled_nogil(function: Function) -> Function:
+    """Compile a function that releases the interpreter's lock while it runs.
 
-
-def compiled_inner(function: Function) -> Function:
-    """Compile a function that only compiled functions call.
-
-    It has no way in from Python, which takes as long to compile as the function: each
-    array of each argument is taken out of its Python object there.
+    For long calls only: a thread needs up to 50 us to get the lock back.
     """
-    return cast("Function", _linked(function))
+    return _compile(function, nogil=True)
 
 
-def inlined(function: Function) -> Function:
-    """Compile a short function into those that call it: an inner one without a call."""
-    return cast("Function", _linked(function, forceinline=True))
-
-
-def _with_entry(function: Function, *, nogil: bool) -> Function:
-    """Return a function with machine code for Python; others are linked to its code.
-
-    What Python calls is kept on disk with all that it calls inside.
-    """
+def _compile(function: Function, **options: bool) -> Function:
     previous = _numba.CACHE_DIR
-    _numba.CACHE_DIR = str(cache_folder(Path(function.__code__.co_filename)))
+    _numba.CACHE_DIR = str(cache_folder())
     try:
-        entry = _njit(
-            cache=True, nogil=nogil, error_model="numpy", pipeline_class=EntryCompiler
-        )(function)
+        kernel = _njit(cache=True, error_model="numpy", **options)(function)
     finally:
         _numba.CACHE_DIR = previous
-    inner = _linked(function)
-    entry.get_call_template = inner.get_call_template
-    entry.get_overload = inner.get_overload
-    entry.compile = partial(_without_collecting, entry.compile)
-    return cast("Function", entry)
+    if not _numba.DISABLE_JIT:
+        _KERNELS.append(kernel)
+    return cast("Function", kernel)
 
 
-def _without_collecting(compile_for: Callable[[Any], Any], signature: Any) -> Any:
-    """Compile while no rubbish is collected: there is little, and looking takes long.
+def is_compiling() -> bool:
+    """Return whether numba compiles kernels: not under `NUMBA_DISABLE_JIT=1`."""
+    return not _numba.DISABLE_JIT
 
-    All that a compiler builds is in use until it is done.
+
+def plain(kernel: Any) -> Any:
+    """Return a kernel, and all kernels that it calls, as plain Python functions."""
+    function = kernel if isinstance(kernel, FunctionType) else kernel.py_func
+    names = dict(function.__globals__)
+    for name in set(function.__code__.co_names) & set(names):
+        if any(names[name] is kernel for kernel in _KERNELS):
+            names[name] = plain(names[name])
+    return FunctionType(function.__code__, names, function.__name__)
+
+
+def struct(fields: type[Fields]) -> type[Fields]:
+    """Let kernels take a named tuple of arrays and numbers as one argument.
+
+    Numba unpacks each array of a tuple for each call, and compiles that code again in
+    each function. A `structref` is one pointer. `as_argument` makes it of a tuple;
+    plain Python takes the tuple itself, since fields are read by the same names.
+
+    Args:
+        fields: A `NamedTuple` class at the top level of a module.
     """
-    collects = gc.isenabled()
-    gc.disable()
-    try:
-        return compile_for(signature)
-    finally:
-        if collects:
-            gc.enable()
-
-
-def _linked(function: Callable[..., Any], **options: bool) -> Any:
-    make = _njit(
-        error_model="numpy",
-        pipeline_class=LinkedCompiler,
-        no_cpython_wrapper=True,
-        no_cfunc_wrapper=True,
-        **options,
+    place = {"__module__": fields.__module__}
+    numba_type = type(
+        f"{fields.__name__}Type",
+        (_StructType,),
+        place | {"__qualname__": f"{fields.__qualname__}.numba_type"},
     )
-    inner = make(function)
-    inner.get_call_template = partial(_without_literals, inner.get_call_template)
-    return inner
-
-
-def _without_literals(template: Any, args: Any, keywords: Any) -> Any:
-    """Ask for a function of numbers, where numba would make one for each constant."""
-    return template(
-        [types.unliteral(kind) for kind in args],
-        {name: types.unliteral(kind) for name, kind in keywords.items()},
+    proxy = type(
+        f"{fields.__name__}Proxy",
+        (_structref.StructRefProxy,),
+        place | {"__qualname__": f"{fields.__qualname__}.proxy"},
     )
+    _structref.register(numba_type)
+    names: Any = fields
+    _structref.define_proxy(proxy, numba_type, list(names._fields))
+    names.numba_type, names.proxy = numba_type, proxy
+
+    def pack(values: Any) -> Any:
+        return proxy(*values)
+
+    # Numba names cache files by these: one for each class, for reading an index fails
+    # where the module of one of its types cannot be imported.
+    pack.__module__, pack.__qualname__ = (
+        fields.__module__,
+        f"{fields.__qualname__}.pack",
+    )
+    names.pack = staticmethod(pack if _numba.DISABLE_JIT else compiled(pack))
+    return fields
+
+
+def as_argument(values: Fields) -> Fields:
+    """Return the argument of a kernel that stands for a tuple of a `struct` class.
+
+    Arrays are shared, numbers are copied; fields that are such tuples are converted
+    too. Without compilation it is the tuple itself.
+    """
+    if _numba.DISABLE_JIT:
+        return values
+    fields = [as_argument(x) if hasattr(x, "pack") else x for x in values]
+    kind: Any = type(values)
+    return kind.pack(kind(*fields))
+
+
+class _StructType(types.StructRef):
+    """A record whose fields have the types of the arrays that it was made of."""
+
+    def preprocess_fields(self, fields: Any) -> Any:
+        """Return the fields with types of numbers in place of those of constants."""
+        return tuple((name, types.unliteral(kind)) for name, kind in fields)
 
 
 @cache
-def cache_folder(source: Path) -> Path:
-    """Return where the machine code of a file's functions is kept.
+def cache_folder() -> Path:
+    """Return where machine code is kept.
 
     In `NUMBA_CACHE_DIR` when that is set, else in the user's cache folder, else, when
     nothing there can be written, in one that lasts as long as the process.
     """
-    parent = _parent()
-    folder = parent / f"{source.stem}-{_state_of(source)}"
+    parent = Path(_numba.CACHE_DIR or user_cache()) / "compiled"
+    folder = parent / _kernels_digest()
     try:
         folder.mkdir(parents=True, exist_ok=True)
         folder.touch()
+        with tempfile.TemporaryFile(dir=folder):
+            pass
     except OSError:
         return Path(tempfile.mkdtemp(prefix="wbc_suite_"))
+    with suppress(OSError):
+        _delete_old(parent)
     return folder
 
 
-@cache
-def _parent() -> Path:
-    parent = Path(_numba.CACHE_DIR or user_cache()) / "compiled"
-    with suppress(OSError):
-        _forget_old(parent)
-    return parent
+def _kernels_digest() -> str:
+    """Return a digest of all source files that hold kernels, and of numba's version.
+
+    Numba compiles a function again when its own file changes, not when a function
+    changes that it calls from another file.
+    """
+    digest = hashlib.sha256(numba.__version__.encode())
+    for file in sorted(Path(__file__).parent.rglob("*.py")):
+        source = file.read_bytes()
+        if b"wbc_suite.compiling import" in source or file.name == "compiling.py":
+            digest.update(source)
+    return digest.hexdigest()[:16]
+
+
+def _delete_old(parent: Path) -> None:
+    """Delete folders that no process has used for long."""
+    for folder in parent.iterdir():
+        if time.time() - folder.stat().st_mtime > KEPT:
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 @contextmanager
 def announced(what: str) -> Iterator[None]:
-    """Say what is being compiled when that takes long.
+    """Log what is being compiled, and how far it is, when that takes long.
 
-    Counted is the processor's time: on a busy machine much else takes long as well.
+    The processor's time counts: a busy machine does not cause a message.
     """
     start, done = time.process_time(), threading.Event()
 
     def watch() -> None:
+        said = PATIENCE
         while not done.wait(0.2):
-            if time.process_time() - start > PATIENCE:
-                log.warning("Compiling %s, once on this machine: half a minute", what)
-                return
+            spent = time.process_time() - start
+            if spent > said:
+                said = spent + INTERVAL
+                count = sum(bool(kernel.signatures) for kernel in list(_KERNELS))
+                log.warning(
+                    "Compiling %s, once on this machine, about half a minute: "
+                    "%d of %d functions after %.0f s",
+                    *(what, count, len(_KERNELS), spent),
+                )
 
-    threading.Thread(target=watch, daemon=True).start()
+    thread = threading.Thread(target=watch, daemon=True)
+    thread.start()
     try:
         yield
     finally:
         done.set()
-
-
-def _state_of(source: Path) -> str:
-    """Return a digest of a file and of what it gets from other files."""
-    digest = hashlib.sha256(numba.__version__.encode())
-    for file in sorted(_sources(source)):
-        digest.update(file.read_bytes())
-    return digest.hexdigest()[:16]
-
-
-@cache
-def _sources(source: Path) -> frozenset[Path]:
-    """Return a file and, through all files with compiled functions, what they import.
-
-    Of a file without any only the constants count, and they are in the file itself.
-    """
-    found, waiting = {source}, [source]
-    while waiting:
-        text = waiting.pop().read_text()
-        if _COMPILES.search(text):
-            files = {_file_of(name) for name in _IMPORT.findall(text)}
-            new = {file for file in files if file.is_file()} - found
-            found |= new
-            waiting.extend(new)
-    return frozenset(found)
-
-
-def _file_of(module: str) -> Path:
-    place = _PACKAGE.parent.joinpath(*module.split("."))
-    return place / "__init__.py" if place.is_dir() else place.with_suffix(".py")
-
-
-def _forget_old(parent: Path) -> None:
-    """Delete what is long unused; other processes may be writing what is not."""
-    for folder in parent.iterdir():
-        if time.time() - folder.stat().st_mtime > KEPT:
-            shutil.rmtree(folder, ignore_errors=True)

@@ -1,12 +1,12 @@
-"""The one tree of errors that this package raises.
+"""The errors that this package raises.
 
-Each class also derives from the built-in error that it refines, so that code which
-knows nothing of this package still catches it in a natural way. Messages say what was
-asked, what was found, what is allowed, and what to do.
+Each class also derives from the built-in error that it refines, so that code without
+knowledge of this package can catch it. A message states what was asked, what was found,
+what is allowed, and what to do.
 """
 
 import difflib
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
 __all__ = [
     "ActionError",
@@ -19,27 +19,39 @@ __all__ = [
     "SolverError",
     "UnknownNameError",
     "WbcError",
-    "nearest_name",
+    "did_you_mean",
+    "join_first",
+    "shortened",
 ]
 
 MAX_NAMES = 25
-"""Names that a message lists at most."""
-MAX_LENGTH = 80
-"""Characters of a name that a message shows at most."""
+"""Largest number of names in a message."""
 
 
-def nearest_name(name: str, known: Collection[str]) -> str | None:
-    """Return the known name closest in spelling, or None when none is near.
+def did_you_mean(name: str, known: Collection[str]) -> str:
+    """Return " Did you mean 'x'?" for the closest spelling, or "" if none is close.
 
-    Upper and lower case count as equal.
+    Case is ignored.
     """
     folded = {k.casefold(): k for k in known}
     close = difflib.get_close_matches(name.casefold(), folded, n=1)
-    return folded[close[0]] if close else None
+    return f" Did you mean '{folded[close[0]]}'?" if close else ""
+
+
+def join_first(items: Sequence[str], *, limit: int = 6, separator: str = ", ") -> str:
+    """Join the first items of a list for a message, and count the others."""
+    hidden = len(items) - limit
+    more = f" and {hidden} more" if hidden > 0 else ""
+    return separator.join(items[:limit]) + more
+
+
+def shortened(text: str, limit: int = 80) -> str:
+    """Return a text for a message, cut to a number of characters."""
+    return text if len(text) <= limit else text[: limit - 3] + "..."
 
 
 class WbcError(Exception):
-    """Root of every error that this package raises on purpose."""
+    """Base class of all errors that this package raises."""
 
 
 class ConfigError(WbcError, ValueError):
@@ -47,38 +59,28 @@ class ConfigError(WbcError, ValueError):
 
 
 class DescriptionError(ConfigError):
-    """A robot description contradicts itself or physics."""
+    """A robot description is inconsistent or physically impossible."""
 
 
 class UnknownNameError(WbcError, LookupError):
     """A name is missing from the collection it was looked up in.
 
     Attributes:
-        kind: What the name should be the name of.
-        name: What was asked for.
-        known: The names there are.
+        kind: Kind of item, such as "robot".
+        name: Name that was asked for.
+        known: Existing names.
     """
 
     def __init__(self, kind: str, name: object, known: Collection[str]) -> None:
         asked = name if isinstance(name, str) else repr(name)
-        close = nearest_name(asked, known) if isinstance(name, str) else None
-        hint = f" Did you mean '{close}'?" if close else ""
-        shown = asked if len(asked) <= MAX_LENGTH else asked[:MAX_LENGTH] + "..."
-        super().__init__(
-            f"No {kind} named '{shown}'.{hint} Known: {_list_names(known)}."
-        )
+        hint = did_you_mean(asked, known) if isinstance(name, str) else ""
+        names = join_first(sorted(known), limit=MAX_NAMES) or "none"
+        super().__init__(f"No {kind} named '{shortened(asked)}'.{hint} Known: {names}.")
         self.kind, self.name, self.known = kind, name, tuple(known)
 
     def __reduce__(self) -> tuple[type, tuple[object, ...]]:
-        """Let it pass between processes, as errors of vector environments do."""
+        """Support pickling, since vector environments send errors across processes."""
         return type(self), (self.kind, self.name, self.known)
-
-
-def _list_names(names: Collection[str]) -> str:
-    """List names for a message; a humanoid's hundred frames are cut short."""
-    shown = sorted(names)[:MAX_NAMES]
-    hidden = len(names) - len(shown)
-    return (", ".join(shown) or "none") + (f" and {hidden} more" if hidden else "")
 
 
 class ActionError(WbcError, ValueError):
@@ -86,7 +88,7 @@ class ActionError(WbcError, ValueError):
 
 
 class SolverError(WbcError, RuntimeError):
-    """A QP solver is missing or was asked for something it cannot do."""
+    """A QP solver is not installed, or does not support the request."""
 
 
 class PlacementError(WbcError, RuntimeError):
@@ -94,12 +96,12 @@ class PlacementError(WbcError, RuntimeError):
 
 
 class PhysicsError(WbcError, RuntimeError):
-    """The physics engine reported a fault."""
+    """The physics engine reported an error."""
 
 
 class DatasetError(WbcError, ValueError):
-    """A recording cannot be read or written as asked."""
+    """A recording cannot be read or written."""
 
 
 class DeviceError(WbcError, RuntimeError):
-    """An input device or a server is missing or misbehaves."""
+    """An input device or a server is missing or failed."""

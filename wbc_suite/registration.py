@@ -1,7 +1,9 @@
-"""Make our environments known to Gymnasium, without importing it.
+"""Registration of the benchmarks as Gymnasium environments, `wbc_suite/{name}-v0`.
 
-Gymnasium takes 0.12 s to import, and `import wbc_suite` stays light: the entries are
-added at once if Gymnasium is there already, else right after somebody imports it.
+Importing Gymnasium and NumPy takes 0.15 s, and `import wbc_suite` stays light. So the
+environments are registered at once if Gymnasium is imported already, and otherwise
+right after it is imported, by a finder of Python's import system that removes itself.
+(Gymnasium 1.0 removed its entry points for plugins.)
 """
 
 import importlib.util
@@ -28,7 +30,7 @@ BENCHMARKS = (
 
 
 def register_environments() -> None:
-    """Register now, or as soon as Gymnasium has been imported."""
+    """Register the environments, now or as soon as Gymnasium is imported."""
     if "gymnasium" in sys.modules:
         _register()
     else:
@@ -49,7 +51,7 @@ def _register() -> None:
 
 
 class _GymnasiumFinder(MetaPathFinder):
-    """Finds Gymnasium as usual, once, and registers after it has loaded."""
+    """Finds Gymnasium as usual, once, with a loader that registers."""
 
     def find_spec(
         self,
@@ -67,6 +69,8 @@ class _GymnasiumFinder(MetaPathFinder):
 
 
 class _RegisteringLoader(Loader):
+    """Loads Gymnasium as usual, then registers the environments."""
+
     def __init__(self, loader: Loader) -> None:
         self._loader = loader
 

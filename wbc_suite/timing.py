@@ -1,6 +1,6 @@
-"""CPU times of environment steps, of raw physics from the same states, of pictures.
+"""CPU times of environment steps, of plain physics steps, and of rendered images.
 
-Peers import this in their own environments: it needs MuJoCo and NumPy only.
+Benchmarks of other packages import this module, so it needs only MuJoCo and NumPy.
 """
 
 import time
@@ -28,7 +28,7 @@ def times(count: int, run: Callable[[], object]) -> list[float]:
 
 @dataclass(kw_only=True)
 class Block:
-    """CPU times of environment steps, and of raw physics over the same span, us."""
+    """CPU times of environment steps, and of equally long plain physics, us."""
 
     step: list[float] = field(default_factory=list)
     raw: list[float] = field(default_factory=list)
@@ -41,24 +41,24 @@ class Block:
 
 @dataclass(kw_only=True)
 class Frames:
-    """Times of pictures, us: of all threads' processors, and by the wall clock."""
+    """Times of rendered images, us: CPU time of all threads, and wall time."""
 
     cpu: list[float] = field(default_factory=list)
     wall: list[float] = field(default_factory=list)
 
     def extend(self, other: "Frames") -> None:
-        """Add others' times."""
+        """Add the times of other images."""
         self.cpu += other.cpu
         self.wall += other.wall
 
     @property
     def per_second(self) -> float:
-        """Pictures per second of the wall clock."""
+        """Images per second of wall time."""
         return 1e6 / float(np.median(self.wall))
 
 
 def time_frames(count: int, draw: Callable[[], object]) -> Frames:
-    """Time pictures, one after the other."""
+    """Time the rendering of images in sequence."""
     frames = Frames()
     for _ in range(count):
         start = time.perf_counter_ns()
@@ -75,12 +75,12 @@ def time_block(
     data: mujoco.MjData,
     substeps: int,
 ) -> Block:
-    """Time steps, then `mj_step` from the states they began in, controls held.
+    """Time steps, then `mj_step` from their initial states with constant controls.
 
     Args:
         step: Takes one environment step.
         actions: One per step.
-        model: The environment's own compiled model.
+        model: The environment's compiled model.
         data: Its state.
         substeps: Physics steps of one environment step.
     """

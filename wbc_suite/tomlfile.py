@@ -1,9 +1,10 @@
-"""Read TOML files into frozen pydantic models, with errors that teach.
+"""Read TOML files into frozen pydantic models, with errors that name file and key.
 
-Every file of the catalogue, and every file that a user brings, comes in through
-`load_model`: one place for size limits, for did-you-mean and for the wording.
+All files of the catalogue and of users are read by `load_model`, which enforces the
+size limit and words the errors.
 """
 
+import json
 import tomllib
 import types
 import typing
@@ -12,33 +13,35 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from wbc_suite.errors import ConfigError, nearest_name
+from wbc_suite.errors import ConfigError, did_you_mean, join_first, shortened
 
 __all__ = [
+    "FROZEN",
     "FrozenModel",
     "load_model",
     "parse_model",
     "parse_toml",
+    "read_json",
     "read_text",
     "read_toml",
 ]
 
 MAX_BYTES = 4_000_000
-"""Largest file that is read; the largest of ours has about 60 kB."""
+"""Largest file that is read; the largest in the catalogue has about 60 kB."""
 
 M = TypeVar("M", bound=BaseModel)
 
 
-class FrozenModel(BaseModel):
-    """Base of everything that is read from a file: frozen, no unknown keys."""
+FROZEN = ConfigDict(
+    frozen=True, extra="forbid", allow_inf_nan=False, populate_by_name=True
+)
+"""Configuration of models that are read from a file: frozen, no unknown keys."""
 
-    model_config = ConfigDict(
-        frozen=True,
-        extra="forbid",
-        allow_inf_nan=False,
-        populate_by_name=True,
-        arbitrary_types_allowed=False,
-    )
+
+class FrozenModel(BaseModel):
+    """Base of models that are read from a file."""
+
+    model_config = FROZEN
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -60,8 +63,8 @@ def read_text(path: Path) -> str:
         size = path.stat().st_size
         if size > MAX_BYTES:
             raise ConfigError(
-                f"{path}: {size} bytes, more than the {MAX_BYTES} that a description "
-                "may have. Is this the right file?"
+                f"{path}: the file has {size} bytes; at most {MAX_BYTES} are read. Is "
+                "this the right file?"
             )
         return path.read_text(encoding="utf-8")
     except OSError as error:
@@ -74,14 +77,35 @@ def parse_toml(text: str, *, source: str) -> dict[str, Any]:
     """Parse TOML text.
 
     Raises:
-        ConfigError: If it is not TOML.
+        ConfigError: If the text is not TOML.
     """
     try:
         return tomllib.loads(text)
     except RecursionError as error:
-        raise ConfigError(f"{source}: its values are nested too deep.") from error
-    except ValueError as error:  # no TOML, or a number of thousands of digits
+        raise ConfigError(f"{source}: the values are nested too deeply.") from error
+    except ValueError as error:  # not TOML, or a number with thousands of digits
         raise ConfigError(f"{source}: not a readable TOML file: {error}") from error
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """Parse one JSON file that holds an object.
+
+    Raises:
+        ConfigError: If it is missing, too large, not JSON, or not an object.
+    """
+    text = read_text(path)
+    try:
+        found = json.loads(text, parse_constant=_no_constant)
+    except (ValueError, RecursionError) as error:
+        raise ConfigError(f"{path}: not a readable JSON file: {error}") from error
+    if not isinstance(found, dict):
+        kind = type(found).__name__
+        raise ConfigError(f"{path}: holds {kind}, not an object {{...}}.")
+    return found
+
+
+def _no_constant(text: str) -> float:
+    raise ValueError(f"{text} is not JSON")
 
 
 def load_model(model: type[M], path: Path) -> M:
@@ -98,74 +122,69 @@ def parse_model(
     data: object,
     *,
     source: str,
+    within: str = "",
     error: type[ConfigError] = ConfigError,
 ) -> M:
-    """Validate plain data against a model, with errors in our words."""
+    """Validate plain data against a model.
+
+    Args:
+        model: Model of the data.
+        data: Tables as `parse_toml` returns them.
+        source: File or item, for the message.
+        within: Key of the data in the file, where it is a part of it.
+        error: Class of the error.
+
+    Raises:
+        ConfigError: Names source, key, value and rule of the first faults.
+    """
     try:
         return model.model_validate(data)
     except ValidationError as failure:
-        lines = [_explain(model, item) for item in failure.errors()[:8]]
-        more = failure.error_count() - len(lines)
-        if more > 0:
-            lines.append(f"... and {more} more")
-        raise error(f"{source}: " + "; ".join(lines)) from failure
+        faults = [_explain(model, item, within) for item in failure.errors()]
+        shown = join_first(faults, limit=8, separator="; ")
+        raise error(f"{source}: {shown}") from failure
 
 
-def _explain(model: type[BaseModel], item: Any) -> str:  # pydantic's ErrorDetails
+def _explain(model: type[BaseModel], item: Any, within: str) -> str:
+    """Return one of pydantic's `ErrorDetails` as a sentence with the nearest name."""
     loc: tuple[int | str, ...] = item["loc"]
-    key = _dotted(loc, model)
+    own, _ = _resolve(loc, model)
+    key = ".".join(filter(None, (within, own)))
     if item["type"] == "extra_forbidden":
-        known = _legal_keys(model, loc[:-1])
-        close = nearest_name(str(loc[-1]), known)
-        hint = f" Did you mean '{close}'?" if close else ""
+        _, tables = _resolve(loc[:-1], model)
+        known = [f.alias or n for m in tables for n, f in m.model_fields.items()]
+        hint = did_you_mean(str(loc[-1]), known)
         return f"unknown key '{key}'.{hint} Known: {', '.join(sorted(known))}"
     if item["type"] == "missing":
         return f"missing key '{key}'"
-    value = _shorten(item["input"])
-    message = str(item["msg"]).removeprefix("Value error, ")
-    hint = ""
+    message, hint = str(item["msg"]).removeprefix("Value error, "), ""
     if item["type"] in ("literal_error", "enum") and isinstance(item["input"], str):
         options = str(item["ctx"]["expected"]).replace("'", "").replace(" or ", ", ")
-        close = nearest_name(item["input"], options.split(", "))
-        hint = f" Did you mean '{close}'?" if close else ""
-    where = f"key '{key}' = {value}: " if key else ""
+        hint = did_you_mean(item["input"], options.split(", "))
+    where = f"key '{key}' = {shortened(repr(item['input']))}: " if key else ""
     return f"{where}{message}.{hint}"
 
 
-def _shorten(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 80 else text[:77] + "..."
+def _resolve(
+    loc: tuple[int | str, ...], model: type[BaseModel]
+) -> tuple[str, list[type[BaseModel]]]:
+    """Return a location as in TOML, `link[3].joint.range`, and the models it may have.
 
-
-def _dotted(loc: tuple[int | str, ...], model: type[BaseModel]) -> str:
-    """Write a location as in TOML: `link[3].joint.range`; union tags are dropped."""
+    The tags that pydantic inserts for the members of a union are dropped.
+    """
     text = ""
-    options: list[type[BaseModel]] = [model]
+    models: list[type[BaseModel]] = [model]
     for part in loc:
         if isinstance(part, int):
             text += f"[{part}]"
             continue
-        tagged = [m for m in options if part in _tags(m)]
-        if tagged and len(options) > 1:
-            options = tagged
-            continue
-        if not options and _is_type(part):  # which of `float | tuple` it was not
-            continue
-        text += f".{part}" if text else part
-        options = _below(options, part)
-    return text
-
-
-def _legal_keys(model: type[BaseModel], loc: tuple[int | str, ...]) -> list[str]:
-    """Return the keys that the table at `loc` may have."""
-    options: list[type[BaseModel]] = [model]
-    for part in loc:
-        if isinstance(part, int):
-            continue
-        tagged = [m for m in options if part in _tags(m)]
-        several = tagged and len(options) > 1
-        options = tagged if several else _below(options, part)
-    return [f.alias or n for m in options for n, f in m.model_fields.items()]
+        tagged = [m for m in models if part in _tags(m)]
+        if tagged and len(models) > 1:
+            models = tagged
+        elif models or not _is_type_name(part):
+            text += f".{part}" if text else part
+            models = _value_models(models, part)
+    return text, models
 
 
 def _tags(model: type[BaseModel]) -> tuple[object, ...]:
@@ -178,29 +197,24 @@ def _tags(model: type[BaseModel]) -> tuple[object, ...]:
     return ()
 
 
-def _is_type(part: str) -> bool:
-    """Whether a part of a location is pydantic's name of a type, and no key."""
+def _is_type_name(part: str) -> bool:
+    """Whether a part of a location is pydantic's name of a type instead of a key."""
     return part.startswith(("constrained-", "tuple[", "literal[", "list[")) or part in (
         *("float", "int", "str", "bool", "none"),
     )
 
 
-def _below(options: list[type[BaseModel]], part: str) -> list[type[BaseModel]]:
-    """Return the models of a key's value; a name in a table of models changes none."""
-    fields = {
-        key for m in options for n, f in m.model_fields.items() for key in (n, f.alias)
-    }
-    if part not in fields:
-        return options
-    return [n for m in options for n in _field_models(m, part)]
-
-
-def _field_models(model: type[BaseModel], key: str) -> list[type[BaseModel]]:
-    """Return the models that the value of a key may be parsed into."""
-    for name, field in model.model_fields.items():
-        if key in (name, field.alias):
-            return _models_in(field.annotation)
-    return []
+def _value_models(models: list[type[BaseModel]], key: str) -> list[type[BaseModel]]:
+    """Return the models of a key's value; a key of a free table keeps the models."""
+    fields = [
+        field
+        for model in models
+        for name, field in model.model_fields.items()
+        if key in (name, field.alias)
+    ]
+    if not fields:
+        return models
+    return [found for field in fields for found in _models_in(field.annotation)]
 
 
 def _models_in(annotation: object) -> list[type[BaseModel]]:

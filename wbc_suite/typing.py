@@ -1,10 +1,10 @@
-"""Shared array types.
+"""Types of the package: arrays, and names of the catalogue.
 
-Shapes are told in docstrings: NumPy's types cannot carry them. Values are float64; the
-aliases say `floating`, since NumPy's own stubs lose the width in ordinary arithmetic.
+NumPy's types cannot express shapes; docstrings give them. Values are float64. The
+aliases use `floating`, because NumPy's stubs lose the width in ordinary arithmetic.
 """
 
-from typing import Any, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,4 +19,30 @@ Matrix: TypeAlias = NDArray[np.floating[Any]]
 """Two-dimensional float64 array."""
 
 Indices: TypeAlias = NDArray[np.int64]
-"""One-dimensional integer array that indexes another."""
+"""Integer array of indices."""
+
+RobotName: TypeAlias = Literal[
+    "Baxter",
+    "GR1",
+    "GR1ArmsOnly",
+    "GR1FixedLowerBody",
+    "GR1FloatingBody",
+    "GR1FreeBody",
+    "IIWA",
+    "IIWA14",
+    "Jaco",
+    "Kinova3",
+    "Panda",
+    "PandaDexLH",
+    "PandaDexRH",
+    "PandaOmron",
+    "Sawyer",
+    "Spot",
+    "SpotWithArm",
+    "SpotWithArmFloating",
+    "Tiago",
+    "TiagoDifferential",
+    "UR5e",
+    "XArm7",
+]
+"""Robots of the catalogue, as editors complete them; case is ignored."""

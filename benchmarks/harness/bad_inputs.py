@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from harness.trials import Case, Found
-from wbc_suite.control.composite.parts import part_models
+from wbc_suite.control.part.registry import part_models
 from wbc_suite.envs.env import RobotEnv
 from wbc_suite.errors import ActionError
 from wbc_suite.typing import Vector

@@ -33,7 +33,7 @@ def soonest(stand: Stand, goal: np.ndarray, *, site: str, drives: np.ndarray) ->
     scratch = mujoco.MjData(stand.model)
     scratch.qpos[:] = stand.data.qpos
     q0 = scratch.qpos[drives["qpos"]].copy()
-    lowest, highest = drives["lowest"], drives["highest"]
+    lowest, highest = drives["position_min"], drives["position_max"]
     mujoco.mj_kinematics(stand.model, scratch)
     hand = scratch.site(site)
     start, turned = hand.xpos.copy(), hand.xmat.reshape(3, 3).copy()
@@ -56,7 +56,7 @@ def soonest(stand: Stand, goal: np.ndarray, *, site: str, drives: np.ndarray) ->
         return J.reshape(6, -1)[:, drives["dof"]] / band[:, None]
 
     def is_possible(time: float) -> bool:
-        rng, reach = np.random.default_rng(0), time * drives["fastest"]
+        rng, reach = np.random.default_rng(0), time * drives["velocity_max"]
         low, high = np.maximum(lowest, q0 - reach), np.minimum(highest, q0 + reach)
         for k in range(STARTS):
             first = rng.uniform(low, high) if k else (low + high) / 2.0

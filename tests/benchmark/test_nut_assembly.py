@@ -1,5 +1,5 @@
 import pytest
-from carried import goals, put_at
+from sorted_goals import goals, put_at
 
 import wbc_suite
 

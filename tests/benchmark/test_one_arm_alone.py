@@ -39,7 +39,7 @@ def test_a_hammer_is_handed_over_before_the_second_arm_has_it(robots, way, monke
         task = put(env, hammer=((0.0, 0.0, 1.0), None))
         if handed:
             hold(monkeypatch, task, (True, True))
-            task.watch()
+            task.after_step()
         for holding in HOLDING:
             hold(monkeypatch, task, holding)
             done = handed and holding == (False, True)

@@ -1,7 +1,7 @@
 import mujoco
 import numpy as np
 import pytest
-from carried import goals, put_at
+from sorted_goals import goals, put_at
 
 import wbc_suite
 from wbc_suite.benchmark import load_benchmark
@@ -27,7 +27,7 @@ def test_stages_rise(env):
     stages = env.benchmark.config.stages
 
     def reward(distance, grasped=False, missing=0.25, aside=0.5, over=False):
-        return stages.reward(
+        return stages.value(
             distance=distance, grasped=grasped, missing=missing, aside=aside, over=over
         )
 

@@ -105,5 +105,5 @@ def test_a_robot_that_leaves_no_room_is_told(env, monkeypatch):
     palm = around.region.model_copy(update={"clearance": 0.06})
     sampler = UniformSampler(names=["cubeA"], region=palm, origin=around.origin)
     monkeypatch.setattr(env.benchmark, "sampler", sampler)
-    with pytest.raises(PlacementError, match="a robot touched them"):
+    with pytest.raises(PlacementError, match="a robot touched cubeA"):
         env.reset(seed=0)

@@ -42,7 +42,7 @@ def hold(env, first, second, height=0.2):
 
 def hand_over(env):
     """Let both hold the hammer, and the benchmark see it."""
-    hold(env, first=True, second=True).watch()
+    hold(env, first=True, second=True).after_step()
 
 
 def test_the_second_arm_alone_after_a_handover_is_a_success(held):
@@ -78,7 +78,7 @@ def test_near_misses_are_no_success(held, first, second, handed):
 def test_the_hammer_must_be_10_cm_up(height, counts):
     env = reaching(height)
     task = hold(env, first=True, second=True, height=height)
-    task.watch()
+    task.after_step()
     assert task.held_by_first
     assert task.held_by_second
     assert task.handed == counts

@@ -23,7 +23,7 @@ def started(name, thing):
     env = wbc_suite.make(name, robots="Panda")
     for seed in range(40):
         env.reset(seed=seed)
-        if env.benchmark.active == (thing,):
+        if env.benchmark.sorting.active == (thing,):
             return env
     raise AssertionError(f"{name} never draws {thing}")
 

@@ -17,8 +17,7 @@ def env():
 def wipe_all_but(env, left=()):
     """Mark all as wiped, but some."""
     wipe = env.benchmark
-    wipe._notes[:] = 1.0
-    wipe._notes[list(left)] = 0.0
+    wipe.wipe(~np.isin(np.arange(len(wipe.marks)), list(left)))
     return wipe
 
 
@@ -85,16 +84,16 @@ def test_a_mark_wiped_now_is_rewarded_and_a_reset_brings_it_back(env):
     env.reset(seed=0)
     wipe = env.benchmark
     before = wipe.reward(shaped=True)
-    wipe._fresh = 1
+    wipe._newly_wiped = 1
     most = 50 * 100 + 500 * (0.01 + 25.5)
     assert before < 0.1
     assert 1.0 - 1e-9 < wipe.reward(shaped=True) < 1.0  # 1.4 is cut
-    wipe._fresh = 0
+    wipe._newly_wiped = 0
     wipe.force = 70.0
     assert wipe.reward(shaped=True) == pytest.approx(
         max(before + (0.01 - 0.05 * 70.0) * 500 / most, 0.0)
     )
-    wipe._notes[:] = 1.0
+    wipe.wipe(np.ones(len(wipe.marks)))
     env.reset(seed=1)
     assert not wipe.wiped.any()
     assert wipe.force == 0.0
@@ -118,7 +117,7 @@ def test_another_part_on_the_table_is_a_collision(env):
     press_on(env, wipe.marks[50], TOP - 0.004)
     assert not wipe.collided
     hands, wipe.hands = wipe.hands, []  # as if the pad were another part
-    wipe.watch()
+    wipe.after_step()
     assert wipe.collided
     assert wipe.force == 0.0
     assert wipe.reward(shaped=True) == 0.0
@@ -144,7 +143,7 @@ def test_robots_wipe_with_a_pad_unless_told_otherwise():
 
 
 @pytest.mark.slow
-def test_contact_is_felt_while_the_pad_presses(env):
+def test_contact_is_observed_while_the_pad_presses(env):
     env.reset(seed=0)
     assert env.observation()["robot0_contact"] == 0.0
     assert env.observation()["object-state"].shape == (8,)  # as datasets have it
@@ -155,3 +154,32 @@ def test_contact_is_felt_while_the_pad_presses(env):
 
 def test_a_robot_without_arms_gets_no_pad():
     assert not wbc_suite.make("Wipe", robots="Spot").robots[0].hands
+
+
+def test_distances_to_a_random_hull_are_those_of_the_nearest_point_in_it():
+    rng = np.random.default_rng(0)
+    for size in (2, 3, 4, 7):
+        hull, points = rng.normal(size=(size, 2)), rng.normal(0.0, 2.0, (20, 2))
+        weights = rng.dirichlet(np.full(size, 0.3), 20_000)
+        inside = weights @ hull
+        nearest = [np.linalg.norm(inside - p, axis=1).min() for p in points]
+        found = _distances(hull, points)
+        assert (found <= np.array(nearest) + 1e-9).all()
+        np.testing.assert_allclose(found, nearest, atol=0.05)  # samples are 5 cm apart
+
+
+def test_the_marks_left_are_measured(env):
+    env.reset(seed=3)
+    wipe = wipe_all_but(env, left=[10, 20])
+    middle = wipe.marks[[10, 20]].mean(axis=0)
+    np.testing.assert_allclose(wipe.centroid, middle)
+    assert wipe.portion == pytest.approx(0.98)
+    env.observables.update()
+    seen = env.observation()
+    np.testing.assert_allclose(seen["wipe_centroid"], middle)
+    radius = np.linalg.norm(wipe.marks[10] - middle)
+    assert seen["wipe_radius"] == pytest.approx(radius)
+    wipe_all_but(env)
+    env.observables.update()
+    assert env.observation()["wipe_radius"] == 0.0
+    np.testing.assert_allclose(wipe.centroid, wipe.marks.mean(axis=0))

@@ -1,6 +1,7 @@
 """What benchmarks share: rows, tables, timing, and the page made of them."""
 
 import json
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -58,17 +59,35 @@ def test_the_file_says_where_and_with_what(report, tmp_path, capsys):
     assert "theirs" in capsys.readouterr().out
 
 
-def test_the_page_shows_tables_and_ratios(report, tmp_path):
+def test_the_artefact_shows_tables_and_ratios(report, tmp_path):
     report.show("Steps", ("case", "side", "median_us"))
     script = tmp_path / "steps.py"
     script.write_text('"""What steps cost.\n\nWords.\n\nUsage: none\n"""\n')
     found = {"rows": report.rows, "ratios": report.ratios, "tables": report.tables}
     text = write_benchmarks.section(script, found)
-    assert text.startswith("## What steps cost\n")
+    assert text.startswith("# What steps cost\n")
     assert "Words." in text
     assert "Usage" not in text
     assert "| Lift | theirs | 20 |" in text
     assert "| `Lift/theirs` | 0.1 |" in text
+
+
+def test_the_page_shows_each_goal_once_with_its_figure():
+    found = {Path("a.py"): {"ratios": {"GR1/mink": 0.123, "GR1/placo": 0.9, "x": 1.0}}}
+    lines = write_benchmarks.goals(found).splitlines()[2:]
+    assert len(lines) == len(write_benchmarks.GOALS) + len(write_benchmarks.AT_LEAST)
+    (mink,) = (line for line in lines if "`GR1/mink`" in line)
+    assert mink.endswith("| at most 0.2 | 0.123 |")
+    (reset,) = (line for line in lines if "`Lift/Panda/reset/1ms`" in line)
+    assert reset.endswith("| at most 1 |  |")  # not measured
+
+
+def test_the_page_in_docs_names_all_goals_and_scripts():
+    text = write_benchmarks.PAGE.read_text(encoding="utf-8")
+    for name, *_ in (*write_benchmarks.GOALS, *write_benchmarks.AT_LEAST):
+        assert f"| `{name}` |" in text
+    assert write_benchmarks.contents() in text
+    assert len(text.splitlines()) < 60
 
 
 def test_every_script_takes_quick_and_json():

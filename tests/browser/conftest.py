@@ -12,8 +12,8 @@ import pinocchio as pin
 import pytest
 
 import wbc_suite
-from wbc_suite.viewers.keeping_time import SWITCH_INTERVAL
-from wbc_suite.viewers.site import Site
+from wbc_suite.viewers.loop_timing import SWITCH_INTERVAL
+from wbc_suite.viewers.page_server import PageServer
 from wbc_suite.viewers.teleop_page import TeleopPage
 from wbc_suite.viewers.teleop_session import TeleopSession
 
@@ -61,7 +61,7 @@ class Viewer:
 
     Args:
         context: Browser context.
-        site: Site to open.
+        site: PageServer to open.
         size: Of the page, in pixels.
         dots: Drawn per pixel; fewer cost a browser without graphics card less. Below
             one there are no shadows either: two thirds of what a picture costs.
@@ -205,7 +205,7 @@ def served(robot, controller="WHOLE_BODY_IK", host="127.0.0.1"):
     session = TeleopSession(env, period=1 / RATE)
     for limb in session.limbs.values():  # a slow browser is not a frozen one
         limb.ownership.timeout = PATIENCE
-    page = TeleopPage(session, Site(host, port=0), label=f"{robot} · Lift")
+    page = TeleopPage(session, PageServer(host, port=0), label=f"{robot} · Lift")
     page.start()
     session.start()
     return session, page

@@ -10,13 +10,13 @@ import pytest
 from conftest import PATIENCE, RATE, TRIES, Viewer, note, wait_until
 
 import wbc_suite
-from wbc_suite.cli.by_hand import stages_of
+from wbc_suite.cli.teleop import stages_of
 from wbc_suite.devices.stream import Stream
 from wbc_suite.recording import Dataset, rebuild
-from wbc_suite.recording.desk import RecordingDesk
+from wbc_suite.recording.episode_control import EpisodeControl
 from wbc_suite.recording.replaying import divergence
-from wbc_suite.viewers.keeping_time import SWITCH_INTERVAL
-from wbc_suite.viewers.site import Site
+from wbc_suite.viewers.loop_timing import SWITCH_INTERVAL
+from wbc_suite.viewers.page_server import PageServer
 from wbc_suite.viewers.teleop_page import TeleopPage
 from wbc_suite.viewers.teleop_session import TeleopSession
 from wbc_suite.wrappers import DataCollection
@@ -49,7 +49,10 @@ class Room:
             horizon=10**7,
         )
         collection = DataCollection(env, path, automatic=False)
-        self.env, self.desk = collection, RecordingDesk(collection.recorder, seed=seed)
+        self.env, self.episode_control = (
+            collection,
+            EpisodeControl(collection.recorder, seed=seed),
+        )
         self.stream = Stream(port=0)
         self.stream.start()
         self.session = TeleopSession(
@@ -57,10 +60,12 @@ class Room:
             period=1.0 / RATE,
             device=self.stream,
             pipeline=stages_of(device=True, scale=1.0, mirror=False),
-            desk=self.desk,
+            episode_control=self.episode_control,
         )
         self.session.tick()
-        self.page = TeleopPage(self.session, Site(port=0), label=f"{robot} records")
+        self.page = TeleopPage(
+            self.session, PageServer(port=0), label=f"{robot} records"
+        )
         self.page.start()
         self.session.start()
         self.viewer = Viewer(context, self.page.site, watching=watching)
@@ -123,10 +128,10 @@ class Room:
             self.press(key)
 
     def switch_to(self, name):
-        while (before := self.session.snapshot.switched_to) != name:
+        while (before := self.session.snapshot.selected) != name:
             self.press("Tab")
             wait_until(
-                lambda before=before: self.session.snapshot.switched_to != before,
+                lambda before=before: self.session.snapshot.selected != before,
                 "the next hand",
             )
 

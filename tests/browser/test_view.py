@@ -4,14 +4,14 @@ import pytest
 from conftest import Viewer, wait_until
 
 import wbc_suite
+from wbc_suite.viewers.page_server import PageServer
 from wbc_suite.viewers.robot_page import RobotPage
-from wbc_suite.viewers.site import Site
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 
 def test_buttons_and_toggles_change_what_is_seen(context):
-    page = RobotPage(wbc_suite.load_robot("GR1"), Site(port=0))
+    page = RobotPage(wbc_suite.load_robot("GR1"), PageServer(port=0))
     try:
         viewer = Viewer(context, page.site, dots=1.0)
         elbow = "right_elbow_pitch_joint"
@@ -20,7 +20,7 @@ def test_buttons_and_toggles_change_what_is_seen(context):
         wait_until(lambda: page.position(elbow) == 0.0, "the posture changes")
         viewer.page.get_by_role("button", name="ready").click()
         wait_until(lambda: page.position(elbow) != 0.0, "the posture changes back")
-        shapes = page.mirror.collision_shapes
+        shapes = page.scene.collision_shapes
         assert not any(shape.visible for shape in shapes)
         viewer.page.get_by_label("Collision shapes").click()
         wait_until(lambda: all(s.visible for s in shapes), "collision shapes appear")

@@ -2,8 +2,8 @@ from importlib import metadata
 
 import pytest
 
-from wbc_suite.cli import diagnosis
-from wbc_suite.cli.diagnosis import State, diagnose
+from wbc_suite.cli import doctor
+from wbc_suite.cli.doctor import State, diagnose
 from wbc_suite.sensing import gl_backend
 
 
@@ -20,7 +20,7 @@ def test_parts_of_mujoco_of_different_versions_are_found(monkeypatch):
     version = metadata.version
     wrong = {"mujoco-core": "3.9.0"}
     monkeypatch.setattr(metadata, "version", lambda n: wrong.get(n) or version(n))
-    (finding,) = diagnosis._mujoco()
+    (finding,) = doctor._mujoco()
     assert finding.state is State.BROKEN
     assert finding.cure.endswith("mujoco mujoco-core mujoco-studio")
 
@@ -29,24 +29,24 @@ def test_a_mujoco_that_lost_its_files_is_found(monkeypatch):
     def fail(name: str) -> None:
         raise ImportError("core bindings are missing\nmore")
 
-    monkeypatch.setattr(diagnosis.importlib, "import_module", fail)
-    (finding,) = diagnosis._mujoco()
+    monkeypatch.setattr(doctor.importlib, "import_module", fail)
+    (finding,) = doctor._mujoco()
     assert finding.state is State.BROKEN
     assert "core bindings are missing" in finding.text
 
 
 def test_a_missing_package_comes_with_its_command(monkeypatch):
-    monkeypatch.setattr(diagnosis, "_required", lambda: ["no-such-thing"])
-    first, _ = diagnosis._packages()
+    monkeypatch.setattr(doctor, "_required", lambda: ["no-such-thing"])
+    first, _ = doctor._packages()
     assert (first.state, first.cure) == (State.BROKEN, "pip install no-such-thing")
 
 
 def test_no_opengl_is_a_note_with_the_command_that_mends_it(monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.delenv("MUJOCO_GL", raising=False)
-    monkeypatch.setattr(gl_backend, "_ask_subprocess", lambda name: None)
+    monkeypatch.setattr(gl_backend, "_gl_renderer", lambda name: None)
     try:
-        (finding,) = diagnosis._drawing()
+        (finding,) = doctor._rendering()
     finally:
         gl_backend.activate.cache_clear()
     assert finding.state is State.OPTIONAL
@@ -59,7 +59,7 @@ def test_an_absent_solver_is_named(monkeypatch, absent):
 
     known = [name for name in qpsolvers.available_solvers if name != absent]
     monkeypatch.setattr(qpsolvers, "available_solvers", known)
-    *_, finding = diagnosis._solvers()
+    *_, finding = doctor._solvers()
     expected = State.BROKEN if absent == "osqp" else State.OPTIONAL
     assert absent in finding.text
     assert finding.state is expected

@@ -1,16 +1,16 @@
 import numpy as np
 import pytest
 
-from wbc_suite.control import ActionLayout, ActionPart
+from wbc_suite.control import ActionLayout, ActionPart, Axis, SliceKind, Unit
 from wbc_suite.errors import ActionError, ConfigError, UnknownNameError
 
 
 def part(name, size):
     return ActionPart(
         name=name,
-        kind="position",
+        kind=SliceKind.POSITION,
         labels=tuple("xyz"[:size]),
-        units=("m",) * size,
+        units=(Unit("m"),) * size,
         low=(-1.0,) * size,
         high=(2.0,) * size,
     )
@@ -107,3 +107,29 @@ def test_take_refuses_what_is_not_finite(layout, bad):
         layout.take(np.array([0.0, 0.0, 0.0, bad, 0.0]))
     with pytest.raises(ActionError, match="shape"):
         layout.take(np.zeros(4))
+
+
+def test_units_print_what_a_value_of_1_means():
+    assert (str(Unit("rad")), str(Unit("rad", 0.05))) == ("rad", "0.05 rad")
+    assert str(Unit("m", 1.0)) == "1 m"
+    assert Unit("m") != Unit("m", 1.0)
+
+
+def test_a_layout_prints_axes_and_each_unit_once():
+    hand = ActionPart(
+        name="hand",
+        kind=SliceKind.POSE,
+        labels=(Axis.X, Axis.RX),
+        units=(Unit("m", 0.05), Unit("rad", 0.5)),
+        low=(-1.0, -1.0),
+        high=(1.0, 1.0),
+    )
+    header, row = str(ActionLayout([hand])).splitlines()
+    assert header.split() == ["slice", "kind", "index", "values", "unit", "low", "high"]
+    assert " ".join(row.split()) == "hand pose 0:2 x rx 0.05 m 0.5 rad -1 1"
+
+
+def test_a_prefix_renames_a_part_and_keeps_the_rest(layout):
+    renamed = layout["hand"].prefixed("robot1_")
+    assert renamed.name == "robot1_hand"
+    assert (renamed.kind, renamed.labels) == (SliceKind.POSITION, ("x", "y", "z"))

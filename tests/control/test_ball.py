@@ -5,7 +5,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from wbc_suite.control.composite.goals import action_of_pose
+from wbc_suite.control.composite.frame_kinds import find_frame_kind
 
 HANDS = ("right_hand", "left_hand")
 
@@ -20,7 +20,9 @@ def random_pose(rng):
 
 def send(scene, poses):
     layout = scene.controller.layout
-    values = {name: action_of_pose("pose", pose) for name, pose in poses.items()}
+    values = {
+        name: find_frame_kind("pose").values(pose) for name, pose in poses.items()
+    }
     action = layout.pack(values, base=scene.controller.hold_action)
     scene.controller.set_goal(layout.clip(action)[0])
 

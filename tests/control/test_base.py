@@ -34,7 +34,7 @@ def test_full_input_is_the_speed_of_the_base(alone, robot, labels):
     linear, angular = rig.robot.root.velocity
     assert part.labels == labels
     assert part.high == (1.0,) * len(labels)
-    assert part.units == tuple(
+    assert tuple(map(str, part.units)) == tuple(
         f"{angular:g} rad/s" if x == "turn" else f"{linear:g} m/s" for x in labels
     )
     action = np.zeros(rig.controller.layout.size)

@@ -6,7 +6,7 @@ import pytest
 import wbc_suite
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.control import load_composite_controller_config
-from wbc_suite.control.composite.parts import hands_of, motors, parts_of
+from wbc_suite.control.robot_parts import hands_of, motors, parts_of
 from wbc_suite.errors import ConfigError
 
 ROBOTS = Catalogue().names("robots")

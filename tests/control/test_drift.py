@@ -8,7 +8,7 @@ import pytest
 
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.control import build_composite_controller
-from wbc_suite.control.composite.parts import hands_of
+from wbc_suite.control.robot_parts import hands_of
 from wbc_suite.envs import Simulation
 
 PERIOD, SECONDS = 0.05, 2.0

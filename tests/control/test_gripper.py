@@ -28,7 +28,7 @@ def command(rig, value, seconds):
 )
 def test_widths_end_at_the_stroke_of_the_data_sheet(alone, name, stroke):
     part = gripper(alone, name, input="width").controller.layout["right_gripper"]
-    assert (part.labels, part.units) == (("width",), ("m",))
+    assert (part.labels, tuple(map(str, part.units))) == (("width",), ("m",))
     assert part.high[0] - part.low[0] == pytest.approx(stroke, abs=4e-3)
     assert 0.0 <= part.low[0] < 2e-3
 

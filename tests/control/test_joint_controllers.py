@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wbc_suite.catalogue import Catalogue
-from wbc_suite.control.composite.parts import parts_of
+from wbc_suite.control.robot_parts import parts_of
 from wbc_suite.errors import ConfigError
 from wbc_suite.robot import load_robot
 

@@ -1,14 +1,13 @@
-"""Laws in joint space: kernels against readable forms, and those against Pinocchio."""
+"""Laws in joint space: kernels against NumPy, and against Pinocchio."""
 
 import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
+from textbook_laws import commands, kernel_commands
 
 from wbc_suite.catalogue import Catalogue
-from wbc_suite.control.composite.parts import parts_of
-from wbc_suite.control.loop import advance
-from wbc_suite.control.part.law import commands
+from wbc_suite.control.robot_parts import parts_of
 from wbc_suite.robot import load_robot
 
 ROBOTS = Catalogue().names("robots")
@@ -61,10 +60,10 @@ def draw_targets(laws, drives, state, rng):
     drives["jerk"] = 20.0 * rng.normal(size=count)
     drives["kp"] = rng.uniform(0.0, 900.0, size=count)
     drives["kd"] = rng.uniform(0.0, 60.0, size=count)
-    drives["most"] = rng.choice([np.inf, 5.0], size=count)
-    drives["leash"] = rng.choice([np.inf, 0.1], size=count)
-    drives["lowest"] = rng.choice([-np.inf, -1.0], size=count)
-    drives["highest"] = rng.choice([np.inf, 1.0], size=count)
+    drives["correction_max"] = rng.choice([np.inf, 5.0], size=count)
+    drives["windup_max"] = rng.choice([np.inf, 0.1], size=count)
+    drives["position_min"] = rng.choice([-np.inf, -1.0], size=count)
+    drives["position_max"] = rng.choice([np.inf, 1.0], size=count)
     laws["since"] = rng.uniform(0.0, 0.1, size=len(laws))
     laws["duration"] = rng.choice([np.inf, 0.05], size=len(laws))
     laws["compensation"] = rng.choice([0.0, 1.0], size=len(laws))
@@ -74,7 +73,7 @@ def draw_targets(laws, drives, state, rng):
     "name",
     [r if r in FAST else pytest.param(r, marks=pytest.mark.slow) for r in ROBOTS],
 )
-def test_kernels_give_what_the_readable_forms_give(alone, name):
+def test_kernels_equal_the_formulas(alone, name):
     robot = load_robot(name)
     rig = alone(robot, "BASIC", **mixed_parts(robot))
     state, simulation = rig.state, rig.simulation
@@ -84,12 +83,11 @@ def test_kernels_give_what_the_readable_forms_give(alone, name):
     for _ in range(count):
         draw_state(state, rng)
         draw_targets(laws, drives, state, rng)
-        told = laws.copy(), drives.copy()
+        records = laws.copy(), drives.copy()
         plain = commands(state, rig.controller.laws)
         moved = drives["position"].copy()
-        laws[:], drives[:] = told
-        advance(*simulation._bound, 1, True)
-        compiled = state.data.ctrl[state.actuator_ids]
+        laws[:], drives[:] = records
+        compiled = kernel_commands(simulation, state)
         np.testing.assert_allclose(compiled, plain, rtol=1e-10, atol=1e-10)
         np.testing.assert_allclose(drives["position"], moved, rtol=0.0, atol=1e-12)
 
@@ -103,16 +101,16 @@ def test_joint_law_is_inverse_dynamics_by_pinocchio(alone, name):
     rig = alone(robot, "BASIC", **one_kind(robot, "JOINT_POSITION"))
     state, law_drives = rig.state, rig.simulation._drives
     model = robot.to_pinocchio()
-    law_drives["low"], law_drives["high"] = -np.inf, np.inf
-    law_drives["lowest"], law_drives["highest"] = -np.inf, np.inf
-    law_drives["fastest"] = np.inf
+    law_drives["command_min"], law_drives["command_max"] = -np.inf, np.inf
+    law_drives["position_min"], law_drives["position_max"] = -np.inf, np.inf
+    law_drives["velocity_max"] = np.inf
     rng = np.random.default_rng(5)
     for _ in range(20):
         draw_state(state, rng)
         for law in rig.controller.laws:
             aim = state.data.qpos[law.drives["qpos"]] + rng.normal(size=len(law.joints))
             law.aim(aim)
-        tau = commands(state, rig.controller.laws)
+        tau = kernel_commands(rig.simulation, state)
         asked = np.zeros(state.model.nv)
         for law in rig.controller.laws:
             if law.record["kind"][0] == 0:
@@ -135,7 +133,7 @@ def test_torque_law_adds_gravity_and_coriolis_by_pinocchio(alone):
     robot = load_robot("Panda")
     rig = alone(robot, "BASIC", body_parts={"right": {"type": "JOINT_TORQUE"}})
     state, law = rig.state, rig.controller.parts["right"].law
-    law.drives["low"], law.drives["high"] = -np.inf, np.inf
+    law.drives["command_min"], law.drives["command_max"] = -np.inf, np.inf
     model = robot.to_pinocchio()
     rng = np.random.default_rng(6)
     for compensation in (1.0, 0.0):
@@ -143,7 +141,7 @@ def test_torque_law_adds_gravity_and_coriolis_by_pinocchio(alone):
         draw_state(state, rng)
         wanted = rng.normal(size=7)
         law.aim(wanted)
-        tau = commands(state, rig.controller.laws)[law.outputs]
+        tau = kernel_commands(rig.simulation, state)[law.outputs]
         force = pin.nonLinearEffects(model, model.createData(), state.q, state.v)
         carried = compensation * force[law.drives["dof"]]
         np.testing.assert_allclose(tau, wanted + carried, atol=1e-8)

@@ -1,9 +1,13 @@
 import numpy as np
 import pytest
+from textbook_laws import observe
 
-from wbc_suite.control.part.joint import JointLaw
-from wbc_suite.control.part.law import observe
-from wbc_suite.robot.mjcf import STOP_MARGIN
+from wbc_suite.compiling import as_argument, plain
+from wbc_suite.control.law.joint_laws import JointLaw
+from wbc_suite.control.loop.acceleration_limits import acceleration_limits
+from wbc_suite.control.loop.inverse_dynamics import write_commands
+from wbc_suite.control.loop.physics import bind_physics
+from wbc_suite.robot.mjcf_export import STOP_MARGIN
 
 JOINTS = tuple(f"panda_joint{i}" for i in range(1, 8))
 
@@ -23,6 +27,15 @@ def run(panda, seconds):
         rows.append((data.qpos[law.drives["qpos"]], data.qvel[law.drives["dof"]]))
     q, v = zip(*rows, strict=True)
     return np.array(q), np.array(v)
+
+
+def as_plain_python(simulation):
+    """Run the laws of a simulation without numba from now on."""
+    physics = bind_physics(simulation.model, simulation.data)
+    records = [x.view(np.recarray) for x in simulation._law_arguments[1:3]]
+    simulation._law_arguments = (physics, *records, *simulation._law_arguments[3:])
+    simulation._write_commands = plain(write_commands)
+    simulation.compiled = False
 
 
 @pytest.fixture
@@ -48,24 +61,26 @@ def test_joints_stop_at_their_limits_however_fast_they_come(panda):
 def test_a_joint_outside_its_limits_comes_back(panda):
     law = panda.controller.parts["right"].law
     law.keep_limits(panda.state)
-    law.drives["highest"][6] = panda.state.data.qpos[law.drives["qpos"][6]] - 0.3
+    law.drives["position_max"][6] = panda.state.data.qpos[law.drives["qpos"][6]] - 0.3
     q, v = run(panda, 1.0)
-    assert q[-1, 6] == pytest.approx(law.drives["highest"][6], abs=1e-3)
-    assert np.abs(v[:, 6]).max() <= law.drives["fastest"][6] + 1e-3
+    assert q[-1, 6] == pytest.approx(law.drives["position_max"][6], abs=1e-3)
+    assert np.abs(v[:, 6]).max() <= law.drives["velocity_max"][6] + 1e-3
 
 
 def test_the_window_lets_a_joint_brake_with_its_own_deceleration(panda):
     law = panda.controller.parts["right"].law
     law.keep_limits(panda.state)
     drives, data = law.drives, panda.state.data
-    drives["braking"], drives["highest"] = 2.0, data.qpos[drives["qpos"]] + 0.5
-    drives["fastest"], drives["lowest"] = np.inf, -np.inf
+    drives["deceleration"] = 2.0
+    drives["position_max"] = data.qpos[drives["qpos"]] + 0.5
+    drives["velocity_max"], drives["position_min"] = np.inf, -np.inf
     data.qvel[drives["dof"]] = np.sqrt(2 * 2.0 * 0.5 + (2.0 / 50) ** 2) - 2.0 / 50
-    a = law.within_limits(panda.state, np.full(7, 1e6))
+    physics = as_argument(bind_physics(panda.state.model, data))
+    limits = np.array([acceleration_limits(physics, drive) for drive in drives])
     # On the profile: b u / (u + b / r), a little less than b.
     u = data.qvel[drives["dof"]]
-    np.testing.assert_allclose(a, -2.0 * u / (u + 2.0 / 50), rtol=1e-12)
-    assert (law.within_limits(panda.state, np.full(7, -1e6)) == -1e6).all()
+    np.testing.assert_allclose(limits[:, 1], -2.0 * u / (u + 2.0 / 50), rtol=1e-12)
+    assert (limits[:, 0] == -np.inf).all()
 
 
 def test_the_observer_finds_a_constant_force_and_takes_it_away(panda):
@@ -85,7 +100,8 @@ def test_the_observer_finds_a_constant_force_and_takes_it_away(panda):
 def test_the_observer_does_not_wind_up_while_a_motor_is_at_its_limit(panda):
     law = panda.controller.parts["right"].law
     law.record["observer"] = 30.0
-    law.drives["low"], law.drives["high"] = -20.0, 20.0  # less than gravity takes
+    law.drives["command_min"] = -20.0  # less than gravity takes
+    law.drives["command_max"] = 20.0
     run(panda, 0.2)
     assert np.abs(law.drives["disturbance"]).max() < 0.5
     observe(panda.state, [law])
@@ -93,12 +109,13 @@ def test_the_observer_does_not_wind_up_while_a_motor_is_at_its_limit(panda):
 
 
 @pytest.mark.slow
-def test_compiled_and_readable_observer_and_window_agree(alone):
+def test_compiled_and_plain_observer_and_limits_agree(alone):
     ends = []
     for compiled in (True, False):
         robot = alone("Panda", "BASIC", **joint_parts())
         robot.simulation.start()
-        robot.simulation.compiled = compiled
+        if not compiled:
+            as_plain_python(robot.simulation)
         law = robot.controller.parts["right"].law
         law.keep_limits(robot.state)
         law.record["observer"] = 30.0

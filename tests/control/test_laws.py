@@ -1,14 +1,17 @@
 import numpy as np
 import pinocchio as pin
 import pytest
+import textbook_approach
+from textbook_laws import contact_forces
 
-from wbc_suite.control.part.approach import (
-    approach_pose,
-    approach_speed,
-    travel_time,
+from wbc_suite.control.loop.records import LAW, new_records
+from wbc_suite.control.part.approach import approach_pose, approach_speed
+from wbc_suite.control.part.spline_reference import (
+    SplineReference,
+    lead_root,
+    window_length,
 )
-from wbc_suite.control.part.reference import Reference, mean_over
-from wbc_suite.control.part.stance import contact_forces
+from wbc_suite.kinematics import Configuration
 from wbc_suite.robot import load_robot
 
 
@@ -40,7 +43,7 @@ def test_contacts_never_pull():
 
 def test_approach_never_brakes_harder_than_asked():
     d = np.linspace(1e-6, 2.0, 20000)
-    v = approach_speed(d, rate=50.0, speed=np.inf, acceleration=4.0)
+    v = np.array([approach_speed(x, 1.0 / 50.0, 4.0) for x in d.tolist()])
     deceleration = v[1:] * np.diff(v) / np.diff(d)
     assert deceleration.max() <= 4.0 + 1e-3
     assert v[0] == pytest.approx(50.0 * d[0], rel=1e-3)
@@ -58,30 +61,31 @@ def test_approach_from_far_takes_about_the_time_of_the_parabola():
     assert dt * ticks == pytest.approx(np.sqrt(2 * 0.5 / 4.0), abs=0.1)
 
 
-def test_travel_time_is_that_of_the_fastest_profile():
-    distance, speed, braking = (
-        np.array([0.0, 0.5, 3.0]),
-        np.full(3, 2.0),
-        np.full(3, 4.0),
-    )
-    times = travel_time(distance, speed=speed, acceleration=braking)
-    # Nothing; a triangle that peaks at sqrt(2) m/s; 1 m of ramps and 2 m at 2 m/s.
-    np.testing.assert_allclose(times, [0.0, np.sqrt(0.5), 2.0])
+def test_a_nearer_goal_is_that_of_the_formula():
+    rng = np.random.default_rng(0)
+    for size in (0.0, 1e-6, 1e-2, 0.3, 2.0):
+        now = pin.SE3(pin.exp3(rng.normal(size=3)), rng.normal(size=3))
+        goal = now * pin.exp6(size * rng.normal(size=6))
+        settings = {"dt": 0.01, "gain": 0.4, "speed": (0.5, 2.0)}
+        settings["acceleration"] = (3.0, 9.0)
+        expected = textbook_approach.approach_pose(now, goal, **settings)
+        found = approach_pose(now, goal, **settings)
+        np.testing.assert_allclose(found, expected, atol=1e-13)
 
 
 def sampled_reference(mean, rates, samples=4):
     """Return solved configurations, then p, v, a of the reference, sampled finely."""
     model = load_robot("Panda").to_pinocchio()
     index = np.arange(3)
-    reference = Reference(model, index, index, 0.01, mean=mean)
-    q0 = np.zeros(model.nq)
-    reference.reset(q0)
-    solved, sampled = [q0[:3]], []
+    configuration = Configuration(model, np.zeros(model.nq))
+    reference = SplineReference(configuration, index, index, 0.01, mean=mean)
+    solved, sampled = [np.zeros(3)], []
     for rate in rates:
         v = np.zeros(model.nv)
         v[:3] = rate
-        solved.append(reference.extend(v)[:3])
-        p, r, c, j = reference.polynomial()
+        reference.extend(v)
+        solved.append(configuration.q[:3].copy())
+        p, r, c, j = reference.motion.copy()
         for s in np.linspace(0.01 / samples, 0.01, samples):
             a = c + s * j
             sampled.append(
@@ -113,7 +117,7 @@ def test_the_reference_keeps_every_limit_of_what_was_solved(mean):
     )
     jerk = np.abs(steps[:, 2]).max() / spans
     assert jerk <= 2.0 * most / (mean * dt) * (1.0 + 1e-6)
-    assert mean_over(most, jerk, dt) <= mean
+    assert window_length(most, jerk, dt) <= mean
     assert jerk > most / (mean * dt), "the worst was asked for"
 
 
@@ -129,17 +133,24 @@ def test_the_reference_arrives_where_the_last_solve_was(mean):
 def test_a_mean_of_turned_roots_is_a_turn_and_arrives():
     model = load_robot("GR1FreeBody").to_pinocchio()
     none = np.zeros(0, dtype=np.int64)
-    reference = Reference(model, none, none, 0.01, mean=3)
-    rng, q = np.random.default_rng(2), pin.neutral(model)
-    reference.reset(q)
+    configuration = Configuration(model)
+    reference = SplineReference(configuration, none, none, 0.01, mean=3)
+    rng, record = np.random.default_rng(2), new_records(1, LAW)
+
+    def lead() -> None:
+        lead_root(reference.argument, record)
+
     for _ in range(8):
-        q = reference.extend(rng.normal(size=model.nv))
-        turn = reference.root_motion().start.rotation
+        reference.extend(rng.normal(size=model.nv))
+        lead()
+        turn = record["start"][0, :9].reshape(3, 3)
         np.testing.assert_allclose(turn @ turn.T, np.eye(3), atol=1e-12)
     for _ in range(5):
         reference.extend(np.zeros(model.nv))
-    motion = reference.root_motion()
-    assert motion.start.isApprox(pin.XYZQUATToSE3(q[:7]), 1e-12)
-    assert (
-        np.abs(np.concatenate([motion.twist, motion.curve, motion.bend])).max() < 1e-8
-    )
+    lead()
+    expected = pin.XYZQUATToSE3(configuration.q[:7])
+    np.testing.assert_allclose(turn, expected.rotation, atol=1e-12)
+    np.testing.assert_allclose(record["start"][0, 9:], expected.translation, atol=1e-12)
+    stance = record["stance"]
+    rates = np.concatenate([stance[n] for n in ("twist", "curve", "bend")])
+    assert np.abs(rates).max() < 1e-8

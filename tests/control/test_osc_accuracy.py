@@ -5,7 +5,7 @@ import pinocchio as pin
 import pytest
 from osc_rig import OscRig
 
-from wbc_suite.control.part.osc_config import OscConfig
+from wbc_suite.control.part.osc_controller import OscConfig
 
 ARMS = ("Panda", "Sawyer", "UR5e", "Baxter", "Tiago")
 EVERY_ARM = [
@@ -47,7 +47,7 @@ def step(one, change, seconds=2.0):
 def needed(one, before):
     """Return how long the slowest joint takes at its top speed, s."""
     q = one.data.qpos[one.law.drives["qpos"]]
-    return float(np.max(np.abs(q - before) / one.law.drives["fastest"]))
+    return float(np.max(np.abs(q - before) / one.law.drives["velocity_max"]))
 
 
 def steps():

@@ -1,4 +1,4 @@
-"""The law in operational space: compiled, readable, and from other libraries."""
+"""The law in operational space against NumPy, QP solvers and Pinocchio."""
 
 import mujoco
 import numpy as np
@@ -6,13 +6,12 @@ import pinocchio as pin
 import pytest
 import qpsolvers
 from osc_rig import OscRig
+from textbook_laws import commands, kernel_commands, textbook
 
 from wbc_suite.catalogue import Catalogue
-from wbc_suite.control.loop import bind_physics, needed, physics_table
-from wbc_suite.control.loop.kernels import control
-from wbc_suite.control.loop.least_change import least_change
-from wbc_suite.control.loop.straight import POSTURE_COST, SHORTENING_COST
+from wbc_suite.control.law.osc_saturation import POSTURE_COST, SHORTENING_COST
 from wbc_suite.qp import Problem
+from wbc_suite.qp.least_change import least_change
 from wbc_suite.qp.solver import DaqpSolver
 from wbc_suite.robot import load_robot
 
@@ -29,7 +28,10 @@ def random_state(rig, rng):
     """Put robot, gains, target and disturbance anywhere; return nothing."""
     model, data, law = rig.state.model, rig.data, rig.law
     drives = law.drives
-    low, high = np.maximum(drives["lowest"], -3.0), np.minimum(drives["highest"], 3.0)
+    low, high = (
+        np.maximum(drives["position_min"], -3.0),
+        np.minimum(drives["position_max"], 3.0),
+    )
     data.qpos[drives["qpos"]] = rng.uniform(low, high)
     data.qvel[:] = 0.5 * rng.normal(size=model.nv)
     mujoco.mj_step1(model, data)
@@ -42,31 +44,28 @@ def random_state(rig, rng):
     )
     law.set_goal(goal, start=pose, duration=rng.uniform(0.0, 0.1))
     drives["disturbance"] = rng.normal(size=len(drives))
-    drives["before"] = data.qvel[drives["dof"]]
+    drives["last_velocity"] = data.qvel[drives["dof"]]
     drives["position"] = data.qpos[drives["qpos"]] + 0.2 * rng.normal(size=len(drives))
 
 
 def disagreement(rig, seed):
-    """Return how far compiled and readable forms are apart, relative, in one state."""
+    """Return how far kernel and formula are apart, relative, in one state."""
     random_state(rig, np.random.default_rng(seed))
-    simulation, data = rig.simulation, rig.data
+    simulation = rig.simulation
     tables = simulation._laws.copy(), simulation._drives.copy()
-    readable = rig.controller.compute(rig.state).copy()
-    asked = rig.law.drives["asked"].copy()
+    expected = commands(rig.state, rig.controller.laws)
+    asked = rig.law.drives["desired"].copy()
     simulation._laws[:], simulation._drives[:] = tables
-    arrays = physics_table(bind_physics(rig.state.model, data))
-    laws, drives = simulation._laws, simulation._drives
-    control(simulation.timestep, arrays.table, laws, drives, *needed(laws))
-    compiled = data.ctrl[rig.state.actuator_ids]
+    compiled = kernel_commands(simulation, rig.state)
     size = 1.0 + np.abs(asked).max()
-    apart = np.abs(rig.law.drives["asked"] - asked).max() / size
-    return max(apart, np.abs(compiled - readable).max() / size)
+    apart = np.abs(rig.law.drives["desired"] - asked).max() / size
+    return max(apart, np.abs(compiled - expected).max() / size)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("saturation", ["clip", "qp"])
 @pytest.mark.parametrize("name", FEW)
-def test_compiled_and_readable_law_agree(alone, name, saturation):
+def test_the_kernel_equals_the_formula(alone, name, saturation):
     rig = OscRig(alone, name, saturation=saturation)
     assert max(disagreement(rig, seed) for seed in range(60)) < 1e-10
 
@@ -74,9 +73,16 @@ def test_compiled_and_readable_law_agree(alone, name, saturation):
 @pytest.mark.slow
 @pytest.mark.parametrize("saturation", ["clip", "qp"])
 @pytest.mark.parametrize("name", ARMS)
-def test_compiled_and_readable_law_agree_everywhere(alone, name, saturation):
+def test_the_kernel_equals_the_formula_everywhere(alone, name, saturation):
     rig = OscRig(alone, name, saturation=saturation)
     assert max(disagreement(rig, seed) for seed in range(1000)) < 1e-10
+
+
+def accelerations(rig):
+    """Return what the kernel asks of the arm's joints, at the present time."""
+    rig.law.record["since"] -= rig.simulation.timestep  # which the kernel adds
+    kernel_commands(rig.simulation, rig.state)
+    return rig.law.drives["desired"].copy()
 
 
 class Truth:
@@ -116,27 +122,31 @@ class Truth:
         return record["kp"] * error + record["kd"] * twist
 
 
-def in_the_world(alone, **settings):
+def in_the_world(alone, *, limits=True, **settings):
     """Return a Panda at a random state, goals in the world, and its truth."""
     rig = OscRig(alone, "Panda", input_ref_frame="world", **settings)
 
     def at(seed):
         random_state(rig, np.random.default_rng(seed))
         rig.law.record["speed"] = np.inf
+        if not limits:
+            drives = rig.law.drives
+            drives["velocity_max"] = drives["position_max"] = np.inf
+            drives["position_min"] = -np.inf
         return rig, Truth(rig)
 
     return at
 
 
-def test_the_readable_law_solves_the_stated_qp(alone):
-    at = in_the_world(alone, saturation="clip")
+def test_the_law_solves_the_stated_qp(alone):
+    at = in_the_world(alone, limits=False, saturation="clip")
     for seed in range(25):
         rig, truth = at(seed)
         law, dofs = rig.law, truth.dofs
         M = truth.M[np.ix_(dofs, dofs)]
         if np.linalg.cond(truth.J @ np.linalg.solve(M, truth.J.T)) > 1e4:
             continue  # damped there
-        rest = law._rest(rig.state)
+        rest = textbook(law, rig.state)._rest(rig.state)
         a = qpsolvers.solve_qp(
             M,
             -M @ rest,
@@ -144,7 +154,7 @@ def test_the_readable_law_solves_the_stated_qp(alone):
             b=truth.push() - truth.drift,
             solver="quadprog",
         )
-        found = law.acceleration(rig.state, np.zeros(rig.state.model.nv))
+        found = accelerations(rig)
         np.testing.assert_allclose(found, a, rtol=1e-8, atol=1e-8 * np.abs(a).max())
 
 
@@ -153,18 +163,18 @@ def test_torques_are_those_of_pinocchio_s_dynamics(alone):
     for seed in range(25):
         rig, truth = at(seed)
         law, data = rig.law, rig.data
-        rig.controller.compute(rig.state)
+        kernel_commands(rig.simulation, rig.state)
         a = np.zeros(truth.model.nv)
-        a[truth.dofs] = law.drives["asked"]
+        a[truth.dofs] = law.drives["desired"]
         tau = (truth.M @ a + truth.h)[truth.dofs]
         # passive forces are MuJoCo's own; the observer's part is known
         tau -= data.qfrc_passive[law.drives["dof"]] + law.drives["disturbance"]
-        found = law.drives["command"] - law.drives["lack"]
+        found = law.drives["command"] - law.drives["saturation"]
         np.testing.assert_allclose(found, tau, atol=1e-8 * (1 + np.abs(tau).max()))
 
 
 @pytest.mark.slow
-def test_at_limits_the_readable_law_solves_the_stated_qp(alone):
+def test_at_limits_the_law_solves_the_stated_qp(alone):
     at = in_the_world(alone, saturation="qp")
     active = 0
     for seed in range(60):
@@ -174,16 +184,16 @@ def test_at_limits_the_readable_law_solves_the_stated_qp(alone):
         mobility = J @ np.linalg.solve(M, J.T)
         if np.linalg.cond(mobility) > 1e3:
             continue
-        law.record["straight"] = 0.0
+        law.record["keep_direction"] = 0.0
         nothing = np.zeros(rig.state.model.nv)
-        a = law.acceleration(rig.state, nothing)
-        law.record["straight"] = 1.0
+        a = textbook(law, rig.state).acceleration(rig.state, nothing)
+        law.record["keep_direction"] = 1.0
         full = np.zeros(truth.model.nv)
         full[dofs] = a
         tau = (truth.M @ full + truth.h)[dofs]
         tau -= rig.data.qfrc_passive[law.drives["dof"]] + law.drives["disturbance"]
         L, pull = np.linalg.inv(mobility), truth.pull()
-        lower, upper = law.window(rig.state)
+        lower, upper = textbook(law, rig.state).window(rig.state)
         longest, halves = np.zeros(2), np.zeros((6, 2))
         for k in (0, 1):
             x = np.where(np.arange(6) // 3 == k, pull, 0.0)
@@ -193,7 +203,7 @@ def test_at_limits_the_readable_law_solves_the_stated_qp(alone):
         cost = np.diag(np.r_[np.zeros(n), np.full(2, SHORTENING_COST)])
         cost[:n, :n] = POSTURE_COST * M
         G = np.hstack([np.vstack([M, -M]), np.zeros((2 * n, 2))])
-        h = np.r_[law.drives["high"] - tau, tau - law.drives["low"]]
+        h = np.r_[law.drives["command_max"] - tau, tau - law.drives["command_min"]]
         x = qpsolvers.solve_qp(
             W.T @ L @ W + cost,
             np.zeros(n + 2),
@@ -203,7 +213,7 @@ def test_at_limits_the_readable_law_solves_the_stated_qp(alone):
             ub=np.r_[upper - a, longest],
             solver="quadprog",
         )
-        found = law.acceleration(rig.state, nothing) - a
+        found = accelerations(rig) - a
         if x is not None and np.abs(x).max() > 1e-6:
             active += 1
             np.testing.assert_allclose(found, x[:n], atol=1e-8 * np.abs(a).max())
@@ -244,7 +254,7 @@ def test_qp_keeps_the_direction_that_clip_loses(alone):
         )
         drives = rig.law.drives
         bias = rig.data.qfrc_bias[drives["dof"]]
-        drives["low"], drives["high"] = bias - 8.0, bias + 8.0
+        drives["command_min"], drives["command_max"] = bias - 8.0, bias + 8.0
         start = rig.pose
         goal = pin.SE3(start.rotation, start.translation + np.array([0.1, 0.1, 0.0]))
         rig.controller.set_goal(rig.action(rig.values(goal)))

@@ -11,12 +11,15 @@ from wbc_suite.control import (
     load_composite_controller_config,
     register_composite,
 )
-from wbc_suite.control.composite.config import (
+from wbc_suite.control.composite.ik_report import lagging_joint
+from wbc_suite.control.composite.whole_body_config import (
     WholeBodyIKConfig,
     default_whole_body_config,
 )
-from wbc_suite.control.composite.hindrance import lagging_joint
+from wbc_suite.control.reasons import Contact, TorqueLimit, TrackingError
 from wbc_suite.errors import ConfigError, UnknownNameError
+from wbc_suite.planning import GoalSearch
+from wbc_suite.qp import ActiveLimit, LimitKind
 from wbc_suite.robot import load_robot
 from wbc_suite.tomlfile import load_model
 
@@ -58,6 +61,23 @@ def test_a_hand_that_creeps_past_a_singularity_takes_another_way(alone):
     assert report["orientation_error"] < 3e-3
 
 
+@pytest.mark.parametrize("planning", [True, False])
+def test_planning_is_switched_off_by_one_line(alone, monkeypatch, planning):
+    """A distant goal is searched for only with planning; the hand arrives anyway."""
+    searches, start = [], GoalSearch.start
+    monkeypatch.setattr(
+        GoalSearch, "start", lambda *args: (searches.append(1), start(*args))
+    )
+    change = np.array([-0.1, 0.3, 0.1, 0.0, 0.0, 0.0])
+    scene = alone("Panda", planning=planning)
+    before = scene.site("right_tcp")
+    report = scene.act({"right_hand": change}, 2.0)
+    assert report["reached"]
+    moved = scene.site("right_tcp") - before
+    np.testing.assert_allclose(moved, change[:3], atol=1e-3)
+    assert bool(searches) is planning
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_a_goal_out_of_reach_is_reported_and_forgotten(alone, robot):
@@ -81,7 +101,7 @@ def test_a_goal_out_of_reach_is_reported_and_forgotten(alone, robot):
 def test_reasons_say_what_is_in_the_way(alone):
     scene = alone("Panda")
     down = scene.act({"right_hand": np.array([-0.4, 0, 0.9, 0, 1.5, 0])}, 2.0)
-    words = " ".join(down["frames"]["right_hand"]["reasons"])
+    words = " ".join(map(str, down["frames"]["right_hand"]["reasons"]))
     assert "limit: panda_joint" in words or "out of reach" in words
 
 
@@ -96,8 +116,8 @@ def test_what_the_hand_presses_on_is_named(alone):
     assert hand["position_error"] > 0.01
     assert hand["reasons"]
     assert all(
-        words.startswith("contact: ") and words.endswith(" - floor")
-        for words in hand["reasons"]
+        isinstance(reason, Contact) and reason.other == "floor"
+        for reason in hand["reasons"]
     )
 
 
@@ -108,12 +128,19 @@ def test_a_limb_that_gives_way_is_no_goal_out_of_reach(alone):
     state.data.body("robot0_robotiq_85_base").xfrc_applied[2] = -60.0  # N, unannounced
     hand = scene.act({"right_hand": 0.5 * STEP}, 3.0)["frames"]["right_hand"]
     assert hand["position_error"] > 1e-3
-    assert [words.split(":")[0] for words in hand["reasons"]] == ["lag"]
+    (reason,) = hand["reasons"]
+    assert isinstance(reason, TrackingError)
+    assert reason.error > 1e-4
     joints = state.robot.joint_names[:2]
     elsewhere = state.data.qpos[state.joint_addresses(joints)[0]] + [0.1, 0.2]
-    assert lagging_joint(state, joints, elsewhere) == f"lag: {joints[1]}"
+    lagging = lagging_joint(state, joints, elsewhere)
+    assert isinstance(lagging, TrackingError)
+    assert (lagging.joint, str(lagging)) == (joints[1], f"lag: {joints[1]}")
+    assert lagging.error == pytest.approx(0.2)
     state.data.ctrl[state.actuator_ids[1]] = 1e3
-    assert lagging_joint(state, joints, elsewhere) == f"motor limit: {joints[1]}"
+    limited = lagging_joint(state, joints, elsewhere)
+    assert isinstance(limited, TorqueLimit)
+    assert str(limited) == f"motor limit: {joints[1]}"
 
 
 @pytest.mark.slow
@@ -123,10 +150,13 @@ def test_each_hand_is_told_its_own_collisions(alone):
     frames = scene.act({"right_hand": back, "left_hand": back}, 0.3)["frames"]
     for side, other in (("right", "left"), ("left", "right")):
         collisions = [
-            r for r in frames[f"{side}_hand"]["reasons"] if r.startswith("self-coll")
+            str(reason.subject)
+            for reason in frames[f"{side}_hand"]["reasons"]
+            if isinstance(reason, ActiveLimit)
+            and reason.kind is LimitKind.SELF_COLLISION
         ]
-        assert any(f"{side}_upper_arm" in r for r in collisions)
-        assert not any(f"{other}_upper_arm" in r for r in collisions)
+        assert any(f"{side}_upper_arm" in pair for pair in collisions)
+        assert not any(f"{other}_upper_arm" in pair for pair in collisions)
 
 
 @pytest.mark.parametrize("reference", ["world", "base", "eef"])
@@ -298,7 +328,7 @@ def test_a_free_robot_that_nothing_holds_is_refused(alone):
 def test_a_biped_of_unknown_soles_is_warned_of(alone, caplog):
     held = [{"frame": f"{side}_foot", "contact": "surface"} for side in SIDES]
     alone("GR1FreeBody", held=held)
-    assert "stands on 2 feet whose soles nobody has told" in caplog.text
+    assert "stands on 2 feet whose soles are unknown" in caplog.text
     caplog.clear()
     alone("SpotWithArm")
     assert not caplog.records

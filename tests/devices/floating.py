@@ -5,7 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.control.action import ActionLayout, ActionPart
+from wbc_suite.control.action import ActionLayout, ActionPart, SliceKind, Unit
+from wbc_suite.control.composite.whole_body_config import ControlledFrame
 
 AXES = ("x", "y", "z", "rx", "ry", "rz")
 BODIES = """<mujoco><worldbody>
@@ -19,9 +20,9 @@ HAND = """<body name="{0}palm" pos="0.4 {1} 1">
 def part(name, kind, labels, bound):
     return ActionPart(
         name=name,
-        kind=kind,
+        kind=SliceKind(kind),
         labels=labels,
-        units=("m",) * len(labels),
+        units=(Unit("m"),) * len(labels),
         low=(-bound,) * len(labels),
         high=(bound,) * len(labels),
     )
@@ -44,10 +45,7 @@ class FloatingEnv:
         data = mujoco.MjData(model)
         mujoco.mj_forward(model, data)
         self.simulation = SimpleNamespace(model=model, data=data)
-        frames = [
-            SimpleNamespace(name=f"{s}_hand", frame=f"{s}_hand", kind="pose")
-            for s in sides
-        ]
+        frames = [ControlledFrame(name=f"{s}_hand", frame=f"{s}_hand") for s in sides]
         config = SimpleNamespace(
             input_type="absolute", input_ref_frame="world", frames=frames
         )

@@ -19,8 +19,8 @@ from wbc_suite.devices import (
     make_device,
     register_device,
 )
+from wbc_suite.devices.action_ports import joint_ports, speed_ports
 from wbc_suite.devices.mjgui import MjGui
-from wbc_suite.devices.ports import joint_ports, speed_ports
 from wbc_suite.errors import ConfigError, DeviceError, UnknownNameError
 
 
@@ -51,7 +51,7 @@ def test_drive_steps_until_quit_and_resets_and_pauses():
         Scripted(says),
         Pipeline(env, PipelineConfig(ramp=0.0)),
         real_time=False,
-        tell=lambda state, info: seen.append(env.simulation.data.qpos[2]),
+        on_step=lambda state, info: seen.append(env.simulation.data.qpos[2]),
     )
     assert info == {"success": False}
     assert len(seen) == 59 - 10  # ten were paused

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import wbc_suite
-from wbc_suite.control.composite.tasks import accelerations
+from wbc_suite.control.composite.qp_tasks import accelerations
 from wbc_suite.devices import DeviceState, LimbInput, Pipeline, PipelineConfig
 
 RATE = 100.0
@@ -79,7 +79,7 @@ def run(env, story):
     sampled = []
     for state in states(story):
         env.step(pipeline.update(state))
-        p, v, a, j = controller._reference.polynomial()
+        p, v, a, j = controller._reference.motion
         for s in dt * np.arange(1, steps + 1):
             sampled.append(
                 (

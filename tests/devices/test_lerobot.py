@@ -76,5 +76,5 @@ def test_their_leader_arm_is_a_device():
 
 
 def test_what_is_no_number_is_named():
-    with pytest.raises(DeviceError, match=r"'a\.pos' is no number"):
+    with pytest.raises(DeviceError, match=r"'a\.pos' is not a number"):
         unflatten({"a.pos": [1, 2]}, 0.0)

@@ -67,7 +67,7 @@ def test_pose_turns_by_the_shortest_way_within_limits():
     limit.reset(start)
     before, fastest = start, 0.0
     for _ in range(400):
-        pose = limit.apply(target, target)
+        pose = limit.apply(target)
         turned = pin.log3(pose.rotation @ before.rotation.T)
         fastest, before = max(fastest, np.linalg.norm(turned) / 0.01), pose
     assert fastest <= 2.0 + 1e-9

@@ -113,7 +113,7 @@ def test_workspace_keeps_the_hand_inside_and_does_not_wind_up():
     person.say(right=LimbInput(pose=hand()))
     person.say(150, right=LimbInput(pose=hand(z=0.25)))
     assert person.target()[2] == pytest.approx(1.05, abs=1e-4)
-    assert "at the edge of its workspace" in person.pipeline.acting["right_hand"]
+    assert "at the workspace limit" in person.pipeline.acting["right_hand"]
     person.say(150, right=LimbInput(pose=hand(z=0.2)))  # back by 5 cm: obeyed at once
     assert person.target()[2] == pytest.approx(1.0, abs=1e-4)
 
@@ -124,7 +124,7 @@ def test_leash_lets_a_target_lead_by_so_much_and_no_more():
     person.say(right=LimbInput(pose=hand()))
     person.say(300, right=LimbInput(pose=hand(x=1.0)))
     assert person.target()[0] == pytest.approx(0.5, abs=1e-3)
-    assert person.pipeline.acting == {"right_hand": ("leash is tight",)}
+    assert person.pipeline.acting == {"right_hand": ("limited by the leash",)}
     person.say(100, right=LimbInput(pose=hand(x=0.92)))  # nothing to unwind first
     assert person.target()[0] == pytest.approx(0.42, abs=1e-3)
 
@@ -132,7 +132,9 @@ def test_leash_lets_a_target_lead_by_so_much_and_no_more():
 def test_an_input_that_jumps_is_latched_anew(person):
     person.say(right=LimbInput(pose=hand()))
     person.say(right=LimbInput(pose=hand(x=1.0)))
-    assert person.pipeline.acting["right_hand"] == ("the input jumped: latched anew",)
+    assert person.pipeline.acting["right_hand"] == (
+        "input jumped: clutch latched again",
+    )
     person.say(100, right=LimbInput(pose=hand(x=1.05)))
     assert person.target()[0] == pytest.approx(0.45, abs=1e-4)
 
@@ -143,9 +145,9 @@ def test_silence_holds_and_then_brings_the_hand_home():
     person.say(100, right=LimbInput(pose=hand(y=0.1)))
     person.silent(60)
     assert person.target()[1] == pytest.approx(-0.1, abs=1e-3)
-    assert person.pipeline.acting["device"] == ("the device is silent: holding",)
+    assert person.pipeline.acting["device"] == ("no data from the device: holding",)
     person.silent(60)
-    assert person.pipeline.acting["device"] == ("the device is silent: going back",)
+    assert person.pipeline.acting["device"] == ("no data from the device: returning",)
     person.silent(150)
     np.testing.assert_allclose(person.target()[:3], [0.4, -0.2, 1.0], atol=1e-4)
     before = person.target().copy()
@@ -167,11 +169,11 @@ def test_one_hand_is_switched_from_limb_to_limb_and_from_robot_to_robot():
     up = LimbInput(twist=np.array([0, 0, 0.5, 0, 0, 0]))
     sides = ("right", "left")
     for name in [f"robot{i}_{side}_hand" for i in range(2) for side in sides]:
-        assert person.pipeline.active == name
+        assert person.pipeline.selected == name
         person.say(20, hand=up)
         assert person.target(name)[2] > 1.03
         person.say(buttons=["next"]).say()
-    assert person.pipeline.active == "robot0_right_hand"
+    assert person.pipeline.selected == "robot0_right_hand"
 
 
 def test_both_hands_move_at_once(person):
@@ -214,7 +216,7 @@ def test_button_grips_with_the_hand_that_is_switched_to_and_no_other():
     person.say(50, buttons=["grip"], hand=up)
     assert closed() == [True, False]
     person.say(buttons=["next"]).say(50, hand=up)
-    assert person.pipeline.active == "robot1_right_hand"
+    assert person.pipeline.selected == "robot1_right_hand"
     assert closed() == [True, False]
     person.say(50, buttons=["grip"], hand=up)
     assert closed() == [True, True]

@@ -13,7 +13,13 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from wbc_suite.devices.frame import MAX_BYTES, Pose, PoseFrame, PoseLimb, frame_schema
+from wbc_suite.devices.pose_frame import (
+    MAX_BYTES,
+    Pose,
+    PoseFrame,
+    PoseLimb,
+    frame_schema,
+)
 from wbc_suite.devices.stream import Stream
 from wbc_suite.devices.stream_client import StreamClient
 from wbc_suite.errors import DeviceError
@@ -122,7 +128,7 @@ def test_first_sender_holds_until_it_leaves(stream):
         first.send(frame(1.0))
         said_at(stream, 1.0)
         second.send(frame(2.0))
-        assert "Somebody else" in second.receive(PATIENCE)["error"]
+        assert "Another sender" in second.receive(PATIENCE)["error"]
         assert stream.read().time == 1.0
         first.__exit__(None, None, None)
 

@@ -13,7 +13,7 @@ import pytest
 import wbc_suite
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.randomisation import Randomisation
-from wbc_suite.sensing.scene_renderer import SceneRenderer
+from wbc_suite.sensing.renderer import Renderer
 
 SEEN = {
     "use_camera_obs": True,
@@ -201,7 +201,7 @@ def test_people_watch_a_page_that_follows_and_goes_when_closed(caplog):
     env.reset(seed=0)
     env.step(env.hold_action)
     assert env.render() is None
-    url = caplog.text.partition("watch at ")[2].split()[0]
+    url = caplog.text.partition("View the scene at ")[2].split()[0]
     with urlopen(url) as page:
         assert page.status == 200
     env.close()
@@ -248,7 +248,7 @@ def test_a_robots_own_view_shows_the_robot_and_the_table(robot):
 @pytest.mark.slow
 def test_a_closed_renderer_is_gone_without_the_collector():
     def alive():
-        return [x for x in gc.get_objects() if isinstance(x, SceneRenderer)]
+        return [x for x in gc.get_objects() if type(x) is Renderer]
 
     gc.collect()
     before = len(alive())

@@ -109,7 +109,8 @@ def test_physics_that_diverges_ends_the_episode_with_a_name(env):
     assert "physics_error" not in info
 
 
-def test_a_controller_that_fails_in_a_broken_state_ends_the_episode(env, monkeypatch):
+def test_a_controller_that_fails_in_a_broken_state_ends_the_episode(monkeypatch):
+    env = wbc_suite.make("Lift", robots="Panda", controller_configs="BASIC").unwrapped
     env.reset(seed=0)
 
     def fail(state):
@@ -126,7 +127,7 @@ def test_a_robot_measured_from_its_pelvis_is_lifted_out_of_the_floor(caplog):
     own = load_robot("gr1_fixed_lower_body")
     robot = own.with_root("fixed", pos=(0.0, 0.0, 0.0))
     env = wbc_suite.make("Lift", robots=robot)
-    assert "GR1FixedLowerBody: nothing says how high it stands" in caplog.text
+    assert "GR1FixedLowerBody has no root height" in caplog.text
     lifted = env.robots[0].root.pos[2]
     assert 0.85 < lifted <= own.root.pos[2] + 0.01
     env.reset(seed=0)
@@ -273,10 +274,22 @@ def test_gymnasium_accepts_the_environment(recwarn):
 
 
 @pytest.mark.parametrize(
-    "imports", ["import wbc_suite, gymnasium", "import gymnasium, wbc_suite"]
+    "code",
+    [
+        "import wbc_suite, gymnasium; s = gymnasium.spec('wbc_suite/Lift-v0')",
+        "import gymnasium, wbc_suite; s = gymnasium.spec('wbc_suite/Lift-v0')",
+        "import wbc_suite; from gymnasium import spec; s = spec('wbc_suite/Lift-v0')",
+        "import wbc_suite, gymnasium.spaces as g; import gymnasium.envs.registration; "
+        "s = gymnasium.envs.registration.spec('wbc_suite/Lift-v0')",
+        pytest.param(  # Gymnasium's own way to name the module that registers
+            "import gymnasium; "
+            "s = gymnasium.make('wbc_suite:wbc_suite/Lift-v0', robots='Panda').spec",
+            marks=pytest.mark.slow,
+        ),
+    ],
 )
-def test_environments_are_registered_in_either_order_of_imports(imports):
-    code = f"{imports}; print(gymnasium.spec('wbc_suite/Lift-v0').id)"
+def test_environments_are_registered_in_either_order_of_imports(code):
+    code += "; print(s.id)"
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     )
@@ -286,7 +299,8 @@ def test_environments_are_registered_in_either_order_of_imports(imports):
 def test_importing_the_package_imports_nothing_heavy():
     code = (
         "import sys, wbc_suite; "
-        "print([m for m in ('numpy', 'mujoco', 'gymnasium') if m in sys.modules])"
+        "heavy = ('numpy', 'mujoco', 'gymnasium.core'); "
+        "print([m for m in heavy if m in sys.modules])"
     )
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True

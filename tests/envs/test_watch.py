@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from wbc_suite.control.loop.sound import LARGEST, is_usable
+from wbc_suite.control.loop.state_checks import LARGEST, is_usable
 from wbc_suite.envs.watch import PhysicsWatch
 from wbc_suite.errors import PhysicsError
 

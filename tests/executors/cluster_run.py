@@ -9,7 +9,7 @@ import signal
 import sys
 from pathlib import Path
 
-from wbc_suite.executors import Executor, Item, work_off
+from wbc_suite.executors import Executor, WorkItem, run_items
 
 
 def killed(item, folder):
@@ -38,9 +38,9 @@ def executor(name) -> Executor:
 if __name__ == "__main__":
     import cluster_run  # workers find it by this name, not as __main__
 
-    items = [Item(name=n, payload={"number": k}) for k, n in enumerate("abcdef")]
+    items = [WorkItem(name=n, payload={"number": k}) for k, n in enumerate("abcdef")]
     folder = Path(sys.argv[2])
-    outcomes = work_off(
+    outcomes = run_items(
         cluster_run.killed, items, folder=folder, executor=executor(sys.argv[1])
     )
     print(json.dumps({o.name: [o.result.get("twice"), o.error] for o in outcomes}))

@@ -8,13 +8,13 @@ import pytest
 
 from wbc_suite.errors import ConfigError, DatasetError, UnknownNameError
 from wbc_suite.executors import (
-    Item,
-    Ledger,
     Outcome,
     Processes,
+    ResultFolder,
     Serial,
+    WorkItem,
     make_executor,
-    work_off,
+    run_items,
 )
 
 
@@ -43,7 +43,7 @@ def failing(item, folder):
 
 
 def items(names="abcd"):
-    return [Item(name=n, payload={"number": k}) for k, n in enumerate(names)]
+    return [WorkItem(name=n, payload={"number": k}) for k, n in enumerate(names)]
 
 
 def calls(folder):
@@ -53,21 +53,21 @@ def calls(folder):
 
 @pytest.mark.parametrize("executor", [Serial(), Processes(2)])
 def test_every_item_is_done_once_and_in_order_of_asking(executor, tmp_path):
-    outcomes = work_off(doubled, items(), folder=tmp_path, executor=executor)
+    outcomes = run_items(doubled, items(), folder=tmp_path, executor=executor)
     assert [o.name for o in outcomes] == list("abcd")
     assert [o.result["twice"] for o in outcomes] == [0, 2, 4, 6]
     assert calls(tmp_path) == list("abcd")
 
 
 def test_what_is_done_is_not_done_twice(tmp_path):
-    first = work_off(doubled, items("ab"), folder=tmp_path, executor=Serial())
+    first = run_items(doubled, items("ab"), folder=tmp_path, executor=Serial())
     told = []
-    again = work_off(
+    again = run_items(
         doubled,
         items("abc"),
         folder=tmp_path,
         executor=Serial(),
-        tell=lambda item, outcome: told.append(item.name),
+        on_outcome=lambda item, outcome: told.append(item.name),
     )
     assert again[:2] == first
     assert told == list("abc")
@@ -75,30 +75,30 @@ def test_what_is_done_is_not_done_twice(tmp_path):
 
 
 def test_an_item_told_otherwise_is_done_again(tmp_path):
-    work_off(doubled, items("ab"), folder=tmp_path, executor=Serial())
-    other = [Item(name="a", payload={"number": 21})]
-    (outcome,) = work_off(doubled, other, folder=tmp_path, executor=Serial())
+    run_items(doubled, items("ab"), folder=tmp_path, executor=Serial())
+    other = [WorkItem(name="a", payload={"number": 21})]
+    (outcome,) = run_items(doubled, other, folder=tmp_path, executor=Serial())
     assert outcome.result == {"twice": 42}
 
 
 def test_a_torn_result_file_is_as_good_as_none(tmp_path):
     (item,) = items("a")
-    ledger = Ledger(tmp_path)
-    ledger.write(item, Outcome(name="a", result={"twice": 0}))
-    assert ledger.result(item) == {"twice": 0}
+    results = ResultFolder(tmp_path)
+    results.write(item, Outcome(name="a", result={"twice": 0}))
+    assert results.read(item) == {"twice": 0}
     path = tmp_path / "results" / "a.json"
     path.write_text(path.read_text()[:-9])
-    assert ledger.result(item) is None
+    assert results.read(item) is None
     path.write_text(json.dumps([1, 2]))
-    assert ledger.result(item) is None
+    assert results.read(item) is None
 
 
 def test_errors_are_told_and_tried_again_next_time(tmp_path):
-    outcomes = work_off(failing, items(), folder=tmp_path, executor=Serial())
+    outcomes = run_items(failing, items(), folder=tmp_path, executor=Serial())
     assert outcomes[1].error == "ConfigError: b is wrong."
     assert "ZeroDivisionError" in str(outcomes[2].error)
     assert calls(tmp_path) == list("ad")
-    outcomes = work_off(doubled, items(), folder=tmp_path, executor=Serial())
+    outcomes = run_items(doubled, items(), folder=tmp_path, executor=Serial())
     assert [o.error for o in outcomes] == [None] * 4
     assert calls(tmp_path) == list("abcd")
 
@@ -106,7 +106,7 @@ def test_errors_are_told_and_tried_again_next_time(tmp_path):
 @pytest.mark.slow
 def test_a_killed_workers_item_is_done_again_and_a_killer_is_given_up(tmp_path):
     executor = Processes(2, attempts=2)
-    outcomes = work_off(
+    outcomes = run_items(
         killed_once, items("abcdef"), folder=tmp_path, executor=executor
     )
     assert [o.name for o in outcomes if o.error] == ["c"]
@@ -118,18 +118,18 @@ def test_a_killed_workers_item_is_done_again_and_a_killer_is_given_up(tmp_path):
 def test_names_that_are_no_file_names_are_refused():
     for name in ("", "a/b", "..", "x" * 200, "a b"):
         with pytest.raises(ConfigError, match="cannot name an item"):
-            Item(name=name, payload={})
+            WorkItem(name=name, payload={})
 
 
 def test_two_items_of_one_name_are_refused(tmp_path):
     with pytest.raises(DatasetError, match="same name"):
-        work_off(doubled, items("aa"), folder=tmp_path, executor=Serial())
+        run_items(doubled, items("aa"), folder=tmp_path, executor=Serial())
 
 
 def test_a_folder_that_cannot_be_made_is_named(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(DatasetError, match="file"):
-        Ledger(tmp_path / "file" / "below")
+        ResultFolder(tmp_path / "file" / "below")
 
 
 def test_executors_have_names():

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import wbc_suite
 from wbc_suite.benchmark import load_benchmark
 from wbc_suite.catalogue import Catalogue
-from wbc_suite.control.composite.names import read_whole_body
+from wbc_suite.control.composite.whole_body_config import read_whole_body
 from wbc_suite.errors import ConfigError, WbcError
 from wbc_suite.scene import empty_arena
 from wbc_suite.tomlfile import read_toml
@@ -25,6 +25,7 @@ CONTROLLERS = [read_toml(path) for path in FILES]
 ROBOTS = [
     wbc_suite.load_robot(path.stem.removesuffix("_whole_body_ik")) for path in FILES
 ]
+PANDA = wbc_suite.load_robot("Panda", gripper="none")
 TASKS = [read_toml(path) for path in Catalogue().files("tasks")]
 
 NUMBERS = st.one_of(
@@ -100,7 +101,7 @@ def test_a_damaged_benchmark_works_or_names_the_file(data, tmp_path_factory):
     file.write_text("\n".join(f"{dump(k)} = {dump(v)}" for k, v in task.items()))
     try:
         benchmark = load_benchmark(file)
-        benchmark.place(ROBOTS[0], 0)
+        benchmark.arrange([PANDA] * len(benchmark.robots), "default")
         spec = empty_arena()
         benchmark.build(spec)
         spec.compile()

@@ -14,7 +14,7 @@ from wbc_suite.catalogue import Catalogue
 from wbc_suite.envs.states import write_scene
 from wbc_suite.errors import ConfigError, WbcError
 from wbc_suite.robot import load_robot
-from wbc_suite.robot.mjcf_files import compile_mjcf
+from wbc_suite.robot.mjcf_compile import compile_mjcf
 
 EXAMPLES = int(os.environ.get("WBC_SUITE_FUZZ", "40"))
 """Damaged files of each kind; 1,000 of them take about a minute."""

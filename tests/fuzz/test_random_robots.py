@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from wbc_suite.kinematics import Configuration, Conversion
 from wbc_suite.qp import FrameTask, PostureTask, TaskStack
 from wbc_suite.robot.assembly import describe_component
-from wbc_suite.robot.component import Component
+from wbc_suite.robot.robot_file import Component
 from wbc_suite.tomlfile import parse_model
 
 TOLERANCE = 1e-9  # two independent loaders of one robot agree to 1e-13
@@ -177,7 +177,7 @@ def check_ik(robot, rng):
     configuration = Configuration(model, random_state(model, rng)[0])
     task = FrameTask("tip")
     stack = TaskStack(configuration, [task, PostureTask(level=1)])
-    bounds = stack._bounds
+    bounds = stack.bounds
     bounded = bounds.q_index >= 0
     places = bounds.q_index[bounded]
     for _ in range(12):

@@ -167,7 +167,7 @@ def check(seed, solver="daqp", ticks=3):
 
 def tick(stack, dt):
     """Solve, check the command against every promise, and move."""
-    robot, bounds = stack.configuration, stack._bounds
+    robot, bounds = stack.configuration, stack.bounds
     solution = stack.solve(dt)
     assert np.isfinite(solution.dq).all()
     assert all(isinstance(str(limit), str) for limit in solution.active)

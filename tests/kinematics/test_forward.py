@@ -6,7 +6,8 @@ import pytest
 
 import wbc_suite
 from wbc_suite.kinematics import Configuration
-from wbc_suite.kinematics.forward import JointKind, joint_kinds
+from wbc_suite.kinematics.forward import JointKind, robot_arrays
+from wbc_suite.kinematics.tangent_space import integrate_joints
 
 ROBOTS = ("GR1", "Tiago", "Panda", "SpotWithArm", "Baxter", "UR5e", "Jaco")
 
@@ -37,7 +38,7 @@ def check(model: pin.Model) -> None:
         robot.update(q)
         J = pin.computeJointJacobians(model, data, q)
         np.testing.assert_allclose(robot.joint_jacobians.T, J, atol=1e-12)
-        for T, expected in zip(robot.placements, data.oMi, strict=True):
+        for T, expected in zip(robot.joint_poses, data.oMi, strict=True):
             rotation = T[:9].reshape(3, 3).T
             np.testing.assert_allclose(rotation, expected.rotation, atol=1e-12)
             np.testing.assert_allclose(T[9:], expected.translation, atol=1e-12)
@@ -57,7 +58,7 @@ def test_kernels_agree_with_pinocchio_on_robots(name):
 @pytest.mark.parametrize("root", ["planar", "free"])
 def test_kernels_agree_with_pinocchio_under_moving_roots(root):
     model = wbc_suite.load_robot("GR1", root=root).to_pinocchio()
-    assert (joint_kinds(model)[0][1:] != JointKind.OTHER).all()
+    assert (robot_arrays(model).kind[1:] != JointKind.OTHER).all()
     check(model)
 
 
@@ -75,21 +76,40 @@ def test_kernels_agree_with_pinocchio_on_every_joint_they_know():
         pin.JointModelFreeFlyer(),
         pin.JointModelRZ(),
     )
-    assert (joint_kinds(model)[0][1:] != JointKind.OTHER).all()
+    assert (robot_arrays(model).kind[1:] != JointKind.OTHER).all()
     check(model)
 
 
 def test_pinocchio_places_joints_that_the_kernels_do_not_know():
     model = chain(pin.JointModelRX(), pin.JointModelSpherical(), pin.JointModelRUBY())
-    assert (joint_kinds(model)[0] == JointKind.OTHER).sum() == 3  # and the universe
+    assert (robot_arrays(model).kind == JointKind.OTHER).sum() == 3  # and the universe
     check(model)
 
 
 def test_what_follows_from_q_is_computed_anew_after_each_update():
     model = wbc_suite.load_robot("Panda").to_pinocchio()
     robot = Configuration(model)
-    before = robot.placements.copy(), robot.com.copy(), robot.com_jacobian.copy()
+    before = robot.joint_poses.copy(), robot.com.copy(), robot.com_jacobian.copy()
     robot.update(robot.q + 0.3)
     assert np.abs(robot.com - before[1]).max() > 1e-2
     assert np.abs(robot.com_jacobian - before[2]).max() > 1e-2
-    assert np.abs(robot.placements - before[0]).max() > 1e-2
+    assert np.abs(robot.joint_poses - before[0]).max() > 1e-2
+
+
+@pytest.mark.parametrize("size", [1e-9, 1e-5, 1e-3, 0.5, 3.0])
+def test_integration_agrees_with_pinocchio(size):
+    model = chain(
+        pin.JointModelFreeFlyer(), pin.JointModelRX(), pin.JointModelFreeFlyer()
+    )
+    robot, rng = Configuration(model), np.random.default_rng(4)
+    for _ in range(20):
+        robot.update(random_q(model, rng))
+        dq = rng.normal(size=model.nv) * size
+        expected = pin.integrate(model, robot.q, dq)
+        before, _ = robot.joint_poses.copy(), robot.data
+        integrate_joints(robot.robot, dq)
+        np.testing.assert_allclose(robot.q, expected, atol=1e-12)
+        assert np.abs(robot.joint_poses - before).max() > 0.1 * size
+        data = model.createData()
+        pin.forwardKinematics(model, data, expected)
+        assert robot.data.oMi[3].isApprox(data.oMi[3], 1e-9)  # not of the q before

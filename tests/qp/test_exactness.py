@@ -5,6 +5,7 @@ import pinocchio as pin
 import pytest
 import quadprog
 
+from wbc_suite.compiling import as_argument
 from wbc_suite.errors import SolverError, UnknownNameError
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp import (
@@ -18,7 +19,7 @@ from wbc_suite.qp import (
     RelativeFrameTask,
     TaskStack,
 )
-from wbc_suite.qp.active_set import solve_warm
+from wbc_suite.qp.active_set import make_qp_arrays, solve_warm
 from wbc_suite.qp.fallback import box_least_squares, checked_solve
 from wbc_suite.qp.solver import make_solver
 
@@ -126,32 +127,54 @@ def test_solvers_by_name_agree(humanoid, name, tolerance):
         np.testing.assert_allclose(gradient, 0.0, atol=100 * tolerance)
 
 
+def random_qp(rng, inequalities):
+    """Return a random QP with bounds, equality rows, and some soft rows."""
+    n, m = int(rng.integers(6, 40)), int(rng.integers(1, 20))
+    k = int(rng.integers(0, 1 + (2 * n) // 3))  # levels above decide so much
+    if inequalities:
+        k = int(rng.integers(0, 1 + n // 4))
+    p = int(rng.integers(1, 12)) if inequalities else 0
+    diagonal, mu = np.abs(rng.normal(size=(2, n))), np.array([10 ** rng.uniform(-3, 0)])
+    W, e = rng.normal(size=(m, n)), rng.normal(size=m)
+    qp = make_qp_arrays(W, e, diagonal, mu, inequalities=p, equalities=k)
+    qp.lower[:n], qp.upper[:n] = -rng.random(n), rng.random(n)
+    qp.rows[:] = rng.normal(size=qp.rows.shape)
+    inside = rng.uniform(qp.lower[:n], qp.upper[:n])
+    values = qp.rows @ inside
+    qp.upper[n:], qp.lower[n + p :] = values, values[p:]
+    qp.upper[n : n + p] += 0.1 * rng.random(p)
+    soft = rng.random(p) < 0.3
+    qp.wanted[soft] = qp.upper[n : n + p][soft] - 0.2 * rng.random(int(soft.sum()))
+    qp.weight[0] = 10 ** rng.uniform(0, 3)
+    problem = Problem(n, p, k)
+    problem.H[:] = W.T @ W + np.diag(diagonal[0] + mu)
+    problem.c[:] = -W.T @ e - diagonal[1]
+    problem.rows[:], problem.lower[:], problem.upper[:] = qp.rows, qp.lower, qp.upper
+    problem.wanted[:], problem.weight = qp.wanted, float(qp.weight[0])
+    return qp, problem
+
+
 @pytest.mark.slow
-def test_warm_active_set_answers_exactly_or_not_at_all(rng):
+@pytest.mark.parametrize("inequalities", [False, True])
+def test_warm_active_set_answers_exactly_or_not_at_all(rng, inequalities):
     answers = 0
     for _ in range(300):
-        n, m = int(rng.integers(6, 40)), int(rng.integers(1, 20))
-        k = int(rng.integers(0, 1 + 2 * n // 3))  # levels above decide so much
-        W, A = rng.normal(size=(m, n)), rng.normal(size=(k, n))
-        problem = Problem(n, 0, k)
-        diagonal = np.abs(rng.normal(size=(2, n)))
-        mu, e = 10 ** rng.uniform(-3, 0), rng.normal(size=m)
-        problem.H[:] = W.T @ W + np.diag(diagonal[0] + mu)
-        problem.c[:] = -W.T @ e - diagonal[1]
-        problem.lb[:], problem.ub[:] = -rng.random(n), rng.random(n)
-        problem.A[:] = A
-        problem.set_equalities(A @ rng.uniform(problem.lb, problem.ub))
-        x, side = np.empty(n), np.zeros(n, dtype=np.int64)
-        bounds, rows = np.empty(n), np.empty(k)
-        b, lb, ub = problem.b, problem.lb, problem.ub
+        qp, problem = random_qp(rng, inequalities)
+        n, p = problem.nv, len(problem.G)
+        argument = as_argument(qp)
         # The second call starts from the set that the first has found.
         for _ in range(2):
-            if solve_warm(W, e, A, b, diagonal, mu, lb, ub, side, x, bounds, rows):
-                answers += 1
-                np.testing.assert_allclose(x, exact(problem), atol=1e-9)
-                gradient = problem.H @ x + problem.c + bounds + A.T @ rows
-                np.testing.assert_allclose(gradient, 0.0, atol=1e-9)
-                assert (bounds * side >= 0).all()
+            if not solve_warm(argument) or problem.violation(qp.x) > 1e-7:
+                continue
+            answers += 1
+            stated = problem.with_slack(problem.soft())
+            np.testing.assert_allclose(qp.x, exact(stated)[:n], atol=1e-8)
+            bounds, forces = qp.multipliers[:n], qp.multipliers[n:]
+            gradient = problem.H @ qp.x + problem.c + bounds + problem.rows.T @ forces
+            np.testing.assert_allclose(gradient, 0.0, atol=1e-7)
+            assert (bounds * qp.side[:n] >= 0).all()
+            assert (forces[:p] >= 0.0).all()
+            assert (forces[:p][qp.side[n:] == 0] == 0.0).all()
     assert answers > 540
 
 

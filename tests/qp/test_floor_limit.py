@@ -16,7 +16,7 @@ from wbc_suite.qp import (
     VelocityLimit,
 )
 from wbc_suite.robot import load_robot
-from wbc_suite.robot.spheres import spanning_spheres
+from wbc_suite.robot.collision_capsules import collision_spheres
 from wbc_suite.scene import attach_robot, empty_arena
 
 DT = 0.01
@@ -71,7 +71,7 @@ def random_q(configuration, rng):
 
 def test_heights_of_all_links_are_those_of_the_simulator(rng):
     spot = Spot()
-    spheres = spanning_spheres(spot.robot)
+    spheres = collision_spheres(spot.robot)
     for _ in range(5):
         spot.configuration.update(random_q(spot.configuration, rng))
         for link, height in spot.heights().items():
@@ -85,9 +85,9 @@ def test_heights_of_all_links_are_those_of_the_simulator(rng):
 def test_rows_are_the_lowest_spheres_and_the_derivative_of_their_height(rng):
     spot = Spot()
     configuration = spot.configuration
-    limit = FloorLimit(spanning_spheres(spot.robot), height=0.1, nearest=8)
+    limit = FloorLimit(collision_spheres(spot.robot), height=0.1, nearest=8)
     limit.bind(configuration)
-    whole = FloorLimit(spanning_spheres(spot.robot), nearest=200, influence=9.0)
+    whole = FloorLimit(collision_spheres(spot.robot), nearest=200, influence=9.0)
     whole.bind(configuration)
     for _ in range(5):
         q = random_q(configuration, rng)
@@ -110,7 +110,7 @@ def test_rows_are_the_lowest_spheres_and_the_derivative_of_their_height(rng):
 @pytest.mark.parametrize("high", [0.0, 0.1])
 def test_a_hand_sent_below_the_floor_rests_above_it(high):
     spot = Spot()
-    spheres = spanning_spheres(spot.robot)
+    spheres = collision_spheres(spot.robot)
     arm = {link: s for link, s in spheres.items() if link.startswith(("arm", "jaw"))}
     limit = FloorLimit(arm, height=high)
     hand = FrameTask("right_tcp", orientation_cost=0.1)

@@ -12,13 +12,16 @@ import pytest
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp import (
     ComTask,
+    Conflict,
     Fallback,
     FrameEquality,
     FrameTask,
     LinearEquality,
     LookAtTask,
+    OutOfReach,
     PostureTask,
     RelativeFrameTask,
+    TargetNotFinite,
     TaskStack,
 )
 
@@ -45,6 +48,10 @@ def shift(task, offset):
     target = task.target
     target.translation = target.translation + np.asarray(offset)
     task.set_target(target)
+
+
+def words(report):
+    return [str(reason) for reason in report.reasons]
 
 
 def run(stack, seconds, dt=DT):
@@ -82,7 +89,7 @@ def test_arm_stands_still_before_an_unreachable_target(arm, level, dt):
     report = stack.explain()["hand"]
     assert not report.reached
     assert report.position_error > 1.0
-    assert "out of reach" in report.reasons[0]
+    assert isinstance(report.reasons[0], OutOfReach)
 
 
 @pytest.mark.slow
@@ -143,7 +150,7 @@ def test_a_straight_arm_pulled_in_gets_there(arm, level):
     along = task_direction(stack)
     shift(task, -0.25 * along)
     run(stack, 0.6)
-    assert "joint limit: joint4 (upper)" in stack.explain()["hand"].reasons
+    assert "joint limit: joint4 (upper)" in words(stack.explain()["hand"])
     _, chatter = run(stack, 6.0)
     assert chatter <= CHATTER
     assert np.linalg.norm(task.error(arm)[:3]) < 1e-3
@@ -157,7 +164,7 @@ def test_a_straight_arm_pushed_out_stands_still(arm, level):
     shift(stack.tasks[0], 0.25 * task_direction(stack))
     _, chatter = run(stack, 6.0)
     assert chatter <= CHATTER
-    assert "out of reach" in stack.explain()["hand"].reasons[0]
+    assert isinstance(stack.explain()["hand"].reasons[0], OutOfReach)
 
 
 def task_direction(stack):
@@ -183,8 +190,8 @@ def test_conflicting_tasks_are_named(arm):
     shift(two, [0.0, -0.2, 0.0])
     _, chatter = run(stack, 4.0)
     assert chatter <= CHATTER
-    assert "conflict: two" in stack.explain()["one"].reasons
-    assert "conflict: one" in stack.explain()["two"].reasons
+    assert Conflict("two") in stack.explain()["one"].reasons
+    assert Conflict("one") in stack.explain()["two"].reasons
 
 
 @pytest.mark.slow
@@ -228,7 +235,7 @@ def test_a_target_that_is_not_finite_holds_the_hand(arm, bad, entry):
     assert chatter <= CHATTER
     moved = arm.frame_pose("hand").translation - start.translation
     assert np.linalg.norm(moved) < 1e-3
-    assert "not finite" in stack.explain()["hand"].reasons[0]
+    assert stack.explain()["hand"].reasons == (TargetNotFinite(),)
     good[2, 3] += 0.05
     task.set_target(good)
     solution, _ = run(stack, 2.0)
@@ -290,7 +297,7 @@ def test_a_solver_that_answers_nonsense_is_not_believed(arm):
             return self
 
     shift(stack.tasks[0], [0.0, 0.1, 0.0])
-    stack._solver = Liar()
+    stack._ladder.solver = Liar()
     before = np.linalg.norm(stack.tasks[0].error(arm))
     solution, _ = run(stack, 2.0)
     assert solution.fallback is Fallback.BOX

@@ -15,7 +15,7 @@ from wbc_suite.qp import (
 )
 from wbc_suite.qp.capsule_distance import segment_parameters
 from wbc_suite.robot import load_robot
-from wbc_suite.robot.capsules import collision_pairs, enclosing_capsules
+from wbc_suite.robot.collision_capsules import collision_pairs, enclosing_capsules
 
 DT = 5e-3
 
@@ -104,6 +104,7 @@ def test_pairs_remembered_from_tick_to_tick_are_those_sought_anew(rng):
     limit = SelfCollisionLimit(capsules, pairs)
     limit.bind(configuration)
     anew = SelfCollisionLimit(capsules, pairs)
+    anew.bind(configuration)
     model = configuration.model
     q, listed = configuration.q.copy(), set()
     for k in range(400):
@@ -113,7 +114,7 @@ def test_pairs_remembered_from_tick_to_tick_are_those_sought_anew(rng):
         configuration.update(q)
         G, h = np.zeros((limit.dim, model.nv)), np.zeros(limit.dim)
         limit.rows(configuration, DT, G, h)
-        anew.bind(configuration)  # forgets
+        anew.reset()
         G_anew, h_anew = np.zeros_like(G), np.zeros_like(h)
         anew.rows(configuration, DT, G_anew, h_anew)
         np.testing.assert_array_equal(limit.found, anew.found)

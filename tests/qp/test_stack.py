@@ -44,7 +44,7 @@ def test_solution_meets_its_kkt_conditions(humanoid, rng):
         move_target(task, rng.normal(size=3) * 0.3)
         solution = stack.solve(DT)
         problem, x = stack.problem(), solution.dq
-        multipliers = solution.pressure.multipliers
+        multipliers = solution.record.levels[0].multipliers
         gradient = problem.H @ x + problem.c + multipliers[: problem.nv]
         np.testing.assert_allclose(gradient, 0.0, atol=1e-10)
         at_upper, at_lower = multipliers > 0, multipliers < 0
@@ -52,7 +52,7 @@ def test_solution_meets_its_kkt_conditions(humanoid, rng):
         np.testing.assert_allclose(x[at_lower], problem.lb[at_lower], atol=1e-10)
         assert (x <= problem.ub + 1e-12).all()
         assert (x >= problem.lb - 1e-12).all()
-        by_daqp, _ = stack._solver.solve(problem)
+        by_daqp, _ = stack._ladder.solver.solve(problem)
         np.testing.assert_allclose(x, by_daqp, atol=1e-10)
         humanoid.update(humanoid.integrate(solution.dq))
 

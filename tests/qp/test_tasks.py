@@ -80,36 +80,19 @@ def test_looking_at_a_point_within_the_frame_backs_off(arm):
     assert 0.019 < away < 0.03
 
 
-def test_frame_kernel_agrees_with_readable_rows(humanoid, rng):
-    tasks = [
-        FrameTask(
-            name,
-            position_cost=rng.uniform(0, 3, 3),
-            orientation_cost=rng.uniform(0, 3, 3),
-            gain=0.7,
-            target=random_pose(rng),
-        )
-        for name in ("rarm_wrist2_joint", "lleg_wrist2_joint", "chest2_joint")
-    ]
-    stack = TaskStack(humanoid, [tasks[0], ComTask(), *tasks[1:]])
-    level = stack._levels[0]
-    for angle in (1e-9, 1e-3, 1.0, np.pi - 1e-6, np.pi):
+@pytest.mark.parametrize("angle", [1e-9, 1e-3, 1.0, np.pi - 1e-6])
+def test_frame_error_and_jacobian_are_those_of_pinocchio(humanoid, rng, angle):
+    for frame in ("rarm_wrist2_joint", "lleg_wrist2_joint", "chest2_joint"):
         turn = pin.SE3(pin.exp3(angle * np.array([0.6, 0.0, 0.8])), rng.normal(size=3))
-        tasks[0].set_target(humanoid.frame_pose(tasks[0].frame) * turn)
-        stack.solve(5e-3)
-        for task, rows in zip(level.row_tasks, level.slices, strict=True):
-            W, e = np.zeros((task.dim, humanoid.nv)), np.zeros(task.dim)
-            task.rows(humanoid, 5e-3, W, e)
-            if angle == np.pi:  # either sign of the axis is right
-                W, e = np.abs(W), np.abs(e)
-                level.W[rows], level.e[rows] = (
-                    np.abs(level.W[rows]),
-                    np.abs(level.e[rows]),
-                )
-            np.testing.assert_allclose(
-                level.W[rows], W, atol=1e-8 if angle > 3 else 1e-10
-            )
-            np.testing.assert_allclose(level.e[rows], e, atol=1e-10)
+        task = FrameTask(frame, target=humanoid.frame_pose(frame) * turn)
+        task.bind(humanoid)
+        pose, target = humanoid.frame_pose(frame), task.target
+        rotation = pin.log3(pose.rotation.T @ target.rotation)
+        error = np.concatenate([target.translation - pose.translation, rotation])
+        J = humanoid.frame_jacobian(frame, "aligned")
+        J[3:] = pin.Jlog3(pin.exp3(-rotation)) @ pose.rotation.T @ J[3:]
+        np.testing.assert_allclose(task.error(humanoid), error, atol=1e-9)
+        np.testing.assert_allclose(task.jacobian(humanoid), J, atol=1e-8)
 
 
 def test_normal_equations_agree_with_matrix_product(humanoid, rng):
@@ -121,7 +104,7 @@ def test_normal_equations_agree_with_matrix_product(humanoid, rng):
     )
     humanoid.update(humanoid.integrate(rng.normal(size=humanoid.nv) * 0.2))
     stack.solve(5e-3)
-    level, problem = stack._levels[0], stack.problem()
+    level, problem = stack.levels[0].tasks, stack.problem()
     mu = 1e-2 + np.abs(level.e) @ np.abs(level.W).max(axis=1)
     H = level.W.T @ level.W + np.diag(level.diagonal[0] + mu)
     c = -level.W.T @ level.e - level.diagonal[1]
@@ -132,13 +115,20 @@ def test_normal_equations_agree_with_matrix_product(humanoid, rng):
 def test_rows_are_weighted_jacobian_and_saturated_step(humanoid, rng):
     dt = 1e-2
     for task in tasks_with_jacobian(rng):
-        task.bind(humanoid)
-        W, e = np.zeros((task.dim, humanoid.nv)), np.zeros(task.dim)
-        error = task.rows(humanoid, dt, W, e)
-        scale = np.abs(W).max() / np.abs(task.jacobian(humanoid)).max()
-        np.testing.assert_allclose(W, scale * task.jacobian(humanoid), atol=1e-12)
-        assert np.linalg.norm(e[3:]) <= scale * 3.0 * dt + 1e-12
-        assert e @ error > 0.0
+        stack = TaskStack(humanoid, [task])
+        stack.solve(dt)
+        rows = stack.levels[0].tasks
+        error = task.error(humanoid)
+        expected = task.cost[:, None] * task.jacobian(humanoid)
+        np.testing.assert_allclose(rows.W, expected, atol=1e-12)
+        step = error.copy()
+        parts = slice(task.angular_start), slice(task.angular_start, None)
+        for part, speed in zip(parts, task.max_speeds, strict=True):
+            length = np.linalg.norm(step[part])
+            if length > speed * dt:
+                step[part] *= speed * dt / length
+        np.testing.assert_allclose(rows.e, task.cost * step, atol=1e-12)
+        assert np.abs(step).max() < np.abs(error).max()  # some are saturated
 
 
 def test_every_task_is_met_at_rest(humanoid, rng):
@@ -160,20 +150,30 @@ def test_every_task_is_met_at_rest(humanoid, rng):
 def test_posture_error_is_zero_at_target_and_ignores_root(humanoid):
     task = PostureTask(1.0)
     task.bind(humanoid)
-    weights, steps = np.zeros(humanoid.nv), np.zeros(humanoid.nv)
-    assert task.diagonal(humanoid, 1e-2, weights, steps)
-    np.testing.assert_array_equal(steps, 0.0)
-    np.testing.assert_array_equal(weights[:6], 0.0)
-    np.testing.assert_array_equal(weights[6:], 1.0)
+    np.testing.assert_array_equal(task.error(humanoid), 0.0)
+    np.testing.assert_array_equal(task.squared_costs[:6], 0.0)
+    np.testing.assert_array_equal(task.squared_costs[6:], 1.0)
+
+
+def test_posture_of_a_free_root_is_a_difference_of_poses(humanoid, rng):
+    costs = {"root_joint": 2.0}
+    target = humanoid.integrate(rng.normal(size=humanoid.nv) * 0.1)
+    task = PostureTask(1.0, costs=costs, target=target, max_speed=1e3)
+    stack = TaskStack(humanoid, [task])
+    stack.solve(1e-2)
+    error = pin.difference(humanoid.model, humanoid.q, target)
+    weights, steps = stack.levels[0].tasks.diagonal
+    np.testing.assert_array_equal(weights[:6], 4.0)
+    np.testing.assert_allclose(steps, weights * error, atol=1e-12)
 
 
 def test_steps_are_saturated(arm):
     far = arm.frame_pose("hand")
     far.translation = far.translation + np.array([9.0, 0.0, 0.0])
     task = FrameTask("hand", target=far, position_cost=2.0)
-    task.bind(arm)
-    W, e = np.zeros((6, 7)), np.zeros(6)
-    task.rows(arm, 0.01, W, e)
+    stack = TaskStack(arm, [task])
+    stack.solve(0.01)
+    e = stack.levels[0].tasks.e
     np.testing.assert_allclose(e, [2.0 * 0.01, 0, 0, 0, 0, 0], atol=1e-12)
 
 

@@ -5,7 +5,7 @@ import pytest
 from random_episodes import HEADER, make_episode
 
 import wbc_suite
-from wbc_suite.policies import make_policy
+from wbc_suite.evaluation import make_policy
 from wbc_suite.recording import Store
 from wbc_suite.wrappers import DataCollection
 

@@ -15,7 +15,7 @@ from wbc_suite.errors import DatasetError, UnknownNameError
 from wbc_suite.executors import Processes, Serial
 from wbc_suite.recording import Dataset, editing, rebuild
 from wbc_suite.recording.converting import convert
-from wbc_suite.recording.converting.shared import convert_piece
+from wbc_suite.recording.converting.conversion import convert_piece
 from wbc_suite.recording.extracting import extract
 from wbc_suite.recording.replaying import divergence, play_states
 
@@ -122,7 +122,7 @@ def test_converting_goes_on_where_it_was_stopped(small_recording, tmp_path):
     with pytest.raises(KeyboardInterrupt):
         convert(small_recording, out, "npz", executor=Stopped(), workers=4)
     assert [path.name for path in out.iterdir()] == []
-    (first,) = (tmp_path / "out.work/made").iterdir()
+    (first,) = (tmp_path / "out.work/written/out").iterdir()
     written = first.stat().st_mtime_ns
     convert(small_recording, out, "npz", told.append, executor=Serial(), workers=4)
     assert told == [1, 1, 1, 1]
@@ -164,7 +164,7 @@ def test_extracting_is_shared_out_to_processes(lift_recording, tmp_path):
         path,
         executor=Processes(2),
         workers=2,
-        tell=told.append,
+        on_progress=told.append,
         reward_shaping=True,
     )
     assert (count, told) == (2, [1, 1])

@@ -14,7 +14,7 @@ import pytest
 from random_episodes import HEADER, make_episode
 
 from wbc_suite.errors import DatasetError
-from wbc_suite.recording import Dataset, Store, editing, files
+from wbc_suite.recording import Dataset, Store, atomic_files, editing
 from wbc_suite.wrappers import DataCollection
 
 KILLS = int(os.environ.get("WBC_SUITE_KILLS", "4"))
@@ -60,7 +60,7 @@ def test_a_full_disk_loses_nothing_that_is_finished(tmp_path, monkeypatch):
             store.add(make_episode(1))
     usage = shutil.disk_usage(tmp_path)._replace(free=1000)
     with monkeypatch.context() as patched:
-        patched.setattr(files.shutil, "disk_usage", lambda _: usage)
+        patched.setattr(atomic_files.shutil, "disk_usage", lambda _: usage)
         with pytest.raises(DatasetError, match=r"0\.0 MB left .*nothing finished"):
             store.add(make_episode(1))
         with pytest.raises(DatasetError, match="Free some space"):
@@ -83,7 +83,7 @@ def test_an_episode_that_could_not_be_kept_goes_on(lift_env, tmp_path, monkeypat
         for _ in range(steps):
             recorded.step(lift_env.hold_action)
         with monkeypatch.context() as patched:
-            patched.setattr(files.shutil, "disk_usage", lambda _: usage)
+            patched.setattr(atomic_files.shutil, "disk_usage", lambda _: usage)
             with pytest.raises(DatasetError, match=r"0\.0 MB left"):
                 recorded.recorder.keep()
     recorded.step(lift_env.hold_action)
@@ -105,7 +105,7 @@ def test_a_folder_that_cannot_be_written_is_said_before_anything_is_recorded():
 def test_two_recordings_into_one_file_at_once_are_refused(tmp_path):
     with (
         Store(tmp_path / "a.hdf5", HEADER),
-        pytest.raises(DatasetError, match="Somebody else records"),
+        pytest.raises(DatasetError, match="Another process records"),
     ):
         Store(tmp_path / "a.hdf5", HEADER)
 

@@ -9,9 +9,9 @@ import pytest
 from random_episodes import HEADER, make_episode
 
 from wbc_suite.errors import DatasetError
-from wbc_suite.recording import Dataset, Store, files, store, writing
-from wbc_suite.recording.late_errors import late_errors
-from wbc_suite.recording.row_log import BLOCK_BYTES, RowLog
+from wbc_suite.recording import Dataset, Store, atomic_files, episode_store, hdf5_writer
+from wbc_suite.recording.hdf5_writer import open_late_errors
+from wbc_suite.recording.step_buffer import BLOCK_BYTES, RowBuffer
 
 SIZE = 24 << 20  # bytes; a recording begins with 20 MB free
 BIG = 3 << 20
@@ -106,21 +106,25 @@ def test_disk_that_fills_up_while_writing_leaves_the_old_file(disk, monkeypatch,
     path = disk.folder / "a.hdf5"
     with Store(path, HEADER) as recording:
         recording.add(make_episode(0))
-    for place in (files, store, writing):  # it looked free a moment ago
+    for place in (
+        atomic_files,
+        episode_store,
+        hdf5_writer,
+    ):  # it looked free a moment ago
         monkeypatch.setattr(place, "check_folder", lambda folder, needed=0: None)
     disk.fill(leave=room)
     big = replace(make_episode(1, length=BIG // 88), name="demo_0")
     with pytest.raises(DatasetError, match="as it was"):
-        files.write_bytes(path, bytes(BIG))
+        atomic_files.write_bytes(path, bytes(BIG))
     with pytest.raises(DatasetError, match="as it was"):
-        writing.write_dataset(path, [big], HEADER)
+        hdf5_writer.write_dataset(path, [big], HEADER)
     disk.filler.unlink()
     assert uids(path) == ["0"]
     assert left_aside(disk.folder) == []
 
 
 def test_rows_of_an_episode_that_no_longer_fit_are_said_to_be_lost(disk):
-    rows = RowLog(disk.folder)
+    rows = RowBuffer(disk.folder)
     disk.fill(leave=BLOCK_BYTES + BLOCK_BYTES // 2)  # the second block goes halfway
     with pytest.raises(DatasetError, match=r"No space left.*finished ones are safe"):
         append_rows(rows, 2 * BLOCK_BYTES)
@@ -157,8 +161,8 @@ def test_files_that_may_not_grow_further_are_said_and_old_ones_stay(
     ):
         recording.add(big)
     with pytest.raises(DatasetError, match="as it was"):
-        writing.write_dataset(path, [big], HEADER)
-    rows = RowLog(tmp_path)
+        hdf5_writer.write_dataset(path, [big], HEADER)
+    rows = RowBuffer(tmp_path)
     with pytest.raises(DatasetError, match="File too large"):
         append_rows(rows, 2 << 20)
     assert uids(path) == ["0"]
@@ -178,7 +182,7 @@ def test_hdf5_never_sees_an_error_and_writing_one_says_it_at_the_end(
 
     with (
         pytest.raises(OSError, match="File too large"),
-        late_errors(tmp_path / "a") as file,
+        open_late_errors(tmp_path / "a") as file,
     ):
         write(file)
     assert (tmp_path / "a").stat().st_size == 3

@@ -14,7 +14,7 @@ from wbc_suite.errors import DatasetError, UnknownNameError
 from wbc_suite.recording import Dataset, EnvSource, rebuild
 from wbc_suite.recording.recorder import Recorder
 from wbc_suite.recording.replaying import divergence, play_states
-from wbc_suite.recording.row_log import BLOCK_BYTES
+from wbc_suite.recording.step_buffer import BLOCK_BYTES
 from wbc_suite.wrappers import DataCollection
 
 
@@ -192,7 +192,7 @@ def test_other_keys_within_an_episode_are_told(tmp_path):
     recorded.step(env.hold_action)
     assert recorded.recorder.length == 2
     env.observables.modify("cube_pos", active=False)
-    with pytest.raises(DatasetError, match="other keys are observed"):
+    with pytest.raises(DatasetError, match="lacks 'cube_pos'"):
         recorded.step(env.hold_action)
     assert not recorded.recorder.recording
 
@@ -201,7 +201,7 @@ def test_a_robot_of_ones_own_is_what_a_file_cannot_tell():
     env = wbc_suite.make("Lift", robots=wbc_suite.load_robot("Panda"))
     source = EnvSource.of(env)
     assert source.missing == ("robots",)
-    with pytest.raises(DatasetError, match="cannot tell robots"):
+    with pytest.raises(DatasetError, match="does not contain robots"):
         EnvSource.parse(source.text).build()
 
 

@@ -1,4 +1,4 @@
-"""A gripper alone on a carriage: it picks a thing from a table, and is shaken.
+"""A gripper alone on a carriage: it picks an object from a table, and is shaken.
 
 Try one gripper, with figures and a picture:
 
@@ -21,7 +21,7 @@ from wbc_suite.scene.objects import box
 
 PREFIX = "robot0_"
 TABLE = 0.4  # m, height of the table's top
-CARRIAGE = 200.0  # kg, moves as it is told whatever a gripper of 2 kg does
+CARRIAGE = 200.0  # kg, much heavier than a gripper of 2 kg
 STIFFNESS = 2500.0  # 1/s^2, of the carriage's position
 CLEAR = 0.002  # m, between fingertips and table
 AWAY = 0.12  # m, from which the open gripper comes
@@ -32,7 +32,7 @@ GRIPPED = 0.9  # s, to close and to squeeze
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class Thing:
+class SceneObject:
     """What is gripped.
 
     Attributes:
@@ -51,17 +51,17 @@ class Thing:
 DOWN = np.diag([1.0, -1.0, -1.0])
 SIDEWAYS = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
 """z ahead and x up."""
-CUBE = Thing(grasp="pinch", approach=DOWN, half=0.02, mass=0.1)
-CAN = Thing(grasp="wrap", approach=SIDEWAYS, half=0.08, mass=0.3)
+CUBE = SceneObject(grasp="pinch", approach=DOWN, half=0.02, mass=0.1)
+CAN = SceneObject(grasp="wrap", approach=SIDEWAYS, half=0.08, mass=0.3)
 CAN_RADIUS = 0.03  # m
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Hold:
-    """How a thing was held from the lift to the end.
+    """How an object was held from the lift to the end.
 
     Attributes:
-        slip: Largest way of the thing in the tool's frame, m.
+        slip: Largest way of the object in the tool's frame, m.
         turn: Largest turn in the tool's frame, rad.
         links: Links that touched it at the end.
         depth: Deepest penetration at the end, m.
@@ -85,18 +85,18 @@ class Hold:
 
 
 class GraspRig:
-    """A table with a thing on it, and an open gripper before it.
+    """A table with an object on it, and an open gripper before it.
 
     Args:
         name: Catalogue name of the gripper.
-        thing: What it is to grip.
+        item: Object to grip.
     """
 
-    def __init__(self, name, thing=CUBE):
-        self.robot, self.thing = wbc_suite.load_robot(f"gripper/{name}"), thing
+    def __init__(self, name, item=CUBE):
+        self.robot, self.item = wbc_suite.load_robot(f"gripper/{name}"), item
         (self.synergies,) = self.robot.synergies.values()
         frames = [frame.name for frame in self.robot.frames]
-        self.tool = thing.grasp if thing.grasp in frames else "tcp"
+        self.tool = item.grasp if item.grasp in frames else "tcp"
         self.model = self._scene().compile()
         self.data = mujoco.MjData(self.model)
         self.state = RobotState(self.model, self.data, self.robot, prefix=PREFIX)
@@ -109,22 +109,22 @@ class GraspRig:
     def _scene(self):
         spec = empty_arena()
         add_table(spec, TableConfig(size=(0.4, 0.4, 0.05), center=(0, 0, TABLE)))
-        if self.thing is CAN:
+        if self.item is CAN:
             _add_can(spec)
         else:
-            half = self.thing.half
-            density = self.thing.mass / (2 * half) ** 3
+            half = self.item.half
+            density = self.item.mass / (2 * half) ** 3
             size, red = (half, half, half), (0.85, 0.25, 0.15, 1)
-            box("thing", size, color=red, density=density).add_to(spec)
-        centre = np.array([0.0, 0.0, TABLE + self.thing.half])
-        spec.body("thing").pos = centre
+            box("object", size, color=red, density=density).add_to(spec)
+        centre = np.array([0.0, 0.0, TABLE + self.item.half])
+        spec.body("object").pos = centre
         body = spec.worldbody.add_body(name="carriage", gravcomp=1)
         body.explicitinertial = True
         body.mass, body.inertia = CARRIAGE, (1.0, 1.0, 1.0)
         slide = mujoco.mjtJoint.mjJNT_SLIDE
         for letter, axis in zip("xyz", np.eye(3), strict=True):
             body.add_joint(name=f"carriage_{letter}", type=slide, axis=axis)
-        root = pin.SE3(self.thing.approach, centre) * self._tool_pose().inverse()
+        root = pin.SE3(self.item.approach, centre) * self._tool_pose().inverse()
         x, y, z, w = pin.Quaternion(root.rotation).normalized().coeffs()
         pose = {"pos": tuple(root.translation), "quat": (w, x, y, z)}
         self.robot = self.robot.with_root("fixed", **pose)
@@ -142,7 +142,7 @@ class GraspRig:
         """Place the open gripper, so high that closing never reaches the table."""
         lowest = min(self._lowest(share) for share in np.linspace(0.0, 1.0, 21))
         self.above = max(0.0, TABLE + CLEAR - lowest)
-        self.target = -AWAY * self.thing.approach[:, 2]
+        self.target = -AWAY * self.item.approach[:, 2]
         self.target[2] += self.above
         self._set_posture(self.commands(0.0))
         self.data.qpos[self._places] = self.target
@@ -150,7 +150,7 @@ class GraspRig:
         mujoco.mj_forward(self.model, self.data)
 
     def _lowest(self, share):
-        """Return the height of the lowest point of the gripper at the thing, m."""
+        """Return the height of the lowest point of the gripper at the object, m."""
         model, data = self.model, self.data
         names = [model.geom(g).name for g in range(model.ngeom)]
         own = [g for g, n in enumerate(names) if n.startswith(PREFIX)]
@@ -166,7 +166,7 @@ class GraspRig:
     def commands(self, share):
         """Return the synergies' commands, share 0 before and 1 after closing."""
         ends = np.array(
-            [s.grasps.get(self.thing.grasp, (-1.0, 1.0)) for s in self.synergies]
+            [s.grasps.get(self.item.grasp, (-1.0, 1.0)) for s in self.synergies]
         )
         return (1.0 - share) * ends[:, 0] + share * ends[:, 1]
 
@@ -217,9 +217,9 @@ class GraspRig:
         self.target = begin + change
 
     def grip(self):
-        """Go to the thing, close, lift; remember how it lies in the hand."""
+        """Go to the object, close, lift; remember how it lies in the hand."""
         self.wait(0.1)
-        self.move(AWAY * self.thing.approach[:, 2], 0.5)
+        self.move(AWAY * self.item.approach[:, 2], 0.5)
         self.close()
         self.wait(GRIPPED)
         self.gripped = self._held()
@@ -239,8 +239,8 @@ class GraspRig:
             self._note()
 
     def _held(self):
-        """Return the thing's pose in the tool's frame."""
-        site, body = self.data.site(PREFIX + self.tool), self.data.body("thing")
+        """Return the object's pose in the tool's frame."""
+        site, body = self.data.site(PREFIX + self.tool), self.data.body("object")
         tool = pin.SE3(site.xmat.reshape(3, 3), site.xpos)
         return tool.inverse() * pin.SE3(body.xmat.reshape(3, 3), body.xpos)
 
@@ -250,14 +250,14 @@ class GraspRig:
         self.turn = max(self.turn, float(np.linalg.norm(pin.log3(moved.rotation))))
 
     def result(self):
-        """Return how the thing was held, and how it is held now."""
+        """Return how the object was held, and how it is held now."""
         model, data = self.model, self.data
-        thing, links, depth, total = model.geom("thing").id, set(), 0.0, 0.0
+        held, links, depth, total = model.geom("object").id, set(), 0.0, 0.0
         force = np.zeros(6)
         for k, contact in enumerate(data.contact):
-            if thing not in contact.geom:
+            if held not in contact.geom:
                 continue
-            (other,) = (g for g in contact.geom if g != thing)
+            (other,) = (g for g in contact.geom if g != held)
             body = model.body(model.geom_bodyid[other]).name
             mujoco.mj_contactForce(model, data, k, force)
             links.add(body.removeprefix(PREFIX))
@@ -267,16 +267,16 @@ class GraspRig:
             turn=self.turn,
             links=frozenset(links),
             depth=depth,
-            rise=float(data.body("thing").xpos[2] - TABLE - self.thing.half),
+            rise=float(data.body("object").xpos[2] - TABLE - self.item.half),
             force=total,
         )
 
 
 def _add_can(spec):
-    body = spec.worldbody.add_body(name="thing")
+    body = spec.worldbody.add_body(name="object")
     body.add_joint(name="thing_joint", type=mujoco.mjtJoint.mjJNT_FREE)
     body.add_geom(
-        name="thing",
+        name="object",
         type=mujoco.mjtGeom.mjGEOM_CYLINDER,
         size=(CAN_RADIUS, CAN.half, 0.0),
         rgba=(0.85, 0.25, 0.15, 1),

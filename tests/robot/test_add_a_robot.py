@@ -9,8 +9,8 @@ import pytest
 
 import wbc_suite
 from wbc_suite.catalogue import Catalogue
-from wbc_suite.robot import parts, shapes
-from wbc_suite.robot.component import AssemblyHeader, Header, Part
+from wbc_suite.robot import elements, shapes
+from wbc_suite.robot.robot_file import AssemblyHeader, Header, Part
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "robots.md").read_text(encoding="utf-8")
@@ -19,7 +19,7 @@ URDF = ROOT / "examples" / "robots" / "six_axis_arm.urdf"
 
 @pytest.fixture
 def lab(tmp_path):
-    """A folder of one's own, with the robot edited as the page says."""
+    """A folder of the user, with the robot edited as on the page."""
     text = wbc_suite.load_robot(URDF).to_toml()
     text = text.replace('name = "six_axis_arm"', 'name = "SixAxis"')
     blocks = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
@@ -62,17 +62,17 @@ def test_its_hand_reaches_and_closes(lab):
 
 TABLES = {
     "[component]": Header,
-    "[root]": parts.Root,
-    "[[link]]": parts.Link,
-    "joint": parts.Joint,
-    "[[frame]]": parts.Frame,
-    "[[mount]]": parts.Mount,
-    "[[camera]]": parts.Camera,
-    "[[actuator]]": parts.Actuator,
-    "[[sensor]]": parts.Sensor,
-    "[[synergy]]": parts.Synergy,
-    "[[connect]]": parts.Connect,
-    "[contacts]": parts.Contacts,
+    "[root]": elements.Root,
+    "[[link]]": elements.Link,
+    "joint": elements.Joint,
+    "[[frame]]": elements.Frame,
+    "[[mount]]": elements.Mount,
+    "[[camera]]": elements.Camera,
+    "[[actuator]]": elements.Actuator,
+    "[[sensor]]": elements.Sensor,
+    "[[synergy]]": elements.Synergy,
+    "[[connect]]": elements.Connect,
+    "[contacts]": elements.Contacts,
     "[assembly]": AssemblyHeader,
     "[[part]]": Part,
     "box": shapes.Box,
@@ -92,7 +92,11 @@ def test_the_reference_names_every_key(table, model):
     assert row is not None
     text = row.group(1)
     keys = {field.alias or name for name, field in model.model_fields.items()}
-    if issubclass(model, shapes.Posed) and table.isalpha() and table != "joint":
+    if (
+        issubclass(model, shapes.Posed | shapes.ShapeFields)
+        and table.isalpha()
+        and table != "joint"
+    ):
         keys -= SHARED
     missing = {key for key in keys if not re.search(rf"`{key}\b", text)}
     assert missing == set()

@@ -7,7 +7,7 @@ import pytest
 
 import wbc_suite
 from wbc_suite.catalogue import Catalogue
-from wbc_suite.robot.mjcf import STOP_MARGIN
+from wbc_suite.robot.mjcf_export import STOP_MARGIN
 
 ROBOTS = Catalogue().names("robots")
 ROOTS = ("fixed", "planar", "free")

@@ -3,7 +3,7 @@
 import pytest
 
 from wbc_suite.errors import ConfigError, UnknownNameError
-from wbc_suite.robot.component import read_robot_file
+from wbc_suite.robot.robot_file import read_robot_file
 
 BASE = """
 format = 1
@@ -57,7 +57,7 @@ def test_tables_given_replace_and_the_others_stay(folder):
     assert changed.component.source == "a data sheet"
 
 
-def test_a_component_that_is_not_there_is_told_with_the_nearest(folder):
+def test_the_error_of_an_unknown_component_names_the_nearest(folder):
     path = folder / "half_jaw.toml"
     path.write_text(CHANGED.replace('extends = "jaw"', 'extends = "yaw"'))
     with pytest.raises(UnknownNameError, match="Did you mean 'jaw'"):

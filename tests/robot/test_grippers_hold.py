@@ -1,6 +1,6 @@
 """Every gripper picks a cube from a table and holds it when shaken; hands a can too.
 
-`grasp_rig.py` says how, and tries one gripper by hand.
+`grasp_rig.py` implements the test, and runs it for one gripper from the shell.
 """
 
 import numpy as np
@@ -37,9 +37,9 @@ GRIPPERS = [
 ]
 
 
-def shaken(name, thing):
-    """Return how a gripper holds a thing that it picked, after shaking it."""
-    rig = GraspRig(name, thing)
+def shaken(name, held):
+    """Return how a gripper holds an object after picking and shaking it."""
+    rig = GraspRig(name, held)
     rig.grip()
     for axis in np.eye(3):
         rig.shake(axis)
@@ -70,7 +70,7 @@ def test_hand_closes_around_a_can_and_holds_it_when_shaken(name):
 
 
 def test_a_slippery_cube_is_lost():
-    """Else the rig would hold things by something other than friction."""
+    """Otherwise the rig would hold objects by something other than friction."""
     rig = GraspRig(QUICK)
     rig.model.geom_friction[:, 0] = 0.005
     rig.grip()

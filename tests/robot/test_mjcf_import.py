@@ -114,7 +114,7 @@ def assert_same_mechanics(original, ours, *, rng, bodies, sites, atol=TOLERANCE)
 
 
 @pytest.mark.parametrize(("name", "root"), CASES)
-def test_our_own_robots_come_back(name, root, tmp_path):
+def test_exported_robots_are_read_back(name, root, tmp_path):
     robot = wbc_suite.load_robot(name, root=root)
     # Without visuals: their meshes cost time and prove nothing here.
     links = [link.model_copy(update={"visual": ()}) for link in robot.links]
@@ -217,7 +217,7 @@ def test_meshes_become_hulls(tmp_path):
     link = read_mjcf(write(tmp_path, text)).links[0]
     hull = link.collision[0]
     assert isinstance(hull, Hull)
-    R = wbc_suite.robot.placing.se3_of(hull)
+    R = wbc_suite.robot.poses.se3_of(hull)
     points = np.array([R.act(np.array(s[:3])) for s in hull.spheres]) - [1, 0, 0]
     found = points[np.lexsort(points.round(6).T)]
     np.testing.assert_allclose(found, vertices[np.lexsort(vertices.T)], atol=1e-6)
@@ -229,11 +229,11 @@ FAULTS = {
     "two free trees": (
         '<mujoco><worldbody><body><freejoint name="f"/><geom size="1"/></body>'
         '<body><geom size="1"/></body></worldbody></mujoco>',
-        "joint 'f' is free and not the only tree",
+        "joint 'f' is free, but there are several root bodies",
     ),
     "weld": (
         body("", '<equality><weld body1="child"/></equality>'),
-        "neither of joints nor of two bodies",
+        "neither a joint equality nor a connect of two bodies",
     ),
     "polynomial": (
         body(
@@ -248,10 +248,10 @@ FAULTS = {
             '<tendon><fixed name="t" stiffness="1"><joint joint="a" coef="1"/></fixed>'
             "</tendon>",
         ),
-        "tendon 't' has forces of its own",
+        "tendon 't' has forces",
     ),
     "gravcomp": (body("").replace('"child"', '"child" gravcomp="1"'), "gravcomp"),
-    "nothing": ("<mujoco/>", "it has no body"),
+    "nothing": ("<mujoco/>", "the model has no body"),
     "plugin": (
         '<mujoco><extension><plugin plugin="x"/></extension></mujoco>',
         "plugins run code",
@@ -262,7 +262,7 @@ FAULTS = {
         body('<joint name="j"/><geom type="mesh"/>'),
         "MuJoCo refuses it.* valid meshid",
     ),
-    "no number": (body('<joint axis="0 nan 1"/>'), "holds what is no number"),
+    "no number": (body('<joint axis="0 nan 1"/>'), "contains NaN; give numbers"),
     "outside mesh": (
         '<mujoco><asset><mesh file="../secret.stl"/></asset></mujoco>',
         "lies outside the folder",

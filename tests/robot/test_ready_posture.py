@@ -5,13 +5,16 @@ import numpy as np
 import pytest
 
 from wbc_suite.catalogue import Catalogue
+from wbc_suite.compiling import as_argument
 from wbc_suite.control import RobotState
-from wbc_suite.control.part.joint import JointLaw
-from wbc_suite.control.part.law import commands
+from wbc_suite.control.law.joint_laws import JointLaw
+from wbc_suite.control.loop.inverse_dynamics import needed_kernels, write_commands
+from wbc_suite.control.loop.physics import bind_physics
+from wbc_suite.control.loop.records import gather
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp import SelfCollisionLimit
 from wbc_suite.robot import load_robot
-from wbc_suite.robot.capsules import (
+from wbc_suite.robot.collision_capsules import (
     _gripper_links,
     collision_pairs,
     enclosing_capsules,
@@ -29,7 +32,7 @@ QUICK_FREE = 100
 
 
 def without_free_root(name):
-    """Return a robot by name; one that stands on its feet hangs in the air."""
+    """Return a robot by name; a free root is fixed in the air."""
     robot = load_robot(name)
     return robot.with_root("fixed") if robot.root.kind == "free" else robot
 
@@ -76,9 +79,13 @@ class Lone:
         for joint in servos:
             self.data.actuator(PREFIX + joint).ctrl = self.ready[joint]
         drift = dict.fromkeys((*driven, *sorted(servos)), 0.0)
+        physics = as_argument(bind_physics(self.model, self.data))
+        records = gather([(law.record, law.drives)])
+        law.adopt(*records)
+        arguments = physics, *records, *needed_kernels(records[0])
         for _ in range(round(seconds / self.model.opt.timestep)):
             mujoco.mj_step1(self.model, self.data)
-            self.data.ctrl[law.drives["ctrl"]] = commands(state, [law])[law.outputs]
+            write_commands(*arguments)
             mujoco.mj_step2(self.model, self.data)
             for joint, largest in drift.items():
                 way = self.data.joint(PREFIX + joint).qpos[0] - self.ready.get(

@@ -33,7 +33,7 @@ def figures(request):
 
 
 def settled(robot, command, seconds=2.0):
-    """Return model and data after the fingers have gone where they are told."""
+    """Return model and data after the fingers have reached their setpoints."""
     model = robot.to_mjspec().compile()
     model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     model.opt.gravity[:] = 0.0

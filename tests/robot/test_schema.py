@@ -1,12 +1,11 @@
-"""The JSON Schemas say what the models say."""
+"""The JSON Schemas agree with the models."""
 
 import json
 
 import pytest
 
 from wbc_suite.catalogue import Catalogue
-from wbc_suite.robot.component import Assembly, Component
-from wbc_suite.robot.schema import robot_schema
+from wbc_suite.robot.robot_file import Assembly, Component, robot_schema
 from wbc_suite.tomlfile import read_toml
 
 CATALOGUE = Catalogue()

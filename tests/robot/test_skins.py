@@ -1,4 +1,4 @@
-"""Skins change what is seen and nothing else; missing meshes are one sentence."""
+"""Skins change only the drawing; missing meshes give one message."""
 
 import sys
 import tomllib
@@ -11,8 +11,8 @@ import trimesh
 import wbc_suite
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.errors import ConfigError
-from wbc_suite.robot.component import read_robot_file
-from wbc_suite.robot.skins import PROVIDERS, Wardrobe
+from wbc_suite.robot.robot_file import read_robot_file
+from wbc_suite.robot.skins import PROVIDERS, SkinFinder
 
 TABLES = Catalogue().files("robots/skin")
 COMPONENTS = [
@@ -78,12 +78,12 @@ def same_dynamics(one, other):
 @pytest.mark.slow
 def test_a_skin_changes_what_is_drawn_and_nothing_else(package):
     write_meshes(package, ["panda", "panda_gripper", "rethink_mount"])
-    plain, dressed = (
+    plain, skinned = (
         wbc_suite.load_robot("Panda"),
         wbc_suite.load_robot("Panda", skin="meshes"),
     )
     assert "robosuite" not in sys.modules
-    one, other = plain.to_mjspec().compile(), dressed.to_mjspec().compile()
+    one, other = plain.to_mjspec().compile(), skinned.to_mjspec().compile()
     before, after = same_dynamics(one, other)
     assert before == after
     drawn = [g for g in range(other.ngeom) if "_visual" in other.geom(g).name]
@@ -92,7 +92,7 @@ def test_a_skin_changes_what_is_drawn_and_nothing_else(package):
         for g in drawn
         if other.geom_type[g] == mujoco.mjtGeom.mjGEOM_MESH
     }
-    pieces = sum(len(pieces) for pieces in dressed.skins.values())
+    pieces = sum(len(pieces) for pieces in skinned.skins.values())
     faces = [other.mesh_facenum[other.geom_dataid[other.geom(g).id]] for g in meshes]
     assert sum(faces) == pieces * len(trimesh.creation.icosphere(2).faces)
     assert 5 < len(meshes) < pieces
@@ -104,7 +104,7 @@ def test_a_skin_changes_what_is_drawn_and_nothing_else(package):
             mujoco.mj_step(model, data)
         states.append(data.qpos.copy())
     np.testing.assert_array_equal(*states)
-    assert dressed.to_urdf() == plain.to_urdf()
+    assert skinned.to_urdf() == plain.to_urdf()
 
 
 def test_a_mesh_lies_where_its_table_says(package):
@@ -131,14 +131,14 @@ def test_a_mesh_lies_where_its_table_says(package):
     np.testing.assert_allclose(turned, (-0.1, -0.2, 0.0), atol=1e-6)
 
 
-def test_a_folder_of_ones_own_will_do(tmp_path):
+def test_meshes_are_found_in_a_folder_of_the_user(tmp_path):
     folder = tmp_path / "mine"
     write_meshes(folder / "deep" / "down", ["iiwa14"])
     robot = wbc_suite.load_robot("IIWA14", skin=folder, gripper="none", base="none")
     assert set(robot.skins) == {f"link_{k}" for k in range(8)} or len(robot.skins) >= 7
 
 
-def test_meshes_are_thinned_once(package, tmp_path, monkeypatch):
+def test_meshes_are_decimated_once(package, tmp_path, monkeypatch):
     fine = trimesh.creation.icosphere(5, radius=0.05)
     assert len(fine.faces) > 20_000
     write_meshes(package, ["panda_gripper"], fine)
@@ -150,16 +150,16 @@ def test_meshes_are_thinned_once(package, tmp_path, monkeypatch):
     radii = np.linalg.norm(model.mesh_vert[first : first + count], axis=1)
     np.testing.assert_allclose(radii, 0.05, rtol=0.03)
     assert list((tmp_path / "cache" / "wbc_suite" / "skins").glob("*.npz"))
-    from wbc_suite.robot import skin_meshes
+    from wbc_suite.robot import mesh_files
 
-    forget = skin_meshes.skin_triangles.cache_clear  # pyright: ignore[reportFunctionMemberAccess]
+    forget = mesh_files.skin_triangles.cache_clear  # pyright: ignore[reportFunctionMemberAccess]
     forget()
-    monkeypatch.setattr(skin_meshes, "_read", None)  # not read again
+    monkeypatch.setattr(mesh_files, "_read_mesh", None)  # not read again
     again = robot.to_mjspec().compile()
     assert again.nmeshface == model.nmeshface
 
 
-def test_what_is_missing_is_said_with_the_command():
+def test_the_error_of_missing_meshes_names_the_command():
     with pytest.raises(ConfigError, match="pip install --no-deps robosuite"):
         wbc_suite.load_robot("Panda", skin="meshes")
 
@@ -208,5 +208,5 @@ def test_every_table_fits_its_component(path, tmp_path):
     write_meshes(tmp_path, [path.stem])
     (component,) = [c for c in COMPONENTS if is_table_of(path, c.component.name)]
     links = [link.name for link in component.links]
-    dressed = Wardrobe(tmp_path, Catalogue()).dress(component.component.name, links)
-    assert set(dressed) == set(table["link"])
+    skinned = SkinFinder(tmp_path, Catalogue()).meshes(component.component.name, links)
+    assert set(skinned) == set(table["link"])

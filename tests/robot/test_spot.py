@@ -1,11 +1,11 @@
-"""Spot: what the maker's figures say, and whether it stands and grasps."""
+"""Spot: the vendor's figures, standing and grasping."""
 
 import mujoco
 import numpy as np
 import pytest
 
 import wbc_suite
-from wbc_suite.robot.validation import inertia_matrix
+from wbc_suite.robot.inertia import inertia_matrix
 
 FEET = ["front_left_foot", "front_right_foot", "rear_left_foot", "rear_right_foot"]
 FOOT_RADIUS = 0.036

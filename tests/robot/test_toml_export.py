@@ -23,7 +23,7 @@ def test_every_robot_comes_back_bit_by_bit(name, tmp_path):
     assert again(robot, tmp_path) == robot
 
 
-def test_words_of_any_kind_survive(tmp_path):
+def test_strings_of_any_kind_survive(tmp_path):
     robot = wbc_suite.load_robot("panda")
     title = 'a "quoted" \\ back\tslash, ünïcode, \x01\x7f and\nlines'
     robot = robot.model_copy(update={"title": title, "deviations": (title, "")})

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import wbc_suite
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.robot.mesh_files import read_points
-from wbc_suite.robot.surfaces import support_points
+from wbc_suite.robot.shape_geometry import support_points
 from wbc_suite.robot.urdf_export import rpy_of, write_urdf
 
 ROBOTS = Catalogue().names("robots")
@@ -143,7 +143,7 @@ def bag(tmp_path: Path):
     return wbc_suite.load_robot(tmp_path / "bag.toml")
 
 
-def test_shapes_without_a_word_in_urdf_become_meshes(bag, tmp_path: Path):
+def test_shapes_that_urdf_lacks_become_meshes(bag, tmp_path: Path):
     text = write_urdf(bag, mesh_dir=tmp_path / "meshes")
     for index, shape in enumerate(bag.links[0].visual[:3]):
         file = f"meshes/bag_visual{index}.stl"
@@ -155,7 +155,7 @@ def test_shapes_without_a_word_in_urdf_become_meshes(bag, tmp_path: Path):
     assert len(list((tmp_path / "meshes").iterdir())) == 3
 
 
-def test_shapes_without_a_word_in_urdf_become_enclosing_boxes(bag):
+def test_shapes_that_urdf_lacks_become_bounding_boxes(bag):
     model = pin.buildModelFromXML(bag.to_urdf())
     geometry = pin.buildGeomFromUrdfString(
         model, bag.to_urdf(), pin.GeometryType.VISUAL

@@ -13,8 +13,8 @@ import wbc_suite
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.errors import ConfigError
 from wbc_suite.robot.mesh_files import write_stl
+from wbc_suite.robot.shape_geometry import support_points
 from wbc_suite.robot.shapes import Box, Cylinder, Hull
-from wbc_suite.robot.surfaces import support_points
 from wbc_suite.robot.urdf_import import read_urdf
 
 ROBOTS = Catalogue().names("robots")
@@ -200,7 +200,7 @@ def test_mujocos_reader_sees_the_same_masses_and_gravity(features):
     np.testing.assert_allclose(e.qfrc_bias, d.qfrc_bias, atol=1e-11)
 
 
-def test_groups_end_effector_and_ready_are_guessed(features):
+def test_groups_end_effector_and_ready_are_inferred(features):
     robot = wbc_suite.load_robot(features)
     assert robot.groups == {"left_arm": ("left_elbow_joint", "left_wrist_slide")}
     eef = robot.frame("left_eef")
@@ -237,7 +237,7 @@ LIMBS = {
 
 
 @pytest.mark.parametrize(("joints", "groups"), LIMBS.items())
-def test_limbs_are_guessed_from_words(tmp_path, joints, groups):
+def test_limbs_are_inferred_from_words(tmp_path, joints, groups):
     names = joints.split()
     bodies = "".join(f'<link name="b{i}">{BODY}</link>' for i in range(len(names)))
     hung = "".join(joint(name, "base", f"b{i}") for i, name in enumerate(names))
@@ -246,7 +246,7 @@ def test_limbs_are_guessed_from_words(tmp_path, joints, groups):
 
 
 @pytest.mark.parametrize(("name", "root"), CASES)
-def test_our_own_robots_come_back(name, root, tmp_path):
+def test_exported_robots_are_read_back(name, root, tmp_path):
     robot = wbc_suite.load_robot(name, root=root)
     # Without visuals: their meshes cost time and prove nothing here.
     links = [link.model_copy(update={"visual": ()}) for link in robot.links]
@@ -259,7 +259,7 @@ def test_our_own_robots_come_back(name, root, tmp_path):
     } | {f.name for f in robot.frames}
     for joint in robot.joints:
         back = again.joint(joint.name)
-        if joint.mimic is not None:  # URDF knows no loops: followers just follow
+        if joint.mimic is not None:  # URDF has no loops: followers are mimic joints
             mimic = joint.mimic.model_copy(update={"closed": False})
             joint = joint.model_copy(update={"mimic": mimic})
         for key in ("range", "effort", "velocity", "damping", "mimic", "type"):
@@ -413,7 +413,7 @@ BAD = BODY.replace('izz="0.1"', 'izz="0.3"')
 FAULTS = {
     "loop": (
         one_arm(TWO, joint("a", "l0", "l1") + joint("b", "l1", "l0")),
-        "'l0', 'l1' hang on each other in a loop",
+        "'l0', 'l1' form a loop",
     ),
     "missing parent": (
         one_arm(TWO, joint("a", "bse", "l0")),
@@ -421,21 +421,24 @@ FAULTS = {
     ),
     "two parents": (
         one_arm(TWO, joint("a", "base", "l0") + joint("b", "l1", "l0")),
-        "'l0' hangs on two joints, 'a' and 'b'",
+        "'l0' is the child of two joints, 'a' and 'b'",
     ),
-    "two roots": (one_arm(TWO, joint("a", "base", "l0")), "2 links hang on nothing"),
-    "duplicated link": (one_arm(TWO + TWO), "two links are called 'l0'"),
+    "two roots": (
+        one_arm(TWO, joint("a", "base", "l0")),
+        "2 links have no parent: 'base', 'l1'",
+    ),
+    "duplicated link": (one_arm(TWO + TWO), "two links are named 'l0'"),
     "duplicated joint": (
         one_arm(TWO, joint("a", "base", "l0") + joint("a", "l0", "l1")),
-        "two joints are called 'a'",
+        "two joints are named 'a'",
     ),
     "unphysical inertia": (
         one_arm(f'<link name="l0">{BAD}</link>', joint("a", "base", "l0")),
-        "link 'l0': the principal moments .* break the triangle inequality",
+        "link 'l0': the principal moments .* violate the triangle inequality",
     ),
     "no mass": (
         one_arm('<link name="l0"/>', joint("a", "base", "l0")),
-        "the links 'l0' move but weigh nothing",
+        "the links 'l0' move but have no mass",
     ),
     "point mass that turns": (
         one_arm(
@@ -444,7 +447,7 @@ FAULTS = {
             "</link>",
             joint("a", "base", "l0") + joint("b", "l0", "l1", kind="fixed"),
         ),
-        "link 'l0' moves and so needs an inertia",
+        "link 'l0' moves and needs an inertia",
     ),
     "revolute without limit": (
         one_arm(
@@ -470,7 +473,7 @@ FAULTS = {
             joint("a", "base", "l0", inner='<mimic joint="b"/>')
             + joint("b", "l0", "l1", inner='<mimic joint="a"/>'),
         ),
-        "follows itself in a circle",
+        "follows itself in a loop",
     ),
     "not a number": (
         one_arm(
@@ -486,8 +489,8 @@ FAULTS = {
         "document type declaration",
     ),
     "not XML": ("<robot><link></robot>", "not well-formed XML"),
-    "deep": ("<robot>" + "<a>" * 500 + "</a>" * 500 + "</robot>", "nested more than"),
-    "huge": ("<robot>" + " " * 9_000_000 + "</robot>", "9000015 bytes, more than"),
+    "deep": ("<robot>" + "<a>" * 500 + "</a>" * 500 + "</robot>", "deeper than 400"),
+    "huge": ("<robot>" + " " * 9_000_000 + "</robot>", "has 9000015 bytes; at most"),
     "no links": ('<robot name="r"/>', "0 links"),
 }
 
@@ -507,7 +510,7 @@ def test_unphysical_inertias_can_be_mended(tmp_path, caplog):
     # The nearest moments without negative mass along z: 0.15 + 0.15 >= 0.3 (+ 1 mm).
     np.testing.assert_allclose([xx, yy, zz], [0.15, 0.15, 0.3], atol=3e-6)
     assert "link 'l0'" in caplog.text
-    assert "mended" in caplog.text
+    assert "corrected" in caplog.text
 
 
 def test_implausible_inertias_are_taken_with_a_warning(tmp_path, caplog):

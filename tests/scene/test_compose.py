@@ -7,7 +7,7 @@ from pydantic import ValidationError
 
 from wbc_suite.benchmark import load_benchmark
 from wbc_suite.robot import load_robot
-from wbc_suite.robot.mjcf import build_mjspec
+from wbc_suite.robot.mjcf_export import build_mjspec
 from wbc_suite.scene import (
     TableConfig,
     add_tables,
@@ -23,7 +23,8 @@ POSTURES = 60
 def scene(robot):
     benchmark, spec = load_benchmark("Lift"), empty_arena()
     benchmark.build(spec)
-    attach_robot(spec, benchmark.place(robot, 0), "robot0_")
+    (robot,) = benchmark.arrange([robot], "default")
+    attach_robot(spec, robot, "robot0_")
     return spec
 
 

@@ -4,7 +4,7 @@ import pytest
 
 from wbc_suite.errors import ConfigError, DescriptionError, UnknownNameError
 from wbc_suite.scene import empty_arena, objects
-from wbc_suite.scene.objects import MjcfThing, Part, Thing, ThingState
+from wbc_suite.scene.objects import MjcfObject, ObjectState, Part, SceneObject
 
 STANDING = [
     objects.box("t", (0.02, 0.03, 0.04)),
@@ -32,7 +32,7 @@ def simulate(thing, *, seconds=0.5, quat=(1.0, 0.0, 0.0, 0.0)):
     thing.add_to(spec)
     model = spec.compile()
     data = mujoco.MjData(model)
-    state = ThingState(model, data, thing.name)
+    state = ObjectState(model, data, thing.name)
     state.move((0.0, 0.0, state.extent(quat).bottom), quat)
     start = data.qpos.copy()
     for _ in range(round(seconds / model.opt.timestep)):
@@ -74,7 +74,7 @@ def test_materials_are_shared():
     for name in "ab":
         objects.box(name, (0.02, 0.02, 0.02)).add_to(spec)
     names = [m.name for m in spec.materials]
-    assert names.count("thing_wood") == 1
+    assert names.count("object_wood") == 1
 
 
 @pytest.mark.parametrize("size", [(0.1,), (0.1, 0.1, -0.1), (0.1, np.nan, 0.1)])
@@ -130,7 +130,7 @@ def written(tmp_path, text):
 
 
 def test_a_users_mjcf_becomes_a_thing(tmp_path):
-    mug = MjcfThing(name="cup", path=written(tmp_path, MUG))
+    mug = MjcfObject(name="cup", path=written(tmp_path, MUG))
     model, data, start = simulate(mug)
     np.testing.assert_allclose(data.qpos, start, atol=1e-3)
     assert model.joint("cup_joint").type[0] == mujoco.mjtJoint.mjJNT_FREE
@@ -153,17 +153,17 @@ def test_a_users_mjcf_becomes_a_thing(tmp_path):
 def test_dangerous_or_unclear_files_are_refused(tmp_path, old, new, told):
     path = written(tmp_path, MUG.replace(old, new, 1))
     with pytest.raises((ConfigError, DescriptionError), match=told):
-        MjcfThing(name="cup", path=path).add_to(empty_arena())
+        MjcfObject(name="cup", path=path).add_to(empty_arena())
 
 
 def test_a_hinge_hangs_one_thing_on_another():
-    arm = Thing(
+    arm = SceneObject(
         name="arm",
         parts=(Part(kind="box", size=(0.1, 0.01, 0.01), pos=(0.1, 0.0, 0.0)),),
         motion=objects.Hinge(axis=(0.0, 1.0, 0.0), range=(-1.0, 1.0)),
     )
     spec = empty_arena()
-    Thing(name="post", parts=(), motion="fixed", children=(arm,)).fixed(
+    SceneObject(name="post", parts=(), motion="fixed", children=(arm,)).fixed(
         (0.0, 0.0, 1.0)
     ).add_to(spec)
     model = spec.compile()

@@ -9,8 +9,8 @@ from wbc_suite.errors import PlacementError
 from wbc_suite.scene.objects import Extent
 from wbc_suite.scene.placement import (
     OnTopSampler,
-    PickySampler,
     Region,
+    RejectionSampler,
     SequentialSampler,
     UniformSampler,
 )
@@ -96,7 +96,7 @@ def test_what_stands_on_a_thing_may_be_above_it_and_moves_with_it():
 
 def test_nothing_stands_on_what_has_no_place():
     on_a = OnTopSampler(names=["b"], support="a", region=REGION)
-    with pytest.raises(PlacementError, match="Nothing can stand on 'a'"):
+    with pytest.raises(PlacementError, match="'a' must be placed before"):
         on_a.sample(np.random.default_rng(0), THINGS, {})
 
 
@@ -104,12 +104,12 @@ def test_a_picky_sampler_draws_until_places_will_do():
     def right(placed):
         return placed["a"].position[0] > REGION.x[1] / 2
 
-    picky = PickySampler(
+    picky = RejectionSampler(
         sampler=sampler(names=["a"]), accepts=right, wanted="a is on the right"
     )
     for seed in range(20):
         assert right(picky.sample(np.random.default_rng(seed), THINGS, {}))
-    never = PickySampler(
+    never = RejectionSampler(
         sampler=sampler(names=["a"]), accepts=lambda _: False, wanted="a is nowhere"
     )
     with pytest.raises(PlacementError, match="no place for a where a is nowhere"):
@@ -117,5 +117,5 @@ def test_a_picky_sampler_draws_until_places_will_do():
 
 
 def test_regions_have_their_ends_in_order():
-    with pytest.raises(ValidationError, match="smaller end"):
+    with pytest.raises(ValidationError, match="lower end must come first"):
         Region(x=(0.1, -0.1), y=(0, 0))

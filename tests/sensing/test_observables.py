@@ -45,22 +45,21 @@ class Slide:
         mujoco.mj_forward(self.model, self.data)
         self.seen.start(np.random.default_rng(seed))
 
-    def tick(self, n):
-        mujoco.mj_step(self.model, self.data, nstep=n)
-
     def step(self, count=1):
         found = []
         for _ in range(count):
-            self.seen.tick(self.tick, STEPS)
-            self.seen.look()
-            found.append(self.seen.observer.observation()["x"].item())
+            for _ in range(STEPS):
+                mujoco.mj_step(self.model, self.data)
+                self.seen.sample()
+            self.seen.update()
+            found.append(self.seen.buffer.observation()["x"].item())
         return np.array(found)
 
 
-def test_what_is_not_changed_is_the_truth_and_physics_is_one_call():
-    slide, calls = Slide(), []
-    slide.seen.tick(calls.append, STEPS)
-    assert calls == [STEPS]
+def test_what_is_not_changed_is_the_truth_and_needs_no_sample_of_each_step():
+    slide = Slide()
+    assert not slide.seen.follows_physics
+    assert Slide(delay=0.1).seen.follows_physics
     assert_allclose(slide.step(3), [0.05, 0.10, 0.15], atol=1e-12)
 
 
@@ -94,7 +93,7 @@ def test_the_group_and_the_key_tell_the_same():
     slide = Slide(noise=UniformNoise(0.1))
     for _ in range(5):
         slide.step()
-        seen = slide.seen.observer.observation()
+        seen = slide.seen.buffer.observation()
         assert_array_equal(seen["all"], [*seen["x"], *seen["y"]])
 
 
@@ -117,6 +116,15 @@ def test_filters_smooth_and_forget_at_a_reset():
     assert_array_equal(low.step(5), first)
 
 
+def test_another_filter_takes_the_place_of_the_first():
+    slide = Slide(filter=LowPass(0.99), sampling_rate=20)
+    slide.step(5)
+    slide.seen.modify("x", filter=LowPass(0.0))
+    assert_allclose(slide.step(), 0.30, atol=1e-9)
+    slide.seen.modify("x", delay=0.0)  # another change keeps the filter
+    assert_allclose(slide.step(), 0.35, atol=1e-9)
+
+
 def test_changes_at_run_time_begin_at_once_and_end():
     slide = Slide()
     slide.step()
@@ -137,19 +145,19 @@ def test_keys_come_and_go_with_their_space():
     )
     slide.seen.modify("y", active=False)
     slide.step(2)
-    seen = slide.seen.observer.observation()
+    seen = slide.seen.buffer.observation()
     assert list(seen) == ["x", "twice", "all"]
     assert_allclose(seen["all"], [0.10, 0.10], atol=1e-9)
-    assert slide.seen.observer.space.contains(seen)
+    assert slide.seen.buffer.space.contains(seen)
     assert slide.seen.names == ("x", "y", "twice")
     slide.seen.modify("y", active=True)
-    assert slide.seen.observer.space["all"].shape == (3,)
+    assert slide.seen.buffer.space["all"].shape == (3,)
 
 
 def test_noise_stays_within_the_declared_bounds():
     slide = Slide(noise=GaussianNoise(1e6))
     slide.step()
-    assert slide.seen.observer.space.contains(slide.seen.observer.observation())
+    assert slide.seen.buffer.space.contains(slide.seen.buffer.observation())
 
 
 def test_wrong_changes_are_named_and_change_nothing():

@@ -7,7 +7,9 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.control.action import ActionLayout, ActionPart
+from wbc_suite.control.action import ActionLayout, ActionPart, SliceKind, Unit
+from wbc_suite.control.composite.whole_body_config import ControlledFrame
+from wbc_suite.qp import ActiveLimit, LimitKind
 
 MJCF = """
 <mujoco>
@@ -39,9 +41,9 @@ STRIDE = 0.02  # m, furthest that a hand moves in a step
 def part(name, kind, labels, bound):
     return ActionPart(
         name=name,
-        kind=kind,
+        kind=SliceKind(kind),
         labels=labels,
-        units=("m",) * len(labels),
+        units=(Unit("m"),) * len(labels),
         low=(-bound,) * len(labels),
         high=(bound,) * len(labels),
     )
@@ -57,6 +59,17 @@ LAYOUT = ActionLayout(
 )
 
 
+def upper_limit(joint):
+    return ActiveLimit(
+        kind=LimitKind.POSITION,
+        subject=joint,
+        side="upper",
+        is_joint=True,
+        unit="rad",
+        multiplier=1.0,
+    )
+
+
 class FakeEnv(gymnasium.Env):
     def __init__(self):
         self.model = mujoco.MjModel.from_xml_string(MJCF)
@@ -66,7 +79,7 @@ class FakeEnv(gymnasium.Env):
         self.hold_action = np.append(np.zeros(12), [-1.0, -1.0])
         self.config = SimpleNamespace(control_freq=50.0)
         frames = [
-            SimpleNamespace(name=side + "_hand", frame=side + "_hand", kind="pose")
+            ControlledFrame(name=side + "_hand", frame=side + "_hand")
             for side in ("right", "left")
         ]
         config = SimpleNamespace(
@@ -91,7 +104,7 @@ class FakeEnv(gymnasium.Env):
         self.data.time += 0.02
         mujoco.mj_forward(self.model, self.data)
         reached = all(f["reached"] for f in frames.values())
-        ik = {"reached": reached, "solve_time": 1e-3, "frames": frames}
+        ik = {"reached": reached, "frames": frames}
         return {}, 0.0, False, False, {"ik": ik, "success": False}
 
     def _follow(self, name, command, address):
@@ -110,5 +123,5 @@ class FakeEnv(gymnasium.Env):
             "orientation_error": 0.0,
             "reasons": []
             if distance <= REACH
-            else [f"joint limit: {side}_elbow_pitch_joint (upper)"],
+            else [upper_limit(f"{side}_elbow_pitch_joint")],
         }

@@ -5,7 +5,7 @@ import pytest
 from fake_env import FakeEnv
 
 from wbc_suite.viewers import gripper_sliders
-from wbc_suite.viewers.site import Site
+from wbc_suite.viewers.page_server import PageServer
 from wbc_suite.viewers.teleop_page import TeleopPage
 from wbc_suite.viewers.teleop_session import TeleopSession
 
@@ -19,7 +19,7 @@ def session():
 
 @pytest.fixture
 def page(session):
-    made = TeleopPage(session, Site(port=0), label="test")
+    made = TeleopPage(session, PageServer(port=0), label="test")
     yield made
     made.stop()
 
@@ -35,11 +35,11 @@ def test_sliders_follow_a_device_and_a_reset(session, page):
     assert shown(page) == (-1.0, [-1.0, -1.0])
     session.set_gripper(GRIPPER, 1, 0.5)  # not by the page
     session.tick()
-    page.push()
+    page.update()
     assert shown(page) == (-0.25, [-1.0, 0.5])
     session.reset()
     session.tick()
-    page.push()
+    page.update()
     assert shown(page) == (-1.0, [-1.0, -1.0])
 
 
@@ -50,6 +50,6 @@ def test_slider_in_a_persons_hand_is_left_to_the_person(session, page, monkeypat
     sliders.touch()
     sliders.update(np.array([1.0, 1.0]))
     assert shown(page) == (-1.0, [-1.0, -1.0])
-    now[0] += gripper_sliders.OWN
+    now[0] += gripper_sliders.USER_TIME
     sliders.update(np.array([1.0, 1.0]))
     assert shown(page) == (1.0, [1.0, 1.0])

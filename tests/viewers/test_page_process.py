@@ -17,7 +17,7 @@ from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
 from wbc_suite.errors import DeviceError
-from wbc_suite.recording.desk import Wish
+from wbc_suite.recording.episode_control import EpisodeCommand
 from wbc_suite.viewers.page_process import PageProcess, RemoteSession
 from wbc_suite.viewers.teleop_session import TeleopSession
 
@@ -121,6 +121,47 @@ def test_a_person_drags_through_the_page_and_lets_go_by_leaving(session, page):
     wait_until(lambda: holder(session) is None)
 
 
+NAN, HUGE = float("nan"), 1e300
+HOSTILE = [
+    {"position": [NAN, 0, 0], "wxyz": [1, 0, 0, 0]},
+    {"position": [0, 0, HUGE], "wxyz": [1, 0, 0, 0]},
+    {"position": [0, 0, 1], "wxyz": [NAN, 0, 0, 0]},
+    {"position": [0, 0, 1], "wxyz": [0, 0, 0, 0]},
+    {"position": [0, 0, 1], "wxyz": [1, 0]},
+    {"position": "here", "wxyz": None},
+    {},
+]
+"""Poses of a drag that no browser sends."""
+
+
+@pytest.mark.slow
+def test_session_survives_any_message_and_the_next_viewer_drags(session, page):
+    start = session.snapshot.limbs[HAND].target.translation
+    for number, pose in enumerate(HOSTILE):
+        visitor = Person(page, number)
+        visitor.grab(session)
+        visitor.drag("Update", **pose)
+        visitor.socket.send(b"\xff\xfe no msgpack")
+        visitor.socket.send("text")
+        wait_until(lambda: holder(session) is None)  # the page hung up, or the drag ...
+        visitor.socket.close()  # ... was refused
+    person = Person(page, len(HOSTILE))
+    person.grab(session)
+    up = (start + np.array([0.0, 0.0, 0.1])).tolist()
+
+    def moved():
+        person.drag("Update", position=up, wxyz=[5.0, 0.0, 0.0, 0.0])
+        session.tick()
+        target = session.snapshot.limbs[HAND].target
+        return target.translation == pytest.approx(up, abs=0.3)
+
+    wait_until(moved)
+    page.check()
+    assert np.isfinite(session.env.actions).all()
+    R = session.snapshot.limbs[HAND].target.rotation
+    np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-9)
+
+
 @pytest.mark.slow
 def test_page_outlives_a_hundred_visits_and_a_flood(session, page):
     start = session.snapshot.limbs[HAND].target.translation
@@ -183,7 +224,7 @@ def test_remote_session_asks_for_what_the_session_does_and_stands_a_loss(session
         for _ in range(9):
             asked.append(ours.recv())
             match asked[-1][0]:
-                case "look":
+                case "snapshot":
                     ours.send(session.snapshot)
                 case "grab":
                     ours.send(True)
@@ -191,7 +232,7 @@ def test_remote_session_asks_for_what_the_session_does_and_stands_a_loss(session
 
     thread = threading.Thread(target=answer)
     thread.start()
-    remote, here = RemoteSession(theirs, session.traits), pin.SE3.Identity()
+    remote, here = RemoteSession(theirs, session.info), pin.SE3.Identity()
     assert remote.grab(HAND, 3, here)
     remote.release(HAND, 3)
     remote.leave(3)
@@ -199,15 +240,15 @@ def test_remote_session_asks_for_what_the_session_does_and_stands_a_loss(session
     remote.set_gripper("right_gripper", 1, 0.5)
     remote.pause(True)
     remote.reset()
-    remote.wish(Wish.RECORD)
+    remote.command_episode(EpisodeCommand.RECORD)
     thread.join()
     names = [name for name, _ in asked]
     assert names == [
-        *("look", "grab", "release", "leave", "enable", "set_gripper"),
-        *("pause", "reset", "wish"),
+        *("snapshot", "grab", "release", "leave", "enable", "set_gripper"),
+        *("pause", "reset", "command_episode"),
     ]
     assert asked[5][1] == ("right_gripper", 1, 0.5)
     assert not remote.lost.is_set()
     remote.drag(HAND, 3, here)
     assert remote.lost.is_set()
-    assert remote.snapshot.limbs.keys() == session.traits.limbs.keys()
+    assert remote.snapshot.limbs.keys() == session.info.limbs.keys()

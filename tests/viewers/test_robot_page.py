@@ -3,14 +3,13 @@ import numpy as np
 import pytest
 
 import wbc_suite
-from wbc_suite.viewers.overlays import equivalent_box
-from wbc_suite.viewers.robot_page import RobotPage
-from wbc_suite.viewers.site import Site
+from wbc_suite.viewers.page_server import PageServer
+from wbc_suite.viewers.robot_page import RobotPage, equivalent_box
 
 
 @pytest.fixture(scope="module")
 def page():
-    page = RobotPage(wbc_suite.load_robot("Panda"), Site(port=0))
+    page = RobotPage(wbc_suite.load_robot("Panda"), PageServer(port=0))
     yield page
     page.stop()
 

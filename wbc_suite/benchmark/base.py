@@ -1,36 +1,39 @@
-"""What a benchmark is: a scene, a way to start, a reward and a success."""
+"""The interface of benchmarks, their registry, and how their files are loaded."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import mujoco
 import numpy as np
+from pydantic import BaseModel
 
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.control import RobotState
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.robot import RobotDescription
 from wbc_suite.sensing.reading import Reading
-from wbc_suite.tomlfile import read_toml
+from wbc_suite.tomlfile import parse_model, read_toml
 
 __all__ = [
     "Benchmark",
     "benchmark_names",
     "load_benchmark",
+    "load_config",
     "register_benchmark",
 ]
 
+C = TypeVar("C", bound=BaseModel)
+
 
 class Benchmark(Protocol):
-    """A benchmark; it knows robots and objects, and no controller.
+    """A task: a scene, start states, a reward and a success; no controller.
 
     Attributes:
         name: Its name.
-        horizon: Actions in an episode, unless the user says otherwise.
-        robots: Robots that are taken unless the user says otherwise.
-        gripper: Gripper that they get unless the user says otherwise; None keeps
-            theirs.
+        horizon: Default number of actions in an episode.
+        robots: Default robots.
+        gripper: Default gripper of the robots; None for their own.
     """
 
     name: str
@@ -41,14 +44,14 @@ class Benchmark(Protocol):
     def arrange(
         self, robots: Sequence[RobotDescription], configuration: str
     ) -> tuple[RobotDescription, ...]:
-        """Return the robots standing where this benchmark wants them.
+        """Return the robots at their places in the scene.
 
         Args:
             robots: One or several.
             configuration: `default`, `single-robot`, `opposed` or `parallel`.
 
         Raises:
-            ConfigError: If they are too many or too few, or cannot stand so.
+            ConfigError: If their number or the configuration is not supported.
         """
         ...
 
@@ -57,47 +60,47 @@ class Benchmark(Protocol):
         ...
 
     def equip(self, spec: mujoco.MjSpec, robots: Sequence[RobotDescription]) -> None:
-        """Add what is fixed to the robots, which are in the scene now."""
+        """Add objects that are fixed to the robots, which are in the scene now."""
         ...
 
     def bind(
         self, model: mujoco.MjModel, data: mujoco.MjData, robots: Sequence[RobotState]
     ) -> None:
-        """Look up in the compiled scene what the other methods need."""
+        """Look up in the compiled scene all that the other methods need."""
         ...
 
     def reset(self, rng: np.random.Generator) -> None:
         """Place the objects; positions and sizes are written into model and data."""
         ...
 
-    def watch(self) -> None:
-        """Note what happened in a control period, where success depends on the past.
+    def after_step(self) -> None:
+        """Update the benchmark's own state after a control period.
 
-        Notes belong into `data.userdata`, so that they are part of the state.
+        It belongs into `data.userdata`, so that it is part of the simulation's state.
         """
         ...
 
     def observables(self) -> dict[str, Reading]:
-        """Return what is seen of the objects, by key; see `wbc_suite.sensing.reading`.
+        """Return readings of the objects by key; see `wbc_suite.sensing.reading`.
 
-        It is asked once, after `bind`.
+        Called once, after `bind`.
         """
         ...
 
-    def felt(self) -> dict[str, dict[str, Reading]]:
-        """Return what robots feel of it, by robot's prefix and key; asked likewise."""
+    def robot_observables(self) -> dict[str, dict[str, Reading]]:
+        """Return readings that belong to robots, by prefix and key; called likewise."""
         ...
 
     def success(self) -> bool:
-        """Whether the benchmark is solved now."""
+        """Whether the task is solved now."""
         ...
 
     def reward(self, *, shaped: bool, success: bool | None = None) -> float:
         """Return a reward in [0, 1]; 1 on success.
 
         Args:
-            shaped: Whether it also says how far a state that is no success has come.
-            success: What `success` says now, where that is known.
+            shaped: Whether states without success get a shaped reward.
+            success: The present value of `success()`, if known.
         """
         ...
 
@@ -106,7 +109,7 @@ _BUILDERS: dict[str, Callable[[Path], Benchmark]] = {}
 
 
 def register_benchmark(name: str, build: Callable[[Path], Benchmark]) -> None:
-    """Make a benchmark known; `build` gets the path of `tasks/{name}.toml`."""
+    """Register a benchmark; `build` gets the path of `tasks/{name}.toml`."""
     _BUILDERS[name] = build
 
 
@@ -120,7 +123,7 @@ def load_benchmark(
 ) -> Benchmark:
     """Make a benchmark by its name, without regard to case, or from its file.
 
-    A class of your own, or any function that returns a benchmark, is called.
+    A class of your own, or a function that returns a benchmark, is called.
 
     Raises:
         UnknownNameError: If there is no such benchmark.
@@ -147,3 +150,25 @@ def _find(name: str) -> str:
         if known.casefold() == name.casefold():
             return known
     raise UnknownNameError("benchmark", name, _BUILDERS)
+
+
+def load_config(model: type[C], path: Path) -> C:
+    """Read a benchmark's file; one that `extends` another has only the differences.
+
+    Raises:
+        ConfigError: If it is wrong, or extends a file outside its folder.
+    """
+    data = read_toml(path)
+    base = data.pop("extends", None)
+    if base is not None:
+        name = str(base)
+        if name != Path(name).name:
+            raise ConfigError(
+                f"{path}: key 'extends' = {name!r}: name a file of the same folder, "
+                "without folder and ending."
+            )
+        try:
+            data = read_toml(path.with_name(f"{name}.toml")) | data
+        except ConfigError as error:
+            raise ConfigError(f"{path}: key 'extends' = {name!r}: {error}") from error
+    return parse_model(model, data, source=str(path))

@@ -7,16 +7,12 @@ from pathlib import Path
 import mujoco
 from pydantic import NonNegativeFloat, PositiveFloat
 
-from wbc_suite.benchmark.object_benchmark import (
-    ObjectBenchmark,
-    ObjectBenchmarkConfig,
-    add_table_cameras,
-    load_config,
-)
+from wbc_suite.benchmark.base import load_config
+from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
 from wbc_suite.control import RobotState
 from wbc_suite.robot.shapes import Vector3
-from wbc_suite.scene import TableConfig, add_table, objects
-from wbc_suite.scene.objects import Thing
+from wbc_suite.scene import TableConfig, add_table, add_table_cameras, objects
+from wbc_suite.scene.objects import SceneObject
 from wbc_suite.scene.placement import Region, UniformSampler
 from wbc_suite.sensing.reading import (
     Reading,
@@ -48,10 +44,10 @@ class DoorConfig(ObjectBenchmarkConfig):
     """`tasks/door.toml`.
 
     Attributes:
-        latch: Whether the lever has to be turned first.
+        latch: Whether the lever must be turned first.
         table: The table that the door stands on.
-        origin: What the region is measured from, m.
-        region: Where the door stands.
+        origin: Origin of the region, m.
+        region: Region of the door.
         reward: Numbers of the reward.
     """
 
@@ -72,7 +68,7 @@ class Door(ObjectBenchmark):
         path: `tasks/door.toml`, or a file of the same form.
     """
 
-    needs_gripper = False  # a lever can be pushed down, and the door pulled, with less
+    needs_gripper = False  # a lever can be pushed down, and the door pulled, without
 
     def __init__(self, path: Path) -> None:
         self.config = load_config(DoorConfig, path)
@@ -87,8 +83,8 @@ class Door(ObjectBenchmark):
         x, y, z = self.config.origin
         add_table_cameras(spec, (x + 0.2, y + 0.25, z), side=1.0)
 
-    def things(self) -> Sequence[Thing]:
-        """Return the door, which stands still but for its hinges."""
+    def objects(self) -> Sequence[SceneObject]:
+        """Return the door, which is fixed but for its hinges."""
         door = objects.door(DOOR, latch=self.config.latch)
         return [door.fixed(self.config.origin)]
 
@@ -102,9 +98,9 @@ class Door(ObjectBenchmark):
         )
 
     def observables(self) -> dict[str, Reading]:
-        """Return where door and lever are, their angles, and their ways from the hands.
+        """Return positions and angles of door and lever, and offsets from the hands.
 
-        Keys are those of this field's datasets.
+        Keys are those of existing datasets.
         """
         door = body_position(self.model.body(f"{DOOR}_panel").id)
         handle = site_position(self.model.site(GRIP).id)

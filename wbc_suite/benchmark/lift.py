@@ -8,17 +8,13 @@ import mujoco
 import numpy as np
 from pydantic import NonNegativeFloat, PositiveFloat
 
-from wbc_suite.benchmark.object_benchmark import (
-    ObjectBenchmark,
-    ObjectBenchmarkConfig,
-    add_table_cameras,
-    load_config,
-)
-from wbc_suite.robot.component import Channel
+from wbc_suite.benchmark.base import load_config
+from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
+from wbc_suite.robot.elements import Channel
 from wbc_suite.robot.shapes import SizeInterval
-from wbc_suite.scene import TableConfig, add_table
+from wbc_suite.scene import TableConfig, add_table, add_table_cameras
 from wbc_suite.scene.materials import MATERIALS
-from wbc_suite.scene.objects import Thing, box
+from wbc_suite.scene.objects import SceneObject, box
 from wbc_suite.scene.placement import Region, UniformSampler
 from wbc_suite.sensing.reading import Reading
 from wbc_suite.tomlfile import FrozenModel
@@ -77,21 +73,21 @@ class Lift(ObjectBenchmark):
         add_table(spec, self.config.table)
         add_table_cameras(spec, self.config.table.center)
 
-    def things(self) -> Sequence[Thing]:
-        """Return the cube, of middle size."""
+    def objects(self) -> Sequence[SceneObject]:
+        """Return the cube, of mean size."""
         cube = self.config.cube
         half = float(np.mean(cube.half_size))
         return [box(CUBE, (half, half, half), color=cube.color)]
 
     def reset(self, rng: np.random.Generator) -> None:
-        """Draw the cube's size and place, and set it on the table."""
+        """Draw size and pose of the cube on the table."""
         half = rng.uniform(*self.config.cube.half_size)
         density = MATERIALS["wood"].density
         self.states[CUBE].resize_box((half, half, half), density=density)
         super().reset(rng)
 
     def observables(self) -> dict[str, Reading]:
-        """Return the cube's pose (quaternion x y z w) and its place from each hand."""
+        """Return the cube's pose (quaternion x y z w) and its offset from each hand."""
         return self.poses_of([CUBE], to="_pos")
 
     @property

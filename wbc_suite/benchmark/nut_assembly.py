@@ -6,21 +6,24 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import mujoco
+import numpy as np
 from pydantic import Field, PositiveFloat
 
-from wbc_suite.benchmark.carrying import CarryingBenchmark, CarryingConfig
-from wbc_suite.benchmark.object_benchmark import add_table_cameras, load_config
+from wbc_suite.benchmark.base import load_config
+from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
+from wbc_suite.benchmark.sorting import Sorting
+from wbc_suite.benchmark.staged_reward import StagedReward
 from wbc_suite.robot.shapes import Real, Size
-from wbc_suite.scene import TableConfig, add_table, objects
+from wbc_suite.scene import TableConfig, add_table, add_table_cameras, objects
 from wbc_suite.scene.furniture import peg
-from wbc_suite.scene.objects import Part, Thing
+from wbc_suite.scene.objects import Part, SceneObject
 from wbc_suite.scene.placement import Region, SequentialSampler, UniformSampler
+from wbc_suite.sensing.reading import Reading
 from wbc_suite.tomlfile import FrozenModel
 
 __all__ = ["NutAssembly", "NutAssemblyConfig"]
 
 MAKERS = {"SquareNut": objects.square_nut, "RoundNut": objects.round_nut}
-PEGS = {"SquareNut": "square_peg", "RoundNut": "round_peg"}
 
 Nut = Literal["SquareNut", "RoundNut"]
 
@@ -35,27 +38,33 @@ class PegsConfig(FrozenModel):
     round: tuple[Real, Real]
 
 
-class NutAssemblyConfig(CarryingConfig):
+class NutAssemblyConfig(ObjectBenchmarkConfig):
     """`tasks/nut_assembly.toml`, and the variants that extend it.
 
     Attributes:
-        nuts: What is to be put over its peg.
+        pick_one: Whether each episode has one of the nuts, drawn at reset.
+        nuts: The nuts.
         table: The table.
         pegs: The pegs on it.
-        regions: Where each nut starts, from the middle of the table's top.
-        aside: Distance of a nut's middle from its peg's axis at most, m.
-        height: Of a nut's middle above the table at most, m.
+        regions: Region where each nut starts, from the middle of the table's top.
+        aside: Largest distance of a placed nut's middle from the axis of its peg, m.
+        height: Largest height of a placed nut's middle above the table, m.
+        lift_height: Height to which lifting is rewarded, above the table, m.
+        stages: Numbers of the shaped reward.
     """
 
+    pick_one: bool = False
     nuts: Annotated[tuple[Nut, ...], Field(min_length=1)]
     table: TableConfig
     pegs: PegsConfig
     regions: dict[Nut, Region]
     aside: PositiveFloat
     height: PositiveFloat
+    lift_height: PositiveFloat
+    stages: StagedReward
 
 
-class NutAssembly(CarryingBenchmark):
+class NutAssembly(ObjectBenchmark):
     """Each nut is to lie around its peg, the hand withdrawn.
 
     Source of geometry and reward: the benchmark of this name in robosuite 1.5, see
@@ -66,9 +75,15 @@ class NutAssembly(CarryingBenchmark):
     """
 
     def __init__(self, path: Path) -> None:
-        self.config = load_config(NutAssemblyConfig, path)
-        floor = self.config.table.center[2]
-        super().__init__(self.config, self.config.nuts, floor=floor)
+        self.config = config = load_config(NutAssemblyConfig, path)
+        super().__init__(config)
+        self.sorting = Sorting(
+            self,
+            config.nuts,
+            pick_one=config.pick_one,
+            stages=config.stages,
+            lifted=config.table.center[2] + config.lift_height,
+        )
 
     def furnish(self, spec: mujoco.MjSpec) -> None:
         """Add table, pegs and cameras."""
@@ -95,12 +110,13 @@ class NutAssembly(CarryingBenchmark):
             peg(name, part, (x + at[0], y + at[1], z)).add_to(spec)
         add_table_cameras(spec, table.center)
 
-    def things(self) -> Sequence[Thing]:
+    def objects(self) -> Sequence[SceneObject]:
         """Return the nuts."""
         return [MAKERS[name](name) for name in self.config.nuts]
 
-    def starts(self) -> SequentialSampler:
-        """Return a sampler of each nut's own region."""
+    def reset(self, rng: np.random.Generator) -> None:
+        """Place each nut in its region; with `pick_one`, one of them."""
+        self.park(self.sorting.draw(rng))
         samplers = [
             UniformSampler(
                 names=[name],
@@ -108,15 +124,19 @@ class NutAssembly(CarryingBenchmark):
                 origin=self.config.table.center,
             )
             for name in self.config.nuts
-            if name in self.active
+            if name in self.sorting.active
         ]
-        return SequentialSampler(samplers=samplers)
+        self.place_objects(rng, self.sampler or SequentialSampler(samplers=samplers))
+
+    def observables(self) -> dict[str, Reading]:
+        """Return the poses of the objects; see `Sorting`."""
+        return self.sorting.observables()
 
     def goal(self, name: str) -> tuple[float, float]:
-        """Return where a nut's peg stands, m."""
+        """Return the place of a nut's peg, m."""
         x, y, _ = self.config.table.center
         pegs = self.config.pegs
-        dx, dy = pegs.square if PEGS[name] == "square_peg" else pegs.round
+        dx, dy = pegs.square if name == "SquareNut" else pegs.round
         return x + dx, y + dy
 
     def lies(self, name: str) -> bool:
@@ -125,11 +145,18 @@ class NutAssembly(CarryingBenchmark):
         return 0.0 < height < self.config.height and self.is_over(name)
 
     def is_over(self, name: str) -> bool:
-        """Whether a nut's middle is near its peg's axis."""
+        """Whether the middle of a nut is near the axis of its peg."""
         x, y, _ = self.states[name].position.tolist()
-        gx, gy = self.goal(name)
-        return math.hypot(x - gx, y - gy) < self.config.aside
+        return math.dist((x, y), self.goal(name)) < self.config.aside
 
-    def hand_distance(self, name: str) -> float:
-        """Return how far the nearest hand is from a nut's handle, m."""
+    def nearest_hand(self, name: str) -> float:
+        """Return the distance of the nearest hand to the handle of a nut, m."""
         return self.distance(self.site(f"{name}_handle"))
+
+    def success(self) -> bool:
+        """Whether each nut lies around its peg; see `Sorting`."""
+        return self.sorting.success()
+
+    def progress(self) -> float:
+        """Return the shaped reward; see `Sorting`."""
+        return self.sorting.progress()

@@ -5,14 +5,18 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import mujoco
+import numpy as np
 from pydantic import Field, PositiveFloat
 
-from wbc_suite.benchmark.carrying import CarryingBenchmark, CarryingConfig
-from wbc_suite.benchmark.object_benchmark import add_table_cameras, load_config
-from wbc_suite.scene import objects
+from wbc_suite.benchmark.base import load_config
+from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
+from wbc_suite.benchmark.sorting import Sorting
+from wbc_suite.benchmark.staged_reward import StagedReward
+from wbc_suite.scene import add_table_cameras, objects
 from wbc_suite.scene.furniture import BinConfig, ghost, standing_bin
-from wbc_suite.scene.objects import Thing
+from wbc_suite.scene.objects import SceneObject
 from wbc_suite.scene.placement import Region, UniformSampler
+from wbc_suite.sensing.reading import Reading
 
 __all__ = ["PickPlace", "PickPlaceConfig"]
 
@@ -24,93 +28,115 @@ MAKERS = {
 }
 GROCERIES = tuple(MAKERS)
 QUADRANTS = {"Milk": (-1, -1), "Bread": (1, -1), "Cereal": (-1, 1), "Can": (1, 1)}
-"""Which quarter of the second bin each belongs to, by the signs of x and y."""
+"""Quadrant of each object in the second bin, by the signs of x and y."""
+REST = {"Milk": 0.065, "Bread": 0.022, "Cereal": 0.060, "Can": 0.0425}
+"""Height of the origin of each object at rest, m."""
 
 Grocery = Literal["Milk", "Bread", "Cereal", "Can"]
 
 
-class PickPlaceConfig(CarryingConfig):
+class PickPlaceConfig(ObjectBenchmarkConfig):
     """`tasks/pick_place.toml`, and the variants that extend it.
 
     Attributes:
-        objects: What is to be sorted.
-        source: The bin where things start.
+        pick_one: Whether each episode has one of the objects, drawn at reset.
+        objects: The objects to be sorted.
+        source: The bin where objects start.
         target: The bin with the quadrants.
-        region: Where in the first bin things start.
-        height: A thing in the target is so little above its floor at most, m.
+        region: Region of the first bin where objects start.
+        height: Largest height of a placed object above the floor of its bin, m.
+        lift_height: Height to which lifting is rewarded, above the target bin, m.
+        stages: Numbers of the shaped reward.
     """
 
+    pick_one: bool = False
     objects: Annotated[tuple[Grocery, ...], Field(min_length=1)]
     source: BinConfig
     target: BinConfig
     region: Region
     height: PositiveFloat
+    lift_height: PositiveFloat
+    stages: StagedReward
 
 
-class PickPlace(CarryingBenchmark):
-    """Each thing is to lie in its own quadrant of the second bin, the hand withdrawn.
+class PickPlace(ObjectBenchmark):
+    """Each object is to lie in its own quadrant of the second bin, the hand withdrawn.
 
     Source of geometry and reward: the benchmark of this name in robosuite 1.5, see
-    `Lift`. What it leaves open is closed here: a thing that a hand still holds is not
-    yet put down.
+    `Lift`. Unlike there, an object that a hand still holds is not placed.
 
     Args:
         path: `tasks/pick_place.toml`, or a file of the same form.
     """
 
     def __init__(self, path: Path) -> None:
-        self.config = load_config(PickPlaceConfig, path)
-        floor = self.config.target.center[2]
-        super().__init__(self.config, self.config.objects, floor=floor)
+        self.config = config = load_config(PickPlaceConfig, path)
+        super().__init__(config)
+        self.sorting = Sorting(
+            self,
+            config.objects,
+            pick_one=config.pick_one,
+            stages=config.stages,
+            lifted=config.target.center[2] + config.lift_height,
+        )
 
     def furnish(self, spec: mujoco.MjSpec) -> None:
-        """Add bins, cameras, and likenesses of the things where they belong."""
+        """Add bins, cameras, and translucent copies of the objects at their goals."""
         source, target = self.config.source, self.config.target
         standing_bin("bin1", source).add_to(spec)
         standing_bin("bin2", target, quadrants=True).add_to(spec)
         for name in self.config.objects:
             x, y = self.goal(name)
-            thing = MAKERS[name](name)
             at = (x, y, target.center[2] + REST[name])
-            ghost(thing, f"{name}_goal", at).add_to(spec)
-        middle = [
-            (a + b) / 2 for a, b in zip(source.center, target.center, strict=True)
-        ]
-        add_table_cameras(spec, (middle[0] + 0.1, middle[1], middle[2]))
+            ghost(MAKERS[name](name), f"{name}_goal", at).add_to(spec)
+        x, y, z = (np.add(source.center, target.center) / 2).tolist()
+        add_table_cameras(spec, (x + 0.1, y, z))
 
-    def things(self) -> Sequence[Thing]:
+    def objects(self) -> Sequence[SceneObject]:
         """Return the groceries."""
         return [MAKERS[name](name) for name in self.config.objects]
 
-    def starts(self) -> UniformSampler:
-        """Return a sampler of the first bin."""
-        return UniformSampler(
-            names=self.active,
+    def reset(self, rng: np.random.Generator) -> None:
+        """Place the objects in the first bin; with `pick_one`, one of them."""
+        self.park(self.sorting.draw(rng))
+        in_bin = UniformSampler(
+            names=self.sorting.active,
             region=self.config.region,
             origin=self.config.source.center,
         )
+        self.place_objects(rng, self.sampler or in_bin)
+
+    def observables(self) -> dict[str, Reading]:
+        """Return the poses of the objects; see `Sorting`."""
+        return self.sorting.observables()
 
     def goal(self, name: str) -> tuple[float, float]:
-        """Return the middle of a thing's quadrant, m."""
-        (x, y, _), (length, width, _) = (
-            self.config.target.center,
-            self.config.target.size,
-        )
+        """Return the middle of an object's quadrant, m."""
+        x, y, _ = self.config.target.center
+        length, width, _ = self.config.target.size
         side, end = QUADRANTS[name]
         return x + side * length / 4, y + end * width / 4
 
     def lies(self, name: str) -> bool:
-        """Whether a thing is low in its quadrant."""
-        height = float(self.states[name].position[2]) - self.config.target.center[2]
+        """Whether an object is low in its quadrant."""
+        height = self.states[name].position.item(2) - self.config.target.center[2]
         return self.is_over(name) and 0.0 < height < self.config.height
 
     def is_over(self, name: str) -> bool:
-        """Whether a thing's origin is in its quadrant, or above that."""
+        """Whether the origin of an object is in its quadrant, or above it."""
         x, y, _ = self.states[name].position.tolist()
         gx, gy = self.goal(name)
         length, width, _ = self.config.target.size
         return abs(x - gx) < length / 4 and abs(y - gy) < width / 4
 
+    def nearest_hand(self, name: str) -> float:
+        """Return the distance of the nearest hand to an object, m."""
+        return self.distance(self.states[name].position.tolist())
 
-REST = {"Milk": 0.065, "Bread": 0.022, "Cereal": 0.060, "Can": 0.0425}
-"""Height of each thing's origin when it stands, m."""
+    def success(self) -> bool:
+        """Whether each object lies in its quadrant; see `Sorting`."""
+        return self.sorting.success()
+
+    def progress(self) -> float:
+        """Return the shaped reward; see `Sorting`."""
+        return self.sorting.progress()

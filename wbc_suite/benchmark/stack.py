@@ -7,16 +7,12 @@ from pathlib import Path
 import mujoco
 from pydantic import NonNegativeFloat, PositiveFloat
 
-from wbc_suite.benchmark.object_benchmark import (
-    ObjectBenchmark,
-    ObjectBenchmarkConfig,
-    add_table_cameras,
-    load_config,
-)
-from wbc_suite.robot.component import Channel
+from wbc_suite.benchmark.base import load_config
+from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
+from wbc_suite.robot.elements import Channel
 from wbc_suite.robot.shapes import Size
-from wbc_suite.scene import TableConfig, add_table
-from wbc_suite.scene.objects import Thing, box
+from wbc_suite.scene import TableConfig, add_table, add_table_cameras
+from wbc_suite.scene.objects import SceneObject, box
 from wbc_suite.scene.placement import Region, UniformSampler
 from wbc_suite.sensing.reading import Reading, body_position, offset
 from wbc_suite.tomlfile import FrozenModel
@@ -77,7 +73,7 @@ class Stack(ObjectBenchmark):
         add_table(spec, self.config.table)
         add_table_cameras(spec, self.config.table.center)
 
-    def things(self) -> Sequence[Thing]:
+    def objects(self) -> Sequence[SceneObject]:
         """Return both cubes."""
         pairs = ((A, self.config.cube_a), (B, self.config.cube_b))
         return [
@@ -86,12 +82,12 @@ class Stack(ObjectBenchmark):
         ]
 
     def observables(self) -> dict[str, Reading]:
-        """Return both cubes' poses, their ways from each hand, and from A to B."""
+        """Return poses of both cubes, their offsets from each hand, and from A to B."""
         a, b = (body_position(self.states[name].body) for name in (A, B))
         return {**self.poses_of([A, B]), "cubeA_to_cubeB": offset(b, a)}
 
     def success(self) -> bool:
-        """Whether A touches B, its middle over B's top face, and no hand holds it."""
+        """Whether A touches B, its middle above B's top face, and no hand holds it."""
         a, b = self.states[A].position.tolist(), self.states[B].position.tolist()
         half = self.config.cube_b.half_size
         over = math.hypot(a[0] - b[0], a[1] - b[1]) < math.sqrt(2.0) * half

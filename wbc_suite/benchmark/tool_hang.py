@@ -8,18 +8,20 @@ import mujoco
 import numpy as np
 from pydantic import PositiveFloat
 
-from wbc_suite.benchmark.object_benchmark import (
-    ObjectBenchmark,
-    ObjectBenchmarkConfig,
-    add_table_cameras,
-    load_config,
-)
-from wbc_suite.benchmark.stages import Stages
+from wbc_suite.benchmark.base import load_config
+from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
+from wbc_suite.benchmark.staged_reward import StagedReward
 from wbc_suite.robot.shapes import Vector3
-from wbc_suite.scene import TableConfig, add_camera, add_table, objects
-from wbc_suite.scene.objects import Thing
+from wbc_suite.scene import (
+    TableConfig,
+    add_camera,
+    add_table,
+    add_table_cameras,
+    objects,
+)
+from wbc_suite.scene.objects import SceneObject
 from wbc_suite.scene.placement import Region, SequentialSampler, UniformSampler
-from wbc_suite.sensing.reading import Reading, computed_apart
+from wbc_suite.sensing.reading import Reading, computed
 from wbc_suite.tomlfile import FrozenModel
 
 __all__ = ["ToolHang", "ToolHangConfig"]
@@ -30,11 +32,11 @@ FLAT = (0.5, 0.5, 0.5, 0.5)
 
 
 class InsertConfig(FrozenModel):
-    """When the frame counts as inserted.
+    """Bounds of an inserted frame.
 
     Attributes:
-        tilt: Of its rod against the vertical at most, rad.
-        depth: Of its tip above the socket's floor at most, m.
+        tilt: Largest angle of its rod to the vertical, rad.
+        depth: Largest height of its tip above the floor of the socket, m.
     """
 
     tilt: PositiveFloat
@@ -46,11 +48,11 @@ class ToolHangConfig(ObjectBenchmarkConfig):
 
     Attributes:
         table: The table.
-        stand: Where the stand stands, from the middle of the table's top, m.
-        frame: Where the frame lies.
-        tool: Where the wrench lies.
-        inserted: When the frame counts as inserted.
-        clear: A hanging wrench is so high above the table at least, m.
+        stand: Place of the stand from the middle of the table's top, m.
+        frame: Region of the frame.
+        tool: Region of the wrench.
+        inserted: Bounds of an inserted frame.
+        clear: Least height of a hanging wrench above the table, m.
         stages: Numbers of the shaped reward.
     """
 
@@ -60,14 +62,14 @@ class ToolHangConfig(ObjectBenchmarkConfig):
     tool: Region
     inserted: InsertConfig
     clear: PositiveFloat
-    stages: Stages
+    stages: StagedReward
 
 
 class ToolHang(ObjectBenchmark):
     """The frame is to stand in its stand, and the wrench to hang on the frame's hook.
 
-    Source of the task: the benchmark of this name in robosuite 1.5, see `Lift`. The
-    shaped reward is ours, for the peer has none.
+    Source of the task: the benchmark of this name in robosuite 1.5, see `Lift`, which
+    has no shaped reward for it.
 
     Args:
         path: `tasks/tool_hang.toml`, or a file of the same form.
@@ -93,7 +95,7 @@ class ToolHang(ObjectBenchmark):
         add_table_cameras(spec, (x, y, z))
         add_camera(spec, "closeview", (x + 0.42, y - 0.42, z + 0.38), (x, y, z + 0.06))
 
-    def things(self) -> Sequence[Thing]:
+    def objects(self) -> Sequence[SceneObject]:
         """Return stand, frame and wrench."""
         x, y, z = self.config.table.center
         dx, dy, dz = self.config.stand
@@ -104,23 +106,18 @@ class ToolHang(ObjectBenchmark):
         ]
 
     def observables(self) -> dict[str, Reading]:
-        """Return poses in the world and as seen by the hands, and what is done.
+        """Return poses in the world and in the frames of the hands, and both flags.
 
-        Keys are those of this field's datasets; quaternions are x y z w.
+        Keys are those of existing datasets; quaternions are x y z w.
         """
-        inserted, hanging = computed_apart(2, self.done)
         return {
             **self.hand_poses_of({name: name for name in (STAND, FRAME, TOOL)}),
-            "frame_is_assembled": inserted,
-            "tool_on_frame": hanging,
+            "frame_is_assembled": computed(1, self.is_inserted),
+            "tool_on_frame": computed(1, self.is_hanging),
         }
 
-    def done(self) -> tuple[bool, bool]:
-        """Return whether the frame is inserted, and whether the wrench hangs."""
-        return self.is_inserted(), self.is_hanging()
-
     def is_inserted(self) -> bool:
-        """Whether the frame stands in the socket, upright and down to its floor."""
+        """Whether the frame is upright in the socket, down to its floor."""
         upright = self.states[FRAME].rotation.item(2, 2)
         if upright <= math.cos(self.config.inserted.tilt):
             return False
@@ -130,7 +127,7 @@ class ToolHang(ObjectBenchmark):
         return within and -0.005 < z < self.config.inserted.depth
 
     def is_hanging(self) -> bool:
-        """Whether the wrench hangs free on the frame's arm, which goes through its eye.
+        """Whether the wrench hangs on the arm of the frame.
 
         It touches the frame and not the stand, no hand holds it, it is above the table,
         and the arm passes through one of its holes.
@@ -163,9 +160,8 @@ class ToolHang(ObjectBenchmark):
     def progress(self) -> float:
         """Return the shaped reward.
 
-        The mean of two terms, each the `Stages.reward` of bringing a thing to its
-        place, and 1 where it is there: the frame above its socket, and only then the
-        wrench at the hook.
+        The mean of two staged rewards, each 1 once it is done: the frame into its
+        socket, and after that the wrench onto the hook.
         """
         if not self.is_inserted():
             return self._stage(FRAME, f"{FRAME}_tip", f"{STAND}_socket") / 2
@@ -176,7 +172,7 @@ class ToolHang(ObjectBenchmark):
     def _stage(self, name: str, point: str, target: str) -> float:
         at, goal = self.site(point).tolist(), self.site(target).tolist()
         aside = math.hypot(at[0] - goal[0], at[1] - goal[1])
-        return self.config.stages.reward(
+        return self.config.stages.value(
             distance=self.distance(self.site(f"{name}_grip")),
             grasped=self.grasped(name),
             missing=max(goal[2] - at[2], 0.0),

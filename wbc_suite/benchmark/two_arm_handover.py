@@ -8,17 +8,23 @@ import mujoco
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
-from wbc_suite.benchmark.object_benchmark import add_table_cameras, load_config
-from wbc_suite.benchmark.two_arms import TwoArmBenchmark, TwoArmConfig
+from wbc_suite.benchmark.arrangement import arrange_two_arms
+from wbc_suite.benchmark.base import load_config
+from wbc_suite.benchmark.object_benchmark import (
+    ObjectBenchmark,
+    ObjectBenchmarkConfig,
+    Opposed,
+)
 from wbc_suite.control import RobotState
+from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.shapes import Size, SizeInterval
-from wbc_suite.scene import TableConfig, add_table
-from wbc_suite.scene.objects import Thing, hammer
+from wbc_suite.scene import TableConfig, add_table, add_table_cameras
+from wbc_suite.scene.objects import SceneObject, hammer
 from wbc_suite.scene.objects.tools import HAMMER_LYING
 from wbc_suite.scene.placement import (
-    PickySampler,
     Placements,
     Region,
+    RejectionSampler,
     UniformSampler,
 )
 from wbc_suite.sensing.reading import (
@@ -55,19 +61,21 @@ class RewardConfig(FrozenModel):
     lift_height: PositiveFloat
 
 
-class TwoArmHandoverConfig(TwoArmConfig):
+class TwoArmHandoverConfig(ObjectBenchmarkConfig):
     """`tasks/two_arm_handover.toml`."""
 
+    opposed: Opposed
+    apart: PositiveFloat
     table: TableConfig
     hammer: HammerConfig
     reward: RewardConfig
 
 
-class TwoArmHandover(TwoArmBenchmark):
+class TwoArmHandover(ObjectBenchmark):
     """Arm 0 picks a hammer up and hands it to arm 1, which alone holds it in the end.
 
-    That both have held it in the air at once is noted in `data.userdata[0]`: without
-    that, an arm which takes the hammer from the table by itself would succeed.
+    `data.userdata[0]` is 1 once both have held it in the air. Otherwise an arm that
+    takes the hammer from the table by itself would succeed.
 
     Source of geometry and reward: the benchmark of this name in robosuite 1.5, see
     `Lift`.
@@ -76,11 +84,13 @@ class TwoArmHandover(TwoArmBenchmark):
         path: `tasks/two_arm_handover.toml`, or a file of the same form.
     """
 
+    robots: Sequence[str] = ("Panda", "Panda")
+
     def __init__(self, path: Path) -> None:
         self.config = load_config(TwoArmHandoverConfig, path)
         super().__init__(self.config)
         self._head = 0.0
-        self.sampler = PickySampler(
+        self.sampler = RejectionSampler(
             sampler=UniformSampler(
                 names=[HAMMER],
                 region=self.config.hammer.region,
@@ -91,19 +101,25 @@ class TwoArmHandover(TwoArmBenchmark):
             wanted="its head lies on the table",
         )
 
+    def arrange(
+        self, robots: Sequence[RobotDescription], configuration: str
+    ) -> tuple[RobotDescription, ...]:
+        """Return the robots at their places; see `arrange_two_arms`."""
+        return arrange_two_arms(self.config, robots, configuration)
+
     def furnish(self, spec: mujoco.MjSpec) -> None:
-        """Add table and cameras, and room for one note."""
+        """Add table and cameras, and one entry of user data."""
         add_table(spec, self.config.table)
         add_table_cameras(spec, (0.0, 0.0, self.config.table.center[2]), before=1.2)
         spec.nuserdata += 1
 
-    def things(self) -> Sequence[Thing]:
+    def objects(self) -> Sequence[SceneObject]:
         """Return the hammer, of middle size."""
         numbers = self.config.hammer
         sizes = (numbers.handle_radius, numbers.handle_length)
         return [self._hammer(*(float(np.mean(size)) for size in sizes))]
 
-    def _hammer(self, radius: float, length: float) -> Thing:
+    def _hammer(self, radius: float, length: float) -> SceneObject:
         numbers = self.config.hammer
         return hammer(
             HAMMER,
@@ -130,14 +146,14 @@ class TwoArmHandover(TwoArmBenchmark):
         super().reset(rng)
 
     def _rests(self, placements: Placements) -> bool:
-        """Whether the head's middle is above the table; else the hammer rolls."""
+        """Whether the middle of the head is above the table; otherwise it rolls off."""
         placed, table, head = placements[HAMMER], self.config.table, np.empty(3)
         mujoco.mju_rotVecQuat(head, np.array([0.0, 0.0, self._head]), placed.quat)
-        away = np.abs(placed.position + head - table.center)[:2]
-        return bool((away <= np.array(table.size[:2]) / 2).all())
+        offset = np.abs(placed.position + head - table.center)[:2]
+        return bool((offset <= np.array(table.size[:2]) / 2).all())
 
-    def watch(self) -> None:
-        """Note when both arms hold the hammer in the air."""
+    def after_step(self) -> None:
+        """Set the user data when both arms hold the hammer in the air."""
         if self.raised and self.held_by_first and self.held_by_second:
             self.data.userdata[0] = 1.0
 
@@ -163,14 +179,17 @@ class TwoArmHandover(TwoArmBenchmark):
         return self.hands[1].grasps(self._handle)
 
     def observables(self) -> dict[str, Reading]:
-        """Return the hammer's pose, its handle, and the way of each hand to it."""
+        """Return the pose of the hammer, its handle, and its offset from each hand."""
         body = self.states[HAMMER].body
         handle = site_position(self.model.site(HANDLE).id)
         return {
             "hammer_pos": body_position(body),
             "hammer_quat": body_quat(body),
             "handle_xpos": handle,
-            **{f"gripper{i}_to_handle": self.arm_to(i, handle) for i in (0, 1)},
+            **{
+                f"gripper{i}_to_handle": self.offset_from_hand(i, handle)
+                for i in (0, 1)
+            },
         }
 
     def success(self) -> bool:
@@ -190,12 +209,12 @@ class TwoArmHandover(TwoArmBenchmark):
         """
         numbers, handle = self.config.reward, self.site(HANDLE)
         if not self.held_by_first:
-            reward = numbers.reach * (1.0 - math.tanh(self.reach(0, handle)))
+            reward = numbers.reach * (1.0 - math.tanh(self.hand_distance(0, handle)))
         elif not self.raised:
             reward = numbers.grasp
         elif self.held_by_second:
             reward = numbers.both
         else:
-            near = 1.0 - math.tanh(self.reach(1, handle))
+            near = 1.0 - math.tanh(self.hand_distance(1, handle))
             reward = numbers.lift + numbers.reach * near
         return reward / numbers.success

@@ -7,12 +7,18 @@ from pathlib import Path
 import mujoco
 from pydantic import Field, NonNegativeFloat, PositiveFloat, field_validator
 
-from wbc_suite.benchmark.object_benchmark import add_table_cameras, load_config
-from wbc_suite.benchmark.two_arms import TwoArmBenchmark, TwoArmConfig
+from wbc_suite.benchmark.arrangement import arrange_two_arms
+from wbc_suite.benchmark.base import load_config
+from wbc_suite.benchmark.object_benchmark import (
+    ObjectBenchmark,
+    ObjectBenchmarkConfig,
+    Opposed,
+)
 from wbc_suite.control import RobotState
+from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.shapes import Size
-from wbc_suite.scene import TableConfig, add_table
-from wbc_suite.scene.objects import Thing, pot
+from wbc_suite.scene import TableConfig, add_table, add_table_cameras
+from wbc_suite.scene.objects import SceneObject, pot
 from wbc_suite.scene.placement import Region, UniformSampler
 from wbc_suite.sensing.reading import (
     Reading,
@@ -63,25 +69,29 @@ class RewardConfig(FrozenModel):
     tilt: PositiveFloat
 
 
-class TwoArmLiftConfig(TwoArmConfig):
+class TwoArmLiftConfig(ObjectBenchmarkConfig):
     """`tasks/two_arm_lift.toml`."""
 
+    opposed: Opposed
+    apart: PositiveFloat
     table: TableConfig
     pot: PotConfig
     reward: RewardConfig
 
 
-class TwoArmLift(TwoArmBenchmark):
+class TwoArmLift(ObjectBenchmark):
     """A pot on a table is to be lifted 10 cm by both arms, and kept level.
 
-    Arm 0 is meant for `handle0`, which starts towards -y, and arm 1 for `handle1`.
+    Arm 0 grasps `handle0`, which starts towards -y, and arm 1 `handle1`.
 
     Source of geometry and reward: the benchmark of this name in robosuite 1.5, see
-    `Lift`. There one arm may lift the pot alone; here both hands must hold it.
+    `Lift`. Unlike there, both hands must hold the pot.
 
     Args:
         path: `tasks/two_arm_lift.toml`, or a file of the same form.
     """
+
+    robots: Sequence[str] = ("Panda", "Panda")
 
     def __init__(self, path: Path) -> None:
         self.config = load_config(TwoArmLiftConfig, path)
@@ -92,23 +102,22 @@ class TwoArmLift(TwoArmBenchmark):
             origin=self.config.table.center,
         )
 
+    def arrange(
+        self, robots: Sequence[RobotDescription], configuration: str
+    ) -> tuple[RobotDescription, ...]:
+        """Return the robots at their places; see `arrange_two_arms`."""
+        return arrange_two_arms(self.config, robots, configuration)
+
     def furnish(self, spec: mujoco.MjSpec) -> None:
         """Add table and cameras."""
         add_table(spec, self.config.table)
         add_table_cameras(spec, self.config.table.center)
 
-    def things(self) -> Sequence[Thing]:
+    def objects(self) -> Sequence[SceneObject]:
         """Return the pot."""
         numbers = self.config.pot
-        made = pot(
-            POT,
-            half_size=numbers.half_size,
-            wall=WALL,
-            handle_length=numbers.handle_length,
-            handle_width=numbers.handle_width,
-            handle_radius=numbers.handle_radius,
-        )
-        return [made.with_mass(numbers.mass)]
+        sizes = numbers.model_dump(exclude={"mass", "region"})
+        return [pot(POT, wall=WALL, **sizes).with_mass(numbers.mass)]
 
     def bind(
         self, model: mujoco.MjModel, data: mujoco.MjData, robots: Sequence[RobotState]
@@ -125,7 +134,7 @@ class TwoArmLift(TwoArmBenchmark):
         ]
 
     def observables(self) -> dict[str, Reading]:
-        """Return the pot's pose, its handles, and the way of each hand to its own."""
+        """Return the pose of the pot, its handles, and their offsets from the hands."""
         body = self.states[POT].body
         sites = (self.model.site(handle).id for handle in HANDLES)
         points = [site_position(site) for site in sites]
@@ -134,7 +143,7 @@ class TwoArmLift(TwoArmBenchmark):
             "pot_quat": body_quat(body),
             **{f"handle{i}_xpos": point for i, point in enumerate(points)},
             **{
-                f"gripper{i}_to_handle{i}": self.arm_to(i, point)
+                f"gripper{i}_to_handle{i}": self.offset_from_hand(i, point)
                 for i, point in enumerate(points)
             },
         }
@@ -176,7 +185,7 @@ class TwoArmLift(TwoArmBenchmark):
             raised = min(max(self.height - numbers.lift_from, 0.0), numbers.lift_most)
             reward += numbers.lift_scale * raised
         for arm, hand in enumerate(self.hands):
-            distance = self.reach(arm, self.site(HANDLES[arm]))
+            distance = self.hand_distance(arm, self.site(HANDLES[arm]))
             near = 1.0 - math.tanh(numbers.reach_scale * distance)
             held = hand.grasps(self._bars[arm])
             reward += numbers.reach * near + numbers.grasp * held

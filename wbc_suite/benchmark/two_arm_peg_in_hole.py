@@ -9,25 +9,28 @@ import mujoco
 import numpy as np
 from pydantic import Field, PositiveFloat, model_validator
 
-from wbc_suite.benchmark.object_benchmark import add_table_cameras, load_config
-from wbc_suite.benchmark.two_arms import TwoArmBenchmark, TwoArmConfig
-from wbc_suite.compiling import compiled
+from wbc_suite.benchmark.arrangement import arrange_two_arms
+from wbc_suite.benchmark.base import load_config
+from wbc_suite.benchmark.object_benchmark import (
+    ObjectBenchmark,
+    ObjectBenchmarkConfig,
+    Opposed,
+)
 from wbc_suite.control import RobotState
 from wbc_suite.errors import ConfigError
 from wbc_suite.robot import RobotDescription
-from wbc_suite.robot.component import Rgba
+from wbc_suite.robot.elements import Rgba
 from wbc_suite.robot.shapes import Real, Size, SizeInterval, Vector3
-from wbc_suite.scene import fix_to_frame, robot_prefix
-from wbc_suite.scene.objects import Part, Thing, cylinder, plate_with_hole
+from wbc_suite.scene import add_table_cameras, fix_to_frame, robot_prefix
+from wbc_suite.scene.objects import Part, SceneObject, cylinder, plate_with_hole
 from wbc_suite.sensing.reading import (
     Reading,
     body_position,
     body_quat,
-    computed_apart,
+    computed,
     offset,
 )
 from wbc_suite.tomlfile import FrozenModel
-from wbc_suite.typing import Matrix, Vector
 
 __all__ = ["TwoArmPegInHole", "TwoArmPegInHoleConfig"]
 
@@ -63,24 +66,26 @@ class PlateConfig(FrozenModel):
 
 
 class RewardConfig(FrozenModel):
-    """When the peg is in the hole; see `TwoArmPegInHole.alignment`."""
+    """Bounds of success; see `TwoArmPegInHole.alignment`."""
 
     distance: PositiveFloat
     depth: tuple[Real, Real]
     cosine: float = Field(ge=0.0, le=1.0)
 
 
-class TwoArmPegInHoleConfig(TwoArmConfig):
+class TwoArmPegInHoleConfig(ObjectBenchmarkConfig):
     """`tasks/two_arm_peg_in_hole.toml`."""
 
+    opposed: Opposed
+    apart: PositiveFloat
     center: Vector3
     peg: PegConfig
     plate: PlateConfig
     reward: RewardConfig
 
 
-class TwoArmPegInHole(TwoArmBenchmark):
-    """Arm 0 has a peg instead of a hand and arm 1 a plate with a hole.
+class TwoArmPegInHole(ObjectBenchmark):
+    """The peg on the wrist of arm 0 is to go through the plate on that of arm 1.
 
     Source of geometry and reward: the benchmark of this name in robosuite 1.5, see
     `Lift`.
@@ -89,6 +94,7 @@ class TwoArmPegInHole(TwoArmBenchmark):
         path: `tasks/two_arm_peg_in_hole.toml`, or a file of the same form.
     """
 
+    robots: Sequence[str] = ("Panda", "Panda")
     gripper: str | None = "none"
     needs_gripper = False
 
@@ -99,7 +105,7 @@ class TwoArmPegInHole(TwoArmBenchmark):
     def arrange(
         self, robots: Sequence[RobotDescription], configuration: str
     ) -> tuple[RobotDescription, ...]:
-        """Return the robots at their places; their wrists must be bare."""
+        """Return the robots at their places; they must have no grippers."""
         gripping = dict.fromkeys(robot.name for robot in robots if robot.synergies)
         if gripping:
             raise ConfigError(
@@ -107,18 +113,18 @@ class TwoArmPegInHole(TwoArmBenchmark):
                 "gripper_types at 'default', and describe robots without grippers; "
                 f"{' and '.join(gripping)} have one."
             )
-        return super().arrange(robots, configuration)
+        return arrange_two_arms(self.config, robots, configuration)
 
     def furnish(self, spec: mujoco.MjSpec) -> None:
         """Add cameras."""
         add_table_cameras(spec, self.config.center, before=1.0)
 
-    def things(self) -> Sequence[Thing]:
+    def objects(self) -> Sequence[SceneObject]:
         """Return the peg, of middle radius, and the plate."""
         return [self._peg(float(np.mean(self.config.peg.radius))), self._plate()]
 
     def build(self, spec: mujoco.MjSpec) -> None:
-        """Add cameras; the things are fixed to the robots."""
+        """Add cameras; the objects are fixed to the robots."""
         self.furnish(spec)
 
     def equip(self, spec: mujoco.MjSpec, robots: Sequence[RobotDescription]) -> None:
@@ -128,13 +134,13 @@ class TwoArmPegInHole(TwoArmBenchmark):
             for i, robot in enumerate(robots)
             for frame in robot.hands.values()
         ]
-        for frame, thing in zip(frames, self.things(), strict=True):
-            fix_to_frame(spec, thing, frame)
+        for frame, attached in zip(frames, self.objects(), strict=True):
+            fix_to_frame(spec, attached, frame)
 
     def bind(
         self, model: mujoco.MjModel, data: mujoco.MjData, robots: Sequence[RobotState]
     ) -> None:
-        """Look up peg and plate, and where their poses will be."""
+        """Look up the poses of peg and plate."""
         super().bind(model, data, robots)
         peg, plate = self.states[PEG], self.states[PLATE]
         self._poses = peg.position, peg.rotation, plate.position, plate.rotation
@@ -144,8 +150,8 @@ class TwoArmPegInHole(TwoArmBenchmark):
         radius = rng.uniform(*self.config.peg.radius)
         self.states[PEG].reshape(self._peg(radius))
 
-    def _peg(self, radius: float) -> Thing:
-        """Return a peg along z, whose lower end is the wrist."""
+    def _peg(self, radius: float) -> SceneObject:
+        """Return a peg along z with its lower end at the wrist."""
         numbers = self.config.peg
         rod = cylinder(
             PEG, radius, numbers.half_length, color=numbers.color, material="wood"
@@ -153,8 +159,8 @@ class TwoArmPegInHole(TwoArmBenchmark):
         at = (0.0, 0.0, numbers.half_length)
         return rod.with_mass(numbers.mass).fixed(at)
 
-    def _plate(self) -> Thing:
-        """Return a plate that holds z in its plane, on a stem."""
+    def _plate(self) -> SceneObject:
+        """Return a plate on a stem, parallel to z."""
         numbers = self.config.plate
         plate = plate_with_hole(
             PLATE,
@@ -174,26 +180,29 @@ class TwoArmPegInHole(TwoArmBenchmark):
         return whole.fixed((0.0, 0.0, numbers.stem + numbers.half_size), ACROSS)
 
     def alignment(self) -> tuple[float, float, float]:
-        """Return how peg and hole lie: depth t, distance d, m, and cosine.
+        """Return depth t and distance d of the peg in the hole, m, and their cosine.
 
         With p the peg's middle, v its axis away from the wrist, h the hole's middle and
         n the plate's normal: t = (h - p) . v, d = |(h - p) - t v|, cosine = |n . v|.
         """
-        return _alignment(*self._poses)
+        p, R_peg, h, R_plate = self._poses
+        axis, to_hole = R_peg[:, 2], h - p
+        depth = float(to_hole @ axis)
+        distance = float(np.linalg.norm(to_hole - depth * axis))
+        return depth, distance, min(abs(float(R_plate[:, 2] @ axis)), 1.0)
 
     def observables(self) -> dict[str, Reading]:
-        """Return where hole and peg are, and how they lie (`alignment`)."""
+        """Return poses of hole and peg, and their alignment."""
         hole = body_position(self.states[PLATE].body)
         peg = self.states[PEG].body
-        depth, distance, cosine = computed_apart(3, self.alignment)
         return {
             "hole_pos": hole,
             "hole_quat": body_quat(self.states[PLATE].body),
             "peg_to_hole": offset(hole, body_position(peg)),
             "peg_quat": body_quat(peg),
-            "angle": cosine,
-            "t": depth,
-            "d": distance,
+            "angle": computed(1, lambda: self.alignment()[2]),
+            "t": computed(1, lambda: self.alignment()[0]),
+            "d": computed(1, lambda: self.alignment()[1]),
         }
 
     def success(self) -> bool:
@@ -216,18 +225,3 @@ class TwoArmPegInHole(TwoArmBenchmark):
         between = math.hypot(depth, distance)
         near = sum(1.0 - math.tanh(x) for x in (between, distance, abs(depth)))
         return (near + cosine) / 5.0
-
-
-@compiled
-def _alignment(
-    p: Vector, R_peg: Matrix, h: Vector, R_plate: Matrix
-) -> tuple[float, float, float]:
-    """Return what `TwoArmPegInHole.alignment` says."""
-    depth = cosine = 0.0
-    for k in range(3):
-        depth += (h[k] - p[k]) * R_peg[k, 2]
-        cosine += R_plate[k, 2] * R_peg[k, 2]
-    square = 0.0
-    for k in range(3):
-        square += (h[k] - p[k] - depth * R_peg[k, 2]) ** 2
-    return depth, math.sqrt(square), min(abs(cosine), 1.0)

@@ -6,23 +6,28 @@ from dataclasses import replace
 from pathlib import Path
 
 import mujoco
-from pydantic import Field, NonNegativeFloat, model_validator
+from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
-from wbc_suite.benchmark.object_benchmark import add_table_cameras, load_config
-from wbc_suite.benchmark.two_arms import TwoArmBenchmark, TwoArmConfig
+from wbc_suite.benchmark.arrangement import arrange_two_arms
+from wbc_suite.benchmark.base import load_config
+from wbc_suite.benchmark.object_benchmark import (
+    ObjectBenchmark,
+    ObjectBenchmarkConfig,
+    Opposed,
+)
 from wbc_suite.control import RobotState
-from wbc_suite.robot.component import Rgba
+from wbc_suite.robot import RobotDescription
+from wbc_suite.robot.elements import Rgba
 from wbc_suite.robot.shapes import Size, Vector3
-from wbc_suite.scene import TableConfig, add_tables
-from wbc_suite.scene.objects import Thing, box, hammer, lid, open_bin
+from wbc_suite.scene import TableConfig, add_table_cameras, add_tables
+from wbc_suite.scene.objects import SceneObject, box, hammer, lid, open_bin
 from wbc_suite.scene.objects.tools import HAMMER_LYING
 from wbc_suite.scene.placement import Region, SequentialSampler, UniformSampler
-from wbc_suite.sensing.hands import pairs_in_contact
 from wbc_suite.sensing.reading import (
     Reading,
     body_position,
     body_quat,
-    computed_apart,
+    computed,
     site_position,
 )
 from wbc_suite.tomlfile import FrozenModel
@@ -69,7 +74,7 @@ class PayloadConfig(FrozenModel):
 
 
 class TrashConfig(FrozenModel):
-    """The cube that is to be thrown away; half its edge in m."""
+    """The cube that belongs into the trash bin; half its edge in m."""
 
     half_size: Size
     color: Rgba
@@ -83,9 +88,11 @@ class RewardConfig(FrozenModel):
     inside: NonNegativeFloat
 
 
-class TwoArmTransportConfig(TwoArmConfig):
+class TwoArmTransportConfig(ObjectBenchmarkConfig):
     """`tasks/two_arm_transport.toml`."""
 
+    opposed: Opposed
+    apart: PositiveFloat
     table: TableConfig
     bin: BinConfig
     lid: LidConfig
@@ -94,11 +101,11 @@ class TwoArmTransportConfig(TwoArmConfig):
     reward: RewardConfig
 
 
-class TwoArmTransport(TwoArmBenchmark):
+class TwoArmTransport(ObjectBenchmark):
     """The payload is to lie in the target bin, and the trash in the trash bin.
 
-    Before arm 0 stands the start bin, closed by a lid, with the payload in it. Before
-    arm 1 stand the target bin, with the trash in it, and the trash bin.
+    The start bin, closed by a lid, with the payload in it, is in front of arm 0; the
+    target bin, with the trash in it, and the trash bin are in front of arm 1.
 
     Source of geometry and success: the benchmark of this name in robosuite 1.5, see
     `Lift`; it has no shaped reward.
@@ -106,6 +113,8 @@ class TwoArmTransport(TwoArmBenchmark):
     Args:
         path: `tasks/two_arm_transport.toml`, or a file of the same form.
     """
+
+    robots: Sequence[str] = ("Panda", "Panda")
 
     def __init__(self, path: Path) -> None:
         self.config = load_config(TwoArmTransportConfig, path)
@@ -134,7 +143,7 @@ class TwoArmTransport(TwoArmBenchmark):
         )
 
     def _bin_places(self) -> dict[str, Vector3]:
-        """Return where the bins stand: before arm 0, and two before arm 1."""
+        """Return the places of the bins: one near arm 0, two near arm 1."""
         x, y, z = self.config.table.center
         near = self.config.bin.near
         return {
@@ -143,6 +152,12 @@ class TwoArmTransport(TwoArmBenchmark):
             TRASH_BIN: (x - near, y, z),
         }
 
+    def arrange(
+        self, robots: Sequence[RobotDescription], configuration: str
+    ) -> tuple[RobotDescription, ...]:
+        """Return the robots at their places; see `arrange_two_arms`."""
+        return arrange_two_arms(self.config, robots, configuration)
+
     def furnish(self, spec: mujoco.MjSpec) -> None:
         """Add both tables and cameras."""
         table = self.config.table
@@ -150,25 +165,19 @@ class TwoArmTransport(TwoArmBenchmark):
         add_tables(spec, table, {"table0": (x, -y, z), "table1": (x, y, z)})
         add_table_cameras(spec, (x, 0.0, z), before=1.2)
 
-    def things(self) -> Sequence[Thing]:
+    def objects(self) -> Sequence[SceneObject]:
         """Return the bins, the lid, the payload and the trash."""
         payload, trash = self.config.payload, self.config.trash
         edge = trash.half_size
         return [
             *(self._bin(name, at) for name, at in self._bin_places().items()),
             lid(LID, self.config.lid.size, color=LIGHT),
-            hammer(
-                PAYLOAD,
-                handle_radius=payload.handle_radius,
-                handle_length=payload.handle_length,
-                head_half_size=payload.head_half_size,
-                mass=payload.mass,
-            ),
+            hammer(PAYLOAD, **payload.model_dump(exclude={"region"})),
             box(TRASH, (edge, edge, edge), color=trash.color),
         ]
 
-    def _bin(self, name: str, at: Vector3) -> Thing:
-        """Return a bin with walls of glass, so that cameras see what is in it."""
+    def _bin(self, name: str, at: Vector3) -> SceneObject:
+        """Return a bin with translucent walls."""
         color = DARK if name == TRASH_BIN else LIGHT
         numbers = self.config.bin
         floor, *walls = open_bin(
@@ -176,7 +185,7 @@ class TwoArmTransport(TwoArmBenchmark):
         ).parts
         clear = (0.75, 0.82, 0.88, GLASS)
         glass = [replace(w, color=clear, material="plastic") for w in walls]
-        whole = Thing(name=name, parts=(floor, *glass))
+        whole = SceneObject(name=name, parts=(floor, *glass))
         return whole.fixed(at)
 
     def bind(
@@ -187,12 +196,11 @@ class TwoArmTransport(TwoArmBenchmark):
         self._floors = {n: model.geom(f"{n}_0").id for n in self._bin_places()}
 
     def observables(self) -> dict[str, Reading]:
-        """Return poses, the hands' ways to what they move, and what is done."""
+        """Return poses, offsets from the hands, and which objects are in their bins."""
         bodies = {name: self.states[name].body for name in self.states}
         handle_site = self.model.site(f"{LID}_handle").id
         payload, trash = body_position(bodies[PAYLOAD]), body_position(bodies[TRASH])
         handle = site_position(handle_site)
-        payload_done, trash_done = computed_apart(2, self.done)
         return {
             "payload_pos": payload,
             "payload_quat": body_quat(bodies[PAYLOAD]),
@@ -202,38 +210,32 @@ class TwoArmTransport(TwoArmBenchmark):
             "lid_handle_quat": body_quat(bodies[LID]),
             "target_bin_pos": body_position(bodies[TARGET_BIN]),
             "trash_bin_pos": body_position(bodies[TRASH_BIN]),
-            "gripper0_to_payload": self.arm_to(0, payload),
-            "gripper0_to_lid_handle": self.arm_to(0, handle),
-            "gripper1_to_payload": self.arm_to(1, payload),
-            "gripper1_to_trash": self.arm_to(1, trash),
-            "payload_in_target_bin": payload_done,
-            "trash_in_trash_bin": trash_done,
+            "gripper0_to_payload": self.offset_from_hand(0, payload),
+            "gripper0_to_lid_handle": self.offset_from_hand(0, handle),
+            "gripper1_to_payload": self.offset_from_hand(1, payload),
+            "gripper1_to_trash": self.offset_from_hand(1, trash),
+            "payload_in_target_bin": computed(
+                1, lambda: self.inside(PAYLOAD, TARGET_BIN)
+            ),
+            "trash_in_trash_bin": computed(1, lambda: self.inside(TRASH, TRASH_BIN)),
         }
 
     def inside(self, name: str, where: str) -> bool:
-        """Whether a thing touches a bin's floor, its middle between the walls."""
-        thing, bin_ = self.states[name], self.states[where]
-        x, y, z = (thing.position - bin_.position).tolist()
+        """Whether an object touches a bin's floor, its middle between the walls."""
+        item, bin_ = self.states[name], self.states[where]
+        x, y, z = (item.position - bin_.position).tolist()
         length, width, height = self.config.bin.size
         between = abs(x) < length / 2 and abs(y) < width / 2 and 0.0 < z < height
-        floor = self._floors[where]
-        return between and any(
-            (a == floor and b in thing.geoms) or (b == floor and a in thing.geoms)
-            for a, b in pairs_in_contact(self.data)
-        )
-
-    def done(self) -> list[bool]:
-        """Return whether the payload and the trash are in their bins."""
-        return [self.inside(name, where) for name, where in GOALS.items()]
+        return between and self.in_contact({self._floors[where]}, item.geoms)
 
     def success(self) -> bool:
         """Whether the payload is in the target bin and the trash in the trash bin."""
-        return all(self.done())
+        return all(self.inside(name, where) for name, where in GOALS.items())
 
     def progress(self) -> float:
-        """Return the shaped reward, which robosuite has not.
+        """Return the shaped reward, which robosuite does not have.
 
-        It is the sum over payload and trash, with d the distance to the own bin:
+        It is the sum over payload and trash, with d the distance to the object's bin:
 
             inside                  if it is in its bin
             near (1 - tanh(d))      else

@@ -6,19 +6,15 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt
 
-from wbc_suite.benchmark.object_benchmark import (
-    ObjectBenchmark,
-    ObjectBenchmarkConfig,
-    add_table_cameras,
-    load_config,
-)
+from wbc_suite.benchmark.base import load_config
+from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
 from wbc_suite.control import RobotState
-from wbc_suite.robot.component import Channel
-from wbc_suite.scene import TableConfig, add_table
-from wbc_suite.scene.objects import Thing
+from wbc_suite.robot.elements import Channel
+from wbc_suite.scene import TableConfig, add_table, add_table_cameras
+from wbc_suite.scene.objects import SceneObject
 from wbc_suite.sensing.hands import pairs_in_contact
 from wbc_suite.sensing.reading import Reading, offset, site_position, user_values
 from wbc_suite.tomlfile import FrozenModel
@@ -27,18 +23,22 @@ from wbc_suite.typing import Matrix, Vector
 __all__ = ["Wipe", "WipeConfig"]
 
 MARK = "mark"
+CENTROID, PORTION, RADIUS, PRESSES, MEASURES = 0, 3, 4, 5, 6
+"""Places of the measured values in user data, after the marks; their number."""
+THICK = 0.0004
+"""Half height of a mark, m: visible from above only."""
 
 
 class StrokeConfig(FrozenModel):
     """The stroke of dirt.
 
     Attributes:
-        marks: How many marks it consists of.
-        step: From each mark to the next, m.
-        width: Of the stroke, m.
-        coverage: Which part of the table, along each side, it stays in.
+        marks: Number of marks.
+        step: Distance of consecutive marks, m.
+        width: Width of the stroke, m.
+        coverage: Share of each side of the table in which it stays.
         bend: Standard deviation of its turn from each mark to the next, rad.
-        color: Of the dirt.
+        color: Colour of the dirt.
     """
 
     marks: PositiveInt
@@ -50,7 +50,7 @@ class StrokeConfig(FrozenModel):
 
 
 class RewardConfig(FrozenModel):
-    """Numbers of the reward, before it is divided; see `Wipe.progress`."""
+    """Numbers of the reward before normalisation; see `Wipe.progress`."""
 
     mark: NonNegativeFloat
     complete: NonNegativeFloat
@@ -69,8 +69,8 @@ class WipeConfig(ObjectBenchmarkConfig):
 
     Attributes:
         table: The table.
-        stroke: What is to be wiped off.
-        margin: Marks that are so near to what presses are wiped, m.
+        stroke: The dirt.
+        margin: Marks so near to the contact area are wiped, m.
         reward: Numbers of the reward.
     """
 
@@ -83,19 +83,20 @@ class WipeConfig(ObjectBenchmarkConfig):
 class Wipe(ObjectBenchmark):
     """All marks of a random stroke are to be wiped off, by pressing on them.
 
-    What wipes is the area that the hands press on: the convex hull of the points where
-    they touch the table. A pad that lies flat wipes its whole face, one that is tilted
-    its edge, and a finger next to nothing.
+    The hands wipe the convex hull of their contact points with the table. A pad that
+    lies flat wipes its whole face, a tilted one its edge, a finger next to nothing.
+
+    Which marks are wiped is kept in `data.userdata`.
 
     Source of geometry and reward: the benchmark of this name in robosuite 1.5, see
-    `Lift`. Its shaped reward leaves [0, 1]; here it is cut to that.
+    `Lift`. Its shaped reward leaves [0, 1]; here it is clipped to that.
 
     Args:
         path: `tasks/wipe.toml`, or a file of the same form.
 
     Attributes:
-        marks: Where the marks are, x y z in the world, shape (n, 3), m.
-        force: With which the hands press on the table, N, in the last step.
+        marks: Positions of the marks in the world, shape (n, 3), m.
+        force: Force of the hands on the table in the last step, N.
         collided: Whether another part of a robot touched the table in the last step.
     """
 
@@ -105,15 +106,14 @@ class Wipe(ObjectBenchmark):
     def __init__(self, path: Path) -> None:
         self.config = load_config(WipeConfig, path)
         super().__init__(self.config)
-        count = self.config.stroke.marks
-        self.marks: Matrix = np.zeros((count, 3))
-        self._fresh, self.force, self.collided, self._seen = 0, 0.0, False, b""
+        self.marks: Matrix = np.zeros((self.config.stroke.marks, 3))
+        self._newly_wiped, self.force, self.collided = 0, 0.0, False
 
     def furnish(self, spec: mujoco.MjSpec) -> None:
         """Add table, dirt and cameras."""
         table, stroke = self.config.table, self.config.stroke
         add_table(spec, table)
-        spec.nuserdata += stroke.marks + FIGURES
+        spec.nuserdata += stroke.marks + MEASURES
         spec.add_material(name="dirt", specular=0.0, shininess=0.0)
         body = spec.worldbody.add_body(name="dirt")
         for i in range(stroke.marks):
@@ -130,42 +130,42 @@ class Wipe(ObjectBenchmark):
             )
         add_table_cameras(spec, table.center)
 
-    def things(self) -> Sequence[Thing]:
-        """Return nothing: dirt is only drawn."""
+    def objects(self) -> Sequence[SceneObject]:
+        """Return no objects: dirt is visual only."""
         return []
 
     def bind(
         self, model: mujoco.MjModel, data: mujoco.MjData, robots: Sequence[RobotState]
     ) -> None:
-        """Look up marks, table and what can touch it."""
+        """Look up the marks, their user data, and the table."""
         super().bind(model, data, robots)
         self._table: int = model.geom("table").id
-        self._wiping = robots[0].prefix
+        self._first_prefix = robots[0].prefix
         first = model.geom(f"{MARK}0").id
         self._geoms = slice(first, first + len(self.marks))
         model.geom_sameframe[self._geoms] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
         self._wrench = np.zeros(6)
-        self._first = model.nuserdata - FIGURES
-        self._figures: Vector = data.userdata[self._first :]
-        self._notes: Vector = data.userdata[self._first - len(self.marks) : self._first]
+        self._first = model.nuserdata - MEASURES
+        self._measures: Vector = data.userdata[self._first :]
+        self._wiped: Vector = data.userdata[self._first - len(self.marks) : self._first]
 
     @property
     def wiped(self) -> NDArray[np.bool_]:
-        """Which marks are wiped off, shape (n,). A part of the simulation's state."""
-        return self._notes > 0.0
+        """Which marks are wiped off, shape (n,)."""
+        return self._wiped > 0.0
 
     def reset(self, rng: np.random.Generator) -> None:
         """Draw a stroke."""
         x, y, z = self.config.table.center
         self.marks[:, :2] = np.array([x, y]) + self._stroke(rng)
         self.marks[:, 2] = z
-        self._notes[:] = self._figures[PRESSES] = 0.0
-        self._fresh, self.force, self.collided, self._seen = 0, 0.0, False, b""
         self.model.geom_pos[self._geoms] = self.marks
-        self._look()
+        self._measures[PRESSES] = 0.0
+        self._newly_wiped, self.force, self.collided = 0, 0.0, False
+        self.wipe(np.zeros(len(self.marks), dtype=np.bool_))
 
     def _stroke(self, rng: np.random.Generator) -> Matrix:
-        """Return a walk that turns back where it would leave its part of the table."""
+        """Return a random walk that turns back at the edges of its area."""
         stroke, table = self.config.stroke, self.config.table
         ends = np.asarray(table.size[:2]) / 2 * stroke.coverage
         at = rng.uniform(-ends, ends)
@@ -174,29 +174,28 @@ class Wipe(ObjectBenchmark):
         for k in range(stroke.marks):
             walk[k] = at
             heading += rng.normal(0.0, stroke.bend)
-            way = stroke.step * np.array([np.cos(heading), np.sin(heading)])
-            out = np.abs(at + way) > ends
-            way[out] *= -1.0
-            heading = float(np.arctan2(way[1], way[0]))
-            at = at + way
+            step = stroke.step * np.array([np.cos(heading), np.sin(heading)])
+            step[np.abs(at + step) > ends] *= -1.0
+            heading = float(np.arctan2(step[1], step[0]))
+            at = at + step
         return walk
 
-    def watch(self) -> None:
-        """Wipe off what the hands press on now."""
-        points, self.force, self.collided = self._touches()
-        self._fresh = 0
+    def after_step(self) -> None:
+        """Wipe off the marks that the hands press on now."""
+        points, self.force, self.collided = self._contacts()
+        self._newly_wiped = 0
         presses = self.force >= self.config.reward.least_force
-        self._figures[PRESSES] = presses
+        self._measures[PRESSES] = presses
         if not presses:
             return
         near = _distances(np.array(points), self.marks[:, :2]) <= self.config.margin
-        fresh = near & ~self.wiped
-        self._fresh = int(fresh.sum())
-        self._notes[fresh] = 1.0
-        self._look()
+        before = self.wiped
+        self._newly_wiped = int((near & ~before).sum())
+        if self._newly_wiped:
+            self.wipe(near | before)
 
-    def _touches(self) -> tuple[list[Vector], float, bool]:
-        """Return where hands touch the table, (2,) each, their force, a collision."""
+    def _contacts(self) -> tuple[list[Vector], float, bool]:
+        """Return contact points of hands and table, (2,) each, force and collision."""
         points: list[Vector] = []
         force, collided = 0.0, False
         for i, (a, b) in enumerate(pairs_in_contact(self.data)):
@@ -211,68 +210,58 @@ class Wipe(ObjectBenchmark):
                 collided = True
         return points, force, collided
 
-    def observables(self) -> dict[str, Reading]:
-        """Return how much is done, and where the rest is.
+    def wipe(self, wiped: ArrayLike) -> None:
+        """Set which marks are wiped off, measure the others and draw only them.
 
-        Keys are those of this field's datasets: the part that is wiped, the rest's
-        centroid and its radius about that, m, and the way there from each hand.
+        Args:
+            wiped: Shape (n,).
         """
-        centroid = self._figure(CENTROID, 3)
+        self._wiped[:] = wiped
+        left = self.marks[~self.wiped]
+        rest = left if len(left) else self.marks
+        centroid = rest.mean(axis=0)
+        self._measures[:3] = centroid
+        self._measures[PORTION] = self.wiped.mean()
+        distances = np.linalg.norm(left - centroid, axis=1)
+        self._measures[RADIUS] = distances.max(initial=0.0)
+        alpha = np.where(self.wiped, 0.0, self.config.stroke.color[3])
+        self.model.geom_rgba[self._geoms, 3] = alpha
+
+    def observables(self) -> dict[str, Reading]:
+        """Return the wiped portion, and centroid and radius of the marks left.
+
+        Keys are those of existing datasets; offsets to the centroid are added for each
+        hand.
+        """
+        centroid = self._measure(CENTROID, 3)
         readings = {
-            "proportion_wiped": self._figure(PORTION),
-            "wipe_radius": self._figure(RADIUS),
+            "proportion_wiped": self._measure(PORTION),
+            "wipe_radius": self._measure(RADIUS),
             "wipe_centroid": centroid,
         }
         for side, hand in self.sided_hands():
-            way = offset(centroid, site_position(hand.site))
-            readings[f"{side}gripper_to_wipe_centroid"] = way
+            to_centroid = offset(centroid, site_position(hand.site))
+            readings[f"{side}gripper_to_wipe_centroid"] = to_centroid
         return readings
 
-    def felt(self) -> dict[str, dict[str, Reading]]:
+    def robot_observables(self) -> dict[str, dict[str, Reading]]:
         """Return whether the robot presses on the table, 1 or 0: `robot0_contact`."""
-        return {self._wiping: {f"{self._wiping}contact": self._figure(PRESSES)}}
+        prefix = self._first_prefix
+        return {prefix: {f"{prefix}contact": self._measure(PRESSES)}}
 
-    def _figure(self, place: int, size: int = 1) -> Reading:
+    def _measure(self, place: int, size: int = 1) -> Reading:
         start = self._first + place
         return user_values(range(start, start + size))
 
-    def _look(self) -> None:
-        """Measure the marks that are left and draw only these, where some are new.
-
-        With none left, the centroid is that of all. Most steps wipe nothing, and ask
-        for these numbers several times; so they are noted beside the marks.
-        """
-        notes = self._notes.tobytes()
-        if notes == self._seen:
-            return
-        self._seen, wiped = notes, self.wiped
-        done = bool(wiped.all())
-        rest = self.marks if done else self.marks[~wiped]
-        centroid = rest.mean(axis=0)
-        away = np.linalg.norm(rest - centroid, axis=1)
-        self._figures[PORTION] = wiped.mean()
-        self._figures[RADIUS] = 0.0 if done else away.max()
-        self._figures[:3] = centroid
-        alpha = np.where(wiped, 0.0, self.config.stroke.color[3])
-        self.model.geom_rgba[self._geoms, 3] = alpha
-
     @property
     def centroid(self) -> Vector:
-        """Middle of the marks that are left, m. A view."""
-        self._look()
-        return self._figures[:3]
+        """Centroid of the marks left, or of all if none is left, m. A view."""
+        return self._measures[:3]
 
     @property
     def portion(self) -> float:
-        """How much is wiped off, from 0 to 1."""
-        self._look()
-        return self._figures.item(PORTION)
-
-    @property
-    def radius(self) -> float:
-        """How far the marks that are left are from their middle at most, m."""
-        self._look()
-        return self._figures.item(RADIUS)
+        """Share of the marks that are wiped off."""
+        return self._measures.item(PORTION)
 
     def success(self) -> bool:
         """Whether all marks are wiped off."""
@@ -282,7 +271,7 @@ class Wipe(ObjectBenchmark):
         """Return the shaped reward.
 
         With n marks wiped in this step, d the distance of the nearest hand to the
-        centroid of the rest, f the force of the hands on the table, and horizon H:
+        centroid of the others, f the force of the hands on the table, and horizon H:
 
             (mark n + reach (1 - tanh(reach_scale d)) + contact [touches]
              + contact + press f                       if least_force < f <= most_force
@@ -290,11 +279,11 @@ class Wipe(ObjectBenchmark):
              - collision [another part touches the table])
             * H / (mark marks + H (contact + complete))
 
-        cut to [0, 1].
+        clipped to [0, 1].
         """
         numbers, force = self.config.reward, self.force
         distance = self.distance(self.centroid)
-        reward = numbers.mark * self._fresh
+        reward = numbers.mark * self._newly_wiped
         reward += numbers.reach * (1.0 - math.tanh(numbers.reach_scale * distance))
         reward += numbers.contact * (force > 0.0)
         if force > numbers.most_force:
@@ -307,14 +296,8 @@ class Wipe(ObjectBenchmark):
         return float(reward * self.horizon / most)
 
 
-CENTROID, PORTION, RADIUS, PRESSES, FIGURES = 0, 3, 4, 5, 6
-"""Places of what is measured, behind the marks' notes, and how many there are."""
-THICK = 0.0004
-"""Half of a mark's height, m: seen from above, and nowhere else."""
-
-
 def _distances(hull: Matrix, points: Matrix) -> Vector:
-    """Return how far points are from the convex hull of others, in a plane.
+    """Return the distances of points to the convex hull of others, in a plane.
 
     Args:
         hull: Points that span the hull, shape (k, 2), k >= 1.
@@ -323,25 +306,19 @@ def _distances(hull: Matrix, points: Matrix) -> Vector:
     Returns:
         Distances, shape (n,); 0 inside.
     """
-    outside = np.full(len(points), np.inf)
-    signs: list[tuple[Vector, Vector]] = []
-    for i in range(len(hull)):
-        for k in range(i + 1, len(hull)):
-            edge = hull[k] - hull[i]
-            along = points - hull[i]
-            t = np.clip(along @ edge / max(float(edge @ edge), 1e-18), 0.0, 1.0)
-            gap = np.linalg.norm(along - t[:, None] * edge, axis=1)
-            outside = np.minimum(outside, gap)
-            normal = np.array([-edge[1], edge[0]])
-            side = (hull - hull[i]) @ normal
-            signs.append((along @ normal, side))
     if len(hull) == 1:
         return np.linalg.norm(points - hull[0], axis=1)
-    inside = np.ones(len(points), dtype=bool)
-    flat = all(np.ptp(side) < 1e-12 for _, side in signs)
-    for value, side in signs:
-        if side.min() > -1e-12:
-            inside &= value >= 0.0
-        elif side.max() < 1e-12:
-            inside &= value <= 0.0
-    return outside if flat else np.where(inside, 0.0, outside)
+    i, k = np.triu_indices(len(hull), 1)  # all pairs: edges and diagonals
+    start, edge = hull[i], hull[k] - hull[i]
+    along = points[:, None] - start
+    squares = np.maximum(np.sum(edge * edge, axis=1), 1e-18)
+    t = np.clip(np.sum(along * edge, axis=2) / squares, 0.0, 1.0)
+    gaps = np.linalg.norm(along - t[..., None] * edge, axis=2).min(axis=1)
+    normal = np.column_stack([-edge[:, 1], edge[:, 0]])
+    height = np.sum(along * normal, axis=2)
+    side = np.sum((hull[:, None] - start) * normal, axis=2)
+    if np.ptp(side, axis=0).max() < 1e-12:
+        return gaps  # all points of the hull on one line
+    left, right = side.min(axis=0) > -1e-12, side.max(axis=0) < 1e-12
+    inside = ((height >= 0.0) | ~left) & ((height <= 0.0) | ~right)
+    return np.where(inside.all(axis=1), 0.0, gaps)

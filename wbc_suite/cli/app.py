@@ -3,6 +3,7 @@
 Command modules import what is heavy inside their functions, so that help is instant.
 """
 
+import os
 import sys
 from typing import Annotated
 
@@ -11,56 +12,50 @@ import typer
 from wbc_suite import __version__
 from wbc_suite.cli import (
     bench,
-    check,
-    convert,
+    catalogue,
     datasets,
     demo,
-    describe_action,
     doctor,
-    export,
-    inspect,
-    listing,
     record,
-    render,
     replay,
+    robots,
     rollout,
-    schema,
     teleop,
-    view,
 )
 from wbc_suite.errors import WbcError
+from wbc_suite.sensing import gl_backend
 
 __all__ = ["app", "run"]
 
 app = typer.Typer(
     name="wbc-suite",
-    help="Whole-body control of robots: describe, look at, teleoperate, benchmark.",
+    help="Whole-body control of robots: describe, view, teleoperate, benchmark.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.command("teleop")(teleop.teleop)
-app.command("view")(view.view)
+app.command("view")(robots.view)
 app.command("demo")(demo.demo)
 app.command("record")(record.record)
 app.command("replay")(replay.replay)
-app.command("inspect")(inspect.inspect)
+app.command("inspect")(datasets.inspect)
 app.command("verify")(datasets.verify)
 app.command("repair")(datasets.repair)
 app.command("merge")(datasets.merge)
 app.command("split")(datasets.split)
 app.command("filter")(datasets.filter_episodes)
-app.command("extract")(convert.extract)
-app.command("convert")(convert.convert)
-app.command("list")(listing.list_catalogue)
-app.command("render")(render.render)
+app.command("extract")(datasets.extract)
+app.command("convert")(datasets.convert)
+app.command("list")(catalogue.list_catalogue)
+app.command("render")(robots.render)
 app.command("rollout")(rollout.rollout)
 app.command("bench")(bench.bench)
-app.command("check")(check.check_file)
-app.command("export")(export.export_robot)
-app.command("schema")(schema.print_schema)
-app.command("describe-action")(describe_action.describe_action)
+app.command("check")(catalogue.check_file)
+app.command("export")(robots.export_robot)
+app.command("schema")(catalogue.print_schema)
+app.command("describe-action")(robots.describe_action)
 app.command("doctor")(doctor.doctor)
 
 
@@ -85,6 +80,10 @@ def _options(
 
 def run() -> None:
     """Run the command that the arguments name."""
+    libraries = gl_backend.missing_environment()
+    if libraries:  # they are found only if they are known when Python starts
+        arguments = [sys.executable, *sys.orig_argv[1:]]
+        os.execve(sys.executable, arguments, os.environ | libraries)
     try:
         app()
     except WbcError as error:

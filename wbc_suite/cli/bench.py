@@ -2,15 +2,19 @@
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from wbc_suite.cli.options import (
     BaseOption,
+    CamerasOption,
     CatalogueOption,
+    ControllerOption,
     GripperOption,
-    chosen,
+    PictureSizeOption,
+    RobotsOption,
+    environment_arguments,
     writing,
 )
 
@@ -28,21 +32,12 @@ SHARE = 0.05  # of the way from what holds the robot to a random action
 def bench(
     benchmark: Annotated[str, typer.Argument(help="Benchmark to step.")] = "Lift",
     *,
-    robots: Annotated[
-        list[str] | None, typer.Option(help="Robot; repeat it for several.")
-    ] = None,
-    controller: Annotated[
-        str | None, typer.Option(help="Controller, by name or file.")
-    ] = None,
+    robots: RobotsOption = None,
+    controller: ControllerOption = None,
     rate: Annotated[float, typer.Option(help="Actions per second, Hz.")] = 20.0,
     actions: Annotated[int, typer.Option(min=BLOCKS, help="How many to time.")] = 200,
-    camera: Annotated[
-        list[str] | None,
-        typer.Option(help="Camera whose pictures are timed; may be repeated."),
-    ] = None,
-    size: Annotated[
-        int, typer.Option(min=8, max=2048, help="Of its pictures, pixels.")
-    ] = 84,
+    camera: CamerasOption = None,
+    size: PictureSizeOption = 84,
     output: Annotated[
         Path | None, typer.Option("--json", help="Write the figures here, too.")
     ] = None,
@@ -58,15 +53,10 @@ def bench(
     import wbc_suite
     from wbc_suite.envs import RobotEnv
 
-    arguments: dict[str, Any] = {"control_freq": rate, "horizon": 10**9}
-    if robots:
-        arguments["robots"] = robots[0] if len(robots) == 1 else robots
-    if controller:
-        arguments["controller_configs"] = controller
-    if gripper:
-        arguments["gripper_types"] = chosen(gripper)
-    if base:
-        arguments["base_types"] = base
+    arguments = environment_arguments(
+        robots=robots, controller=controller, gripper=gripper, base=base
+    )
+    arguments |= {"control_freq": rate, "horizon": 10**9}
     env = wbc_suite.make(benchmark, **arguments).unwrapped
     assert isinstance(env, RobotEnv), "`make` made it"
     found = _times(env, actions)

@@ -1,21 +1,130 @@
-"""`wbc-suite verify | repair | merge | split | filter`: care of recordings."""
+"""Commands about recordings, from `inspect` to `convert`, but for `replay`."""
 
+import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+from wbc_suite.cli.options import (
+    CamerasOption,
+    ExecutorOption,
+    PictureSizeOption,
+    RecordingArgument,
+    TrustFilesOption,
+    camera_arguments,
+    progress,
+)
 
 if TYPE_CHECKING:
     from wbc_suite.recording import Dataset
     from wbc_suite.recording.editing import Finding
 
-__all__ = ["filter_episodes", "merge", "repair", "split", "verify"]
+__all__ = [
+    "convert",
+    "extract",
+    "filter_episodes",
+    "inspect",
+    "merge",
+    "repair",
+    "split",
+    "verify",
+]
 
-FileArgument = Annotated[Path, typer.Argument(help="Recording.")]
 OutOption = Annotated[Path, typer.Option("--out", "-o", help="File to write.")]
 
 
-def verify(file: FileArgument) -> None:
+SHOWN = 20  # episodes
+
+
+def inspect(
+    file: RecordingArgument,
+    *,
+    every: Annotated[
+        bool, typer.Option("--all", help="List every episode, not twenty.")
+    ] = False,
+    columns: Annotated[
+        bool, typer.Option("--columns", help="List what the first episode holds.")
+    ] = False,
+    plots: Annotated[
+        Path | None, typer.Option(help="Write lengths, actions and rewards as a PNG.")
+    ] = None,
+    sheet: Annotated[
+        Path | None, typer.Option(help="Write pictures of episodes as one PNG.")
+    ] = None,
+    camera: Annotated[str, typer.Option(help="Camera of the sheet.")] = "agentview",
+) -> None:
+    """Show lengths, success and origin of episodes; write plots, a contact sheet."""
+    from wbc_suite.recording import Dataset
+
+    with Dataset(file) as dataset:
+        _print_origin(dataset)
+        _print_episodes(dataset, len(dataset) if every else SHOWN)
+        if columns and len(dataset):
+            _print_columns(dataset)
+        if plots is not None:
+            from wbc_suite.recording.plots import write_plots
+
+            write_plots(dataset, plots)
+            print(f"Wrote {plots}.")
+        if sheet is not None:
+            from wbc_suite.recording.video import write_sheet
+
+            write_sheet(dataset, sheet, camera=camera)
+            print(f"Wrote {sheet}.")
+
+
+def _print_origin(dataset: "Dataset") -> None:
+    from wbc_suite.recording import EnvSource
+
+    header = dataset.header
+    env_args = header.get("env_args")
+    if env_args is not None:
+        source = EnvSource.parse(str(env_args))
+        arguments = json.dumps(dict(source.arguments))
+        print(f"{dataset.path}: {source.benchmark} {arguments[:300]}")
+    else:
+        print(f"{dataset.path}: its environment is not named")
+    for key in ("schema_version", "date", "versions", "model_hash"):
+        if key in header:
+            print(f"  {key:<15} {str(header[key])[:200]}")
+    for name, names in dataset.masks.items():
+        print(f"  mask {name:<10} {len(names)} episodes")
+
+
+def _print_episodes(dataset: "Dataset", most: int) -> None:
+    lengths = [dataset.length(name) for name in dataset.names]
+    facts = [dataset.facts(name) for name in dataset.names]
+    successes = [bool(fact["success"]) for fact in facts if "success" in fact]
+    print(
+        f"  {len(lengths)} episodes, {sum(lengths)} actions"
+        + (f", {sum(successes)} of {len(successes)} succeeded" if successes else "")
+        + (f"; lengths {min(lengths)} to {max(lengths)}" if lengths else "")
+    )
+    for name, length, fact in list(zip(dataset.names, lengths, facts, strict=True))[
+        :most
+    ]:
+        word = {None: "", True: "success", False: "no success"}[
+            bool(fact["success"]) if "success" in fact else None
+        ]
+        clipped = fact.get("clipped_steps", 0)
+        print(
+            f"    {name:<10} {length:6d} actions  {word:<10}"
+            + (f"  seed {fact['seed']}" if "seed" in fact else "")
+            + (f"  {clipped} clipped" if clipped else "")
+        )
+    if len(lengths) > most:
+        print(f"    ... and {len(lengths) - most} more (--all)")
+
+
+def _print_columns(dataset: "Dataset") -> None:
+    episode = dataset.episode(dataset.names[0])
+    print(f"  {episode.name} holds:")
+    for name, column in sorted(episode.columns.items()):
+        print(f"    {name:<36} {column.dtype!s:<8} {column.shape}")
+
+
+def verify(file: RecordingArgument) -> None:
     """Read every episode and compare it with the checksum it was written with."""
     from wbc_suite.recording import editing
 
@@ -23,8 +132,8 @@ def verify(file: FileArgument) -> None:
     raise typer.Exit(1 if bad else 0)
 
 
-def repair(file: FileArgument) -> None:
-    """Put what can be read into one file again, after a crash or damage."""
+def repair(file: RecordingArgument) -> None:
+    """Restore readable episodes into one file, after a crash or damage."""
     from wbc_suite.recording import editing
 
     if _report(editing.repair(file)):
@@ -43,7 +152,7 @@ def merge(
 
 
 def split(
-    file: FileArgument,
+    file: RecordingArgument,
     *,
     valid: Annotated[
         float, typer.Option(min=0.0, max=1.0, help="Share kept for validation.")
@@ -54,12 +163,12 @@ def split(
     from wbc_suite.recording import editing
 
     masks = editing.split(file, valid=valid, seed=seed)
-    told = ", ".join(f"{key} {len(names)}" for key, names in masks.items())
-    print(f"{file}: {told} episodes.")
+    counts = ", ".join(f"{key} {len(names)}" for key, names in masks.items())
+    print(f"{file}: {counts} episodes.")
 
 
 def filter_episodes(
-    file: FileArgument,
+    file: RecordingArgument,
     *,
     out: OutOption,
     success: Annotated[
@@ -72,7 +181,7 @@ def filter_episodes(
         list[str] | None, typer.Option(help="Only this one; may be repeated.")
     ] = None,
 ) -> None:
-    """Write those episodes that fulfil every condition."""
+    """Write the episodes that meet every condition."""
     from wbc_suite.errors import UnknownNameError
     from wbc_suite.recording import editing
 
@@ -97,3 +206,75 @@ def _report(findings: "list[Finding]") -> int:
         print(f"  {finding.place}: {finding.problem}")
     print(f"{len(findings) - len(bad)} episodes are whole, {len(bad)} problems.")
     return len(bad)
+
+
+def convert(
+    file: RecordingArgument,
+    *,
+    to: Annotated[str, typer.Option(help="robomimic, npz, lerobot, minari or mcap.")],
+    out: Annotated[
+        Path, typer.Option("--out", "-o", help="File, or folder, to write.")
+    ],
+    executor: ExecutorOption = "serial",
+    workers: Annotated[
+        int, typer.Option(min=1, help="At once, for lerobot and npz; others are one.")
+    ] = 1,
+) -> None:
+    """Write a recording in another layout.
+
+    A stopped command continues when it is given again, but for `serial`.
+    """
+    from wbc_suite.executors import make_executor
+    from wbc_suite.recording import Dataset
+    from wbc_suite.recording.converting import convert as write
+
+    asked = None if executor == "serial" else make_executor(executor, workers=workers)
+    with Dataset(file) as dataset:
+        total = len(dataset)
+    with progress("Converting", total) as advance:
+        written = write(file, out, to, advance, executor=asked, workers=workers)
+    print(f"Wrote {written}.")
+
+
+def extract(
+    file: RecordingArgument,
+    *,
+    out: Annotated[Path, typer.Option("--out", "-o", help="File to write.")],
+    camera: CamerasOption = None,
+    size: PictureSizeOption = 84,
+    depth: Annotated[bool, typer.Option("--depth", help="See depth too.")] = False,
+    shaped: Annotated[
+        bool, typer.Option("--shaped", help="Reward progress, not success alone.")
+    ] = False,
+    executor: ExecutorOption = "process",
+    workers: Annotated[
+        int, typer.Option(min=1, help="At once; each makes an environment.")
+    ] = 1,
+    trust_files: TrustFilesOption = False,
+) -> None:
+    """Restore recorded states, and store other observations and rewards.
+
+    A stopped command continues when it is given again.
+    """
+    from wbc_suite.executors import make_executor
+    from wbc_suite.recording import Dataset
+    from wbc_suite.recording.extracting import extract as extract_observations
+
+    changes: dict[str, Any] = {"reward_shaping": shaped, "use_camera_obs": bool(camera)}
+    changes |= camera_arguments(camera, size)
+    if camera:
+        changes["camera_depths"] = depth
+    chosen = "serial" if executor == "process" and workers == 1 else executor
+    with Dataset(file) as dataset:
+        total = len(dataset)
+    with progress("Extracting", total) as advance:
+        count = extract_observations(
+            file,
+            out,
+            trust_files=trust_files,
+            executor=make_executor(chosen, workers=workers),
+            workers=workers,
+            on_progress=advance,
+            **changes,
+        )
+    print(f"{out}: {count} episodes.")

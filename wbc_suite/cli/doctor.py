@@ -1,19 +1,37 @@
-"""`wbc-suite doctor`: explain this machine."""
+"""`wbc-suite doctor`: what this machine has, what is missing, and how to install it."""
+
+import importlib
+import platform
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+from importlib import metadata
 
 import typer
 
-__all__ = ["doctor"]
+from wbc_suite.errors import WbcError
+
+__all__ = ["Finding", "State", "diagnose", "doctor"]
+
+BASE_SOLVERS = ("daqp", "proxqp", "osqp")
+"""QP solvers that come with the package, by the names `qpsolvers` gives them."""
+EXTRA_SOLVERS = ("piqp", "clarabel", "quadprog")
+"""QP solvers that come with the extra `solvers`."""
+MUJOCO_PARTS = ("mujoco", "mujoco-core", "mujoco-studio")
+"""MuJoCo 4 is three distributions of one version."""
+REPAIR_MUJOCO = "pip install --force-reinstall --no-deps " + " ".join(MUJOCO_PARTS)
+
 
 _MARKS = {"fine": "ok  ", "optional": "note", "broken": "BAD "}
 
 
 def doctor() -> None:
-    """Explain this machine: what draws, what solves, what is missing, what mends it.
+    """Check this machine: packages, solvers, rendering, and what is missing.
 
     Ends with exit code 1 when something that is needed is broken.
     """
-    from wbc_suite.cli.diagnosis import State, diagnose
-
     broken = 0
     for finding in diagnose():
         print(f"{_MARKS[finding.state]}  {finding.topic:<11} {finding.text}")
@@ -24,3 +42,166 @@ def doctor() -> None:
         print("Something that is needed is broken: see BAD above.")
         raise typer.Exit(1)
     print("All that is needed is here.")
+
+
+class State(StrEnum):
+    """Severity of a finding."""
+
+    FINE = "fine"
+    OPTIONAL = "optional"
+    BROKEN = "broken"
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Finding:
+    """One property of this machine.
+
+    Attributes:
+        topic: What was checked.
+        text: Result of the check.
+        state: Severity.
+        cure: The command that repairs it; empty if nothing is wrong.
+    """
+
+    topic: str
+    text: str
+    state: State = State.FINE
+    cure: str = ""
+
+
+def diagnose() -> Iterator[Finding]:
+    """Run all checks, cheapest first; one broken part does not hide the others."""
+    for check in (_system, _packages, _mujoco, _solvers, _catalogue, _rendering):
+        yield from check()
+
+
+def _system() -> Iterator[Finding]:
+    name = platform.freedesktop_os_release() if sys.platform == "linux" else {}
+    system = name.get("PRETTY_NAME", platform.platform())
+    yield Finding(topic="system", text=f"{system}, {platform.machine()}")
+    version = platform.python_version()
+    yield Finding(topic="python", text=f"{version} at {sys.executable}")
+
+
+def _packages() -> Iterator[Finding]:
+    """Check that all required packages are installed."""
+    texts: list[str] = []
+    for name in _required():
+        try:
+            texts.append(f"{name} {metadata.version(name)}")
+        except metadata.PackageNotFoundError:
+            yield Finding(
+                topic=name,
+                text="not installed",
+                state=State.BROKEN,
+                cure=f"pip install {name}",
+            )
+    yield Finding(topic="packages", text=", ".join(texts))
+
+
+def _required() -> list[str]:
+    """Return the names of the base dependencies, from the installed metadata."""
+    try:
+        lines = metadata.requires("wbc-suite") or []
+    except metadata.PackageNotFoundError:
+        return ["mujoco", "pin"]
+    base = (line for line in lines if "extra ==" not in line)
+    return [line.split(";")[0].split(">")[0].strip() for line in base]
+
+
+def _mujoco() -> Iterator[Finding]:
+    """Check MuJoCo's distributions; an upgrade from 3 to 4 can lose files."""
+    versions = {}
+    for part in MUJOCO_PARTS:
+        try:
+            versions[part] = metadata.version(part)
+        except metadata.PackageNotFoundError:
+            versions[part] = "missing"
+    try:
+        importlib.import_module("mujoco").mj_versionString()
+    except (ImportError, AttributeError) as error:
+        first = str(error).splitlines()[0]
+        text = f"broken, as after an upgrade from MuJoCo 3: {first}"
+        yield Finding(topic="mujoco", text=text, state=State.BROKEN, cure=REPAIR_MUJOCO)
+        return
+    if versions["mujoco"] != versions["mujoco-core"]:
+        text = f"parts of different versions: {versions}"
+        yield Finding(topic="mujoco", text=text, state=State.BROKEN, cure=REPAIR_MUJOCO)
+
+
+def _solvers() -> Iterator[Finding]:
+    known = importlib.import_module("qpsolvers").available_solvers
+    yield Finding(topic="QP solvers", text=", ".join(sorted(known)))
+    broken = [name for name in BASE_SOLVERS if name not in known]
+    if broken:
+        yield Finding(
+            topic="QP solvers",
+            text=f"missing: {', '.join(broken)}",
+            state=State.BROKEN,
+            cure="pip install --force-reinstall daqp proxsuite osqp",
+        )
+    absent = [name for name in EXTRA_SOLVERS if name not in known]
+    if absent:
+        yield Finding(
+            topic="QP solvers",
+            text=f"not installed: {', '.join(absent)}",
+            state=State.OPTIONAL,
+            cure='pip install "wbc-suite[solvers]"',
+        )
+
+
+def _catalogue() -> Iterator[Finding]:
+    from wbc_suite.catalogue import Catalogue
+
+    try:
+        catalogue = Catalogue()
+    except WbcError as error:
+        yield Finding(topic="catalogue", text=str(error), state=State.BROKEN)
+        return
+    folders = ("robots", "tasks", "controllers")
+    counts = ", ".join(f"{len(catalogue.names(f))} {f}" for f in folders)
+    places = " + ".join(str(p) for p in (catalogue.root, *catalogue.extra))
+    yield Finding(topic="catalogue", text=f"{counts} in {places}")
+
+
+def _rendering() -> Iterator[Finding]:
+    from wbc_suite.sensing import gl_backend
+
+    gl_backend.forget()  # results of an earlier run are not used
+    try:
+        backend = gl_backend.activate()
+        duration = _frame_seconds()
+    except WbcError as error:
+        yield Finding(
+            topic="pictures",
+            text=str(error),
+            state=State.OPTIONAL,
+            cure=gl_backend.APT_COMMAND,
+        )
+        return
+    artist = "the processor draws" if backend.software else "a graphics card draws"
+    speed = f"{1e3 * duration:.1f} ms for a 256x256 frame"
+    text = f"{backend.name}, {artist} ({backend.renderer}): {speed}"
+    yield Finding(topic="pictures", text=text)
+
+
+def _frame_seconds() -> float:
+    """Measure one frame of a small scene with the preset `fast`: best of 20."""
+    import mujoco
+
+    from wbc_suite.sensing.renderer import RenderPreset, make_renderer
+
+    scene = """<mujoco><worldbody><light pos="0 0 3"/><geom type="plane" size="1 1 1"/>
+        <geom size=".2" pos="0 0 .2"/></worldbody></mujoco>"""
+    model = mujoco.MjModel.from_xml_string(scene)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    fast = RenderPreset.FAST
+    best = float("inf")
+    with make_renderer(model, width=256, height=256, preset=fast) as renderer:
+        for _ in range(20):
+            start = time.perf_counter()
+            renderer.update_scene(data)
+            renderer.render()
+            best = min(best, time.perf_counter() - start)
+    return best

@@ -1,11 +1,13 @@
 """Options that several commands share."""
 
 import os
+import signal
+import threading
 import tomllib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import Annotated, Any, Protocol, TypeVar
 
 import typer
 
@@ -14,16 +16,109 @@ from wbc_suite.errors import ConfigError
 
 __all__ = [
     "BaseOption",
+    "CamerasOption",
     "CatalogueOption",
+    "ControllerOption",
     "ExecutorOption",
     "GripperOption",
+    "HostOption",
+    "PictureSizeOption",
+    "PortOption",
+    "RecordingArgument",
     "RobotArgument",
+    "RobotsOption",
+    "Served",
     "SkinOption",
+    "TrustFilesOption",
+    "camera_arguments",
     "chosen",
     "device_options",
+    "environment_arguments",
     "progress",
+    "serve_until_interrupted",
     "tracked",
     "writing",
+]
+
+RobotArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="ROBOT", help="Name (`wbc-suite list`) or a .toml, .urdf or .xml file."
+    ),
+]
+GripperOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME",
+        help="Another gripper; one for each side: right=NAME,left=NAME; or none.",
+    ),
+]
+BaseOption = Annotated[
+    str | None, typer.Option(metavar="NAME", help="Another base, or none.")
+]
+ExecutorOption = Annotated[
+    str, typer.Option(metavar="NAME", help="process, serial, ray or slurm.")
+]
+SkinOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="meshes|DIR",
+        help="Draw with real meshes, from installed packages or from a folder.",
+    ),
+]
+RobotsOption = Annotated[
+    list[str] | None, typer.Option(help="Robot; repeat it for several.")
+]
+
+ControllerOption = Annotated[
+    str | None, typer.Option(help="Controller, by name or file.")
+]
+
+CamerasOption = Annotated[
+    list[str] | None, typer.Option("--camera", help="Camera; may be repeated.")
+]
+
+PictureSizeOption = Annotated[
+    int, typer.Option(min=8, max=2048, help="Of camera pictures, pixels.")
+]
+
+RecordingArgument = Annotated[Path, typer.Argument(help="Recording.")]
+
+TrustFilesOption = Annotated[
+    bool,
+    typer.Option(
+        "--trust-files", help="Let the recording name files to read robots from."
+    ),
+]
+
+DeviceOptions = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--device-option",
+        metavar="NAME=VALUE",
+        help="Option of the device; may be repeated.",
+    ),
+]
+ScaleOption = Annotated[
+    float, typer.Option(help="Motion of a hand per motion of the device.", min=0.01)
+]
+MirrorOption = Annotated[
+    bool, typer.Option("--mirror", help="Face the robot: swap left and right.")
+]
+HostOption = Annotated[
+    str,
+    typer.Option(
+        help="Address to listen on. Other than 127.0.0.1, the page asks for a token."
+    ),
+]
+PortOption = Annotated[
+    int | None,
+    typer.Option(
+        help="Port to listen on, 0 for any free one; the first free from 8080 on "
+        "when left out.",
+        min=0,
+        max=65535,
+    ),
 ]
 
 
@@ -31,7 +126,7 @@ T = TypeVar("T")
 
 
 def _add_to_catalogue(folders: list[Path] | None) -> list[Path]:
-    """Let every `Catalogue()` of this process see the folders."""
+    """Add folders to every `Catalogue()` of this process."""
     added = [str(folder) for folder in folders or []]
     known = os.environ.get(ENVIRONMENT_VARIABLE, "")
     if added:
@@ -51,57 +146,9 @@ CatalogueOption = Annotated[
     ),
 ]
 
-RobotArgument = Annotated[
-    str,
-    typer.Argument(
-        metavar="ROBOT", help="Name (`wbc-suite list`) or a .toml, .urdf or .xml file."
-    ),
-]
-
-GripperOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="NAME",
-        help="Another gripper; one for each side: right=NAME,left=NAME; or none.",
-    ),
-]
-
-BaseOption = Annotated[
-    str | None, typer.Option(metavar="NAME", help="Another base, or none.")
-]
-
-ExecutorOption = Annotated[
-    str, typer.Option(metavar="NAME", help="process, serial, ray or slurm.")
-]
-
-SkinOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="meshes|DIR",
-        help="Draw with real meshes, from installed packages or from a folder.",
-    ),
-]
-
-DeviceOptions = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--device-option",
-        metavar="NAME=VALUE",
-        help="Option of the device; may be repeated.",
-    ),
-]
-
-ScaleOption = Annotated[
-    float, typer.Option(help="Motion of a hand per motion of the device.", min=0.01)
-]
-
-MirrorOption = Annotated[
-    bool, typer.Option("--mirror", help="Face the robot: swap left and right.")
-]
-
 
 def chosen(gripper: str | None) -> str | dict[str, str] | None:
-    """Return what `--gripper` says: one for all sides, or one for each."""
+    """Return the value of `--gripper`: one for all sides, or one for each."""
     if gripper is None or "=" not in gripper:
         return gripper
     return {
@@ -110,8 +157,40 @@ def chosen(gripper: str | None) -> str | dict[str, str] | None:
     }
 
 
+def environment_arguments(
+    *,
+    robots: list[str] | None,
+    controller: str | None,
+    gripper: str | None,
+    base: str | None,
+) -> dict[str, Any]:
+    """Return the arguments of `make` for the options that are given."""
+    arguments: dict[str, Any] = {}
+    if robots:
+        arguments["robots"] = robots[0] if len(robots) == 1 else robots
+    if controller:
+        arguments["controller_configs"] = controller
+    if gripper:
+        arguments["gripper_types"] = chosen(gripper)
+    if base:
+        arguments["base_types"] = base
+    return arguments
+
+
+def camera_arguments(cameras: list[str] | None, size: int) -> dict[str, Any]:
+    """Return the arguments of `make` for square pictures; none without cameras."""
+    if not cameras:
+        return {}
+    return {
+        "use_camera_obs": True,
+        "camera_names": tuple(cameras),
+        "camera_heights": size,
+        "camera_widths": size,
+    }
+
+
 def device_options(pairs: list[str] | None) -> dict[str, object]:
-    """Return what `--device-option NAME=VALUE` says.
+    """Return the options of `--device-option NAME=VALUE`.
 
     Values are read as TOML (`8091`, `true`, `["right", "left"]`), else they are text.
 
@@ -132,7 +211,7 @@ def device_options(pairs: list[str] | None) -> dict[str, object]:
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Turn what can go wrong with an output file into one line that names it."""
+    """Turn errors of an output file into one line that names it."""
     try:
         yield
     except (OSError, ValueError) as error:
@@ -160,8 +239,42 @@ def progress(title: str, total: int) -> Iterator[Callable[[int], None]]:
 
 
 def tracked(items: Sequence[T], title: str) -> Iterator[T]:
-    """Hand out items one by one, and show how many have been dealt with."""
+    """Yield items one by one, and show how many are finished."""
     with progress(title, len(items)) as advance:
         for item in items:
             yield item
             advance(1)
+
+
+class Served(Protocol):
+    """A page that is served at an address, with or without a token."""
+
+    @property
+    def url(self) -> str:
+        """The address, with its token."""
+        ...
+
+    @property
+    def token(self) -> str | None:
+        """Token that requests must contain; None if they need none."""
+        ...
+
+
+def serve_until_interrupted(
+    site: Served, title: str, until: threading.Event | None = None
+) -> None:
+    """Print the address of a page, and wait for Ctrl-C or SIGTERM.
+
+    Args:
+        site: The page.
+        title: Title that is printed.
+        until: Another event that ends it.
+    """
+    interrupted = until or threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):  # before the address is printed
+        signal.signal(number, lambda *_: interrupted.set())
+    print(f"{title}\n\n    {site.url}\n", flush=True)
+    if site.token is not None:
+        print("Anyone with this address may use the page.", flush=True)
+    print("Ctrl-C ends it.", flush=True)
+    interrupted.wait()

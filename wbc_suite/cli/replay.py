@@ -6,8 +6,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from wbc_suite.cli.options import tracked
-from wbc_suite.cli.serving import HostOption, PortOption, serve_until_interrupted
+from wbc_suite.cli.options import (
+    HostOption,
+    PortOption,
+    RecordingArgument,
+    TrustFilesOption,
+    serve_until_interrupted,
+    tracked,
+)
 
 if TYPE_CHECKING:
     from wbc_suite.envs import RobotEnv
@@ -31,7 +37,7 @@ class Place(StrEnum):
 
 
 def replay(
-    file: Annotated[Path, typer.Argument(help="Recording.")],
+    file: RecordingArgument,
     *,
     by: Annotated[
         Way, typer.Option(help="States as recorded, or actions, open loop.")
@@ -48,22 +54,17 @@ def replay(
     ] = None,
     camera: Annotated[str, typer.Option(help="Camera of the film.")] = "agentview",
     size: Annotated[int, typer.Option(min=16, max=2048, help="Pixels.")] = 256,
-    trust_files: Annotated[
-        bool,
-        typer.Option(
-            "--trust-files", help="Let the recording name files to read robots from."
-        ),
-    ] = False,
+    trust_files: TrustFilesOption = False,
     host: HostOption = "127.0.0.1",
     port: PortOption = None,
 ) -> None:
     """Play episodes again, and say whether they come out as they were recorded."""
     from wbc_suite.recording import Dataset, rebuild
-    from wbc_suite.recording.film import check_film
+    from wbc_suite.recording.video import check_video
 
     shown = {}
     if film is not None:
-        check_film(film)
+        check_video(film)
         shown = {"render_mode": "rgb_array", "render_camera": camera}
         shown |= {"render_size": (size, size)}
     with Dataset(file) as dataset:
@@ -91,19 +92,21 @@ def _show(
     place: Place,
     address: tuple[str, int | None],
 ) -> None:
-    """Show episodes until somebody ends it."""
-    from wbc_suite.viewers.tape import open_tape
+    """Show episodes until the user ends it."""
+    from wbc_suite.viewers.episode_player import open_player
 
-    tape = open_tape(dataset, names, env, by_states=by is Way.STATES)
+    player = open_player(dataset, names, env, by_states=by is Way.STATES)
     if place is Place.SCREEN:
         from wbc_suite.viewers.replay_window import show_in_window
 
-        show_in_window(tape, env)
+        show_in_window(player, env)
         return
+    from wbc_suite.viewers.page_server import PageServer
     from wbc_suite.viewers.replay_page import ReplayPage
-    from wbc_suite.viewers.site import Site
 
-    page = ReplayPage(tape, env, Site(*address), label=f"Replay · {dataset.path.name}")
+    page = ReplayPage(
+        player, env, PageServer(*address), label=f"Replay · {dataset.path.name}"
+    )
     page.start()
     serve_until_interrupted(page.site, f"Replay of {dataset.path}:")
     page.stop()
@@ -135,11 +138,11 @@ def _film(
     by: Way,
     path: Path,
 ) -> None:
-    from wbc_suite.recording.film import RATE, episode_pictures, write_film
+    from wbc_suite.recording.video import RATE, episode_pictures, write_video
 
     control = env.config.control_freq
     every = max(1, round(control / RATE))
-    write_film(
+    write_video(
         (
             picture
             for name in tracked(names, "Drawing")

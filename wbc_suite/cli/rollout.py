@@ -12,8 +12,8 @@ import typer
 from wbc_suite.cli.options import CatalogueOption, ExecutorOption, writing
 
 if TYPE_CHECKING:
-    from wbc_suite.executors import Item, Outcome
-    from wbc_suite.rollout import Case, Summary
+    from wbc_suite.evaluation import Case, Summary
+    from wbc_suite.executors import Outcome, WorkItem
 
 __all__ = ["rollout"]
 
@@ -61,23 +61,23 @@ def rollout(
 
     Example: wbc-suite rollout Lift Door --robots Panda --robots UR5e --episodes 100
     """
-    from wbc_suite.executors import make_executor, work_off
-    from wbc_suite.rollout import plan, roll_out
+    from wbc_suite.evaluation import plan_rollouts, run_rollouts
+    from wbc_suite.executors import make_executor, run_items
 
     arguments: dict[str, str | int | float | bool] = {"reward_shaping": shaped}
     if horizon is not None:
         arguments["horizon"] = horizon
     cases = _cases(benchmarks, robots, controller, policy, arguments, record=record)
     seeds = range(first_seed, first_seed + episodes)
-    items = {case: plan([case], seeds=seeds, chunk=chunk) for case in cases}
+    items = {case: plan_rollouts([case], seeds=seeds, chunk=chunk) for case in cases}
     every = [item for mine in items.values() for item in mine]
-    with _progress(len(every)) as tell:
-        outcomes = work_off(
-            roll_out,
+    with _progress(len(every)) as report:
+        outcomes = run_items(
+            run_rollouts,
             every,
             folder=output,
             executor=make_executor(executor, workers=workers),
-            tell=tell,
+            on_outcome=report,
         )
     _report(items, outcomes, output)
 
@@ -91,9 +91,9 @@ def _cases(
     *,
     record: bool,
 ) -> "list[Case]":
-    """Return every combination; a robot that does not exist is told at once."""
+    """Return every combination; raise an error at once for an unknown robot."""
     from wbc_suite import load_robot
-    from wbc_suite.rollout import Case
+    from wbc_suite.evaluation import Case
 
     for name in {name.strip() for together in robots for name in together.split(",")}:
         load_robot(name)
@@ -113,8 +113,8 @@ def _cases(
 
 
 @contextmanager
-def _progress(total: int) -> "Iterator[Callable[[Item, Outcome], None]]":
-    """Show a bar; errors are told above it as they come."""
+def _progress(total: int) -> "Iterator[Callable[[WorkItem, Outcome], None]]":
+    """Show a progress bar, and errors above it."""
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,
@@ -127,19 +127,19 @@ def _progress(total: int) -> "Iterator[Callable[[Item, Outcome], None]]":
     ) as bar:
         line = bar.add_task("rollouts", total=total)
 
-        def tell(item: "Item", outcome: "Outcome") -> None:
+        def report(item: "WorkItem", outcome: "Outcome") -> None:
             if outcome.error is not None:
                 bar.console.print(f"{item.name}: {outcome.error}", markup=False)
             bar.advance(line)
 
-        yield tell
+        yield report
 
 
 def _report(
-    items: "dict[Case, list[Item]]", outcomes: "list[Outcome]", output: Path
+    items: "dict[Case, list[WorkItem]]", outcomes: "list[Outcome]", output: Path
 ) -> None:
     """Print a table and write summary.json; fail when an item failed."""
-    from wbc_suite.rollout import episodes_of, summarise
+    from wbc_suite.evaluation import episodes_of, summarise
 
     by_name = {outcome.name: outcome for outcome in outcomes}
     summaries: dict[str, Summary] = {}

@@ -1,63 +1,79 @@
-"""`wbc-suite teleop`: move a simulated robot in the browser."""
+"""`wbc-suite teleop`, and what `record` shares with it: device, page, session."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wbc_suite.cli.by_hand import ONE_DAY, device_maker, drive, stages_of
 from wbc_suite.cli.options import (
     BaseOption,
     CatalogueOption,
     DeviceOptions,
     GripperOption,
+    HostOption,
     MirrorOption,
+    PortOption,
     ScaleOption,
     SkinOption,
     chosen,
+    device_options,
+    serve_until_interrupted,
 )
-from wbc_suite.cli.serving import HostOption, PortOption
 
 if TYPE_CHECKING:
     import gymnasium
 
-__all__ = ["teleop"]
+    from wbc_suite.devices import Device, PipelineConfig
+    from wbc_suite.recording.episode_control import EpisodeControl
+
+__all__ = ["DeviceMaker", "device_maker", "drive", "stages_of", "teleop"]
+
+ONE_DAY = 86_400  # s; horizon of a session, in place of the benchmark's
+POLL_PERIOD = 0.2  # s; of a session without a page
+DeviceMaker = Callable[["gymnasium.Env[Any, Any]"], "Device"]
+
+
+WholeBodyOption = Annotated[
+    str, typer.Option(help="Whole-body controller, by name or TOML file.")
+]
+TargetRateOption = Annotated[
+    float, typer.Option(help="Targets taken per second, Hz.", min=5.0, max=200.0)
+]
+DeviceOption = Annotated[
+    str | None,
+    typer.Option(
+        help="A device beside the page's handles: keyboard, stream, spacemouse, "
+        "gamepad, dualsense, mjgui, or yours: module:Class."
+    ),
+]
+RecordOption = Annotated[
+    Path | None,
+    typer.Option(help="File that the page's button Record adds episodes to."),
+]
 
 
 def teleop(
     benchmark: Annotated[str, typer.Argument(help="Benchmark to play in.")] = "Lift",
     robots: Annotated[str, typer.Option(help="Robot.")] = "GR1",
-    controller: Annotated[
-        str, typer.Option(help="Whole-body controller, by name or TOML file.")
-    ] = "WHOLE_BODY_IK",
-    rate: Annotated[
-        float, typer.Option(help="Targets taken per second, Hz.", min=5.0, max=200.0)
-    ] = 100.0,
+    controller: WholeBodyOption = "WHOLE_BODY_IK",
+    rate: TargetRateOption = 100.0,
     gripper: GripperOption = None,
     base: BaseOption = None,
     skin: SkinOption = None,
     seed: Annotated[int, typer.Option(help="Seed of the scene.")] = 0,
     host: HostOption = "127.0.0.1",
     port: PortOption = None,
-    device: Annotated[
-        str | None,
-        typer.Option(
-            help="A device beside the page's handles: keyboard, stream, spacemouse, "
-            "gamepad, dualsense, mjgui, or yours: module:Class."
-        ),
-    ] = None,
+    device: DeviceOption = None,
     device_option: DeviceOptions = None,
     scale: ScaleOption = 1.0,
     mirror: MirrorOption = False,
-    record: Annotated[
-        Path | None,
-        typer.Option(help="File that the page's button Record adds episodes to."),
-    ] = None,
+    record: RecordOption = None,
     catalogue: CatalogueOption = None,
 ) -> None:
     """Move a robot's hands, head, feet and base by dragging them in a web page."""
     import wbc_suite
-    from wbc_suite.recording.desk import RecordingDesk
+    from wbc_suite.recording.episode_control import EpisodeControl
     from wbc_suite.wrappers import DataCollection
 
     make = None if device is None else device_maker(device, device_option)
@@ -73,11 +89,11 @@ def teleop(
         horizon=round(ONE_DAY * rate),
         skin=skin,
     )
-    desk = None
+    episode_control = None
     chosen_device = None if make is None else make(env)
     if record is not None:
-        collection = DataCollection(env, record, automatic=False)
-        env, desk = collection, RecordingDesk(collection.recorder, seed=seed)
+        env = collection = DataCollection(env, record, automatic=False)
+        episode_control = EpisodeControl(collection.recorder, seed=seed)
     try:
         drive(
             env,
@@ -87,7 +103,102 @@ def teleop(
             address=(host, port),
             device=chosen_device,
             stages=stages,
-            desk=desk,
+            episode_control=episode_control,
         )
     finally:
         env.close()
+
+
+def device_maker(name: str, pairs: list[str] | None) -> DeviceMaker:
+    """Return a function that makes a device for an environment.
+
+    Args:
+        name: See `find_device`.
+        pairs: Its options, `NAME=VALUE`.
+    """
+    from wbc_suite.devices import find_device
+
+    make, options = find_device(name), device_options(pairs)
+
+    def build(env: "gymnasium.Env[Any, Any]") -> "Device":
+        if name.lower() == "mjgui":
+            options["env"] = env  # it shows the scene
+        return make(**options)
+
+    return build
+
+
+def stages_of(*, device: bool, scale: float, mirror: bool) -> "PipelineConfig":
+    """Return the pipeline's stages; a device gets a leash."""
+    from wbc_suite.devices.pipeline.config import Leash
+    from wbc_suite.viewers.teleop_session import DRAGGED
+
+    changes: dict[str, object] = {"mirror": mirror, "scale": scale}
+    if device:
+        changes["leash"] = Leash()
+    return DRAGGED.model_copy(update=changes)
+
+
+def drive(
+    env: "gymnasium.Env[Any, Any]",
+    *,
+    names: tuple[str, str],
+    rate: float,
+    seed: int,
+    address: tuple[str, int | None] | None,
+    device: "Device | None",
+    stages: "PipelineConfig",
+    episode_control: "EpisodeControl | None",
+) -> None:
+    """Run a session until it is ended, or all planned episodes are recorded.
+
+    Args:
+        env: Environment, made; the caller closes it.
+        names: Robot and benchmark, for titles.
+        rate: Actions per second, Hz.
+        seed: Seed of every reset but those of recordings.
+        address: Where the page is served, host and port; None for a device alone.
+        device: A device beside the page.
+        stages: Stages between inputs and the controller.
+        episode_control: Starts and ends recorded episodes.
+    """
+    from wbc_suite.viewers.loop_timing import prepare_interpreter
+    from wbc_suite.viewers.page_process import PageProcess
+    from wbc_suite.viewers.teleop_session import TeleopSession
+
+    session = TeleopSession(
+        env,
+        period=1.0 / rate,
+        seed=seed,
+        device=device,
+        pipeline=stages,
+        episode_control=episode_control,
+    )
+    robots, benchmark = names
+    page = None
+    try:
+        if address is not None:  # it gets ready while the controllers are compiled
+            label = f"{robots} · {benchmark}"
+            page = PageProcess(session, *address, label=label)
+        if device is not None:
+            device.start()
+        print("Compiling; this takes a few seconds the first time ...", flush=True)
+        session.tick()
+        if page is not None:
+            page.wait()
+        prepare_interpreter()
+        session.start(urgent=True)
+        print(getattr(device, "help", ""), end="", flush=True)
+        if page is None:
+            while session.running and not session.quit.wait(POLL_PERIOD):
+                pass
+        else:
+            title = f"Teleoperation of {robots}, {benchmark}:"
+            serve_until_interrupted(page, title, until=session.quit)
+            page.check()
+    finally:
+        session.stop()
+        if page is not None:
+            page.stop()
+        if device is not None:
+            device.stop()

@@ -1,1 +1,1 @@
-"""Other libraries' shapes, so that scripts written for them run here."""
+"""Interfaces of other libraries, so that scripts written for them run here."""

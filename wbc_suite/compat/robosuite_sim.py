@@ -1,17 +1,21 @@
-"""`env.sim` under robosuite's names: model, data, states in one vector, pictures."""
+"""`env.sim` and `env.robots` under robosuite's names."""
 
 import re
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import mujoco
 import numpy as np
+from numpy.typing import ArrayLike
 
+from wbc_suite.control import CompositeController, RobotState
 from wbc_suite.envs import RobotEnv
 from wbc_suite.envs.states import write_physics
 from wbc_suite.errors import UnknownNameError
-from wbc_suite.typing import Vector
+from wbc_suite.typing import Indices, Vector
 
-__all__ = ["Sim"]
+__all__ = ["Model", "RobotView", "Sim"]
 
 KINDS = "body|joint|geom|site|light|camera|actuator|sensor|tendon|mesh"
 _OF_MODEL = re.compile(rf"({KINDS})_(name2id|id2name|names)")
@@ -49,7 +53,7 @@ class Model:
 
     @property
     def _model(self) -> mujoco.MjModel:
-        """MuJoCo's own."""
+        """MuJoCo's own object."""
         return self._env.simulation.model
 
     def get_xml(self) -> str:
@@ -58,7 +62,7 @@ class Model:
 
 
 class Data:
-    """MuJoCo's state, and what of it belongs to a name: `get_site_xpos`, ..."""
+    """MuJoCo's state, and its arrays by name: `get_site_xpos`, ..."""
 
     def __init__(self, env: RobotEnv) -> None:
         object.__setattr__(self, "_env", env)
@@ -75,7 +79,7 @@ class Data:
 
     @property
     def _data(self) -> mujoco.MjData:
-        """MuJoCo's own."""
+        """MuJoCo's own object."""
         return self._env.simulation.data
 
     def set_joint_qpos(self, name: str, value: Any) -> None:
@@ -114,15 +118,15 @@ class Sim:
         self._env.simulation.start()
 
     def forward(self) -> None:
-        """Compute what follows from the state."""
+        """Compute all that depends on positions and velocities."""
         self._env.simulation.forward()
 
     def reset(self) -> None:
-        """Do nothing: what follows writes a state."""
+        """Do nothing: scripts write a state after it."""
 
-    def look(self) -> dict[str, Any]:
-        """Return what is seen of the state as it is now."""
-        self._env.observables.look()
+    def observe(self) -> dict[str, Any]:
+        """Return the observation of the present state."""
+        self._env.observables.update()
         return self._env.observation()
 
     def render(
@@ -160,3 +164,98 @@ def _index(kind: str, name: str, names: tuple[str, ...]) -> int:
     if name not in names:
         raise UnknownNameError(kind, name, [known for known in names if known])
     return names.index(name)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class RobotModelView:
+    """Name of a robot, and the prefix of its names in the scene."""
+
+    name: str
+    naming_prefix: str
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class GripperView:
+    """Number of action values of a gripper."""
+
+    dof: int
+
+
+class RobotView:
+    """One robot; other attributes are those of its description.
+
+    Args:
+        state: The robot in the simulation.
+        controller: Its controller.
+
+    Attributes:
+        name: Name of the robot.
+        robot_model: Its name and prefix.
+        composite_controller: Its controller.
+        arms: `right`, `left`, or the names of its hands.
+        gripper: The gripper of each arm.
+    """
+
+    def __init__(self, state: RobotState, controller: CompositeController) -> None:
+        robot, layout = state.robot, controller.layout
+        self._state, self._slices = state, {s.name: s for s in layout.slices}
+        self.name = robot.name
+        self.robot_model = RobotModelView(name=robot.name, naming_prefix=state.prefix)
+        self.composite_controller = controller
+        self.arms = tuple(robot.hands)
+        self.gripper = {
+            arm: GripperView(dof=self._size(f"{arm}_gripper")) for arm in self.arms
+        }
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._state.robot, name)
+
+    @property
+    def action_dim(self) -> int:
+        """Length of this robot's part of an action."""
+        return self.composite_controller.layout.size
+
+    @property
+    def action_limits(self) -> tuple[Vector, Vector]:
+        """Least and greatest values of this robot's part of an action."""
+        layout = self.composite_controller.layout
+        return layout.low.copy(), layout.high.copy()
+
+    @property
+    def _action_split_indexes(self) -> dict[str, tuple[int, int]]:
+        """Begin and end of each part of the action."""
+        return {name: (part.start, part.stop) for name, part in self._slices.items()}
+
+    @property
+    def is_mobile(self) -> bool:
+        """Whether the robot has a moving base."""
+        return self._state.robot.root.kind != "fixed"
+
+    @property
+    def _ref_joint_pos_indexes(self) -> Indices:
+        """Indices of the robot's joints in qpos, without grippers."""
+        robot, model = self._state.robot, self._state.model
+        joints = [
+            joint
+            for group, names in robot.groups.items()
+            if not group.endswith("gripper")
+            for joint in names
+        ]
+        places = [model.joint(self._state.prefix + j).qposadr[0] for j in joints]
+        return np.array(places, dtype=np.int64)
+
+    def create_action_vector(self, parts: Mapping[str, ArrayLike]) -> Vector:
+        """Return an action from values of parts; other parts get zeros.
+
+        Raises:
+            UnknownNameError: If there is no such part.
+            ActionError: If a part has a wrong size.
+        """
+        zeros = {name: np.zeros(self._size(name)) for name in self._slices}
+        return self.composite_controller.layout.pack(
+            zeros | {name: np.atleast_1d(values) for name, values in parts.items()}
+        )
+
+    def _size(self, part: str) -> int:
+        found = self._slices.get(part)
+        return 0 if found is None else found.stop - found.start

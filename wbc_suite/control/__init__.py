@@ -1,29 +1,78 @@
-"""Controllers: actions in, actuator commands out. They know no environment."""
+"""Controllers: actions in, actuator commands out, without an environment."""
 
-from wbc_suite.control.action import ActionLayout, ActionPart, ActionSlice
+from wbc_suite.control.action import (
+    ActionLayout,
+    ActionPart,
+    ActionSlice,
+    Axis,
+    SliceKind,
+    Unit,
+)
 from wbc_suite.control.composite import (
     BasicController,
     CompositeController,
+    CompositeControllerName,
+    FrameKind,
+    SteppedController,
     build_composite_controller,
     composite_names,
     default_basic_config,
     default_composite,
+    frame_kind_names,
     load_composite_controller_config,
     register_composite,
+    register_config_converter,
+    register_frame_kind,
 )
+from wbc_suite.control.law.custom import register_law
+from wbc_suite.control.law.joint_laws import JointLaw, VelocityLaw
+from wbc_suite.control.law.law import Law, ServoLaw, TorqueLaw
+from wbc_suite.control.law.osc import OscLaw
+from wbc_suite.control.part import (
+    PartController,
+    PartSettings,
+    PoseInput,
+    load_part_controller_config,
+    register_part_controller,
+)
+from wbc_suite.control.part.registry import PartControllerName
+from wbc_suite.control.robot_parts import RobotPart
 from wbc_suite.control.state import RobotState
 
 __all__ = [
     "ActionLayout",
     "ActionPart",
     "ActionSlice",
+    "Axis",
     "BasicController",
     "CompositeController",
+    "CompositeControllerName",
+    "FrameKind",
+    "JointLaw",
+    "Law",
+    "OscLaw",
+    "PartController",
+    "PartControllerName",
+    "PartSettings",
+    "PoseInput",
+    "RobotPart",
     "RobotState",
+    "ServoLaw",
+    "SliceKind",
+    "SteppedController",
+    "TorqueLaw",
+    "Unit",
+    "VelocityLaw",
     "build_composite_controller",
     "composite_names",
     "default_basic_config",
     "default_composite",
+    "frame_kind_names",
     "load_composite_controller_config",
+    "load_part_controller_config",
     "register_composite",
+    "register_config_converter",
+    "register_frame_kind",
+    "register_law",
+    "register_part_controller",
 ]

@@ -1,11 +1,11 @@
-"""Actions: one flat vector, cut into named slices with units and bounds."""
+"""Actions: one flat vector of named slices with units and bounds."""
 
 import math
 import textwrap
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+from enum import StrEnum
 from itertools import zip_longest
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,35 +14,74 @@ from wbc_suite.compiling import compiled
 from wbc_suite.errors import ActionError, ConfigError, UnknownNameError
 from wbc_suite.typing import Vector
 
-__all__ = ["ActionLayout", "ActionPart", "ActionSlice", "SliceKind"]
+__all__ = ["ActionLayout", "ActionPart", "ActionSlice", "Axis", "SliceKind", "Unit"]
 
-SliceKind = Literal[
-    "pose",
-    "position",
-    "orientation",
-    "gripper",
-    "base",
-    "posture",
-    "velocity",
-    "torque",
-    "stiffness",
-    "damping",
-]
+
+class SliceKind(StrEnum):
+    """What the values of a slice set."""
+
+    POSE = "pose"
+    POSITION = "position"
+    ORIENTATION = "orientation"
+    GRIPPER = "gripper"
+    BASE = "base"
+    POSTURE = "posture"
+    VELOCITY = "velocity"
+    TORQUE = "torque"
+    STIFFNESS = "stiffness"
+    DAMPING = "damping"
+
+
+class Axis(StrEnum):
+    """Components of a pose, and of the velocity of a base in its own axes."""
+
+    X = "x"
+    Y = "y"
+    Z = "z"
+    RX = "rx"
+    RY = "ry"
+    RZ = "rz"
+    QX = "qx"
+    QY = "qy"
+    QZ = "qz"
+    QW = "qw"
+    YAW = "yaw"
+    FORWARD = "forward"
+    SIDEWAYS = "sideways"
+    TURN = "turn"
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """What a value of 1 means; prints as `rad`, or as `0.05 rad` with a scale.
+
+    Attributes:
+        symbol: Unit of the quantity, such as `m`, or what values mean that have none.
+        scale: Quantity that a value of 1 commands; None for values that are the
+            quantity itself.
+    """
+
+    symbol: str
+    scale: float | None = None
+
+    def __str__(self) -> str:
+        return self.symbol if self.scale is None else f"{self.scale:g} {self.symbol}"
+
 
 CELL = 40
-"""Letters in a line of a printed layout's cell."""
+"""Characters in a line of a printed layout's cell."""
 FLOAT64 = np.dtype(np.float64)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class ActionPart:
-    """What one controller wants of the action: named values with units and bounds.
+    """What one controller reads from the action: named values with units and bounds.
 
     Attributes:
         name: Name of the slice.
-        kind: What the values mean.
-        labels: One word per value.
-        units: One unit per value.
+        kind: What the values set.
+        labels: Name of each value: an `Axis`, a joint, or another word.
+        units: Unit of each value.
         low: Least values.
         high: Greatest values.
     """
@@ -50,7 +89,7 @@ class ActionPart:
     name: str
     kind: SliceKind
     labels: tuple[str, ...]
-    units: tuple[str, ...]
+    units: tuple[Unit, ...]
     low: tuple[float, ...]
     high: tuple[float, ...]
 
@@ -60,15 +99,8 @@ class ActionPart:
             raise ConfigError(f"Action part '{self.name}': lengths differ: {sizes}.")
 
     def prefixed(self, prefix: str) -> "ActionPart":
-        """Return the same part under another name."""
-        return ActionPart(
-            name=prefix + self.name,
-            kind=self.kind,
-            labels=self.labels,
-            units=self.units,
-            low=self.low,
-            high=self.high,
-        )
+        """Return the same part with a prefix before its name."""
+        return replace(self, name=prefix + self.name)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -80,7 +112,7 @@ class ActionSlice(ActionPart):
 
 
 class ActionLayout:
-    """The one owner of slices, names, bounds and units of an action.
+    """Slices, names, bounds and units of an action.
 
     Args:
         parts: Parts in the order of the vector.
@@ -99,18 +131,8 @@ class ActionLayout:
         start = 0
         for part in parts:
             stop = start + len(part.labels)
-            slices.append(
-                ActionSlice(
-                    name=part.name,
-                    kind=part.kind,
-                    labels=part.labels,
-                    units=part.units,
-                    low=part.low,
-                    high=part.high,
-                    start=start,
-                    stop=stop,
-                )
-            )
+            values = {f.name: getattr(part, f.name) for f in fields(ActionPart)}
+            slices.append(ActionSlice(**values, start=start, stop=stop))
             start = stop
         self.slices = tuple(slices)
         self.size = start
@@ -136,7 +158,7 @@ class ActionLayout:
 
         Args:
             values: Values by slice.
-            base: Action that gives the slices that `values` leaves out, such as a
+            base: Action with the slices that are not in `values`, such as a
                 controller's `hold_action`.
 
         Raises:
@@ -175,9 +197,9 @@ class ActionLayout:
         try:
             array = np.asarray(action)
         except ValueError as error:  # rows of different lengths
-            raise ActionError(f"An action is a flat vector, not {action!r:.60}.") from (
-                error
-            )
+            raise ActionError(
+                f"An action is a flat vector, not {action!r:.60}."
+            ) from error
         if array.dtype.kind not in "fiu":
             raise ActionError(
                 f"An action holds real numbers, not {array.dtype} ({action!r:.60})."
@@ -232,7 +254,7 @@ class ActionLayout:
                     s.kind,
                     f"{s.start}:{s.stop}",
                     " ".join(s.labels),
-                    " ".join(dict.fromkeys(s.units)),
+                    " ".join(map(str, dict.fromkeys(s.units))),
                     " ".join(f"{x:g}" for x in dict.fromkeys(s.low)),
                     " ".join(f"{x:g}" for x in dict.fromkeys(s.high)),
                 )
@@ -256,10 +278,7 @@ def _table(rows: list[tuple[str, ...]]) -> str:
 
 @compiled
 def _clip(values: Vector, low: Vector, high: Vector) -> int:
-    """Clip in place; return how many values were outside, or -1 if one is not finite.
-
-    It keeps Python's lock, which other threads would take for longer than this takes.
-    """
+    """Clip in place; return how many were outside, or -1 if one is not finite."""
     outside = 0
     for i in range(len(values)):
         value = values[i]

@@ -1,16 +1,16 @@
-"""From a person's hand to an action: devices, and the pipeline behind them."""
+"""Input devices, and the pipeline from their states to actions."""
 
 from wbc_suite.devices.device import (
     Device,
+    Scripted,
     device_names,
     find_device,
     is_device,
     make_device,
     register_device,
 )
-from wbc_suite.devices.driving import drive
+from wbc_suite.devices.drive_loop import drive
 from wbc_suite.devices.pipeline import Clutch, Pipeline, PipelineConfig
-from wbc_suite.devices.scripted import Scripted
 from wbc_suite.devices.state import DeviceState, LimbInput
 
 __all__ = [

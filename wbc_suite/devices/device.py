@@ -1,7 +1,7 @@
-"""The protocol of devices, and where they are found by name."""
+"""The protocol of devices, and their registry by name."""
 
 import importlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, Protocol
 
 from wbc_suite.devices.state import DeviceState
@@ -9,6 +9,7 @@ from wbc_suite.errors import ConfigError, DeviceError, UnknownNameError
 
 __all__ = [
     "Device",
+    "Scripted",
     "device_names",
     "find_device",
     "is_device",
@@ -18,22 +19,42 @@ __all__ = [
 
 
 class Device(Protocol):
-    """Something that a person moves.
-
-    Three methods are all there is; nothing has to be inherited.
-    """
+    """An input device; classes need no base, only these three methods."""
 
     def start(self) -> None:
-        """Open it; raises DeviceError with what to do when it is not there."""
+        """Open the device; raises DeviceError if it is not available."""
         ...
 
     def read(self) -> DeviceState:
-        """Return the newest state at once; the last one when there is no newer."""
+        """Return the newest state without waiting."""
         ...
 
     def stop(self) -> None:
-        """Close it; also after a start that failed."""
+        """Close the device; also called after a failed start."""
         ...
+
+
+class Scripted:
+    """A device without hardware: it returns given states, then the last one again.
+
+    Args:
+        states: One state per read; may be an endless generator.
+    """
+
+    def __init__(self, states: Iterable[DeviceState]) -> None:
+        self._states = iter(states)
+        self._last = DeviceState(time=0.0)
+
+    def start(self) -> None:
+        """Do nothing."""
+
+    def read(self) -> DeviceState:
+        """Return the next state."""
+        self._last = next(self._states, self._last)
+        return self._last
+
+    def stop(self) -> None:
+        """Do nothing."""
 
 
 _BUILT_IN = {
@@ -44,40 +65,40 @@ _BUILT_IN = {
     "spacemouse": "wbc_suite.devices.spacemouse:SpaceMouse",
     "stream": "wbc_suite.devices.stream:Stream",
 }
-"""Names of ours, and where they are: a device is imported when it is made."""
+"""Module and class by name; imported when the device is created."""
 
-_OWN: dict[str, Callable[..., Device]] = {}
+_REGISTERED: dict[str, Callable[..., Device]] = {}
 
 
 def register_device(name: str, make: Callable[..., Device]) -> None:
-    """Make a device known to `make_device` and to `--device`, case ignored.
+    """Register a device for `make_device` and `--device`; case is ignored.
 
     Raises:
         ConfigError: If the name is taken.
     """
     if name.lower() in device_names():
         raise ConfigError(f"A device named '{name}' exists already.")
-    _OWN[name.lower()] = make
+    _REGISTERED[name.lower()] = make
 
 
 def device_names() -> tuple[str, ...]:
-    """Return the names that `make_device` knows."""
-    return tuple(sorted({*_BUILT_IN, *_OWN}))
+    """Return the names of all devices."""
+    return tuple(sorted({*_BUILT_IN, *_REGISTERED}))
 
 
 def find_device(name: str) -> Callable[..., Device]:
-    """Return what makes a device of a name.
+    """Return the class or factory of a device.
 
     Args:
-        name: A known name, or `module:Class` for one that is found by importing it.
+        name: Name of a device, or `module:Class`.
 
     Raises:
-        UnknownNameError: If there is none of this name.
+        UnknownNameError: If there is no device of this name.
         DeviceError: If the module cannot be imported, or lacks the class.
     """
     key = name.lower()
-    if key in _OWN:
-        return _OWN[key]
+    if key in _REGISTERED:
+        return _REGISTERED[key]
     if ":" not in name and key not in _BUILT_IN:
         raise UnknownNameError("device", name, device_names())
     module, _, kind = _BUILT_IN.get(key, name).partition(":")
@@ -91,7 +112,7 @@ def find_device(name: str) -> Callable[..., Device]:
 
 
 def is_device(name: str) -> bool:
-    """Tell whether a name is that of a device, as opposed to a function's."""
+    """Return whether a name is that of a device."""
     if name.lower() in device_names():
         return True
     try:
@@ -102,5 +123,5 @@ def is_device(name: str) -> bool:
 
 
 def make_device(name: str, **options: Any) -> Device:
-    """Make a device by its name; `start` opens it. For errors see `find_device`."""
+    """Create a device by its name; `start` opens it. For errors see `find_device`."""
     return find_device(name)(**options)

@@ -1,4 +1,4 @@
-"""Gamepads: DualSense by its reports, any other on Linux by the kernel's files."""
+"""Gamepads: DualSense by its HID reports, others by Linux' joystick files."""
 
 import errno
 import os
@@ -25,7 +25,7 @@ __all__ = [
     "parse_joystick",
 ]
 
-DEAD = 0.1  # of a stick's way that counts as rest
+DEAD = 0.1  # dead zone, as a fraction of a stick's range
 SPEED, TURN = 0.3, 1.0  # m/s and rad/s at full deflection
 DRIVE, SPIN = 0.4, 0.6  # of the base
 SONY, DUALSENSE = (0x054C,), (0x0CE6, 0x0DF2)
@@ -38,7 +38,7 @@ BUTTONS = {
 
 @dataclass(frozen=True, slots=True)
 class Pad:
-    """Where everything on a gamepad is.
+    """State of a gamepad.
 
     Attributes:
         left: Left stick, right and up, -1 .. 1.
@@ -57,7 +57,7 @@ class Pad:
 
 
 def parse_dualsense(report: bytes) -> Pad | None:
-    """Read a DualSense's report, of USB (1) or of Bluetooth (49); None for others.
+    """Parse a DualSense's report of USB (1) or Bluetooth (49); None for others.
 
     Source: Linux, drivers/hid/hid-playstation.c, struct dualsense_input_report.
     """
@@ -90,7 +90,7 @@ def parse_joystick(event: bytes, pad: Pad) -> Pad:
     xpad gives them.
     """
     _, value, kind, number = struct.unpack("<IhBB", event)
-    if kind & 2:  # an axis; bit 7 only says that it is the first report
+    if kind & 2:  # an axis; bit 7 marks the first report
         return _with_axis(pad, number, value / 32767.0)
     names = ("south", "east", "west", "north", "l1", "r1", "select", "start")
     if not kind & 1 or number >= len(names):
@@ -100,35 +100,29 @@ def parse_joystick(event: bytes, pad: Pad) -> Pad:
 
 
 def _with_axis(pad: Pad, number: int, x: float) -> Pad:
-    match number:
-        case 0:
-            return replace(pad, left=(x, pad.left[1]))
-        case 1:
-            return replace(pad, left=(pad.left[0], -x))
-        case 2:
-            return replace(pad, triggers=(0.5 * (x + 1.0), pad.triggers[1]))
-        case 3:
-            return replace(pad, right=(x, pad.right[1]))
-        case 4:
-            return replace(pad, right=(pad.right[0], -x))
-        case 5:
-            return replace(pad, triggers=(pad.triggers[0], 0.5 * (x + 1.0)))
-        case 6:
-            return replace(pad, cross=(round(x), pad.cross[1]))
-        case 7:
-            return replace(pad, cross=(pad.cross[0], round(-x)))
-    return pad
+    """Return a pad with one axis of the joystick file set, -1 .. 1."""
+    changes: dict[int, dict[str, Any]] = {
+        0: {"left": (x, pad.left[1])},
+        1: {"left": (pad.left[0], -x)},
+        2: {"triggers": (0.5 * (x + 1.0), pad.triggers[1])},
+        3: {"right": (x, pad.right[1])},
+        4: {"right": (pad.right[0], -x)},
+        5: {"triggers": (pad.triggers[0], 0.5 * (x + 1.0))},
+        6: {"cross": (round(x), pad.cross[1])},
+        7: {"cross": (pad.cross[0], round(-x))},
+    }
+    return replace(pad, **changes.get(number, {}))
 
 
 def pad_state(time: float, pad: Pad, pressed: Set[str] = frozenset()) -> DeviceState:
-    """Return a pad as velocities of the hand that is switched to.
+    """Return velocities of the selected hand and the base.
 
     Args:
         time: s.
-        pad: Where everything is now.
-        pressed: Buttons that were down since the last state.
+        pad: State of the gamepad.
+        pressed: Buttons that were pressed since the last state.
     """
-    (lx, ly), (rx, ry) = _calm(pad.left), _calm(pad.right)
+    (lx, ly), (rx, ry) = _without_dead_zone(pad.left), _without_dead_zone(pad.right)
     rise = pad.triggers[1] - pad.triggers[0]
     roll = float("r1" in pad.down) - float("l1" in pad.down)
     linear, angular = np.array([ly, -lx, rise]), np.array([roll, ry, -rx])
@@ -142,9 +136,9 @@ def pad_state(time: float, pad: Pad, pressed: Set[str] = frozenset()) -> DeviceS
 
 
 class Gamepad:
-    """Any gamepad that Linux knows, by its joystick file; needs no package.
+    """A gamepad by its joystick file; Linux only.
 
-    On other systems use the page of the stream, where the browser reads the gamepad.
+    On other systems use the page of the stream: there the browser reads the gamepad.
 
     Args:
         path: The joystick file.
@@ -165,7 +159,7 @@ class Gamepad:
         self._file, self._pad = -1, Pad()
 
     def start(self) -> None:
-        """Open the file; raises DeviceError when there is none."""
+        """Open the file; raises DeviceError if there is none."""
         try:
             self._file = os.open(self._path, os.O_RDONLY | os.O_NONBLOCK)
         except OSError as error:
@@ -175,14 +169,14 @@ class Gamepad:
             ) from error
 
     def read(self) -> DeviceState:
-        """Return what the pad says now."""
+        """Return the state of the gamepad."""
         pressed: frozenset[str] = frozenset()
         try:
             while len(event := os.read(self._file, 8)) == 8:
                 self._pad = parse_joystick(event, self._pad)
                 pressed |= self._pad.down
         except OSError as error:
-            if error.errno != errno.EAGAIN:  # it was pulled out: everything at rest
+            if error.errno != errno.EAGAIN:  # unplugged: everything at rest
                 self._pad = Pad()
         return pad_state(self._clock(), self._pad, pressed)
 
@@ -197,7 +191,7 @@ class DualSense:
     """Sony's DualSense, by USB or Bluetooth, on any system.
 
     Args:
-        find: Opens the pads that are plugged in.
+        find: Opens the connected gamepads.
         clock: Source of time, s.
     """
 
@@ -214,11 +208,11 @@ class DualSense:
         self._pad = Pad()
 
     def start(self) -> None:
-        """Open the pad; raises DeviceError when there is none."""
+        """Open the gamepad; raises DeviceError if there is none."""
         self._hid = self._find()[0]
 
     def read(self) -> DeviceState:
-        """Return what the pad says now."""
+        """Return the state of the gamepad."""
         pressed: frozenset[str] = frozenset()
         for report in waiting_reports(self._hid):
             self._pad = parse_dualsense(report) or self._pad
@@ -226,7 +220,7 @@ class DualSense:
         return pad_state(self._clock(), self._pad, pressed)
 
     def stop(self) -> None:
-        """Close the pad."""
+        """Close the gamepad."""
         if self._hid is not None:
             self._hid.close()
         self._hid = None
@@ -236,8 +230,8 @@ def _byte(x: int) -> float:
     return min(max((x - 127.5) / 127.5, -1.0), 1.0)
 
 
-def _calm(stick: tuple[float, float]) -> tuple[float, float]:
-    """Return a stick's deflection without its dead zone, which is round."""
+def _without_dead_zone(stick: tuple[float, float]) -> tuple[float, float]:
+    """Return a stick's deflection without its round dead zone."""
     far = float(np.hypot(*stick))
     factor = max(0.0, far - DEAD) / (1.0 - DEAD) / max(far, 1e-9)
     return stick[0] * factor, stick[1] * factor

@@ -1,4 +1,4 @@
-"""Devices on the USB bus, by their raw reports."""
+"""USB and Bluetooth devices by their HID reports."""
 
 import importlib
 from collections.abc import Iterator, Sequence
@@ -9,22 +9,22 @@ from wbc_suite.errors import DeviceError
 __all__ = ["UDEV_RULE", "open_hid", "waiting_reports"]
 
 UDEV_RULE = 'KERNEL=="hidraw*", ATTRS{idVendor}=="%04x", MODE="0660", TAG+="uaccess"'
-"""What lets a person on Linux open a device of a vendor without being root."""
+"""udev rule with which users on Linux may open a vendor's devices."""
 
 
 def open_hid(
     kind: str, vendors: Sequence[int], products: Sequence[int], count: int = 1
 ) -> list[Any]:
-    """Open devices; their `read(n)` returns at once, with nothing when nothing waits.
+    """Open devices in non-blocking mode.
 
     Args:
-        kind: What people call it.
-        vendors: Numbers of vendors.
-        products: Numbers of products.
-        count: How many are needed.
+        kind: Name of the device, for error messages.
+        vendors: Vendor ids.
+        products: Product ids.
+        count: Number of devices that are needed.
 
     Raises:
-        DeviceError: If the package is missing, or devices are, or may not be opened.
+        DeviceError: If hidapi or a device is missing, or may not be opened.
     """
     try:
         hid: Any = importlib.import_module("hid")
@@ -40,7 +40,7 @@ def open_hid(
     if len(found) < count:
         raise DeviceError(
             f"{count} {kind} needed, {len(found)} found. Plug it in; on Linux "
-            "`lsusb` shows whether the computer sees it."
+            "`lsusb` lists connected devices."
         )
     opened = []
     for info in list(found.values())[:count]:
@@ -49,7 +49,7 @@ def open_hid(
             device.open_path(info["path"])
         except OSError as error:
             raise DeviceError(
-                f"{kind} is there but may not be opened. On Linux put this line into "
+                f"{kind} was found but may not be opened. On Linux put this line into "
                 "/etc/udev/rules.d/70-wbc-suite.rules and plug it in again: "
                 + UDEV_RULE
                 % info["vendor_id"]
@@ -60,7 +60,7 @@ def open_hid(
 
 
 def waiting_reports(device: Any) -> Iterator[bytes]:
-    """Yield the reports that wait; none of a device that was pulled out."""
+    """Yield the queued reports; none if the device was unplugged."""
     while True:
         try:
             report = bytes(device.read(128))

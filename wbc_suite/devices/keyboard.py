@@ -1,20 +1,52 @@
-"""The keyboard of a terminal: works over ssh, needs nothing but Python."""
+"""The keyboard of a terminal, also over ssh, and what its keys do."""
 
 import contextlib
 import os
 import select
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Set
 from typing import Any
 
-from wbc_suite.devices.keys import HELP, KeyJog
-from wbc_suite.devices.state import DeviceState
+import numpy as np
+
+from wbc_suite.devices.state import DeviceState, LimbInput
 from wbc_suite.errors import DeviceError
 
-__all__ = ["Keyboard", "parse_keys"]
+__all__ = ["BUTTONS", "HELP", "JOG", "KeyJog", "Keyboard", "parse_keys"]
 
 HOLD = 0.12  # s, after a press; a terminal repeats a held key every 0.03 s
+SPEED = 0.25  # m/s, of a held key
+TURN = 0.8  # rad/s
+BASE_SPEED, BASE_TURN = 0.4, 0.6  # m/s and rad/s
+FACTOR = 1.5  # of `+` and `-`
+SLOWEST, FASTEST = 0.1, 4.0
+
+JOG: dict[str, tuple[int, float]] = {
+    "w": (0, 1), "s": (0, -1), "a": (1, 1), "d": (1, -1), "r": (2, 1), "f": (2, -1),
+    "u": (3, -1), "o": (3, 1), "i": (4, 1), "k": (4, -1), "j": (5, 1), "l": (5, -1),
+}  # fmt: skip
+"""Component of the twist and sign by key."""
+
+BASE_JOG: dict[str, tuple[int, float]] = {
+    "up": (0, 1), "down": (0, -1), ",": (1, 1), ".": (1, -1),
+    "left": (2, 1), "right": (2, -1),
+}  # fmt: skip
+"""Component of the base's velocity and sign by key."""
+
+BUTTONS = {
+    " ": "grip", "tab": "next", "m": "mirror", "h": "home", "p": "pause", "0": "reset",
+    "enter": "keep", "backspace": "discard", "z": "undo", "escape": "quit",
+}  # fmt: skip
+"""Button by key."""
+
+HELP = """\
+  w s  forward, back     u o  roll       space  open or close the gripper
+  a d  left, right       i k  pitch      tab    next hand      m  mirror
+  r f  up, down          j l  yaw        + -    faster, slower  h  home
+  arrows , .  drive and turn the base    p pause  0 reset  esc quit
+  enter  keep the episode    backspace  discard it    z  undo
+"""
 
 _ESCAPES = {b"[A": "up", b"[B": "down", b"[C": "right", b"[D": "left"}
 _NAMES = {
@@ -27,7 +59,7 @@ _NAMES = {
 
 
 def parse_keys(data: bytes) -> Iterator[str]:
-    """Yield the names of the keys in what a terminal sent."""
+    """Yield the names of the keys in a terminal's input."""
     at = 0
     while at < len(data):
         if data[at] == 0x1B and data[at + 1 : at + 3] in _ESCAPES:
@@ -39,15 +71,55 @@ def parse_keys(data: bytes) -> Iterator[str]:
         at += 1
 
 
+class KeyJog:
+    """Converts keys to velocities of the selected hand.
+
+    Attributes:
+        pace: Factor of all speeds.
+    """
+
+    def __init__(self) -> None:
+        self.pace = 1.0
+
+    def press(self, key: str) -> None:
+        """Handle a key press that changes the pace."""
+        if key in ("+", "=", "-"):
+            pace = self.pace * (1.0 / FACTOR if key == "-" else FACTOR)
+            self.pace = min(max(pace, SLOWEST), FASTEST)
+
+    def state(self, time: float, held: Set[str], pressed: Set[str]) -> DeviceState:
+        """Return the state for some keys.
+
+        Args:
+            time: s.
+            held: Keys that are held.
+            pressed: Keys pressed since the last state.
+        """
+        twist = np.zeros(6)
+        for key in held & JOG.keys():
+            index, sign = JOG[key]
+            twist[index] += sign * self.pace * (SPEED if index < 3 else TURN)
+        base = np.zeros(3)
+        for key in held & BASE_JOG.keys():
+            index, sign = BASE_JOG[key]
+            base[index] += sign * self.pace * (BASE_SPEED if index < 2 else BASE_TURN)
+        return DeviceState(
+            time=time,
+            limbs={"hand": LimbInput(twist=twist)},
+            base=base,
+            buttons=frozenset(BUTTONS[key] for key in pressed & BUTTONS.keys()),
+        )
+
+
 class Keyboard:
     """Keys of the terminal that the program runs in.
 
-    A terminal tells of presses and repeats, but not of releases: a key counts as held
-    for a moment after each of them. A tap moves 3 cm; a key that is held pauses before
-    it repeats, as it does in writing.
+    A terminal reports presses and repeats, but no releases: a key counts as held for
+    `HOLD` after each of them. A tap moves 3 cm. A held key pauses before it repeats, as
+    in writing.
 
     Args:
-        descriptor: File descriptor of the terminal; that of the input when left out.
+        descriptor: File descriptor of the terminal; standard input by default.
         clock: Source of time, s.
     """
 
@@ -65,7 +137,7 @@ class Keyboard:
         self._before: list[Any] | None = None
 
     def start(self) -> None:
-        """Take the terminal's keys one by one, without showing them."""
+        """Read single keys without echo; raises DeviceError if there is no terminal."""
         with contextlib.suppress(ValueError, OSError):  # a closed or captured input
             asked = self._asked
             self._descriptor = sys.stdin.fileno() if asked is None else asked
@@ -81,7 +153,7 @@ class Keyboard:
         tty.setcbreak(self._descriptor)
 
     def read(self) -> DeviceState:
-        """Return what the keys say now."""
+        """Return the state of the keys."""
         now, pressed = self._clock(), set(parse_keys(self._waiting()))
         self._until = {key: end for key, end in self._until.items() if end >= now}
         fresh = {key for key in pressed if key not in self._until}
@@ -92,7 +164,7 @@ class Keyboard:
         return self._jog.state(now, held, fresh)
 
     def stop(self) -> None:
-        """Give the terminal back as it was."""
+        """Restore the terminal."""
         if self._before is None:
             return
         import termios

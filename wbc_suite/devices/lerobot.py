@@ -1,6 +1,6 @@
-"""Both ways between our devices and LeRobot's teleoperators; neither imports the other.
+"""Adapters between devices and LeRobot's teleoperators; LeRobot is not imported.
 
-LeRobot asks a teleoperator for a flat dictionary of numbers. Ours has these keys:
+A teleoperator returns a flat dictionary of numbers. The keys here are
 `right.x .y .z .rx .ry .rz` for a pose (m, rotation vector in rad), `right.vx ... .wz`
 for a twist, `right.engaged`, `right.grip` (or `right.grip.0`, ... by synergy),
 `elbow.pos` for a joint, `base.forward .left .turn`, and `button.keep`, `button.grip`.
@@ -27,7 +27,7 @@ BASE = ("forward", "left", "turn")
 
 
 class Teleoperator(Protocol):
-    """What is used of LeRobot's teleoperators."""
+    """The part of LeRobot's teleoperators that is used here."""
 
     def connect(self) -> None:
         """Open it."""
@@ -43,7 +43,7 @@ class Teleoperator(Protocol):
 
 
 def flatten(state: DeviceState) -> dict[str, float]:
-    """Return a state as LeRobot has actions; see above."""
+    """Return a state as a flat dictionary; for its keys see the module."""
     flat: dict[str, float] = {}
     for name, limb in state.limbs.items():
         if limb.pose is not None:
@@ -63,10 +63,10 @@ def flatten(state: DeviceState) -> dict[str, float]:
 
 
 def unflatten(flat: Mapping[str, Any], time: float) -> DeviceState:
-    """Return a flat action as a state; what is not named as above is left out.
+    """Return a flat dictionary as a state; other keys are ignored.
 
     Raises:
-        DeviceError: If a value is no number.
+        DeviceError: If a value is not a number.
     """
     numbers = {name: _number(name, value) for name, value in flat.items()}
     ends = {*POSE, *TWIST, "engaged", "grip"}
@@ -91,7 +91,7 @@ def unflatten(flat: Mapping[str, Any], time: float) -> DeviceState:
 
 
 class ToLeRobot:
-    """One of our devices, as LeRobot wants teleoperators.
+    """A device as a teleoperator of LeRobot.
 
     Args:
         device: The device.
@@ -106,16 +106,16 @@ class ToLeRobot:
 
     @property
     def action_features(self) -> dict[str, type]:
-        """Names of what the device says now, each a number."""
+        """Keys of the current state, each a float."""
         return dict.fromkeys(self.get_action(), float)
 
     @property
     def feedback_features(self) -> dict[str, type]:
-        """None: our devices only speak."""
+        """Empty: devices have no feedback."""
         return {}
 
     def connect(self, calibrate: bool = True) -> None:
-        """Start the device; there is nothing to calibrate."""
+        """Start the device."""
         self._device.start()
         self.is_connected = True
 
@@ -126,7 +126,7 @@ class ToLeRobot:
         """Do nothing."""
 
     def get_action(self) -> dict[str, float]:
-        """Return the newest state, flat."""
+        """Return the newest state as a flat dictionary."""
         return flatten(self._device.read())
 
     def send_feedback(self, feedback: Mapping[str, Any]) -> None:
@@ -139,13 +139,13 @@ class ToLeRobot:
 
 
 class FromLeRobot:
-    """One of LeRobot's teleoperators, as a device.
+    """A teleoperator of LeRobot as a device.
 
     Args:
         teleoperator: Connected by `start`.
-        names: Their name of a number to ours, such as `shoulder_pan.pos` to
-            `right_shoulder_yaw_joint.pos`; others keep theirs.
-        scale: Factor by our name; LeRobot's arms often say degrees: `math.pi / 180`.
+        names: New keys of the teleoperator's keys, such as `shoulder_pan.pos` to
+            `right_shoulder_yaw_joint.pos`; other keys are kept.
+        scale: Factor by new key; LeRobot's arms often have degrees: `DEGREES`.
         clock: Source of time, s.
     """
 
@@ -160,20 +160,20 @@ class FromLeRobot:
         self._names, self._scale = dict(names or {}), dict(scale or {})
 
     def start(self) -> None:
-        """Connect it."""
+        """Connect the teleoperator."""
         self._teleoperator.connect()
 
     def read(self) -> DeviceState:
-        """Return what it says now."""
-        said = self._teleoperator.get_action()
-        ours = {self._names.get(name, name): value for name, value in said.items()}
+        """Return its current state."""
+        action = self._teleoperator.get_action()
+        flat = {self._names.get(name, name): value for name, value in action.items()}
         for name, factor in self._scale.items():
-            if name in ours:
-                ours[name] = factor * _number(name, ours[name])
-        return unflatten(ours, self._clock())
+            if name in flat:
+                flat[name] = factor * _number(name, flat[name])
+        return unflatten(flat, self._clock())
 
     def stop(self) -> None:
-        """Disconnect it."""
+        """Disconnect the teleoperator."""
         self._teleoperator.disconnect()
 
 
@@ -207,7 +207,7 @@ def _number(name: str, value: Any) -> float:
     try:
         return float(value)
     except (TypeError, ValueError) as error:
-        raise DeviceError(f"'{name}' is no number: {value!r:.40}.") from error
+        raise DeviceError(f"'{name}' is not a number: {value!r:.40}.") from error
 
 
 DEGREES = math.pi / 180.0

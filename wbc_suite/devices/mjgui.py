@@ -1,4 +1,4 @@
-"""MJGUI: drag targets in MuJoCo's own window."""
+"""MJGUI: targets that are dragged in MuJoCo's window."""
 
 import time
 from collections.abc import Callable
@@ -8,22 +8,20 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.devices.limbs import LimbKind, LimbPort
-from wbc_suite.devices.ports import limb_ports
+from wbc_suite.devices.action_ports import LimbKind, LimbPort, limb_ports
 from wbc_suite.devices.state import DeviceState, LimbInput
 from wbc_suite.errors import DeviceError
 
-__all__ = ["MjGui"]
+__all__ = ["MjGui", "open_window"]
 
-SIZE = 0.03  # m, half the edge of a target
+SIZE = 0.03  # m, half size of a target
 COLOURS = ((0.9, 0.3, 0.2, 0.5), (0.2, 0.5, 0.9, 0.5), (0.3, 0.7, 0.3, 0.5))
 
 
 class MjGui:
-    """Boxes at the robot's limbs that a mouse drags: double click, then Ctrl and drag.
+    """Boxes at the robot's limbs that are dragged: double click, then Ctrl and drag.
 
-    The window shows a copy of the scene that has the boxes too; the simulation itself
-    stays as it is.
+    The window displays a copy of the scene with the boxes added.
 
     Args:
         env: Environment whose limbs are dragged.
@@ -39,13 +37,17 @@ class MjGui:
         launch: Callable[[mujoco.MjModel, mujoco.MjData], Any] | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._env, self._launch, self._clock = env.unwrapped, launch or _window, clock
+        self._env, self._launch, self._clock = (
+            env.unwrapped,
+            launch or open_window,
+            clock,
+        )
         movable = (LimbKind.POSE, LimbKind.POSITION)
         self._ports = [p for p in limb_ports(env).values() if p.kind in movable]
         self._viewer: Any = None
 
     def start(self) -> None:
-        """Open the window; raises DeviceError where there is no screen."""
+        """Open the window; raises DeviceError if there is no display."""
         self._model = _with_targets(self._env.scene_xml, self._ports)
         self._data = mujoco.MjData(self._model)
         self._copy()
@@ -57,7 +59,7 @@ class MjGui:
         self._viewer = self._launch(self._model, self._data)
 
     def read(self) -> DeviceState:
-        """Return where the boxes are; a closed window says `quit`."""
+        """Return the poses of the boxes; the button `quit` if the window is closed."""
         if not self._viewer.is_running():
             return DeviceState(time=self._clock(), buttons=frozenset({"quit"}))
         with self._viewer.lock():
@@ -99,13 +101,18 @@ def _with_targets(scene: str, ports: list[LimbPort]) -> mujoco.MjModel:
     return spec.compile()
 
 
-def _window(model: mujoco.MjModel, data: mujoco.MjData) -> Any:
+def open_window(model: mujoco.MjModel, data: mujoco.MjData, **options: Any) -> Any:
+    """Open MuJoCo's passive viewer; for options see `mujoco.viewer.launch_passive`.
+
+    Raises:
+        DeviceError: If there is no display.
+    """
     from mujoco import viewer
 
     try:
-        return viewer.launch_passive(model, data)
-    except Exception as error:  # the window library has errors of many kinds
+        return viewer.launch_passive(model, data, **options)
+    except Exception as error:  # GLFW raises many kinds
         raise DeviceError(
-            f"MuJoCo's window does not open: {error}. It needs a screen; on macOS run "
-            "with mjpython. The page of `wbc-suite teleop` needs neither."
+            f"MuJoCo's window does not open: {error}. It needs a display; on macOS run "
+            "with mjpython. The pages in the browser need neither."
         ) from error

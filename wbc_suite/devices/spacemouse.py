@@ -1,4 +1,4 @@
-"""SpaceMouse: six axes under one hand; two of them, two hands."""
+"""SpaceMouse: six axes for one hand, or one mouse for each hand."""
 
 import struct
 import time
@@ -20,23 +20,23 @@ PRODUCTS = (
     0xC62B,
 )  # fmt: skip
 FULL = 350.0  # counts at full deflection; vendor's nominal range
-DEAD = 0.06  # of full deflection that counts as rest
-EXPONENT = 1.6  # finer near rest
+DEAD = 0.06  # dead zone, as a fraction of full deflection
+EXPONENT = 1.6  # of the response, which is finer near rest
 SPEED, TURN = 0.35, 1.2  # m/s and rad/s at full deflection
-SHARED = {0: "grip", 1: "next"}  # buttons of a mouse that goes from hand to hand
-SILENCE = 0.3  # s; a mouse at rest says nothing, so the last report lasts that long
+SHARED = {0: "grip", 1: "next"}  # buttons of a mouse for the selected hand
+TIMEOUT = 0.3  # s; a mouse at rest sends no reports
 
 _TO_OURS = np.array([[0, -1, 0], [-1, 0, 0], [0, 0, -1]], dtype=np.float64)
-"""The mouse's axes are right, towards the person and down; ours forward, left, up."""
+"""From the mouse's axes (right, backward, down) to forward, left, up."""
 
 
 def parse_axes(report: bytes, axes: Vector) -> Vector:
-    """Return the six axes after a report, in the mouse's axes, full deflection 1.
+    """Return the deflections after a report, in the mouse's axes, shape (6,).
 
     Args:
         report: Number 1: translation, or all six axes in newer models; 2: rotation.
-            Others change nothing. Values are little-endian, 16 bits.
-        axes: As they were, shape (6,).
+            Others are ignored. Values are little-endian, 16 bits.
+        axes: Deflections before it, full deflection is 1, shape (6,).
     """
     axes = axes.copy()
     count = 6 if len(report) >= 13 and report[0] == 1 else 3
@@ -49,7 +49,7 @@ def parse_axes(report: bytes, axes: Vector) -> Vector:
 
 
 def parse_buttons(report: bytes) -> frozenset[int] | None:
-    """Return the numbers of the buttons that a report says are down, or None."""
+    """Return the numbers of the pressed buttons in a report, or None."""
     if len(report) < 2 or report[0] != 3:
         return None
     bits = int.from_bytes(report[1:5], "little")
@@ -57,52 +57,51 @@ def parse_buttons(report: bytes) -> frozenset[int] | None:
 
 
 def shaped(axes: Vector) -> Vector:
-    """Return deflections without the dead zone, finer near rest, shape (6,)."""
+    """Return deflections with dead zone and exponent applied, shape (6,)."""
     beyond = np.maximum(np.abs(axes) - DEAD, 0.0) / (1.0 - DEAD)
     return np.sign(axes) * beyond**EXPONENT
 
 
 class _Mouse:
-    """What one mouse said last."""
+    """State of one mouse."""
 
     def __init__(self, hid: Any) -> None:
         self.hid = hid
         self.axes: Vector = np.zeros(6)
         self.buttons: frozenset[int] = frozenset()
         self.closed = False
-        self.heard = -np.inf
+        self.last_report = -np.inf
 
     def drain(self, now: float) -> frozenset[int]:
-        """Take all reports that wait; return the buttons that went down."""
+        """Read the queued reports; return the buttons that were pressed."""
         pressed: frozenset[int] = frozenset()
         for report in waiting_reports(self.hid):
-            self.heard = now
+            self.last_report = now
             self.axes = parse_axes(report, self.axes)
             down = parse_buttons(report)
             if down is not None:
                 pressed |= down - self.buttons
                 self.buttons = down
-        if now - self.heard > SILENCE:
+        if now - self.last_report > TIMEOUT:
             self.axes = np.zeros(6)
         return pressed
 
     def twist(self) -> Vector:
-        """Return the velocity that is asked for, our axes, m/s and rad/s."""
+        """Return the velocity: forward, left, up, m/s and rad/s, shape (6,)."""
         axes = shaped(self.axes)
         linear, angular = _TO_OURS @ axes[:3], _TO_OURS @ axes[3:]
         return np.concatenate([SPEED * linear, TURN * angular])
 
 
 class SpaceMouse:
-    """One SpaceMouse for the hand that is switched to, or one for each hand.
+    """One SpaceMouse for the selected hand, or one for each hand.
 
-    The left button closes and opens the gripper; the right one goes on to the next
-    hand, or home where every hand has a mouse of its own. A mouse with a hand of its
-    own says itself how far that is closed.
+    The left button closes and opens the gripper. The right one selects the next hand,
+    or moves all hands home if each has a mouse.
 
     Args:
-        hands: Which limb each mouse moves, in the order that they are found.
-        find: Opens all mice that are plugged in.
+        hands: Limb of each mouse, in the order in which they are found.
+        find: Opens all connected mice.
         clock: Source of time, s.
     """
 
@@ -121,11 +120,11 @@ class SpaceMouse:
         self._mice: list[_Mouse] = []
 
     def start(self) -> None:
-        """Open the mice; raises DeviceError when there are too few."""
+        """Open the mice; raises DeviceError if there are too few."""
         self._mice = [_Mouse(hid) for hid in self._find()]
 
     def read(self) -> DeviceState:
-        """Return what all mice say now."""
+        """Return the state of all mice."""
         now, limbs = self._clock(), {}
         buttons: set[str] = set()
         for name, mouse in zip(self._hands, self._mice, strict=False):

@@ -1,7 +1,7 @@
-"""What a device says: one frozen, time-stamped, name-keyed value."""
+"""The state of a device: frozen, with a time stamp, by limb, and its mirror image."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -10,7 +10,10 @@ from numpy.typing import ArrayLike
 
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["DeviceState", "LimbInput"]
+__all__ = ["DeviceState", "LimbInput", "mirrored"]
+
+_FLIP = np.diag([1.0, -1.0, 1.0])  # left and right change places
+_TWIST = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])  # a rotation is a pseudovector
 
 
 def _frozen(values: ArrayLike | None) -> Vector | None:
@@ -23,15 +26,15 @@ def _frozen(values: ArrayLike | None) -> Vector | None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LimbInput:
-    """What a device says about one limb; what is None is not said.
+    """Input of a device for one limb; None where there is none.
 
     Attributes:
-        pose: Pose of the input in a fixed frame of the device, x forward, y left, z up.
-        twist: Velocity that is wanted, axes of the world, m/s and rad/s, shape (6,).
-        engaged: Whether the limb follows; a clutch pedal that is let go says no.
+        pose: Pose of the input in a fixed frame, x forward, y left, z up.
+        twist: Velocity in axes of the world, m/s and rad/s, shape (6,).
+        engaged: Whether the limb follows the input.
         grip: Closing of the gripper, -1 open .. 1 closed: one value for all synergies,
-            or one for each. A device that only toggles says the button `grip`.
-        fingers: Joints of the person's hand, m, in any frame, shape (25, 3), in the
+            or one for each. A device that only toggles has the button `grip`.
+        fingers: Joints of the user's hand, m, in any frame, shape (25, 3), in the
             order of WebXR.
     """
 
@@ -47,7 +50,7 @@ class LimbInput:
 
     @property
     def finite(self) -> bool:
-        """Whether every number is one."""
+        """Whether all numbers are finite."""
         arrays = [self.twist, self.grip, self.fingers]
         if self.pose is not None:
             arrays += [self.pose.rotation, self.pose.translation]
@@ -56,21 +59,20 @@ class LimbInput:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DeviceState:
-    """Everything that a device says at one moment.
+    """State of a device at one moment.
 
     Attributes:
-        time: When it was measured, on the device's own clock, s. A state whose time has
-            not moved on is the old one.
+        time: Time of the measurement on the device's own clock, s. A state whose time
+            has not advanced is an old one.
         limbs: Input by limb: a slice of the action (`right_hand`), its side (`right`),
-            or `hand`, which is the one that is switched to.
+            or `hand`, the selected one.
         joints: Positions by joint, rad or m, as a leader arm has them.
-        base: Velocity of the base that is wanted, in its own axes: forward and left,
-            m/s, turn, rad/s.
-        height: Velocity of the torso's height that is wanted, m/s.
-        buttons: Names of what is pressed, or was since the last read: `grip` (closes
-            the gripper of the hand that is switched to, or opens it), `next`, `mirror`,
-            `home`, `pause`, `reset`, `quit`, and of a recording `keep` (or begin),
-            `discard`, `undo` and `success`.
+        base: Velocity of the base in its own axes: forward and left, m/s, turn, rad/s.
+        height: Velocity of the torso's height, m/s.
+        buttons: Names of buttons pressed since the last read: `grip` (closes or opens
+            the gripper of the selected hand), `next`, `mirror`, `home`, `pause`,
+            `reset`, `quit`, and of a recording `keep` (or start), `discard`, `undo`
+            and `success`.
     """
 
     time: float
@@ -87,9 +89,31 @@ class DeviceState:
 
     @property
     def finite(self) -> bool:
-        """Whether every number is one."""
+        """Whether all numbers are finite."""
         numbers = [self.time, self.height, *self.joints.values()]
         base = () if self.base is None else self.base
         return bool(np.isfinite([*numbers, *base]).all()) and all(
             limb.finite for limb in self.limbs.values()
         )
+
+
+def mirrored(state: DeviceState) -> DeviceState:
+    """Return a state with left and right swapped, for a user who faces the robot."""
+    base = state.base
+    return replace(
+        state,
+        limbs={_swapped(name): _mirror(limb) for name, limb in state.limbs.items()},
+        base=None if base is None else base * _TWIST[[0, 1, 5]],
+    )
+
+
+def _swapped(name: str) -> str:
+    other = {"left": "right", "right": "left"}
+    return "_".join(other.get(word, word) for word in name.split("_"))
+
+
+def _mirror(limb: LimbInput) -> LimbInput:
+    pose, twist = limb.pose, limb.twist
+    if pose is not None:
+        pose = pin.SE3(_FLIP @ pose.rotation @ _FLIP, _FLIP @ pose.translation)
+    return replace(limb, pose=pose, twist=None if twist is None else twist * _TWIST)

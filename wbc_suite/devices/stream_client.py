@@ -1,19 +1,23 @@
-"""The reference client of the stream: twenty lines to copy into any program."""
+"""A client of the stream, short enough to copy into any program."""
 
+import json
 from types import TracebackType
 from typing import Any
 
-from wbc_suite.devices.frame import PoseFrame
+from wbc_suite.devices.pose_frame import PoseFrame
 from wbc_suite.errors import DeviceError
 
 __all__ = ["StreamClient"]
 
 
 class StreamClient:
-    """Sends pose frames to a stream.
+    """Send pose frames to a stream.
 
     Args:
-        url: The address that the stream prints, `http://...`, with its token if any.
+        url: The address that the stream prints, with its token if any.
+
+    Raises:
+        DeviceError: If there is no stream at the address.
     """
 
     def __init__(self, url: str) -> None:
@@ -32,13 +36,7 @@ class StreamClient:
         self._socket.send(frame.model_dump_json(exclude_defaults=False))
 
     def receive(self, timeout: float) -> dict[str, Any]:
-        """Return what the stream says: `{"error": ...}`.
-
-        Raises:
-            TimeoutError: If it says nothing in time.
-        """
-        import json
-
+        """Return a reply of the stream, `{"error": ...}`; raises TimeoutError."""
         return json.loads(self._socket.recv(timeout=timeout))
 
     def __enter__(self) -> "StreamClient":

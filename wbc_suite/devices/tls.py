@@ -1,7 +1,6 @@
-"""A key and a certificate of this installation, for pages that browsers want encrypted.
+"""The TLS key and certificate of this installation; headsets need TLS for WebXR.
 
-Headsets show WebXR only over TLS. The key is made here, once, and stays in the user's
-cache: a key that came with the package would be everybody's.
+The key is created once, in the user's cache.
 """
 
 import shutil
@@ -9,8 +8,8 @@ import ssl
 import subprocess
 from pathlib import Path
 
+from wbc_suite.catalogue import user_cache
 from wbc_suite.errors import DeviceError
-from wbc_suite.user_cache import user_cache
 
 __all__ = ["make_key", "server_context"]
 
@@ -18,10 +17,10 @@ DAYS = 825  # of validity; the most that browsers accept
 
 
 def server_context(folder: Path | None = None) -> ssl.SSLContext:
-    """Return the server's side of TLS; the first call makes the key.
+    """Return the server side of TLS; the first call creates the key.
 
     Raises:
-        DeviceError: If the key cannot be made.
+        DeviceError: If the key cannot be created or read.
     """
     folder = folder or user_cache() / "tls"
     key, certificate = folder / "key.pem", folder / "certificate.pem"
@@ -34,13 +33,13 @@ def server_context(folder: Path | None = None) -> ssl.SSLContext:
     except (OSError, ssl.SSLError) as error:
         raise DeviceError(
             f"The key in '{folder}' cannot be used: {error}. Delete the folder; the "
-            "next start makes a new one."
+            "next start creates a new one."
         ) from error
     return context
 
 
 def make_key(key: Path, certificate: Path) -> None:
-    """Make a key that only this user can read, and a certificate signed by itself.
+    """Create a key that only this user can read, and a self-signed certificate.
 
     Raises:
         DeviceError: If the program `openssl` is missing or fails.
@@ -48,7 +47,7 @@ def make_key(key: Path, certificate: Path) -> None:
     program = shutil.which("openssl")
     if program is None:
         raise DeviceError(
-            "TLS needs a key, and the program 'openssl' to make it: install it (apt "
+            "TLS needs a key, and the program 'openssl' to create it: install it (apt "
             f"install openssl), or put key.pem and certificate.pem into '{key.parent}'."
         )
     key.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
@@ -68,4 +67,6 @@ def make_key(key: Path, certificate: Path) -> None:
     key.chmod(0o600)
     if made.returncode != 0:
         key.unlink()
-        raise DeviceError(f"openssl made no key: {made.stderr.strip()[-300:]}")
+        raise DeviceError(
+            f"openssl failed to create a key: {made.stderr.strip()[-300:]}"
+        )

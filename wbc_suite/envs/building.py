@@ -1,36 +1,63 @@
-"""Put an environment together: robots, scene, simulation, observations."""
+"""Parts of an environment: robots, scene, simulation, observations, cameras."""
 
 from typing import Any
 
+import gymnasium
 import mujoco
+import numpy as np
 
 from wbc_suite.benchmark import Benchmark, ObjectBenchmark
 from wbc_suite.control import (
+    ActionLayout,
+    CompositeController,
     RobotState,
     build_composite_controller,
     load_composite_controller_config,
 )
-from wbc_suite.envs.config import EnvConfig
-from wbc_suite.envs.posture import StartPosture
+from wbc_suite.envs.config import EnvConfig, NoiseConfig
+from wbc_suite.envs.display import Display
 from wbc_suite.envs.simulation import Simulation
 from wbc_suite.errors import ConfigError
 from wbc_suite.robot import RobotDescription, load_robot
-from wbc_suite.scene import attach_robot, compile_scene, empty_arena, robot_prefix
+from wbc_suite.scene import (
+    add_robot_view,
+    aim_robot_view,
+    attach_robot,
+    compile_scene,
+    empty_arena,
+    robot_prefix,
+)
+from wbc_suite.sensing.cameras import Cameras
 from wbc_suite.sensing.observables import Observables
-from wbc_suite.sensing.proprioception import proprioception
-from wbc_suite.sensing.robot_sensors import add_contact_sensors, sensors_of
-from wbc_suite.sensing.robot_view import add_robot_view, aim_robot_view
+from wbc_suite.sensing.projection import camera_id
+from wbc_suite.sensing.proprioception import (
+    add_contact_sensors,
+    proprioception,
+    sensors_of,
+)
+from wbc_suite.typing import Indices, Vector
 
-__all__ = ["compose", "make_observables", "place_robots", "simulate", "take_sampler"]
+__all__ = [
+    "StartPosture",
+    "action_space",
+    "compose",
+    "count_substeps",
+    "joint_layout",
+    "make_cameras",
+    "make_observables",
+    "place_robots",
+    "simulate",
+    "use_sampler",
+]
 
 
-def take_sampler(benchmark: Benchmark, config: EnvConfig) -> None:
-    """Let the user's own sampler, if there is one, place a benchmark's things."""
+def use_sampler(benchmark: Benchmark, config: EnvConfig) -> None:
+    """Replace the benchmark's sampler by that of the arguments, if there is one."""
     if config.placement_initializer is None:
         return
     if not isinstance(benchmark, ObjectBenchmark):
         raise ConfigError(
-            f"placement_initializer: {benchmark.name} places things by itself."
+            f"placement_initializer: {benchmark.name} has no sampler to replace."
         )
     benchmark.sampler = config.placement_initializer
 
@@ -38,7 +65,7 @@ def take_sampler(benchmark: Benchmark, config: EnvConfig) -> None:
 def place_robots(
     benchmark: Benchmark, config: EnvConfig
 ) -> tuple[RobotDescription, ...]:
-    """Load the robots, and stand them where the benchmark wants them."""
+    """Return the robots at their places in the benchmark."""
     robots = [_load(robot, benchmark, config) for robot in config.robot_list]
     return benchmark.arrange(robots, config.env_configuration)
 
@@ -51,14 +78,14 @@ def _load(robot: Any, benchmark: Benchmark, config: EnvConfig) -> RobotDescripti
     if gripper == "default":
         gripper = benchmark.gripper
         if gripper is not None and not load_robot(robot, base=base).hands:
-            gripper = None  # Spot without an arm has no place for a pad
+            gripper = None  # such as Spot without an arm
     return load_robot(robot, gripper=gripper, base=base, skin=config.skin)
 
 
 def compose(
     benchmark: Benchmark, robots: tuple[RobotDescription, ...], config: EnvConfig
 ) -> mujoco.MjSpec:
-    """Return the scene: the benchmark's room with the robots in it."""
+    """Return the scene: the benchmark's arena and objects, and the robots."""
     spec = empty_arena()
     benchmark.build(spec)
     for i, robot in enumerate(robots):
@@ -68,6 +95,58 @@ def compose(
             add_contact_sensors(spec, robot, robot_prefix(i))
     benchmark.equip(spec, robots)
     return spec
+
+
+class StartPosture:
+    """Writes the keyframe `ready` of one robot, with noise on the arms' joints.
+
+    Args:
+        state: The robot in the simulation.
+        noise: The noise, drawn at each call; None for none.
+    """
+
+    def __init__(self, state: RobotState, noise: NoiseConfig | None) -> None:
+        robot = state.robot
+        posture = robot.keyframe("ready")
+        self._qpos, self._noise = state.data.qpos, noise
+        joints, _ = state.joint_addresses(tuple(posture))
+        self._index, self._values = _root(state)
+        self._index = np.concatenate([self._index, joints])
+        self._values = np.concatenate([self._values, list(posture.values())])
+        arms = [
+            name
+            for group, names in robot.groups.items()
+            if group.endswith("arm")
+            for name in names
+        ]
+        self._arms, _ = state.joint_addresses(tuple(arms))
+        ranges = [robot.joint(name).range or (-np.inf, np.inf) for name in arms]
+        self._low, self._high = np.array(ranges).reshape(-1, 2).T
+
+    def write(self, rng: np.random.Generator | None = None) -> None:
+        """Write the posture into the simulation; without `rng` there is no noise."""
+        self._qpos[self._index] = self._values
+        if self._noise is None or rng is None:
+            return
+        count = len(self._arms)
+        gaussian = self._noise.type == "gaussian"
+        draw = rng.normal(size=count) if gaussian else rng.uniform(-1.0, 1.0, count)
+        moved = self._qpos[self._arms] + self._noise.magnitude * draw
+        self._qpos[self._arms] = np.clip(moved, self._low, self._high)
+
+
+def _root(state: RobotState) -> tuple[Indices, Vector]:
+    """Return the indices of the root's pose in qpos, and its start value."""
+    root, model = state.robot.root, state.model
+    if root.kind == "free":
+        first = int(model.joint(f"{state.prefix}root").qposadr[0])
+        return np.arange(first, first + 7, dtype=np.int64), np.array(
+            [*root.pos, *root.quat]
+        )
+    index, _ = state.joint_addresses(
+        state.robot.root_joint_names if root.kind == "planar" else ()
+    )
+    return index, np.zeros(len(index))
 
 
 def simulate(
@@ -105,13 +184,13 @@ def simulate(
 def make_observables(
     benchmark: Benchmark, simulation: Simulation, config: EnvConfig
 ) -> Observables:
-    """Return what is seen of robots, sensors and things, with the user's changes."""
+    """Return the observables of robots, sensors and objects, changed as asked."""
     groups = {
         f"{state.prefix}proprio-state": proprioception(state)
         for state in simulation.robots
     }
-    for prefix, felt in benchmark.felt().items():
-        groups[f"{prefix}proprio-state"] |= felt
+    for prefix, readings in benchmark.robot_observables().items():
+        groups[f"{prefix}proprio-state"] |= readings
     if config.use_sensor_obs:
         for state in simulation.robots:
             groups[f"{state.prefix}sensor-state"] = sensors_of(state)
@@ -121,3 +200,60 @@ def make_observables(
     for key, changes in (config.observables or {}).items():
         observables.modify(key, **changes)
     return observables
+
+
+def make_cameras(simulation: Simulation, config: EnvConfig) -> tuple[Cameras, Display]:
+    """Return the observed cameras, and the display of `render`."""
+    cameras = Cameras(
+        simulation.model,
+        simulation.data,
+        simulation.robots,
+        config.cameras,
+        preset=config.render_preset,
+    )
+    if config.render_mode:
+        camera_id(simulation.model, config.render_camera)
+    display = Display(
+        config.render_mode,
+        simulation,
+        cameras,
+        camera=config.render_camera,
+        size=config.render_size,
+        period=1.0 / config.control_freq,
+    )
+    return cameras, display
+
+
+def count_substeps(simulation: Simulation, config: EnvConfig) -> int:
+    """Return the physics steps of a control period.
+
+    Raises:
+        ConfigError: If it is no whole number.
+    """
+    period = 1.0 / (config.control_freq * simulation.timestep)
+    count = round(period)
+    if count < 1 or abs(period - count) > 1e-6:
+        raise ConfigError(
+            f"control_freq {config.control_freq:g} must divide "
+            f"{1.0 / simulation.timestep:g}, the physics steps per second."
+        )
+    return count
+
+
+def joint_layout(controllers: tuple[CompositeController, ...]) -> ActionLayout:
+    """Return one layout; with several robots names carry the robot's prefix."""
+    if len(controllers) == 1:
+        return controllers[0].layout
+    return ActionLayout(
+        part.prefixed(robot_prefix(i))
+        for i, controller in enumerate(controllers)
+        for part in controller.layout.slices
+    )
+
+
+def action_space(layout: ActionLayout) -> gymnasium.spaces.Box:
+    """Return the space of actions: float32 inside of the layout's bounds."""
+    low, high = (bound.astype(np.float32) for bound in (layout.low, layout.high))
+    low = np.where(low < layout.low, np.nextafter(low, np.float32(np.inf)), low)
+    high = np.where(high > layout.high, np.nextafter(high, np.float32(-np.inf)), high)
+    return gymnasium.spaces.Box(low, high, dtype=np.float32)

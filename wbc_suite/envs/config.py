@@ -2,8 +2,9 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias, TypedDict
 
+import numpy as np
 from pydantic import (
     ConfigDict,
     Field,
@@ -14,14 +15,25 @@ from pydantic import (
     model_validator,
 )
 
+from wbc_suite.control import CompositeControllerName, PartControllerName
 from wbc_suite.envs.display import RenderMode
+from wbc_suite.envs.states import Randomiser
+from wbc_suite.errors import ConfigError
 from wbc_suite.robot import RobotDescription
+from wbc_suite.scene.placement import Sampler
 from wbc_suite.sensing.cameras import CameraRequest
 from wbc_suite.sensing.renderer import RenderPreset
 from wbc_suite.sensing.segmentation import SegmentationLevel
 from wbc_suite.tomlfile import FrozenModel, parse_model
+from wbc_suite.typing import RobotName
 
-__all__ = ["EnvConfig", "NoiseConfig", "parse_env_config"]
+__all__ = [
+    "EnvArguments",
+    "EnvConfig",
+    "NoiseConfig",
+    "checked_seed",
+    "parse_env_config",
+]
 
 
 Pixels: TypeAlias = Annotated[int, Field(gt=0, le=8192)]
@@ -42,37 +54,80 @@ class NoiseConfig(FrozenModel):
     magnitude: NonNegativeFloat = 0.02
 
 
+Robot: TypeAlias = RobotName | str | Path | RobotDescription
+Controller: TypeAlias = (
+    CompositeControllerName | PartControllerName | str | Path | Mapping[str, Any]
+)
+Configuration: TypeAlias = Literal["default", "single-robot", "opposed", "parallel"]
+Noise: TypeAlias = NoiseConfig | Mapping[str, Any] | Literal["default"]
+Preset: TypeAlias = RenderPreset | Literal["fast", "balanced", "quality"]
+Level: TypeAlias = SegmentationLevel | Literal["element", "instance", "class"]
+
+
+class EnvArguments(TypedDict, total=False):
+    """Keyword arguments of `make` as users write them; see `EnvConfig`."""
+
+    robots: Robot | Sequence[Robot]
+    env_configuration: Configuration
+    controller_configs: Controller | Sequence[Controller | None] | None
+    placement_initializer: Sampler | None
+    gripper_types: str | Mapping[str, str] | None
+    base_types: str | None
+    skin: str | Path | None
+    initialization_noise: Noise | None
+    control_freq: float
+    lite_physics: bool
+    compiled: bool
+    horizon: int | None
+    reward_shaping: bool
+    reward_scale: float
+    terminate_on_success: bool
+    use_object_obs: bool
+    randomisation: Randomiser | None
+    use_sensor_obs: bool
+    observables: Mapping[str, Mapping[str, Any]] | None
+    use_camera_obs: bool
+    camera_names: str | Sequence[str]
+    camera_heights: int | Sequence[int]
+    camera_widths: int | Sequence[int]
+    camera_depths: bool | Sequence[bool]
+    camera_segmentations: Level | Sequence[Level | Sequence[Level] | None] | None
+    render_preset: Preset | None
+    render_mode: RenderMode | None
+    render_camera: str
+    render_size: tuple[int, int] | Sequence[int]
+
+
 class EnvConfig(FrozenModel):
-    """Arguments of an environment, under the names this field knows.
+    """Checked arguments of an environment, with their defaults.
 
     Attributes:
         robots: One robot, or several: names, files or descriptions; the benchmark's
             own choice by default.
-        env_configuration: How robots stand: two `opposed` (by default) or
+        env_configuration: Arrangement of robots: two `opposed` (by default) or
             `parallel`, one `single-robot`.
         controller_configs: Composite controller: a name, a file or a config; one for
             all robots, or one for each.
-        placement_initializer: Draws where things start, in place of the benchmark's own
-            sampler; see `wbc_suite.scene.placement`.
-        gripper_types: Another gripper; "default" keeps the benchmark's choice, most
-            often the robot's own.
-        base_types: Another base; "default" keeps the robot's own.
+        placement_initializer: Sampler of start poses in place of the benchmark's; see
+            `wbc_suite.scene.placement`.
+        gripper_types: Another gripper, one for all hands or one for each; "none" for
+            none; "default" for the benchmark's choice, most often the robot's own.
+        base_types: Another base; "default" for the robot's own.
         skin: "meshes" draws robots with the meshes of installed packages, a folder with
             those found there.
         initialization_noise: "default", None, or `{"type": ..., "magnitude": ...}`.
         control_freq: Actions per second.
-        lite_physics: Whether contacts, accelerations and sensors are left as MuJoCo's
-            last step saw them, one step behind the positions; computing them anew
-            costs one more step.
+        lite_physics: Whether contacts, accelerations and sensors are those of MuJoCo's
+            last step, one step behind the positions; otherwise they are computed
+            again, which costs one more step.
         compiled: Whether the control loop is compiled; the plain one can be debugged,
             and gives the same states.
         horizon: Actions in an episode; the benchmark's own when absent.
-        reward_shaping: A reward on the way, or only for success.
+        reward_shaping: Whether the reward is shaped, or given for success only.
         reward_scale: Factor on the reward.
         terminate_on_success: Whether success ends the episode.
         use_object_obs: Whether objects are observed.
-        randomisation: What changes at each reset: a
-            `wbc_suite.randomisation.Randomisation`.
+        randomisation: A `wbc_suite.randomisation.Randomisation`, drawn at each reset.
         use_sensor_obs: Whether robots' sensors are observed: joint torques, wrists,
             IMU, fingers, feet.
         observables: Changes of observations by key, such as `{"cube_pos": {"delay":
@@ -84,7 +139,8 @@ class EnvConfig(FrozenModel):
         camera_depths: Whether depth is observed too; one for all, or one for each.
         camera_segmentations: `instance`, `class`, `element` or None; one for all, or
             one for each camera, which may be a list of several.
-        render_preset: `fast`, `balanced`, `quality`; chosen by what draws when absent.
+        render_preset: `fast`, `balanced` or `quality`; when absent, `quality` on a
+            graphics card and `fast` on a processor.
         render_mode: `human`, `rgb_array`, `depth_array`, or None.
         render_camera: Camera of `render`.
         render_size: Width and height of `render`, pixels.
@@ -93,9 +149,7 @@ class EnvConfig(FrozenModel):
     model_config = ConfigDict(arbitrary_types_allowed=True)
 
     robots: Any = "Panda"
-    env_configuration: Literal["default", "single-robot", "opposed", "parallel"] = (
-        "default"
-    )
+    env_configuration: Configuration = "default"
     controller_configs: Any = None
     placement_initializer: Any = None
     gripper_types: Any = "default"
@@ -238,3 +292,16 @@ def parse_env_config(arguments: Mapping[str, Any]) -> EnvConfig:
         ConfigError: Names the argument, its value and the nearest legal name.
     """
     return parse_model(EnvConfig, dict(arguments), source="make()")
+
+
+def checked_seed(seed: object) -> int | None:
+    """Return a seed, or None.
+
+    Raises:
+        ConfigError: If it is no whole number >= 0.
+    """
+    if seed is None:
+        return None
+    if not isinstance(seed, int | np.integer) or isinstance(seed, bool) or seed < 0:
+        raise ConfigError(f"reset: a seed is a whole number from 0 on, not {seed!r}.")
+    return int(seed)

@@ -1,4 +1,4 @@
-"""What `render` shows: a picture, a depth picture, or a page that people watch."""
+"""The display of `render`: a picture, a depth picture, or a page in the browser."""
 
 import importlib
 import time
@@ -13,7 +13,7 @@ __all__ = ["Display", "RenderMode"]
 RenderMode: TypeAlias = Literal["human", "rgb_array", "depth_array"]
 
 WATCH_PAGE = "wbc_suite.viewers.watch_page"
-"""By its name: pages stand above environments, and only people need them."""
+"""Imported when needed: `viewers` is a layer above `envs`."""
 
 
 class Display:

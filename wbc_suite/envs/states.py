@@ -1,4 +1,4 @@
-"""States of an environment: an episode up to now, and a place to begin at."""
+"""States of an environment: episodes, physics states and scenes as text."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,18 +17,18 @@ __all__ = ["EnvState", "Randomiser", "write_physics", "write_scene"]
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class EnvState:
-    """An episode up to now: how it began, and what was done.
+    """An episode up to now: its start and its actions.
 
     Solvers and controllers cannot be copied, and an episode is determined by its start
     and its actions. It can be pickled.
 
     Attributes:
         began_with: State of the random generator at the start.
-        placed: Physics state that it began at, if it was told one.
+        placed: Physics state at the start, if the episode began with `reset_to`.
         taken: Actions since then.
-        observables: What of observations is not determined by these.
-        rng: The random generator as it is now.
-        seed: What it was seeded with.
+        observables: State of observables that these do not determine.
+        rng: The present random generator.
+        seed: Its seed.
     """
 
     began_with: Mapping[str, Any]
@@ -43,7 +43,7 @@ class Randomiser(Protocol):
     """Changes a scene at the start of each episode; can be pickled."""
 
     def bind(self, env: Any) -> "BoundRandomiser":
-        """Take one environment as it is now for the nominal one."""
+        """Bind to an environment, whose present model is the nominal one."""
         ...
 
 
@@ -51,16 +51,16 @@ class BoundRandomiser(Protocol):
     """A randomiser of one environment."""
 
     def restore(self) -> None:
-        """Put everything back."""
+        """Restore the nominal values."""
         ...
 
     def apply(self, rng: np.random.Generator) -> None:
-        """Draw everything anew, in a scene that is nominal but for the benchmark."""
+        """Draw all values, after the benchmark has reset its objects."""
         ...
 
 
 def write_physics(model: mujoco.MjModel, data: mujoco.MjData, state: ArrayLike) -> None:
-    """Write a physics state as datasets of this field have it: time, qpos, qvel.
+    """Write a physics state: time, qpos and qvel, as in datasets.
 
     Raises:
         ConfigError: If its size is wrong or a value is not finite.
@@ -74,7 +74,7 @@ def write_physics(model: mujoco.MjModel, data: mujoco.MjData, state: ArrayLike) 
 
 
 def write_scene(spec: mujoco.MjSpec) -> str:
-    """Write a scene as MJCF text; computed textures become plain, MJCF has no word."""
+    """Write a scene as MJCF text; computed textures become plain colours."""
     for texture in spec.textures:
         if len(texture.data):
             texture.data = b""

@@ -1,10 +1,10 @@
-"""Several environments of one process, stepped in parallel threads."""
+"""Several environments in one process, stepped in parallel threads."""
 
 import os
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from typing import Any, Unpack
 
 import gymnasium
 import numpy as np
@@ -12,7 +12,9 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from wbc_suite.envs.env import RobotEnv, checked_seed
+from wbc_suite.envs.config import EnvArguments, checked_seed
+from wbc_suite.envs.env import RobotEnv
+from wbc_suite.envs.vector_infos import gather_infos
 from wbc_suite.errors import ActionError, ConfigError
 from wbc_suite.typing import Array, Matrix
 
@@ -22,29 +24,25 @@ Observations = dict[str, Array]
 Info = dict[str, Any]
 Flags = NDArray[np.bool_]
 
-_SCALARS = (bool, int, float)
-
 
 class VectorRobotEnv(gymnasium.vector.VectorEnv[Observations, Array, NDArray[Any]]):
-    """Copies of one environment with their own states, stepped at once.
+    """Copies of one environment with their own states, stepped in threads.
 
-    Physics and control laws hold no Python lock, so threads share the work; a thread
-    that is done takes the next environment. Controllers that plan in Python between
-    physics steps (inverse kinematics, whole-body ones) would wait for each other's
-    lock: then one thread does all. Every environment does exactly what it would do
-    alone, cameras included. Each has a model of its own, because a reset writes sizes
-    of objects into it.
+    Physics and control laws run without Python's lock; an idle thread takes the next
+    environment. Controllers that plan in Python between physics steps would wait for
+    each other's lock: then one thread steps all environments. Every environment does
+    exactly what it does alone, cameras included. Each has its own model, since a reset
+    writes sizes of objects into it.
 
     Args:
-        num_envs: How many.
+        num_envs: Number of environments.
         benchmark: Name of the benchmark, such as `Lift`.
-        threads: How many threads step them; by default as many as there are
-            processors, or one where controllers plan in Python. Pictures are drawn in
-            the thread that asks: OpenGL's threads have a picture's work already.
+        threads: Number of threads; by default that of the processors, or one if
+            controllers plan in Python. Pictures are drawn in the calling thread.
         autoreset_mode: When an environment whose episode is over begins the next:
-            `NextStep` in the next step, whose action it does not take; `SameStep` at
-            once, with `final_obs` and `final_info`; `Disabled` when told to.
-        arguments: Of every environment; see `EnvConfig`.
+            `NextStep` in the next step, whose action is ignored; `SameStep` at once,
+            with `final_obs` and `final_info`; `Disabled` by `reset`.
+        arguments: Arguments of every environment; see `EnvConfig`.
 
     Raises:
         ConfigError: If an argument is wrong.
@@ -66,7 +64,7 @@ class VectorRobotEnv(gymnasium.vector.VectorEnv[Observations, Array, NDArray[Any
         *,
         threads: int | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
-        **arguments: Any,
+        **arguments: Unpack[EnvArguments],
     ) -> None:
         _check_count("num_envs", num_envs)
         _check_count("threads", 1 if threads is None else threads)
@@ -80,8 +78,10 @@ class VectorRobotEnv(gymnasium.vector.VectorEnv[Observations, Array, NDArray[Any
         self.action_space = batch_space(first.action_space, num_envs)
         self.single_observation_space = first.observation_space
         self.observation_space = batch_space(first.observation_space, num_envs)
-        self._places = first.observer.places
-        self._values: Matrix = np.zeros((num_envs, len(first.observer.values)))
+        self._places = first.observation_buffer.places
+        self._values: Matrix = np.zeros(
+            (num_envs, len(first.observation_buffer.values))
+        )
         self._rewards: Array = np.zeros(num_envs)
         self._terminated: Flags = np.zeros(num_envs, dtype=np.bool_)
         self._truncated: Flags = np.zeros(num_envs, dtype=np.bool_)
@@ -99,8 +99,8 @@ class VectorRobotEnv(gymnasium.vector.VectorEnv[Observations, Array, NDArray[Any
         """Start episodes.
 
         Args:
-            seed: The first environment's seed, and one more for each next; or one for
-                each.
+            seed: Seed of the first environment, increased by one for each next; or
+                one for each.
             options: `reset_mask`, which environments to reset, shape (num_envs,).
 
         Raises:
@@ -114,7 +114,7 @@ class VectorRobotEnv(gymnasium.vector.VectorEnv[Observations, Array, NDArray[Any
             infos[i] = self._begin(i, seeds[i])
 
         self._for_each(begin, chosen.tolist())
-        return self._observations(), self._gathered(infos)
+        return self._observations(), gather_infos(infos)
 
     def step(
         self, actions: Any
@@ -125,9 +125,9 @@ class VectorRobotEnv(gymnasium.vector.VectorEnv[Observations, Array, NDArray[Any
             actions: One row per environment, shape (num_envs, size).
 
         Raises:
-            ActionError: If an action is wrong; names the environment. Then none has
-                moved.
-            PhysicsError: If an environment's episode ended in one, and nobody reset it.
+            ActionError: If an action is wrong; names the environment. Then no
+                environment was stepped.
+            PhysicsError: If an environment's episode ended in one and it was not reset.
         """
         over = self._terminated | self._truncated
         if self._mode is not AutoresetMode.NEXT_STEP:
@@ -146,7 +146,7 @@ class VectorRobotEnv(gymnasium.vector.VectorEnv[Observations, Array, NDArray[Any
             self._rewards.copy(),
             self._terminated.copy(),
             self._truncated.copy(),
-            self._gathered(infos),
+            gather_infos(infos),
         )
 
     def render(self) -> tuple[Any, ...]:
@@ -178,7 +178,7 @@ class VectorRobotEnv(gymnasium.vector.VectorEnv[Observations, Array, NDArray[Any
             env.set_wrapper_attr(name, value)
 
     def close_extras(self, **kwargs: Any) -> None:
-        """End the threads and free what the environments hold."""
+        """End the threads and close the environments."""
         self._pool.shutdown()
         for env in self.envs:
             env.close()
@@ -196,21 +196,21 @@ class VectorRobotEnv(gymnasium.vector.VectorEnv[Observations, Array, NDArray[Any
     def _begin(self, i: int, seed: int | None = None) -> Info:
         env = self.envs[i]
         info = env.begin(seed)
-        self._values[i] = env.observer.values
+        self._values[i] = env.observation_buffer.values
         self._rewards[i], self._terminated[i], self._truncated[i] = 0.0, False, False
         return info
 
     def _advance(self, i: int, action: Array) -> Info:
         env = self.envs[i]
         reward, terminated, truncated, info = env.advance(action)
-        self._values[i], self._rewards[i] = env.observer.values, reward
+        self._values[i], self._rewards[i] = env.observation_buffer.values, reward
         self._terminated[i], self._truncated[i] = terminated, truncated
         return info
 
     def _begin_next(self, infos: list[Info]) -> None:
-        """Begin the next episodes of those that are over; see them off in this thread.
+        """Begin the next episodes of environments whose episode is over.
 
-        What was the end of an episode stays in rewards and flags.
+        Rewards and flags remain those of the last step.
         """
         over = np.flatnonzero(self._terminated | self._truncated).tolist()
         finals = {
@@ -220,7 +220,7 @@ class VectorRobotEnv(gymnasium.vector.VectorEnv[Observations, Array, NDArray[Any
 
         def begin(i: int) -> None:
             infos[i] = finals[i] | self.envs[i].begin()
-            self._values[i] = self.envs[i].observer.values
+            self._values[i] = self.envs[i].observation_buffer.values
 
         self._for_each(begin, over)
 
@@ -228,8 +228,8 @@ class VectorRobotEnv(gymnasium.vector.VectorEnv[Observations, Array, NDArray[Any
         """Call `do` with every index, on all threads.
 
         Raises:
-            Exception: What the first environment raised, with its index; the others
-                have done their part.
+            Exception: The error of the first environment, with its index, after all
+                environments are done.
         """
         waiting, failed = deque(indices), dict[int, Exception]()
 
@@ -255,12 +255,12 @@ class VectorRobotEnv(gymnasium.vector.VectorEnv[Observations, Array, NDArray[Any
 
     @property
     def _plans(self) -> bool:
-        """Whether Python had a say between physics steps of the last actions."""
+        """Whether controllers ran in Python between physics steps, last time."""
         simulations = (env.simulation for env in self.envs)
-        return any(s.spans > 1 or not s.compiled for s in simulations)
+        return any(s.loop_calls > 1 or not s.compiled for s in simulations)
 
     def _checked(self, actions: Any, used: Flags) -> Matrix:
-        """Return actions, shape (num_envs, size), of which the used ones are right."""
+        """Return actions, shape (num_envs, size), after checking the used ones."""
         shape = self.action_space.shape
         if np.shape(actions) != shape:
             raise ActionError(
@@ -278,29 +278,14 @@ class VectorRobotEnv(gymnasium.vector.VectorEnv[Observations, Array, NDArray[Any
         return rows
 
     def _observations(self) -> Observations:
-        seen = {key: self._values[:, at].copy() for key, at in self._places.items()}
+        observations = {
+            key: self._values[:, at].copy() for key, at in self._places.items()
+        }
         if self._pictures:
-            all_seen = [env.observation() for env in self.envs]
+            each = [env.observation() for env in self.envs]
             for key in self._pictures:
-                seen[key] = np.stack([one[key] for one in all_seen])
-        return seen
-
-    def _gathered(self, infos: Sequence[Info]) -> Info:
-        """Return infos in Gymnasium's form, `_add_info`; plain numbers at once."""
-        common = [
-            key
-            for key, value in infos[0].items()
-            if type(value) in _SCALARS and all(key in info for info in infos)
-        ]
-        gathered: Info = {}
-        for key in common:
-            gathered[key] = np.array([info[key] for info in infos])
-            gathered[f"_{key}"] = np.ones(self.num_envs, dtype=np.bool_)
-        for i, info in enumerate(infos):
-            if len(info) > len(common):
-                rest = {key: info[key] for key in info if key not in common}
-                gathered = self._add_info(gathered, rest, i)
-        return gathered
+                observations[key] = np.stack([one[key] for one in each])
+        return observations
 
     def _seeds(self, seed: object) -> list[int | None]:
         if seed is None or isinstance(seed, int | np.integer):
@@ -348,7 +333,7 @@ def _mode(given: object) -> AutoresetMode:
 
 
 def _processors() -> int:
-    """Return how many processors this process may use."""
+    """Return the number of processors this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

@@ -1,4 +1,4 @@
-"""What goes wrong inside MuJoCo, said as errors."""
+"""Errors for what goes wrong inside MuJoCo."""
 
 import logging
 import math
@@ -7,15 +7,14 @@ from types import TracebackType
 import mujoco
 import numpy as np
 
-from wbc_suite.control.loop import (
+from wbc_suite.compiling import as_argument
+from wbc_suite.control.loop.state_checks import (
     LARGEST,
-    SoundField,
-    begins_sound,
-    bind_sound,
-    ends_sound,
+    check_after,
+    check_before,
+    checked_state,
 )
 from wbc_suite.errors import PhysicsError
-from wbc_suite.typing import Indices
 
 __all__ = ["PhysicsWatch"]
 
@@ -36,10 +35,10 @@ class PhysicsWatch:
     unless the process has its own handler, not to a file in the working folder.
 
     Args:
-        data: What is watched.
+        data: The simulation's data.
 
     Attributes:
-        sound: Where the numbers are, for compiled code; see `bind_sound`.
+        state: The checked arrays, for the control loop.
     """
 
     def __init__(self, data: mujoco.MjData) -> None:
@@ -50,17 +49,23 @@ class PhysicsWatch:
             "qfrc_applied": data.qfrc_applied,
             "xfrc_applied": data.xfrc_applied.ravel(),
         }
-        self._table = bind_sound(data)
-        self._warnings = self._table[SoundField.WARNINGS]
-        self._before = self._table[SoundField.BEFORE]
-        self.sound: Indices = self._table.table
+        self.state = checked_state(data)
+        self._argument = as_argument(self.state)
         if mujoco.get_mju_user_warning() is None:
-            # Once and for good: threads would take it from each other.
+            # Never reset: threads would replace each other's handler.
             mujoco.set_mju_user_warning(log.warning)
 
     def __enter__(self) -> None:
-        if not begins_sound(self.sound) or not math.isfinite(self._data.time):
-            self._tell_numbers()
+        if not self.is_usable() or not math.isfinite(self._data.time):
+            self._raise_numbers()
+
+    def is_usable(self) -> bool:
+        """Note the warnings so far; return whether MuJoCo accepts all numbers."""
+        return check_before(self._argument)
+
+    def is_sound(self) -> bool:
+        """Return whether there is no new warning, and all numbers are usable."""
+        return check_after(self._argument)
 
     def __exit__(
         self,
@@ -77,19 +82,21 @@ class PhysicsWatch:
             ) from error
 
     def check(self, cause: BaseException | None = None) -> None:
-        """Raise what is wrong now, or came up since the beginning.
+        """Raise an error if the state is not usable, or MuJoCo warned.
 
         Raises:
             PhysicsError: See above.
         """
-        if ends_sound(self.sound) and math.isfinite(self._data.time):
+        if self.is_sound() and math.isfinite(self._data.time):
             return
         # Numbers are mostly bad, and a controller mostly fails, where MuJoCo warned.
-        self._tell_warnings(cause)
-        self._tell_numbers()
+        self._raise_warnings(cause)
+        self._raise_numbers()
 
-    def _tell_warnings(self, cause: BaseException | None) -> None:
-        raised = np.flatnonzero(self._warnings != self._before).tolist()
+    def _raise_warnings(self, cause: BaseException | None) -> None:
+        raised = np.flatnonzero(
+            self.state.warnings != self.state.warnings_before
+        ).tolist()
         if not raised:
             return
         raise PhysicsError(
@@ -98,7 +105,7 @@ class PhysicsWatch:
             "longer to be trusted: reset."
         ) from cause
 
-    def _tell_numbers(self) -> None:
+    def _raise_numbers(self) -> None:
         for name, values in (*self._arrays.items(), ("time", self._data.time)):
             if not np.all(np.abs(values) <= LARGEST):
                 finite = np.isfinite(values).all()

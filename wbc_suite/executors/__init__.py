@@ -1,20 +1,23 @@
-"""Work cut into items, done by whatever is there: this process, many, or a cluster."""
+"""Work items, run in this process, in worker processes, on Ray or on Slurm."""
 
-from wbc_suite.executors.choice import EXECUTORS, make_executor
-from wbc_suite.executors.executor import Executor
-from wbc_suite.executors.item import Item, Outcome
-from wbc_suite.executors.ledger import Ledger, work_off
-from wbc_suite.executors.processes import Processes
-from wbc_suite.executors.serial import Serial
+from wbc_suite.executors.executor import (
+    EXECUTORS,
+    Executor,
+    Outcome,
+    WorkItem,
+    make_executor,
+)
+from wbc_suite.executors.local import Processes, Serial
+from wbc_suite.executors.results import ResultFolder, run_items
 
 __all__ = [
     "EXECUTORS",
     "Executor",
-    "Item",
-    "Ledger",
     "Outcome",
     "Processes",
+    "ResultFolder",
     "Serial",
+    "WorkItem",
     "make_executor",
-    "work_off",
+    "run_items",
 ]

@@ -1,27 +1,128 @@
-"""The seam between work and the machines that do it."""
+"""Work items, their outcomes, and the interface of what runs them."""
 
-from collections.abc import Iterator, Sequence
+import re
+import traceback
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
-from wbc_suite.executors.item import Item, Outcome, Work
+from wbc_suite.errors import ConfigError, UnknownNameError, WbcError
 
-__all__ = ["Executor"]
+__all__ = [
+    "EXECUTORS",
+    "Executor",
+    "Json",
+    "Outcome",
+    "Work",
+    "WorkItem",
+    "make_executor",
+    "run_item",
+]
+
+Json: TypeAlias = "bool | int | float | str | list[Json] | dict[str, Json] | None"
+
+EXECUTORS = ("process", "serial", "ray", "slurm")
+
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,150}")
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class WorkItem:
+    """A unit of work that can run alone, again, and on another machine.
+
+    Attributes:
+        name: Names its result file; letters, digits, dots, dashes and underscores.
+        payload: Arguments of the work, plain JSON data.
+    """
+
+    name: str
+    payload: Mapping[str, Json]
+
+    def __post_init__(self) -> None:
+        if not _NAME.fullmatch(self.name):
+            raise ConfigError(
+                f"'{self.name}' cannot name an item: letters, digits, '.', '_' and '-' "
+                "only, as it becomes the name of a file."
+            )
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Outcome:
+    """Result or error of an item.
+
+    Attributes:
+        name: The item's name.
+        result: What the work returned; empty after an error.
+        error: Error message, or None.
+    """
+
+    name: str
+    result: Mapping[str, Json] = field(default_factory=dict)
+    error: str | None = None
+
+
+Work: TypeAlias = Callable[[WorkItem, Path], Mapping[str, Json]]
+"""A function of an importable module: from an item and a folder to a result."""
 
 
 class Executor(Protocol):
-    """Does items in any order, anywhere, and hands back outcomes as they come."""
+    """Runs items in any order and on any machine, and yields outcomes as they end."""
 
-    def run(self, work: Work, items: Sequence[Item], folder: Path) -> Iterator[Outcome]:
-        """Do all items.
+    def run(
+        self, work: Work, items: Sequence[WorkItem], folder: Path
+    ) -> Iterator[Outcome]:
+        """Run all items.
 
         Args:
             work: Function of an importable module.
-            items: What is to be done.
+            items: Items to run.
             folder: Where the work may write; every worker must reach it.
 
         Yields:
-            One outcome per item. A worker that dies takes no other item with it: its
-            item is done again, and is an error when it kills its worker every time.
+            One outcome per item. If a worker dies, the other items are not affected;
+            its own item runs again, and fails if its worker dies every time.
         """
         ...
+
+
+def make_executor(name: str, *, workers: int | None = None) -> Executor:
+    """Make an executor by name.
+
+    Args:
+        name: One of `EXECUTORS`.
+        workers: Number of items that run at once; None for one per processor.
+
+    Raises:
+        UnknownNameError: If there is no such executor.
+        ConfigError: If its package is not installed.
+    """
+    match name:
+        case "serial":
+            from wbc_suite.executors.local import Serial
+
+            return Serial()
+        case "process":
+            from wbc_suite.executors.local import Processes
+
+            return Processes(workers)
+        case "ray":
+            from wbc_suite.executors.ray_cluster import RayCluster
+
+            return RayCluster(workers=workers)
+        case "slurm":
+            from wbc_suite.executors.slurm import Slurm
+
+            return Slurm()
+        case _:
+            raise UnknownNameError("executor", name, EXECUTORS)
+
+
+def run_item(work: Work, item: WorkItem, folder: Path) -> Outcome:
+    """Run one item; an exception becomes the outcome's error."""
+    try:
+        return Outcome(name=item.name, result=dict(work(item, folder)))
+    except WbcError as error:
+        return Outcome(name=item.name, error=f"{type(error).__name__}: {error}")
+    except Exception:  # noqa: BLE001  # one failed item must not end the others
+        return Outcome(name=item.name, error=traceback.format_exc(limit=-4))

@@ -1,21 +1,22 @@
-"""Items on a Ray cluster: many machines, none of which needs to last."""
+"""Work items on a Ray cluster; its machines may come and go."""
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from wbc_suite.errors import ConfigError
-from wbc_suite.executors.item import Item, Outcome, Work, attempt
+from wbc_suite.executors.executor import Outcome, Work, WorkItem, run_item
 
 __all__ = ["RayCluster"]
 
 
 class RayCluster:
-    """Does items as Ray tasks; Ray does those of dead workers again, elsewhere.
+    """Runs items as Ray tasks; Ray runs those of dead workers again, elsewhere.
 
     Args:
-        address: Of the cluster; None for `RAY_ADDRESS`, or a cluster of this machine.
-        workers: How many at once; None for as many as the cluster has processors.
-        attempts: How often an item may lose its worker before it is given up.
+        address: Address of the cluster; None for `RAY_ADDRESS`, or for a cluster on
+            this machine.
+        workers: Number of items that run at once; None for one per processor.
+        attempts: How often an item may lose its worker before it fails.
 
     Raises:
         ConfigError: If Ray is not installed (`pip install 'wbc-suite[ray]'`).
@@ -35,7 +36,7 @@ class RayCluster:
         except ImportError as error:
             raise ConfigError(
                 "Ray is not installed: pip install 'wbc-suite[ray]'. The 'process' "
-                "executor needs nothing."
+                "executor needs no package."
             ) from error
         self._ray = ray
         self._attempts = attempts
@@ -43,9 +44,11 @@ class RayCluster:
             ray.init(address=address, log_to_driver=False)
         self._workers = workers or max(1, int(ray.cluster_resources().get("CPU", 1)))
 
-    def run(self, work: Work, items: Sequence[Item], folder: Path) -> Iterator[Outcome]:
-        """Do all items; see `Executor`. All machines must share the folder."""
-        remote = self._ray.remote(num_cpus=1, max_retries=self._attempts - 1)(attempt)
+    def run(
+        self, work: Work, items: Sequence[WorkItem], folder: Path
+    ) -> Iterator[Outcome]:
+        """Run all items; see `Executor`. All machines must share the folder."""
+        remote = self._ray.remote(num_cpus=1, max_retries=self._attempts - 1)(run_item)
         waiting = list(reversed(items))
         busy = {}
         while waiting or busy:
@@ -56,15 +59,15 @@ class RayCluster:
             for reference in done:
                 yield self._outcome(reference, busy.pop(reference))
 
-    def _outcome(self, reference: object, item: Item) -> Outcome:
+    def _outcome(self, reference: object, item: WorkItem) -> Outcome:
         try:
             return self._ray.get(reference)
         except self._ray.exceptions.RayTaskError as error:
-            # `attempt` raises nothing: the worker could not even load the work.
-            told = str(error).strip().splitlines()[-1]
+            # `run_item` raises nothing: the worker could not load the work.
+            reason = str(error).strip().splitlines()[-1]
             return Outcome(
                 name=item.name,
-                error=f"{told}. Is wbc_suite, and the work's module, everywhere?",
+                error=f"{reason}. All machines need wbc_suite and the work's module.",
             )
         except self._ray.exceptions.RayError as error:
             return Outcome(

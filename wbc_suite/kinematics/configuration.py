@@ -1,28 +1,31 @@
 """A robot's configuration with its forward kinematics and Jacobians."""
 
-import ctypes
 from typing import Literal
 
 import numpy as np
 import pinocchio as pin
 
 from wbc_suite.arguments import check_array
+from wbc_suite.compiling import as_argument
 from wbc_suite.errors import ConfigError, UnknownNameError
-from wbc_suite.kinematics.array_table import ArrayTable
 from wbc_suite.kinematics.forward import (
     JointKind,
-    RobotField,
-    joint_kinds,
-    place_joints,
-    weigh_joints,
+    RobotArrays,
+    compute_com,
+    compute_joint_poses,
+    pack_pose,
+    robot_arrays,
 )
-from wbc_suite.kinematics.tangent import TangentSpace
+from wbc_suite.kinematics.tangent_space import TangentSpace
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["Axes", "Configuration"]
+__all__ = ["Axes", "Configuration", "named_joints", "random_configuration"]
 
 Axes = Literal["local", "aligned", "world"]
 """Axes of a Jacobian: the frame's own, world axes at the frame, world at its origin."""
+
+UNLIMITED = 1e6
+"""rad or m; joints with a greater limit have none."""
 
 _REFERENCE = {
     "local": pin.ReferenceFrame.LOCAL,
@@ -44,7 +47,8 @@ class Configuration:
 
     Attributes:
         q: Joint positions, shape (nq,); move them with `update`.
-        table: What compiled kernels read and write, by `RobotField`.
+        arrays: What compiled kernels read and write.
+        robot: The argument of kernels that stands for `arrays`.
         root_linear: Velocity indices that translate a free or planar root.
         root_angular: Velocity indices that turn a free or planar root.
     """
@@ -60,47 +64,15 @@ class Configuration:
         self._data: pin.Data = model.createData()
         self.nq, self.nv = int(model.nq), int(model.nv)
         self._tangent = TangentSpace(model)
-        self.q: Vector = pin.neutral(model)
+        self.arrays: RobotArrays = robot_arrays(model)
+        self.robot = as_argument(self.arrays)
+        self.q: Vector = self.arrays.q
+        self._by_pinocchio = bool((self.arrays.kind[1:] == JointKind.OTHER).any())
         self.root_linear, self.root_angular = _root_indices(model)
         self._frame_ids = {f.name: i for i, f in enumerate(model.frames)}
         self._nframes = len(model.frames)
         self._joint_ids = {n: i for i, n in enumerate(model.names)}
-        self._current: Indices = np.zeros(2, dtype=np.int64)
-        self._arrays = self._make_table()
-        self.table = self._arrays.table
         self.update(self.q if q is None else q)
-
-    def _make_table(self) -> ArrayTable:
-        """Gather what the kernels of `forward` read and write."""
-        model, data = self.model, self._data
-        kinds, axes = joint_kinds(model)
-        self._by_pinocchio = bool((kinds[1:] == JointKind.OTHER).any())
-        self._placements = _view_placements(data, int(model.njoints))
-        # Pinocchio gives a single column as a vector.
-        self._joint_jacobians: Matrix = data.J.reshape(6, self.nv).T
-        self._com: Vector = data.com[0]
-        self._com_jacobian: Matrix = data.Jcom.reshape(3, self.nv)
-        f = RobotField
-        return ArrayTable(
-            RobotField,
-            {
-                f.Q: self.q,
-                f.CURRENT: self._current,
-                f.KIND: kinds,
-                f.PARENT: np.array(model.parents, dtype=np.int64),
-                f.V_FIRST: np.array(model.idx_vs, dtype=np.int64),
-                f.V_COUNT: np.array(model.nvs, dtype=np.int64),
-                f.Q_FIRST: np.array(model.idx_qs, dtype=np.int64),
-                f.MOUNT: np.array([_packed(T) for T in model.jointPlacements]),
-                f.AXIS: axes,
-                f.MASS: np.array([body.mass for body in model.inertias]),
-                f.LEVER: np.array([body.lever for body in model.inertias]),
-                f.PLACEMENT: self._placements,
-                f.JACOBIAN: self._joint_jacobians,
-                f.COM: self._com,
-                f.COM_JACOBIAN: self._com_jacobian.T,
-            },
-        )
 
     def update(self, q: Vector) -> None:
         """Move to q.
@@ -113,25 +85,38 @@ class Configuration:
             ConfigError: If the shape is wrong.
         """
         self.q[:] = self._checked("q", q, self.nq)
-        self._current.fill(0)
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Discard what was computed from q, after q itself was written to."""
+        self.arrays.is_current.fill(0)
         if self._by_pinocchio:  # it has joints that the kernels do not know
-            pin.computeJointJacobians(self.model, self._data, self.q)
-            self._current[0] = 1
+            self._copy_from_pinocchio()
+
+    def _copy_from_pinocchio(self) -> None:
+        data, arrays = self.data, self.arrays
+        for row, T in zip(arrays.pose, data.oMi, strict=True):
+            row[:] = pack_pose(T)
+        # Pinocchio gives a single column as a vector.
+        arrays.jacobian[:] = data.J.reshape(6, self.nv).T
+        arrays.is_current[0] = 1
 
     @property
     def data(self) -> pin.Data:
         """Pinocchio's data with `oMi` and `J` of the present q."""
-        self._place()
+        if not self.arrays.is_current[2]:
+            pin.computeJointJacobians(self.model, self._data, self.q)
+            self.arrays.is_current[2] = 1
         return self._data
 
     @property
-    def placements(self) -> Matrix:
+    def joint_poses(self) -> Matrix:
         """Joint poses in the world, shape (njoints, 12), a view.
 
         The rotation column by column, then the position.
         """
-        self._place()
-        return self._placements
+        compute_joint_poses(self.robot)
+        return self.arrays.pose
 
     @property
     def joint_jacobians(self) -> Matrix:
@@ -139,8 +124,8 @@ class Configuration:
 
         World axes at the world's origin.
         """
-        self._place()
-        return self._joint_jacobians
+        compute_joint_poses(self.robot)
+        return self.arrays.jacobian
 
     def integrate(self, dq: Vector) -> Vector:
         """Return `q (+) dq`: the configuration reached by the tangent step dq (nv,)."""
@@ -180,6 +165,15 @@ class Configuration:
             names += [name] if joint.nv == 1 else many
         return tuple(names)
 
+    def velocity_units(self) -> tuple[str, ...]:
+        """Return the unit of each velocity's position: m or rad."""
+        units = ["rad"] * self.nv
+        linear = {JointKind.PRISMATIC.value: 1, JointKind.FREE.value: 3}
+        for kind, i in zip(self.arrays.kind, self.arrays.v_start, strict=True):
+            count = linear.get(int(kind), 0)
+            units[i : i + count] = ["m"] * count
+        return tuple(units)
+
     def support(self, frame: str | int) -> Indices:
         """Return the velocity indices that move a frame, ascending."""
         joint = self.model.frames[self._resolve(frame)].parentJoint
@@ -215,23 +209,19 @@ class Configuration:
     @property
     def com(self) -> Vector:
         """Centre of mass in the world, m, shape (3,). A view."""
-        self._weigh()
-        return self._com
+        self._compute_com()
+        return self.arrays.com
 
     @property
     def com_jacobian(self) -> Matrix:
         """Jacobian of the centre of mass, shape (3, nv). A view."""
-        self._weigh()
-        return self._com_jacobian
+        self._compute_com()
+        return self.arrays.com_jacobian.T
 
-    def _place(self) -> None:
-        if not self._current[0]:
-            place_joints(self.table)
-
-    def _weigh(self) -> None:
-        if not self._current[1]:
-            self._place()
-            weigh_joints(self.table)
+    def _compute_com(self) -> None:
+        if not self.arrays.is_current[1]:
+            compute_joint_poses(self.robot)
+            compute_com(self.robot)
 
     def _resolve(self, frame: str | int) -> int:
         """Return a frame's index; Pinocchio would read past its own memory."""
@@ -263,20 +253,14 @@ def _root_indices(model: pin.Model) -> tuple[Indices, Indices]:
     return np.array(linear, dtype=np.int64), np.array(angular, dtype=np.int64)
 
 
-def _packed(T: pin.SE3) -> Vector:
-    return np.concatenate([T.rotation.T.ravel(), T.translation])
-
-
-def _view_placements(data: pin.Data, count: int) -> Matrix:
-    """View Pinocchio's vector of joint poses as one array, shape (count, 12).
-
-    Pinocchio keeps it as contiguous SE3, each 9 doubles of rotation (by columns) and
-    3 of position. The binding offers no array over it, so the first element's address
-    is used; the layout is checked, and the view keeps `data` alive.
-    """
-    first = data.oMi[0].rotation.ctypes.data
-    if data.oMi[count - 1].translation.ctypes.data != first + (count - 1) * 96 + 72:
-        raise RuntimeError("Pinocchio's SE3 layout is not the one this package knows.")
-    buffer = (ctypes.c_double * (12 * count)).from_address(first)
-    buffer._owner = data  # type: ignore[attr-defined]  # keeps the memory alive
-    return np.ctypeslib.as_array(buffer).reshape(count, 12)
+def random_configuration(
+    model: pin.Model, q: Vector, rng: np.random.Generator
+) -> Vector:
+    """Return q with every limited joint drawn uniformly from its range."""
+    drawn = q.copy()
+    for joint in list(model.joints)[1:]:
+        low = model.lowerPositionLimit[joint.idx_q]
+        high = model.upperPositionLimit[joint.idx_q]
+        if joint.nq == 1 and low < high < UNLIMITED:
+            drawn[joint.idx_q] = rng.uniform(low, high)
+    return drawn

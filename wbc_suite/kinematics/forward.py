@@ -1,78 +1,130 @@
 """Forward kinematics, joint Jacobians and centre of mass, compiled.
 
-Pinocchio is the specification: `pin.computeJointJacobians` and
-`pin.jacobianCenterOfMass`, to which a test holds these kernels at 1e-12. They write
-into Pinocchio's own memory, so that its frames and frame Jacobians follow, and they are
-kernels so that a task stack's compiled tick can run them inside.
+Tests hold these kernels to Pinocchio at 1e-12: `pin.computeJointJacobians`,
+`pin.jacobianCenterOfMass`. They are kernels so that compiled loops can call them.
 """
 
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.compiling import compiled
-from wbc_suite.kinematics.array_table import indices, matrix, vector
+from wbc_suite.compiling import compiled, struct
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["JointKind", "RobotField", "joint_kinds", "place_joints", "weigh_joints"]
+__all__ = [
+    "JointKind",
+    "RobotArrays",
+    "compute_com",
+    "compute_joint_poses",
+    "multiply_poses",
+    "pack_pose",
+    "robot_arrays",
+]
 
 
-class RobotField(IntEnum):
-    """Arrays of a robot: what its joints are, and where q puts them.
+@struct
+class RobotArrays(NamedTuple):
+    """The joints of a robot, the universe first, and where q places them.
 
-    By joint, the universe first: kind, parent, first and number of velocities, first
-    position, mount (pose in the parent: rotation by columns, then position), axis, mass
-    and centre of mass of what it carries, placement (pose in the world, as a mount).
-    By velocity: Jacobian, world axes at the world's origin, and that of the robot's
-    centre of mass. `CURRENT` tells what follows from the present q: placements with
-    Jacobians, and the centre of mass.
+    Poses have the rotation column by column, then the position. Jacobians are
+    transposed, with world axes at the world's origin.
+
+    Attributes:
+        q: Joint positions, shape (nq,).
+        is_current: Whether joint poses with Jacobians, the centre of mass, and
+            Pinocchio's data belong to the present q, shape (3,).
+        kind: `JointKind` of each joint.
+        parent: Parent of each joint.
+        q_start: First position of each joint.
+        v_start: First velocity of each joint.
+        v_count: Number of velocities of each joint.
+        mount: Pose of each joint in its parent at q = 0, shape (njoints, 12).
+        axis: Axis of each joint, shape (njoints, 3).
+        mass: Mass that each joint carries itself, kg.
+        lever: Its centre of mass in the joint, m, shape (njoints, 3).
+        pose: Pose of each joint in the world, shape (njoints, 12).
+        jacobian: Joint Jacobians, shape (nv, 6).
+        com: Centre of mass, m, shape (3,).
+        com_jacobian: Its Jacobian, shape (nv, 3).
     """
 
-    Q = 0
-    CURRENT = 1
-    KIND = 2
-    PARENT = 3
-    V_FIRST = 4
-    V_COUNT = 5
-    Q_FIRST = 6
-    MOUNT = 7
-    AXIS = 8
-    MASS = 9
-    LEVER = 10
-    PLACEMENT = 11
-    JACOBIAN = 12
-    COM = 13
-    COM_JACOBIAN = 14
+    q: Vector
+    is_current: Indices
+    kind: Indices
+    parent: Indices
+    q_start: Indices
+    v_start: Indices
+    v_count: Indices
+    mount: Matrix
+    axis: Matrix
+    mass: Vector
+    lever: Matrix
+    pose: Matrix
+    jacobian: Matrix
+    com: Vector
+    com_jacobian: Matrix
 
 
 class JointKind(IntEnum):
-    """How a joint moves; it turns about an axis of its mount or about any."""
+    """How a joint moves: about or along an axis of its mount, or freely."""
 
     OTHER = -1
-    TURN_X = 0
-    TURN_Y = 1
-    TURN_Z = 2
-    TURN = 3
-    SHIFT = 4
+    """Unknown to the kernels; Pinocchio computes models with such joints."""
+    REVOLUTE_X = 0
+    REVOLUTE_Y = 1
+    REVOLUTE_Z = 2
+    REVOLUTE = 3
+    PRISMATIC = 4
     FREE = 5
 
 
 _KINDS = {
-    "RX": (JointKind.TURN_X, (1.0, 0.0, 0.0)),
-    "RY": (JointKind.TURN_Y, (0.0, 1.0, 0.0)),
-    "RZ": (JointKind.TURN_Z, (0.0, 0.0, 1.0)),
-    "PX": (JointKind.SHIFT, (1.0, 0.0, 0.0)),
-    "PY": (JointKind.SHIFT, (0.0, 1.0, 0.0)),
-    "PZ": (JointKind.SHIFT, (0.0, 0.0, 1.0)),
-    "RevoluteUnaligned": (JointKind.TURN, None),
-    "PrismaticUnaligned": (JointKind.SHIFT, None),
+    "RX": (JointKind.REVOLUTE_X, (1.0, 0.0, 0.0)),
+    "RY": (JointKind.REVOLUTE_Y, (0.0, 1.0, 0.0)),
+    "RZ": (JointKind.REVOLUTE_Z, (0.0, 0.0, 1.0)),
+    "PX": (JointKind.PRISMATIC, (1.0, 0.0, 0.0)),
+    "PY": (JointKind.PRISMATIC, (0.0, 1.0, 0.0)),
+    "PZ": (JointKind.PRISMATIC, (0.0, 0.0, 1.0)),
+    "RevoluteUnaligned": (JointKind.REVOLUTE, None),
+    "PrismaticUnaligned": (JointKind.PRISMATIC, None),
     "FreeFlyer": (JointKind.FREE, (0.0, 0.0, 0.0)),
 }
-"""By Pinocchio's names; unaligned joints know their axis."""
+"""By Pinocchio's names; unaligned joints have their own axis."""
 
 
-def joint_kinds(model: pin.Model) -> tuple[Indices, Matrix]:
+def robot_arrays(model: pin.Model) -> RobotArrays:
+    """Return the arrays of a model at its neutral configuration, not yet computed."""
+    count, nv = int(model.njoints), int(model.nv)
+    kind, axis = _kinds_and_axes(model)
+    pose = np.zeros((count, 12))
+    pose[0] = pack_pose(pin.SE3.Identity())
+    return RobotArrays(
+        q=pin.neutral(model),
+        is_current=np.zeros(3, dtype=np.int64),
+        kind=kind,
+        parent=np.array(model.parents, dtype=np.int64),
+        q_start=np.array(model.idx_qs, dtype=np.int64),
+        v_start=np.array(model.idx_vs, dtype=np.int64),
+        v_count=np.array(model.nvs, dtype=np.int64),
+        mount=np.array([pack_pose(T) for T in model.jointPlacements]),
+        axis=axis,
+        mass=np.array([body.mass for body in model.inertias]),
+        lever=np.array([body.lever for body in model.inertias]),
+        pose=pose,
+        jacobian=np.zeros((nv, 6)),
+        com=np.zeros(3),
+        com_jacobian=np.zeros((nv, 3)),
+    )
+
+
+def pack_pose(T: pin.SE3) -> Vector:
+    """Return a pose as a row: its rotation column by column, then its position."""
+    return np.concatenate([T.rotation.T.ravel(), T.translation])
+
+
+def _kinds_and_axes(model: pin.Model) -> tuple[Indices, Matrix]:
     """Return kind and axis of each joint, the universe first."""
     kinds = np.full(len(model.joints), JointKind.OTHER, dtype=np.int64)
     axes = np.zeros((len(model.joints), 3))
@@ -85,96 +137,69 @@ def joint_kinds(model: pin.Model) -> tuple[Indices, Matrix]:
 
 
 @compiled
-def place_joints(robot: Indices) -> None:
+def compute_joint_poses(robot: RobotArrays) -> None:
     """Compute joint poses and Jacobians from q, unless they are current.
 
     A joint's pose is `T_parent T_mount T_joint(q)`. The column of a revolute joint with
-    the axis a and the origin p is `(p x a, a)`, of a prismatic one `(a, 0)`.
-
-    Args:
-        robot: Table of `RobotField`; no joint's kind is `OTHER` but the universe's.
+    the axis a and the origin p is `(p x a, a)`, of a prismatic one `(a, 0)`. No joint
+    but the universe may be of kind `OTHER`.
     """
-    current = indices(robot, RobotField.CURRENT)
-    if current[0]:
+    if robot.is_current[0]:
         return
-    q = vector(robot, RobotField.Q)
-    kinds, parents = indices(robot, RobotField.KIND), indices(robot, RobotField.PARENT)
-    firsts, mounts = indices(robot, RobotField.Q_FIRST), matrix(robot, RobotField.MOUNT)
-    axes, placements = (
-        matrix(robot, RobotField.AXIS),
-        matrix(robot, RobotField.PLACEMENT),
-    )
-    columns, v_firsts = (
-        matrix(robot, RobotField.JACOBIAN),
-        indices(robot, RobotField.V_FIRST),
-    )
+    # Fields are read once: each access counts references.
+    kinds, poses, axes, parents = robot.kind, robot.pose, robot.axis, robot.parent
+    columns, q, mounts = robot.jacobian, robot.q, robot.mount
+    q_start, v_start = robot.q_start, robot.v_start
     for j in range(1, kinds.shape[0]):
-        kind, T, column = kinds[j], placements[j], columns[v_firsts[j]]
-        _mount(placements[parents[j]], mounts[j], T)
+        kind, T, k, column = kinds[j], poses[j], q_start[j], columns[v_start[j]]
+        multiply_poses(poses[parents[j]], mounts[j], T)
         if kind == JointKind.FREE:
-            _float(T, q[firsts[j] :], columns[v_firsts[j] :])
-        elif kind == JointKind.SHIFT:
-            _shift(T, axes[j], float(q[firsts[j]]), column)
-        elif kind == JointKind.TURN:
-            _turn(T, axes[j], float(q[firsts[j]]), column)
+            _move_freely(T, q[k:], columns[v_start[j] :])
+        elif kind == JointKind.PRISMATIC:
+            _shift(T, axes[j], float(q[k]), column)
+        elif kind == JointKind.REVOLUTE:
+            _turn(T, axes[j], float(q[k]), column)
         else:
-            _turn_about(T, kind, float(q[firsts[j]]), column)
-    current[0] = 1
+            _turn_about(T, kind, float(q[k]), column)
+    robot.is_current[0] = 1
 
 
 @compiled
-def weigh_joints(robot: Indices) -> None:
+def compute_com(robot: RobotArrays) -> None:
     """Compute the centre of mass and its Jacobian, unless they are current.
 
-    The velocity of joint j moves what hangs on it, of mass m_j and centre c_j, and so
-    the robot's centre by `m_j (v_j + w_j x c_j) / m`, with (v_j, w_j) its Jacobian's
-    column.
-
-    Args:
-        robot: Table of `RobotField`, placements and Jacobians being current.
+    The velocity of joint j moves its subtree, of mass m_j and centre c_j, and so the
+    robot's centre by `m_j (v_j + w_j x c_j) / m`, with (v_j, w_j) its Jacobian's
+    column. Joint poses and Jacobians are current.
     """
-    current = indices(robot, RobotField.CURRENT)
-    if current[1]:
+    if robot.is_current[1]:
         return
-    parents, counts = (
-        indices(robot, RobotField.PARENT),
-        indices(robot, RobotField.V_COUNT),
-    )
-    v_firsts, masses = (
-        indices(robot, RobotField.V_FIRST),
-        vector(robot, RobotField.MASS),
-    )
-    levers, placements = (
-        matrix(robot, RobotField.LEVER),
-        matrix(robot, RobotField.PLACEMENT),
-    )
-    columns, com = matrix(robot, RobotField.JACOBIAN), vector(robot, RobotField.COM)
-    com_columns = matrix(robot, RobotField.COM_JACOBIAN)
-    joints = parents.shape[0]
-    hung = np.zeros((joints, 4))  # moment and mass of all that hangs on a joint
+    joints, parents, poses = robot.parent.shape[0], robot.parent, robot.pose
+    columns, com_columns = robot.jacobian, robot.com_jacobian
+    subtree = np.zeros((joints, 4))  # first moment and mass
     for j in range(joints - 1, 0, -1):
-        T, m, lever = placements[j], masses[j], levers[j]
+        T, m, lever = poses[j], robot.mass[j], robot.lever[j]
         for i in range(3):
             along = T[i] * lever[0] + T[3 + i] * lever[1] + T[6 + i] * lever[2]
-            hung[j, i] += m * (T[9 + i] + along)
-        hung[j, 3] += m
+            subtree[j, i] += m * (T[9 + i] + along)
+        subtree[j, 3] += m
         for i in range(4):
-            hung[parents[j], i] += hung[j, i]
-    total = 1.0 / hung[0, 3]
+            subtree[parents[j], i] += subtree[j, i]
+    scale = 1.0 / subtree[0, 3]
     for j in range(1, joints):
-        x, y, z, m = hung[j]
-        for k in range(v_firsts[j], v_firsts[j] + counts[j]):
+        x, y, z, m = subtree[j]
+        for k in range(robot.v_start[j], robot.v_start[j] + robot.v_count[j]):
             v, out = columns[k], com_columns[k]
-            out[0] = total * (m * v[0] + v[4] * z - v[5] * y)
-            out[1] = total * (m * v[1] + v[5] * x - v[3] * z)
-            out[2] = total * (m * v[2] + v[3] * y - v[4] * x)
+            out[0] = scale * (m * v[0] + v[4] * z - v[5] * y)
+            out[1] = scale * (m * v[1] + v[5] * x - v[3] * z)
+            out[2] = scale * (m * v[2] + v[3] * y - v[4] * x)
     for i in range(3):
-        com[i] = total * hung[0, i]
-    current[1] = 1
+        robot.com[i] = scale * subtree[0, i]
+    robot.is_current[1] = 1
 
 
 @compiled
-def _mount(A: Vector, B: Vector, out: Vector) -> None:
+def multiply_poses(A: Vector, B: Vector, out: Vector) -> None:
     """Write the pose `A B`; rotations by columns, then positions."""
     for i in range(3):
         a, b, c = A[i], A[3 + i], A[6 + i]
@@ -191,7 +216,7 @@ def _turn_about(T: Vector, k: int, angle: float, column: Vector) -> None:
     for i in range(3):
         u, v = T[a + i], T[b + i]
         T[a + i], T[b + i] = c * u + s * v, c * v - s * u
-    _spin(T, T[3 * k], T[3 * k + 1], T[3 * k + 2], column)
+    _write_revolute(T, T[3 * k], T[3 * k + 1], T[3 * k + 2], column)
 
 
 @compiled
@@ -205,13 +230,13 @@ def _turn(T: Vector, axis: Vector, angle: float, column: Vector) -> None:
         T[i] = c * u + s * (v * z - w * y) + along * x
         T[3 + i] = c * v + s * (w * x - u * z) + along * y
         T[6 + i] = c * w + s * (u * y - v * x) + along * z
-    _spin(T, *_along(T, axis), column)
+    _write_revolute(T, *_in_world(T, axis), column)
 
 
 @compiled
 def _shift(T: Vector, axis: Vector, distance: float, column: Vector) -> None:
     """Shift a pose along a unit axis of its own."""
-    x, y, z = _along(T, axis)
+    x, y, z = _in_world(T, axis)
     T[9] += distance * x
     T[10] += distance * y
     T[11] += distance * z
@@ -221,8 +246,8 @@ def _shift(T: Vector, axis: Vector, distance: float, column: Vector) -> None:
 
 
 @compiled
-def _float(T: Vector, q: Vector, columns: Matrix) -> None:
-    """Move a pose by position and unit quaternion x y z w."""
+def _move_freely(T: Vector, q: Vector, columns: Matrix) -> None:
+    """Move a pose by a position and unit quaternion x y z w."""
     x, y, z, w = q[3], q[4], q[5], q[6]
     local = np.empty(12)
     local[0] = 1.0 - 2.0 * (y * y + z * z)
@@ -235,16 +260,16 @@ def _float(T: Vector, q: Vector, columns: Matrix) -> None:
     parent = np.empty(12)
     for i in range(12):
         parent[i] = T[i]
-    _mount(parent, local, T)
+    multiply_poses(parent, local, T)
     for k in range(3):
         for i in range(3):
             columns[k, i], columns[k, 3 + i] = T[3 * k + i], 0.0
-        _spin(T, T[3 * k], T[3 * k + 1], T[3 * k + 2], columns[3 + k])
+        _write_revolute(T, T[3 * k], T[3 * k + 1], T[3 * k + 2], columns[3 + k])
 
 
 @compiled
-def _along(T: Vector, axis: Vector) -> tuple[float, float, float]:
-    """Return an axis of a pose in the world."""
+def _in_world(T: Vector, axis: Vector) -> tuple[float, float, float]:
+    """Return an axis of a pose in world coordinates."""
     x, y, z = axis[0], axis[1], axis[2]
     return (
         T[0] * x + T[3] * y + T[6] * z,
@@ -254,7 +279,7 @@ def _along(T: Vector, axis: Vector) -> tuple[float, float, float]:
 
 
 @compiled
-def _spin(T: Vector, u: float, v: float, w: float, column: Vector) -> None:
+def _write_revolute(T: Vector, u: float, v: float, w: float, column: Vector) -> None:
     """Write `(p x a, a)` for the axis a through a pose's origin p."""
     x, y, z = T[9], T[10], T[11]
     column[0], column[1], column[2] = y * w - z * v, z * u - x * w, x * v - y * u

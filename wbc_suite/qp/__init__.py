@@ -5,27 +5,32 @@ solution = stack.solve(dt)
 configuration.update(configuration.integrate(solution.dq))
 """
 
-from wbc_suite.qp.acceleration_limit import AccelerationLimit
-from wbc_suite.qp.bounds import LimitKind
 from wbc_suite.qp.com_task import ComTask
-from wbc_suite.qp.damping_task import DampingTask
 from wbc_suite.qp.equality import Equality, FrameEquality, LinearEquality
 from wbc_suite.qp.floor_limit import FloorLimit
 from wbc_suite.qp.frame_task import FrameTask
 from wbc_suite.qp.joint_coupling_task import JointCouplingTask
-from wbc_suite.qp.limit import BoxLimit, Limit, RowLimit
+from wbc_suite.qp.joint_limits import AccelerationLimit, PositionLimit, VelocityLimit
+from wbc_suite.qp.kernel import Kernel
+from wbc_suite.qp.limit import BoxLimit, Limit, LimitKind, RowLimit
 from wbc_suite.qp.look_at_task import LookAtTask
-from wbc_suite.qp.position_limit import PositionLimit
-from wbc_suite.qp.posture_task import PostureTask
+from wbc_suite.qp.posture_task import DampingTask, PostureTask
 from wbc_suite.qp.problem import Problem
 from wbc_suite.qp.relative_frame_task import RelativeFrameTask
-from wbc_suite.qp.report import TaskReport, TickRecord
-from wbc_suite.qp.self_collision_limit import SelfCollisionLimit
-from wbc_suite.qp.solution import ActiveLimit, Fallback, Solution
+from wbc_suite.qp.report import (
+    ActiveLimit,
+    Conflict,
+    OutOfReach,
+    Reason,
+    TargetNotFinite,
+    TaskReport,
+    TickRecord,
+)
+from wbc_suite.qp.self_collision_limit import LinkPair, SelfCollisionLimit
+from wbc_suite.qp.solution import Fallback, Solution
 from wbc_suite.qp.stack import TaskStack
 from wbc_suite.qp.support_limit import Sole, SupportLimit
-from wbc_suite.qp.task import DiagonalTask, RowTask, Task
-from wbc_suite.qp.velocity_limit import VelocityLimit
+from wbc_suite.qp.task import JointTask, RowTask, Task
 from wbc_suite.qp.weight_limit import WeightLimit
 
 __all__ = [
@@ -33,21 +38,26 @@ __all__ = [
     "ActiveLimit",
     "BoxLimit",
     "ComTask",
+    "Conflict",
     "DampingTask",
-    "DiagonalTask",
     "Equality",
     "Fallback",
     "FloorLimit",
     "FrameEquality",
     "FrameTask",
     "JointCouplingTask",
+    "JointTask",
+    "Kernel",
     "Limit",
     "LimitKind",
     "LinearEquality",
+    "LinkPair",
     "LookAtTask",
+    "OutOfReach",
     "PositionLimit",
     "PostureTask",
     "Problem",
+    "Reason",
     "RelativeFrameTask",
     "RowLimit",
     "RowTask",
@@ -55,6 +65,7 @@ __all__ = [
     "Sole",
     "Solution",
     "SupportLimit",
+    "TargetNotFinite",
     "Task",
     "TaskReport",
     "TaskStack",

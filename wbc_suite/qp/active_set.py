@@ -1,116 +1,179 @@
-"""A warm active-set solver for the stack's own kind of problem, compiled.
+"""A compiled active-set solver for the QP of one level, warm-started.
 
 A level's cost has few rows and a positive diagonal, `0.5 |W x - e|^2 + 0.5 x^T D x -
-r^T x`, and mostly the joints that met a bound at the last tick meet it again. For a
-given set of joints at bounds the optimum follows from one small linear system of the
+r^T x`, and mostly the bounds and rows that were active at the last tick are active
+again. For a given active set the optimum follows from one small linear system of the
 size of the rows, not of the robot:
 
-    x_F = D_F^-1 (r_F - B_F^T y),   B = [W; A],   S = diag(1 for W, 0 for A)
+    x_F = D_F^-1 (r_F - B_F^T y),   B = [W; rows],   S = diag(1 for W, s for rows)
     (S + B_F D_F^-1 B_F^T) y = B_F D_F^-1 r_F + B_K x_K - [e; b]
 
-with F the free and K the kept joints. Joints that leave their bounds are kept, joints
-whose multiplier has the wrong sign are freed, until nothing changes: then the KKT
-conditions hold, and x is the one optimum if it keeps `A x = b`, which the caller
-checks: rows that the kept joints leave nothing to are left out. All at once is quick
-from a set that is nearly right, and else may go in circles; then it begins again with
-none kept, and of the joints beyond their bounds keeps the farthest alone. Where that
-takes too long nothing is answered, and a general solver takes over.
+with F the free joints and K those at a bound, rows the equality rows and the active
+inequality rows. A soft row, of the cost `0.5 w max(0, g x - wanted)^2`, is an active
+row with `s = 1 / w`; of hard ones s is 0. What violates its bound becomes active, what
+has a multiplier of the wrong sign inactive, until nothing changes: then the KKT
+conditions hold, and x is the one optimum if it keeps all rows, which the caller checks,
+since rows that depend on others are left out. All changes at once are quick from a set
+that is nearly right, and may cycle; then the solver begins again with an empty set and
+adds only the worst violation. Where that takes too long, daqp takes over.
 
 Source: Hintermueller, Ito, Kunisch (2002), "The Primal-Dual Active Set Strategy as a
 Semismooth Newton Method", SIAM J. Optim. 13(3); the small system is the matrix
 inversion lemma.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
-from wbc_suite.compiling import compiled
-from wbc_suite.qp.sums import dot
+from wbc_suite.compiling import compiled, struct
+from wbc_suite.linear_algebra import cholesky, dot, solve_lower, solve_upper
+from wbc_suite.qp.problem import UNBOUNDED
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["solve_warm"]
+__all__ = ["QpArrays", "make_qp_arrays", "solve_warm"]
 
-_QUICK = 8  # rounds in which all joints beyond their bounds are kept at once
-_CAREFUL = 16  # rounds after those, in which one more is kept
-_DEPENDENT = 1e-12  # part of a row's square that is left by the rows above
-_TOLERANCE = 1e-13  # m, rad: how far a free joint may pass its bound by rounding
+_QUICK = 8  # rounds in which all violated bounds and rows become active at once
+_CAREFUL = 32  # rounds after those, in which the worst one does
+_DEPENDENT = 1e-12  # part of a row's square that the rows above must leave
+_TOLERANCE = 1e-13  # m, rad: violation of a bound by rounding
+_ROW_TOLERANCE = 1e-11  # m: violation of a row by rounding
+
+_SOFT, _HARD = 1, 2
+"""States of an active inequality row: at `wanted` with slack, or at its bound."""
+
+
+@struct
+class QpArrays(NamedTuple):
+    """The QP of one level: m cost rows, p inequality rows, up to k equality rows.
+
+    Bounds stand in the order x, inequality rows, equality rows.
+
+    Attributes:
+        W: Weighted cost rows, shape (m, n).
+        e: Weighted steps, shape (m,).
+        diagonal: D without mu, and r, shape (2, n).
+        mu: Added to D, positive, shape (1,).
+        rows: Inequality rows, then equality rows, shape (p + k, n).
+        lower: Lower bounds, shape (n + p + k,).
+        upper: Upper bounds, shape (n + p + k,).
+        wanted: Upper bounds that rows keep softly, where they are below `upper`, (p,).
+        weight: Cost w of soft rows, shape (1,).
+        counts: p, and how many equality rows there are, shape (2,).
+        side: In and out, the active set: -1 or 1 where x is at its lower or upper
+            bound; 1 for soft, 2 for hard inequality rows; else 0; shape (n + p,).
+        x: Output, the optimum, shape (n,).
+        multipliers: Output, of bounds and rows, positive at upper ones.
+        active: Scratch, the rows of the small system, shape (m + p + k,).
+        last: Scratch, end of the entries of each row that are not zero.
+        scaled: Scratch, rows times D^-1/2, shape (m + p + k, n).
+        system: Scratch, the small system.
+        y: Scratch, its solution.
+        root: Scratch, D^-1/2, shape (n,).
+        kept: Scratch, x at bounds, else 0, shape (n,).
+    """
+
+    W: Matrix
+    e: Vector
+    diagonal: Matrix
+    mu: Vector
+    rows: Matrix
+    lower: Vector
+    upper: Vector
+    wanted: Vector
+    weight: Vector
+    counts: Indices
+    side: Indices
+    x: Vector
+    multipliers: Vector
+    active: Indices
+    last: Indices
+    scaled: Matrix
+    system: Matrix
+    y: Vector
+    root: Vector
+    kept: Vector
+
+
+def make_qp_arrays(
+    W: Matrix,
+    e: Vector,
+    diagonal: Matrix,
+    mu: Vector,
+    *,
+    inequalities: int = 0,
+    equalities: int = 0,
+    x: Vector | None = None,
+    multipliers: Vector | None = None,
+) -> QpArrays:
+    """Return the arrays of a QP without bounds, over the cost that is given.
+
+    Args:
+        W: See `QpArrays`.
+        e: See `QpArrays`.
+        diagonal: See `QpArrays`.
+        mu: See `QpArrays`.
+        inequalities: Number of inequality rows.
+        equalities: Greatest number of equality rows.
+        x: Buffer of the optimum, if there is one.
+        multipliers: Buffer of the multipliers, if there is one.
+    """
+    m, n = W.shape
+    rows, size = inequalities + equalities, m + inequalities + equalities
+    return QpArrays(
+        W=W,
+        e=e,
+        diagonal=diagonal,
+        mu=mu,
+        rows=np.zeros((rows, n)),
+        lower=np.full(n + rows, -UNBOUNDED),
+        upper=np.full(n + rows, UNBOUNDED),
+        wanted=np.full(inequalities, UNBOUNDED),
+        weight=np.zeros(1),
+        counts=np.array([inequalities, equalities], dtype=np.int64),
+        side=np.zeros(n + inequalities, dtype=np.int64),
+        x=np.zeros(n) if x is None else x,
+        multipliers=np.zeros(n + rows) if multipliers is None else multipliers,
+        active=np.zeros(size, dtype=np.int64),
+        last=np.zeros(size, dtype=np.int64),
+        scaled=np.zeros((size, n)),
+        system=np.zeros((size, size)),
+        y=np.zeros(size),
+        root=np.zeros(n),
+        kept=np.zeros(n),
+    )
 
 
 @compiled
-def solve_warm(  # noqa: C901, one flat loop is what compiles well
-    W: Matrix,
-    e: Vector,
-    A: Matrix,
-    b: Vector,
-    diagonal: Matrix,
-    mu: float,
-    lb: Vector,
-    ub: Vector,
-    side: Indices,
-    x: Vector,
-    multipliers: Vector,
-    row_multipliers: Vector,
-) -> bool:
-    """Minimise `0.5 |W x - e|^2 + 0.5 x^T D x - r^T x` with `A x = b`, `lb <= x <= ub`.
-
-    Args:
-        W: Weighted rows, shape (m, n).
-        e: Weighted steps, shape (m,).
-        A: Equality rows, shape (k, n), independent.
-        b: Their right-hand side, shape (k,).
-        diagonal: D without mu, and r, shape (2, n).
-        mu: Added to D; positive.
-        lb: Lower bounds, shape (n,).
-        ub: Upper bounds, shape (n,).
-        side: In and out, -1 or 1 where x is kept at its lower or upper bound, else 0.
-        x: Output, the optimum, shape (n,).
-        multipliers: Output, of the bounds, shape (n,); positive at upper ones.
-        row_multipliers: Output, of A, shape (k,).
+def solve_warm(qp: QpArrays) -> bool:
+    """Minimise `0.5 |W x - e|^2 + 0.5 x^T (D + mu) x - r^T x` within bounds and rows.
 
     Returns:
-        Whether x is the optimum, provided that it keeps A x = b.
+        Whether x is the optimum, provided that it keeps the rows.
     """
-    m, k, n = W.shape[0], A.shape[0], x.shape[0]
-    scaled, system = np.empty((m + k, n)), np.empty((m + k, m + k))
-    y, root = np.empty(m + k), np.empty(n)
-    loose, kept = np.empty(n), np.empty(n)
-    ends = np.empty(m + k, dtype=np.int64)
-    for row in range(m + k):
-        ends[row] = _end(W[row] if row < m else A[row - m])
+    n, m = qp.x.shape[0], qp.e.shape[0]
+    p, k = qp.counts[0], qp.counts[1]
     for i in range(n):
-        root[i] = 1.0 / np.sqrt(diagonal[0, i] + mu)
+        qp.root[i] = 1.0 / np.sqrt(qp.diagonal[0, i] + qp.mu[0])
+    for row in range(m + p + k):
+        qp.last[row] = _end(qp.W[row] if row < m else qp.rows[row - m])
+    for row in range(p):
+        if qp.upper[n + row] >= UNBOUNDED and qp.wanted[row] >= UNBOUNDED:
+            qp.side[n + row] = 0
     for count in range(_QUICK + _CAREFUL):
         if count == _QUICK:
-            for i in range(n):
-                side[i] = 0
-        for i in range(n):
-            loose[i], kept[i] = root[i], 0.0
-            if side[i] != 0:
-                loose[i], kept[i] = 0.0, ub[i] if side[i] > 0 else lb[i]
-            x[i] = loose[i] * diagonal[1, i]  # scaled right-hand side, for now
-        for row in range(m + k):
-            of, own, end = W[row] if row < m else A[row - m], scaled[row], ends[row]
-            for i in range(end):
-                own[i] = of[i] * loose[i]
-            y[row] = dot(of, kept, end) - (e[row] if row < m else b[row - m])
-            y[row] += dot(own, x, end)
-            for other in range(row + 1):
-                last = min(end, ends[other])
-                system[row, other] = dot(own, scaled[other], last)
-            if row < m:
-                system[row, row] += 1.0
-        _solve_in_place(system, y)
-        for i in range(n):
-            x[i] = root[i] * diagonal[1, i]
-        for row in range(m + k):
-            for i in range(ends[row]):
-                x[i] -= scaled[row, i] * y[row]
-        same = _free(W, A, y, diagonal, mu, root, lb, ub, side, x, multipliers)
-        if _keep(lb, ub, side, x, count >= _QUICK) and same:
-            for row in range(k):
-                row_multipliers[row] = y[m + row]
+            for i in range(n + p):
+                qp.side[i] = 0
+        size = _state_system(qp)
+        cholesky(qp.system, size, _DEPENDENT)
+        solve_lower(qp.system, qp.y, size)
+        solve_upper(qp.system, qp.y, size)
+        _recover(qp, size)
+        changed = _deactivate(qp)
+        if not _activate(qp, count >= _QUICK) and not changed:
             return True
-    for i in range(n):
-        side[i] = 0
+    for i in range(n + p):
+        qp.side[i] = 0
     return False
 
 
@@ -127,76 +190,121 @@ def _end(row: Vector) -> int:
 
 
 @compiled
-def _solve_in_place(S: Matrix, y: Vector) -> None:
-    """Solve `S y = y` by Cholesky, lower triangle.
+def _state_system(qp: QpArrays) -> int:
+    """Write the small system and its right-hand side; return its size.
 
-    The factor's diagonal is kept as its inverse. Rows that follow from those above are
-    left out, with y = 0: on the way to the right set, joints that are kept for now may
-    leave fewer free ones than there are equality rows.
+    Leaves the columns of free joints in `scaled`, and their `D^-1/2 r` in x.
     """
-    n = y.shape[0]
+    # Fields are read once: each access counts references.
+    n, m, p = qp.x.shape[0], qp.e.shape[0], qp.counts[0]
+    x, kept, side, root, y = qp.x, qp.kept, qp.side, qp.root, qp.y
+    W, rows, upper, last, active = qp.W, qp.rows, qp.upper, qp.last, qp.active
+    all_scaled, system = qp.scaled, qp.system
     for i in range(n):
-        own = S[i]
-        for j in range(i):
-            own[j] = (own[j] - dot(own, S[j], j)) * S[j, j]
-        pivot = own[i] - dot(own, own, i)
-        own[i] = 1.0 / np.sqrt(pivot) if pivot > _DEPENDENT * own[i] else 0.0
-        y[i] = (y[i] - dot(own, y, i)) * own[i]
-    for i in range(n - 1, -1, -1):
-        y[i] *= S[i, i]
-        for j in range(i):
-            y[j] -= S[i, j] * y[i]
-
-
-@compiled
-def _free(
-    W: Matrix,
-    A: Matrix,
-    y: Vector,
-    diagonal: Matrix,
-    mu: float,
-    root: Vector,
-    lb: Vector,
-    ub: Vector,
-    side: Indices,
-    x: Vector,
-    multipliers: Vector,
-) -> bool:
-    """Finish x; free joints that are pulled off their bounds; True if there are none.
-
-    Comes in with `x = root^2 r` less the rows' part on free joints scaled by one root.
-    """
-    m, same = W.shape[0], True
-    for i in range(x.shape[0]):
-        multipliers[i] = 0.0
-        if side[i] == 0:
-            x[i] *= root[i]
-            continue
-        x[i] = ub[i] if side[i] > 0 else lb[i]
-        force = diagonal[1, i] - (diagonal[0, i] + mu) * x[i]
-        for row in range(y.shape[0]):
-            force -= (W[row, i] if row < m else A[row - m, i]) * y[row]
-        multipliers[i] = force
-        if force * side[i] < 0.0 and lb[i] < ub[i]:
-            side[i], same = 0, False
-    return same
-
-
-@compiled
-def _keep(lb: Vector, ub: Vector, side: Indices, x: Vector, only_one: bool) -> bool:
-    """Keep joints beyond their bounds, or the farthest; True if there are none."""
-    found, worst = -1, _TOLERANCE
-    for i in range(x.shape[0]):
-        over, under = x[i] - ub[i], lb[i] - x[i]
-        beyond = over if over > under else under
-        if beyond <= worst:  # False for what is not a number
-            x[i] = min(max(x[i], lb[i]), ub[i])
-            continue
-        found = i
-        if only_one:
-            worst = beyond
+        kept[i], x[i] = 0.0, root[i] * qp.diagonal[1, i]
+        if side[i] != 0:
+            kept[i], x[i] = upper[i] if side[i] > 0 else qp.lower[i], 0.0
+    size = 0
+    for row in range(m + p + qp.counts[1]):
+        if row < m:
+            own, b, slack = W[row], qp.e[row], 1.0
         else:
-            side[i] = 1 if over > under else -1
+            i = row - m
+            own, b, slack = rows[i], upper[n + i], 0.0
+            if i < p and side[n + i] == 0:
+                continue
+            if i < p and side[n + i] == _SOFT:
+                b, slack = qp.wanted[i], 1.0 / qp.weight[0]
+        end, scaled, line = last[row], all_scaled[size], system[size]
+        for i in range(end):
+            scaled[i] = own[i] * root[i] if side[i] == 0 else 0.0
+        active[size] = row
+        y[size] = dot(own, kept, end) - b + dot(scaled, x, end)
+        for other in range(size + 1):
+            shared = min(end, last[active[other]])
+            line[other] = dot(scaled, all_scaled[other], shared)
+        line[size] += slack
+        size += 1
+    return size
+
+
+@compiled
+def _recover(qp: QpArrays, size: int) -> None:
+    """Write x and the multipliers from the solution of the small system."""
+    n, m = qp.x.shape[0], qp.e.shape[0]
+    x, multipliers, side, last = qp.x, qp.multipliers, qp.side, qp.last
+    W, rows, all_scaled = qp.W, qp.rows, qp.scaled
+    for i in range(multipliers.shape[0]):
+        multipliers[i] = 0.0
+    for k in range(size):
+        row, y, scaled = qp.active[k], qp.y[k], all_scaled[k]
+        if row >= m:
+            multipliers[n + row - m] = y
+        own = W[row] if row < m else rows[row - m]
+        for i in range(last[row]):
+            x[i] -= scaled[i] * y
+            multipliers[i] -= own[i] * y
+    for i in range(n):
+        if side[i] == 0:
+            x[i] *= qp.root[i]
+            multipliers[i] = 0.0
+        else:
+            x[i] = qp.kept[i]
+            weight = qp.diagonal[0, i] + qp.mu[0]
+            multipliers[i] += qp.diagonal[1, i] - weight * x[i]
+
+
+@compiled
+def _deactivate(qp: QpArrays) -> bool:
+    """Make inactive what has a multiplier of the wrong sign; return if there is any."""
+    n, changed = qp.x.shape[0], False
+    for i in range(n):
+        wrong = qp.multipliers[i] * qp.side[i] < 0.0
+        if wrong and qp.lower[i] < qp.upper[i]:
+            qp.side[i], changed = 0, True
+    for row in range(qp.counts[0]):
+        force, side = qp.multipliers[n + row], qp.side[n + row]
+        if side != 0 and force < 0.0:
+            qp.side[n + row], changed = 0, True
+        elif side == _HARD and qp.wanted[row] < qp.upper[n + row]:
+            slack = qp.upper[n + row] - qp.wanted[row]
+            if force < qp.weight[0] * slack:
+                qp.side[n + row], changed = _SOFT, True
+    return changed
+
+
+@compiled
+def _activate(qp: QpArrays, only_one: bool) -> bool:  # noqa: C901, one search
+    """Make active what is violated, or the worst of it; return if there is any.
+
+    Clips what is violated by rounding.
+    """
+    n, found, worst, state = qp.x.shape[0], -1, 0.0, 0
+    for i in range(n):
+        over, under = qp.x[i] - qp.upper[i], qp.lower[i] - qp.x[i]
+        violation = over if over > under else under
+        if violation <= _TOLERANCE:  # False for what is not a number
+            qp.x[i] = min(max(qp.x[i], qp.lower[i]), qp.upper[i])
+            continue
+        side = 1 if over > under else -1
+        if not only_one:
+            qp.side[i] = side
+        if found < 0 or violation > worst:
+            found, worst, state = i, violation, side
+    for row in range(qp.counts[0]):
+        if qp.side[n + row] == _HARD:
+            continue
+        bound = qp.upper[n + row]
+        soft = qp.wanted[row] < bound and qp.side[n + row] == 0
+        value = dot(qp.rows[row], qp.x, n)
+        violation = value - (qp.wanted[row] if soft else bound)
+        if violation <= _ROW_TOLERANCE:
+            continue
+        side = _SOFT if soft else _HARD
+        if not only_one:
+            qp.side[n + row] = side
+        if found < 0 or violation > worst:
+            found, worst, state = n + row, violation, side
     if only_one and found >= 0:
-        side[found] = 1 if x[found] > ub[found] else -1
-    return found < 0
+        qp.side[found] = state
+    return found >= 0

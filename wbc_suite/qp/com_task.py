@@ -1,12 +1,13 @@
 """Bring the centre of mass to a point."""
 
-import numpy as np
+from typing import ClassVar
 
 from wbc_suite.arguments import check_array
 from wbc_suite.kinematics import Configuration
-from wbc_suite.qp.lie import is_usable, saturate
-from wbc_suite.qp.rows import PACKED_COM
-from wbc_suite.qp.task import RowTask, check_speed, cost_vector
+from wbc_suite.kinematics.forward import compute_joint_poses
+from wbc_suite.qp.kernel import Kernel
+from wbc_suite.qp.task import RowTask, SharedRow
+from wbc_suite.qp.task_kernels import com_error
 from wbc_suite.typing import Matrix, Vector
 
 __all__ = ["ComTask"]
@@ -24,7 +25,7 @@ class ComTask(RowTask):
         name: How reports call the task.
     """
 
-    dim = 3
+    kernel: ClassVar[Kernel] = Kernel.COM
 
     def __init__(
         self,
@@ -36,11 +37,11 @@ class ComTask(RowTask):
         max_speed: float = 1.0,
         name: str = "com",
     ) -> None:
-        super().__init__(name, gain=gain, level=level)
-        self.packed: Vector = np.zeros(PACKED_COM)
-        self.packed[3:6] = cost_vector(name, cost, 3)
-        self.packed[6:] = self.gain, check_speed(name, max_speed)
-        self.has_target = target is not None
+        super().__init__(
+            name, dim=3, cost=cost, gain=gain, level=level, max_speed=max_speed
+        )
+        self.target_row = SharedRow(3)
+        self.has_target = False
         if target is not None:
             self.set_target(target)
 
@@ -51,37 +52,22 @@ class ComTask(RowTask):
             ConfigError: If the shape is wrong.
         """
         what = f"Task '{self.name}': the target"
-        self.packed[:3] = check_array(what, target, (3,))
+        self.target_row.set(check_array(what, target, (3,)))
         self.has_target = True
 
     @property
     def target(self) -> Vector:
         """Point p*, m, a copy."""
-        return self.packed[:3].copy()
+        return self.target_row.values.copy()
 
     def bind(self, configuration: Configuration) -> None:
         """Without a target, hold the present point."""
         if not self.has_target:
             self.set_target(configuration.com)
 
-    def error(self, configuration: Configuration) -> Vector:
-        """Return `p* - p_com`, m, shape (3,)."""
-        if not is_usable(self.packed[:3]):
-            return np.full(3, np.nan)
-        return self.packed[:3] - configuration.com
-
-    def jacobian(self, configuration: Configuration) -> Matrix:
-        """Return the derivative J of the error, `d(e) = -J dq`, shape (3, nv)."""
-        return configuration.com_jacobian
-
-    def rows(
-        self, configuration: Configuration, dt: float, W: Matrix, e: Vector
-    ) -> Vector:
-        """Write the weighted rows; the readable form of the kernel `com_rows`."""
-        error = self.error(configuration)
-        costs, gain, speed = self.packed[3:6], self.packed[6], self.packed[7]
-        step = gain * error if np.isfinite(error).all() else np.zeros(3)
-        saturate(step, speed * dt)
-        W[:] = costs[:, None] * configuration.com_jacobian
-        e[:] = costs * step
-        return error
+    def evaluate(
+        self, configuration: Configuration, error: Vector, jacobian: Matrix
+    ) -> None:
+        """Write the error, m, and its Jacobian."""
+        compute_joint_poses(configuration.robot)
+        com_error(configuration.robot, self.target_row.values, error, jacobian)

@@ -1,33 +1,50 @@
-"""The rows of a stack's limits and equalities: written, named, and told apart."""
+"""The rows of a stack's limits and equalities: bound, evaluated and named."""
 
-from collections.abc import Callable, Iterator, Sequence
-from functools import partial
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import cast
 
 import numpy as np
 
-from wbc_suite.compiling import compiled
+from wbc_suite.compiling import as_argument
+from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Configuration
-from wbc_suite.qp.bounds import LimitKind
-from wbc_suite.qp.equality import Equality
-from wbc_suite.qp.limit import Limit, RowLimit
-from wbc_suite.qp.problem import Problem
-from wbc_suite.qp.solution import Pressure
-from wbc_suite.typing import Array, Indices, Matrix, Vector
+from wbc_suite.qp.active_set import QpArrays
+from wbc_suite.qp.equality import Equality, FrameEquality, HeldFrames, LinearEquality
+from wbc_suite.qp.floor_limit import FloorLimit
+from wbc_suite.qp.kernel import Kernel, kernel_of
+from wbc_suite.qp.limit import Limit, LimitKind, RowLimit
+from wbc_suite.qp.self_collision_limit import SelfCollisionLimit
+from wbc_suite.qp.strict_level import MAX_LEVELS
+from wbc_suite.qp.task import RowTask, Task
+from wbc_suite.typing import Indices, Vector
 
-__all__ = ["Constraints"]
+__all__ = ["Constraints", "check_parts"]
 
 
 class Constraints:
     """Inequality rows, then equality rows, in the order in which a problem has them.
 
+    The first self-collision limit, the first floor limit and the equalities of this
+    package are written by kernels; others by their own `rows` before each tick.
+
     Args:
-        configuration: The robot; the rows are bound to it here.
+        configuration: The robot; limits and equalities are bound to it here.
         limits: Limits; those with rows are used.
         equalities: Equality rows.
 
     Attributes:
         inequalities: Number of inequality rows.
-        dim: Number of equality rows.
+        equalities: Number of equality rows.
+        names: Name and number of rows of each equality.
+        relax_speed: `RowLimit.relax_speed` of each inequality row.
+        rate: Right-hand side per second of constant equality rows, NaN for others.
+        held: Frames of the equality rows, for `hold_frames`.
+        collision: The self-collision limit that a kernel writes.
+        collision_rows: Its first inequality row and the end.
+        floor: The floor limit that a kernel writes.
+        floor_rows: Its first inequality row and the end.
+        is_compiled: Whether kernels write all rows.
     """
 
     def __init__(
@@ -38,149 +55,139 @@ class Constraints:
     ) -> None:
         self._limits = [x for x in limits if isinstance(x, RowLimit)]
         self._equalities = tuple(equalities)
-        for bound in (*self._limits, *self._equalities):
-            bound.bind(configuration)
-        self.inequalities = sum(x.dim for x in self._limits)
-        self.dim = sum(x.dim for x in self._equalities)
-        self._gives_way: Vector = np.repeat(
-            [x.gives_way for x in self._limits], [x.dim for x in self._limits]
-        )
-        self._b: Vector = np.zeros(self.dim)
-        self._names = configuration.velocity_names()
+        for part in (*self._limits, *self._equalities):
+            part.bind(configuration)
+        dims = [x.dim for x in self._limits]
+        self._rows = _slices(dims)
+        self._equality_rows = _slices([x.dim for x in equalities])
+        self.inequalities = sum(dims)
+        self.equalities = sum(x.dim for x in equalities)
+        self.names = tuple((x.name, x.dim) for x in equalities)
+        speeds = [x.relax_speed for x in self._limits]
+        self.relax_speed: Vector = np.repeat(np.array(speeds, dtype=np.float64), dims)
+        self._bind_limits(configuration)
+        self._bind_equalities(configuration)
+        self.is_compiled = not self._python_limits and not self._python_equalities
+
+    def _bind_limits(self, configuration: Configuration) -> None:
+        """Choose what kernels write; limits without capsules and spheres write none."""
+        self.collision, self.floor = SelfCollisionLimit((), ()), FloorLimit({})
+        self.collision_rows: Indices = np.zeros(2, dtype=np.int64)
+        self.floor_rows: Indices = np.zeros(2, dtype=np.int64)
+        self._python_limits: list[tuple[RowLimit, slice]] = []
+        for limit, rows in zip(self._limits, self._rows, strict=True):
+            kernel, end = kernel_of(limit), (rows.start, rows.stop)
+            is_first = not self.collision_rows.any()
+            if isinstance(limit, SelfCollisionLimit) and kernel and is_first:
+                self.collision, self.collision_rows[:] = limit, end
+            elif isinstance(limit, FloorLimit) and kernel and not self.floor_rows.any():
+                self.floor, self.floor_rows[:] = limit, end
+            else:
+                self._python_limits.append((limit, rows))
+        self.collision.bind(configuration)
+        self.floor.bind(configuration)
+
+    def _bind_equalities(self, configuration: Configuration) -> None:
+        self.rate: Vector = np.full(self.equalities, np.nan)
+        self._frames: list[tuple[FrameEquality, int]] = []
+        self._constant: list[tuple[LinearEquality, slice]] = []
+        self._python_equalities: list[tuple[Equality, slice]] = []
+        for equality, rows in zip(self._equalities, self._equality_rows, strict=True):
+            kernel = kernel_of(equality)
+            if isinstance(equality, FrameEquality) and kernel is Kernel.FRAME:
+                self._frames.append((equality, rows.start))
+            elif isinstance(equality, LinearEquality) and kernel is Kernel.CONSTANT:
+                self._constant.append((equality, rows))
+                self.rate[rows] = equality.rate
+            else:
+                self._python_equalities.append((equality, rows))
+        self._held = HeldFrames.of(configuration, self._frames)
+        self.held = as_argument(self._held)
+        self._targets = list(self._held.target)  # copies live as long as these views
+        for (equality, _), target in zip(self._frames, self._targets, strict=True):
+            equality.target_row.attach(target)
+
+    def fill_constants(self, qp: QpArrays) -> None:
+        """Write the rows that never change."""
+        A = qp.rows[self.inequalities :]
+        for equality, rows in self._constant:
+            A[rows] = equality.matrix
+
+    def prepare(self, configuration: Configuration, dt: float, qp: QpArrays) -> None:
+        """Write the rows that have no kernel."""
+        nv, p = configuration.nv, self.inequalities
+        G, h = qp.rows[:p], qp.upper[nv : nv + p]
+        A, b = qp.rows[p:], qp.upper[nv + p :]
+        for limit, rows in self._python_limits:
+            limit.rows(configuration, dt, G[rows], h[rows])
+        for equality, rows in self._python_equalities:
+            equality.rows(configuration, dt, A[rows], b[rows])
 
     def reset(self) -> None:
-        """Let limits that remember how the robot moved forget it."""
+        """Let limits discard their memory of earlier ticks."""
         for limit in self._limits:
             limit.reset()
 
-    def write(self, configuration: Configuration, dt: float, problem: Problem) -> bool:
-        """Fill the rows of a problem; return whether a row is outside its limit.
-
-        A row that is outside its limit does not bind to come back, or rows could demand
-        more than joints can do: it wants to, softly, and binds to go no further out. So
-        a robot that stands is never asked to move. Far outside it may give way, see
-        `RowLimit.gives_way`.
-        """
-        row, outside = 0, False
-        for limit in self._limits:
-            rows = slice(row, row + limit.dim)
-            limit.rows(configuration, dt, problem.G[rows], problem.h[rows])
-            row = rows.stop
-        if self._limits:
-            outside = _let_out(problem.h, problem.wanted, self._gives_way, dt)
-        row = 0
-        for equality in self._equalities:
-            rows = slice(row, row + equality.dim)
-            equality.rows(configuration, dt, problem.A[rows], self._b[rows])
-            row = rows.stop
-        if self._equalities:
-            problem.set_equalities(self._b)
-        return outside
-
-    def broken(self, problem: Problem, x: Vector, tolerance: float) -> tuple[str, ...]:
-        """Return the names of the rows that a step does not keep."""
-        names, row = list[str](), 0
-        missed = np.abs(problem.A @ x - problem.b) > tolerance
-        for equality in self._equalities:
-            if missed[row : row + equality.dim].any():
-                names.append(equality.name)
-            row += equality.dim
-        over = np.flatnonzero(problem.G @ x - problem.h > tolerance)
-        return (*names, *(self._label(int(i))[1] for i in over))
-
-    def press(
-        self, levels: Sequence[Vector], kinds: Array | Indices
-    ) -> Callable[[], Pressure]:
-        """Return what tells how limits are pressed.
-
-        Rows are named at once: the next tick may give them other words.
-
-        Args:
-            levels: Multipliers of each level's bounds and rows.
-            kinds: The `LimitKind` of lower and upper bounds, 2 nv numbers.
-        """
-        tell, nv = partial(self.pressure, levels, kinds), len(self._names)
-        rows = slice(nv, nv + self.inequalities)
-        if not self.inequalities or not any(
-            np.count_nonzero(level[rows]) for level in levels
-        ):
-            return tell
-        pressure = tell()
-        return lambda: pressure
-
-    def pressure(self, levels: Sequence[Vector], kinds: Array | Indices) -> Pressure:
-        """Merge the multipliers of levels, the greatest of each kept; see `press`."""
-        nv = len(self._names)
-        rows = nv + self.inequalities
-        merged: Vector = levels[0][:rows] if levels else np.zeros(rows)
-        for multipliers in levels[1:]:
-            greater = np.abs(multipliers[:rows]) > np.abs(merged)
-            merged = np.where(greater, multipliers[:rows], merged)
-        labels: dict[int, tuple[LimitKind, str]] = {}
-        if self.inequalities:
-            pressed = merged[nv:].nonzero()[0]
-            labels = {int(i): self._label(int(i)) for i in pressed}
-        kinds = kinds.reshape(2, nv).astype(np.int64)
-        return Pressure(merged, kinds, self._names, labels)
-
-    def opponents(
-        self, rows: Matrix, multipliers: Vector, kinds: Indices, *, first: bool
-    ) -> Callable[[], Iterator[tuple[str, Vector]]]:
-        """Return what yields words and force on the joints of what is pressed.
-
-        Rows are named and copied at once, as by `press`.
-
-        Args:
-            rows: Of one level's problem.
-            multipliers: Of its bounds and rows.
-            kinds: See `pressure`.
-            first: Whether the equality rows are these; else they stand for the levels
-                above.
-        """
-        pressure = self.pressure([multipliers], kinds)
-        copied = rows.copy()
-        return lambda: self._opponents(pressure, multipliers, copied, first=first)
-
-    def _opponents(
-        self, pressure: Pressure, multipliers: Vector, rows: Matrix, *, first: bool
-    ) -> Iterator[tuple[str, Vector]]:
-        nv = rows.shape[1]
-        for i in pressure.multipliers.nonzero()[0].tolist():
-            row = np.eye(nv)[i] if i < nv else rows[i - nv]
-            yield str(pressure.limit(i)), multipliers[i] * row
-        n = self.inequalities
-        forces = multipliers[nv + n :, None] * rows[n:]
-        if not first:
-            yield "conflict: tasks of a higher level", forces.sum(axis=0)
-            return
-        row = 0
-        for equality in self._equalities:
-            force = forces[row : row + equality.dim].sum(axis=0)
-            yield f"conflict: {equality.name}", force
-            row += equality.dim
-
-    def _label(self, row: int) -> tuple[LimitKind, str]:
-        """Return kind and words of an inequality row."""
-        for limit in self._limits:
-            if row < limit.dim:
-                return limit.kind, limit.label(row)
-            row -= limit.dim
+    def subject(self, row: int) -> tuple[LimitKind, object, str]:
+        """Return kind, subject and unit of an inequality row of the last tick."""
+        for limit, rows in zip(self._limits, self._rows, strict=True):
+            if row < rows.stop:
+                return limit.kind, limit.subject(row - rows.start), limit.unit
         raise IndexError(row)
 
+    def violated(self, qp: QpArrays, x: Vector, tolerance: float) -> tuple[str, ...]:
+        """Return the names of the rows that a step does not keep."""
+        over = qp.rows @ x - qp.upper[len(x) :]
+        p = self.inequalities
+        missed = np.abs(over[p:]) > tolerance
+        names = [
+            equality.name
+            for equality, rows in zip(
+                self._equalities, self._equality_rows, strict=True
+            )
+            if missed[rows].any()
+        ]
+        rows = np.flatnonzero(over[:p] > tolerance)
+        return (*names, *(str(self.subject(int(i))[1]) for i in rows))
 
-@compiled
-def _let_out(h: Vector, wanted: Vector, gives_way: Vector, dt: float) -> bool:
-    """Let rows want what they were to bind to; return whether any wants more.
 
-    Args:
-        h: In and out, what rows bind to, shape (n,).
-        wanted: Output, what they lead to.
-        gives_way: See `RowLimit.gives_way`, for each row.
-        dt: Step, s.
-    """
-    outside = False
-    for i in range(h.shape[0]):
-        wanted[i] = h[i]
-        h[i] = max(h[i], 0.0, -2.0 * (wanted[i] + gives_way[i] * dt))
-        outside |= wanted[i] < h[i]
-    return outside
+def _slices(sizes: Sequence[int]) -> list[slice]:
+    """Return where each block of rows is, one after another."""
+    return [slice(a, b) for a, b in pairwise(np.cumsum([0, *sizes]).tolist())]
+
+
+def check_parts(
+    configuration: object, tasks: object, limits: object, equalities: object
+) -> None:
+    """Raise ConfigError if a part is of another kind, or two tasks share a name."""
+    if not isinstance(configuration, Configuration):
+        raise ConfigError(
+            f"TaskStack needs a Configuration, not {type(configuration).__name__}."
+        )
+    _check_list("limits", limits if limits is not None else (), Limit)
+    _check_list("equalities", equalities, Equality)
+    checked = cast("Sequence[Task]", _check_list("tasks", tasks, Task))
+    levels = {task.level for task in checked}
+    if len(levels) > MAX_LEVELS:
+        raise ConfigError(
+            f"TaskStack: {len(levels)} levels, but there may be at most {MAX_LEVELS}."
+        )
+    names = [task.name for task in checked if isinstance(task, RowTask)]
+    for name in names:
+        if names.count(name) > 1:
+            raise ConfigError(
+                f"TaskStack: two tasks are named '{name}', and reports go by name. "
+                "Give one of them another name=..."
+            )
+
+
+def _check_list(what: str, given: object, kind: type) -> Sequence[object]:
+    if not isinstance(given, Sequence) or isinstance(given, str):
+        raise ConfigError(f"TaskStack: {what} are a list, not {given!r:.60}.")
+    items = cast("Sequence[object]", given)
+    for item in items:
+        if not isinstance(item, kind):
+            raise ConfigError(
+                f"TaskStack: {what} hold {kind.__name__} objects, not {item!r:.60}."
+            )
+    return items

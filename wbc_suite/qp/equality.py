@@ -2,37 +2,49 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Literal
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from wbc_suite.arguments import check_array, check_number
+from wbc_suite.compiling import as_argument, compiled, struct
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.kinematics import Configuration
+from wbc_suite.kinematics.forward import (
+    RobotArrays,
+    compute_joint_poses,
+    multiply_poses,
+    pack_pose,
+)
 from wbc_suite.qp.frame_task import homogeneous
-from wbc_suite.qp.lie import is_usable, saturate
+from wbc_suite.qp.kernel import Kernel
+from wbc_suite.qp.lie import FAR, log3, saturate
+from wbc_suite.qp.task import SharedRow
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["Equality", "FrameEquality", "LinearEquality"]
+__all__ = ["Equality", "FrameEquality", "HeldFrames", "LinearEquality", "hold_frames"]
 
 Direction = Literal["x", "y", "z", "roll", "pitch", "yaw"]
 _DIRECTIONS = ("x", "y", "z", "roll", "pitch", "yaw")
+_RETURN_SPEED = 0.5  # m/s, of a frame that has drifted
+_RETURN_ANGULAR_SPEED = 1.0  # rad/s
 
 
 class Equality(ABC):
     """Rows `A dq = b`, prior to every task.
 
     Attributes:
+        kernel: What writes the rows, see `kernel_of`.
         name: How reports call the rows.
         dim: Number of rows.
     """
 
+    kernel: ClassVar[Kernel] = Kernel.PYTHON
     name: str
     dim: int
 
-    @abstractmethod
-    def bind(self, configuration: Configuration) -> None:
+    def bind(self, configuration: Configuration) -> None:  # noqa: B027, may be empty
         """Resolve names in a model."""
 
     @abstractmethod
@@ -63,6 +75,8 @@ class FrameEquality(Equality):
         UnknownNameError: If a direction is unknown.
     """
 
+    kernel: ClassVar[Kernel] = Kernel.FRAME
+
     def __init__(
         self,
         frame: str,
@@ -83,47 +97,38 @@ class FrameEquality(Equality):
         self.name, self.frame = name or frame, frame
         self.hold_pose = hold_pose
         kept = [_DIRECTIONS.index(direction) for direction in directions]
-        self._kept: Indices = np.array(kept, dtype=np.int64)
-        self.dim = len(self._kept)
-        self.target: pin.SE3 | None = None
+        self.directions: Indices = np.array(kept, dtype=np.int64)
+        self.dim = len(kept)
+        self.target_row, self.has_target = SharedRow(12), False
         if target is not None:
             self.set_target(target)
 
     def set_target(self, target: pin.SE3 | Matrix) -> None:
         """Set the pose T_wt to hold."""
-        T = homogeneous(self.name, target)
-        self.target = pin.SE3(T[:3, :3].copy(), T[:3, 3].copy())
+        self.target_row.set(homogeneous(self.name, target).ravel()[:12])
+        self.has_target = True
 
     def bind(self, configuration: Configuration) -> None:
         """Resolve the frame; without a target, hold its present pose."""
         self.frame_index = configuration.frame_id(self.frame)
-        if self.target is None:
-            self.target = configuration.frame_pose(self.frame_index)
+        if not self.has_target:
+            self.set_target(configuration.frame_pose(self.frame_index))
 
     def rows(
         self, configuration: Configuration, dt: float, A: Matrix, b: Vector
     ) -> None:
         """Write the kept rows of `J_local dq = gain e`."""
-        A[:] = configuration.frame_jacobian(self.frame_index)[self._kept]
-        if not self.hold_pose:
-            b[:] = 0.0
-            return
-        error = self.error(configuration)
-        error *= self.gain
-        if not np.isfinite(error).all():
-            error[:] = 0.0
-        saturate(error[:3], 0.5 * dt)
-        saturate(error[3:], 1.0 * dt)
-        b[:] = error[self._kept]
+        compute_joint_poses(configuration.robot)
+        held = as_argument(HeldFrames.of(configuration, [(self, 0)]))
+        hold_frames(configuration.robot, held, dt, A, b)
 
     def error(self, configuration: Configuration) -> Vector:
         """Return the drift e, m and rad in the frame's axes, shape (6,)."""
-        assert self.target is not None
-        if not is_usable(self.target.homogeneous):
-            return np.full(6, np.nan)
-        pose = configuration.frame_pose(self.frame_index)
-        drift = pose.actInv(self.target)
-        return np.concatenate([drift.translation, pin.log3(drift.rotation)])
+        compute_joint_poses(configuration.robot)
+        held, error = HeldFrames.of(configuration, [(self, 0)]), np.empty(6)
+        frame = held.joint[0], held.offset[0], held.target[0]
+        _drift(configuration.robot, *frame, np.empty(12), error)
+        return error
 
 
 class LinearEquality(Equality):
@@ -137,6 +142,8 @@ class LinearEquality(Equality):
     Raises:
         ConfigError: If shapes differ or a value is not finite.
     """
+
+    kernel: ClassVar[Kernel] = Kernel.CONSTANT
 
     def __init__(
         self, matrix: Matrix, *, rate: Vector | None = None, name: str = "equality"
@@ -173,3 +180,118 @@ class LinearEquality(Equality):
         """Write the rows."""
         A[:] = self.matrix
         np.multiply(self.rate, dt, out=b)
+
+
+@struct
+class HeldFrames(NamedTuple):
+    """Frames that `hold_frames` holds, n of them.
+
+    Attributes:
+        joint: Parent joint of each frame, shape (n,).
+        offset: Pose of the frame in its joint, by columns, shape (n, 12).
+        moves: 1 where a velocity moves the frame, else 0, shape (n, nv).
+        target: Pose to hold, [R p] row by row, shape (n, 12).
+        gain: Fraction of the drift that one step removes; 0 leads nothing back.
+        directions: Local direction of each row, shape (m,).
+        row_start: First entry of each frame in `directions`, and m, shape (n + 1,).
+        row: Row of the problem of each entry of `directions`, shape (m,).
+    """
+
+    joint: Indices
+    offset: Matrix
+    moves: Matrix
+    target: Matrix
+    gain: Vector
+    directions: Indices
+    row_start: Indices
+    row: Indices
+
+    @classmethod
+    def of(
+        cls, configuration: Configuration, held: Sequence[tuple[FrameEquality, int]]
+    ) -> "HeldFrames":
+        """Return the arrays of some equalities, each with its first row."""
+        ids = [configuration.frame_id(x.frame) for x, _ in held]
+        frames = [configuration.model.frames[k] for k in ids]
+        count = len(held)
+        moves = np.zeros((count, configuration.nv))
+        for k, frame in enumerate(frames):
+            moves[k, configuration.joint_support(frame.parentJoint)] = 1.0
+        none = [np.zeros(0, dtype=np.int64)]
+        rows = [row + np.arange(x.dim, dtype=np.int64) for x, row in held]
+        return cls(
+            joint=np.array([f.parentJoint for f in frames], dtype=np.int64),
+            offset=np.array([pack_pose(f.placement) for f in frames]).reshape(
+                count, 12
+            ),
+            moves=moves,
+            target=np.array([x.target_row.values for x, _ in held]).reshape(count, 12),
+            gain=np.array([x.gain if x.hold_pose else 0.0 for x, _ in held]),
+            directions=np.concatenate([*none, *(x.directions for x, _ in held)]),
+            row_start=np.cumsum([0, *(x.dim for x, _ in held)], dtype=np.int64),
+            row=np.concatenate([*none, *rows]),
+        )
+
+
+@compiled
+def hold_frames(
+    robot: RobotArrays, held: HeldFrames, dt: float, A: Matrix, b: Vector
+) -> None:
+    """Write the rows of `FrameEquality`: the kept rows of `J_local dq = gain e`.
+
+    Args:
+        robot: The robot; joint poses are current.
+        held: The frames.
+        dt: Step, s.
+        A: Output, rows of the problem.
+        b: Output, their right-hand side.
+    """
+    T, error = np.empty(12), np.empty(6)
+    for t in range(held.joint.shape[0]):
+        _drift(robot, held.joint[t], held.offset[t], held.target[t], T, error)
+        finite = True
+        for i in range(6):
+            error[i] *= held.gain[t]
+            finite &= bool(np.isfinite(error[i]))
+        saturate(error[:3], _RETURN_SPEED * dt)
+        saturate(error[3:], _RETURN_ANGULAR_SPEED * dt)
+        for k in range(held.row_start[t], held.row_start[t + 1]):
+            row, direction = held.row[k], held.directions[k]
+            b[row] = error[direction] if finite and held.gain[t] > 0.0 else 0.0
+            a = T[3 * (direction % 3) : 3 * (direction % 3) + 3]
+            for col in range(A.shape[1]):
+                J, speed = robot.jacobian[col], 0.0
+                if direction >= 3:
+                    speed = a[0] * J[3] + a[1] * J[4] + a[2] * J[5]
+                else:
+                    speed += a[0] * (J[0] + J[4] * T[11] - J[5] * T[10])
+                    speed += a[1] * (J[1] + J[5] * T[9] - J[3] * T[11])
+                    speed += a[2] * (J[2] + J[3] * T[10] - J[4] * T[9])
+                A[row, col] = held.moves[t, col] * speed
+
+
+@compiled
+def _drift(
+    robot: RobotArrays,
+    joint: int,
+    offset: Vector,
+    target: Vector,
+    T: Vector,
+    error: Vector,
+) -> None:
+    """Write the pose of a frame, and its drift in the frame's axes, shape (6,)."""
+    multiply_poses(robot.pose[joint], offset, T)
+    E, finite = np.empty((3, 3)), True
+    for i in range(12):
+        finite &= abs(target[i]) < FAR
+    for i in range(3):
+        error[i] = 0.0
+        for j in range(3):
+            error[i] += T[3 * i + j] * (target[4 * j + 3] - T[9 + j])
+            E[i, j] = T[3 * i] * target[j]
+            E[i, j] += T[3 * i + 1] * target[4 + j] + T[3 * i + 2] * target[8 + j]
+    if finite:
+        log3(E, error[3:])
+    else:
+        for i in range(6):
+            error[i] = np.nan

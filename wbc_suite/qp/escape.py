@@ -1,11 +1,11 @@
-"""A way out of postures from which no small step leads nearer to a target.
+"""Escape from local minima of differential inverse kinematics.
 
-Differential inverse kinematics walks downhill, and can end where every small step
-leads away: an arm stretched against its elbow's limit, with its target between hand and
-shoulder, would have to reach out further before it can fold. Such a posture is left by
-driving the joints concerned towards the middle of their ranges for a moment. Whether
-that helps is found out beforehand on a copy of the robot, a few steps per tick, so that
-a robot whose target is simply out of reach stands still.
+Differential inverse kinematics descends, and can end where every small step leads away
+from the target: an arm stretched against its elbow's limit, with its target between
+hand and shoulder, would have to reach out further before it can fold. Such a posture is
+left by driving the joints concerned towards the middle of their ranges for a moment.
+Whether that helps is simulated beforehand on a copy of the robot, a few steps per tick,
+so that a robot whose target is out of reach stands still.
 """
 
 from collections.abc import Callable, Generator, Sequence
@@ -20,14 +20,14 @@ from wbc_suite.qp.lie import is_usable
 from wbc_suite.qp.limit import JointBounds
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["Escape", "Shadow"]
+__all__ = ["Escape", "StackCopy"]
 
 _STILL = 0.02  # rad/s or m/s; a slower robot stands
-_PATIENCE = 0.25  # s of standing before a look ahead
-_FAR = 5e-3  # m (and rad / _ARM); a smaller error is no reason to look
+_STANDING_TIME = 0.25  # s of standing before a simulation
+_FAR = 5e-3  # m (and rad / _ARM); a smaller error is accepted
 _ARM = 0.3  # m; weighs angles against distances
-_LOOK_STEP = 0.02  # s, step of the look ahead
-_LOOKS_PER_SECOND = 200.0  # steps of the look ahead per second of the robot's time
+_STEP = 0.02  # s, step of the simulation
+_STEPS_PER_SECOND = 200.0  # simulated steps per second of the robot's time
 _DRIVE_TIME = 2.5  # s, longest drive towards the middle
 _SETTLE_TIME = 2.0  # s given to the tasks afterwards
 _ARRIVED = 0.1  # of the range; this near to the middle the drive ends
@@ -36,8 +36,8 @@ _DRIVE_COST = 3.0  # against the greatest cost of a watched task
 _DRIVE_SPEED = 0.5  # of the velocity limit
 
 
-class Shadow(Protocol):
-    """A copy of a stack on a copy of its robot, to look ahead with."""
+class StackCopy(Protocol):
+    """A copy of a stack on a copy of its robot, for simulation."""
 
     configuration: Configuration
 
@@ -55,13 +55,13 @@ class _Drive:
 
 
 class Escape:
-    """Watches frame tasks, and answers the bias of each tick.
+    """Monitors frame tasks, and returns the bias of each tick.
 
     Args:
         configuration: The robot.
-        tasks: The frame tasks to watch.
+        tasks: The frame tasks to monitor.
         bounds: The joints' limits; only joints with two position limits are driven.
-        make_shadow: Makes the copy to look ahead with, at the present configuration.
+        make_copy: Returns a copy for simulation, at the present configuration.
     """
 
     def __init__(
@@ -69,10 +69,10 @@ class Escape:
         configuration: Configuration,
         tasks: Sequence[FrameTask],
         bounds: JointBounds,
-        make_shadow: Callable[[], Shadow],
+        make_copy: Callable[[], StackCopy],
     ) -> None:
         self._configuration, self._tasks = configuration, tuple(tasks)
-        self._bounds, self._make_shadow = bounds, make_shadow
+        self._bounds, self._make_copy = bounds, make_copy
         self._range = bounds.q_upper - bounds.q_lower
         limited = np.isfinite(self._range) & (bounds.q_index >= 0)
         self._limited = np.flatnonzero(limited)
@@ -84,12 +84,12 @@ class Escape:
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything."""
+        """Discard all state."""
         self._still = 0.0
         self._drive: _Drive | None = None
         self._search: Generator[None, None, _Drive | None] | None = None
         self._targets: Vector | None = None  # of the search or drive
-        self._answered: Vector | None = None  # targets that need no second look
+        self._simulated: Vector | None = None  # targets that have been simulated
 
     def bias(
         self, dt: float, v: Vector, pressed: Callable[[], Indices]
@@ -99,20 +99,20 @@ class Escape:
         Args:
             dt: Step, s.
             v: Velocity of the previous tick, shape (nv,).
-            pressed: Tells the velocity indices of the joints that were pressed against
+            pressed: Returns the velocity indices of the joints that are pressed against
                 position limits.
         """
         self._still = self._still + dt if max(v.max(), -v.min()) < _STILL else 0.0
         if self._drive is None and self._search is None:
-            if self._still < _PATIENCE or not self._is_stuck():
+            if self._still < _STANDING_TIME or not self._is_stuck():
                 return None
             self._targets = self._present_targets()
-            self._search = self._look_ahead(pressed())
+            self._search = self._simulate(pressed())
         if self._targets_moved(self._targets, 1e-2):
             self._drive, self._search = None, None
             return None
         if self._search is not None:
-            self._advance(max(1, round(_LOOKS_PER_SECOND * dt)))
+            self._advance(max(1, round(_STEPS_PER_SECOND * dt)))
         if self._drive is None:
             return None
         if self._is_over(self._drive, self._configuration.q):
@@ -122,16 +122,16 @@ class Escape:
         return self._bias_of(self._drive, self._configuration.q, dt)
 
     def _advance(self, steps: int) -> None:
-        """Look some steps further ahead; begin the drive that was found."""
+        """Simulate some more steps; begin the drive that was found."""
         assert self._search is not None
         try:
             for _ in range(steps):
                 next(self._search)
         except StopIteration as end:
             self._search, self._drive = None, end.value
-            self._answered = self._present_targets()
+            self._simulated = self._present_targets()
 
-    def _look_ahead(self, pressed: Indices) -> Generator[None, None, _Drive | None]:
+    def _simulate(self, pressed: Indices) -> Generator[None, None, _Drive | None]:
         """Try drives on a copy of the robot; return the first that helps."""
         far = [e > _FAR for e in self._errors(self._configuration)]
         chains = [s for s, is_far in zip(self._supports, far, strict=True) if is_far]
@@ -140,14 +140,14 @@ class Escape:
         for joints in (np.intersect1d(pressed, chain), chain):
             if not len(joints):
                 continue
-            shadow, drive = self._make_shadow(), _Drive(joints)
-            robot = shadow.configuration
+            copy, drive = self._make_copy(), _Drive(joints)
+            robot = copy.configuration
             while not self._is_over(drive, robot.q):
-                shadow.step(_LOOK_STEP, self._bias_of(drive, robot.q, _LOOK_STEP))
-                drive.time += _LOOK_STEP
+                copy.step(_STEP, self._bias_of(drive, robot.q, _STEP))
+                drive.time += _STEP
                 yield
-            for _ in range(round(_SETTLE_TIME / _LOOK_STEP)):
-                shadow.step(_LOOK_STEP, None)
+            for _ in range(round(_SETTLE_TIME / _STEP)):
+                copy.step(_STEP, None)
                 yield
             if np.linalg.norm(self._errors(robot)) < _BETTER * before:
                 return _Drive(joints)
@@ -161,7 +161,7 @@ class Escape:
 
     def _bias_of(self, drive: _Drive, q: Vector, dt: float) -> Matrix:
         joints = drive.joints
-        cost = _DRIVE_COST * max(float(t.packed[12:18].max()) for t in self._tasks)
+        cost = _DRIVE_COST * max(float(t.cost.max()) for t in self._tasks)
         speed = np.minimum(self._bounds.v_max[joints], 3.0) * _DRIVE_SPEED * dt
         step = self._middle[joints] - q[self._bounds.q_index[joints]]
         self._bias[:] = 0.0
@@ -170,16 +170,18 @@ class Escape:
         return self._bias
 
     def _is_stuck(self) -> bool:
-        if self._answered is not None and not self._targets_moved(self._answered, 1e-3):
+        if self._simulated is not None and not self._targets_moved(
+            self._simulated, 1e-3
+        ):
             return False
         return any(e > _FAR for e in self._errors(self._configuration))
 
     def _errors(self, configuration: Configuration) -> list[float]:
-        """Return each task's weighted distance; 0 for what it does not ask for."""
+        """Return each task's weighted distance; rows without cost do not count."""
         errors: list[float] = []
         for task in self._tasks:
             error = task.error(configuration)
-            costs = task.packed[12:18]
+            costs = task.cost
             if not np.isfinite(error).all():
                 error = np.zeros(6)
             kept = np.where(costs > 0.0, error, 0.0)
@@ -188,7 +190,7 @@ class Escape:
         return errors
 
     def _present_targets(self) -> Vector:
-        return np.concatenate([t.packed[:12] for t in self._tasks])
+        return np.concatenate([t.target_row.values for t in self._tasks])
 
     def _targets_moved(self, since: Vector | None, tolerance: float) -> bool:
         present = self._present_targets()

@@ -1,26 +1,127 @@
-"""What a tick does when its problem has no solution.
+"""How a tick is solved where its active set is not found, or has no solution.
 
-The ladder, mildest first: relax inequality rows with slack; leave the acceleration
-window, as little as may be; keep it, and relax equality rows too; damped least squares
-within the joints' bounds; stand still. The bounds of position and velocity are kept on
-every rung. Limits come before the window: a robot that must brake harder than it can
-brakes as it can, where dropping the window let it jump by 6 rad/s between two ticks.
+A solver runs first. Where the first level has no solution, a ladder is descended,
+mildest rung first: relax inequality rows with slack; leave the acceleration window, as
+little as may be; keep it, and relax equality rows too; damped least squares within the
+joints' bounds; stand still. The bounds of position and velocity are kept on every rung.
+Limits come before the window: a robot that must brake harder than it can brakes as it
+can, where dropping the window let it jump by 6 rad/s between two ticks.
 """
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from wbc_suite.compiling import compiled
+from wbc_suite.kinematics import Configuration
+from wbc_suite.qp.level import Level
+from wbc_suite.qp.limit import JointBounds
 from wbc_suite.qp.problem import UNBOUNDED, Problem, clip_step
 from wbc_suite.qp.solution import Fallback
 from wbc_suite.qp.solver import QpSolver
+from wbc_suite.qp.tick import RETURN_WEIGHT, TOLERANCE, TickArrays, stiffness
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["box_least_squares", "checked_solve", "retreat"]
+__all__ = ["Ladder", "box_least_squares", "checked_solve", "retreat"]
 
-_TOLERANCE = 1e-7  # greatest broken row or bound of an accepted solution, m or rad
 _SLACK_WEIGHT = 1e2  # of a relaxed row against one that is led back
 _SWEEPS = 100
 _NO_ROWS: Indices = np.zeros(0, dtype=np.int64)
+_ROOM = 1e-11
+"""m or rad; bounds are so much wider where the only steps that levels above allow lie
+on them, and rounding decides whether there is any."""
+
+
+class Ladder:
+    """Solves the levels of a stack one by one, by a solver or a fallback.
+
+    Args:
+        configuration: The robot.
+        levels: The levels, as `solve_tick` has stated them.
+        bounds: Bounds of the joints.
+        tick: The tick.
+        solver: Solver of the first level; a fresh one of its kind is made for each
+            size of problem below.
+    """
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        levels: Sequence[Level],
+        bounds: JointBounds,
+        tick: TickArrays,
+        solver: QpSolver,
+    ) -> None:
+        self._configuration, self._levels = configuration, levels
+        self._bounds, self._tick, self.solver = bounds, tick, solver
+        self._problems: dict[tuple[int, int], tuple[Problem, QpSolver]] = {}
+
+    def reset(self) -> None:
+        """Discard all warm starts."""
+        self.solver = self.solver.fresh()
+        self._problems.clear()
+
+    def solve_level(self, k: int, dt: float, *, is_finite: bool) -> Fallback:
+        """Write step and multipliers of a level into its arrays.
+
+        Args:
+            k: The level.
+            dt: Step, s.
+            is_finite: Whether its rows are.
+
+        Returns:
+            What it took; `Fallback.LEVEL` if nothing is written.
+        """
+        if k > 0:
+            return self._solve_lower(k) if is_finite else Fallback.LEVEL
+        level, (problem, solver) = self._levels[0], self.problem(0)
+        result, fallback = None, Fallback.NONE
+        if is_finite:
+            level.state(problem)
+            result = checked_solve(solver, problem)
+        if result is None:
+            problem.weight = RETURN_WEIGHT * stiffness(level.arrays.tasks)
+            q, v, kinds = self._configuration.q, self._tick.v, self._tick.kinds
+            lb, ub = self._bounds.without_acceleration(q, v, dt, kinds)
+            if is_finite:
+                *result, fallback = retreat(solver, problem, lb=lb, ub=ub)
+                level.qp.lower[:], level.qp.upper[:] = problem.lower, problem.upper
+            else:
+                still = np.clip(np.zeros(problem.nv), lb, ub)
+                result, fallback = (still, np.zeros(len(problem.upper))), Fallback.HOLD
+        level.qp.x[:], level.qp.multipliers[:] = result
+        return fallback
+
+    def _solve_lower(self, k: int) -> Fallback:
+        """Solve a level below the first."""
+        level, first = self._levels[k], self._levels[0].qp
+        problem, solver = self.problem(k)
+        level.state(problem)
+        result = checked_solve(solver, problem)
+        if result is None:  # only just feasible: rounding may leave nothing
+            bounds = slice(problem.nv + len(problem.G))
+            problem.lower[bounds] -= _ROOM
+            problem.upper[bounds] += _ROOM
+            result = checked_solve(solver, problem)
+        # Clipped again: over a short tick, that margin is a speed. Long rows are
+        # more sensitive than their orthonormal basis.
+        if result is None or not clip_step(
+            result[0], first.rows, first.lower, first.upper, TOLERANCE
+        ):
+            return Fallback.LEVEL
+        level.qp.x[:] = result[0]
+        level.qp.multipliers[:] = 0.0
+        level.qp.multipliers[: len(result[1])] = result[1]
+        return Fallback.NONE
+
+    def problem(self, k: int) -> tuple[Problem, QpSolver]:
+        """Return buffers and a solver for a level's present size of problem."""
+        p, rank = (int(count) for count in self._levels[k].qp.counts)
+        if (k, rank) not in self._problems:
+            solver = self.solver if k == 0 else self.solver.fresh()
+            problem = Problem(self._configuration.nv, p, rank)
+            self._problems[k, rank] = problem, solver
+        return self._problems[k, rank]
 
 
 def checked_solve(solver: QpSolver, problem: Problem) -> tuple[Vector, Vector] | None:
@@ -36,7 +137,7 @@ def checked_solve(solver: QpSolver, problem: Problem) -> tuple[Vector, Vector] |
     if len(soft):
         x = x[: problem.nv].copy()
         multipliers = np.delete(multipliers, problem.nv + np.arange(len(soft)))
-    if not clip_step(x, problem.rows, problem.lower, problem.upper, _TOLERANCE):
+    if not clip_step(x, problem.rows, problem.lower, problem.upper, TOLERANCE):
         return None
     return x, multipliers
 
@@ -112,7 +213,7 @@ def _solve_with_slack(
     """Solve with equality rows as heavy tasks and slack s >= 0 on `G dq <= h + s`.
 
     Rows that cannot be kept have a residual, so what damps unreachable tasks is needed
-    here too, see `rows.damping_of_rows`: without it a robot whose feet and links
+    here too, see `task_kernels.write_tasks`: without it a robot whose feet and links
     contradict each other was measured to swing at full speed, 9.6 rad/s between ticks.
     """
     relaxed = problem.copy(equalities=False)

@@ -1,14 +1,17 @@
 """Bring a frame to a pose in the world."""
 
+from typing import ClassVar
+
 import numpy as np
 import pinocchio as pin
 
 from wbc_suite.arguments import check_array
 from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Configuration
-from wbc_suite.qp.lie import is_usable, saturate
-from wbc_suite.qp.rows import PACKED_FRAME
-from wbc_suite.qp.task import RowTask, check_speed, cost_vector
+from wbc_suite.kinematics.forward import compute_joint_poses, pack_pose
+from wbc_suite.qp.kernel import Kernel
+from wbc_suite.qp.task import RowTask, SharedRow, cost_vector
+from wbc_suite.qp.task_kernels import frame_error
 from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["FrameTask", "homogeneous"]
@@ -43,7 +46,7 @@ class FrameTask(RowTask):
     Chirikjian (2012), "Stochastic Models, Information Theory, and Lie Groups", 10.86.
     """
 
-    dim = 6
+    kernel: ClassVar[Kernel] = Kernel.FRAME
 
     def __init__(
         self,
@@ -58,16 +61,22 @@ class FrameTask(RowTask):
         max_angular_speed: float = 3.0,
         name: str | None = None,
     ) -> None:
-        super().__init__(name or frame, gain=gain, level=level)
+        super().__init__(
+            name or frame,
+            dim=6,
+            gain=gain,
+            level=level,
+            max_speed=max_linear_speed,
+            max_angular_speed=max_angular_speed,
+            angular_start=3,
+        )
         self.frame = frame
-        self.packed: Vector = np.zeros(PACKED_FRAME)
-        self._pose: Matrix = self.packed[:12].reshape(3, 4)
-        self.packed[18] = self.gain
-        self.packed[19] = check_speed(self.name, max_linear_speed)
-        self.packed[20] = check_speed(self.name, max_angular_speed)
-        self.packed[12:15] = cost_vector(self.name, position_cost, 3)
-        self.packed[15:18] = cost_vector(self.name, orientation_cost, 3)
-        self.has_target = target is not None
+        position = cost_vector(self.name, position_cost, 3)
+        orientation = cost_vector(self.name, orientation_cost, 3)
+        self.cost_row.set(np.concatenate([position, orientation]))
+        self.target_row = SharedRow(12)
+        self._pose: Matrix = self.target_row.values.reshape(3, 4)
+        self.has_target = False
         if target is not None:
             self.set_target(target)
 
@@ -78,10 +87,12 @@ class FrameTask(RowTask):
         orientation: float | Vector | None = None,
     ) -> None:
         """Change the costs, [cost]/m and [cost]/rad."""
+        costs = self.cost.copy()
         if position is not None:
-            self.packed[12:15] = cost_vector(self.name, position, 3)
+            costs[:3] = cost_vector(self.name, position, 3)
         if orientation is not None:
-            self.packed[15:18] = cost_vector(self.name, orientation, 3)
+            costs[3:] = cost_vector(self.name, orientation, 3)
+        self.cost_row.set(costs)
 
     def set_target(self, target: pin.SE3 | Matrix) -> None:
         """Set the target pose T_wt: an SE3 or a homogeneous matrix, shape (4, 4).
@@ -92,7 +103,7 @@ class FrameTask(RowTask):
         Raises:
             ConfigError: If the shape is wrong or the rotation is no rotation.
         """
-        self._pose[:] = homogeneous(self.name, target)[:3]
+        self.target_row.set(homogeneous(self.name, target).ravel()[:12])
         self.has_target = True
 
     @property
@@ -103,6 +114,9 @@ class FrameTask(RowTask):
     def bind(self, configuration: Configuration) -> None:
         """Resolve the frame; without a target, hold its present pose."""
         self.frame_index = configuration.frame_id(self.frame)
+        frame = configuration.model.frames[self.frame_index]
+        self.joint, self.offset = int(frame.parentJoint), pack_pose(frame.placement)
+        self._support = configuration.support(self.frame)
         if not self.has_target:
             self.set_target(configuration.frame_pose(self.frame_index))
 
@@ -110,42 +124,14 @@ class FrameTask(RowTask):
         """Return the velocity indices between the root and the frame."""
         return configuration.support(self.frame)
 
-    def rows(
-        self, configuration: Configuration, dt: float, W: Matrix, e: Vector
-    ) -> Vector:
-        """Write the rows; the readable form of the kernel `frame_rows`."""
-        error = self.error(configuration)
-        held = not np.isfinite(error).all()
-        step = np.zeros(6) if held else error
-        J = self.jacobian(configuration, step[3:])
-        step = step * self.gain
-        saturate(step[:3], self.packed[19] * dt)
-        saturate(step[3:], self.packed[20] * dt)
-        costs = self.packed[12:18]
-        W[:] = costs[:, None] * J
-        e[:] = costs * step
-        return error
-
-    def error(self, configuration: Configuration) -> Vector:
-        """Return (e_p, e_r), m and rad, shape (6,)."""
-        if not is_usable(self.packed[:12]):
-            return np.full(6, np.nan)
-        pose, error = configuration.frame_pose(self.frame_index), np.empty(6)
-        np.subtract(self._pose[:, 3], pose.translation, out=error[:3])
-        error[3:] = pin.log3(pose.rotation.T @ self._pose[:, :3])
-        return error
-
-    def jacobian(
-        self, configuration: Configuration, rotation_error: Vector | None = None
-    ) -> Matrix:
-        """Return the derivative J of the error, `d(e) = -J dq`, shape (6, nv)."""
-        if rotation_error is None:
-            rotation_error = self.error(configuration)[3:]
-        J = configuration.frame_jacobian(self.frame_index, "aligned")
-        R = configuration.frame_pose(self.frame_index).rotation
-        # Jlog3 is the inverse right Jacobian; Jl^-1(r) = Jr^-1(-r).
-        J[3:] = pin.Jlog3(pin.exp3(-rotation_error)) @ R.T @ J[3:]
-        return J
+    def evaluate(
+        self, configuration: Configuration, error: Vector, jacobian: Matrix
+    ) -> None:
+        """Write (e_p, e_r), m and rad, and its Jacobian."""
+        robot = configuration.robot
+        compute_joint_poses(robot)
+        joint, offset, target = self.joint, self.offset, self.target_row.values
+        frame_error(robot, joint, offset, target, self._support, error, jacobian)
 
 
 def homogeneous(owner: str, pose: pin.SE3 | Matrix) -> Matrix:

@@ -5,7 +5,7 @@ import numpy as np
 from wbc_suite.arguments import check_number
 from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Configuration
-from wbc_suite.qp.task import RowTask, check_speed, cost_vector
+from wbc_suite.qp.task import RowTask
 from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["JointCouplingTask"]
@@ -29,7 +29,7 @@ class JointCouplingTask(RowTask):
         name: How reports call the task; "follower - leader" when absent.
     """
 
-    dim = 1
+    unit = "rad"
 
     def __init__(
         self,
@@ -44,12 +44,17 @@ class JointCouplingTask(RowTask):
         max_speed: float = 3.0,
         name: str | None = None,
     ) -> None:
-        super().__init__(name or f"{follower} - {leader}", gain=gain, level=level)
+        super().__init__(
+            name or f"{follower} - {leader}",
+            dim=1,
+            cost=cost,
+            gain=gain,
+            level=level,
+            max_speed=max_speed,
+        )
         self.follower, self.leader = follower, leader
         self.ratio = check_number(f"Task '{self.name}': the ratio", ratio)
         self.offset = check_number(f"Task '{self.name}': the offset", offset)
-        self.max_speed = check_speed(self.name, max_speed)
-        self._cost = float(cost_vector(self.name, cost, 1)[0])
 
     def bind(self, configuration: Configuration) -> None:
         """Resolve both joints.
@@ -70,24 +75,10 @@ class JointCouplingTask(RowTask):
         """Return the two velocity indices."""
         return np.sort(self._v)
 
-    def error(self, configuration: Configuration) -> Vector:
-        """Return the deviation, rad or m, shape (1,)."""
+    def evaluate(
+        self, configuration: Configuration, error: Vector, jacobian: Matrix
+    ) -> None:
+        """Write the deviation, rad or m, and its Jacobian."""
         follower, leader = configuration.q[self._q]
-        return np.array([self.ratio * leader + self.offset - follower])
-
-    def jacobian(self, configuration: Configuration) -> Matrix:
-        """Return the derivative J of the error, `d(e) = -J dq`, shape (1, nv)."""
-        J = np.zeros((1, configuration.nv))
-        J[0, self._v] = 1.0, -self.ratio
-        return J
-
-    def rows(
-        self, configuration: Configuration, dt: float, W: Matrix, e: Vector
-    ) -> Vector:
-        """Write the weighted row."""
-        error = self.error(configuration)
-        limit = self.max_speed * dt
-        W[0, self._v] = self._cost, -self.ratio * self._cost
-        step = float(np.clip(self.gain * error[0], -limit, limit))
-        e[0] = self._cost * step if np.isfinite(step) else 0.0
-        return error
+        error[0] = self.ratio * leader + self.offset - follower
+        jacobian[0, self._v] = 1.0, -self.ratio

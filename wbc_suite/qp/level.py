@@ -1,280 +1,329 @@
-"""The rows of all tasks that share one strict level."""
+"""The tasks that share one strict level, and their buffers."""
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
-from typing import TypeVar
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
+from wbc_suite.compiling import as_argument
 from wbc_suite.kinematics import Configuration
-from wbc_suite.kinematics.array_table import ArrayTable
-from wbc_suite.qp.com_task import ComTask
-from wbc_suite.qp.damping_task import DampingTask
+from wbc_suite.qp.active_set import QpArrays, make_qp_arrays
+from wbc_suite.qp.constraints import Constraints
 from wbc_suite.qp.frame_task import FrameTask
+from wbc_suite.qp.kernel import Kernel, kernel_of
 from wbc_suite.qp.limit import JointBounds
-from wbc_suite.qp.posture_task import PostureTask
 from wbc_suite.qp.problem import Problem
-from wbc_suite.qp.report import LevelRecord
-from wbc_suite.qp.rows import normal_equations
-from wbc_suite.qp.task import DiagonalTask, RowTask, Task
-from wbc_suite.qp.tick import RowField
-from wbc_suite.typing import Indices, Matrix, Vector
+from wbc_suite.qp.strict_level import LevelArrays
+from wbc_suite.qp.task import JointTask, RowTask, Task
+from wbc_suite.qp.task_kernels import TaskArrays
+from wbc_suite.typing import Array, Indices, Matrix, Vector
 
-__all__ = ["Level"]
+__all__ = ["Level", "LevelLayout", "TickLayout", "make_levels", "tick_layout"]
 
-AnyTask = TypeVar("AnyTask", bound=Task)
+
+@dataclass(frozen=True, slots=True)
+class LevelLayout:
+    """Names of a level's row tasks, and where its results are in the stack's buffer.
+
+    Attributes:
+        names: The row tasks.
+        units: Unit of each one's error.
+        slices: Where each one's rows are.
+        shapes: Shape of each array of results, in the order of the buffer.
+        start: Where the first one begins.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    slices: tuple[slice, ...]
+    shapes: Mapping[str, tuple[int, ...]]
+    start: int
+
+    @property
+    def end(self) -> int:
+        """Where the results end."""
+        return self.start + sum(math.prod(shape) for shape in self.shapes.values())
+
+    def views(self, buffer: Vector) -> dict[str, Array]:
+        """Return the arrays of results in the stack's buffer, by name."""
+        found: dict[str, Array] = {}
+        start = self.start
+        for name, shape in self.shapes.items():
+            end = start + math.prod(shape)
+            found[name] = buffer[start:end].reshape(shape)
+            start = end
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class TickLayout:
+    """Names of a stack's joints and rows, and where its results are in one buffer.
+
+    Attributes:
+        joints: Names of the velocities.
+        units: Their units.
+        equalities: Name and number of rows of each equality.
+        inequalities: Number of inequality rows.
+        levels: Layouts of the levels.
+    """
+
+    joints: tuple[str, ...]
+    units: tuple[str, ...]
+    equalities: Sequence[tuple[str, int]]
+    inequalities: int
+    levels: tuple[LevelLayout, ...]
 
 
 class Level:
-    """Buffers and row layout of one level: `H = W^T W + D + mu I`, `c = -W^T e - d`.
-
-    Frame, centre-of-mass and posture tasks are written by one compiled kernel, other
-    tasks by their own `rows` and `diagonal` before it. A subclass of a compiled task
-    counts as another: its methods are called.
+    """Tasks of one level with their arrays, and the arrays of their problem.
 
     Args:
         configuration: The robot.
         tasks: Tasks of this level; they are bound here.
+        layout: Where the results are, see `tick_layout`.
+        buffer: The results of the stack.
+        inequalities: Number of inequality rows of the stack.
+        above: Number of rows of all levels above, and of the stack's equalities.
 
     Attributes:
-        row_tasks: Tasks with rows, in the order of the rows.
-        slices: Where each row task's rows are.
-        W: Weighted rows, shape (m, nv).
-        e: Weighted steps, shape (m,).
-        diagonal: Squared weights and weighted steps of joints, shape (2, nv).
-        mu: Damping of every joint at the last tick, see `rows.damping_of_rows`.
-        held: Names of the tasks whose target was not finite at the last tick.
-        is_interpreted: Whether there are tasks that are not compiled.
-        table: What the kernels of `tick` read, by `RowField`.
+        tasks: Arrays of the tasks.
+        qp: Arrays of the problem.
+        arrays: What the kernels of `tick` read and write.
+        is_compiled: Whether all tasks have a kernel.
     """
 
-    def __init__(self, configuration: Configuration, tasks: Sequence[Task]) -> None:
+    def __init__(
+        self,
+        configuration: Configuration,
+        tasks: Sequence[Task],
+        layout: LevelLayout,
+        buffer: Vector,
+        *,
+        inequalities: int,
+        above: int,
+    ) -> None:
         for task in tasks:
             task.bind(configuration)
-        self.row_tasks = [t for t in tasks if isinstance(t, RowTask)]
-        self._starts = np.cumsum([0] + [t.dim for t in self.row_tasks])
-        self.slices = [
-            slice(a, b)
-            for a, b in zip(self._starts[:-1], self._starts[1:], strict=True)
-        ]
-        self.W: Matrix = np.zeros((int(self._starts[-1]), configuration.nv))
-        self.e: Vector = np.zeros(len(self.W))
-        self.held: tuple[str, ...] = ()
-        self._support = _concatenate([t.support(configuration) for t in self.row_tasks])
-        self._bind_frames(configuration)
-        self._bind_coms()
-        self._bind_joints(configuration, tasks)
-        compiled = (*self._frames, *self._coms)
-        self._others = [
-            (t, self.W[s], self.e[s])
-            for t, s in zip(self.row_tasks, self.slices, strict=True)
-            if t not in compiled
-        ]
-        self.is_interpreted = len(self._others) + len(self._diagonals) > 0
-        self._errors: dict[RowTask, Vector] = {}
-        self.mu, self._biased = 0.0, False
-        self._arrays = self._make_table()
-        self.table = self._arrays.table
-
-    def _rows_of(self, kind: type[AnyTask]) -> tuple[list[AnyTask], Indices]:
-        """Return the tasks of exactly one class, and the first row of each."""
-        found = [
-            (t, s.start)
-            for t, s in zip(self.row_tasks, self.slices, strict=True)
-            if type(t) is kind
-        ]
-        return [t for t, _ in found], np.array(
-            [row for _, row in found], dtype=np.int64
-        )
-
-    def _bind_frames(self, configuration: Configuration) -> None:
-        self._frames, self._frame_row = self._rows_of(FrameTask)
-        frames = [configuration.model.frames[t.frame_index] for t in self._frames]
-        count = len(frames)
-        self._joints = np.array([f.parentJoint for f in frames], dtype=np.int64)
-        self._offsets: Matrix = np.array(
-            [[*f.placement.rotation.ravel(), *f.placement.translation] for f in frames]
-        ).reshape(count, 12)
-        self._frame_support = _concatenate(
-            [t.support(configuration) for t in self._frames]
-        )
-        self._frame_errors: Matrix = np.zeros((count, 2))
-
-    def _bind_coms(self) -> None:
-        self._coms, self._com_row = self._rows_of(ComTask)
-        self._com_errors: Vector = np.zeros(len(self._coms))
-
-    def _bind_joints(self, configuration: Configuration, tasks: Sequence[Task]) -> None:
+        self._row_tasks = [t for t in tasks if isinstance(t, RowTask)]
+        self._joint_tasks = [t for t in tasks if isinstance(t, JointTask)]
+        self._slices, views = layout.slices, layout.views(buffer)
         nv = configuration.nv
-        self._q_index = JointBounds.unlimited(configuration).q_index
-        many = self._q_index < 0  # joints with several parameters
-        self._postures = [
-            t
-            for t in tasks
-            if type(t) is PostureTask and not t.squared_costs[many].any()
+        views["all_finite"] = buffer[2 * nv + 1 : 2 * nv + 2]
+        self.tasks = _task_arrays(
+            configuration, self._row_tasks, self._joint_tasks, views
+        )
+        self.qp: QpArrays = make_qp_arrays(
+            self.tasks.W,
+            self.tasks.e,
+            self.tasks.diagonal,
+            self.tasks.mu,
+            inequalities=inequalities,
+            equalities=len(views["multipliers"]) - nv - inequalities,
+            x=views["x"],
+            multipliers=views["multipliers"],
+        )
+        self._kept_counts: Indices = np.zeros(2, dtype=np.int64)
+        self.arrays = LevelArrays(
+            tasks=as_argument(self.tasks),
+            qp=as_argument(self.qp),
+            above=np.zeros((above, nv)),
+            lengths=np.zeros(nv),
+            kept=np.zeros((nv, nv)),
+            kept_counts=self._kept_counts,
+        )
+        self._copies = self._attach_rows()
+        self.is_compiled = not any(
+            kernel == Kernel.PYTHON
+            for kernel in (*self.tasks.kernel, *self.tasks.joint_kernel)
+        )
+        self._evaluate(configuration, Kernel.CONSTANT)
+
+    def prepare(self, configuration: Configuration) -> None:
+        """Evaluate what has no kernel."""
+        if not self.is_compiled:
+            self._evaluate(configuration, Kernel.PYTHON)
+
+    def reset(self) -> None:
+        """Discard the active set and the basis of the last tick."""
+        self.qp.side[:] = 0
+        self._kept_counts[:] = 0
+
+    def state(self, problem: Problem) -> None:
+        """Fill a problem of the right size with what a tick has stated."""
+        tasks, qp = self.tasks, self.qp
+        count, size = len(problem.rows), len(problem.upper)
+        problem.H[:] = tasks.W.T @ tasks.W
+        problem.H += np.diag(tasks.diagonal[0] + tasks.mu)
+        problem.c[:] = -tasks.W.T @ tasks.e - tasks.diagonal[1]
+        problem.rows[:], problem.wanted[:] = qp.rows[:count], qp.wanted
+        problem.lower[:], problem.upper[:] = qp.lower[:size], qp.upper[:size]
+        problem.weight = float(qp.weight[0])
+
+    def pressed(self) -> tuple[Indices, Matrix]:
+        """Return the rows with a multiplier other than zero, and copies of them."""
+        pressed = self.qp.multipliers[len(self.qp.x) :].nonzero()[0]
+        return pressed, self.qp.rows[pressed]
+
+    def held(self) -> tuple[str, ...]:
+        """Return the names of the tasks whose target was not finite."""
+        distances, finite = self.tasks.distance, self.tasks.joint_finite
+        rows = np.isnan(distances[:, 0])
+        held = [t.name for t, bad in zip(self._row_tasks, rows, strict=True) if bad]
+        held += [
+            t.name for t, ok in zip(self._joint_tasks, finite, strict=True) if not ok
         ]
-        count = len(self._postures)
-        self._posture_costs: Matrix = np.zeros((count, nv))
-        self._posture_gains: Matrix = np.zeros((count, 2))
-        for k, task in enumerate(self._postures):
-            self._posture_costs[k] = task.squared_costs
-            self._posture_gains[k] = task.gain, task.max_speed
-        self._constant: Matrix = np.zeros((2, nv))
-        self._diagonals: list[DiagonalTask] = []
-        for task in tasks:
-            if type(task) is DampingTask:
-                self._constant[0] += task.squared_costs
-            elif isinstance(task, DiagonalTask) and task not in self._postures:
-                self._diagonals.append(task)
-        self._given: Matrix = self._constant.copy()
-        self.diagonal: Matrix = np.zeros((2, nv))
+        return tuple(held)
 
-    def _make_table(self) -> ArrayTable:
-        """Gather what the kernels read; targets where the tasks keep them."""
-        f = RowField
-        return ArrayTable(
-            RowField,
-            {
-                f.FRAME_JOINTS: self._joints,
-                f.FRAME_OFFSETS: self._offsets,
-                f.FRAME_TASKS: _addresses([t.packed for t in self._frames]),
-                f.FRAME_ROW: self._frame_row,
-                f.FRAME_SUPPORT_START: self._frame_support[0],
-                f.FRAME_SUPPORT: self._frame_support[1],
-                f.FRAME_ERRORS: self._frame_errors,
-                f.COM_TASKS: _addresses([t.packed for t in self._coms]),
-                f.COM_ROW: self._com_row,
-                f.COM_ERRORS: self._com_errors,
-                f.Q_INDEX: self._q_index,
-                f.POSTURE_COSTS: self._posture_costs,
-                f.POSTURE_TARGETS: _addresses([t.target for t in self._postures]),
-                f.POSTURE_GAINS: self._posture_gains,
-                f.ROW_START: self._starts,
-                f.SUPPORT_START: self._support[0],
-                f.SUPPORT: self._support[1],
-                f.W: self.W,
-                f.E: self.e,
-                f.GIVEN: self._given,
-                f.DIAGONAL: self.diagonal,
+    def _attach_rows(self) -> list[Vector]:
+        """Let targets and costs follow those of the tasks; return the copies."""
+        copies: list[Vector] = []
+        for k, task in enumerate(self._row_tasks):
+            cost = self.tasks.cost[self._slices[k]]
+            target = self.tasks.target[k, : task.target_row.values.size]
+            task.cost_row.attach(cost)
+            task.target_row.attach(target)
+            copies += [cost, target]
+        for k, task in enumerate(self._joint_tasks):
+            target = self.tasks.joint_target[k, : task.target_row.values.size]
+            task.target_row.attach(target)
+            copies.append(target)
+        return copies
+
+    def _evaluate(self, configuration: Configuration, kernel: Kernel) -> None:
+        """Evaluate all tasks of a kind in Python."""
+        tasks = self.tasks
+        for k in np.flatnonzero(tasks.kernel == kernel).tolist():
+            rows = self._slices[k]
+            self._row_tasks[k].evaluate(
+                configuration, tasks.error[rows], tasks.jacobian[rows]
+            )
+        for k in np.flatnonzero(tasks.joint_kernel == kernel).tolist():
+            self._joint_tasks[k].evaluate(configuration, tasks.joint_error[k])
+
+
+def tick_layout(
+    configuration: Configuration, tasks: Sequence[Task], rows: Constraints
+) -> TickLayout:
+    """Return where the results of a stack are in one buffer.
+
+    First are the step, the velocity, the residual, and whether all targets are finite.
+    """
+    nv, layouts = configuration.nv, list[LevelLayout]()
+    start = 2 * nv + 2
+    for own in _by_level(tasks):
+        row_tasks = [task for task in own if isinstance(task, RowTask)]
+        ends = np.cumsum([0, *(task.dim for task in row_tasks)]).tolist()
+        size = rows.inequalities + (nv if layouts else rows.equalities)
+        layout = LevelLayout(
+            names=tuple(task.name for task in row_tasks),
+            units=tuple(task.unit for task in row_tasks),
+            slices=tuple(slice(a, b) for a, b in pairwise(ends)),
+            shapes={
+                "distances": (len(row_tasks), 2),
+                "W": (ends[-1], nv),
+                "e": (ends[-1],),
+                "diagonal": (2, nv),
+                "x": (nv,),
+                "multipliers": (nv + size,),
             },
+            start=start,
         )
+        start = layout.end
+        layouts.append(layout)
+    return TickLayout(
+        joints=configuration.velocity_names(),
+        units=configuration.velocity_units(),
+        equalities=rows.names,
+        inequalities=rows.inequalities,
+        levels=tuple(layouts),
+    )
 
-    def prepare(
-        self, configuration: Configuration, dt: float, bias: Matrix | None = None
-    ) -> None:
-        """Do what comes before the kernels: the terms of tasks that are not compiled.
 
-        A bias, shape (2, nv), adds squared costs and weighted steps on single joints.
-        """
-        self.held = ()
-        if self._biased or bias is not None or self._diagonals:
-            self._given[:] = self._constant if bias is None else self._constant + bias
-            self._biased = bias is not None
-        if self.is_interpreted:
-            self._write_others(configuration, dt)
-
-    def note(self, mu: float, *, finite: bool) -> None:
-        """Take in what a kernel has answered."""
-        self.mu = mu
-        if not finite:
-            self._name_held()
-
-    def record(self) -> Callable[[], LevelRecord]:
-        """Return what tells of the last tick, also after the next ones.
-
-        Few are ever asked, so the present only costs copies.
-        """
-        return partial(
-            self._record,
-            self.W.copy(),
-            self.e.copy(),
-            self.diagonal.copy(),
-            self._frame_errors.copy(),
-            self._com_errors.copy(),
-            self._errors.copy(),
-            self.held,
+def make_levels(
+    configuration: Configuration,
+    tasks: Sequence[Task],
+    layout: TickLayout,
+    buffer: Vector,
+) -> list[Level]:
+    """Return the strict levels, the first first; tasks are bound."""
+    levels: list[Level] = []
+    above = sum(size for _, size in layout.equalities)
+    for own, place in zip(_by_level(tasks), layout.levels, strict=True):
+        levels.append(
+            Level(
+                configuration,
+                own,
+                place,
+                buffer,
+                inequalities=layout.inequalities,
+                above=above if levels else 0,
+            )
         )
-
-    def _record(
-        self,
-        W: Matrix,
-        e: Vector,
-        diagonal: Matrix,
-        of_frames: Matrix,
-        of_coms: Vector,
-        of_others: Mapping[RowTask, Vector],
-        held: tuple[str, ...],
-    ) -> LevelRecord:
-        """Return the record of a tick from copies; errors are m and rad.
-
-        Tasks with fewer than six rows have one error, in their own unit.
-        """
-        known: dict[RowTask, tuple[float, float]] = {
-            task: (float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:])))
-            for task, error in of_others.items()
-        }
-        frames = zip(self._frames, of_frames.tolist(), strict=True)
-        known |= {task: (position, angle) for task, (position, angle) in frames}
-        coms = zip(self._coms, of_coms.tolist(), strict=True)
-        known |= {task: (distance, 0.0) for task, distance in coms}
-        return LevelRecord(
-            names=tuple(task.name for task in self.row_tasks),
-            slices=self.slices,
-            errors=[known[task] for task in self.row_tasks],
-            held=held,
-            W=W,
-            e=e,
-            diagonal=diagonal,
-        )
-
-    def stiffness(self) -> float:
-        """Return the largest entry of H at the last tick, without damping."""
-        squares = np.einsum("ij,ij->j", self.W, self.W) + self.diagonal[0]
-        return max(1.0, float(squares.max()))
-
-    def form(self, problem: Problem) -> None:
-        """Fill H and c of a problem from the rows of the last tick."""
-        normal_equations(
-            self.W,
-            self.e,
-            self._starts,
-            *self._support,
-            self.diagonal,
-            self.mu,
-            problem.H,
-            problem.c,
-        )
-
-    def _write_others(self, configuration: Configuration, dt: float) -> None:
-        """Run the tasks outside the kernel."""
-        for task in self._diagonals:
-            if not task.diagonal(configuration, dt, *self._given):
-                self.held += (task.name,)
-        for task, W, e in self._others:
-            error = task.rows(configuration, dt, W, e)
-            self._errors[task] = error
-            if not np.isfinite(error).all():
-                self.held += (task.name,)
-
-    def _name_held(self) -> None:
-        for task, error in zip(self._frames, self._frame_errors, strict=True):
-            if not np.isfinite(error[0]):
-                self.held += (task.name,)
-        for task, error in zip(self._coms, self._com_errors, strict=True):
-            if not np.isfinite(error):
-                self.held += (task.name,)
-        for task, costs in zip(self._postures, self._posture_costs, strict=True):
-            used = self._q_index[costs > 0.0]
-            if not np.isfinite(task.target[used]).all():
-                self.held += (task.name,)
+        above += len(levels[-1].tasks.e)
+    return levels
 
 
-def _concatenate(lists: Sequence[Indices]) -> tuple[Indices, Indices]:
-    """Return where each list begins in the concatenation, and the concatenation."""
-    starts = np.cumsum([0] + [len(x) for x in lists]).astype(np.int64)
-    joined = np.concatenate(lists) if lists else np.zeros(0)
-    return starts, joined.astype(np.int64)
+def _by_level(tasks: Sequence[Task]) -> list[list[Task]]:
+    """Return the tasks of each strict level, the first first."""
+    numbers = sorted({task.level for task in tasks}) or [0]
+    return [[task for task in tasks if task.level == k] for k in numbers]
 
 
-def _addresses(arrays: Sequence[Vector]) -> Indices:
-    return np.array([a.ctypes.data for a in arrays], dtype=np.int64)
+def _task_arrays(
+    configuration: Configuration,
+    rows: Sequence[RowTask],
+    joints: Sequence[JointTask],
+    views: Mapping[str, Array],
+) -> TaskArrays:
+    """Return the arrays of bound tasks; results are views of one buffer."""
+    nv, nq, n, k = configuration.nv, configuration.nq, len(rows), len(joints)
+    row_start = np.cumsum([0, *(task.dim for task in rows)], dtype=np.int64)
+    m, supports = int(row_start[-1]), [task.support(configuration) for task in rows]
+    q_index = JointBounds.unlimited(configuration).q_index
+    frames = [task if isinstance(task, FrameTask) else None for task in rows]
+    angular = [
+        start + task.angular_start
+        for start, task in zip(row_start.tolist(), rows, strict=False)
+    ]
+    return TaskArrays(
+        kernel=np.array([kernel_of(task) for task in rows], dtype=np.int64),
+        joint=np.array([f.joint if f else 0 for f in frames], dtype=np.int64),
+        offset=np.array([f.offset if f else np.zeros(12) for f in frames]).reshape(
+            n, 12
+        ),
+        target=np.zeros((n, 12)),
+        row_start=row_start,
+        angular_start=np.array(angular, dtype=np.int64),
+        support_start=np.cumsum([0, *(len(s) for s in supports)], dtype=np.int64),
+        support=np.concatenate([np.zeros(0), *supports]).astype(np.int64),
+        error=np.zeros(m),
+        jacobian=np.zeros((m, nv)),
+        cost=np.zeros(m),
+        gain=np.array([task.gain for task in rows], dtype=np.float64),
+        max_speed=np.array([task.max_speeds for task in rows]).reshape(n, 2),
+        distance=views["distances"],
+        joint_kernel=np.array(list(_joint_kernels(q_index, joints)), dtype=np.int64),
+        joint_target=np.zeros((k, nq)),
+        joint_error=np.zeros((k, nv)),
+        squared_cost=np.array([task.squared_costs for task in joints]).reshape(k, nv),
+        joint_gain=np.array([task.gain for task in joints], dtype=np.float64),
+        joint_speed=np.array([task.max_speed for task in joints], dtype=np.float64),
+        joint_finite=np.ones(k, dtype=np.int64),
+        q_index=q_index,
+        bias=np.zeros((2, nv)),
+        W=views["W"],
+        e=views["e"],
+        diagonal=views["diagonal"],
+        mu=np.zeros(1),
+        all_finite=views["all_finite"],
+    )
+
+
+def _joint_kernels(q_index: Indices, tasks: Sequence[JointTask]) -> Iterator[Kernel]:
+    """Yield the kernel of each; joints with several parameters are Pinocchio's."""
+    for task in tasks:
+        kernel, several = kernel_of(task), task.squared_costs[q_index < 0].any()
+        is_posture = kernel is Kernel.POSTURE
+        yield Kernel.PYTHON if is_posture and several else kernel

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wbc_suite.compiling import compiled, compiled_inner
+from wbc_suite.compiling import compiled
 from wbc_suite.typing import Matrix, Vector
 
 __all__ = ["FAR", "exp3", "inverse_left_jacobian", "is_usable", "log3", "saturate"]
@@ -51,7 +51,7 @@ def log3(R: Matrix, out: Vector) -> float:
     return angle
 
 
-@compiled_inner
+@compiled
 def exp3(x: float, y: float, z: float, out: Matrix) -> None:
     """Write the rotation of a rotation vector r, `I + a [r] + b [r]^2`, shape (3, 3).
 

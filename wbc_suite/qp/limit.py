@@ -1,21 +1,110 @@
-"""What limits have in common: a box per joint, or inequality rows."""
+"""What limits have in common: bounds of joints, or inequality rows."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from enum import IntEnum
+from typing import ClassVar
 
 import numpy as np
 
+from wbc_suite.compiling import compiled
 from wbc_suite.kinematics import Configuration
 from wbc_suite.kinematics.configuration import named_joints
-from wbc_suite.qp.bounds import LimitKind, merge_bounds
+from wbc_suite.qp.kernel import Kernel
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["BoxLimit", "JointBounds", "Limit", "RowLimit"]
+__all__ = ["BoxLimit", "JointBounds", "Limit", "LimitKind", "RowLimit", "merge_bounds"]
+
+
+class LimitKind(IntEnum):
+    """What set a bound or a row."""
+
+    NONE = 0
+    POSITION = 1
+    VELOCITY = 2
+    ACCELERATION = 3
+    SELF_COLLISION = 4
+    EQUALITY = 5
+    BALANCE = 6
+    EFFORT = 7
+    FLOOR = 8
+    OTHER = 9
+    """A limit of a user's own that names no kind."""
+
+    def __str__(self) -> str:
+        """Return the name as reports print it: "self-collision"."""
+        return self.name.lower().replace("_", "-")
+
+
+class Limit(ABC):  # noqa: B024, what a stack takes is either of the two below
+    """A constraint that a solution never violates as long as one exists."""
+
+
+class BoxLimit(Limit):
+    """A limit on single joints."""
+
+    @abstractmethod
+    def apply(self, configuration: Configuration, bounds: "JointBounds") -> None:
+        """Tighten the bounds; called once, when a stack is built."""
+
+
+class RowLimit(Limit):
+    """A limit `G dq <= h` of a fixed number of rows.
+
+    A subclass sets `dim` and writes `rows`; `subject` and `kind` are for reports:
+
+        class Ceiling(RowLimit):
+            dim = 1
+
+            def rows(self, configuration, dt, G, h):
+                G[0] = configuration.frame_jacobian("head", "aligned")[2]
+                h[0] = 1.8 - configuration.frame_pose("head").translation[2]
+
+    A row with h < 0 is outside its limit. It leads back softly and may go no further
+    out, so that other rows can still be kept.
+
+    Attributes:
+        kernel: What writes the rows, see `kernel_of`.
+        dim: Number of rows.
+        kind: What reports call the rows.
+        unit: Unit of `G dq` and h.
+        relax_speed: Speed of return, in the rows' unit per second, beyond which a row
+            may go further out, so that other rows can lead back; infinity is never.
+    """
+
+    kernel: ClassVar[Kernel] = Kernel.PYTHON
+    dim: int
+    kind: LimitKind = LimitKind.OTHER
+    unit: str = "m"
+    relax_speed: float = np.inf
+
+    def bind(self, configuration: Configuration) -> None:
+        """Resolve names in a model; called when a stack is built."""
+
+    @abstractmethod
+    def rows(
+        self, configuration: Configuration, dt: float, G: Matrix, h: Vector
+    ) -> None:
+        """Write G, shape (dim, nv), and h, shape (dim,); unused rows are 0 <= inf.
+
+        Args:
+            configuration: Where the robot is.
+            dt: Step, s.
+            G: Output, zero before the first call.
+            h: Output.
+        """
+
+    def reset(self) -> None:
+        """Discard memory of earlier ticks; called by a stack's `reset`."""
+
+    def subject(self, row: int) -> object:
+        """Return what a row of the last tick limits: a value that prints itself."""
+        return f"{type(self).__name__}[{row}]"
 
 
 @dataclass(slots=True)
 class JointBounds:
-    """The box that limits fill in at binding time, one entry per velocity.
+    """The box that limits fill in when a stack is built, one entry per velocity.
 
     Attributes:
         q_index: Position index of each velocity, -1 where positions are no vector.
@@ -35,7 +124,7 @@ class JointBounds:
 
     @classmethod
     def unlimited(cls, configuration: Configuration) -> "JointBounds":
-        """Return bounds that bind nothing."""
+        """Return infinite bounds."""
         nv = configuration.nv
         q_index = np.full(nv, -1, dtype=np.int64)
         for _, joint in named_joints(configuration.model):
@@ -59,7 +148,7 @@ class JointBounds:
             q: Joint positions, shape (nq,).
             v_previous: Velocity of the last step, shape (nv,).
             dt: Duration of the step, s.
-            kinds: Output: which limit set each lower and upper bound, shape (2, nv).
+            kinds: Output, which limit set each bound, see `merge_bounds`.
         """
         nv = len(self.v_max)
         lower, upper = np.empty(nv), np.empty(nv)
@@ -75,50 +164,82 @@ class JointBounds:
             dt,
             lower,
             upper,
-            *kinds,
+            kinds,
         )
         return lower, upper
 
 
-class Limit(ABC):  # noqa: B024, what a stack takes is either of the two below
-    """A constraint that a solution never breaks as long as one exists."""
+@compiled
+def merge_bounds(
+    q: Vector,
+    q_index: Indices,
+    q_lower: Vector,
+    q_upper: Vector,
+    position_gain: float,
+    v_max: Vector,
+    v_previous: Vector,
+    a_max: Vector,
+    dt: float,
+    lower: Vector,
+    upper: Vector,
+    kinds: Indices,
+) -> None:
+    """Write bounds of the step dq that are never empty.
 
+    The acceleration window `v_previous dt -+ a dt^2` is clipped into the position
+    interval, the result into the velocity interval `-+ v dt`. Clipping an interval into
+    another keeps it non-empty, and is the intersection where there is one: velocity
+    wins over position, position over acceleration. A joint outside a limit therefore
+    returns at its greatest speed.
 
-class BoxLimit(Limit):
-    """A limit on single joints."""
-
-    @abstractmethod
-    def apply(self, configuration: Configuration, bounds: JointBounds) -> None:
-        """Tighten the bounds; called once, when a stack is built."""
-
-
-class RowLimit(Limit):
-    """A limit `G dq <= h` of a fixed number of rows.
-
-    Attributes:
-        dim: Number of rows.
-        kind: What its rows are called in reports.
-        gives_way: Speed of return, in the rows' unit per second, beyond which a row may
-            go further out, so that other rows can lead back; endless is never.
+    Args:
+        q: Joint positions, shape (nq,).
+        q_index: Position index of each velocity, -1 where it has none, shape (nv,).
+        q_lower: Lower position limits, -inf where there is none, shape (nv,).
+        q_upper: Upper position limits.
+        position_gain: Fraction of the distance that one step may cover, 0 to 1.
+        v_max: Speed limits, inf where there is none, shape (nv,).
+        v_previous: Velocity of the previous step, shape (nv,).
+        a_max: Acceleration limits, inf where there is none, shape (nv,).
+        dt: Step, s.
+        lower: Output, least step, shape (nv,).
+        upper: Output, greatest step, shape (nv,).
+        kinds: Output, the `LimitKind` that set each lower, then each upper bound,
+            shape (2 nv,).
     """
+    nv = lower.shape[0]
+    for i in range(nv):
+        window = a_max[i] * dt * dt
+        lo, hi = v_previous[i] * dt - window, v_previous[i] * dt + window
+        lo_kind = hi_kind = LimitKind.ACCELERATION.value
+        k = q_index[i]
+        if k >= 0:
+            top = _reach(q_upper[i] - q[k], position_gain, a_max[i], dt)
+            bottom = -_reach(q[k] - q_lower[i], position_gain, a_max[i], dt)
+            if lo < bottom or lo > top:
+                lo, lo_kind = min(max(lo, bottom), top), LimitKind.POSITION.value
+            if hi < bottom or hi > top:
+                hi, hi_kind = min(max(hi, bottom), top), LimitKind.POSITION.value
+        step = v_max[i] * dt
+        if lo < -step or lo > step:
+            lo, lo_kind = min(max(lo, -step), step), LimitKind.VELOCITY.value
+        if hi < -step or hi > step:
+            hi, hi_kind = min(max(hi, -step), step), LimitKind.VELOCITY.value
+        lower[i], upper[i] = lo, hi
+        kinds[i], kinds[nv + i] = lo_kind, hi_kind
 
-    dim: int
-    kind: LimitKind = LimitKind.SELF_COLLISION
-    gives_way: float = np.inf
 
-    @abstractmethod
-    def bind(self, configuration: Configuration) -> None:
-        """Resolve names in a model."""
+@compiled
+def _reach(distance: float, gain: float, a: float, dt: float) -> float:
+    """Return the greatest step towards a limit that is a distance away.
 
-    @abstractmethod
-    def rows(
-        self, configuration: Configuration, dt: float, G: Matrix, h: Vector
-    ) -> None:
-        """Write G, shape (dim, nv), and h, shape (dim,); unused rows are 0 <= inf."""
-
-    def reset(self) -> None:
-        """Forget how the robot moved; called by a stack's `reset`."""
-
-    @abstractmethod
-    def label(self, row: int) -> str:
-        """Return in words what a row of the last tick limits."""
+    It is a fraction of the distance, and no more than what can still be braked in the
+    distance d: `v dt + v^2 / (2 a) = d`, the discrete form of `v = sqrt(2 a d)`.
+    A negative distance is outside the limit: the step leads back to it.
+    """
+    if distance < 0.0:
+        return distance
+    step = gain * distance
+    if np.isfinite(a) and np.isfinite(distance):
+        step = min(step, dt * a * (np.sqrt(dt * dt + 2.0 * distance / a) - dt))
+    return step

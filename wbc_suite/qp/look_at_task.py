@@ -6,13 +6,13 @@ import pinocchio as pin
 from wbc_suite.arguments import check_array
 from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Configuration
-from wbc_suite.qp.lie import is_usable, saturate
-from wbc_suite.qp.task import RowTask, check_speed, cost_vector
+from wbc_suite.qp.lie import is_usable
+from wbc_suite.qp.task import RowTask, cost_vector
 from wbc_suite.typing import Matrix, Vector
 
 __all__ = ["LookAtTask"]
 
-_LEAST_DISTANCE = 0.02  # m; nearer points have no direction worth the name
+_LEAST_DISTANCE = 0.02  # m; nearer points have no direction
 
 
 class LookAtTask(RowTask):
@@ -46,7 +46,7 @@ class LookAtTask(RowTask):
         ConfigError: If the axis has no length.
     """
 
-    dim = 3
+    unit = "rad"
 
     def __init__(
         self,
@@ -60,10 +60,15 @@ class LookAtTask(RowTask):
         max_angular_speed: float = 3.0,
         name: str | None = None,
     ) -> None:
-        super().__init__(name or f"{frame} looks", gain=gain, level=level)
+        super().__init__(
+            name or f"{frame} looks",
+            dim=3,
+            cost=float(cost_vector(f"{frame} looks", cost, 1)[0]),
+            gain=gain,
+            level=level,
+            max_speed=max_angular_speed,
+        )
         self.frame = frame
-        self._cost = float(cost_vector(self.name, cost, 1)[0])
-        self._speed = check_speed(self.name, max_angular_speed)
         direction = check_array(f"Task '{self.name}': the axis", axis, (3,))
         length = float(np.linalg.norm(direction))
         if not 0.0 < length < np.inf:
@@ -89,46 +94,20 @@ class LookAtTask(RowTask):
             pose = configuration.frame_pose(self._f)
             self.target = pose.translation + pose.rotation @ self._axis
 
-    def error(self, configuration: Configuration) -> Vector:
-        """Return `u - a`, shape (3,); NaN for a target that is not finite."""
-        if not is_usable(self._point()):
-            return np.full(3, np.nan)
-        direction, _ = self._direction(configuration)
-        R = configuration.frame_pose(self._f).rotation
-        return R.T @ direction - self._axis
-
-    def jacobian(self, configuration: Configuration) -> Matrix:
-        """Return the derivative J of the error, `d(e) = -J dq`, shape (3, nv)."""
-        d, distance = self._direction(configuration)
-        R = configuration.frame_pose(self._f).rotation
+    def evaluate(
+        self, configuration: Configuration, error: Vector, jacobian: Matrix
+    ) -> None:
+        """Write `u - a` and its Jacobian."""
+        assert self.target is not None
+        pose = configuration.frame_pose(self._f)
+        R, usable = pose.rotation, is_usable(self.target)
+        offset = R @ self._axis  # for a point that is not finite: along the axis
+        if usable:
+            offset = self.target - pose.translation
+        distance = max(float(np.linalg.norm(offset)), _LEAST_DISTANCE)
+        d = offset / distance
+        error[:] = R.T @ d - self._axis if usable else np.nan
         J = configuration.frame_jacobian(self._f, "aligned")
         turn = -pin.skew(R.T @ d) @ R.T @ J[3:]
         along = d if distance > _LEAST_DISTANCE else np.zeros(3)
-        return turn + R.T @ (J[:3] - np.outer(along, d @ J[:3])) / distance
-
-    def rows(
-        self, configuration: Configuration, dt: float, W: Matrix, e: Vector
-    ) -> Vector:
-        """Write the weighted rows."""
-        error = self.error(configuration)
-        step = self.gain * error if np.isfinite(error).all() else np.zeros(3)
-        saturate(step, self._speed * dt)
-        np.multiply(self._cost, self.jacobian(configuration), out=W)
-        np.multiply(self._cost, step, out=e)
-        return error
-
-    def _point(self) -> Vector:
-        assert self.target is not None
-        return self.target
-
-    def _direction(self, configuration: Configuration) -> tuple[Vector, float]:
-        """Return the unit vector from the frame to the point, and the distance.
-
-        For a point that is not finite, where the axis points now and 1 m.
-        """
-        pose = configuration.frame_pose(self._f)
-        if not is_usable(self._point()):
-            return pose.rotation @ self._axis, 1.0
-        offset = self._point() - pose.translation
-        distance = max(float(np.linalg.norm(offset)), _LEAST_DISTANCE)
-        return offset / distance, distance
+        jacobian[:] = turn + R.T @ (J[:3] - np.outer(along, d @ J[:3])) / distance

@@ -1,26 +1,26 @@
-"""Pull joints to a posture."""
+"""Tasks on all joints: pull them to a posture, or let them stand still."""
 
 from collections.abc import Mapping
-
-import numpy as np
+from typing import ClassVar
 
 from wbc_suite.arguments import check_array
 from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Configuration
-from wbc_suite.qp.task import DiagonalTask, check_speed, cost_vector, joint_costs
+from wbc_suite.qp.kernel import Kernel
+from wbc_suite.qp.task import JointTask, SharedRow
 from wbc_suite.typing import Vector
 
-__all__ = ["PostureTask"]
+__all__ = ["DampingTask", "PostureTask"]
 
 
-class PostureTask(DiagonalTask):
+class PostureTask(JointTask):
     """Pull joints to a posture q*: `e = q* (-) q`, `J = I`.
 
-    Free and planar roots have cost zero unless named in `costs`. Each joint's wanted
-    step is shortened to `max_speed dt`.
+    Each joint's wanted step is shortened to `max_speed dt`.
 
     Args:
-        cost: [cost]/rad or [cost]/m, the same for all joints.
+        cost: [cost]/rad or [cost]/m for all joints; free and planar roots have cost
+            zero unless named.
         costs: Costs of single joints by name, in place of `cost`.
         target: Posture q*, shape (nq,); without one the posture at binding time.
         gain: See `Task`.
@@ -28,6 +28,8 @@ class PostureTask(DiagonalTask):
         max_speed: Greatest speed asked for, rad/s or m/s.
         name: How reports call the task.
     """
+
+    kernel: ClassVar[Kernel] = Kernel.POSTURE
 
     def __init__(
         self,
@@ -40,12 +42,10 @@ class PostureTask(DiagonalTask):
         max_speed: float = 3.0,
         name: str = "posture",
     ) -> None:
-        super().__init__(name, gain=gain, level=level)
-        self.cost, self.costs = cost, dict(costs or {})
-        for value in (cost, *self.costs.values()):
-            cost_vector(name, value, 1)
-        self.max_speed = check_speed(name, max_speed)
-        self._target: Vector | None = None
+        super().__init__(
+            name, cost=cost, costs=costs, gain=gain, level=level, max_speed=max_speed
+        )
+        self.has_target = False
         if target is not None:
             self.set_target(target)
 
@@ -56,21 +56,24 @@ class PostureTask(DiagonalTask):
             ConfigError: If the shape is wrong.
         """
         what = f"Task '{self.name}': the posture"
-        if self._target is None:
-            self._target = check_array(what, target, None).copy()
-        else:  # in place: kernels know where it is
-            self._target[:] = check_array(what, target, self._target.shape)
+        shape = self.target_row.values.shape if self.has_target else None
+        posture = check_array(what, target, shape)
+        if posture.ndim != 1:
+            raise ConfigError(f"{what} is a vector, not shape {posture.shape}.")
+        if not self.has_target:
+            self.target_row = SharedRow(posture.size)
+        self.target_row.set(posture)
+        self.has_target = True
 
     @property
     def target(self) -> Vector:
-        """Posture q*, shape (nq,), known once it is set or bound. The task's own."""
-        assert self._target is not None
-        return self._target
+        """Posture q*, shape (nq,), once it is set or bound; a copy."""
+        return self.target_row.values.copy()
 
     def bind(self, configuration: Configuration) -> None:
         """Resolve joint names; without a target, take the present posture."""
-        self.squared_costs = joint_costs(configuration, self.cost, self.costs) ** 2
-        if self._target is None:
+        super().bind(configuration)
+        if not self.has_target:
             self.set_target(configuration.q)
         if self.target.shape != (configuration.nq,):
             raise ConfigError(
@@ -78,18 +81,34 @@ class PostureTask(DiagonalTask):
                 f"the model has nq {configuration.nq}."
             )
 
-    def error(self, configuration: Configuration) -> Vector:
-        """Return `q* (-) q`, rad or m, shape (nv,)."""
-        return configuration.difference(self.target)
+    def evaluate(self, configuration: Configuration, error: Vector) -> None:
+        """Write `q* (-) q`, rad or m."""
+        error[:] = configuration.difference(self.target_row.values)
 
-    def diagonal(
-        self, configuration: Configuration, dt: float, weights: Vector, steps: Vector
-    ) -> bool:
-        """Add the terms; the readable form of the kernel `posture_terms`."""
-        weights += self.squared_costs
-        error = np.where(self.squared_costs > 0.0, self.error(configuration), 0.0)
-        if not np.isfinite(error).all():
-            return False
-        limit = self.max_speed * dt
-        steps += self.squared_costs * np.clip(self.gain * error, -limit, limit)
-        return True
+
+class DampingTask(JointTask):
+    """Prefer small steps: `e = 0`, `J = I`.
+
+    Args:
+        cost: [cost]/rad or [cost]/m for all joints; free and planar roots have cost
+            zero unless named.
+        costs: Costs of single joints by name, in place of `cost`.
+        level: See `Task`.
+        name: How reports call the task.
+    """
+
+    kernel: ClassVar[Kernel] = Kernel.CONSTANT
+
+    def __init__(
+        self,
+        cost: float,
+        *,
+        costs: Mapping[str, float] | None = None,
+        level: int = 0,
+        name: str = "damping",
+    ) -> None:
+        super().__init__(name, cost=cost, costs=costs, level=level)
+
+    def evaluate(self, configuration: Configuration, error: Vector) -> None:
+        """Write zeros."""
+        error[:] = 0.0

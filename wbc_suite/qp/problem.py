@@ -14,8 +14,8 @@ UNBOUNDED = 1e30
 class Problem:
     """Minimise `0.5 x^T H x + c^T x` subject to `G x <= h`, `A x = b`, `lb <= x <= ub`.
 
-    Rows of G may want more than they bind to: where `wanted < h`, the cost is joined by
-    `0.5 weight s^2`, s >= 0 being what is missing from `G x <= wanted`.
+    Rows of G may be soft: where `wanted < h`, the cost has the term `0.5 weight s^2`,
+    s >= 0 being the violation of `G x <= wanted`.
 
     Owns its arrays, and keeps all bounds in two vectors in the order x, G, A. The
     attributes below are views: write into them.
@@ -30,7 +30,7 @@ class Problem:
         c: Cost vector, shape (nv,).
         G: Inequality rows, shape (inequalities, nv).
         h: Their upper bounds.
-        wanted: What they lead to softly; no soft part where it is not below h.
+        wanted: Their soft upper bounds; not below h, rows are hard.
         weight: Cost of what is missing from that, [cost]^2/m^2.
         A: Equality rows, shape (equalities, nv).
         lb: Lower bounds of x.
@@ -86,7 +86,7 @@ class Problem:
         return out
 
     def soft(self) -> Indices:
-        """Return the rows of G that want more than they bind to."""
+        """Return the soft rows of G."""
         return (self.wanted < self.h).nonzero()[0]
 
     def with_slack(self, soft: Indices) -> "Problem":

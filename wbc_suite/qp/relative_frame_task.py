@@ -5,8 +5,8 @@ import pinocchio as pin
 
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.frame_task import homogeneous
-from wbc_suite.qp.lie import is_usable, saturate
-from wbc_suite.qp.task import RowTask, check_speed, cost_vector
+from wbc_suite.qp.lie import is_usable
+from wbc_suite.qp.task import RowTask, cost_vector
 from wbc_suite.typing import Matrix, Vector
 
 __all__ = ["RelativeFrameTask"]
@@ -36,8 +36,6 @@ class RelativeFrameTask(RowTask):
         name: How reports call the task; "frame in root" when absent.
     """
 
-    dim = 6
-
     def __init__(
         self,
         frame: str,
@@ -52,18 +50,19 @@ class RelativeFrameTask(RowTask):
         max_angular_speed: float = 3.0,
         name: str | None = None,
     ) -> None:
-        super().__init__(name or f"{frame} in {root}", gain=gain, level=level)
+        super().__init__(
+            name or f"{frame} in {root}",
+            dim=6,
+            gain=gain,
+            level=level,
+            max_speed=max_linear_speed,
+            max_angular_speed=max_angular_speed,
+            angular_start=3,
+        )
         self.frame, self.root = frame, root
-        self._costs = np.concatenate(
-            [
-                cost_vector(self.name, position_cost, 3),
-                cost_vector(self.name, orientation_cost, 3),
-            ]
-        )
-        self._speeds = (
-            check_speed(self.name, max_linear_speed),
-            check_speed(self.name, max_angular_speed),
-        )
+        position = cost_vector(self.name, position_cost, 3)
+        orientation = cost_vector(self.name, orientation_cost, 3)
+        self.cost_row.set(np.concatenate([position, orientation]))
         self.target: pin.SE3 | None = None
         if target is not None:
             self.set_target(target)
@@ -85,42 +84,24 @@ class RelativeFrameTask(RowTask):
             root = configuration.frame_pose(self._r)
             self.target = root.actInv(configuration.frame_pose(self._f))
 
-    def error(self, configuration: Configuration) -> Vector:
-        """Return (e_p, e_r), m and rad, shape (6,)."""
+    def evaluate(
+        self, configuration: Configuration, error: Vector, jacobian: Matrix
+    ) -> None:
+        """Write (e_p, e_r), m and rad, and its Jacobian."""
         assert self.target is not None
         root = configuration.frame_pose(self._r)
-        pose = root.actInv(configuration.frame_pose(self._f))
-        if not is_usable(self.target.homogeneous):
-            return np.full(6, np.nan)
-        rotation = pose.rotation.T @ self.target.rotation
-        return np.concatenate(
-            [self.target.translation - pose.translation, pin.log3(rotation)]
-        )
-
-    def jacobian(
-        self, configuration: Configuration, rotation_error: Vector | None = None
-    ) -> Matrix:
-        """Return the derivative J of the error, `d(e) = -J dq`, shape (6, nv)."""
-        if rotation_error is None:
-            rotation_error = self.error(configuration)[3:]
-        root = configuration.frame_pose(self._r)
         pose = configuration.frame_pose(self._f)
+        seen, rotation_error = root.actInv(pose), np.zeros(3)
+        error[:] = np.nan
+        if is_usable(self.target.homogeneous):
+            rotation_error = pin.log3(seen.rotation.T @ self.target.rotation)
+            error[:3] = self.target.translation - seen.translation
+            error[3:] = rotation_error
         J_root = configuration.frame_jacobian(self._r, "aligned").copy()
         J = configuration.frame_jacobian(self._f, "aligned") - J_root
         arm = pose.translation - root.translation
         J[:3] += pin.skew(arm) @ J_root[3:]  # - w x arm = arm x w
-        J[:3] = root.rotation.T @ J[:3]
-        J[3:] = pin.Jlog3(pin.exp3(-rotation_error)) @ pose.rotation.T @ J[3:]
-        return J
-
-    def rows(
-        self, configuration: Configuration, dt: float, W: Matrix, e: Vector
-    ) -> Vector:
-        """Write the weighted rows."""
-        error = self.error(configuration)
-        step = self.gain * error if np.isfinite(error).all() else np.zeros(6)
-        W[:] = self._costs[:, None] * self.jacobian(configuration, step[3:] / self.gain)
-        saturate(step[:3], self._speeds[0] * dt)
-        saturate(step[3:], self._speeds[1] * dt)
-        e[:] = self._costs * step
-        return error
+        jacobian[:3] = root.rotation.T @ J[:3]
+        # Jlog3 is the inverse right Jacobian; Jl^-1(r) = Jr^-1(-r).
+        turn = pin.Jlog3(pin.exp3(-rotation_error)) @ pose.rotation.T
+        jacobian[3:] = turn @ J[3:]

@@ -1,17 +1,100 @@
-"""Why a task is not where it should be."""
+"""Why a task is not at its target: records of a tick, and typed reasons."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal, NamedTuple
 
 import numpy as np
 
-from wbc_suite.typing import Matrix, Vector
+from wbc_suite.qp.level import TickLayout
+from wbc_suite.qp.limit import LimitKind
+from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["LevelRecord", "TaskReport", "TickRecord", "reasons"]
+__all__ = [
+    "ActiveLimit",
+    "Conflict",
+    "LevelRecord",
+    "OutOfReach",
+    "Reason",
+    "TargetNotFinite",
+    "TaskReport",
+    "TickRecord",
+]
 
 _SHARE = 0.1  # part of a task's pull that something must oppose to be named
 _NOTHING = 1e-12  # pull that is rounding: no joint moves the task at all
 _STRETCHED = 0.05  # pull over its greatest possible value; below, no joint can help
+
+
+@dataclass(frozen=True, slots=True)
+class ActiveLimit:
+    """A limit that the tasks press against.
+
+    Attributes:
+        kind: What set it.
+        subject: What is limited: the name of a joint, or what `RowLimit.subject`
+            returns, such as a `LinkPair`.
+        side: Which bound is met.
+        is_joint: Whether it is a bound of a single joint.
+        unit: Unit of the limited quantity: rad, m, N m.
+        multiplier: How hard the tasks press, [cost]^2 times the unit.
+    """
+
+    kind: LimitKind
+    subject: object
+    side: Literal["lower", "upper"]
+    is_joint: bool
+    unit: str
+    multiplier: float
+
+    @property
+    def name(self) -> str:
+        """The subject as text."""
+        return str(self.subject)
+
+    def __str__(self) -> str:
+        """Return "joint limit: elbow (upper)", or "self-collision: forearm - torso"."""
+        if not self.is_joint:
+            kind = "limit" if self.kind is LimitKind.OTHER else str(self.kind)
+            return f"{kind}: {self.subject}"
+        kind = "joint" if self.kind is LimitKind.POSITION else str(self.kind)
+        return f"{kind} limit: {self.subject} ({self.side})"
+
+
+@dataclass(frozen=True, slots=True)
+class Conflict:
+    """Another task, equality rows or upper levels that oppose a task.
+
+    Attributes:
+        other: What opposes it.
+    """
+
+    other: str
+
+    def __str__(self) -> str:
+        """Return "conflict: other"."""
+        return f"conflict: {self.other}"
+
+
+@dataclass(frozen=True, slots=True)
+class OutOfReach:
+    """No joint moves the task nearer to its target: its limb is stretched."""
+
+    def __str__(self) -> str:
+        """Return the reason as text."""
+        return "out of reach: no joint moves it nearer"
+
+
+@dataclass(frozen=True, slots=True)
+class TargetNotFinite:
+    """The target is not finite, so that the task holds what it controls."""
+
+    def __str__(self) -> str:
+        """Return the reason as text."""
+        return "target not finite: held"
+
+
+Reason = ActiveLimit | Conflict | OutOfReach | TargetNotFinite
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,130 +103,223 @@ class TaskReport:
 
     Attributes:
         name: The task's name.
-        position_error: Distance to the target before saturation, m.
+        position_error: Length of the error before saturation, in `unit`.
         orientation_error: Angle to the target, rad; 0 for tasks without one.
+        unit: Unit of `position_error`.
         reached: Whether both are within the tolerances asked for.
-        reasons: What keeps the task from its target, weightiest first, in words;
-            empty when it is reached or simply on its way.
+        reasons: What keeps the task from its target, weightiest first; empty when it
+            is reached or simply on its way. `str` turns each into text.
     """
 
     name: str
     position_error: float
     orientation_error: float
+    unit: str
     reached: bool
-    reasons: tuple[str, ...]
+    reasons: tuple[Reason, ...]
 
-
-Opponents = Iterable[tuple[str, Vector]]
-"""Words and force on the joints, shape (nv,), of each active limit and equality."""
+    def __str__(self) -> str:
+        """Return "hand: 0.120 m, 0.30 rad; joint limit: elbow (upper)"."""
+        if self.reached:
+            return f"{self.name}: reached"
+        error = f"{self.position_error:.3g} {self.unit}"
+        if self.orientation_error > 0.0:
+            error += f", {self.orientation_error:.3g} rad"
+        why = "; ".join(str(reason) for reason in self.reasons)
+        return f"{self.name}: {error} from its target; {why or 'moving'}"
 
 
 @dataclass(frozen=True, slots=True)
 class LevelRecord:
-    """What a level knew at one tick, in arrays of its own.
+    """What a tick left of one level.
 
     Attributes:
         names: Its row tasks.
+        units: Unit of each one's error.
         slices: Where each one's rows are.
-        errors: Position (m) and orientation error (rad) of each.
         held: Names of the tasks whose target was not finite.
+        distances: Length (in its unit) and angle (rad) of each error, shape (n, 2).
         W: Weighted rows, shape (m, nv).
         e: Weighted steps, shape (m,).
         diagonal: Squared weights and weighted steps of joints, shape (2, nv).
+        x: The step that was found, shape (nv,).
+        multipliers: Of bounds, inequality rows and equality rows.
+        pressed: Rows with a multiplier other than zero, shape (k,).
+        rows: These rows, shape (k, nv).
     """
 
     names: tuple[str, ...]
-    slices: Sequence[slice]
-    errors: Sequence[tuple[float, float]]
+    units: tuple[str, ...]
+    slices: tuple[slice, ...]
     held: tuple[str, ...]
+    distances: Matrix
     W: Matrix
     e: Vector
     diagonal: Matrix
+    x: Vector
+    multipliers: Vector
+    pressed: Indices
+    rows: Matrix
 
-    def reports(
-        self,
-        x: Vector,
-        opponents: Sequence[tuple[str, Vector]],
-        position_tolerance: float,
-        orientation_tolerance: float,
-    ) -> dict[str, TaskReport]:
-        """Report every row task by name; see `reasons` for the arguments."""
-        found: dict[str, TaskReport] = {}
-        for n, (name, (position, angle)) in enumerate(
-            zip(self.names, self.errors, strict=True)
-        ):
-            near = position <= position_tolerance and angle <= orientation_tolerance
-            why: tuple[str, ...] = ()
-            if name in self.held:
-                why = ("target not finite: held",)
-            elif not near:
-                why = reasons(self, n, x, opponents)
-            found[name] = TaskReport(
-                name=name,
-                position_error=position,
-                orientation_error=angle,
-                reached=near,
-                reasons=why,
-            )
-        return found
+    def pulls(self) -> list[Vector]:
+        """Return the force of each row task on the joints, `W^T (e - W x)`."""
+        return [
+            self.W[rows].T @ (self.e[rows] - self.W[rows] @ self.x)
+            for rows in self.slices
+        ]
+
+    def reasons(
+        self, task: int, opponents: Sequence[tuple[Reason, Vector]]
+    ) -> tuple[Reason, ...]:
+        """Return what opposes the pull of a task, weightiest first.
+
+        At the optimum the forces on the joints balance: the pulls
+        `g_i = W_i^T (e_i - W_i dq)` of all tasks against the multipliers of limits and
+        equality rows. The share of an opponent with force f in stopping task i is
+        `f . g_i / (g_i . g_i)`. A task that is not met though it hardly pulls has its
+        limb stretched: no joint moves it nearer.
+
+        Args:
+            task: Its number among the level's row tasks.
+            opponents: Force on the joints of each active limit and equality.
+        """
+        pulls, rows = self.pulls(), self.slices[task]
+        pull = pulls[task]
+        rest = self.e[rows] - self.W[rows] @ self.x
+        greatest = float(np.linalg.norm(self.W[rows]) * np.linalg.norm(rest))
+        square = float(pull @ pull)
+        found: list[tuple[Reason, float]] = [
+            (reason, float(force @ pull)) for reason, force in opponents
+        ]
+        found += [
+            (Conflict(other), float(-force @ pull))
+            for k, (other, force) in enumerate(zip(self.names, pulls, strict=True))
+            if k != task
+        ]
+        joints = self.diagonal[1] - self.diagonal[0] * self.x
+        found.append((Conflict("posture"), float(-joints @ pull)))
+        named = [(reason, part) for reason, part in found if part > _SHARE * square]
+        reasons = tuple(reason for reason, _ in sorted(named, key=lambda r: -r[1]))
+        if np.sqrt(square) <= max(_STRETCHED * greatest, _NOTHING):
+            return (OutOfReach(), *reasons)
+        return reasons
 
 
-@dataclass(frozen=True, slots=True)
-class TickRecord:
-    """What a stack knew at one tick: it explains it at any later time.
+class TickRecord(NamedTuple):
+    """What explains a tick, also after the next ones.
+
+    It is made in each tick, and only copies; names and arrays are resolved when it is
+    read.
 
     Attributes:
-        levels: Each level that was solved, with its step and what tells its opponents.
+        layout: Names, and where the results are.
+        buffer: The results of all levels, a copy.
+        kinds: The `LimitKind` of each lower, then each upper bound, shape (2 nv,).
+        held: Names of the tasks whose target was not finite, of each solved level.
+        pressed: Rows with a multiplier other than zero and these rows, of each solved
+            level; empty for stacks without rows.
+        subjects: Kind, subject and unit of the pressed inequality rows, by row.
     """
 
-    levels: Sequence[tuple[Callable[[], LevelRecord], Vector, Callable[[], Opponents]]]
+    layout: TickLayout
+    buffer: Vector
+    kinds: Indices
+    held: tuple[tuple[str, ...], ...]
+    pressed: tuple[tuple[Indices, Matrix], ...]
+    subjects: Mapping[int, tuple[LimitKind, object, str]]
+
+    @property
+    def levels(self) -> list[LevelRecord]:
+        """Each level that was solved."""
+        none = np.zeros(0, dtype=np.int64), np.zeros((0, len(self.layout.joints)))
+        records: list[LevelRecord] = []
+        for k, held in enumerate(self.held):
+            layout = self.layout.levels[k]
+            pressed, rows = self.pressed[k] if self.pressed else none
+            records.append(
+                LevelRecord(
+                    names=layout.names,
+                    units=layout.units,
+                    slices=layout.slices,
+                    held=held,
+                    pressed=pressed,
+                    rows=rows,
+                    **layout.views(self.buffer),
+                )
+            )
+        return records
+
+    def active(self) -> tuple[ActiveLimit, ...]:
+        """Return the active limits of all levels, hardest pressed first."""
+        size = len(self.layout.joints) + self.layout.inequalities
+        merged: Vector = np.zeros(size)
+        for level in self.levels:
+            own = level.multipliers[:size]
+            merged = np.where(np.abs(own) > np.abs(merged), own, merged)
+        order = np.argsort(-np.abs(merged), kind="stable")
+        return tuple(self._limit(int(i), float(merged[i])) for i in order if merged[i])
 
     def explain(
-        self, *, position_tolerance: float, orientation_tolerance: float
+        self, *, position_tolerance: float = 1e-3, orientation_tolerance: float = 5e-3
     ) -> dict[str, TaskReport]:
-        """See `TaskStack.explain`."""
+        """Report every row task by name.
+
+        Args:
+            position_tolerance: Length of an error that counts as reached, m.
+            orientation_tolerance: Angle that counts as reached, rad.
+        """
         found: dict[str, TaskReport] = {}
-        for level, x, opponents in self.levels:
-            found |= level().reports(
-                x, list(opponents()), position_tolerance, orientation_tolerance
-            )
+        for k, level in enumerate(self.levels):
+            opponents = list(self._opponents(level, is_first=k == 0))
+            for n, name in enumerate(level.names):
+                distance, angle = (float(x) for x in level.distances[n])
+                near = distance <= position_tolerance and angle <= orientation_tolerance
+                reasons: tuple[Reason, ...] = ()
+                if name in level.held:
+                    reasons = (TargetNotFinite(),)
+                elif not near:
+                    reasons = level.reasons(n, opponents)
+                unit = level.units[n]
+                found[name] = TaskReport(name, distance, angle, unit, near, reasons)
         return found
 
+    def _limit(self, i: int, multiplier: float) -> ActiveLimit:
+        """Describe one limit by its place among the multipliers."""
+        nv, is_upper = len(self.layout.joints), multiplier > 0.0
+        if i < nv:
+            kind = LimitKind(int(self.kinds[nv * is_upper + i]))
+            subject, unit = self.layout.joints[i], self.layout.units[i]
+        else:
+            kind, subject, unit = self.subjects[i - nv]
+        return ActiveLimit(
+            kind=kind,
+            subject=subject,
+            side="upper" if is_upper else "lower",
+            is_joint=i < nv,
+            unit=unit,
+            multiplier=abs(multiplier),
+        )
 
-def reasons(
-    level: LevelRecord, task: int, x: Vector, opponents: Opponents
-) -> tuple[str, ...]:
-    """Return what opposes the pull of a task, weightiest first.
-
-    At the optimum the forces on the joints balance: the pulls
-    `g_i = W_i^T (e_i - W_i dq)` of all tasks against the multipliers of limits and
-    equality rows. The share of an opponent with force f in stopping task i is
-    `f . g_i / (g_i . g_i)`. A task that is not met though it hardly pulls has its limb
-    stretched: no joint moves it nearer.
-
-    Args:
-        level: The level of the task.
-        task: Its number among the level's row tasks.
-        x: The step that was found, shape (nv,).
-        opponents: Words and force, shape (nv,), of each active limit and equality.
-    """
-    pulls = [
-        level.W[rows].T @ (level.e[rows] - level.W[rows] @ x) for rows in level.slices
-    ]
-    pull, rows = pulls[task], level.slices[task]
-    rest = level.e[rows] - level.W[rows] @ x
-    greatest = float(np.linalg.norm(level.W[rows]) * np.linalg.norm(rest))
-    square = float(pull @ pull)
-    found = [(words, float(force @ pull)) for words, force in opponents]
-    found += [
-        (f"conflict: {other}", float(-other_pull @ pull))
-        for k, (other, other_pull) in enumerate(zip(level.names, pulls, strict=True))
-        if k != task
-    ]
-    joints = level.diagonal[1] - level.diagonal[0] * x
-    found.append(("conflict: posture", float(-joints @ pull)))
-    named = [(words, part) for words, part in found if part > _SHARE * square]
-    words = tuple(words for words, _ in sorted(named, key=lambda w: -w[1]))
-    if np.sqrt(square) <= max(_STRETCHED * greatest, _NOTHING):
-        return ("out of reach: no joint moves it nearer", *words)
-    return words
+    def _opponents(
+        self, level: LevelRecord, *, is_first: bool
+    ) -> Iterator[tuple[Reason, Vector]]:
+        """Yield each active limit and equality with its force on the joints."""
+        nv, p = len(self.layout.joints), self.layout.inequalities
+        for i in level.multipliers[:nv].nonzero()[0].tolist():
+            force = np.zeros(nv)
+            force[i] = value = float(level.multipliers[i])
+            yield self._limit(i, value), force
+        forces = level.multipliers[nv + level.pressed][:, None] * level.rows
+        for row, force in zip(level.pressed.tolist(), forces, strict=True):
+            if row < p:
+                value = float(level.multipliers[nv + row])
+                yield self._limit(nv + row, value), force
+        if not is_first:
+            upper = forces[level.pressed >= p].sum(axis=0)
+            yield Conflict("tasks of a higher level"), upper
+            return
+        start = p
+        for name, size in self.layout.equalities:
+            own = (level.pressed >= start) & (level.pressed < start + size)
+            yield Conflict(name), forces[own].sum(axis=0)
+            start += size

@@ -1,20 +1,14 @@
-"""What one tick of a stack answers.
+"""The solution of one tick of a stack."""
 
-`Solution` and `Pressure` are named tuples: made anew at each tick, which as frozen
-dataclasses costs 3 us, more than the QP of an arm.
-"""
-
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from enum import IntEnum
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from wbc_suite.qp.bounds import LimitKind
-from wbc_suite.typing import Indices, Vector
+from wbc_suite.qp.report import ActiveLimit, TaskReport, TickRecord
+from wbc_suite.typing import Vector
 
-__all__ = ["ActiveLimit", "Fallback", "Pressure", "Solution"]
+__all__ = ["Fallback", "Solution"]
 
 
 class Fallback(IntEnum):
@@ -33,85 +27,38 @@ class Fallback(IntEnum):
     BOX = 5
     """Damped least squares within the bounds of joints, rows left out."""
     HOLD = 6
-    """Nothing usable came in or out: the robot stands still."""
-
-
-@dataclass(frozen=True, slots=True)
-class ActiveLimit:
-    """A limit that holds a joint back.
-
-    Attributes:
-        name: The joint's name, or a row limit's own words ("forearm - torso").
-        side: Which bound is met.
-        kind: What set it.
-        multiplier: How hard the tasks push against it, [cost]^2 rad or m.
-    """
-
-    name: str
-    side: Literal["lower", "upper"]
-    kind: LimitKind
-    multiplier: float
+    """Inputs or results are not finite: the robot stands still."""
 
     def __str__(self) -> str:
-        words = self.kind.name.lower().replace("_", "-")
-        if self.kind in (
-            LimitKind.SELF_COLLISION,
-            LimitKind.BALANCE,
-            LimitKind.EFFORT,
-            LimitKind.FLOOR,
-        ):
-            return f"{words}: {self.name}"
-        words = "joint" if self.kind is LimitKind.POSITION else words
-        return f"{words} limit: {self.name} ({self.side})"
+        """Return what was done as a sentence."""
+        return _SENTENCES[self]
 
 
-class Pressure(NamedTuple):
-    """How hard the tasks press against bounds and inequality rows.
-
-    Attributes:
-        multipliers: One per velocity, then one per row; positive at an upper bound.
-        kinds: The `LimitKind` of each lower and each upper bound, shape (2, nv).
-        names: Names of the velocities.
-        rows: Kind and words of the rows that are pressed, by row.
-    """
-
-    multipliers: Vector
-    kinds: Indices
-    names: tuple[str, ...]
-    rows: Mapping[int, tuple[LimitKind, str]]
-
-    def limits(self) -> tuple[ActiveLimit, ...]:
-        """List the limits that are pressed, hardest first."""
-        pressed = self.multipliers.nonzero()[0]
-        order = np.argsort(-np.abs(self.multipliers[pressed]), kind="stable")
-        return tuple(self.limit(int(i)) for i in pressed[order])
-
-    def limit(self, i: int) -> ActiveLimit:
-        """Describe one limit by its place among the multipliers."""
-        value, nv = float(self.multipliers[i]), len(self.names)
-        if i < nv:
-            kind, name = LimitKind(int(self.kinds[int(value > 0.0), i])), self.names[i]
-        else:
-            kind, name = self.rows[i - nv]
-        return ActiveLimit(
-            name=name,
-            side="upper" if value > 0.0 else "lower",
-            kind=kind,
-            multiplier=abs(value),
-        )
+_SENTENCES = {
+    Fallback.NONE: "solved as stated",
+    Fallback.LEVEL: "a lower level could not be solved and was left out",
+    Fallback.LIMITS: "limit rows were relaxed",
+    Fallback.ACCELERATION: "acceleration limits were dropped",
+    Fallback.SLACK: "equality and limit rows were relaxed",
+    Fallback.BOX: "rows were left out, bounds of joints are kept",
+    Fallback.HOLD: "the robot holds still",
+}
 
 
 class Solution(NamedTuple):
-    """The step of one tick.
+    """The step of one tick; `print` shows what each task lacks, and what holds it.
+
+    It is a named tuple, because a frozen dataclass takes 3 us to make, which is more
+    than the QP of an arm.
 
     Attributes:
         dq: Step in the tangent space, shape (nv,); integrate it, never add it to q.
         v: Velocity `dq / dt`, shape (nv,).
         fallback: How far the tick had to retreat.
-        residual: By how much the worst kept constraint is broken, in its own unit.
-        held: Tasks whose target was not finite; what they watch stands still.
-        conflicts: Names of the equality rows that could not be kept.
-        press: Tells what `active` is read off.
+        residual: By how much the worst kept constraint is violated, in its own unit.
+        held: Tasks whose target was not finite; what they control stands still.
+        conflicts: Names of the equality rows and limits that could not be kept.
+        record: What explains the tick.
     """
 
     dq: Vector
@@ -120,19 +67,37 @@ class Solution(NamedTuple):
     residual: float
     held: tuple[str, ...]
     conflicts: tuple[str, ...]
-    press: Callable[[], Pressure]
-
-    @property
-    def pressure(self) -> Pressure:
-        """How hard the tasks press against bounds and inequality rows."""
-        return self.press()
+    record: TickRecord
 
     @property
     def active(self) -> tuple[ActiveLimit, ...]:
         """Limits that hold joints back, hardest pressed first."""
-        return self.pressure.limits()
+        return self.record.active()
 
     @property
     def ok(self) -> bool:
         """Whether the problem was solved as stated."""
         return self.fallback is Fallback.NONE and not self.held
+
+    def explain(
+        self, *, position_tolerance: float = 1e-3, orientation_tolerance: float = 5e-3
+    ) -> dict[str, TaskReport]:
+        """Report every task with rows; see `TickRecord.explain`."""
+        return self.record.explain(
+            position_tolerance=position_tolerance,
+            orientation_tolerance=orientation_tolerance,
+        )
+
+    def __str__(self) -> str:
+        """Return the fallback, the fastest joint, every task and every active limit."""
+        lines = [f"Solution: {self.fallback} (residual {self.residual:.1g})"]
+        names, units = self.record.layout.joints, self.record.layout.units
+        if len(self.v):
+            fastest = int(np.argmax(np.abs(self.v)))
+            speed = f"{abs(self.v[fastest]):.3g} {units[fastest]}/s"
+            lines.append(f"  fastest joint: {names[fastest]}, {speed}")
+        lines += [f"  {report}" for report in self.explain().values()]
+        lines += [f"  active: {limit}" for limit in self.active]
+        lines += [f"  not kept: {name}" for name in self.conflicts]
+        lines += [f"  target not finite: {name}" for name in self.held]
+        return "\n".join(lines)

@@ -7,7 +7,6 @@ import daqp
 import numpy as np
 
 from wbc_suite.errors import SolverError, UnknownNameError
-from wbc_suite.qp.least_distance import LeastDistance
 from wbc_suite.qp.problem import UNBOUNDED, Problem
 from wbc_suite.typing import Vector
 
@@ -15,6 +14,7 @@ __all__ = ["DaqpSolver", "QpSolver", "QpsolversSolver", "make_solver"]
 
 _TOLERANCE = 1e-10
 _ITERATIONS = 1000  # of one solve, some 10 ms; a humanoid's takes up to 100
+_EQUALITY = 5  # how daqp marks an equality row
 
 
 class QpSolver(Protocol):
@@ -34,13 +34,7 @@ class QpSolver(Protocol):
 
 
 class DaqpSolver:
-    """daqp on the bounds that matter, see `least_distance`; it remembers which did.
-
-    The factor of H and the bounds that do not bind are a compiled kernel's work: on a
-    humanoid that takes half the time that daqp takes with a dense H.
-
-    A workspace is kept for the last size of problem, and one of daqp's for each number
-    of rows that it was asked about.
+    """daqp, with one workspace for the last size of problem; it is warm-started.
 
     Primal tolerance 1e-10; the default of 1e-6 would let joints out of their limits by
     as much. Iterations are capped, not seconds: what a robot does must not depend on
@@ -51,9 +45,8 @@ class DaqpSolver:
     """
 
     def __init__(self) -> None:
-        self._size = 0, 0, 0
-        self._space: LeastDistance | None = None  # until a problem tells its size
-        self._models: dict[int, daqp.Model] = {}
+        self._size = 0, 0
+        self._model: daqp.Model | None = None  # until a problem fixes its size
 
     def fresh(self) -> "DaqpSolver":
         """Return another, without memory."""
@@ -61,50 +54,31 @@ class DaqpSolver:
 
     def solve(self, problem: Problem) -> tuple[Vector, Vector] | None:
         """Solve; see `QpSolver`."""
-        size = (problem.nv, len(problem.rows), problem.equalities)
-        space = self._space
-        if space is None or size != self._size:
-            space = LeastDistance(*size)
-            self._size, self._space = size, space
-        constraints = problem.rows, problem.lower, problem.upper
-        count = space.begin(problem.H, problem.c, *constraints)
-        if count < 0:
+        if not (np.isfinite(problem.H).all() and np.isfinite(problem.c).all()):
             return None
-        forces = np.zeros(0)
-        while True:
-            if count:
-                forces = self._forces(space, count)
-            if forces is None:
-                space.forget()  # a failed active set is no warm start
-                return None
-            broken = space.complete(forces, *constraints)
-            if broken == count:
-                return space.x.copy(), space.multipliers.copy()
-            count = broken
-
-    def _forces(self, space: LeastDistance, count: int) -> Vector | None:
-        """Return the multipliers of the small problem; None where daqp finds none."""
-        M, high, low = space.M[:count, :count].copy(), space.high[:count], space.low
-        sense = space.sense[:count].astype(np.intc)
-        model = self._models.get(count)
-        if model is None:
-            model = self._models[count] = daqp.Model()
+        sense = np.zeros(len(problem.upper), dtype=np.intc)
+        sense[len(sense) - problem.equalities :] = _EQUALITY
+        data = problem.H, problem.c, problem.rows, problem.upper, problem.lower, sense
+        size = problem.nv, len(problem.rows)
+        model, self._model = self._model, None  # one that fails is no warm start
+        if model is None or size != self._size:
+            model = daqp.Model()
             model.settings = {"primal_tol": _TOLERANCE, "iter_limit": _ITERATIONS}
-            flag, _ = model.setup(
-                np.eye(count), np.zeros(count), M, high, low[:count], sense
-            )
+            flag, _ = model.setup(*data)
         else:
-            flag = model.update(A=M, bupper=high, blower=low[:count], sense=sense)
-        if flag >= 0:
-            _, _, flag, info = model.solve()
-            if flag > 0:
-                return info["lam"]
-        del self._models[count]
-        return None
+            A = problem.rows if len(problem.rows) else None  # it rejects an empty one
+            flag = model.update(*data[:2], A, *data[3:])
+        if flag < 0:
+            return None
+        x, _, flag, info = model.solve()
+        if flag <= 0:
+            return None
+        self._size, self._model = size, model
+        return np.array(x), np.array(info["lam"])
 
 
 class QpsolversSolver:
-    """Any solver that qpsolvers knows, for comparison and for users' own choice.
+    """Any solver of qpsolvers, for comparison and for users' own choice.
 
     proxqp runs at 1e-9: at its default it reports success with x off by 0.2 in flat
     directions when warm-started. It runs sparse: its dense form gives up on some

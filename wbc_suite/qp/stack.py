@@ -2,38 +2,39 @@
 
 import math
 from collections.abc import Sequence
-from functools import partial
 
 import numpy as np
 
 from wbc_suite.arguments import check_array, check_number
+from wbc_suite.compiling import as_argument
 from wbc_suite.kinematics import Configuration
-from wbc_suite.kinematics.array_table import ArrayTable
-from wbc_suite.qp.acceleration_limit import AccelerationLimit
-from wbc_suite.qp.bending import RowBending
-from wbc_suite.qp.bounds import LimitKind
-from wbc_suite.qp.constraints import Constraints
+from wbc_suite.qp.constraints import Constraints, check_parts
 from wbc_suite.qp.equality import Equality
 from wbc_suite.qp.escape import Escape
-from wbc_suite.qp.fallback import checked_solve, retreat
+from wbc_suite.qp.fallback import Ladder
 from wbc_suite.qp.frame_task import FrameTask
-from wbc_suite.qp.level import Level
-from wbc_suite.qp.limit import BoxLimit, JointBounds, Limit
-from wbc_suite.qp.lower_levels import LowerLevels
-from wbc_suite.qp.parts import check_parts
-from wbc_suite.qp.position_limit import PositionLimit
+from wbc_suite.qp.joint_limits import AccelerationLimit, PositionLimit, VelocityLimit
+from wbc_suite.qp.level import make_levels, tick_layout
+from wbc_suite.qp.limit import BoxLimit, JointBounds, Limit, LimitKind
 from wbc_suite.qp.problem import Problem
 from wbc_suite.qp.report import TaskReport, TickRecord
 from wbc_suite.qp.solution import Fallback, Solution
 from wbc_suite.qp.solver import make_solver
+from wbc_suite.qp.strict_level import MAX_LEVELS
 from wbc_suite.qp.task import Task
-from wbc_suite.qp.tick import LOST, SOLVED, STATED, TOLERANCE, BoxField, tick
-from wbc_suite.qp.velocity_limit import VelocityLimit
-from wbc_suite.typing import Array, Indices, Matrix, Vector
+from wbc_suite.qp.tick import (
+    TOLERANCE,
+    TickArrays,
+    TickStatus,
+    finish_level,
+    solve_tick,
+)
+from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["TaskStack"]
 
-_RETURN_WEIGHT = 1e2  # of a row that leads back, against the stiffest joint's cost
+_SOLVED = TickStatus.SOLVED.value
+_NO_NAMES: tuple[tuple[str, ...], ...] = ((),)
 
 
 class TaskStack:
@@ -46,7 +47,11 @@ class TaskStack:
 
     each level within what leaves the rows of the levels above as they are. It never
     raises on what a robot or an operator may do: targets that are not finite hold what
-    they watch, rows that contradict each other are relaxed, and the `Solution` says so.
+    they control, rows that contradict each other are relaxed, and the `Solution`
+    reports it.
+
+    A tick is one compiled call: see `tick.solve_tick`, which compiled loops may call
+    with `arrays` themselves. The solver runs where it does not converge.
 
     Args:
         configuration: The robot; `solve` reads it, the caller moves it.
@@ -55,17 +60,23 @@ class TaskStack:
         limits: Limits; position, velocity and acceleration limits with their defaults
             when absent.
         equalities: Rows that are kept exactly, before all tasks.
-        solver: "daqp", or a name that qpsolvers knows.
+        solver: "daqp", or a name of qpsolvers.
         damping: Tikhonov term, [cost]^2/rad^2. 1e-3 removes the flutter at singular
             postures and does not move the point of rest.
         curvature_damping: Factor of a damping that follows the tasks' errors, see
-            `rows.normal_equations`: it keeps targets that cannot be reached from making
-            the robot flutter, and vanishes at targets that can. 0 is without.
+            `task_kernels.write_tasks`: it keeps targets that cannot be reached from
+            making the robot flutter, and vanishes at targets that can. 0 is without.
         escape: Whether the stack may lead the robot out of postures from which no small
             step leads nearer to a frame's target; see `escape`.
-        warm: Whether the active set of the last tick is tried before the solver is
-            asked; it answers most ticks, exactly. By default with daqp, so that a
-            solver chosen by name is the one that runs.
+        warm: Whether the active set of the last tick is tried before the solver; it
+            solves most ticks, exactly. By default with daqp, so that a solver chosen
+            by name is the one that runs.
+
+    Attributes:
+        v_previous: Velocity of the last tick, shape (nv,); write to set it.
+        arrays: The argument of `solve_tick`; targets of tasks are copied into it by
+            `prepare`.
+        is_compiled: Whether a tick needs no Python: all parts have a kernel.
 
     Raises:
         ConfigError: If an argument is out of range.
@@ -91,74 +102,100 @@ class TaskStack:
             limits = (PositionLimit(), VelocityLimit(), AccelerationLimit())
         self.configuration = configuration
         self.tasks, self.equalities = tuple(tasks), tuple(equalities)
-        self.solver = solver
+        self.solver, self._limits = solver, tuple(limits)
         self.damping = check_number("TaskStack: damping", damping, above=0.0)
         self.curvature_damping = check_number(
             "TaskStack: curvature_damping", curvature_damping, least=0.0
         )
-        self._bounds = JointBounds.unlimited(configuration)
+        self.bounds = JointBounds.unlimited(configuration)
         for limit in limits:
             if isinstance(limit, BoxLimit):
-                limit.apply(configuration, self._bounds)
+                limit.apply(configuration, self.bounds)
+        qp = make_solver(solver)
         self._constraints = Constraints(configuration, limits, self.equalities)
-        numbers = sorted({t.level for t in tasks}) or [0]
-        self._levels = [
-            Level(configuration, [t for t in tasks if t.level == k]) for k in numbers
-        ]
+        rows = self._constraints
+        self._layout = tick_layout(configuration, tasks, rows)
+        self._buffer: Vector = np.zeros(self._layout.levels[-1].end)
+        self.levels = make_levels(configuration, tasks, self._layout, self._buffer)
+        rows.fill_constants(self.levels[0].qp)
         self._warm = solver == "daqp" if warm is None else warm
-        rows = self._constraints.inequalities, self._constraints.dim
-        self._problem = Problem(configuration.nv, *rows)
-        self._solver = make_solver(solver)
-        self._solved: list[tuple[Matrix, Vector, Vector]] = []
-        self._bending = RowBending(self.curvature_damping)
-        nv = configuration.nv
-        self._side: Indices = np.zeros(nv, dtype=np.int64)
-        self._kinds: Indices = np.zeros((2, nv), dtype=np.int64)
-        self.v_previous: Vector = np.zeros(nv)
-        self._arrays = self._make_table()
-        self._box = self._arrays.table
-        self._lower = LowerLevels(
-            configuration,
-            self._levels,
-            self._problem,
-            self._box,
-            warm=self._warm,
-            curvature=self.curvature_damping,
+        self.is_compiled = self._constraints.is_compiled and all(
+            level.is_compiled for level in self.levels
         )
-        self._limits = tuple(limits)
-        self._bias: Matrix | None = None
+        self._tick = self._make_arrays()
+        self.v_previous: Vector = self._tick.v
+        self._ladder = Ladder(configuration, self.levels, self.bounds, self._tick, qp)
+        self.arrays = as_argument(self._tick)
         frames = [t for t in tasks if isinstance(t, FrameTask)]
         self._escape = (
-            Escape(configuration, frames, self._bounds, self._shadow)
+            Escape(configuration, frames, self.bounds, self._copy)
             if escape and frames
             else None
         )
-        self._is_plain = len(self._levels) == 1 and len(self._problem.rows) == 0
-        # Python code that reads q comes before the kernel, which would say it is lost.
-        self._looks_first = (
-            self._escape is not None
-            or len(self._problem.rows) > 0
-            or any(level.is_interpreted for level in self._levels)
+        self._is_alone = self._escape is None and self.is_compiled
+        self._last: Solution | None = None
+
+    def _make_arrays(self) -> TickArrays:
+        """Gather what the kernel reads and writes."""
+        bounds, rows, nv = self.bounds, self._constraints, self.configuration.nv
+        levels = tuple(as_argument(level.arrays) for level in self.levels)
+        step = self._buffer[: 2 * nv + 2]
+        return TickArrays(
+            robot=self.configuration.robot,
+            levels=(*levels, *levels[-1:] * (MAX_LEVELS - len(levels))),
+            level_count=len(levels),
+            q_lower=bounds.q_lower,
+            q_upper=bounds.q_upper,
+            v_max=bounds.v_max,
+            a_max=bounds.a_max,
+            kinds=np.zeros(2 * nv, dtype=np.int64),
+            v=step[nv : 2 * nv],
+            x=step[:nv],
+            residual=step[2 * nv : 2 * nv + 1],
+            solved=np.zeros(1, dtype=np.int64),
+            relax_speed=rows.relax_speed,
+            pressure_damping=np.zeros(1),
+            held=rows.held,
+            rate=rows.rate,
+            capsules=rows.collision.argument,
+            collision=rows.collision.rates,
+            collision_rows=rows.collision_rows,
+            spheres=rows.floor.argument,
+            floor_rows=rows.floor_rows,
+            prepared=np.full(2, int(self.is_compiled), dtype=np.int64),
+            position_gain=float(bounds.position_gain),
+            damping=float(self.damping),
+            curvature=float(self.curvature_damping),
+            warm=bool(self._warm),
+            all_finite=step[2 * nv + 1 :],
         )
 
     def reset(self, v: Vector | None = None) -> None:
-        """Forget the past, warm starts too; set the previous velocity, shape (nv,).
+        """Discard the past, warm starts too; set the previous velocity, shape (nv,).
 
-        After it the same inputs give bit-equal answers.
+        After it the same inputs give bit-equal solutions.
         """
         if v is None:
             self.v_previous[:] = 0.0
         else:
             shape = (self.configuration.nv,)
             self.v_previous[:] = check_array("TaskStack.reset: v", v, shape)
-        self._solver = self._solver.fresh()
-        self._lower.reset()
-        self._side[:] = 0
-        self._solved.clear()
-        self._bending.forget()
+        self._ladder.reset()
+        for level in self.levels:
+            level.reset()
+        self._tick.pressure_damping[:] = 0.0
         self._constraints.reset()
+        self._last = None
         if self._escape is not None:
             self._escape.reset()
+
+    def prepare(self, dt: float) -> None:
+        """Evaluate tasks, limits and equalities that have no kernel."""
+        if not self.is_compiled:
+            for level in self.levels:
+                level.prepare(self.configuration)
+            self._constraints.prepare(self.configuration, dt, self.levels[0].qp)
+        self._tick.prepared[0] = 1
 
     def solve(self, dt: float) -> Solution:
         """Return the step from the present configuration.
@@ -171,66 +208,98 @@ class TaskStack:
         """
         if not isinstance(dt, float) or not 0.0 < dt < math.inf:
             dt = check_number("TaskStack.solve: dt, a time,", dt, above=0.0)
-        if self._looks_first and not self._look(dt):
-            return self._stand(dt)
-        problem, leading_back = self._problem, False
-        if len(problem.rows):
-            leading_back = self._constraints.write(self.configuration, dt, problem)
-        outcome, residual = self._tick(dt, warm=self._warm and not leading_back)
-        if outcome == LOST:
-            return self._stand(dt)
-        if outcome == SOLVED:
-            answer, fallback = self._first.copy(), Fallback.NONE
-            of_x, of_v, of_multipliers, of_kinds = self._parts
-            x, v = answer[of_x], answer[of_v]
-            multipliers, kinds = answer[of_multipliers], answer[of_kinds]
-        else:
-            x, multipliers, fallback = self._ask_solver(
-                dt, stated=outcome == STATED, leading_back=leading_back
-            )
-            v, residual, kinds = x / dt, problem.violation(x), self._kinds.copy()
-            self.v_previous[:] = v
-        self._solved = [(problem.rows, x, multipliers)]
-        if self._is_plain:
-            press = partial(self._constraints.pressure, [multipliers], kinds)
-            held = self._levels[0].held
-            return Solution(x, v, fallback, residual, held, (), press)
-        if len(problem.rows):
-            kept = fallback is Fallback.NONE  # what is relaxed has its own damping
-            pressing = multipliers[problem.nv :]
-            first = self._levels[0]
-            pulls = first.W, first.e, first.diagonal[1]
-            self._bending.note(problem.rows, pressing, pulls, dt, kept=kept)
-        if len(self._levels) > 1:
-            x, fallback = self._solve_lower(x, fallback, dt)
-            v, residual = x / dt, problem.violation(x)
-            self.v_previous[:] = v
-        return self._answer(x, v, fallback, residual, kinds)
+        if not self._is_alone:
+            q = self.configuration.q
+            if math.isfinite(q.dot(q)):
+                if self._escape is not None:
+                    bias = self._escape.bias(dt, self.v_previous, self._pressed)
+                    self._set_bias(bias)
+                self.prepare(dt)
+            self._tick.prepared[0] = 1
+        status, k = solve_tick(self.arrays, dt, 0)
+        if status == _SOLVED:
+            self._last = self._read(Fallback.NONE)
+            return self._last
+        return self.complete(dt, status, k)
 
-    def _look(self, dt: float) -> bool:
-        """Let the escape see the robot; False where q is not finite."""
-        q = self.configuration.q
-        if not math.isfinite(q.dot(q)):
-            return False
-        if self._escape is not None:
-            self._bias = self._escape.bias(dt, self.v_previous, self._pressed)
-        return True
+    def complete(self, dt: float, status: int, k: int) -> Solution:
+        """Return the solution of a tick, after solving what the kernel did not solve.
+
+        Args:
+            dt: Duration of the step, s.
+            status: Status that `solve_tick` returned.
+            k: Level that it returned.
+        """
+        fallback = Fallback.NONE
+        while status != TickStatus.SOLVED:
+            if status == TickStatus.BAD_POSITION:
+                self._tick.x[:] = self._tick.v[:] = self._tick.residual[:] = 0.0
+                fallback = Fallback.HOLD
+                break
+            is_finite = status != TickStatus.BAD_ROWS
+            result = self._ladder.solve_level(k, dt, is_finite=is_finite)
+            fallback = max(fallback, result)
+            if result is not Fallback.LEVEL:
+                finish_level(self.arrays, k, dt, result is Fallback.NONE)
+            if result is Fallback.LEVEL or result >= Fallback.BOX:
+                k = len(self.levels) - 1  # the levels below are left out
+            status, k = solve_tick(self.arrays, dt, k + 1)
+        self._last = self._read(fallback)
+        return self._last
 
     def problem(self) -> Problem:
-        """Return the QP of the first level at the last tick: a view, valid until next.
+        """Return the QP of the first level at the last tick, a buffer.
 
-        After a retreat its bounds are those without acceleration limits. What rows
-        outside their limit want is beside it, see `Problem`.
+        After a retreat its bounds are those without acceleration limits. Rows outside
+        their limit are soft, see `Problem`.
         """
-        self._levels[0].form(self._problem)
-        return self._problem
+        problem, _ = self._ladder.problem(0)
+        self.levels[0].state(problem)
+        return problem
+
+    def solution(self) -> Solution:
+        """Return the solution of the last tick, also of one that a kernel solved."""
+        return self._read(Fallback.NONE)
+
+    def _read(self, fallback: Fallback) -> Solution:
+        """Copy the step and what explains it."""
+        tick, nv = self._tick, self.configuration.nv
+        values, solved = self._buffer.copy(), int(tick.solved[0])
+        held = _NO_NAMES * solved
+        if not values[2 * nv + 1]:
+            held = tuple(level.held() for level in self.levels[:solved])
+        pressed: tuple[tuple[Indices, Matrix], ...] = ()
+        subjects: dict[int, tuple[LimitKind, object, str]] = {}
+        conflicts: tuple[str, ...] = ()
+        if len(self.levels[0].qp.rows) or solved > 1:
+            rows, p = self._constraints, self._layout.inequalities
+            pressed = tuple(level.pressed() for level in self.levels[:solved])
+            active = {int(i) for found, _ in pressed for i in found if i < p}
+            subjects = {row: rows.subject(row) for row in active}
+            if fallback >= Fallback.LIMITS and solved:
+                conflicts = rows.violated(self.levels[0].qp, tick.x, TOLERANCE)
+        record = TickRecord(
+            self._layout, values, tick.kinds.copy(), held, pressed, subjects
+        )
+        return Solution(
+            values[:nv],
+            values[nv : 2 * nv],
+            fallback,
+            float(values[2 * nv]),
+            tuple(name for names in held for name in names),
+            conflicts,
+            record,
+        )
 
     def step(self, dt: float, bias: Matrix | None) -> None:
         """Solve and move the configuration one step, with a bias on single joints."""
-        self._bias = bias
+        self._set_bias(bias)
         self.configuration.update(self.configuration.integrate(self.solve(dt).dq))
 
-    def _shadow(self) -> "TaskStack":
+    def _set_bias(self, bias: Matrix | None) -> None:
+        self.levels[0].tasks.bias[:] = 0.0 if bias is None else bias
+
+    def _copy(self) -> "TaskStack":
         """Return a copy of the stack on a copy of the robot, where it is now."""
         return TaskStack(
             Configuration(self.configuration.model, self.configuration.q),
@@ -246,156 +315,30 @@ class TaskStack:
 
     def _pressed(self) -> Indices:
         """Return the velocity indices pressed against position limits last tick."""
-        if not self._solved:
+        if not self._tick.solved[0]:
             return np.zeros(0, dtype=np.int64)
-        multipliers = self._solved[0][2][: self._problem.nv]
-        upper = multipliers > 0.0
-        at_position = self._kinds == LimitKind.POSITION
-        pressed = (upper & at_position[1]) | ((multipliers < 0.0) & at_position[0])
+        multipliers = self.levels[0].qp.multipliers[: self.configuration.nv]
+        lower, upper = self._tick.kinds.reshape(2, -1) == LimitKind.POSITION
+        pressed = (multipliers > 0.0) & upper | (multipliers < 0.0) & lower
         return pressed.nonzero()[0]
+
+    def record(self) -> TickRecord:
+        """Return what explains the last tick, also after the next ones."""
+        return (self._last or self.solution()).record
 
     def explain(
         self, *, position_tolerance: float = 1e-3, orientation_tolerance: float = 5e-3
     ) -> dict[str, TaskReport]:
-        """Tell how each task with rows stood at the last tick, and why.
+        """Report how each task with rows stood at the last tick, and why.
 
         Costs some 50 us a task: meant for reports, not for every tick of a fast loop,
-        which can keep a `record` and be told later.
+        which can keep a `record` and explain it later.
 
         Args:
-            position_tolerance: Distance that counts as reached, m.
+            position_tolerance: Length of an error that counts as reached, m.
             orientation_tolerance: Angle that counts as reached, rad.
         """
         return self.record().explain(
             position_tolerance=position_tolerance,
             orientation_tolerance=orientation_tolerance,
         )
-
-    def record(self) -> TickRecord:
-        """Return what explains the last tick, also after the next ones."""
-        solved = zip(self._levels, self._solved, strict=False)
-        return TickRecord(
-            [
-                (
-                    level.record(),
-                    x,
-                    self._constraints.opponents(
-                        rows, multipliers, self._kinds, first=k == 0
-                    ),
-                )
-                for k, (level, (rows, x, multipliers)) in enumerate(solved)
-            ]
-        )
-
-    def _make_table(self) -> ArrayTable:
-        """Gather what the kernel `tick` reads and writes beside the first level."""
-        bounds, problem, f = self._bounds, self._problem, BoxField
-        nv, last = problem.nv, 2 * problem.nv + len(problem.upper)
-        self._first: Vector = np.zeros(last + 2 * nv)
-        self._parts = (
-            slice(0, nv),
-            slice(nv, 2 * nv),
-            slice(2 * nv, last),
-            slice(last, None),
-        )
-        return ArrayTable(
-            BoxField,
-            {
-                f.Q_LOWER: bounds.q_lower,
-                f.Q_UPPER: bounds.q_upper,
-                f.V_MAX: bounds.v_max,
-                f.A_MAX: bounds.a_max,
-                f.V_PREVIOUS: self.v_previous,
-                f.KINDS: self._kinds,
-                f.H: problem.H,
-                f.C: problem.c,
-                f.ROWS: problem.rows,
-                f.EQUALITIES: problem.A,
-                f.LOWER: problem.lower,
-                f.UPPER: problem.upper,
-                f.SIDE: self._side,
-                f.ANSWER: self._first,
-                f.WANTED: problem.wanted,
-            },
-        )
-
-    def _tick(self, dt: float, *, warm: bool) -> tuple[int, float]:
-        """Run the kernel; return its outcome and by how much a bound is broken."""
-        level = self._levels[0]
-        level.prepare(self.configuration, dt, self._bias)
-        outcome, mu, finite, residual = tick(
-            self.configuration.table,
-            level.table,
-            self._box,
-            dt,
-            self._bounds.position_gain,
-            self.damping + self._bending.value,
-            self.curvature_damping,
-            warm,
-        )
-        level.note(mu, finite=finite)
-        return outcome, residual
-
-    def _ask_solver(
-        self, dt: float, *, stated: bool, leading_back: bool
-    ) -> tuple[Vector, Vector, Fallback]:
-        """Solve the first level as it is stated, or retreat."""
-        problem = self._problem
-        if stated:
-            if leading_back:
-                problem.weight = _RETURN_WEIGHT * self._levels[0].stiffness()
-            result = checked_solve(self._solver, problem)
-            if result is not None:
-                return *result, Fallback.NONE
-        return self._retreat(dt, finite=stated)
-
-    def _retreat(self, dt: float, *, finite: bool) -> tuple[Vector, Vector, Fallback]:
-        """Find a step where the first level has no solution."""
-        problem, bounds = self._problem, self._bounds
-        q, kinds = self.configuration.q, self._kinds
-        lb, ub = bounds.without_acceleration(q, self.v_previous, dt, kinds)
-        if not finite:
-            still = np.clip(np.zeros(problem.nv), lb, ub)
-            return still, np.zeros(len(problem.upper)), Fallback.HOLD
-        problem.weight = _RETURN_WEIGHT * self._levels[0].stiffness()
-        return retreat(self._solver, problem, lb=lb, ub=ub)
-
-    def _solve_lower(
-        self, x: Vector, fallback: Fallback, dt: float
-    ) -> tuple[Vector, Fallback]:
-        """Let the lower levels, one after another, improve on the first one's step."""
-        for k in range(1, len(self._levels)):
-            if fallback >= Fallback.BOX:
-                break
-            result = self._lower.solve(k, x, dt, self._solver)
-            if result is None:
-                return x, max(fallback, Fallback.LEVEL)
-            x = result[1]
-            self._solved.append(result)
-        return x, fallback
-
-    def _stand(self, dt: float) -> Solution:
-        """Answer a position that is not finite."""
-        self._solved.clear()
-        still = np.zeros(self.configuration.nv)
-        self.v_previous[:] = 0.0
-        return self._answer(still, still / dt, Fallback.HOLD, 0.0, self._kinds.copy())
-
-    def _answer(
-        self,
-        x: Vector,
-        v: Vector,
-        fallback: Fallback,
-        residual: float,
-        kinds: Array | Indices,
-    ) -> Solution:
-        """Tell what happened."""
-        held = self._levels[0].held
-        for level in self._levels[1:]:
-            held += level.held
-        conflicts: tuple[str, ...] = ()
-        if fallback is not Fallback.NONE and fallback >= Fallback.LIMITS:
-            conflicts = self._constraints.broken(self._problem, x, TOLERANCE)
-        multipliers = [multipliers for _, _, multipliers in self._solved]
-        press = self._constraints.press(multipliers, kinds)
-        return Solution(x, v, fallback, residual, held, conflicts, press)

@@ -9,8 +9,7 @@ import pinocchio as pin
 from wbc_suite.arguments import check_number
 from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Configuration
-from wbc_suite.qp.bounds import LimitKind
-from wbc_suite.qp.limit import RowLimit
+from wbc_suite.qp.limit import LimitKind, RowLimit
 from wbc_suite.qp.problem import UNBOUNDED
 from wbc_suite.typing import Matrix, Vector
 
@@ -121,8 +120,8 @@ class SupportLimit(RowLimit):
             room = np.maximum(room - self.pressure_margin, 0.0)
             h[pressed] = dt**2 * room + G[pressed] @ self._last_step(configuration, dt)
 
-    def label(self, row: int) -> str:
-        """Say over which side the robot would fall."""
+    def subject(self, row: int) -> str:
+        """Return over which side the robot would fall."""
         row %= self._edges
         ahead, left = self._forward @ self._normals[row], self._left(row)
         sides = ("toes", "heels") if abs(ahead) > abs(left) else ("left", "right")

@@ -2,17 +2,21 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from typing import ClassVar
+from weakref import ref
 
 import numpy as np
 
 from wbc_suite.arguments import check_array, check_count, check_number
 from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Configuration
+from wbc_suite.qp.kernel import Kernel
 from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = [
-    "DiagonalTask",
+    "JointTask",
     "RowTask",
+    "SharedRow",
     "Task",
     "check_speed",
     "cost_vector",
@@ -20,7 +24,36 @@ __all__ = [
 ]
 
 
-class Task(ABC):
+class SharedRow:
+    """A target or costs, with a copy in every stack that holds the task.
+
+    Args:
+        size: Number of values.
+
+    Attributes:
+        values: The values; write them with `set`.
+    """
+
+    def __init__(self, size: int) -> None:
+        self.values: Vector = np.zeros(size)
+        self._copies: list[ref[Vector]] = []
+
+    def set(self, values: Vector) -> None:
+        """Set the values, and those of all copies."""
+        self.values[:] = values
+        for copy in self._copies:
+            row = copy()
+            if row is not None:
+                row[:] = values
+
+    def attach(self, copy: Vector) -> None:
+        """Keep an array equal to the values as long as it exists."""
+        copy[:] = self.values
+        self._copies = [other for other in self._copies if other() is not None]
+        self._copies.append(ref(copy))
+
+
+class Task(ABC):  # noqa: B024, what a stack takes is either of the two below
     """One term `|| W (J dq - gain e) ||^2` of a stack's cost.
 
     `e` is the task's error and `J` its derivative: `d(e) = -J dq`. The wanted step
@@ -33,17 +66,24 @@ class Task(ABC):
         level: Strict priority; level 0 is served first, and level 1 moves only in ways
             that leave the rows of level 0 as they are.
 
+    Attributes:
+        kernel: What computes error and Jacobian. A class says so in its own body; its
+            subclasses, whose error may be another, do not inherit it.
+        target_row: Target of a task with a kernel, as the kernel reads it.
+
     Raises:
         ConfigError: If the gain or the level is out of range.
     """
+
+    kernel: ClassVar[Kernel] = Kernel.PYTHON
 
     def __init__(self, name: str, *, gain: float = 1.0, level: int = 0) -> None:
         self.name = str(name)
         self.gain = check_number(f"Task '{name}': gain", gain, above=0.0, most=1.0)
         self.level = check_count(f"Task '{name}': level", level)
+        self.target_row = SharedRow(0)
 
-    @abstractmethod
-    def bind(self, configuration: Configuration) -> None:
+    def bind(self, configuration: Configuration) -> None:  # noqa: B027, may be empty
         """Resolve names in a model. A stack calls it once.
 
         Raises:
@@ -54,52 +94,139 @@ class Task(ABC):
 class RowTask(Task):
     """A task with a few dense rows.
 
-    Attributes:
+    A subclass writes `evaluate`; weights, saturation, damping and reports are the
+    stack's work:
+
+        class HeightTask(RowTask):
+            def evaluate(self, configuration, error, jacobian):
+                error[0] = 1.2 - configuration.frame_pose("head").translation[2]
+                jacobian[0] = configuration.frame_jacobian("head", "aligned")[2]
+
+        task = HeightTask("height", dim=1, cost=10.0)
+
+    Args:
+        name: How reports call the task.
         dim: Number of rows.
+        cost: [cost] per unit of the error, one number or one per row.
+        gain: See `Task`.
+        level: See `Task`.
+        max_speed: Greatest speed asked for, in the error's unit per second.
+        max_angular_speed: The same for the rows from `angular_start` on, rad/s.
+        angular_start: First row that is an angle; `dim` when absent.
+
+    Attributes:
+        unit: Unit of the rows before `angular_start`, for reports.
     """
 
-    dim: int
+    unit: str = "m"
+
+    def __init__(
+        self,
+        name: str,
+        *,
+        dim: int,
+        cost: float | Vector = 1.0,
+        gain: float = 1.0,
+        level: int = 0,
+        max_speed: float = np.inf,
+        max_angular_speed: float = np.inf,
+        angular_start: int | None = None,
+    ) -> None:
+        super().__init__(name, gain=gain, level=level)
+        self.dim = check_count(f"Task '{name}': dim", dim, least=1)
+        self.cost_row = SharedRow(self.dim)
+        self.cost_row.set(cost_vector(self.name, cost, self.dim))
+        self.max_speeds = (
+            check_speed(self.name, max_speed),
+            check_speed(self.name, max_angular_speed),
+        )
+        self.angular_start = dim if angular_start is None else angular_start
+
+    @property
+    def cost(self) -> Vector:
+        """Cost of each row, [cost] per unit of the error, shape (dim,). A view."""
+        return self.cost_row.values
+
+    @abstractmethod
+    def evaluate(
+        self, configuration: Configuration, error: Vector, jacobian: Matrix
+    ) -> None:
+        """Write the error and its Jacobian at the present configuration.
+
+        Args:
+            configuration: Where the robot is.
+            error: Output, shape (dim,). An error that is not finite, or beyond 1e9,
+                holds what the task controls, and is reported.
+            jacobian: Output J, finite in any case, `d(error) = -J dq`, shape (dim, nv).
+                It is zero before the first call, and keeps columns outside the support.
+        """
 
     def support(self, configuration: Configuration) -> Indices:
-        """Return the velocity indices whose columns may be other than zero."""
+        """Return the velocity indices whose columns may differ from zero."""
         return np.arange(configuration.nv)
 
+    def error(self, configuration: Configuration) -> Vector:
+        """Return the error, shape (dim,); NaN for a target that is not finite."""
+        return self._evaluated(configuration)[0]
+
+    def jacobian(self, configuration: Configuration) -> Matrix:
+        """Return the derivative J of the error, `d(e) = -J dq`, shape (dim, nv)."""
+        return self._evaluated(configuration)[1]
+
+    def _evaluated(self, configuration: Configuration) -> tuple[Vector, Matrix]:
+        error, jacobian = np.zeros(self.dim), np.zeros((self.dim, configuration.nv))
+        self.evaluate(configuration, error, jacobian)
+        return error, jacobian
+
+
+class JointTask(Task):
+    """A task whose Jacobian is the identity: one row per velocity.
+
+    Args:
+        name: How reports call the task.
+        cost: [cost]/rad or [cost]/m for all joints; free and planar roots have cost
+            zero unless named.
+        costs: Costs of single joints by name, in place of `cost`.
+        gain: See `Task`.
+        level: See `Task`.
+        max_speed: Greatest speed of each joint, rad/s or m/s.
+
+    Attributes:
+        squared_costs: Squared cost of each velocity once bound, shape (nv,).
+    """
+
+    def __init__(
+        self,
+        name: str,
+        *,
+        cost: float,
+        costs: Mapping[str, float] | None = None,
+        gain: float = 1.0,
+        level: int = 0,
+        max_speed: float = np.inf,
+    ) -> None:
+        super().__init__(name, gain=gain, level=level)
+        self.cost, self.costs = cost, dict(costs or {})
+        for value in (cost, *self.costs.values()):
+            cost_vector(name, value, 1)
+        self.max_speed = check_speed(name, max_speed)
+
+    def bind(self, configuration: Configuration) -> None:
+        """Resolve joint names."""
+        self.squared_costs = joint_costs(configuration, self.cost, self.costs) ** 2
+
     @abstractmethod
-    def rows(
-        self, configuration: Configuration, dt: float, W: Matrix, e: Vector
-    ) -> Vector:
-        """Write weighted rows `W J` and weighted steps `W gain e`, saturated.
+    def evaluate(self, configuration: Configuration, error: Vector) -> None:
+        """Write the error of each velocity, shape (nv,).
 
-        Args:
-            configuration: Where the robot is.
-            dt: Step, s.
-            W: Output, shape (dim, nv); columns outside the support stay untouched.
-            e: Output, shape (dim,).
-
-        Returns:
-            The error before gain and saturation; NaN where the target is not finite,
-            and then the steps are zero: what the task watches is held.
+        Values that are not finite hold all joints of the task, and are reported.
         """
 
-
-class DiagonalTask(Task):
-    """A task whose Jacobian is the identity: one row per velocity."""
-
-    @abstractmethod
-    def diagonal(
-        self, configuration: Configuration, dt: float, weights: Vector, steps: Vector
-    ) -> bool:
-        """Add squared costs to `weights` and squared costs times steps to `steps`.
-
-        Args:
-            configuration: Where the robot is.
-            dt: Step, s.
-            weights: In and out, [cost]^2, shape (nv,).
-            steps: In and out, [cost]^2 rad or m, shape (nv,).
-
-        Returns:
-            False if the target is not finite; joints are then held.
-        """
+    def error(self, configuration: Configuration) -> Vector:
+        """Return the error of each velocity, rad or m, shape (nv,)."""
+        error = np.zeros(configuration.nv)
+        self.evaluate(configuration, error)
+        return error
 
 
 def cost_vector(owner: str, cost: float | Vector, size: int) -> Vector:
@@ -125,7 +252,7 @@ def check_speed(owner: str, speed: object) -> float:
         ConfigError: If it is not positive.
     """
     return check_number(
-        f"Task '{owner}': the greatest speed", speed, above=0.0, endless=True
+        f"Task '{owner}': the greatest speed", speed, above=0.0, allow_inf=True
     )
 
 

@@ -1,266 +1,315 @@
-"""One tick of a level in one compiled call.
+"""One tick of a stack in one compiled call.
 
-`write_rows` writes the rows of all compiled tasks; `tick` writes bounds and rows of the
-first level, and answers with the optimum where the active set of the last tick leads
-there. What happens inside is told in `bounds`, `rows` and `active_set`.
+`solve_tick` computes forward kinematics, task rows, bounds and limit rows, and solves
+all levels by the active set of the last tick. Compiled loops may call it as well as
+Python. Where a level is not solved it returns: the caller solves that level by other
+means, writes the result into the level's `qp`, calls `finish_level`, and calls
+`solve_tick` again for the levels below.
 """
 
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 
-from wbc_suite.compiling import compiled
-from wbc_suite.kinematics.array_table import indices, matrix, vector
-from wbc_suite.kinematics.forward import RobotField, place_joints, weigh_joints
-from wbc_suite.qp.active_set import solve_warm
-from wbc_suite.qp.bounds import merge_bounds
-from wbc_suite.qp.problem import worst_violation
-from wbc_suite.qp.rows import (
-    com_rows,
-    damping_of_rows,
-    frame_rows,
-    normal_equations,
-    posture_terms,
-)
+from wbc_suite.compiling import compiled, struct
+from wbc_suite.kinematics.forward import RobotArrays, compute_joint_poses
+from wbc_suite.qp.active_set import QpArrays, solve_warm
+from wbc_suite.qp.capsule_distance import CapsuleArrays
+from wbc_suite.qp.equality import HeldFrames, hold_frames
+from wbc_suite.qp.floor_limit import SphereArrays, floor_rows
+from wbc_suite.qp.limit import merge_bounds
+from wbc_suite.qp.problem import UNBOUNDED, worst_violation
+from wbc_suite.qp.self_collision_limit import self_collision_rows
+from wbc_suite.qp.strict_level import LevelArrays, restrict_level
+from wbc_suite.qp.task_kernels import TaskArrays, write_tasks
 from wbc_suite.typing import Indices, Vector
 
 __all__ = [
-    "LOST",
-    "SOLVED",
-    "STATED",
+    "RETURN_WEIGHT",
     "TOLERANCE",
-    "UNUSABLE",
-    "BoxField",
-    "RowField",
-    "tick",
-    "write_rows",
+    "LevelArrays",
+    "TickArrays",
+    "TickStatus",
+    "finish_level",
+    "solve_tick",
+    "stiffness",
 ]
 
 TOLERANCE = 1e-7
-"""A step that breaks a row or bound by more is not taken, m or rad."""
+"""A step that violates a row or bound by more is not taken, m or rad."""
 
-LOST, UNUSABLE, STATED, SOLVED = range(4)
-"""What comes of a tick: q is not finite; rows are not; H and c are written for a
-solver; the answer is written."""
-
-
-class RowField(IntEnum):
-    """Arrays of a level's rows; the arguments of the kernels in `rows`."""
-
-    FRAME_JOINTS = 0
-    FRAME_OFFSETS = 1
-    FRAME_TASKS = 2
-    FRAME_ROW = 3
-    FRAME_SUPPORT_START = 4
-    FRAME_SUPPORT = 5
-    FRAME_ERRORS = 6
-    COM_TASKS = 7
-    COM_ROW = 8
-    COM_ERRORS = 9
-    Q_INDEX = 10
-    POSTURE_COSTS = 11
-    POSTURE_TARGETS = 12
-    POSTURE_GAINS = 13
-    ROW_START = 14
-    SUPPORT_START = 15
-    SUPPORT = 16
-    W = 17
-    E = 18
-    GIVEN = 19
-    DIAGONAL = 20
+RETURN_WEIGHT = 1e2  # of a soft row, against the stiffest joint's cost
+_PRESSURE_MEMORY = 0.2  # s, in which the damping by rows falls to 1 / e
+_PRESSURE_MAX = 1e6  # times what tasks pull with
 
 
-class BoxField(IntEnum):
-    """Arrays of the first level's bounds, constraints and answer.
+class TickStatus(IntEnum):
+    """How `solve_tick` ended."""
 
-    The answer holds the step, the velocity, the multipliers of bounds and rows, and the
-    kinds of the bounds.
+    SOLVED = 0
+    UNSOLVED = 1
+    """A level is stated, and its active set was not found."""
+    BAD_ROWS = 2
+    """Rows of a level are not finite."""
+    BAD_POSITION = 3
+    """The configuration is not finite."""
+    NEEDS_PYTHON = 4
+    """Tasks or limits without a kernel must be evaluated before each tick."""
+
+
+@struct
+class TickArrays(NamedTuple):
+    """What a tick reads and writes.
+
+    Attributes:
+        robot: The robot; its q is where the tick begins.
+        levels: Strict levels, the first first; the last is repeated up to
+            `MAX_LEVELS`, so that machine code does not depend on their number.
+        level_count: How many there are.
+        q_lower: Lower position limits, shape (nv,).
+        q_upper: Upper position limits, shape (nv,).
+        v_max: Speed limits, shape (nv,).
+        a_max: Acceleration limits, shape (nv,).
+        kinds: Output, the `LimitKind` of each lower, then each upper bound, (2 nv,).
+        v: In and out, velocity of the last step, shape (nv,).
+        x: Output, the step, shape (nv,).
+        residual: Output, greatest violation of the first level's rows, shape (1,).
+        all_finite: Output, whether the targets of all tasks are finite, shape (1,).
+        solved: Output, number of solved levels, shape (1,).
+        relax_speed: `RowLimit.relax_speed` of each inequality row, shape (p,).
+        pressure_damping: Damping by the rows that tasks press against, shape (1,).
+        held: Frames of equality rows.
+        rate: Right-hand side of equality rows per second, shape (k,).
+        capsules: Capsules of the self-collision limit.
+        collision: Its distance and rate, see `self_collision_rows`, shape (2,).
+        collision_rows: Its first inequality row and the end, shape (2,).
+        spheres: Spheres of the floor limit.
+        floor_rows: Its first inequality row and the end, shape (2,).
+        prepared: 1 where Python has evaluated what has no kernel, or nothing has none;
+            a tick sets it back to the second entry, shape (2,).
+        position_gain: Fraction of the distance to a limit that one step may cover.
+        damping: Tikhonov term, [cost]^2/rad^2.
+        curvature: See `write_tasks`.
+        warm: Whether the active set of the last tick is tried.
     """
 
-    Q_LOWER = 0
-    Q_UPPER = 1
-    V_MAX = 2
-    A_MAX = 3
-    V_PREVIOUS = 4
-    KINDS = 5
-    H = 6
-    C = 7
-    ROWS = 8
-    EQUALITIES = 9
-    LOWER = 10
-    UPPER = 11
-    SIDE = 12
-    ANSWER = 13
-    WANTED = 14
+    robot: RobotArrays
+    levels: tuple[LevelArrays, ...]
+    level_count: int
+    q_lower: Vector
+    q_upper: Vector
+    v_max: Vector
+    a_max: Vector
+    kinds: Indices
+    v: Vector
+    x: Vector
+    residual: Vector
+    all_finite: Vector
+    solved: Indices
+    relax_speed: Vector
+    pressure_damping: Vector
+    held: HeldFrames
+    rate: Vector
+    capsules: CapsuleArrays
+    collision: Vector
+    collision_rows: Indices
+    spheres: SphereArrays
+    floor_rows: Indices
+    prepared: Indices
+    position_gain: float
+    damping: float
+    curvature: float
+    warm: bool
 
 
 @compiled
-def _copy(values: Vector | Indices, out: Vector) -> None:
-    """Copy values; a slice assignment would take 2 s to compile, for its error text."""
-    for i in range(values.shape[0]):
-        out[i] = values[i]
-
-
-@compiled
-def write_rows(
-    robot: Indices, rows: Indices, dt: float, damping: float, curvature: float
-) -> tuple[float, bool]:
-    """Write all compiled tasks of a level.
-
-    The diagonal begins with what is given: the terms of tasks outside the kernels.
+def solve_tick(tick: TickArrays, dt: float, start: int) -> tuple[int, int]:
+    """Solve the levels from `start` on; the step is then in `tick.x` and `tick.v`.
 
     Args:
-        robot: Table of `RobotField`.
-        rows: Table of `RowField`.
+        tick: What the tick reads and writes.
         dt: Step, s.
-        damping: See `damping_of_rows`.
-        curvature: See `damping_of_rows`.
+        start: First level; 0 begins a tick.
 
     Returns:
-        mu of `damping_of_rows`, and whether all targets were finite.
+        A `TickStatus`, and the level at which it ended.
     """
-    com_tasks = indices(rows, RowField.COM_TASKS)
-    place_joints(robot)
-    if com_tasks.shape[0]:
-        weigh_joints(robot)
-    W, e = matrix(rows, RowField.W), vector(rows, RowField.E)
-    diagonal = matrix(rows, RowField.DIAGONAL)
-    _copy(vector(rows, RowField.GIVEN), vector(rows, RowField.DIAGONAL))
-    finite = frame_rows(
-        matrix(robot, RobotField.PLACEMENT),
-        matrix(robot, RobotField.JACOBIAN),
-        indices(rows, RowField.FRAME_JOINTS),
-        matrix(rows, RowField.FRAME_OFFSETS),
-        indices(rows, RowField.FRAME_TASKS),
-        indices(rows, RowField.FRAME_ROW),
-        indices(rows, RowField.FRAME_SUPPORT_START),
-        indices(rows, RowField.FRAME_SUPPORT),
-        dt,
-        W,
-        e,
-        matrix(rows, RowField.FRAME_ERRORS),
-    )
-    finite &= com_rows(
-        vector(robot, RobotField.COM),
-        matrix(robot, RobotField.COM_JACOBIAN),
-        com_tasks,
-        indices(rows, RowField.COM_ROW),
-        dt,
-        W,
-        e,
-        vector(rows, RowField.COM_ERRORS),
-    )
-    finite &= posture_terms(
-        vector(robot, RobotField.Q),
-        indices(rows, RowField.Q_INDEX),
-        matrix(rows, RowField.POSTURE_COSTS),
-        indices(rows, RowField.POSTURE_TARGETS),
-        matrix(rows, RowField.POSTURE_GAINS),
-        dt,
-        diagonal,
-    )
-    mu = damping_of_rows(
-        W,
-        e,
-        indices(rows, RowField.ROW_START),
-        indices(rows, RowField.SUPPORT_START),
-        indices(rows, RowField.SUPPORT),
-        damping,
-        curvature,
-    )
-    return mu, finite
+    if start == 0 and not tick.prepared[0]:
+        return TickStatus.NEEDS_PYTHON.value, 0
+    tick.prepared[0] = tick.prepared[1]
+    levels = tick.levels
+    for k in range(start, tick.level_count):
+        level, damping = levels[k], tick.damping
+        if k == 0:
+            if not _begin_tick(tick, dt):
+                return TickStatus.BAD_POSITION.value, 0
+            damping += tick.pressure_damping[0]
+        else:
+            restrict_level(levels, k, tick.x)
+            damping = levels[k - 1].tasks.mu[0]
+        finite = write_tasks(tick.robot, level.tasks, dt, damping, tick.curvature)
+        if not finite:
+            return TickStatus.BAD_ROWS.value, k
+        if k == 0 and _is_soft(level.qp):
+            level.qp.weight[0] = RETURN_WEIGHT * stiffness(level.tasks)
+        if not tick.warm or not solve_warm(level.qp) or not _is_feasible(tick, k):
+            return TickStatus.UNSOLVED.value, k
+        finish_level(tick, k, dt, True)
+    for i in range(tick.x.shape[0]):
+        tick.v[i] = tick.x[i] / dt
+    if start > 0:
+        tick.residual[0] = _violation(tick.x, tick.levels[0].qp)
+    return TickStatus.SOLVED.value, tick.level_count
 
 
 @compiled
-def tick(
-    robot: Indices,
-    rows: Indices,
-    box: Indices,
-    dt: float,
-    position_gain: float,
-    damping: float,
-    curvature: float,
-    warm: bool,
-) -> tuple[int, float, bool, float]:
-    """Write bounds and rows of the first level, and its optimum or normal equations.
-
-    With the optimum, the previous velocity becomes the present one.
+def finish_level(tick: TickArrays, k: int, dt: float, kept: bool) -> None:
+    """Take the solution of a level, in `qp.x` and `qp.multipliers`, as the step.
 
     Args:
-        robot: Table of `RobotField`.
-        rows: Table of `RowField`.
-        box: Table of `BoxField`.
+        tick: The tick.
+        k: The level.
         dt: Step, s.
-        position_gain: See `merge_bounds`.
-        damping: See `damping_of_rows`.
-        curvature: See `damping_of_rows`.
-        warm: Whether the last active set may answer.
-
-    Returns:
-        What came of it; mu of `damping_of_rows`; whether all targets were finite; by
-        how much the answer breaks its worst constraint.
+        kept: Whether its rows were; those that are relaxed do not damp the next tick.
     """
-    kinds, answer = indices(box, BoxField.KINDS), vector(box, BoxField.ANSWER)
-    lower, upper = vector(box, BoxField.LOWER), vector(box, BoxField.UPPER)
-    v_max = vector(box, BoxField.V_MAX)
-    v_previous, nv = vector(box, BoxField.V_PREVIOUS), v_max.shape[0]
-    lb, ub = lower[:nv], upper[:nv]
-    if not merge_bounds(
-        vector(robot, RobotField.Q),
-        indices(rows, RowField.Q_INDEX),
-        vector(box, BoxField.Q_LOWER),
-        vector(box, BoxField.Q_UPPER),
-        position_gain,
-        v_max,
-        v_previous,
-        vector(box, BoxField.A_MAX),
+    qp = tick.levels[k].qp
+    tick.solved[0] = k + 1
+    for i in range(tick.x.shape[0]):
+        tick.x[i] = qp.x[i]
+    if k == 0 and qp.rows.shape[0] > 0:
+        tick.pressure_damping[0] *= np.exp(-dt / _PRESSURE_MEMORY)
+        if kept:
+            pressure = tick.curvature * _row_pressure(qp)
+            tick.pressure_damping[0] = max(tick.pressure_damping[0], pressure)
+
+
+@compiled
+def _begin_tick(tick: TickArrays, dt: float) -> bool:
+    """Write bounds and limit rows; return whether the configuration is finite."""
+    robot, qp, total = tick.robot, tick.levels[0].qp, 0.0
+    tick.solved[0], tick.all_finite[0] = 0, 1.0
+    for i in range(robot.q.shape[0]):
+        total += robot.q[i]
+    if not np.isfinite(total):
+        return False
+    nv = tick.x.shape[0]
+    merge_bounds(
+        robot.q,
+        tick.levels[0].tasks.q_index,
+        tick.q_lower,
+        tick.q_upper,
+        tick.position_gain,
+        tick.v_max,
+        tick.v,
+        tick.a_max,
         dt,
-        lb,
-        ub,
-        kinds[:nv],
-        kinds[nv:],
-    ):
-        return LOST, np.nan, True, np.inf
-    mu, finite = write_rows(robot, rows, dt, damping, curvature)
-    if not np.isfinite(mu):
-        return UNUSABLE, mu, finite, np.inf
-    if warm:
-        A = matrix(box, BoxField.EQUALITIES)
-        first = lower.shape[0] - A.shape[0]
-        for i in range(answer.shape[0]):
-            answer[i] = 0.0
-        x = answer[:nv]
-        answered = solve_warm(
-            matrix(rows, RowField.W),
-            vector(rows, RowField.E),
-            A,
-            lower[first:],
-            matrix(rows, RowField.DIAGONAL),
-            mu,
-            lb,
-            ub,
-            indices(box, BoxField.SIDE),
-            x,
-            answer[2 * nv : 3 * nv],
-            answer[2 * nv + first : 2 * nv + lower.shape[0]],
-        )
-        if answered:
-            worst = worst_violation(x, matrix(box, BoxField.ROWS), lower, upper)
-            if worst <= TOLERANCE:
-                for i in range(nv):
-                    v_previous[i] = x[i] / dt
-                _copy(v_previous, answer[nv : 2 * nv])
-                _copy(kinds, answer[2 * nv + lower.shape[0] :])
-                return SOLVED, mu, finite, worst
-    normal_equations(
-        matrix(rows, RowField.W),
-        vector(rows, RowField.E),
-        indices(rows, RowField.ROW_START),
-        indices(rows, RowField.SUPPORT_START),
-        indices(rows, RowField.SUPPORT),
-        matrix(rows, RowField.DIAGONAL),
-        mu,
-        matrix(box, BoxField.H),
-        vector(box, BoxField.C),
+        qp.lower[:nv],
+        qp.upper[:nv],
+        tick.kinds,
     )
-    return STATED, mu, finite, np.inf
+    if qp.rows.shape[0] > 0:
+        compute_joint_poses(robot)
+        _write_rows(tick, qp, dt)
+    return True
+
+
+@compiled
+def _write_rows(tick: TickArrays, qp: QpArrays, dt: float) -> None:
+    """Write the rows of limits and equalities that have a kernel; relax all limits.
+
+    A row outside its limit, h < 0, does not bind to come back, or rows could demand
+    more than joints can do: it wants to, softly, and binds to go no further out. So a
+    robot that stands is never asked to move. Far outside it may be relaxed further,
+    see `RowLimit.relax_speed`.
+    """
+    p, k, nv = qp.counts[0], qp.counts[1], tick.x.shape[0]
+    first, last = tick.collision_rows[0], tick.collision_rows[1]
+    h = qp.upper[nv : nv + p]
+    if last > first:
+        G, near = qp.rows[first:last], h[first:last]
+        self_collision_rows(tick.robot, tick.capsules, tick.collision, dt, G, near)
+    first, last = tick.floor_rows[0], tick.floor_rows[1]
+    if last > first:
+        floor_rows(tick.robot, tick.spheres, dt, qp.rows[first:last], h[first:last])
+    for row in range(p):
+        wanted = h[row]
+        h[row] = max(wanted, 0.0, -2.0 * (wanted + tick.relax_speed[row] * dt))
+        qp.wanted[row] = min(wanted, UNBOUNDED)
+    b = qp.upper[nv + p :]
+    for row in range(k):
+        if np.isfinite(tick.rate[row]):
+            b[row] = tick.rate[row] * dt
+    hold_frames(tick.robot, tick.held, dt, qp.rows[p:], b)
+    for row in range(k):
+        qp.lower[nv + p + row] = b[row]
+
+
+@compiled
+def _is_soft(qp: QpArrays) -> bool:
+    """Return whether a row is outside its limit."""
+    for row in range(qp.counts[0]):
+        if qp.wanted[row] < qp.upper[qp.x.shape[0] + row]:
+            return True
+    return False
+
+
+@compiled
+def stiffness(tasks: TaskArrays) -> float:
+    """Return the largest entry of H without damping, or 1."""
+    stiffest, W = 1.0, tasks.W
+    for i in range(tasks.diagonal.shape[1]):
+        total = tasks.diagonal[0, i]
+        for row in range(W.shape[0]):
+            total += W[row, i] ** 2
+        stiffest = max(stiffest, total)
+    return stiffest
+
+
+@compiled
+def _row_pressure(qp: QpArrays) -> float:
+    """Return `sum |nu| max|A|` over the rows A that tasks press on with forces nu.
+
+    Rows bend as tasks do: it bounds the curvature of `nu . A(q)`, and damps the next
+    tick. Where rows nearly depend on each other, rounding alone presses in proportion
+    to the damping, and both would grow for ever: a multiple of what the tasks pull
+    with is the most.
+    """
+    n, greatest, total = qp.x.shape[0], 0.0, 0.0
+    rows, W, e = qp.rows, qp.W, qp.e
+    for row in range(qp.counts[0] + qp.counts[1]):
+        if qp.multipliers[n + row] != 0.0:
+            longest = 0.0
+            for i in range(n):
+                longest = max(longest, abs(rows[row, i]))
+            total += abs(qp.multipliers[n + row]) * longest
+    if total > 0.0:
+        for i in range(n):
+            pull = qp.diagonal[1, i]
+            for row in range(e.shape[0]):
+                pull += W[row, i] * e[row]
+            greatest += _PRESSURE_MAX * abs(pull)
+    return min(total, greatest)
+
+
+@compiled
+def _violation(x: Vector, qp: QpArrays) -> float:
+    """Return by how much x violates the bounds and rows of a problem."""
+    size = qp.counts[0] + qp.counts[1]
+    if size == 0:  # bounds are kept by clipping
+        return 0.0
+    end = x.shape[0] + size
+    return worst_violation(x, qp.rows[:size], qp.lower[:end], qp.upper[:end])
+
+
+@compiled
+def _is_feasible(tick: TickArrays, k: int) -> bool:
+    """Return whether a level's solution keeps its own rows and the first level's.
+
+    Rows longer than 1 are more sensitive than their orthonormal basis.
+    """
+    x, own = tick.levels[k].qp.x, 0.0
+    if k > 0:
+        own = _violation(x, tick.levels[k].qp)
+    tick.residual[0] = _violation(x, tick.levels[0].qp)
+    return own <= TOLERANCE and tick.residual[0] <= TOLERANCE

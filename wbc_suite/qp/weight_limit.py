@@ -1,4 +1,4 @@
-"""Keep motors from having to carry more than they can."""
+"""Keep the torque of gravity within the efforts of motors."""
 
 from collections.abc import Mapping
 
@@ -7,8 +7,7 @@ import pinocchio as pin
 
 from wbc_suite.arguments import check_number
 from wbc_suite.kinematics import Configuration
-from wbc_suite.qp.bounds import LimitKind
-from wbc_suite.qp.limit import RowLimit
+from wbc_suite.qp.limit import LimitKind, RowLimit
 from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["WeightLimit"]
@@ -32,6 +31,7 @@ class WeightLimit(RowLimit):
     """
 
     kind = LimitKind.EFFORT
+    unit = "N m"
 
     def __init__(self, torques: Mapping[str, float]) -> None:
         for name, value in torques.items():
@@ -59,6 +59,6 @@ class WeightLimit(RowLimit):
         room = np.concatenate([self._torques - torque, self._torques + torque])
         h[:] = dt * np.maximum(RATE * room, -RETURN * np.tile(self._torques, 2))
 
-    def label(self, row: int) -> str:
-        """Say which motor carries all it can."""
+    def subject(self, row: int) -> str:
+        """Return which motor carries all it can."""
         return f"{self.names[row % len(self.names)]} carries all it can"

@@ -1,6 +1,6 @@
-"""Demonstrations: recorded, kept safe, played again, and read by others.
+"""Demonstrations: recording, storage, replay and conversion.
 
-What only reads and writes files loads at once; what needs robots when first used.
+Modules that need robots are loaded when they are first used.
 """
 
 import importlib
@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 from wbc_suite.recording.dataset import Dataset
 from wbc_suite.recording.episode import Episode
-from wbc_suite.recording.store import Store
+from wbc_suite.recording.episode_store import Store
 
 if TYPE_CHECKING:
+    from wbc_suite.recording.env_source import EnvSource, rebuild
     from wbc_suite.recording.recorder import Recorder
-    from wbc_suite.recording.source import EnvSource, rebuild
 
 _HOME = {
-    "EnvSource": "wbc_suite.recording.source",
+    "EnvSource": "wbc_suite.recording.env_source",
     "Recorder": "wbc_suite.recording.recorder",
-    "rebuild": "wbc_suite.recording.source",
+    "rebuild": "wbc_suite.recording.env_source",
 }
 
 __all__ = ["Dataset", "EnvSource", "Episode", "Recorder", "Store", "rebuild"]

@@ -1,16 +1,15 @@
-"""Datasets as they are read: a file, and finished episodes that are still beside it."""
+"""Reading of datasets: a file, and finished episodes in files beside it."""
 
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from types import TracebackType
 from typing import Self, cast
 
 import h5py
 import numpy as np
 
 from wbc_suite.errors import DatasetError, UnknownNameError
-from wbc_suite.recording import hdf5
+from wbc_suite.recording import hdf5_reader
 from wbc_suite.recording.episode import (
     PER_STEP,
     Column,
@@ -19,15 +18,16 @@ from wbc_suite.recording.episode import (
     fingerprint,
     pieces,
 )
+from wbc_suite.recording.hdf5_check import check_files, open_safely
 
-__all__ = ["Dataset", "part_files", "parts_folder"]
+__all__ = ["Dataset", "dataset_files", "part_files", "parts_folder"]
 
 _DEMO = re.compile(r"demo_?(\d{1,9})\Z")
 _GROUPS = ("obs", "next_obs")
 
 
 def parts_folder(path: Path) -> Path:
-    """Return the folder of the episodes that are not in the file yet."""
+    """Return the folder of episodes that are not merged into the file yet."""
     return path.with_name(path.name + ".parts")
 
 
@@ -36,16 +36,24 @@ def part_files(path: Path) -> list[Path]:
     return sorted(parts_folder(path).glob("episode_*.hdf5"))
 
 
+def dataset_files(path: Path) -> list[Path]:
+    """Return a dataset's file, unless only the files beside it exist, and these."""
+    parts = part_files(path)
+    return [path, *parts] if path.exists() or not parts else parts
+
+
 class Dataset:
     """Episodes of a file in robomimic's layout, robosuite's raw one, or our own.
 
-    The file may come from anywhere: nothing in it is run, links out of it are not
-    followed, sizes are checked before memory is taken. A recording that was cut off
+    The file is not trusted: nothing in it is executed, links out of it are not
+    followed, sizes are checked before memory is allocated. An interrupted recording
     reads as if it had been closed.
 
     Args:
         path: The file.
         alone: Whether finished episodes beside the file are left out.
+        checked: Whether this process has read or written the files before; all others
+            are read by a child process first, see `check_files`.
 
     Raises:
         DatasetError: If it cannot be read.
@@ -57,14 +65,17 @@ class Dataset:
         masks: Names of episodes by filter key.
     """
 
-    def __init__(self, path: str | Path, *, alone: bool = False) -> None:
+    def __init__(
+        self, path: str | Path, *, alone: bool = False, checked: bool = False
+    ) -> None:
         self.path = Path(path)
-        parts = [] if alone else part_files(self.path)
-        files = [self.path, *parts] if self.path.exists() or not parts else parts
+        files = [self.path] if alone else dataset_files(self.path)
         self._open: list[h5py.File] = []
         self._groups: dict[str, tuple[Path, h5py.Group]] = {}
         self.header: dict[str, Fact] = {}
         self.masks: dict[str, list[str]] = {}
+        if not checked:
+            check_files(files)
         try:
             for file in files:
                 self._add(file)
@@ -77,12 +88,7 @@ class Dataset:
         """Return the dataset."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         """Close it."""
         self.close()
 
@@ -100,20 +106,20 @@ class Dataset:
             self._open.pop().close()
 
     def facts(self, name: str) -> Mapping[str, Fact]:
-        """Return what is known of an episode as a whole, without reading it.
+        """Return the facts of an episode, without reading its columns.
 
         Raises:
             UnknownNameError: If there is none of that name.
             DatasetError: If it cannot be read.
         """
         path, group = self._find(name)
-        with hdf5.reading(path):
+        with hdf5_reader.reading(path):
             return _facts(group)
 
     def length(self, name: str) -> int:
         """Return an episode's number of actions, without reading it."""
         path, group = self._find(name)
-        with hdf5.reading(path):
+        with hdf5_reader.reading(path):
             return _dataset(group, "actions").shape[0]
 
     def column(self, name: str, key: str) -> Column:
@@ -124,11 +130,11 @@ class Dataset:
             DatasetError: If it cannot be read.
         """
         path, group = self._find(name)
-        with hdf5.reading(path):
+        with hdf5_reader.reading(path):
             columns = _columns(group)
             if key not in columns:
                 raise UnknownNameError("column", key, tuple(columns))
-            return hdf5.read_column(columns[key])
+            return hdf5_reader.read_column(columns[key])
 
     def episode(self, name: str) -> Episode:
         """Read an episode.
@@ -141,9 +147,9 @@ class Dataset:
         return self._episode(name)
 
     def streamed(self) -> Iterator[Episode]:
-        """Read episodes one by one, for writing: each column piece by piece, twice.
+        """Read episodes one by one; their columns are read slice by slice when used.
 
-        Of columns there are length, shape, type and slices, as long as this is open.
+        Columns have length, shape, type and slices, while the dataset is open.
 
         Raises:
             DatasetError: See `episode`.
@@ -152,14 +158,16 @@ class Dataset:
 
     def _episode(self, name: str, *, later: bool = False) -> Episode:
         path, group = self._find(name)
-        with hdf5.reading(path):
-            stored = {k: hdf5.StoredColumn(d, path) for k, d in _columns(group).items()}
+        with hdf5_reader.reading(path):
+            stored = {
+                k: hdf5_reader.StoredColumn(d, path) for k, d in _columns(group).items()
+            }
             columns = {
                 k: cast("Column", column) if later and column.sliced else column[:]
                 for k, column in stored.items()
             }
-            last = hdf5.child(group, "final_state", h5py.Dataset)
-            final = None if last is None else hdf5.read_column(last)
+            last = hdf5_reader.child(group, "final_state", h5py.Dataset)
+            final = None if last is None else hdf5_reader.read_column(last)
             _check_lengths(name, columns)
             facts = _facts(group)
             written = facts.pop("sha256", None)
@@ -176,10 +184,10 @@ class Dataset:
         return self._groups[name]
 
     def _add(self, path: Path) -> None:
-        file = hdf5.open_safely(path)
+        file = open_safely(path, checked=True)
         self._open.append(file)
-        with hdf5.reading(path):
-            data = hdf5.child(file, "data", h5py.Group)
+        with hdf5_reader.reading(path):
+            data = hdf5_reader.child(file, "data", h5py.Group)
             if data is None:
                 raise DatasetError("there is no group 'data'; that is no dataset.")
             known = {
@@ -187,19 +195,20 @@ class Dataset:
                 for _, group in self._groups.values()
                 if "uid" in (facts := _facts(group))
             }
-            for name in hdf5.child_names(data):
+            for name in hdf5_reader.child_names(data):
                 if not _DEMO.match(name):
                     continue
-                group = hdf5.child(data, name, h5py.Group)
+                group = hdf5_reader.child(data, name, h5py.Group)
                 if group is None or _facts(group).get("uid", name) in known:
                     continue
                 self._groups[self._free(name)] = path, group
             if not self.header:
-                self.header = _header(data)
+                self.header = _facts(data)
+                self.header.pop("total", None)
             self.masks |= _masks(file)
 
     def _free(self, name: str) -> str:
-        """Return the name, or another when a part has the name of another episode."""
+        """Return the name, or another one if it is taken."""
         while name in self._groups:
             name = f"demo_{_number(name) + 1}"
         return name
@@ -210,55 +219,50 @@ def _number(name: str) -> int:
     return int(match[1]) if match else 0
 
 
-def _header(data: h5py.Group) -> dict[str, Fact]:
-    found = {name: hdf5.attribute(data, name) for name in _attribute_names(data)}
-    return {k: v for k, v in found.items() if v is not None and k != "total"}
-
-
-def _attribute_names(node: h5py.Group) -> list[str]:
-    if len(node.attrs) > 1000:
-        raise DatasetError(f"'{node.name}' has {len(node.attrs)} attributes.")
-    return list(node.attrs)
-
-
 def _facts(group: h5py.Group) -> dict[str, Fact]:
-    found = {name: hdf5.attribute(group, name) for name in _attribute_names(group)}
+    found = {
+        name: hdf5_reader.attribute(group, name)
+        for name in hdf5_reader.attribute_names(group)
+    }
     return {name: value for name, value in found.items() if value is not None}
 
 
 def _masks(file: h5py.File) -> dict[str, list[str]]:
-    group = hdf5.child(file, "mask", h5py.Group)
+    group = hdf5_reader.child(file, "mask", h5py.Group)
     if group is None:
         return {}
-    found = {n: hdf5.child(group, n, h5py.Dataset) for n in hdf5.child_names(group)}
-    return {n: hdf5.read_names(d) for n, d in found.items() if d is not None}
+    found = {
+        n: hdf5_reader.child(group, n, h5py.Dataset)
+        for n in hdf5_reader.child_names(group)
+    }
+    return {n: hdf5_reader.read_names(d) for n, d in found.items() if d is not None}
 
 
 def _dataset(group: h5py.Group, name: str) -> h5py.Dataset:
-    found = hdf5.child(group, name, h5py.Dataset)
+    found = hdf5_reader.child(group, name, h5py.Dataset)
     if found is None or found.ndim < 1:
         raise DatasetError(f"'{group.name}' has no '{name}'.")
     return found
 
 
 def _columns(group: h5py.Group) -> dict[str, h5py.Dataset]:
-    """Return what has a row per action, by name."""
+    """Return the datasets with a row per action, by name."""
     _dataset(group, "actions")
     found: dict[str, h5py.Dataset] = {}
-    for name in hdf5.child_names(group):
+    for name in hdf5_reader.child_names(group):
         if name == "final_state":
             continue
         if name in _GROUPS:
-            inner = hdf5.child(group, name, h5py.Group)
+            inner = hdf5_reader.child(group, name, h5py.Group)
             assert inner is not None, "its name was listed"
-            for key in hdf5.child_names(inner):
+            for key in hdf5_reader.child_names(inner):
                 found[f"{name}/{key}"] = _dataset(inner, key)
         elif isinstance(group.get(name, getlink=True), h5py.HardLink) and (
             group.get(name, getclass=True) is h5py.Dataset
         ):
             found[name] = _dataset(group, name)
         elif not isinstance(group.get(name, getlink=True), h5py.HardLink):
-            hdf5.child(group, name, h5py.Dataset)
+            hdf5_reader.child(group, name, h5py.Dataset)
     return found
 
 

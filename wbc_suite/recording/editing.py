@@ -1,10 +1,10 @@
-"""Datasets checked, mended, put together and taken apart.
+"""Datasets verified, repaired, merged, split and filtered.
 
-Whatever is written is written aside and put in place at once: a process that dies at
-any moment leaves either the old file or the new one.
+Every result replaces the old file atomically.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 from shutil import rmtree
@@ -12,21 +12,27 @@ from shutil import rmtree
 import numpy as np
 
 from wbc_suite.errors import DatasetError
-from wbc_suite.recording.dataset import Dataset, part_files, parts_folder
+from wbc_suite.recording.dataset import (
+    Dataset,
+    dataset_files,
+    part_files,
+    parts_folder,
+)
 from wbc_suite.recording.episode import Episode
-from wbc_suite.recording.store import locked
-from wbc_suite.recording.writing import write_dataset
+from wbc_suite.recording.episode_store import locked
+from wbc_suite.recording.hdf5_check import check_files
+from wbc_suite.recording.hdf5_writer import write_dataset
 
 __all__ = ["Finding", "filter_dataset", "merge", "repair", "split", "verify"]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Finding:
-    """What was found of an episode, or of a file that cannot be opened.
+    """Result of reading an episode, or a file that cannot be opened.
 
     Attributes:
         place: File, and name of the episode.
-        problem: What is wrong, in words; None if nothing is.
+        problem: Description of the damage; None if there is none.
     """
 
     place: str
@@ -34,18 +40,18 @@ class Finding:
 
 
 def verify(path: str | Path) -> list[Finding]:
-    """Read every episode, and compare its numbers with the sum it was written with."""
+    """Read every episode, and compare its numbers with its checksum."""
     return [finding for finding, _ in _read_all(Path(path))]
 
 
 def repair(path: str | Path) -> list[Finding]:
-    """Put what can be read into one file again.
+    """Write all readable episodes into one file.
 
     A file that lost something is kept beside it as `FILE.damaged`.
 
     Raises:
-        DatasetError: If nothing can be read, somebody records into it, or the disk is
-            full; then everything is as it was.
+        DatasetError: If nothing can be read, another process records into it, or the
+            disk is full; then everything stays as it was.
     """
     path = Path(path)
     parts = part_files(path)
@@ -54,12 +60,13 @@ def repair(path: str | Path) -> list[Finding]:
         for finding, episode in _read_all(path):
             findings.append(finding)
             if episode is not None:
-                episodes.setdefault(_identity(finding, episode), finding.place)
+                uid = str(episode.facts.get("uid", finding.place))
+                episodes.setdefault(uid, finding.place)
         damaged = any(f.problem for f in findings)
         if not episodes and damaged:
             raise DatasetError(f"Nothing of '{path}' can be read: {findings[0]}.")
         if damaged or parts:
-            _put_together(path, set(episodes.values()), keep_old=damaged)
+            _write_repaired(path, set(episodes.values()), keep_old=damaged)
             if not damaged:
                 rmtree(parts_folder(path), ignore_errors=True)
     if not part_files(path):
@@ -68,32 +75,29 @@ def repair(path: str | Path) -> list[Finding]:
 
 
 def merge(sources: Sequence[str | Path], out: str | Path) -> int:
-    """Put the episodes of several files into one; their number is returned.
+    """Merge the episodes of several files into one; return their number.
 
-    An episode that is there twice comes once, so that merging again changes nothing.
+    An episode that is in several files is written once.
 
     Raises:
         DatasetError: If they are of different environments, or one cannot be read.
     """
     out = Path(out)
-    datasets = [Dataset(source) for source in sources]
-    try:
+    with ExitStack() as opened:
+        datasets = [opened.enter_context(Dataset(source)) for source in sources]
         origins = {str(d.header.get("env_args", "")) for d in datasets}
         if len(origins) > 1:
             raise DatasetError(
                 "These are recordings of different environments: "
                 + "; ".join(sorted(o[:120] for o in origins))
             )
-        wanted = _without_twins(datasets)
+        wanted = _distinct(datasets)
         renamed = (
             replace(dataset.episode(name), name=f"demo_{k}")
             for k, (dataset, name) in enumerate(wanted)
         )
         needed = sum(d.path.stat().st_size for d in datasets if d.path.exists())
         write_dataset(out, renamed, datasets[0].header, needed=needed)
-    finally:
-        for dataset in datasets:
-            dataset.close()
     return len(wanted)
 
 
@@ -104,11 +108,11 @@ def split(
 
     Args:
         path: The file.
-        valid: Share of the episodes that is kept for validation.
-        seed: Of the draw.
+        valid: Share of the episodes for validation.
+        seed: Seed of the draw.
 
     Raises:
-        DatasetError: If one of both would be empty.
+        DatasetError: If either would be empty.
     """
     path = Path(path)
     with Dataset(path) as dataset:
@@ -132,12 +136,12 @@ def split(
 def filter_dataset(
     path: str | Path, out: str | Path, keep: Callable[[Dataset, str], bool]
 ) -> int:
-    """Write those episodes that `keep(dataset, name)` wants; their number is returned.
+    """Write the episodes for which `keep(dataset, name)` is true; return their number.
 
-    They keep their names, and masks the names that are left.
+    They keep their names; masks keep the names that remain.
 
     Raises:
-        DatasetError: If none is left.
+        DatasetError: If none remains.
     """
     with Dataset(path) as dataset:
         names = [name for name in dataset.names if keep(dataset, name)]
@@ -152,11 +156,15 @@ def filter_dataset(
 
 
 def _read_all(path: Path) -> Iterator[tuple[Finding, Episode | None]]:
-    """Read episode by episode; what cannot be read is told."""
-    files = [path] if path.exists() or not part_files(path) else []
-    for file in [*files, *part_files(path)]:
+    """Read episode by episode; yield None in place of one that cannot be read."""
+    files = dataset_files(path)
+    damage = _damage(files)
+    for file in files:
+        if file in damage:
+            yield Finding(place=str(file), problem=damage[file]), None
+            continue
         try:
-            dataset = Dataset(file, alone=True)
+            dataset = Dataset(file, alone=True, checked=True)
         except DatasetError as error:
             yield Finding(place=str(file), problem=str(error)), None
             continue
@@ -169,12 +177,20 @@ def _read_all(path: Path) -> Iterator[tuple[Finding, Episode | None]]:
                     yield Finding(place=place, problem=str(error)), None
 
 
-def _identity(finding: Finding, episode: Episode) -> str:
-    return str(episode.facts.get("uid", finding.place))
+def _damage(files: Sequence[Path]) -> dict[Path, str]:
+    """Return which files cannot be opened safely, and why."""
+    try:
+        check_files(files)
+    except DatasetError as error:
+        if len(files) == 1:
+            return {files[0]: str(error)}
+        half = len(files) // 2
+        return _damage(files[:half]) | _damage(files[half:])
+    return {}
 
 
-def _put_together(path: Path, wanted: set[str], *, keep_old: bool) -> None:
-    """Write the wanted episodes, by their places, into one file."""
+def _write_repaired(path: Path, wanted: set[str], *, keep_old: bool) -> None:
+    """Write the wanted episodes, given by their places, into one file."""
     header: dict[str, str | int | float | bool] = {}
     masks: dict[str, list[str]] = {}
     for file in [path, *part_files(path)]:
@@ -184,24 +200,23 @@ def _put_together(path: Path, wanted: set[str], *, keep_old: bool) -> None:
             break
         except DatasetError:
             continue
-    names: list[str] = []
-
-    def numbered() -> Iterator[Episode]:
-        for finding, episode in _read_all(path):
-            if episode is not None and finding.place in wanted:
-                name = _free(episode.name, names)
-                names.append(name)
-                yield replace(episode, name=name)
-
-    mended = path.with_name(path.name + ".mended")
-    write_dataset(mended, numbered(), header)
-    if masks:
-        kept = {k: [n for n in held if n in names] for k, held in masks.items()}
-        with Dataset(mended, alone=True) as dataset:
-            write_dataset(mended, dataset, header, masks=kept)
+    names: dict[str, str] = {}  # by place; masks have names of the first file
+    for finding, episode in _read_all(path):
+        if episode is not None and finding.place in wanted:
+            names[finding.place] = _free(episode.name, names.values())
+    kept = {
+        k: [n for n in masked if n in names.values()] for k, masked in masks.items()
+    }
+    renamed = (
+        replace(episode, name=names[finding.place])
+        for finding, episode in _read_all(path)
+        if episode is not None and finding.place in names
+    )
+    repaired = path.with_name(path.name + ".repaired")
+    write_dataset(repaired, renamed, header, masks=kept)
     if keep_old and path.exists():
         path.replace(path.with_name(path.name + ".damaged"))
-    mended.replace(path)
+    repaired.replace(path)
 
 
 def _free(name: str, taken: Iterable[str]) -> str:
@@ -211,8 +226,8 @@ def _free(name: str, taken: Iterable[str]) -> str:
     return f"demo_{number}"
 
 
-def _without_twins(datasets: Iterable[Dataset]) -> list[tuple[Dataset, str]]:
-    """Return where each episode is, those with the same `uid` once."""
+def _distinct(datasets: Iterable[Dataset]) -> list[tuple[Dataset, str]]:
+    """Return the dataset and name of each episode, once for each `uid`."""
     found: dict[str, tuple[Dataset, str]] = {}
     for dataset in datasets:
         for name in dataset.names:

@@ -1,4 +1,4 @@
-"""One recorded episode, as plain arrays and plain facts."""
+"""One recorded episode: columns of numbers, and facts."""
 
 import hashlib
 import mmap
@@ -14,12 +14,12 @@ __all__ = ["PER_STEP", "Column", "Episode", "Fact", "fingerprint", "pieces"]
 Column: TypeAlias = NDArray[Any]
 """One row per action."""
 Fact: TypeAlias = str | int | float | bool
-"""What is known of a whole episode."""
+"""A value about a whole episode."""
 
 PER_STEP = ("states", "actions", "rewards", "dones")
-"""The columns that robomimic's layout asks for, besides `obs/*`."""
+"""Columns of robomimic's layout, besides `obs/*`."""
 PIECE = 1 << 20
-"""Bytes that are read at once while a column is written, those beside it included."""
+"""Bytes that are read at once while a column is written."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -47,9 +47,9 @@ class Episode:
 
     @property
     def success(self) -> bool | None:
-        """Whether it succeeded; None when nobody said."""
-        told = self.facts.get("success")
-        return None if told is None else bool(told)
+        """Whether it succeeded; None if this is not recorded."""
+        success = self.facts.get("success")
+        return None if success is None else bool(success)
 
     @property
     def observed(self) -> tuple[str, ...]:
@@ -72,10 +72,10 @@ def fingerprint(columns: Mapping[str, Column], final_state: Column | None) -> st
 
 
 def pieces(column: Column) -> Iterator[tuple[int, Column]]:
-    """Cut a column into contiguous arrays of a megabyte at most, and tell their rows.
+    """Yield contiguous pieces of at most a megabyte, with the number of the first row.
 
-    What was read from a mapped file is let go of: it would count as this process's
-    memory until the whole column was there.
+    Pages of a mapped file are released after use; they would count as memory of this
+    process.
     """
     if not column.ndim:
         column = np.reshape(column, 1)
@@ -84,10 +84,10 @@ def pieces(column: Column) -> Iterator[tuple[int, Column]]:
     rows = max(1, PIECE // wide if wide else len(column))
     for begin in range(0, len(column), rows):
         yield begin, np.ascontiguousarray(column[begin : begin + rows])
-        _let_go(column)
+        _release_pages(column)
 
 
-def _let_go(column: Column) -> None:
+def _release_pages(column: Column) -> None:
     if getattr(column, "flags", None) is None or column.flags.writeable:
         return
     held: Any = column

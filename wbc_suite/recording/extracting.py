@@ -1,4 +1,4 @@
-"""Other observations and rewards of episodes that were recorded long ago."""
+"""New observations and rewards at the states of recorded episodes."""
 
 import json
 import math
@@ -12,18 +12,18 @@ import numpy as np
 
 from wbc_suite.envs import RobotEnv
 from wbc_suite.errors import DatasetError
-from wbc_suite.executors import Executor, Item
+from wbc_suite.executors import Executor, WorkItem
 from wbc_suite.recording.dataset import Dataset
+from wbc_suite.recording.env_source import EnvSource, rebuild
 from wbc_suite.recording.episode import Episode
+from wbc_suite.recording.hdf5_writer import write_dataset
 from wbc_suite.recording.replaying import play_states
-from wbc_suite.recording.sharing import share_out, work_folder
-from wbc_suite.recording.source import EnvSource, rebuild
-from wbc_suite.recording.writing import write_dataset
+from wbc_suite.recording.resumable_work import run_pieces, work_folder
 
-__all__ = ["extract", "extract_part", "seen_again"]
+__all__ = ["extract", "extract_part", "observe_again"]
 
 PART = 10
-"""Episodes of one item of work at most: each makes its environment anew."""
+"""Maximum number of episodes of a work item; each item makes an environment."""
 
 
 def extract(
@@ -33,20 +33,20 @@ def extract(
     trust_files: bool = False,
     executor: Executor | None = None,
     workers: int = 1,
-    tell: Callable[[int], None] = lambda _: None,
+    on_progress: Callable[[int], None] = lambda _: None,
     **changes: Any,
 ) -> int:
-    """Show every recorded state again, and store what is seen and rewarded.
+    """Restore every recorded state, and store its observations and rewards.
 
-    What is finished waits in `OUT.work`: stopped, it goes on when called again.
+    Finished parts wait in `OUT.work`: a stopped extraction continues when called again.
 
     Args:
-        path: A recording, of anybody's whose states fit.
+        path: A recording whose states fit the environment.
         out: File to write; it may be the same.
         trust_files: See `EnvSource.build`.
-        executor: Who does the work; this process when left out.
-        workers: How many it has: episodes are shared out among them.
-        tell: Called with the number of episodes of each piece that is done.
+        executor: Runs the parts; this process when left out.
+        workers: Number of workers that the episodes are split among.
+        on_progress: Called with the number of episodes of each finished piece.
         changes: Arguments of the environment, such as `use_camera_obs`,
             `camera_names`, `reward_shaping`.
 
@@ -63,7 +63,7 @@ def extract(
         names, masks = dataset.names, dataset.masks
     size = min(PART, math.ceil(len(names) / workers))
     common = {"trust_files": trust_files, "changes": json.loads(json.dumps(changes))}
-    done = share_out(
+    done = run_pieces(
         extract_part,
         [
             {**common, "names": list(names[k : k + size])}
@@ -72,17 +72,17 @@ def extract(
         source=path,
         out=out,
         executor=executor,
-        tell=lambda item: tell(len(_names(item))),
+        on_piece=lambda item: on_progress(len(_names(item))),
     )
     folder = work_folder(out)
     parts = [folder / f"{item.name}.hdf5" for item, _ in done]
 
     def episodes() -> Iterator[Episode]:
         for part in parts:
-            with Dataset(part, alone=True) as dataset:
+            with Dataset(part, alone=True, checked=True) as dataset:
                 yield from dataset
 
-    with Dataset(parts[0], alone=True) as first:
+    with Dataset(parts[0], alone=True, checked=True) as first:
         header = first.header
     needed = sum(part.stat().st_size for part in parts)
     write_dataset(out, episodes(), header, masks=masks, needed=needed)
@@ -90,36 +90,36 @@ def extract(
     return len(names)
 
 
-def extract_part(item: Item, folder: Path) -> dict[str, Any]:
-    """Do a few episodes; they are written to `FOLDER/ITEM.hdf5`."""
-    told: Any = item.payload
-    with Dataset(told["source"]) as dataset:
-        env = rebuild(dataset, trust_files=told["trust_files"], **told["changes"])
+def extract_part(item: WorkItem, folder: Path) -> dict[str, Any]:
+    """Extract a few episodes into `FOLDER/ITEM.hdf5`."""
+    payload: Any = item.payload
+    with Dataset(payload["source"]) as dataset:
+        env = rebuild(dataset, trust_files=payload["trust_files"], **payload["changes"])
         try:
             header = dataset.header | {"env_args": EnvSource.of(env).text}
-            chosen = (seen_again(env, dataset.episode(n)) for n in told["names"])
+            chosen = (observe_again(env, dataset.episode(n)) for n in payload["names"])
             write_dataset(folder / f"{item.name}.hdf5", chosen, header)
         finally:
             env.close()
-    return {"episodes": len(told["names"])}
+    return {"episodes": len(payload["names"])}
 
 
-def _names(item: Item) -> list[Any]:
+def _names(item: WorkItem) -> list[Any]:
     names: Any = item.payload["names"]
     return names
 
 
-def seen_again(env: RobotEnv, episode: Episode) -> Episode:
-    """Return an episode with what this environment sees and rewards at its states.
+def observe_again(env: RobotEnv, episode: Episode) -> Episode:
+    """Return an episode with an environment's observations and rewards at its states.
 
-    What depends on the past, such as a delay or noise of a sensor, is as at rest; the
-    last reward is as recorded where the state after it is missing.
+    Delays of sensors are those of a robot at rest. The last reward is the recorded one
+    where the state after it is missing.
     """
-    seen: list[dict[str, Any]] = []
+    observations: list[dict[str, Any]] = []
     rewards: list[float] = []
     for k in play_states(env, episode):
         if k < episode.length:
-            seen.append(env.observation())
+            observations.append(env.observation())
         if k > 0:
             reward = env.benchmark.reward(shaped=env.config.reward_shaping)
             rewards.append(reward * env.config.reward_scale)
@@ -132,6 +132,6 @@ def seen_again(env: RobotEnv, episode: Episode) -> Episode:
         if not name.startswith(("obs/", "next_obs/"))
     }
     columns["rewards"] = np.array(rewards)
-    for key in seen[0]:
-        columns[f"obs/{key}"] = np.array([now[key] for now in seen])
+    for key in observations[0]:
+        columns[f"obs/{key}"] = np.array([row[key] for row in observations])
     return replace(episode, columns=columns)

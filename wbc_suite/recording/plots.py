@@ -1,4 +1,4 @@
-"""What a dataset looks like in numbers: one picture with a few curves."""
+"""A chart of a dataset: lengths, actions and successes."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from wbc_suite.errors import DatasetError
 from wbc_suite.recording.dataset import Dataset
 from wbc_suite.typing import Vector
 
-__all__ = ["write_plots"]
+__all__ = ["save_picture", "write_plots"]
 
 WIDTH, HEIGHT, MARGIN = 720, 150, 28  # pixels of one plot
 INK, CURVE, GOOD, BAD = "#333333", "#4a6fa5", "#3f8f5b", "#c8553d"
@@ -27,20 +27,29 @@ def write_plots(dataset: Dataset, path: Path) -> None:
     if not names:
         raise DatasetError(f"'{dataset.path}' has no episodes to plot.")
     lengths = np.array([dataset.length(name) for name in names], dtype=np.float64)
-    told = [dataset.facts(name).get("success") for name in names]
+    successes = [dataset.facts(name).get("success") for name in names]
     actions = np.concatenate([dataset.column(name, "actions") for name in names])
     sheet = Image.new("RGB", (WIDTH, 3 * HEIGHT), "white")
     pen = ImageDraw.Draw(sheet)
-    colours = [CURVE if s is None else GOOD if s else BAD for s in told]
+    colours = [CURVE if s is None else GOOD if s else BAD for s in successes]
     _bars(pen, 0, "Actions per episode (green: success)", lengths, colours)
     spread = actions.std(axis=0)
     _bars(pen, 1, "Spread of each action", spread, [CURVE] * len(spread))
     sizes = [float(np.linalg.norm(a)) for a in actions[:: len(actions) // MOST + 1]]
     values = np.array(sizes)
     _bars(pen, 2, "Size of the action over time", values, [CURVE] * len(values))
+    save_picture(sheet, path)
+
+
+def save_picture(picture: Image.Image, path: Path) -> None:
+    """Write a picture in the format of the path's suffix; make its folder.
+
+    Raises:
+        DatasetError: If it cannot be written.
+    """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        sheet.save(path)
+        picture.save(path)
     except (OSError, ValueError) as error:
         raise DatasetError(f"'{path}' cannot be written: {error}.") from error
 

@@ -1,4 +1,4 @@
-"""From steps to episodes: kept, discarded, taken back."""
+"""Recording of an environment: steps become episodes, kept or discarded."""
 
 import hashlib
 import json
@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from wbc_suite.errors import DatasetError
+from wbc_suite.recording.env_source import header_of
 from wbc_suite.recording.episode import Episode, Fact, pieces
-from wbc_suite.recording.source import header_of
-from wbc_suite.recording.step_rows import StepRows
-from wbc_suite.recording.store import Store
+from wbc_suite.recording.episode_store import Store
+from wbc_suite.recording.step_buffer import StepBuffer
 
 __all__ = ["Recorder"]
 
@@ -24,14 +24,13 @@ class Recorder:
     """Records one environment's episodes into a file.
 
     Args:
-        env: One of our environments, wrapped or not.
+        env: An environment of this package, wrapped or not.
         path: The file; episodes are added to those in it.
-        next_obs: Whether observations after each action are stored too; they are
-            those before the next action, but for the last one.
+        next_obs: Whether observations after each action are stored too.
         later: Whether the file is opened by `open` or the first episode, not at once.
 
     Raises:
-        DatasetError: If the environment is none of ours, or see `Store`.
+        DatasetError: If it is another environment, or see `Store`.
 
     Attributes:
         path: The file.
@@ -44,7 +43,7 @@ class Recorder:
         self.path = Path(path)
         self._header, self._model_file = header_of(env), ""
         self._store: Store | None = None
-        self._rows = StepRows(env, self.path.parent)
+        self._rows = StepBuffer(env, self.path.parent)
         self._facts: dict[str, Fact] | None = None
         self._clipped, self._succeeded = 0, False
         if not later:
@@ -85,7 +84,7 @@ class Recorder:
         return self._succeeded
 
     def begin(self) -> None:
-        """Start an episode where the environment stands, right after its reset."""
+        """Begin an episode, right after the environment's reset."""
         self.discard()
         self.open()
         state, placed = self._inner.beginning
@@ -115,11 +114,8 @@ class Recorder:
     ) -> None:
         """Record a step that the environment has just taken.
 
-        Numbers that it observed are taken from the environment itself; `observation`
-        tells pictures, and everything where a wrapper may have changed it.
-
         Raises:
-            DatasetError: If the disk is full; then the episode is gone.
+            DatasetError: If the disk is full; then the episode is lost.
         """
         success = bool(info.get("success", False))
         clipped = int(info.get("clipped", 0))
@@ -134,14 +130,14 @@ class Recorder:
         self._succeeded = success
 
     def keep(self, success: bool | None = None) -> str | None:
-        """End the episode and store it; its name, or None if there was nothing.
+        """End the episode and store it; return its name, or None if it has no steps.
 
         Args:
-            success: What a person says; by default what the benchmark said last.
+            success: Success by an operator's judgement; None for the benchmark's.
 
         Raises:
-            DatasetError: If it cannot be stored; then it is still in progress, and
-                `keep` may be tried again.
+            DatasetError: If it cannot be stored; it stays in progress, and `keep` may
+                be called again.
         """
         if self._facts is None or not len(self._rows):
             self.discard()
@@ -165,16 +161,16 @@ class Recorder:
         return name
 
     def discard(self) -> None:
-        """Forget the episode in progress."""
+        """Discard the episode in progress."""
         self._facts = None
         self._rows.close()
 
     def undo(self) -> str | None:
-        """Forget the last episode that was kept; its name, or None if there is none."""
+        """Delete the last episode that was kept; return its name, or None."""
         return None if self._store is None else self._store.undo()
 
     def close(self) -> None:
-        """Forget what is in progress, and put all episodes into one file."""
+        """Discard the episode in progress, and merge all episodes into one file."""
         self.discard()
         if self._store is not None:
             self._store.close()

@@ -1,4 +1,4 @@
-"""Episodes played again: by their states, or by their actions."""
+"""Replay of episodes by their states or by their actions."""
 
 import json
 import logging
@@ -25,12 +25,12 @@ _JOINT = re.compile(r'<(?:free)?joint\b[^<>]*?\bname="([^"<>]{1,200})"')
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Divergence:
-    """How far a replay by actions went from what was recorded.
+    """Difference of a replay by actions from the recording.
 
     Attributes:
         steps: Actions played.
         largest: Largest difference of any number of the state (m, rad, m/s, rad/s).
-        first: Action after which the first difference was seen; None without any.
+        first: Action with the first difference after it; None without any.
         success: Whether the benchmark is solved at the end of the replay.
     """
 
@@ -46,14 +46,14 @@ class Divergence:
 
 
 def start_as(env: RobotEnv, episode: Episode) -> None:
-    """Start an episode as a recorded one started.
+    """Reset the environment to the start of a recorded episode.
 
-    With the state of the random generator it begins bit by bit as it did, sizes of
-    objects included; without (files from elsewhere) at the recorded physics state.
+    With the recorded state of the random generator the start is equal to the bit, sizes
+    of objects included. Without it, the physics state is set.
 
     Raises:
-        DatasetError: If the recorded state does not fit the environment, or its joints
-            have other names here. In files from elsewhere they may have.
+        DatasetError: If the recorded state does not fit the environment, or the joints
+            of a recording of this package have other names.
     """
     if "states" not in episode.columns or not episode.length:
         raise DatasetError(f"'{episode.name}' has no states to start from.")
@@ -65,13 +65,13 @@ def start_as(env: RobotEnv, episode: Episode) -> None:
             "differ, and it cannot be replayed here."
         )
     _check_joints(env, episode)
-    told = episode.facts.get("rng_state")
+    generator = episode.facts.get("rng_state")
     try:
-        if told is None:
+        if generator is None:
             env.reset_to(state)
         else:
             placed = json.loads(str(episode.facts.get("placed", "null")))
-            env.begin_at(_generator_state(str(told)), placed)
+            env.begin_at(_generator_state(str(generator)), placed)
     except (ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
         raise DatasetError(f"'{episode.name}' has no usable start: {error}") from error
     except WbcError as error:
@@ -79,10 +79,10 @@ def start_as(env: RobotEnv, episode: Episode) -> None:
 
 
 def play_states(env: RobotEnv, episode: Episode) -> Iterator[int]:
-    """Put every recorded state into the simulation, one after the other.
+    """Set the simulation to every recorded state, one after the other.
 
     Yields:
-        The number of the action that was taken there; the last one is the end.
+        The number of the action taken in the state; at last the number of actions.
     """
     start_as(env, episode)
     simulation = env.simulation
@@ -92,19 +92,19 @@ def play_states(env: RobotEnv, episode: Episode) -> Iterator[int]:
     for k, state in enumerate(states):
         write_physics(simulation.model, simulation.data, state)
         simulation.forward()
-        env.benchmark.watch()
-        env.observables.look()
+        env.benchmark.after_step()
+        env.observables.update()
         yield k
 
 
 def play_actions(
     env: RobotEnv, episode: Episode
 ) -> Iterator[tuple[int, Vector, dict[str, Any]]]:
-    """Take the recorded actions, open loop.
+    """Apply the recorded actions, open loop.
 
     Yields:
         Number of the action, difference of the state after it from the recorded one
-        (none for the last when the dataset lacks it), and `info`.
+        (zero if that is missing), and `info`.
     """
     start_as(env, episode)
     if episode.columns["actions"].shape[1] != env.action_layout.size:
@@ -124,7 +124,7 @@ def play_actions(
 
 
 def divergence(env: RobotEnv, episode: Episode) -> Divergence:
-    """Replay an episode by its actions, and say how far it went from the recording."""
+    """Replay an episode by its actions, and compare it with the recording."""
     largest, first, steps, success = 0.0, None, 0, False
     for k, difference, info in play_actions(env, episode):
         worst = float(np.abs(difference).max())
@@ -136,7 +136,7 @@ def divergence(env: RobotEnv, episode: Episode) -> Divergence:
 
 
 def _check_joints(env: RobotEnv, episode: Episode) -> None:
-    """Refuse the states of another robot, which may be as many numbers."""
+    """Refuse states of another robot with the same number of joints."""
     recorded = _joints_named(str(episode.facts.get("model_file", "")))
     model = env.simulation.model
     here = [model.joint(number).name for number in range(model.njnt)]
@@ -145,7 +145,7 @@ def _check_joints(env: RobotEnv, episode: Episode) -> None:
     pairs = zip_longest(recorded, here, fillvalue="nothing")
     differing = [f"'{one}' is '{other}' here" for one, other in pairs if one != other]
     words = f"{len(differing)} joints have other names: {', '.join(differing[:3])}"
-    if "uid" in episode.facts:  # it was recorded by us
+    if "uid" in episode.facts:  # of this package
         raise DatasetError(
             f"'{episode.name}' is of another robot or other objects, though its states "
             f"have as many numbers; {words}."
@@ -154,7 +154,7 @@ def _check_joints(env: RobotEnv, episode: Episode) -> None:
 
 
 def _joints_named(mjcf: str) -> list[str]:
-    """Return the names of a scene's joints, found without parsing what is untrusted."""
+    """Return the names of a scene's joints, without parsing the untrusted MJCF."""
     world = mjcf[mjcf.find("<worldbody") : mjcf.rfind("</worldbody>") + 1]
     return _JOINT.findall(world)
 

@@ -1,67 +1,49 @@
-"""`RobotDescription`: one robot, complete, from which every engine's model is built."""
+"""`RobotDescription`: a complete robot, and the exports to each engine."""
 
+from collections.abc import Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from pydantic import Field, model_validator
 
 from wbc_suite.errors import DescriptionError, UnknownNameError
-from wbc_suite.robot.parts import (
-    Actuator,
-    Camera,
-    Connect,
-    Contacts,
-    Frame,
-    Joint,
-    Link,
-    Mount,
-    Name,
-    Root,
-    Sensor,
-    Synergy,
-)
+from wbc_suite.robot.elements import Elements, Frame, Joint, Link, Name, Synergy
 from wbc_suite.robot.shapes import Shape, SkinMesh
 from wbc_suite.robot.validation import check_description
-from wbc_suite.tomlfile import FrozenModel, parse_model
+from wbc_suite.tomlfile import parse_model
 
 if TYPE_CHECKING:
     import mujoco
 
 __all__ = ["RobotDescription"]
 
-Rgba = tuple[float, float, float, float]
-
-
+T = TypeVar("T")
 _SIDES = {"right", "left"}
 
 
-class RobotDescription(FrozenModel):
-    """A robot: links in depth-first order, and everything that hangs on them.
+def _find(kind: str, name: str, items: Mapping[str, T]) -> T:
+    try:
+        return items[name]
+    except (KeyError, TypeError):
+        raise UnknownNameError(kind, name, items) from None
 
-    Valid when it exists: names are unique, inertias are physical, references resolve.
-    The MuJoCo and the Pinocchio model built from it have the same joint names and one
-    velocity index per joint, in the same order.
+
+class RobotDescription(Elements):
+    """A robot: links in depth-first order, joints, frames and the other elements.
+
+    It is validated on construction: names are unique, inertias are physical, references
+    resolve. The MuJoCo and the Pinocchio model built from it have the same joint names
+    and one velocity index per joint, in the same order. `Elements` has the other
+    attributes.
 
     Attributes:
         name: Name of the robot.
-        title: Name for people.
-        source: Where the figures come from, in words.
+        title: Display name.
+        source: Source of the figures.
         license: Licence of the figures.
         deviations: Each deliberate difference from the source, with its reason.
-        root: How the first link stands in the world.
-        links: Links, parents before children.
-        frames: Named poses on links.
-        mounts: Places where components can be mounted.
-        cameras: Cameras.
-        actuators: Motors that differ from the default.
-        sensors: Sensors.
-        synergies: Commands of grippers, by gripper.
-        groups: Joint names by group, such as `right_arm`.
-        keyframes: Joint values by name of the posture; absent joints are zero.
-        contacts: Pairs of links that never collide.
-        connects: Closed loops.
-        materials: Colours by name.
-        skins: Meshes that are drawn in place of a link's own shapes, see `robot.skins`.
+        synergies: Gripper commands, by gripper.
+        skins: Meshes drawn instead of a link's visual shapes, see `robot.skins`.
     """
 
     name: str
@@ -69,19 +51,7 @@ class RobotDescription(FrozenModel):
     source: str = ""
     license: str = ""
     deviations: tuple[str, ...] = ()
-    root: Root = Root()
-    links: tuple[Link, ...]
-    frames: tuple[Frame, ...] = ()
-    mounts: tuple[Mount, ...] = ()
-    cameras: tuple[Camera, ...] = ()
-    actuators: tuple[Actuator, ...] = ()
-    sensors: tuple[Sensor, ...] = ()
     synergies: dict[Name, tuple[Synergy, ...]] = {}
-    groups: dict[Name, tuple[Name, ...]] = {}
-    keyframes: dict[Name, dict[Name, float]] = {}
-    contacts: Contacts = Contacts()
-    connects: tuple[Connect, ...] = ()
-    materials: dict[Name, Rgba] = {}
     skins: dict[Name, tuple[SkinMesh, ...]] = Field(default={}, exclude=True)
 
     @model_validator(mode="after")
@@ -91,7 +61,7 @@ class RobotDescription(FrozenModel):
 
     @cached_property
     def joints(self) -> tuple[Joint, ...]:
-        """All joints below the root, in the order of both engines' models."""
+        """All joints except the root's, in the order of both engines."""
         return tuple(link.joint for link in self.links if link.joint is not None)
 
     @cached_property
@@ -111,22 +81,23 @@ class RobotDescription(FrozenModel):
 
     @cached_property
     def dof(self) -> int:
-        """Independent joints: those that follow no other; the root is not counted."""
+        """Number of joints that follow no other, without the root."""
         return sum(joint.mimic is None for joint in self.joints)
 
     @cached_property
     def mass(self) -> float:
-        """Mass of the whole robot in kg."""
+        """Total mass, kg."""
         return sum(link.mass for link in self.links)
 
     @cached_property
     def hands(self) -> dict[str, str]:
-        """The frame of each hand, right before left, by side or by its own name.
+        """Frame of each hand by side, or by frame name if it has no side.
 
-        It is the frame with role `tcp`, or `eef` on a side without a gripper.
+        This is the frame with role `tcp`, or `eef` on a side without gripper. The
+        right hand comes first.
         """
         tcp, eef = self._sided("tcp"), self._sided("eef")
-        if tcp:  # what else ends an arm is no second hand
+        if tcp:  # other `eef` frames are not further hands
             eef = {s: f for s, f in eef.items() if s in _SIDES and set(tcp) <= _SIDES}
         hands = eef | tcp
         order = sorted(hands, key=lambda side: (side != "right", side))
@@ -146,44 +117,32 @@ class RobotDescription(FrozenModel):
 
     def link(self, name: str) -> Link:
         """Return a link by name; raises UnknownNameError."""
-        try:
-            return self._links_by_name[name]
-        except (KeyError, TypeError):
-            raise UnknownNameError("link", name, self._links_by_name) from None
-
-    def drawn(self, link: Link) -> tuple[Shape | SkinMesh, ...]:
-        """Return what a link is drawn with."""
-        return self.skins.get(link.name, link.visual)
+        return _find("link", name, self._links_by_name)
 
     def joint(self, name: str) -> Joint:
         """Return a joint by name; raises UnknownNameError."""
-        for joint in self.joints:
-            if joint.name == name:
-                return joint
-        raise UnknownNameError("joint", name, self.joint_names)
+        return _find("joint", name, {joint.name: joint for joint in self.joints})
 
     def frame(self, name: str) -> Frame:
         """Return a frame by name; raises UnknownNameError."""
-        for frame in self.frames:
-            if frame.name == name:
-                return frame
-        raise UnknownNameError("frame", name, [f.name for f in self.frames])
+        return _find("frame", name, {frame.name: frame for frame in self.frames})
+
+    def drawn(self, link: Link) -> tuple[Shape | SkinMesh, ...]:
+        """Return the skin of a link, or else its visual shapes."""
+        return self.skins.get(link.name, link.visual)
 
     def link_of(self, frame: str) -> str:
-        """Return the link that a frame, or a link's own name, belongs to."""
+        """Return the link of a frame; a link's name is returned unchanged."""
         return next((f.link for f in self.frames if f.name == frame), frame)
 
     def group(self, name: str) -> tuple[str, ...]:
         """Return the joints of a group; raises UnknownNameError."""
-        if name not in tuple(self.groups):
-            raise UnknownNameError("group", name, self.groups)
-        return self.groups[name]
+        return _find("group", name, self.groups)
 
     def keyframe(self, name: str) -> dict[str, float]:
-        """Return a posture with every joint filled in; followers are computed."""
-        if name not in tuple(self.keyframes):
-            raise UnknownNameError("keyframe", name, self.keyframes)
-        values = {j: 0.0 for j in self.joint_names} | self.keyframes[name]
+        """Return the values of all joints in a posture; followers are computed."""
+        given = _find("keyframe", name, self.keyframes)
+        values = dict.fromkeys(self.joint_names, 0.0) | given
         for joint in self.joints:
             if joint.mimic is not None:
                 leader = values[joint.mimic.joint]
@@ -191,38 +150,38 @@ class RobotDescription(FrozenModel):
         return values
 
     def to_mjspec(self) -> "mujoco.MjSpec":
-        """Build the MuJoCo specification; it compiles alone.
+        """Build the MuJoCo specification, which can be compiled or attached.
 
-        Physics options are left at MuJoCo's defaults: they belong to the scene.
+        Physics options keep MuJoCo's defaults; the scene sets them.
         """
-        from wbc_suite.robot.mjcf import build_mjspec
+        from wbc_suite.robot.mjcf_export import build_mjspec
 
         return build_mjspec(self)
 
     def to_mjcf(self) -> str:
-        """Write the MuJoCo model as MJCF text, with all digits."""
-        from wbc_suite.robot.mjcf import write_mjcf
+        """Return the MuJoCo model as MJCF text with all digits."""
+        from wbc_suite.robot.mjcf_export import write_mjcf
 
         return write_mjcf(self)
 
     def to_pinocchio(self) -> Any:
         """Build the Pinocchio model (`pinocchio.Model`) without geometry.
 
-        Followers (mimic joints) are plain joints of the open tree here, so that nv and
-        the order of velocities equal MuJoCo's.
+        Mimic joints are independent joints here, so that nv and the order of velocities
+        equal those of MuJoCo.
         """
-        from wbc_suite.robot.pinocchio import build_pinocchio
+        from wbc_suite.robot.pinocchio_export import build_pinocchio
 
         return build_pinocchio(self)
 
     def to_urdf(self) -> str:
-        """Write the robot as URDF text; `write_urdf` says what is lost."""
+        """Return the robot as URDF text; `write_urdf` lists what is converted."""
         from wbc_suite.robot.urdf_export import write_urdf
 
         return write_urdf(self)
 
     def to_toml(self) -> str:
-        """Write the robot as one component file in our own format; nothing is lost."""
+        """Return the robot as one component file (TOML), without loss."""
         from wbc_suite.robot.toml_export import write_toml
 
         return write_toml(self)
@@ -230,11 +189,17 @@ class RobotDescription(FrozenModel):
     def with_root(
         self, kind: Literal["fixed", "planar", "free"], **changes: Any
     ) -> "RobotDescription":
-        """Return the same robot on another root."""
-        data = self.root.model_dump() | {"kind": kind} | changes
-        source = f"{self.name}: root"
-        root = parse_model(Root, data, source=source, error=DescriptionError)
-        fields = {key: getattr(self, key) for key in type(self).model_fields}
-        return parse_model(
-            type(self), fields | {"root": root}, source=source, error=DescriptionError
-        )
+        """Return the robot with another root.
+
+        Args:
+            kind: Kind of the root.
+            changes: Other fields of `Root`.
+
+        Raises:
+            DescriptionError: If a field of the root is invalid.
+        """
+        data: dict[str, Any] = {
+            key: getattr(self, key) for key in type(self).model_fields
+        }
+        data["root"] = self.root.model_dump() | {"kind": kind} | changes
+        return parse_model(type(self), data, source=self.name, error=DescriptionError)

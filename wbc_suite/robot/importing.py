@@ -1,42 +1,74 @@
-"""What URDF and MJCF import share: from plain fields to a checked description."""
+"""Common steps of the URDF and MJCF import: names, checks, inferred groups."""
 
 import logging
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
 
-import numpy as np
+import mujoco
 
-from wbc_suite.errors import DescriptionError
+from wbc_suite.errors import DescriptionError, join_first, shortened
 from wbc_suite.robot.description import RobotDescription
-from wbc_suite.robot.guessing import (
-    guess_frames,
-    guess_limbs,
-    guess_ready,
-    guess_role,
+from wbc_suite.robot.elements import Frame, Link, rigid_bodies
+from wbc_suite.robot.group_inference import (
+    infer_frames,
+    infer_limbs,
+    infer_ready,
+    infer_role,
 )
-from wbc_suite.robot.naming import NameTable
-from wbc_suite.robot.parts import Frame, Link
-from wbc_suite.robot.standing import standing_legs
-from wbc_suite.robot.validation import (
-    implausible,
-    inertia_matrix,
-    rigid_bodies,
-    unphysical,
-)
+from wbc_suite.robot.inertia import implausible, nearest_physical, unphysical
+from wbc_suite.robot.standing_posture import standing_legs
+from wbc_suite.robot.validation import RESERVED
 from wbc_suite.tomlfile import parse_model
-from wbc_suite.typing import Matrix
 
-__all__ = ["LinkFields", "describe_import", "inertia_fields", "shortened"]
+__all__ = ["LinkFields", "NameTable", "describe_import", "overlapping_links"]
 
 LOG = logging.getLogger(__name__)
 
-SMALLEST = 1e-3
-"""Radius of gyration in m below which a mended inertia does not go."""
-
 LinkFields: TypeAlias = dict[str, Any]
 """Fields of one `Link`, before validation."""
+
+MAX_NAME = 70
+"""Characters kept of a name in the file; our limit of 80 leaves room for a suffix."""
+OVERLAP = 1e-3
+"""Smallest penetration in m that counts as an overlap."""
+MAX_JOINTS_BETWEEN = 3
+"""Largest number of joints between overlapping links that are excluded from contact.
+Links farther apart, such as an arm and the trunk, overlap because of the posture."""
+MAX_MESSAGE = 800
+"""Largest number of characters of a list in a message."""
+
+
+class NameTable:
+    """Assigns unique names of letters, digits and `_`.
+
+    URDF has separate names for links and joints, and allows any character; ours are
+    unique together. Equal files give equal names.
+    """
+
+    def __init__(self) -> None:
+        self._taken: set[str] = set(RESERVED)
+
+    def take(self, original: str, kind: str) -> str:
+        """Return a unique name that is as close as possible to the original.
+
+        Args:
+            original: Name in the file.
+            kind: Kind of item ("link", "joint", "frame"): the suffix if the name is
+                already taken.
+        """
+        plain = re.sub(r"[^A-Za-z0-9_]", "_", original)[:MAX_NAME]
+        if not re.match(r"[A-Za-z]", plain):
+            plain = f"{kind}_{plain.lstrip('_')}".rstrip("_")
+        name, number = plain, 1
+        while name in self._taken:
+            name = f"{plain}_{kind}{number if number > 1 else ''}"
+            number += 1
+        self._taken.add(name)
+        if name != original:
+            LOG.info("The %s '%s' is imported as '%s'.", kind, original, name)
+        return name
 
 
 def describe_import(
@@ -50,46 +82,44 @@ def describe_import(
     mend_inertias: bool = False,
     **others: Any,
 ) -> RobotDescription:
-    """Check imported links and frames, and add what the file does not say.
+    """Check imported links and frames, and infer what the file does not define.
 
-    Groups, end effectors and a `ready` posture are guessed where `others` has none.
-    An implausible centre of mass or inertia is a warning here and not an error, since
-    meshes that could not be read leave the shapes incomplete.
+    Groups, end effectors and a `ready` posture are inferred unless `others` has them.
+    An implausible centre of mass or inertia is only a warning, because meshes that
+    could not be read leave the shapes incomplete.
 
     Raises:
-        DescriptionError: If the robot contradicts itself or physics.
+        DescriptionError: If the robot is inconsistent or unphysical.
     """
     checked = [_link(fields, source) for fields in _without_chains(links)]
     _check_masses(checked, source)
     checked = _physical(checked, source, mend=mend_inertias)
-    checked = _accepted(checked, source)
+    checked = _accept_implausible(checked, source)
     given = [
         parse_model(
             Frame,
-            frame | {"role": guess_role(frame["name"])},
+            frame | {"role": infer_role(frame["name"])},
             source=str(source),
             error=DescriptionError,
         )
         for frame in frames
     ]
-    limbs = guess_limbs(checked)
+    limbs = infer_limbs(checked)
     keyframes = others.pop("keyframes", {})
     data: dict[str, Any] = {
         "name": _robot_name(name),
         "source": f"imported from {source.name}",
         "root": root,
         "links": checked,
-        "frames": guess_frames(checked, limbs, given, names),
+        "frames": infer_frames(checked, limbs, given, names),
         "groups": {limb.name: limb.joints for limb in limbs if limb.joints},
-        "keyframes": {"ready": guess_ready(checked)} | keyframes,
+        "keyframes": {"ready": infer_ready(checked)} | keyframes,
     }
     robot = parse_model(
         RobotDescription, data | others, source=str(source), error=DescriptionError
     )
-    return robot if "ready" in keyframes else _on_bent_legs(robot)
-
-
-def _on_bent_legs(robot: RobotDescription) -> RobotDescription:
+    if "ready" in keyframes:
+        return robot
     ready = robot.keyframes["ready"] | standing_legs(robot)
     return robot.model_copy(update={"keyframes": robot.keyframes | {"ready": ready}})
 
@@ -104,21 +134,8 @@ def _link(fields: LinkFields, source: Path) -> Link:
     return parse_model(Link, fields, source=where, error=DescriptionError)
 
 
-def _accepted(links: Sequence[Link], source: Path) -> list[Link]:
-    """Accept what is implausible but possible, and tell it in one warning."""
-    faults = {link.name: dict(implausible(link)) for link in links}
-    told = [f"link '{n}': {text}" for n, own in faults.items() for text in own.values()]
-    if told:
-        LOG.warning("%s: taken as it is: %s.", source, shortened("; ".join(told)))
-    reason = f"as it was in {source.name}"
-    return [
-        link.model_copy(update={"accept": dict.fromkeys(faults[link.name], reason)})
-        for link in links
-    ]
-
-
 def _without_chains(links: Sequence[LinkFields]) -> Sequence[LinkFields]:
-    """Let joints that follow a follower follow its leader."""
+    """Couple joints that follow a follower to the leader at the end of the chain."""
     mimics = {
         fields["joint"]["name"]: fields["joint"]["mimic"]
         for fields in links
@@ -128,7 +145,7 @@ def _without_chains(links: Sequence[LinkFields]) -> Sequence[LinkFields]:
         seen = {name}
         while own["joint"] in mimics:
             if own["joint"] in seen:
-                raise DescriptionError(f"joint '{name}' follows itself in a circle.")
+                raise DescriptionError(f"joint '{name}' follows itself in a loop.")
             seen.add(own["joint"])
             leader = mimics[own["joint"]]
             own |= {
@@ -139,61 +156,78 @@ def _without_chains(links: Sequence[LinkFields]) -> Sequence[LinkFields]:
     return links
 
 
+def _check_masses(links: Sequence[Link], source: Path) -> None:
+    """Refuse moving links without mass, with advice for the file."""
+    rigid = rigid_bodies(links)
+    heavy = {rigid[link.name] for link in links if link.mass > 0.0}
+    empty = [f"'{x.name}'" for x in links if x.joint and x.name not in heavy]
+    if empty:
+        raise DescriptionError(
+            f"{source}: the links {join_first(empty)} move but have no mass. Give each "
+            "a mass and an inertia (1e-3 kg and 1e-6 kg m^2 are enough for a dummy), "
+            "or make its joint fixed."
+        )
+
+
 def _physical(links: Sequence[Link], source: Path, *, mend: bool) -> list[Link]:
-    """Refuse or mend the inertias that no body has."""
+    """Refuse or correct the inertias that no rigid body can have."""
     faults = {link.name: fault for link in links if (fault := unphysical(link))}
     if faults and not mend:
         shown = "; ".join(f"link '{n}': {fault}" for n, fault in faults.items())
         raise DescriptionError(
-            f"{source}: {shortened(shown)}. Mend these links in the file, or take the "
-            "nearest tensors that a body can have: wbc-suite export FILE "
+            f"{source}: {shortened(shown, MAX_MESSAGE)}. Correct these links in the "
+            "file, or take the nearest physical tensors: wbc-suite export FILE "
             "--mend-inertias --to toml, or read_urdf(path, mend_inertias=True)."
         )
     for name, fault in faults.items():
-        LOG.warning("%s: link '%s': %s; mended.", source, name, fault)
-    return [_mended(link) if link.name in faults else link for link in links]
+        LOG.warning("%s: link '%s': %s; corrected.", source, name, fault)
+    return [nearest_physical(x) if x.name in faults else x for x in links]
 
 
-def shortened(text: str) -> str:
-    """Return a message's list, cut where nobody would read on."""
-    return text if len(text) <= 800 else text[:800] + " ..."
+def _accept_implausible(links: Sequence[Link], source: Path) -> list[Link]:
+    """Accept implausible links, and list them in one warning."""
+    faults = {link.name: dict(implausible(link)) for link in links}
+    lines = [f"link '{n}': {t}" for n, own in faults.items() for t in own.values()]
+    if lines:
+        shown = shortened("; ".join(lines), MAX_MESSAGE)
+        LOG.warning("%s: accepted as given: %s.", source, shown)
+    reason = f"as given in {source.name}"
+    return [
+        link.model_copy(update={"accept": dict.fromkeys(faults[link.name], reason)})
+        for link in links
+    ]
 
 
-def _mended(link: Link) -> Link:
-    """Return the link with the nearest physical inertia.
+def overlapping_links(robot: RobotDescription) -> tuple[tuple[str, str], ...]:
+    """Return pairs of links that overlap in the posture `ready`, few joints apart.
 
-    An inertia I is physical when the second moments of mass S = tr(I)/2 - I are
-    positive: their eigenvalues are raised to that of a body of 1 mm at least.
-
-    Source: Wensing, Kim, Slotine (2018), "Linear matrix inequalities for physically
-    consistent inertial parameter identification", RA-L 3(1).
+    Hulls of meshes, and shapes drawn with a margin, can reach past the next link into
+    the one after it. In a simulation they would permanently push each other apart.
     """
-    inertia = inertia_matrix(link.inertia)
-    moments, axes = np.linalg.eigh(np.trace(inertia) / 2 * np.eye(3) - inertia)
-    raised = np.maximum(moments, link.mass * SMALLEST**2)
-    second = (axes * raised) @ axes.T
-    fields = inertia_fields(np.trace(second) * np.eye(3) - second)
-    return link.model_copy(update={"inertia": fields})
+    model = robot.to_mjspec().compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("ready").id)
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    mujoco.mj_collision(model, data)
+    contacts = data.contact
+    names = {model.body(link.name).id: link.name for link in robot.links}
+    deep = contacts.geom[contacts.dist < -OVERLAP]
+    pairs = {tuple(sorted(pair)) for pair in model.geom_bodyid[deep].tolist()}
+    return tuple(
+        (names[first], names[second])
+        for first, second in sorted(pairs)
+        if _joints_between(robot, names[first], names[second]) <= MAX_JOINTS_BETWEEN
+    )
 
 
-def _check_masses(links: Sequence[Link], source: Path) -> None:
-    """Find links that move without mass, before the engines do."""
-    rigid = rigid_bodies(tuple(links))
-    masses = dict.fromkeys(rigid.values(), 0.0)
-    for link in links:
-        masses[rigid[link.name]] += link.mass
-    empty = [link for link in links if link.joint and masses[link.name] == 0.0]
-    if empty:
-        shown = ", ".join(f"'{link.name}'" for link in empty[:6])
-        more = f" and {len(empty) - 6} more" if len(empty) > 6 else ""
-        raise DescriptionError(
-            f"{source}: the links {shown}{more} move but weigh nothing, so no motor "
-            "could hold them still. Give each a mass and an inertia (1e-3 kg and "
-            "1e-6 kg m^2 will do for a dummy), or make its joint fixed."
-        )
+def _joints_between(robot: RobotDescription, first: str, second: str) -> int:
+    parent = {link.name: link.parent for link in robot.links}
+    moving = {link.name for link in robot.links if link.joint}
 
+    def ancestors(name: str | None) -> Iterator[str]:
+        while name is not None:
+            yield name
+            name = parent[name]
 
-def inertia_fields(tensor: Matrix) -> tuple[float, ...]:
-    """Return `xx yy zz xy xz yz` of a symmetric matrix, shape (3, 3)."""
-    rows, columns = (0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)
-    return tuple(tensor[rows, columns].tolist())
+    return len(({*ancestors(first)} ^ {*ancestors(second)}) & moving)

@@ -1,4 +1,4 @@
-"""`load_robot`: from a catalogue name or a file to a `RobotDescription`."""
+"""`load_robot`: read a robot from the catalogue or from a TOML, URDF or MJCF file."""
 
 from collections.abc import Iterator
 from contextlib import suppress
@@ -8,10 +8,11 @@ from typing import Literal
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.robot.assembly import assemble, describe_component
-from wbc_suite.robot.choosing import Choice
-from wbc_suite.robot.component import Component, read_robot_file
+from wbc_suite.robot.component_choice import Choice
 from wbc_suite.robot.description import RobotDescription
-from wbc_suite.robot.skins import Wardrobe
+from wbc_suite.robot.robot_file import Component, read_robot_file
+from wbc_suite.robot.skins import SkinFinder
+from wbc_suite.typing import RobotName
 
 __all__ = ["load_robot"]
 
@@ -19,7 +20,7 @@ FOLDERS = ("gripper", "base", "arm", "body")
 
 
 def load_robot(
-    name: str | Path,
+    name: RobotName | str | Path,
     *,
     gripper: Choice = None,
     base: Choice = None,
@@ -30,34 +31,36 @@ def load_robot(
     """Load a robot by its catalogue name, or from a TOML, URDF or MJCF file.
 
     Args:
-        name: Catalogue name without regard to case (`Panda`, `gr1`), a component with
-            its folder (`gripper/panda_gripper`), or a path to a .toml, .urdf or .xml.
-        gripper: Another gripper for every side, or one for each: `{"right": ...}`;
-            "none" leaves it out, and puts `tcp` at the flange. `InspireHand` is the one
-            of each side; a name that ends in .toml is a file.
-        base: Another base, which brings its own root and height; "none" leaves it out.
-            A robot with legs or wheels takes only a root, such as `NullMobileBase`.
+        name: Catalogue name, ignoring case (`Panda`, `gr1`), a component with its
+            folder (`gripper/panda_gripper`), or a path to a .toml, .urdf or .xml.
+        gripper: Another gripper for every side, or one per side: `{"right": ...}`;
+            "none" leaves it out and puts `tcp` at the flange. `InspireHand` stands for
+            the hand of each side. A name that ends in .toml is a file.
+        base: Another base with its own root and height; "none" leaves it out. A robot
+            with legs or wheels accepts only a base without body (`NullMobileBase`).
         root: Another root: `fixed`, `planar` or `free`.
-        skin: "meshes" draws the robot with the meshes of installed packages, a folder
-            with those found there; see `robot.skins`. Nothing else changes.
-        catalogue: Where to look; our own catalogue by default.
+        skin: "meshes" draws the robot with meshes of installed packages, a folder
+            with those found there; see `robot.skins`. Physics does not change.
+        catalogue: Where names are looked up; by default the package's catalogue.
 
     Raises:
         UnknownNameError: If the catalogue has no such robot, gripper or base.
-        DescriptionError: If the description contradicts itself or physics.
+        DescriptionError: If the description is inconsistent or unphysical.
         ConfigError: If the file cannot be read.
     """
     catalogue = catalogue or Catalogue()
-    # Callers without a type checker are answered in words.
+    # Checked at run time for callers without a type checker.
     if not isinstance(catalogue, Catalogue):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise ConfigError(f"load_robot: {catalogue!r:.60} is no Catalogue.")
+        raise ConfigError(
+            f"load_robot: 'catalogue' must be a Catalogue, not {catalogue!r:.60}."
+        )
     if not isinstance(name, str | Path):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise UnknownNameError("robot", name, catalogue.called("robots"))
     path = _locate(str(name), catalogue)
-    wardrobe = None if skin is None else Wardrobe(skin, catalogue)
-    robot = _read(path, catalogue, gripper=gripper, base=base, wardrobe=wardrobe)
-    if wardrobe is not None:
-        wardrobe.report()
+    skins = None if skin is None else SkinFinder(skin, catalogue)
+    robot = _read(path, catalogue, gripper=gripper, base=base, skins=skins)
+    if skins is not None:
+        skins.report_missing()
     return robot if root in (None, robot.root.kind) else robot.with_root(root)
 
 
@@ -65,7 +68,7 @@ def _locate(name: str, catalogue: Catalogue) -> Path:
     path = Path(name)
     if path.suffix in (".toml", ".urdf", ".xml", ".mjcf"):
         if not path.is_file():
-            raise ConfigError(f"{path}: no such file.")
+            raise ConfigError(f"{path}: the file does not exist.")
         return path
     folder, _, stem = name.rpartition("/")
     if folder:
@@ -81,7 +84,7 @@ def _locate(name: str, catalogue: Catalogue) -> Path:
 
 
 def _components(name: str, catalogue: Catalogue) -> Iterator[str]:
-    """Return the components of a name that no robot has, as `load_robot` takes them."""
+    """Yield the components with a name, each with its folder."""
     for folder in FOLDERS:
         with suppress(UnknownNameError):
             catalogue.find(f"robots/{folder}", name, kind=folder)
@@ -94,19 +97,15 @@ def _read(
     *,
     gripper: Choice,
     base: Choice,
-    wardrobe: Wardrobe | None,
+    skins: SkinFinder | None,
 ) -> RobotDescription:
     if path.suffix == ".toml":
         content = read_robot_file(path)
         if not isinstance(content, Component):
             return assemble(
-                path,
-                catalogue=catalogue,
-                gripper=gripper,
-                base=base,
-                wardrobe=wardrobe,
+                path, catalogue=catalogue, gripper=gripper, base=base, skins=skins
             )
-        robot = describe_component(content, source=str(path), wardrobe=wardrobe)
+        robot = describe_component(content, source=str(path), skins=skins)
     elif path.suffix == ".urdf":
         from wbc_suite.robot.urdf_import import read_urdf
 

@@ -1,22 +1,37 @@
-"""Read and write the points of mesh files (STL, OBJ)."""
+"""Mesh files (STL, OBJ): write, read points, and read the meshes of skins."""
 
+import hashlib
+import importlib
+import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from wbc_suite.errors import DescriptionError
+from wbc_suite.catalogue import user_cache
+from wbc_suite.errors import ConfigError, DescriptionError
+from wbc_suite.robot.shapes import SkinMesh, Vector3, cached_by_shape
 from wbc_suite.typing import Indices, Matrix
 
-__all__ = ["READABLE", "read_points", "write_stl"]
+__all__ = ["READABLE", "read_points", "skin_triangles", "write_stl"]
 
 READABLE = (".stl", ".obj")
-"""Endings of the files that `read_points` understands."""
+"""Suffixes of the files that `read_points` can read."""
 MAX_BYTES = 100_000_000
 """Largest mesh file that is read."""
 
 TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("tag", "<u2")])
 """One record of a binary STL file, which begins with 80 bytes and a count."""
 HEADER = 84
+
+EDGE = 0.008
+"""Edge length in m to which skins are decimated; finer meshes render slowly."""
+MIN_TRIANGLES = 400
+"""Number of triangles below which a skin is not decimated."""
+AGGRESSION = 5.0
+"""How quickly edges are collapsed; the default of 7 tears thin shells."""
+CACHE_VERSION = 1
+"""Raised when the content of the cache changes."""
 
 
 def write_stl(path: Path, vertices: Matrix, faces: Indices) -> None:
@@ -41,7 +56,7 @@ def read_points(path: Path) -> Matrix:
     size = path.stat().st_size
     if size > MAX_BYTES:
         raise DescriptionError(
-            f"{path}: {size} bytes, more than the {MAX_BYTES} that a mesh may have."
+            f"{path}: the mesh has {size} bytes; at most {MAX_BYTES} are read."
         )
     try:
         data = path.read_bytes()
@@ -55,7 +70,7 @@ def read_points(path: Path) -> Matrix:
     except ValueError as error:
         raise DescriptionError(f"{path}: not a readable mesh: {error}.") from error
     if len(points) == 0 or not np.isfinite(points).all():
-        raise DescriptionError(f"{path}: not a readable mesh: no finite points in it.")
+        raise DescriptionError(f"{path}: not a readable mesh: no finite points.")
     return np.unique(points, axis=0)
 
 
@@ -69,3 +84,84 @@ def _text_points(data: bytes, keyword: bytes) -> Matrix:
     rows = (line.split() for line in data.splitlines())
     points = [row[1:4] for row in rows if row and row[0] == keyword]
     return np.array(points, dtype=np.float64).reshape(-1, 3)
+
+
+@cached_by_shape
+def skin_triangles(shape: SkinMesh) -> tuple[Matrix, Indices]:
+    """Return vertices (n, 3) in the shape's frame and faces (m, 3), decimated.
+
+    Results are kept in the user's cache folder.
+
+    Raises:
+        ConfigError: If the file is not a mesh, or the extra `skins` is not installed.
+    """
+    path = Path(shape.file)
+    kept = user_cache() / "skins" / f"{_cache_key(path, shape.scale)}.npz"
+    if kept.is_file():
+        with np.load(kept, allow_pickle=False) as data:
+            vertices, faces = data["vertices"], data["faces"]
+    else:
+        vertices, faces = _decimated(*_read_mesh(path, shape.scale))
+        _write_cache(kept, vertices, faces)
+    return vertices.astype(np.float64), faces.astype(np.int64)
+
+
+def _read_mesh(path: Path, scale: Vector3) -> tuple[Matrix, Indices]:
+    """Read a file; equal points are merged, so that decimation keeps the surface."""
+    if path.stat().st_size > MAX_BYTES:
+        raise ConfigError(f"{path}: the mesh is larger than {MAX_BYTES} bytes.")
+    trimesh = _import_extra("trimesh")
+    try:
+        mesh = trimesh.load_mesh(path, skip_materials=True)
+    except Exception as error:  # trimesh raises anything for a malformed file
+        raise ConfigError(f"{path}: not a readable mesh: {error}.") from error
+    mesh.merge_vertices(merge_tex=True, merge_norm=True)
+    vertices, faces = np.asarray(mesh.vertices) * scale, np.asarray(mesh.faces)
+    if np.prod(scale) < 0.0:  # a reflection turns the faces inside out
+        faces = faces[:, ::-1]
+    if not len(faces) or not np.isfinite(vertices).all():
+        raise ConfigError(f"{path}: not a readable mesh: no finite triangles.")
+    return vertices, faces
+
+
+def _decimated(vertices: Matrix, faces: Indices) -> tuple[Matrix, Indices]:
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+    target = max(MIN_TRIANGLES, round(area / (0.433 * EDGE**2)))
+    if target >= len(faces):
+        return vertices, faces
+    points, triangles = _import_extra("fast_simplification").simplify(
+        vertices.astype(np.float32),
+        faces.astype(np.int32),
+        target_count=target,
+        agg=AGGRESSION,
+    )
+    return np.asarray(points), np.asarray(triangles)
+
+
+def _import_extra(name: str) -> Any:
+    """Import a module of the extra `skins`; these modules have no types."""
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        raise ConfigError(
+            f"skin: meshes need {name.replace('_', '-')}, which is not installed. "
+            "Install it with: pip install 'wbc-suite[skins]'"
+        ) from None
+
+
+def _cache_key(path: Path, scale: Vector3) -> str:
+    state = path.stat()
+    text = f"{CACHE_VERSION} {path} {state.st_size} {state.st_mtime_ns} {scale}"
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+def _write_cache(path: Path, vertices: Matrix, faces: Indices) -> None:
+    """Store a decimated mesh, unless the folder cannot be written."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part = path.with_suffix(f".{os.getpid()}.npz")
+        np.savez_compressed(part, vertices=vertices.astype(np.float32), faces=faces)
+        part.replace(path)
+    except OSError:
+        return

@@ -1,12 +1,11 @@
-"""`[mirror]`: write the other side of a robot by reflection in a plane.
+"""`[mirror]`: generate the other side of a robot by reflection in a plane.
 
-With `S` the reflection (for the plane xz: diag(1, -1, 1)), a link frame goes to
+Let `S` be the reflection (for the plane xz: diag(1, -1, 1)). A link frame goes to
 `S p`, `S R S`. Within a link, points go to `D p`, tensors to `D I D^T`, the axis of a
-slide to `D a` and that of a hinge (pseudovector) to `-D a`, where `D` is `S` unless
-the file gives the other side's link by hand: then `D = R_target^T S R_source`, both
-taken at zero joint angles. Where an axis only turns round, it is kept and
-the joint's range is negated instead, as vendors write their robots. Whatever the file
-gives for the other side by hand wins over the reflection.
+slide to `D a` and that of a hinge (pseudovector) to `-D a`. `D` is `S`, unless the file
+defines the link of the other side: then `D = R_target^T S R_source`, both at zero joint
+angles. If an axis is only negated, the axis is kept and the range is negated instead,
+as in vendors' models. Definitions of the file override the reflection.
 """
 
 import re
@@ -17,24 +16,28 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from wbc_suite.errors import DescriptionError
-from wbc_suite.robot.parts import Joint, Link, Name
-from wbc_suite.robot.shapes import Posed
-from wbc_suite.robot.validation import inertia_matrix
+from wbc_suite.robot.elements import Joint, Link, Name
+from wbc_suite.robot.inertia import inertia_fields, inertia_matrix
+from wbc_suite.robot.poses import HasPose, rotation_matrix
 from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Matrix, Vector
 
 if TYPE_CHECKING:
-    from wbc_suite.robot.component import Component
+    from wbc_suite.robot.robot_file import Component
 
 __all__ = ["Mirror", "reflect_component"]
 
 
+POSED = ("frames", "mounts", "cameras")
+NAMED = ("sensors", "actuators", "connects")
+
+
 class Mirror(FrozenModel):
-    """Which side is written, and which one follows.
+    """The side that is defined, and the one that is generated.
 
     Attributes:
-        source: Word in a name (between underscores) that marks the written side.
-        target: The word that stands there on the other side.
+        source: Word in a name (between underscores) that marks the defined side.
+        target: The word that replaces it on the other side.
         plane: Plane of reflection in the axes of the component's first link.
     """
 
@@ -44,7 +47,11 @@ class Mirror(FrozenModel):
 
 
 def reflect_component(component: "Component", *, source: str) -> "Component":
-    """Return the component with the other side written out."""
+    """Return the component with both sides.
+
+    Raises:
+        DescriptionError: If no link belongs to the defined side.
+    """
     mirror = component.mirror
     if mirror is None:
         return component
@@ -77,12 +84,8 @@ class _Reflection:
         links = self._links()
         return {
             "links": links,
-            "frames": self._posed(c.frames),
-            "mounts": self._posed(c.mounts),
-            "cameras": self._posed(c.cameras),
-            "sensors": self._renamed(c.sensors),
-            "actuators": self._renamed(c.actuators),
-            "connects": self._renamed(c.connects),
+            **{k: self._posed(getattr(c, k)) for k in POSED},
+            **{k: self._renamed(getattr(c, k)) for k in NAMED},
             "groups": self._groups(c.groups),
             "keyframes": {k: self._values(v) for k, v in c.keyframes.items()},
             "contacts": c.contacts.model_copy(
@@ -91,11 +94,11 @@ class _Reflection:
         }
 
     def matches(self, name: str) -> bool:
-        """Whether a name belongs to the written side."""
+        """Whether a name belongs to the defined side."""
         return self._word.search(name) is not None
 
     def name(self, name: str) -> str:
-        """Return the name on the other side; names of neither side stay."""
+        """Return the name on the other side; names of neither side are unchanged."""
         return self._word.sub(self._mirror.target, name, count=1)
 
     def _links(self) -> tuple[Link, ...]:
@@ -114,9 +117,9 @@ class _Reflection:
         return (*own.values(), *made)
 
     def _turn(self, link: Link) -> None:
-        """Remember the orientation of a link at zero joint angles."""
+        """Store the orientation of a link at zero joint angles."""
         parent = self._world.get(link.parent or "", np.eye(3))
-        self._world[link.name] = parent @ _matrix(link)
+        self._world[link.name] = parent @ rotation_matrix(link)
 
     def _link(self, link: Link, given: Link | None) -> Link:
         update = self._moved(link, self._d(link.parent)) | {
@@ -128,8 +131,8 @@ class _Reflection:
         self._turn(placed)
         d = self._set_d(link.name, placed.name)
         update |= {
-            "com": _rounded(d @ np.asarray(link.com)),
-            "inertia": _tensor(d @ inertia_matrix(link.inertia) @ d.T),
+            "com": _floats(d @ np.asarray(link.com)),
+            "inertia": inertia_fields(0.0 + d @ inertia_matrix(link.inertia) @ d.T),
             "visual": tuple(self._shape(s, d) for s in link.visual),
             "collision": tuple(self._shape(s, d) for s in link.collision),
         }
@@ -138,7 +141,7 @@ class _Reflection:
         return link.model_copy(update=update | hand)
 
     def _set_d(self, source: str, target: str) -> Matrix:
-        """Compute and keep D between a link and its image (itself on the plane)."""
+        """Store and return D between a link and its image, itself on the plane."""
         d = self._world[target].T @ self._s @ self._world[source]
         self._inside[source] = np.where(abs(d) < 1e-12, 0.0, d)
         return self._inside[source]
@@ -146,16 +149,16 @@ class _Reflection:
     def _d(self, link: str | None) -> Matrix:
         return self._inside.get(link or "", self._s)
 
-    def _moved(self, posed: Posed, d: Matrix) -> dict[str, Any]:
-        """Pose `D p`, `D R S` of something that is itself reflected by S inside."""
+    def _moved(self, posed: HasPose, d: Matrix) -> dict[str, Any]:
+        """Return the pose `D p`, `D R S` of an item whose inside is reflected by S."""
         quat = posed.quat
         if np.array_equal(d, self._s):
             axis = -np.diag(self._s)  # exact: a rotation's axis goes to -S a
-            turned = (quat[0], *_rounded(axis * np.asarray(quat[1:])))
+            turned = (quat[0], *_floats(axis * np.asarray(quat[1:])))
         else:
-            rotation = Rotation.from_matrix(d @ _matrix(posed) @ self._s)
+            rotation = Rotation.from_matrix(d @ rotation_matrix(posed) @ self._s)
             turned = tuple(rotation.as_quat(scalar_first=True).tolist())
-        return {"pos": _rounded(d @ np.asarray(posed.pos)), "quat": turned}
+        return {"pos": _floats(d @ np.asarray(posed.pos)), "quat": turned}
 
     def _joint(self, joint: Joint, d: Matrix, given: Joint | None) -> Joint:
         axis = np.asarray(joint.axis)
@@ -165,7 +168,7 @@ class _Reflection:
         self._signs[joint.name] = sign
         update: dict[str, Any] = {"name": self.name(joint.name)}
         if sign > 0:
-            update["axis"] = _rounded(reflected)
+            update["axis"] = _floats(reflected)
         elif joint.range is not None:
             update["range"] = (-joint.range[1], -joint.range[0])
         if joint.mimic is not None:
@@ -195,7 +198,7 @@ class _Reflection:
         return shape.model_copy(update=update | inner)
 
     def _point(self, point: tuple[float, ...]) -> tuple[float, ...]:
-        return _rounded(self._s @ np.asarray(point))
+        return _floats(self._s @ np.asarray(point))
 
     def _sections(
         self, axis: str, sections: tuple[tuple[float, ...], ...]
@@ -217,7 +220,7 @@ class _Reflection:
         items: tuple[Any, ...],
         extra: Callable[[Any], dict[str, Any]] | None = None,
     ) -> tuple[Any, ...]:
-        """Copy items of the written side with every name in them changed."""
+        """Return the items, and copies of the defined side with changed names."""
         known = {getattr(item, "name", None) for item in items} - {None}
         made: list[Any] = []
         for item in items:
@@ -261,16 +264,6 @@ class _Reflection:
         return (*pairs, *(p for p in made if frozenset(p) not in known))
 
 
-def _matrix(posed: Posed) -> Matrix:
-    return Rotation.from_quat(posed.quat, scalar_first=True).as_matrix()
-
-
-def _rounded(vector: Vector) -> tuple[float, ...]:
-    """Return plain floats, without a negative zero."""
+def _floats(vector: Vector) -> tuple[float, ...]:
+    """Return plain floats without negative zeros."""
     return tuple((vector + 0.0).tolist())
-
-
-def _tensor(matrix: Matrix) -> tuple[float, ...]:
-    """Return `xx yy zz xy xz yz`."""
-    rows, columns = (0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)
-    return _rounded(matrix[rows, columns])

@@ -9,72 +9,68 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.errors import DescriptionError
+from wbc_suite.errors import DescriptionError, join_first
 from wbc_suite.robot.description import RobotDescription
-from wbc_suite.robot.importing import LinkFields, describe_import, inertia_fields
-from wbc_suite.robot.mjcf_files import compile_mjcf
-from wbc_suite.robot.mjcf_motors import read_motors
-from wbc_suite.robot.mjcf_shapes import pose_at, shapes_of
-from wbc_suite.robot.naming import NameTable
-from wbc_suite.robot.placing import pose_fields
+from wbc_suite.robot.importing import LinkFields, NameTable, describe_import
+from wbc_suite.robot.inertia import inertia_fields
+from wbc_suite.robot.mjcf_compile import compile_mjcf
+from wbc_suite.robot.mjcf_export import SENSOR_TYPES
+from wbc_suite.robot.mjcf_import_elements import pose_at, read_actuators, read_shapes
+from wbc_suite.robot.poses import joint_motion, pose_fields
 from wbc_suite.typing import Vector
 
 __all__ = ["read_mjcf"]
 
 LOG = logging.getLogger(__name__)
 
-GRAIN = {"mass": 1e-9, "inertia": (1e-13, 1e-13, 1e-13, 0.0, 0.0, 0.0)}
-"""Mass of a link between two joints of one body: too small to matter, enough to be."""
+DUMMY = {"mass": 1e-9, "inertia": (1e-13, 1e-13, 1e-13, 0.0, 0.0, 0.0)}
+"""Negligible mass and inertia of the links between the joints of one body."""
 FREE, BALL = mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_BALL
 SLIDE, HINGE = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
-SENSORS = {  # plain numbers, as the compiled model has them
-    int(mujoco.mjtSensor.mjSENS_FORCE): "force",
-    int(mujoco.mjtSensor.mjSENS_TORQUE): "torque",
-    int(mujoco.mjtSensor.mjSENS_GYRO): "gyro",
-    int(mujoco.mjtSensor.mjSENS_ACCELEROMETER): "accelerometer",
-    int(mujoco.mjtSensor.mjSENS_TOUCH): "touch",
-}
+SENSOR_KINDS = {int(code): kind for kind, code in SENSOR_TYPES.items()}
+"""Kinds of sensors by the numbers of a compiled model."""
 
 
 def read_mjcf(path: Path | str) -> RobotDescription:
     """Read an MJCF file.
 
-    MuJoCo compiles it; bodies become links, sites frames, joint equalities followers.
-    A body with several joints becomes a chain with links of a microgram between them.
-    What stands in the world (floors, lamps) is left out. Meshes become convex hulls.
-    Groups and end effectors are guessed; `to_toml()` writes the result for editing.
+    MuJoCo compiles it. Bodies become links, sites become frames, joint equalities
+    become mimic joints. A body with several joints becomes a chain with links of a
+    microgram between them. Items of the world body (floors, lights) are ignored. Meshes
+    become convex hulls. Groups and end effectors are inferred; `to_toml()` writes the
+    result for editing.
 
     Raises:
-        ConfigError: If the file is no MJCF, or leads out of its folder.
-        DescriptionError: If it holds what our format has no word for, such as ball
-            joints, springs or flexible parts, or contradicts physics.
+        ConfigError: If the file is not MJCF, or refers to files outside its folder.
+        DescriptionError: If it has elements that our format does not support, such as
+            ball joints, springs or flexible parts, or is unphysical.
     """
     path = Path(path)
     m = compile_mjcf(path)
     faults = list(_faults(m))
     if faults:
-        shown = "; ".join(faults[:6])
-        raise DescriptionError(f"{path}: it cannot be described here: {shown}.")
+        shown = join_first(faults, separator="; ")
+        raise DescriptionError(f"{path}: not supported: {shown}.")
     return _Importer(m).robot(path)
 
 
 def _faults(m: mujoco.MjModel) -> Iterator[str]:
-    """Find what has no word in our format and would change how the robot moves."""
+    """Yield elements that the format does not support and that change the dynamics."""
     roots = _world_children(m)
     for j in range(m.njnt):
         name, kind = f"joint '{_joint_name(m, j)}'", m.jnt_type[j]
         if kind == BALL:
-            yield f"{name} is a ball joint (write three hinges)"
+            yield f"{name} is a ball joint (use three hinges)"
         elif kind == FREE and len(roots) > 1:
-            yield f"{name} is free and not the only tree in the file"
+            yield f"{name} is free, but there are several root bodies"
         elif m.jnt_stiffness[j].any():
             yield f"{name} has a spring (stiffness)"
     if m.nflex:
-        yield "it has flexible parts (flex)"
+        yield "the model has flexible parts (flex)"
     if not roots:
-        yield "it has no body"
+        yield "the model has no body"
     if m.body_gravcomp.any():
-        yield "it has gravity compensation (gravcomp)"
+        yield "the model has gravity compensation (gravcomp)"
     yield from _tendon_faults(m)
     yield from _equality_faults(m)
 
@@ -84,9 +80,9 @@ def _tendon_faults(m: mujoco.MjModel) -> Iterator[str]:
     for t in range(m.ntendon):
         name = m.tendon(t).name or f"number {t}"
         if any(np.any(getattr(m, f"tendon_{key}")[t]) for key in acting):
-            yield f"tendon '{name}' has forces of its own"
+            yield f"tendon '{name}' has forces"
         else:
-            LOG.warning("The tendon '%s' is left out.", name)
+            LOG.warning("Tendon '%s' is ignored.", name)
 
 
 def _equality_faults(m: mujoco.MjModel) -> Iterator[str]:
@@ -99,7 +95,7 @@ def _equality_faults(m: mujoco.MjModel) -> Iterator[str]:
         elif kind != mujoco.mjtEq.mjEQ_CONNECT or (
             m.eq_objtype[e] != mujoco.mjtObj.mjOBJ_BODY
         ):
-            yield f"{name} is neither of joints nor of two bodies at a point"
+            yield f"{name} is neither a joint equality nor a connect of two bodies"
 
 
 def _world_children(m: mujoco.MjModel) -> list[int]:
@@ -111,7 +107,7 @@ def _joint_name(m: mujoco.MjModel, j: int) -> str:
 
 
 class _Importer:
-    """Carries one compiled model into the fields of a description."""
+    """Converts one compiled model to the fields of a description."""
 
     def __init__(self, m: mujoco.MjModel) -> None:
         self._m = m
@@ -126,12 +122,12 @@ class _Importer:
         m = self._m
         root, rooted = self._root()
         for b in range(1, m.nbody):
-            foreign = m.body(b).name or f"body{b}"
-            self._bodies[b] = self._names.take(foreign, "link")
+            original = m.body(b).name or f"body{b}"
+            self._bodies[b] = self._names.take(original, "link")
         own = range(m.njnt) if rooted is None else self._below(rooted)
         for j in own:
             self._joints[j] = self._names.take(_joint_name(m, j), "joint")
-        efforts, actuators = read_motors(m, self._joints)
+        efforts, actuators = read_actuators(m, self._joints)
         links: list[LinkFields] = []
         if rooted is None:
             self._bodies[0] = self._names.take("base_link", "link")
@@ -157,11 +153,11 @@ class _Importer:
         )
 
     def _below(self, rooted: int) -> range:
-        """Return the joints that are not the root's own."""
+        """Return the joints that do not belong to the root."""
         return range(int(self._m.body_jntnum[rooted]), self._m.njnt)
 
     def _root(self) -> tuple[dict[str, Any], int | None]:
-        """Return the root's fields and its body; none when the world is the root."""
+        """Return the fields of the root and its body; None if the world is the root."""
         m, bodies = self._m, _world_children(self._m)
         b = bodies[0]
         count = int(m.body_jntnum[b])
@@ -188,7 +184,7 @@ class _Importer:
     def _links(
         self, b: int, *, first: bool, efforts: dict[int, float]
     ) -> Iterator[LinkFields]:
-        """Yield the link of a body, after the grains between its joints."""
+        """Yield the link of a body, after the dummy links between its joints."""
         m = self._m
         body: LinkFields = {"name": self._bodies[b]}
         parent = int(m.body_parentid[b])
@@ -198,7 +194,10 @@ class _Importer:
         above, origin = self._bodies.get(parent), np.zeros(3)
         for j in joints:
             anchor = np.array(m.jnt_pos[j])
-            step = pin.SE3(np.eye(3), anchor - origin) * self._motion(j, -_zero(m, j))
+            motion = joint_motion(
+                m.jnt_axis[j], -_zero(m, j), slide=bool(m.jnt_type[j] == SLIDE)
+            )
+            step = pin.SE3(np.eye(3), anchor - origin) * motion
             last = j == joints[-1]
             name = body["name"]
             if not last:
@@ -213,17 +212,11 @@ class _Importer:
             if last:
                 body |= fields
             else:
-                yield fields | GRAIN
+                yield fields | DUMMY
         if not joints and not first:
             body |= {"parent": above, **pose_fields(pose)}
         self._offsets[b] = -origin
-        yield body | self._inertia(b) | shapes_of(m, b, -origin)
-
-    def _motion(self, j: int, value: float) -> pin.SE3:
-        axis = np.array(self._m.jnt_axis[j])
-        if self._m.jnt_type[j] == SLIDE:
-            return pin.SE3(np.eye(3), value * axis)
-        return pin.SE3(pin.AngleAxis(value, axis).matrix(), np.zeros(3))
+        yield body | self._inertia(b) | read_shapes(m, b, -origin)
 
     def _joint(self, j: int, efforts: dict[int, float]) -> dict[str, Any]:
         m = self._m
@@ -296,7 +289,7 @@ class _Importer:
     def _sensors(self) -> Iterator[dict[str, Any]]:
         m, names = self._m, NameTable()
         for s in range(m.nsensor):
-            kind, site = SENSORS.get(int(m.sensor_type[s])), int(m.sensor_objid[s])
+            kind, site = SENSOR_KINDS.get(int(m.sensor_type[s])), int(m.sensor_objid[s])
             if kind and site in self._sites:
                 name = names.take(m.sensor(s).name or f"sensor{s}", "sensor")
                 yield {"name": name, "kind": kind, "frame": self._sites[site]}
@@ -320,7 +313,7 @@ class _Importer:
                 yield self._bodies[pair[0]], self._bodies[pair[1]]
 
     def _keyframes(self) -> dict[str, dict[str, float]]:
-        """Return the postures; values a hair outside their range are put back."""
+        """Return the postures, with values clipped to their ranges."""
         m, found, names = self._m, dict[str, dict[str, float]](), NameTable()
         for k in range(m.nkey):
             values: dict[str, float] = {}
@@ -335,5 +328,5 @@ class _Importer:
 
 
 def _zero(m: mujoco.MjModel, j: int) -> float:
-    """Return the joint value in which the bodies are given (`ref`)."""
+    """Return the joint value at which the body poses are defined (`ref`)."""
     return float(m.qpos0[m.jnt_qposadr[j]])

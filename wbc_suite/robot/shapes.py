@@ -1,7 +1,7 @@
-"""The primitive shapes that links are drawn with and collide with.
+"""Shapes of links for drawing and collision.
 
-Lengths are in metres, poses are in the link frame, quaternions are w x y z. A box has
-half sizes, as in MJCF. A hull is the convex hull of spheres, a loft a skin over rings.
+Lengths are in metres, poses in the link frame, quaternions w x y z. Boxes have half
+sizes, as in MJCF. A hull is the convex hull of spheres, a loft a surface over rings.
 """
 
 import itertools
@@ -10,9 +10,9 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import Annotated, Any, Literal, TypeAlias, TypeVar, cast
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, BaseModel, Field, model_validator
 
-from wbc_suite.tomlfile import FrozenModel
+from wbc_suite.tomlfile import FROZEN
 
 __all__ = [
     "Box",
@@ -33,22 +33,22 @@ __all__ = [
     "Sphere",
     "Vector3",
     "as_table",
-    "kept_by_shape",
+    "cached_by_shape",
 ]
 
 S = TypeVar("S")
 T = TypeVar("T")
 
 Real: TypeAlias = Annotated[float, Field(ge=-1e4, le=1e4)]
-"""A length in m, an angle in rad or the like: what no robot exceeds is a mistake."""
+"""A length in m, an angle in rad or the like: larger values are input errors."""
 Size: TypeAlias = Annotated[float, Field(ge=1e-6, le=1e4)]
-"""A positive length in m; an engine cannot draw less than a micrometre."""
+"""A positive length in m; engines do not draw less than a micrometre."""
 Vector3: TypeAlias = tuple[Real, Real, Real]
 
 
 def _ordered(ends: tuple[float, float]) -> tuple[float, float]:
     if ends[0] > ends[1]:
-        raise ValueError(f"the smaller end comes first, {ends[0]:g} > {ends[1]:g}")
+        raise ValueError(f"the lower end must come first, {ends[0]:g} > {ends[1]:g}")
     return ends
 
 
@@ -57,14 +57,14 @@ SizeInterval: TypeAlias = Annotated[tuple[Size, Size], AfterValidator(_ordered)]
 
 
 ROUNDING = 1e-14
-"""A length as near to 1 is left alone, so that a file written by us reads the same."""
+"""Lengths this close to 1 are not normalised, so that exported files stay equal."""
 
 
 def _unit(q: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
     norm = math.sqrt(sum(c * c for c in q))
     if abs(norm - 1.0) > 1e-6:
         raise ValueError(
-            f"a quaternion w x y z must have length 1, this has {norm:.9g}"
+            f"a quaternion w x y z must have length 1, this one has {norm:.9g}"
         )
     if abs(norm - 1.0) < ROUNDING:
         return q
@@ -90,52 +90,70 @@ def quaternion_from_rpy(rpy: Vector3) -> tuple[float, float, float, float]:
     )
 
 
-class Posed(FrozenModel):
-    """Something with a pose; `rpy` (radians) may be written instead of `quat`."""
+def _accept_rpy(data: Any) -> Any:
+    """Replace the key `rpy` of a table by `quat`."""
+    fields = as_table(data)
+    if "rpy" not in fields:
+        return data
+    if "quat" in fields:
+        raise ValueError("give either 'quat' or 'rpy', not both")
+    match fields.pop("rpy"):
+        case [float() | int() as r, float() | int() as p, float() | int() as y]:
+            return fields | {"quat": quaternion_from_rpy((r, p, y))}
+        case _:
+            raise ValueError("'rpy' needs three angles in radians")
+
+
+class Posed(BaseModel):
+    """An item with a pose; files may have `rpy` (radians) instead of `quat`."""
+
+    model_config = FROZEN
 
     pos: Vector3 = (0.0, 0.0, 0.0)
     quat: Quaternion = (1.0, 0.0, 0.0, 0.0)
 
     @model_validator(mode="before")
     @classmethod
-    def _accept_rpy(cls, data: Any) -> Any:
-        fields = as_table(data)
-        if "rpy" not in fields:
-            return data
-        if "quat" in fields:
-            raise ValueError("give either 'quat' or 'rpy', not both")
-        match fields.pop("rpy"):
-            case [float() | int() as r, float() | int() as p, float() | int() as y]:
-                return fields | {"quat": quaternion_from_rpy((r, p, y))}
-            case _:
-                raise ValueError("'rpy' needs three angles in radians")
+    def _convert_rpy(cls, data: Any) -> Any:
+        return _accept_rpy(data)
 
 
 def as_table(data: Any) -> dict[str, Any]:
-    """Return a copy of a table that is still plain data; empty for anything else."""
+    """Return a copy of a table of plain data; empty for any other value."""
     return dict(cast("dict[str, Any]", data)) if isinstance(data, dict) else {}
 
 
-class _Surface(Posed):
-    """What every shape has: a pose, a colour, and how it touches others.
+class ShapeFields(BaseModel):
+    """Fields of every shape: pose, colour and contact parameters.
 
     Attributes:
+        pos: Origin of the shape in the link's frame, m.
+        quat: Orientation w x y z in the link's frame; files may have `rpy`.
         color: Name in `[materials]`, or red green blue (alpha) from 0 to 1.
         friction: Sliding, torsional and rolling friction; MuJoCo's default when absent.
         condim: Contact dimension (1, 3, 4 or 6).
         solref: Time constant in s and damping ratio of the contact.
-        margin: Distance in m at which a contact begins.
+        margin: Distance in m at which contacts become active.
     """
 
+    model_config = FROZEN
+
+    pos: Vector3 = (0.0, 0.0, 0.0)
+    quat: Quaternion = (1.0, 0.0, 0.0, 0.0)
     color: Color = "grey"
     friction: Vector3 | None = None
     condim: Literal[1, 3, 4, 6] | None = None
     solref: tuple[Real, Real] | None = None
     margin: Real | None = None
 
+    @model_validator(mode="before")
+    @classmethod
+    def _convert_rpy(cls, data: Any) -> Any:
+        return _accept_rpy(data)
 
-class Box(_Surface):
-    """A box with half sizes; `radius` rounds its edges inside these sizes."""
+
+class Box(ShapeFields):
+    """A box with half sizes; `radius` rounds its edges within these sizes."""
 
     shape: Literal["box"]
     size: tuple[Size, Size, Size]
@@ -150,49 +168,56 @@ class Box(_Surface):
         return self
 
 
-class Sphere(_Surface):
+class Sphere(ShapeFields):
     """A sphere."""
 
     shape: Literal["sphere"]
     radius: Size
 
 
-class Ellipsoid(_Surface):
+class Ellipsoid(ShapeFields):
     """An ellipsoid with half axes."""
 
     shape: Literal["ellipsoid"]
     size: tuple[Size, Size, Size]
 
 
-class _Segment(_Surface):
-    """A round shape along the segment from one point to another."""
+class Capsule(ShapeFields):
+    """A cylinder along a segment, with half spheres around its end points."""
 
+    shape: Literal["capsule"]
     start: Vector3 = Field(alias="from")
     end: Vector3 = Field(alias="to")
     radius: Size
 
     @model_validator(mode="after")
-    def _has_length(self) -> "_Segment":
-        if math.dist(self.start, self.end) < 1e-6:
-            raise ValueError("'from' and 'to' are the same point: use a sphere")
+    def _has_length(self) -> "Capsule":
+        _check_length(self.start, self.end)
         return self
 
 
-class Capsule(_Segment):
-    """A cylinder with half spheres around its end points."""
-
-    shape: Literal["capsule"]
-
-
-class Cylinder(_Segment):
-    """A cylinder; `radius_to` gives the far end another radius (visuals only)."""
+class Cylinder(ShapeFields):
+    """A cylinder along a segment; `radius_to` makes it a cone (visuals only)."""
 
     shape: Literal["cylinder"]
+    start: Vector3 = Field(alias="from")
+    end: Vector3 = Field(alias="to")
+    radius: Size
     radius_to: Size | None = None
 
+    @model_validator(mode="after")
+    def _has_length(self) -> "Cylinder":
+        _check_length(self.start, self.end)
+        return self
 
-class Hull(_Surface):
-    """The convex hull of a few spheres `[x, y, z, radius]`: a smooth tapered shell."""
+
+def _check_length(start: Vector3, end: Vector3) -> None:
+    if math.dist(start, end) < 1e-6:
+        raise ValueError("'from' and 'to' are the same point: use a sphere")
+
+
+class Hull(ShapeFields):
+    """The convex hull of spheres `[x, y, z, radius]`."""
 
     shape: Literal["hull"]
     spheres: tuple[
@@ -206,15 +231,15 @@ class Hull(_Surface):
         return self
 
 
-class Loft(_Surface):
-    """A skin over rings along one axis (visuals only; need not be convex).
+class Loft(ShapeFields):
+    """A surface over rings along one axis (visuals only; may be non-convex).
 
     Attributes:
-        axis: Axis along which the rings stand.
+        axis: Normal of the rings.
         sections: Rows `[position, centre_u, centre_v, half_u, half_v]`; u and v are the
             two other axes in the order x, y, z.
         exponent: Superellipse exponent of a ring: 2 ellipse, 4 squircle, 8 nearly box.
-        smooth: Pass a smooth curve through the rings instead of straight lines.
+        smooth: Interpolate the rings by a smooth curve instead of lines.
     """
 
     shape: Literal["loft"]
@@ -229,14 +254,14 @@ class Loft(_Surface):
     def _positions_rise(self) -> "Loft":
         positions = [s[0] for s in self.sections]
         if any(b - a < 1e-6 for a, b in itertools.pairwise(positions)):
-            raise ValueError("the rings' positions must rise from each to the next")
+            raise ValueError("the positions of rings must increase")
         if any(s[3] < 1e-6 or s[4] < 1e-6 for s in self.sections):
             raise ValueError("half sizes of rings must be positive")
         return self
 
 
-class SkinMesh(_Surface):
-    """A mesh file that dresses a link, see `robot.skins`; drawn, and nothing else.
+class SkinMesh(ShapeFields):
+    """A mesh file that replaces a link's visual shapes, see `robot.skins`.
 
     Attributes:
         file: Absolute path of an STL or OBJ file.
@@ -254,11 +279,7 @@ Shape: TypeAlias = Annotated[
 ]
 
 
-def kept_by_shape(compute: Callable[[S], T]) -> Callable[[S], T]:
-    """Keep what a function computes of a shape, for equal shapes to share.
-
-    Ten robots in one scene, or one robot in a hundred environments, compute their
-    hulls once.
-    """
+def cached_by_shape(compute: Callable[[S], T]) -> Callable[[S], T]:
+    """Cache the results of a function of a shape; equal shapes share one result."""
     # Frozen models are hashable, which pyright does not see.
     return lru_cache(maxsize=4096)(compute)  # pyright: ignore[reportReturnType]

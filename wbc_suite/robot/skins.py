@@ -1,9 +1,9 @@
-"""Real meshes as an optional dress over our own shapes.
+"""Skins: meshes of other packages, drawn instead of a robot's own visual shapes.
 
-No mesh is shipped. A table `robots/skin/NAME.toml` says for each link of a component
-which mesh file of which public package belongs where; the files are found in an
-installed package, without importing it, or in a folder of the user's. A dressed robot
-looks different and is otherwise the same: masses, joints and collisions stay ours.
+This package ships no meshes. A table `robots/skin/NAME.toml` lists the mesh files of a
+public package for each link of component NAME. The files are found in an installed
+package, which is not imported, or in a folder of the user. Masses, joints and
+collisions do not change.
 """
 
 import importlib.util
@@ -18,31 +18,30 @@ from typing import Literal
 
 from pydantic import Field
 
-from wbc_suite.catalogue import Catalogue
+from wbc_suite.catalogue import Catalogue, user_cache_root
 from wbc_suite.errors import ConfigError, UnknownNameError
-from wbc_suite.robot.parts import Name
+from wbc_suite.robot.elements import Name
 from wbc_suite.robot.shapes import Color, Posed, SkinMesh, Vector3
 from wbc_suite.tomlfile import FrozenModel, load_model
-from wbc_suite.user_cache import user_cache_root
 
-__all__ = ["MESHES", "SkinTable", "Wardrobe", "read_skin"]
+__all__ = ["MESHES", "SkinFinder", "SkinTable", "read_skin"]
 
 log = logging.getLogger(__name__)
 
 MESHES = "meshes"
-"""The skin that is looked for in installed packages; any other is a folder."""
+"""Name of the skin from installed packages; any other skin is a folder."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Provider:
-    """A package that carries meshes, and what a user types to get it."""
+    """A package with meshes, and how to install it."""
 
     install: str
     module: str | None = None
     shared: str | None = None  # folder below an entry of sys.path
 
     def folders(self) -> Iterator[Path]:
-        """Yield the folders that its files are given relative to."""
+        """Yield the folders that the paths of tables are relative to."""
         if self.module is not None:
             spec = importlib.util.find_spec(self.module)
             for place in (spec and spec.submodule_search_locations) or ():
@@ -54,7 +53,7 @@ class _Provider:
 
 
 class _Menagerie(_Provider):
-    """The cache of the package `mujoco-menagerie`: one folder a model and version."""
+    """The cache of the package `mujoco-menagerie`: one folder per model and version."""
 
     def folders(self) -> Iterator[Path]:
         if root := os.environ.get("MENAGERIE_ROOT"):
@@ -94,7 +93,7 @@ class _Piece(Posed):
 
 
 class SkinTable(FrozenModel):
-    """One file `robots/skin/NAME.toml`: for each link of component NAME its meshes."""
+    """One file `robots/skin/NAME.toml`: the meshes of each link of component NAME."""
 
     format: Literal[1]
     provider: str
@@ -102,12 +101,12 @@ class SkinTable(FrozenModel):
     link: dict[Name, tuple[_Piece, ...]]
 
 
-class Wardrobe:
-    """Finds the meshes of components; tells once what is missing.
+class SkinFinder:
+    """Finds the meshes of components and reports missing ones once.
 
     Args:
         skin: `"meshes"` for those of installed packages, or a folder: meshes are then
-            looked for there by path or, when only one fits, by name.
+            looked up there by path or, if only one file matches, by name.
         catalogue: Where the tables are.
 
     Raises:
@@ -124,87 +123,82 @@ class Wardrobe:
         self._missing: dict[str, list[str]] = {}
         self._found = False
 
-    def dress(
+    def meshes(
         self, component: str, links: Iterable[str]
     ) -> dict[str, tuple[SkinMesh, ...]]:
-        """Return the meshes of each link of a component; none if there are none.
+        """Return the meshes of each link of a component; empty without a skin.
 
         Args:
-            component: The component's name.
-            links: The links that it has.
+            component: Name of the component.
+            links: Names of its links.
 
         Raises:
             UnknownNameError: If the table names a link that the component lacks.
         """
-        table = self._table(component)
-        if table is None:
+        if not self._catalogue.holds("robots/skin", component):
             return {}
+        path = self._catalogue.find("robots/skin", component, kind="skin")
+        table = read_skin(path)
         names = set(links)
         for name in table.link:
             if name not in names:
                 raise UnknownNameError("link of a skin", name, names)
-        files = {p.file: self._locate(table, p.file) for p in _pieces(table)}
+        pieces = [piece for own in table.link.values() for piece in own]
+        files = {piece.file: self._locate(table, piece.file) for piece in pieces}
         if None in files.values():
             self._missing.setdefault(table.provider, []).append(component)
             return {}
         self._found = True
         return {
             link: tuple(
-                SkinMesh(
-                    shape="skin",
-                    file=str(files[piece.file]),
-                    pos=piece.pos,
-                    quat=piece.quat,
-                    scale=piece.scale,
-                    color=piece.color,
+                SkinMesh.model_validate(
+                    {
+                        **piece.model_dump(),
+                        "shape": "skin",
+                        "file": str(files[piece.file]),
+                    }
                 )
-                for piece in pieces
+                for piece in own
             )
-            for link, pieces in table.link.items()
+            for link, own in table.link.items()
         }
 
-    def report(self) -> None:
-        """Warn of what stays undressed.
+    def report_missing(self) -> None:
+        """Log a warning about missing meshes.
 
         Raises:
-            ConfigError: If nothing at all was found.
+            ConfigError: If no mesh at all was found.
         """
         where = f" below {self._folder}" if self._folder else ""
         lines = [
-            f"the meshes of {', '.join(names)} were not found{where}; they come with: "
-            f"{PROVIDERS[provider].install}"
+            f"the meshes of {', '.join(names)} were not found{where}. To install "
+            f"them: {PROVIDERS[provider].install}"
             for provider, names in self._missing.items()
         ]
         if lines and not self._found:
             raise ConfigError(f"skin: {'; '.join(lines)}.")
         if not self._found:
-            raise ConfigError("skin: no meshes are known for this robot.")
+            raise ConfigError("skin: there are no meshes for this robot.")
         for line in lines:
             log.warning("skin: %s", line)
-
-    def _table(self, component: str) -> SkinTable | None:
-        if not self._catalogue.holds("robots/skin", component):
-            return None
-        path = self._catalogue.find("robots/skin", component, kind="skin")
-        return read_skin(path)
 
     def _locate(self, table: SkinTable, file: str) -> Path | None:
         inside = Path(table.folder) / file
         if self._folder is not None:
             return self._in_folder(inside)
+        first, *rest = inside.parts
+        versioned = "/".join((f"{first}-*", *rest))  # the folder name-1a2b of a version
         for folder in PROVIDERS[table.provider].folders():
-            for path in (folder / inside, *folder.glob(_versioned(inside))):
+            for path in (folder / inside, *folder.glob(versioned)):
                 if path.is_file():
                     return path
         return None
 
     def _in_folder(self, file: Path) -> Path | None:
-        """Find a file below the user's folder: the one that shares most of its path."""
+        """Find the only file of the user's folder with the longest common path end."""
         matches = self._by_name.get(file.name.casefold(), [])
-        ranked = sorted(matches, key=lambda path: -_common_end(path, file))
-        best = [
-            p for p in ranked if _common_end(p, file) == _common_end(ranked[0], file)
-        ]
+        longest = max((_common_end(path, file) for path in matches), default=0)
+        best = [path for path in matches if _common_end(path, file) == longest]
         return best[0] if len(best) == 1 else None
 
     @cached_property
@@ -221,7 +215,7 @@ def read_skin(path: Path) -> SkinTable:
     """Read a table of meshes.
 
     Raises:
-        ConfigError: Names file, key, value and the rule.
+        ConfigError: If the file violates the format.
         UnknownNameError: If the provider is unknown.
     """
     table = load_model(SkinTable, path)
@@ -230,18 +224,8 @@ def read_skin(path: Path) -> SkinTable:
     return table
 
 
-def _pieces(table: SkinTable) -> Iterator[_Piece]:
-    for pieces in table.link.values():
-        yield from pieces
-
-
-def _versioned(path: Path) -> str:
-    """Return the pattern of a path whose first folder carries a version: name-1a2b."""
-    first, *rest = path.parts
-    return "/".join((f"{first}-*", *rest))
-
-
 def _common_end(one: Path, other: Path) -> int:
+    """Return how many trailing parts of two paths are equal, ignoring case."""
     count = 0
     for a, b in zip(reversed(one.parts), reversed(other.parts), strict=False):
         if a.casefold() != b.casefold():

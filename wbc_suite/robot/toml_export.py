@@ -1,40 +1,26 @@
-"""Write a robot description as one component file, to be edited and kept."""
+"""Write a robot description as one component file (TOML)."""
 
 import json
 from collections.abc import Iterator
 from typing import Any, TypeAlias, cast
 
-from wbc_suite.robot.component import Component, Header
 from wbc_suite.robot.description import RobotDescription
+from wbc_suite.robot.elements import Elements
+from wbc_suite.robot.robot_file import Component, Header
 
 __all__ = ["write_toml"]
 
-ROBOT_FIELDS = (
-    "root",
-    "materials",
-    "groups",
-    "contacts",
-    "links",
-    "frames",
-    "mounts",
-    "cameras",
-    "actuators",
-    "sensors",
-    "connects",
-    "keyframes",
-)
-"""Fields that a component and a robot share."""
 ONE_A_LINE = ("visual", "collision", "spheres", "sections", "exclude")
-"""Lists of which each entry gets a line of its own."""
+"""Lists that are written with one entry per line."""
 
 
 def write_toml(robot: RobotDescription) -> str:
     """Write a robot as the text of one component file.
 
-    An assembly is written as the single robot that it builds; what equals a default is
-    left out. Numbers keep all digits: reading the text gives the same robot.
+    An assembly is written as one robot. Values that equal a default are omitted.
+    Numbers keep all digits, so reading the text gives an equal robot.
     """
-    data: dict[str, Any] = {key: getattr(robot, key) for key in ROBOT_FIELDS}
+    data: dict[str, Any] = {key: getattr(robot, key) for key in Elements.model_fields}
     data["synergies"] = tuple(s for own in robot.synergies.values() for s in own)
     component = Component(
         format=1,
@@ -50,13 +36,14 @@ def write_toml(robot: RobotDescription) -> str:
     )
     fields = component.model_dump(by_alias=True, exclude_defaults=True)
     tables = [f"format = {fields.pop('format')}"]
+    fields = {"component": fields.pop("component"), **fields}
     for name, value in fields.items():
         tables += _tables(name, value)
     return "\n\n".join(tables) + "\n"
 
 
 Table: TypeAlias = dict[str, Any]
-"""A dumped model."""
+"""A model as plain data."""
 
 
 def _tables(name: str, value: Table | list[Table]) -> Iterator[str]:
@@ -76,7 +63,7 @@ def _table(head: str, items: Table) -> str:
 
 
 def _sorted(items: Table) -> Table:
-    """Put first what tells what a table is."""
+    """Return the table with its identifying keys first."""
     first = [key for key in ("name", "shape", "parent", "link") if key in items]
     return {key: items[key] for key in dict.fromkeys([*first, *items])}
 
@@ -106,6 +93,6 @@ def _inline(value: Any) -> str:
 
 
 def _number(value: float) -> str:
-    """Write whole numbers without a point, all others with all digits."""
+    """Write integers without a point, other numbers with all digits."""
     whole = value.is_integer() and abs(value) < 1e15
     return str(int(value)) if whole else repr(value)

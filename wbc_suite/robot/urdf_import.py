@@ -3,41 +3,41 @@
 import logging
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.errors import DescriptionError
+from wbc_suite.errors import DescriptionError, join_first
 from wbc_suite.robot.description import RobotDescription
+from wbc_suite.robot.elements import Contacts
 from wbc_suite.robot.importing import (
     LinkFields,
+    NameTable,
     describe_import,
-    inertia_fields,
-    shortened,
+    overlapping_links,
 )
-from wbc_suite.robot.naming import NameTable
-from wbc_suite.robot.overlaps import overlapping_neighbours
-from wbc_suite.robot.parts import Contacts
-from wbc_suite.robot.placing import pose_fields
-from wbc_suite.robot.urdf_export import UNLIMITED
-from wbc_suite.robot.urdf_shapes import MeshFolder, UrdfShapes
-from wbc_suite.robot.urdf_tree import Branch, UrdfTree, read_tree
-from wbc_suite.robot.urdf_values import number, numbers, pose_of
+from wbc_suite.robot.inertia import inertia_fields
+from wbc_suite.robot.poses import pose_fields
+from wbc_suite.robot.urdf_elements import (
+    Branch,
+    UrdfTree,
+    number,
+    numbers,
+    pose_of,
+    read_tree,
+)
+from wbc_suite.robot.urdf_export import ROOT_TYPES, UNLIMITED
+from wbc_suite.robot.urdf_import_shapes import MeshFolder, UrdfShapes
+from wbc_suite.robot.xml_files import Element
 
 __all__ = ["read_urdf"]
 
 LOG = logging.getLogger(__name__)
-Element = ElementTree.Element
 
-ENDLESS = 1e4
-"""A range as wide, in rad or m, means that there is none."""
-MOVING = {
-    "revolute": "hinge",
-    "continuous": "hinge",
-    "prismatic": "slide",
-}
-ROOTS = {"fixed": "fixed", "floating": "free", "planar": "planar"}
+UNLIMITED_RANGE = 1e4
+"""A position limit at least as large, in rad or m, means that there is none."""
+JOINT_TYPES = {"revolute": "hinge", "continuous": "hinge", "prismatic": "slide"}
+ROOT_KINDS = {urdf: kind for kind, urdf in ROOT_TYPES.items()}
 
 
 def read_urdf(
@@ -45,23 +45,22 @@ def read_urdf(
 ) -> RobotDescription:
     """Read a URDF file.
 
-    Links and joints keep their names where our format allows them (letters, digits,
-    `_`, unique over links, joints and frames). A massless link `world` above the robot
-    tells how it is rooted. Massless links without shapes at the ends become frames.
-    Meshes become convex hulls. Groups, end effectors and the posture `ready` are
-    guessed; `to_toml()` writes the result in our own format for editing.
+    Links and joints keep names that are valid in our format (letters, digits, `_`,
+    unique over links, joints and frames). The joint below a massless link `world`
+    defines the root. Massless links without shapes at the ends become frames. Meshes
+    become convex hulls. Groups, end effectors and the posture `ready` are inferred;
+    `to_toml()` writes the result for editing.
 
     Args:
         path: The file.
-        mesh_root: Folder that meshes may be read from, and that `package://` names
-            start in; by default the ROS package that the file is in, or its own folder.
-
-        mend_inertias: Take the nearest tensor that a body can have in place of one that
-            no body has, with a warning, instead of raising.
+        mesh_root: Folder that meshes are read from, and that `package://` refers to;
+            by default the ROS package of the file, or its folder.
+        mend_inertias: Replace an unphysical inertia by the nearest physical one, with
+            a warning, instead of raising.
 
     Raises:
-        ConfigError: If the file is no URDF, or leads out of the folder.
-        DescriptionError: If the robot contradicts itself or physics.
+        ConfigError: If the file is not URDF, or refers to files outside the folder.
+        DescriptionError: If the robot is inconsistent or unphysical.
     """
     path = Path(path)
     tree = read_tree(path)
@@ -73,26 +72,21 @@ def read_urdf(
         if str(error).startswith(str(path)):
             raise
         raise DescriptionError(f"{path}: {error}") from error
-    meshes.report()
-    return _apart(robot, path)
-
-
-def _apart(robot: RobotDescription, path: Path) -> RobotDescription:
-    """Let links not collide that stand in each other, and say so."""
-    pairs = overlapping_neighbours(robot)
+    meshes.report_missing()
+    pairs = overlapping_links(robot)
     if not pairs:
         return robot
-    told = ", ".join(f"'{first}' and '{second}'" for first, second in pairs)
+    shown = [f"'{first}' and '{second}'" for first, second in pairs]
     LOG.warning(
-        "%s: stand in each other in the posture ready, so they do not collide: %s.",
+        "%s: these links overlap in the posture ready and will not collide: %s.",
         path,
-        shortened(told),
+        join_first(shown, limit=12),
     )
     return robot.model_copy(update={"contacts": Contacts(exclude=pairs)})
 
 
 class _Importer:
-    """Carries the names and shapes of one file into the fields of a description."""
+    """Converts the elements of one file to the fields of a description."""
 
     def __init__(self, tree: UrdfTree, shapes: UrdfShapes) -> None:
         self._tree = tree
@@ -102,15 +96,15 @@ class _Importer:
         self._joints: dict[str, str] = {}
 
     def robot(self, path: Path, *, mend_inertias: bool) -> RobotDescription:
-        root, branches = self._rooted()
+        root, branches = self._root()
         frames = _frame_names(branches)
         kept = [branch for branch in branches if branch.name not in frames]
         for branch in kept:
             self._links[branch.name] = self._names.take(branch.name, "link")
         for branch in kept:
-            if branch.joint is not None and branch.kind in MOVING:
-                foreign = branch.joint.get("name", "")
-                self._joints[foreign] = self._names.take(foreign, "joint")
+            if branch.joint is not None and branch.kind in JOINT_TYPES:
+                original = branch.joint.get("name", "")
+                self._joints[original] = self._names.take(original, "joint")
         first = kept[0]
         return describe_import(
             name=self._tree.robot.get("name", "") or path.stem,
@@ -118,85 +112,80 @@ class _Importer:
             root=root,
             links=[self._link(branch, first=branch is first) for branch in kept],
             frames=self._frames(branches, frames),
-            materials=self._shapes.palette.colors,
+            materials=self._shapes.colors,
             names=self._names,
             mend_inertias=mend_inertias,
         )
 
-    def _rooted(self) -> tuple[dict[str, Any], tuple[Branch, ...]]:
+    def _root(self) -> tuple[dict[str, Any], tuple[Branch, ...]]:
         """Return the fields of the root, and the branches without the world."""
         world, *rest = self._tree.branches
         below = self._tree.below(world.name)
-        wild = [b for b in self._tree.branches if b.kind in ("floating", "planar")]
-        leads = len(below) == 1 and below[0].kind in ROOTS and _is_bare(world)
-        if leads and (world.name == "world" or wild):
-            kind = ROOTS[below[0].kind]
-            joint = _joint_of(below[0])
-            if kind == "planar":
-                _check_planar(joint)
-            pose = pose_of(joint, where=f"joint '{joint.get('name')}'")
-            wild = [b for b in wild if b is not below[0]]
-            _refuse_wild(wild)
-            return {"kind": kind, **pose_fields(pose)}, tuple(rest)
-        _refuse_wild(wild)
-        return {"kind": "fixed"}, self._tree.branches
+        moving = [b for b in self._tree.branches if b.kind in ("floating", "planar")]
+        first = below[0] if len(below) == 1 and _is_bare(world) else None
+        if first is None or first.kind not in ROOT_KINDS:
+            _refuse_roots(moving)
+            return {"kind": "fixed"}, self._tree.branches
+        if world.name != "world" and not moving:
+            return {"kind": "fixed"}, self._tree.branches
+        if first.joint is not None and first.kind == "planar":
+            axis = _axis(first.joint, first.where)
+            if not np.allclose(axis, (0.0, 0.0, 1.0)):
+                raise DescriptionError(
+                    f"{first.where}: a planar root needs the axis z, not {axis}."
+                )
+        _refuse_roots([b for b in moving if b is not first])
+        kind = ROOT_KINDS[first.kind]
+        return {"kind": kind, **pose_fields(first.pose)}, tuple(rest)
 
     def _link(self, branch: Branch, *, first: bool) -> LinkFields:
-        where = f"link '{branch.name}'"
         fields: LinkFields = {"name": self._links[branch.name]}
-        fields |= _inertial(branch.link, where)
+        fields |= _inertial(branch.link, f"link '{branch.name}'")
         fields |= self._shapes.of(branch.link)
         if first or branch.joint is None:
             return fields
-        joint_where = f"joint '{branch.joint.get('name')}'"
-        pose = pose_of(branch.joint, where=joint_where)
-        fields |= {"parent": self._links[str(branch.parent)], **pose_fields(pose)}
-        if branch.kind in MOVING:
-            fields["joint"] = self._joint(branch.joint, branch.kind, joint_where)
+        parent = self._links[str(branch.parent)]
+        fields |= {"parent": parent, **pose_fields(branch.pose)}
+        if branch.kind in JOINT_TYPES:
+            fields["joint"] = self._joint(branch.joint, branch.kind, branch.where)
         elif branch.kind != "fixed":
-            raise DescriptionError(f"{joint_where}: unknown type '{branch.kind}'.")
+            raise DescriptionError(f"{branch.where}: unknown type '{branch.kind}'.")
         return fields
 
     def _joint(self, joint: Element, kind: str, where: str) -> dict[str, Any]:
         fields: dict[str, Any] = {
             "name": self._joints[joint.get("name", "")],
-            "type": MOVING[kind],
+            "type": JOINT_TYPES[kind],
             "axis": _axis(joint, where),
             **_limits(joint, kind, where),
         }
         dynamics = joint.find("dynamics")
         if dynamics is not None:
-            fields["damping"] = number(dynamics, "damping", where=where, default=0.0)
-            fields["frictionloss"] = number(
-                dynamics, "friction", where=where, default=0.0
-            )
+            for ours, key in (("damping", "damping"), ("frictionloss", "friction")):
+                fields[ours] = number(dynamics, key, where=where, default=0.0)
         mimic = joint.find("mimic")
         if mimic is not None:
-            fields["mimic"] = self._mimic(mimic, where)
+            leader = mimic.get("joint", "")
+            fields["mimic"] = {
+                "joint": self._joints.get(leader, leader or "nothing"),
+                "ratio": number(mimic, "multiplier", where=where, default=1.0),
+                "offset": number(mimic, "offset", where=where, default=0.0),
+            }
         return fields
-
-    def _mimic(self, mimic: Element, where: str) -> dict[str, Any]:
-        leader = mimic.get("joint", "")
-        return {
-            "joint": self._joints.get(leader, leader or "nothing"),
-            "ratio": number(mimic, "multiplier", where=where, default=1.0),
-            "offset": number(mimic, "offset", where=where, default=0.0),
-        }
 
     def _frames(
         self, branches: tuple[Branch, ...], frames: set[str]
     ) -> list[dict[str, Any]]:
-        """Turn bare links into frames of the link that they are fixed to."""
+        """Return massless links as frames of the link that they are fixed to."""
         poses = {name: (ours, pin.SE3.Identity()) for name, ours in self._links.items()}
         found: list[dict[str, Any]] = []
         for branch in branches:
-            if branch.name in frames and branch.joint is not None:
+            if branch.name in frames:
                 link, above = poses[str(branch.parent)]
-                where = f"joint '{branch.joint.get('name')}'"
-                pose = above * pose_of(branch.joint, where=where)
-                poses[branch.name] = (link, pose)
+                poses[branch.name] = (link, above * branch.pose)
                 name = self._names.take(branch.name, "frame")
-                found.append({"name": name, "link": link, **pose_fields(pose)})
+                pose = pose_fields(poses[branch.name][1])
+                found.append({"name": name, "link": link, **pose})
         return found
 
 
@@ -205,30 +194,16 @@ def _is_bare(branch: Branch) -> bool:
     return all(branch.link.find(tag) is None for tag in tags)
 
 
-def _joint_of(branch: Branch) -> Element:
-    assert branch.joint is not None
-    return branch.joint
-
-
-def _refuse_wild(branches: list[Branch]) -> None:
+def _refuse_roots(branches: list[Branch]) -> None:
     for branch in branches:
         raise DescriptionError(
-            f"joint '{_joint_of(branch).get('name')}' is {branch.kind}: only the joint "
-            "between a bare link 'world' and the rest of the robot may be."
-        )
-
-
-def _check_planar(joint: Element) -> None:
-    axis = _axis(joint, f"joint '{joint.get('name')}'")
-    if not np.allclose(axis, (0.0, 0.0, 1.0)):
-        raise DescriptionError(
-            f"joint '{joint.get('name')}': a planar root moves in the plane across "
-            f"z; its axis is {axis}."
+            f"{branch.where} is {branch.kind}: only the joint between an empty link "
+            "'world' and the rest of the robot may be."
         )
 
 
 def _frame_names(branches: tuple[Branch, ...]) -> set[str]:
-    """Return the bare fixed links that carry nothing but their like."""
+    """Return the bare fixed links whose children are all frames."""
     frames: set[str] = set()
     for branch in reversed(branches):
         below = [b.name for b in branches if b.parent == branch.name]
@@ -245,39 +220,39 @@ def _axis(joint: Element, where: str) -> list[float]:
     axis = numbers(element, "xyz", 3, where=where, default=(1.0, 0.0, 0.0))
     length = float(np.linalg.norm(axis))
     if length < 1e-6:
-        raise DescriptionError(f"{where}: the axis {axis.tolist()} has no direction.")
+        raise DescriptionError(f"{where}: the axis {axis.tolist()} has length zero.")
     return (axis / length).tolist()
 
 
 def _limits(joint: Element, kind: str, where: str) -> dict[str, Any]:
-    """Read `<limit>`; zero efforts and speeds, and huge limits, mean there is none."""
+    """Read `<limit>`; zero effort or velocity, and huge limits, mean no limit."""
     limit = joint.find("limit")
     if limit is None:
         if kind == "continuous":
             return {}
         raise DescriptionError(
-            f"{where}: a {kind} joint needs <limit>; one that turns without end is "
+            f"{where}: a {kind} joint needs <limit>; an unlimited hinge is "
             "'continuous'."
         )
     fields: dict[str, Any] = {}
-    for ours in ("effort", "velocity"):
-        value = number(limit, ours, where=where, default=0.0)
+    for key in ("effort", "velocity"):
+        value = number(limit, key, where=where, default=0.0)
         if 0.0 != value < UNLIMITED:
-            fields[ours] = value
+            fields[key] = value
     low = number(limit, "lower", where=where, default=0.0)
     high = number(limit, "upper", where=where, default=0.0)
-    if kind != "continuous" and max(-low, high) < ENDLESS:
+    if kind != "continuous" and max(-low, high) < UNLIMITED_RANGE:
         if not low < high:
             raise DescriptionError(
-                f"{where}: it cannot move from {low} to {high}. Mend 'lower' and "
-                "'upper', or make it fixed, or continuous if it turns without end."
+                f"{where}: it cannot move from {low} to {high}. Correct 'lower' and "
+                "'upper', or make it fixed, or continuous if it is unlimited."
             )
         fields["range"] = (low, high)
     return fields
 
 
 def _inertial(link: Element, where: str) -> dict[str, Any]:
-    """Read `<inertial>`, and turn its tensor into the link's axes."""
+    """Read `<inertial>`, with the tensor in the link's axes."""
     element = link.find("inertial")
     if element is None:
         return {}
@@ -295,7 +270,7 @@ def _inertial(link: Element, where: str) -> dict[str, Any]:
     kilograms = number(mass, "value", where=where)
     if kilograms == 0.0:
         if own.any():
-            LOG.warning("%s has no mass; its inertia tensor is left out.", where)
+            LOG.warning("%s has no mass; its inertia tensor is ignored.", where)
         return {}
     return {
         "mass": kilograms,

@@ -1,38 +1,38 @@
-"""Read XML files from outside: no entities, no other files, size and depth limited."""
+"""Read XML files from untrusted sources: no entities, limited size and depth."""
 
-from collections.abc import Iterator
 from pathlib import Path
+from typing import TypeAlias
 from xml.etree import ElementTree
 from xml.parsers import expat
 
 from wbc_suite.errors import ConfigError
 
-__all__ = ["children", "inside", "read_xml"]
+__all__ = ["Element", "inside", "read_xml"]
 
 MAX_BYTES = 8_000_000
 """Largest XML file that is read; large humanoids have about 200 kB."""
 MAX_DEPTH = 400
-"""Deepest nesting; MJCF nests bodies, one level for each link of a chain."""
+"""Largest nesting depth; MJCF nests one body per link of a chain."""
 
-Element = ElementTree.Element
+Element: TypeAlias = ElementTree.Element
 
 
 def read_xml(path: Path) -> Element:
     """Parse one XML file into elements.
 
-    A document type declaration is refused, for it is how entities come in, which may
-    grow without bound or name other files. Prefixes of namespaces need no declaration:
-    vendors' files forget it.
+    A document type declaration is refused, because it can define entities that grow
+    without bound or read other files. Namespace prefixes need no declaration, which
+    vendors' files often omit.
 
     Raises:
-        ConfigError: If the file is missing, too large, too deep or no plain XML.
+        ConfigError: If the file is missing, too large, too deep or not plain XML.
     """
     try:
         size = path.stat().st_size
         if size > MAX_BYTES:
             raise ConfigError(
-                f"{path}: {size} bytes, more than the {MAX_BYTES} that a robot's XML "
-                "may have. Is this the right file?"
+                f"{path}: the file has {size} bytes; at most {MAX_BYTES} are read. Is "
+                "this the right file?"
             )
         data = path.read_bytes()
     except OSError as error:
@@ -63,7 +63,7 @@ class _Reader:
         self._depth += 1
         if self._depth > MAX_DEPTH:
             raise ConfigError(
-                f"{self._path}: elements are nested more than {MAX_DEPTH} deep."
+                f"{self._path}: elements are nested deeper than {MAX_DEPTH} levels."
             )
         self._builder.start(tag, attributes)
 
@@ -74,25 +74,20 @@ class _Reader:
     def _refuse(self, *_: object) -> None:
         raise ConfigError(
             f"{self._path}: a document type declaration (<!DOCTYPE ...>) is not "
-            "allowed: it could pull in other files. Remove it."
+            "allowed, because it can read other files. Remove it."
         )
 
 
-def children(element: Element, tag: str) -> Iterator[Element]:
-    """Yield the direct children with a tag."""
-    return (child for child in element if child.tag == tag)
-
-
 def inside(root: Path, path: Path, *, source: Path) -> Path:
-    """Return a path with all links followed, if it lies in a folder.
+    """Return a path with resolved links, if it lies in a folder.
 
     Raises:
-        ConfigError: If the path leaves the folder.
+        ConfigError: If the path lies outside the folder.
     """
     resolved = path.resolve()
     if not resolved.is_relative_to(root.resolve()):
         raise ConfigError(
-            f"{source}: the file '{path}' lies outside the folder {root.resolve()}: "
-            "nothing outside it is read. Copy it below that folder and name it there."
+            f"{source}: the file '{path}' lies outside the folder {root.resolve()} and "
+            "is not read. Copy it into that folder."
         )
     return resolved

@@ -1,8 +1,16 @@
-"""Scenes: arenas, things and robots composed into one MuJoCo specification."""
+"""Scenes: arenas, objects and robots composed into one MuJoCo specification."""
 
-from wbc_suite.scene.arena import TableConfig, add_table, add_tables, empty_arena
+from wbc_suite.scene.arena import (
+    TableConfig,
+    add_table,
+    add_table_cameras,
+    add_tables,
+    empty_arena,
+)
 from wbc_suite.scene.compose import (
     add_camera,
+    add_robot_view,
+    aim_robot_view,
     attach_robot,
     compile_scene,
     fix_to_frame,
@@ -13,8 +21,11 @@ from wbc_suite.scene.compose import (
 __all__ = [
     "TableConfig",
     "add_camera",
+    "add_robot_view",
     "add_table",
+    "add_table_cameras",
     "add_tables",
+    "aim_robot_view",
     "attach_robot",
     "compile_scene",
     "empty_arena",

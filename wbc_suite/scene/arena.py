@@ -1,4 +1,4 @@
-"""Arenas: the room, the light and the furniture that robots work in."""
+"""Arenas: floor, sky, lights and tables."""
 
 from collections.abc import Mapping
 from typing import Annotated, TypeAlias
@@ -7,22 +7,25 @@ import mujoco
 from pydantic import Field, model_validator
 
 from wbc_suite.robot.shapes import Size, Vector3
-from wbc_suite.scene.textures import wood_pixels
+from wbc_suite.scene.compose import add_camera
+from wbc_suite.scene.materials import FRICTION, wood_pixels
 from wbc_suite.tomlfile import FrozenModel
 
-__all__ = ["TableConfig", "add_table", "add_tables", "empty_arena"]
-
-FRICTION = (1.0, 0.005, 0.0001)
-"""Sliding, torsional, rolling; the default of this field's table-top benchmarks."""
-
+__all__ = [
+    "TableConfig",
+    "add_table",
+    "add_table_cameras",
+    "add_tables",
+    "empty_arena",
+]
 
 WOOD_SIZE = 512
 """Pixels along each side of the table's texture."""
 
-
 LEG_AT = 0.5
-"""Where a table's legs stand, from its middle, as a share of half its side; further out
+"""Distance of a table's legs from its middle, as a share of half its side; further out
 they would stand on the feet of robots' pedestals, which reach 24 cm under it."""
+
 LEAST_LEG = 0.01
 """Shortest legs of a table, m."""
 
@@ -53,7 +56,7 @@ class TableConfig(FrozenModel):
 
 
 def empty_arena(*, timestep: float = 0.002) -> mujoco.MjSpec:
-    """Return a calm room: floor, sky and soft light, with the physics options set.
+    """Return an arena with floor, sky and soft light, and the physics options set.
 
     Implicit integration keeps stiff servos and damping stable; dense Jacobians avoid a
     fault of the sparse Newton path in MuJoCo 4.0.0.
@@ -69,7 +72,7 @@ def empty_arena(*, timestep: float = 0.002) -> mujoco.MjSpec:
     option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     option.impratio = 10.0
     spec.memory = 64 * 2**20
-    _add_looks(spec)
+    _add_textures(spec)
     spec.worldbody.add_geom(
         name="floor",
         type=mujoco.mjtGeom.mjGEOM_PLANE,
@@ -111,11 +114,11 @@ def add_table(spec: mujoco.MjSpec, table: TableConfig, name: str = "table") -> N
 def add_tables(
     spec: mujoco.MjSpec, table: TableConfig, centers: Mapping[str, Vector3]
 ) -> None:
-    """Add several equal tables, such as one before each arm.
+    """Add several equal tables, such as one in front of each arm.
 
     Args:
         spec: The scene.
-        table: What they are like.
+        table: Size and friction of all.
         centers: Middle of each top's upper face, m, by the name of its body and top.
     """
     for name, center in centers.items():
@@ -123,7 +126,26 @@ def add_tables(
         add_table(spec, TableConfig(**given), name)
 
 
-def _add_looks(spec: mujoco.MjSpec) -> None:
+def add_table_cameras(
+    spec: mujoco.MjSpec, center: Vector3, *, side: float = -1.0, before: float = 0.75
+) -> None:
+    """Add the cameras of table-top benchmarks, under the names of existing datasets.
+
+    Args:
+        spec: The scene.
+        center: Middle of the table's upper face, m.
+        side: Side of `sideview`: -1 for -y, 1 for +y.
+        before: Distance of `agentview` from the table's middle along x, m.
+    """
+    x, y, z = center
+    middle = (x - 0.15, y, z + 0.25)
+    add_camera(spec, "frontview", (x + 1.9, y, z + 0.75), middle)
+    add_camera(spec, "agentview", (x + before, y, z + 0.75), (x - 0.1, y, z + 0.1))
+    add_camera(spec, "sideview", (x - 0.1, y + 1.9 * side, z + 0.65), middle)
+    add_camera(spec, "birdview", (x - 0.2, y, z + 2.2), (x - 0.2, y, z))
+
+
+def _add_textures(spec: mujoco.MjSpec) -> None:
     flat, gradient = (
         mujoco.mjtBuiltin.mjBUILTIN_FLAT,
         mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,

@@ -1,4 +1,4 @@
-"""Put robots and things into one MuJoCo specification."""
+"""Robots, their cameras and objects put into one MuJoCo specification."""
 
 import logging
 
@@ -6,14 +6,16 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
+from wbc_suite.control import RobotState
 from wbc_suite.robot import RobotDescription
-from wbc_suite.robot.placing import pose_fields, se3_of
+from wbc_suite.robot.poses import pose_fields, se3_of
 from wbc_suite.robot.shapes import Vector3
-from wbc_suite.scene.objects.thing import TORSION, Thing
-from wbc_suite.scene.reach import let_floors_ignore_far_links
+from wbc_suite.scene.objects.scene_object import TORSION, SceneObject
 
 __all__ = [
     "add_camera",
+    "add_robot_view",
+    "aim_robot_view",
     "attach_robot",
     "compile_scene",
     "fix_to_frame",
@@ -25,11 +27,18 @@ __all__ = [
 log = logging.getLogger(__name__)
 
 SMALL = 24
-"""Degrees of freedom up to which islands cost more than they save: a physics step of
-Lift takes 6 % less without them at 15 and at 18, as long at 30 and 15 % more at 60."""
+"""Degrees of freedom up to which constraint islands cost more than they save: a physics
+step of Lift takes 6 % less without them at 15 and at 18, as long at 30 and 15 % more at
+60."""
 
 GROUNDED = 0.03
-"""m; feet and mounts may reach so far into the floor."""
+"""Depth by which feet and mounts may reach into the floor, m."""
+
+ROBOT_VIEW = "robotview"
+"""Name of the camera behind each robot, after the robot's prefix."""
+BEHIND, ABOVE, AHEAD = 0.4, 0.5, 0.2
+"""Distance of that camera behind and above the robot at rest, and of its target in
+front of the robot, m."""
 
 
 def robot_prefix(index: int) -> str:
@@ -42,9 +51,8 @@ def place_robot(
 ) -> RobotDescription:
     """Return the robot moved to x, y on the floor and turned about z.
 
-    Its own root pose is seen from there: a base whose middle lies behind its arm keeps
-    it there. The place is part of the description, so that every engine's model of it
-    measures from the same world.
+    Its own root pose is relative to that place. The place is part of the description,
+    so that the models of all engines use the same world frame.
     """
     robot = _on_the_floor(robot)
     turn = pin.Quaternion(np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2))
@@ -54,9 +62,9 @@ def place_robot(
 
 
 def _on_the_floor(robot: RobotDescription) -> RobotDescription:
-    """Lift a robot of which nothing says how high it stands out of the floor.
+    """Raise a robot without a root height so that it stands on the floor.
 
-    The links of many a humanoid's URDF are measured from its pelvis.
+    The URDF of many a humanoid has its origin in the pelvis.
     """
     if any(robot.root.pos):
         return robot
@@ -74,8 +82,8 @@ def _on_the_floor(robot: RobotDescription) -> RobotDescription:
     if depth < GROUNDED:
         return robot
     log.warning(
-        "%s: nothing says how high it stands, and it reaches %.2f m below the floor; "
-        "it is lifted by so much. [root] pos in its own file says better.",
+        "%s has no root height and reaches %.2f m below the floor; it is raised. "
+        "Set [root] pos in its file.",
         robot.name,
         depth,
     )
@@ -91,14 +99,14 @@ def attach_robot(
 ) -> None:
     """Add a robot at its own root pose; every name of it gets the prefix.
 
-    Fingers keep what they hold from turning about the line between them: they have
-    torsional friction, whatever their description says.
+    Fingers get torsional friction, so that an object does not turn about the line
+    between them.
 
     Args:
         spec: The scene.
         robot: The robot.
         prefix: Text before its names.
-        frame: What it hangs on; the world by default.
+        frame: Frame that it is attached to; the world by default.
     """
     own = robot.to_mjspec()
     for key in list(own.keys):
@@ -109,45 +117,42 @@ def attach_robot(
     spec.attach(own, prefix=prefix, frame=frame or spec.worldbody.add_frame())
 
 
-def fix_to_frame(spec: mujoco.MjSpec, thing: Thing, frame: str) -> None:
-    """Fix a thing to the link of a robot in a scene.
+def fix_to_frame(spec: mujoco.MjSpec, attached: SceneObject, frame: str) -> None:
+    """Fix an object to the link of a robot in a scene.
 
     Args:
         spec: The scene, with the robot.
-        thing: The thing; its own pose is seen from the frame.
+        attached: The object; its own pose is relative to the frame.
         frame: Name of a robot's frame, with the robot's prefix.
     """
     site = spec.site(frame)
     at = pin.SE3(pin.Quaternion(*site.quat).normalized().matrix(), site.pos)
-    own = pin.SE3(pin.Quaternion(*thing.quat).matrix(), np.array(thing.pos))
+    own = pin.SE3(pin.Quaternion(*attached.quat).matrix(), np.array(attached.pos))
     pose = pose_fields(at * own)
-    thing.fixed(pose["pos"], pose["quat"]).add_to(spec, site.parent)
+    attached.fixed(pose["pos"], pose["quat"]).add_to(spec, site.parent)
 
 
 def compile_scene(spec: mujoco.MjSpec) -> mujoco.MjModel:
-    """Compile a scene, and spare MuJoCo work that changes nothing.
+    """Compile a scene with settings that save work and keep the results.
 
-    MuJoCo looks for bodies that may touch by spheres around all their geoms, also those
-    that are only drawn; without these GR1 has 115 pairs of bodies to look into and not
-    191. Geoms that collide keep their spheres, so the same contacts are found. Links
-    that cannot reach the floor are not looked at there. In small scenes all constraints
-    are solved at once: to find what is independent takes longer. And where no force but
-    that of joints' own damping depends on speeds, the explicit integrator, which takes
-    that implicitly as well, does what the implicit one does, with less work.
+    - MuJoCo's broadphase uses bounding spheres of all geoms, visual ones included.
+      Those get radius 0: GR1 has 115 pairs of bodies to test instead of 191.
+    - In small scenes all constraints are solved at once, without islands.
+    - If no force but joint damping depends on velocities, the Euler integrator, which
+      takes joint damping implicitly as well, replaces the implicit one.
     """
     model = spec.compile()
     model.geom_rbound[(model.geom_contype | model.geom_conaffinity) == 0] = 0.0
-    let_floors_ignore_far_links(model)
     if model.nv <= SMALL:
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ISLAND
     implicit = model.opt.integrator == mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    if implicit and not _speeds_matter(model):
+    if implicit and not _has_velocity_forces(model):
         model.opt.integrator = mujoco.mjtIntegrator.mjINT_EULER
     return model
 
 
-def _speeds_matter(model: mujoco.MjModel) -> bool:
-    """Whether forces depend on speeds, other than those of joints' linear damping."""
+def _has_velocity_forces(model: mujoco.MjModel) -> bool:
+    """Whether forces other than linear joint damping depend on velocities."""
     gains, biases = model.actuator_gaintype, model.actuator_biastype
     fixed = gains == mujoco.mjtGain.mjGAIN_FIXED
     affine = biases == mujoco.mjtBias.mjBIAS_AFFINE
@@ -165,7 +170,7 @@ def _speeds_matter(model: mujoco.MjModel) -> bool:
 def add_camera(
     spec: mujoco.MjSpec, name: str, eye: Vector3, target: Vector3, fovy: float = 45.0
 ) -> None:
-    """Add a fixed camera at `eye` that looks at `target`; x of its picture is level.
+    """Add a fixed, level camera at `eye` with `target` in the middle of its picture.
 
     Args:
         spec: The scene.
@@ -183,3 +188,58 @@ def add_camera(
         np.column_stack([right, np.cross(back, right), back])
     ).coeffs()
     spec.worldbody.add_camera(name=name, pos=eye, quat=(w, x, y, z), fovy=fovy)
+
+
+def add_robot_view(spec: mujoco.MjSpec, robot: RobotDescription, prefix: str) -> None:
+    """Add a camera behind the robot to its first link; see `aim_robot_view`."""
+    body = spec.body(prefix + robot.links[0].name)
+    body.add_camera(name=prefix + ROBOT_VIEW, fovy=60.0)
+
+
+def aim_robot_view(state: RobotState) -> None:
+    """Set the camera behind a robot so that it shows the robot and the space ahead."""
+    model, data = state.model, state.data
+    low, high = _extent(state)
+    eye = np.array([low[0] - BEHIND, 0.0, high[2] + ABOVE])
+    target = np.array([high[0] + AHEAD, 0.0, low[2] + 0.6 * (high[2] - low[2])])
+    back = (eye - target) / np.linalg.norm(eye - target)
+    right = np.array([0.0, -1.0, 0.0])
+    turn = np.column_stack([right, np.cross(back, right), back])
+    root = state.root_pose
+    upright = _yaw_only(root)
+    pose = root.inverse() * upright * pin.SE3(turn, eye)
+    camera = model.camera(state.prefix + ROBOT_VIEW).id
+    x, y, z, w = pin.Quaternion(pose.rotation).coeffs()
+    model.cam_pos[camera] = pose.translation
+    model.cam_quat[camera] = w, x, y, z
+    mujoco.mj_camlight(model, data)
+
+
+def _extent(state: RobotState) -> tuple[np.ndarray, np.ndarray]:
+    """Return the corners of a box around the robot in its level base frame, m."""
+    model, data = state.model, state.data
+    solid = (model.geom_contype | model.geom_conaffinity) > 0
+    own = [
+        i
+        for i, body in enumerate(model.geom_bodyid.tolist())
+        if model.body(body).name.startswith(state.prefix)
+    ]
+    own = [i for i in own if solid[i]] or own
+    place = _yaw_only(state.root_pose)
+    if not own:
+        bodies = [state.model.body(state.prefix + x.name).id for x in state.robot.links]
+        points = (data.xpos[bodies] - place.translation) @ place.rotation
+        return points.min(axis=0), points.max(axis=0)
+    turns = place.rotation.T @ data.geom_xmat[own].reshape(-1, 3, 3)
+    middle, half = np.split(model.geom_aabb[own], 2, axis=1)
+    middles = (data.geom_xpos[own] - place.translation) @ place.rotation
+    middles += np.einsum("gij,gj->gi", turns, middle)
+    reach = np.einsum("gij,gj->gi", abs(turns), half)
+    return (middles - reach).min(axis=0), (middles + reach).max(axis=0)
+
+
+def _yaw_only(pose: pin.SE3) -> pin.SE3:
+    """Return the pose without roll and pitch."""
+    yaw = np.arctan2(pose.rotation[1, 0], pose.rotation[0, 0])
+    turn = pin.Quaternion(np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2))
+    return pin.SE3(turn.matrix(), pose.translation)

@@ -1,12 +1,13 @@
-"""Furniture that is fixed to the room: bins on legs, pegs, goals to be looked at."""
+"""Fixed furniture: bins on legs, pegs, and visual goals."""
 
 from dataclasses import replace
+from functools import partial
 
 from pydantic import model_validator
 
-from wbc_suite.robot.component import Channel
+from wbc_suite.robot.elements import Channel
 from wbc_suite.robot.shapes import Size, Vector3
-from wbc_suite.scene.objects.thing import Color, Part, Thing
+from wbc_suite.scene.objects.scene_object import Color, Part, SceneObject
 from wbc_suite.scene.objects.vessels import open_bin
 from wbc_suite.tomlfile import FrozenModel
 
@@ -15,7 +16,7 @@ __all__ = ["BinConfig", "ghost", "peg", "standing_bin"]
 LEG: Color = (0.32, 0.33, 0.35, 1.0)
 LEG_RADIUS, INSET = 0.012, 0.03
 GHOST = 0.3
-"""Opacity of what only shows where something belongs."""
+"""Opacity of visual goals."""
 
 
 class BinConfig(FrozenModel):
@@ -25,7 +26,7 @@ class BinConfig(FrozenModel):
         size: Inner length along x, width along y, and height of the walls, m.
         center: Middle of its floor, m.
         wall: Thickness of walls and floor, m.
-        color: Of walls and floor.
+        color: Colour of walls and floor.
     """
 
     size: tuple[Size, Size, Size]
@@ -40,8 +41,10 @@ class BinConfig(FrozenModel):
         return self
 
 
-def standing_bin(name: str, config: BinConfig, *, quadrants: bool = False) -> Thing:
-    """Make a bin on legs; with quadrants, two walls cross in it.
+def standing_bin(
+    name: str, config: BinConfig, *, quadrants: bool = False
+) -> SceneObject:
+    """Make a bin on legs; with quadrants, two walls divide it.
 
     Its origin is the middle of its floor.
     """
@@ -52,42 +55,35 @@ def standing_bin(name: str, config: BinConfig, *, quadrants: bool = False) -> Th
         for part in open_bin(name, outer, wall=wall, color=config.color).parts
     ]
     if quadrants:
+        wood = partial(Part, kind="box", color=config.color, material="wood")
         parts += [
-            Part(
-                kind="box",
-                size=size,
-                pos=(0.0, 0.0, z / 2),
-                color=config.color,
-                material="wood",
-            )
+            wood(size=size, pos=(0.0, 0.0, z / 2))
             for size in ((x / 2, wall / 2, z / 2), (wall / 2, y / 2, z / 2))
         ]
-    leg = (config.center[2] - wall) / 2
+    half = (config.center[2] - wall) / 2
+    leg = partial(Part, kind="cylinder", color=LEG, material="metal")
     parts += [
-        Part(
-            kind="cylinder",
-            size=(LEG_RADIUS, leg),
-            pos=(side * (x / 2 - INSET), end * (y / 2 - INSET), -wall - leg),
-            color=LEG,
-            material="metal",
+        leg(
+            size=(LEG_RADIUS, half),
+            pos=(side * (x / 2 - INSET), end * (y / 2 - INSET), -wall - half),
         )
         for side in (-1, 1)
         for end in (-1, 1)
     ]
-    return Thing(name=name, parts=tuple(parts)).fixed(config.center)
+    return SceneObject(name=name, parts=tuple(parts)).fixed(config.center)
 
 
-def peg(name: str, part: Part, foot: Vector3) -> Thing:
-    """Stand a part upright on a foot point; its half height is its last size."""
+def peg(name: str, part: Part, foot: Vector3) -> SceneObject:
+    """Make a peg of an upright part with its lower end at `foot`."""
     x, y, z = foot
-    return Thing(name=name, parts=(part,)).fixed((x, y, z + part.size[-1]))
+    return SceneObject(name=name, parts=(part,)).fixed((x, y, z + part.size[-1]))
 
 
-def ghost(thing: Thing, name: str, pos: Vector3) -> Thing:
-    """Return a see-through likeness that touches nothing."""
+def ghost(original: SceneObject, name: str, pos: Vector3) -> SceneObject:
+    """Return a translucent copy without collisions."""
     parts = tuple(
         replace(part, solid=False, color=(*part.color[:3], GHOST))
-        for part in thing.parts
+        for part in original.parts
         if part.drawn
     )
-    return replace(thing, name=name, parts=parts, sites={}).fixed(pos)
+    return replace(original, name=name, parts=parts, sites={}).fixed(pos)

@@ -1,7 +1,7 @@
-"""Where things start: samplers of poses that do not touch one another.
+"""Samplers of start poses of objects that do not touch one another.
 
-A sampler draws from the generator that it is given, and sees of a thing only the
-upright cylinder that holds it: two things are apart if their cylinders are.
+An object is represented by its upright bounding cylinder: two objects are apart if
+their cylinders are.
 """
 
 import math
@@ -13,48 +13,48 @@ from numpy.random import Generator
 
 from wbc_suite.errors import PlacementError
 from wbc_suite.robot.shapes import Interval, Real, Vector3
-from wbc_suite.scene.objects.state import Extent
-from wbc_suite.scene.objects.thing import STANDING, Quat
+from wbc_suite.scene.objects.object_state import Extent
+from wbc_suite.scene.objects.scene_object import STANDING, Quat
 from wbc_suite.tomlfile import FrozenModel
 
 __all__ = [
     "Measured",
     "OnTopSampler",
-    "PickySampler",
     "Placed",
     "Placements",
     "Region",
+    "RejectionSampler",
     "Sampler",
     "SequentialSampler",
     "UniformSampler",
 ]
 
 TRIES = 300
-"""Poses that are drawn for one thing before all of them are placed anew."""
+"""Poses drawn for one object before all objects are placed again."""
 LAYOUTS = 20
-"""How often all things of a sampler are placed anew before giving up."""
+"""How often all objects of a sampler are placed before an error."""
 ON_TOP = 1e-9
-"""m; what stands on another thing may sink in by rounding."""
+"""Tolerance of rounding between an object and its support, m."""
 
 
 class Measured(Protocol):
-    """Something that can say how much room it takes."""
+    """An object whose bounding cylinder can be measured."""
 
     def extent(self, quat: Quat = STANDING) -> Extent:
-        """Return its room when turned by `quat`."""
+        """Return its bounding cylinder when turned by `quat`."""
         ...
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Placed:
-    """A thing at its place: position in m, quaternion w x y z, room it takes."""
+    """A placed object: position in m, quaternion w x y z, bounding cylinder."""
 
     position: Vector3
     quat: Quat
     extent: Extent
 
     def touches(self, other: "Placed", gap: float) -> bool:
-        """Whether two cylinders are nearer than `gap`, side by side and in height."""
+        """Whether two cylinders overlap in height and are nearer than `gap`."""
         (ax, ay, az), (bx, by, bz) = self.position, other.position
         beside = self.extent.radius + other.extent.radius + gap
         if math.hypot(ax - bx, ay - by) >= beside:
@@ -64,38 +64,38 @@ class Placed:
         return not (above or below)
 
 
-Things: TypeAlias = Mapping[str, Measured]
+Objects: TypeAlias = Mapping[str, Measured]
 Taken: TypeAlias = Mapping[str, Placed]
 Placements: TypeAlias = dict[str, Placed]
 
 
 class Sampler(Protocol):
-    """Draws places for some things."""
+    """Draws start poses of some objects."""
 
-    def sample(self, rng: Generator, things: Things, taken: Taken) -> Placements:
-        """Return a place for each of the sampler's things.
+    def sample(self, rng: Generator, objects: Objects, taken: Taken) -> Placements:
+        """Return a pose for each of the sampler's objects.
 
         Args:
-            rng: Generator that everything is drawn from.
-            things: What can be measured, by name.
-            taken: What has its place already.
+            rng: Source of randomness.
+            objects: All objects, by name.
+            taken: Objects that are placed already.
 
         Raises:
-            PlacementError: If there is no room; says what to relax.
+            PlacementError: If no free place is found; names what to relax.
         """
         ...
 
 
 class Region(FrozenModel):
-    """Part of a surface, and how things are turned on it.
+    """Rectangle of a surface with a range of orientations.
 
     Attributes:
         x: Smallest and largest x from the surface's origin, m.
         y: Smallest and largest y, m.
-        yaw: Smallest and largest turn about the vertical, rad.
+        yaw: Smallest and largest angle about the vertical, rad.
         clearance: Height above the surface, m.
-        inside: Whether a thing as a whole stays inside, or only its origin.
-        gap: Least distance between things, m.
+        inside: Whether objects lie inside entirely, or only their origins.
+        gap: Least distance between objects, m.
     """
 
     x: Interval
@@ -108,13 +108,13 @@ class Region(FrozenModel):
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class UniformSampler:
-    """Draws places uniformly in a region, those that touch another thing excepted.
+    """Draws poses uniformly in a region, without contact between objects.
 
     Attributes:
-        names: The things.
-        region: Where.
-        origin: Of the surface, m in the world.
-        rest: How a thing rests, before it is turned about the vertical; w x y z.
+        names: The objects.
+        region: Where they are placed.
+        origin: Origin of the surface in the world, m.
+        rest: Orientation before the turn about the vertical; w x y z.
     """
 
     names: Sequence[str]
@@ -122,9 +122,9 @@ class UniformSampler:
     origin: Vector3 = (0.0, 0.0, 0.0)
     rest: Quat = STANDING
 
-    def sample(self, rng: Generator, things: Things, taken: Taken) -> Placements:
+    def sample(self, rng: Generator, objects: Objects, taken: Taken) -> Placements:
         """See `Sampler`."""
-        extents = {name: things[name].extent(self.rest) for name in self.names}
+        extents = {name: objects[name].extent(self.rest) for name in self.names}
         failed: tuple[str, Extent, dict[str, Placed]] | None = None
         for _ in range(LAYOUTS):
             found: Placements = {}
@@ -170,45 +170,45 @@ class UniformSampler:
             f"No free place for '{name}' of radius {extent.radius:.3f} m in x "
             f"{region.x[0]:g}..{region.x[1]:g}, y {region.y[0]:g}..{region.y[1]:g} m "
             f"beside {beside or 'nothing'}, with a gap of {region.gap:g} m. Enlarge "
-            f"the region, make the gap or the things smaller{inside}, or place fewer."
+            f"the region, make the gap or the objects smaller{inside}, or place fewer."
         )
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class SequentialSampler:
-    """Lets samplers draw one after the other; each sees what has its place already."""
+    """Calls samplers in order; each avoids the objects placed before."""
 
     samplers: Sequence[Sampler]
 
-    def sample(self, rng: Generator, things: Things, taken: Taken) -> Placements:
+    def sample(self, rng: Generator, objects: Objects, taken: Taken) -> Placements:
         """See `Sampler`."""
         found: Placements = {}
         for sampler in self.samplers:
-            found |= sampler.sample(rng, things, {**taken, **found})
+            found |= sampler.sample(rng, objects, {**taken, **found})
         return found
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class OnTopSampler:
-    """Draws places on top of a thing that has its own.
+    """Draws poses on top of an object that is placed already.
 
     Attributes:
-        names: The things.
-        support: The thing below.
-        region: Where, from the support's origin; it does not turn with it.
+        names: The objects.
+        support: The object below.
+        region: Region relative to the support's origin; it does not turn with it.
     """
 
     names: Sequence[str]
     support: str
     region: Region
 
-    def sample(self, rng: Generator, things: Things, taken: Taken) -> Placements:
+    def sample(self, rng: Generator, objects: Objects, taken: Taken) -> Placements:
         """See `Sampler`."""
         below = taken.get(self.support)
         if below is None:
             raise PlacementError(
-                f"Nothing can stand on '{self.support}' before it has a place: give it "
-                f"one first. Placed: {', '.join(taken) or 'nothing'}."
+                f"'{self.support}' must be placed before objects on top of it. "
+                f"Placed: {', '.join(taken) or 'nothing'}."
             )
         x, y, z = below.position
         on_top = UniformSampler(
@@ -216,38 +216,38 @@ class OnTopSampler:
             region=self.region,
             origin=(x, y, z + below.extent.top),
         )
-        return on_top.sample(rng, things, taken)
+        return on_top.sample(rng, objects, taken)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class PickySampler:
-    """Lets a sampler draw until its places will do.
+class RejectionSampler:
+    """Calls a sampler until a condition holds for its poses.
 
     Attributes:
-        sampler: Draws places.
-        accepts: Whether they will do.
-        wanted: What is wanted of them, in words.
+        sampler: Draws poses.
+        accepts: The condition.
+        wanted: Description of the condition, for the error.
     """
 
     sampler: Sampler
     accepts: Callable[[Placements], bool]
     wanted: str
 
-    def sample(self, rng: Generator, things: Things, taken: Taken) -> Placements:
+    def sample(self, rng: Generator, objects: Objects, taken: Taken) -> Placements:
         """See `Sampler`."""
         found: Placements = {}
         for _ in range(TRIES):
-            found = self.sampler.sample(rng, things, taken)
+            found = self.sampler.sample(rng, objects, taken)
             if self.accepts(found):
                 return found
         raise PlacementError(
             f"In {TRIES} tries there was no place for {', '.join(found)} where "
-            f"{self.wanted}. Change the region, or the things' sizes."
+            f"{self.wanted}. Change the region, or the sizes of the objects."
         )
 
 
 def _product(a: Quat, b: Quat) -> Quat:
-    """Return the quaternion of turning by b, then by a."""
+    """Return the product of two quaternions: rotation by b, then by a."""
     (aw, ax, ay, az), (bw, bx, by, bz) = a, b
     return (
         aw * bw - ax * bx - ay * by - az * bz,

@@ -1,1 +1,1 @@
-"""What environments observe: observables, cameras, and how pictures are drawn."""
+"""Observations of environments: observables, cameras and rendering."""

@@ -1,4 +1,4 @@
-"""Cameras of a scene: pictures, depths, segmentations, and where points are in them."""
+"""Cameras of a scene: pictures, depths, segmentations, projections."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from wbc_suite.control import RobotState
 from wbc_suite.sensing.projection import Projection, camera_id
-from wbc_suite.sensing.renderer import RenderPreset, make_renderer
-from wbc_suite.sensing.scene_renderer import SceneRenderer
+from wbc_suite.sensing.renderer import Renderer, RenderPreset, make_renderer
 from wbc_suite.sensing.segmentation import Labels, SegmentationLevel
 from wbc_suite.typing import Array
 
@@ -23,14 +22,14 @@ Picture = NDArray[Any]
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class CameraRequest:
-    """A camera that is observed.
+    """An observed camera.
 
     Attributes:
-        name: Name of the camera; keys begin with it.
-        width: Of its pictures, pixels.
-        height: Of its pictures, pixels.
+        name: Name of the camera; keys start with it.
+        width: Width of its pictures, pixels.
+        height: Height of its pictures, pixels.
         depth: Whether depth is observed.
-        segmentations: Levels of segmentation that are observed.
+        segmentations: Observed levels of segmentation.
     """
 
     name: str
@@ -40,7 +39,7 @@ class CameraRequest:
     segmentations: tuple[SegmentationLevel, ...] = ()
 
     def segmentation_key(self, level: SegmentationLevel) -> str:
-        """Return the key of a segmentation; with several levels it names its own."""
+        """Return the key of a segmentation; with several levels it names the level."""
         several = len(self.segmentations) > 1
         return f"{self.name}_segmentation" + (f"_{level}" if several else "")
 
@@ -48,19 +47,19 @@ class CameraRequest:
 class Cameras:
     """Takes pictures of a simulation.
 
-    Renderers are made when they are first needed, one for each size of picture, and
-    belong to the thread that asked first. Row 0 of a picture is its upper edge.
+    Renderers are made when they are first used, one for each size of picture, and
+    belong to the first thread that draws. Row 0 of a picture is its upper edge.
 
     Args:
         model: The scene.
         data: Its state.
         robots: The robots in it.
-        requests: What is observed.
-        preset: How much work goes into a picture; see `make_renderer`.
+        requests: The observed cameras.
+        preset: Quality of pictures; see `make_renderer`.
 
     Attributes:
-        labels: Numbers of segmentations, and what they stand for.
-        space: Spaces of what is observed, by key.
+        labels: Numbers of segmentations, and their names.
+        space: Spaces of the observed pictures, by key.
 
     Raises:
         UnknownNameError: If there is no such camera.
@@ -80,7 +79,7 @@ class Cameras:
         self._requests = tuple(requests)
         for request in self._requests:
             camera_id(model, request.name)
-        self._renderers: dict[tuple[int, int], SceneRenderer] = {}
+        self._renderers: dict[tuple[int, int], Renderer] = {}
         self._stale: set[tuple[int, int]] = set()
         self.space = {
             key: space
@@ -90,7 +89,7 @@ class Cameras:
 
     @property
     def far(self) -> float:
-        """Depth of the sky, m: nothing beyond it is drawn."""
+        """Depth of the background, m: the far clipping plane."""
         return float(np.float32(self._model.vis.map.zfar * self._model.stat.extent))
 
     @property
@@ -99,22 +98,22 @@ class Cameras:
         return tuple(self._model.camera(i).name for i in range(self._model.ncam))
 
     def observation(self) -> dict[str, Picture]:
-        """Take what is observed, by key."""
-        seen: dict[str, Picture] = {}
+        """Return the observed pictures, by key."""
+        pictures: dict[str, Picture] = {}
         for request in self._requests:
             renderer = self._aim(request.name, request.width, request.height)
-            seen[f"{request.name}_image"] = renderer.render()
+            pictures[f"{request.name}_image"] = renderer.render()
             if request.depth or request.segmentations:
                 renderer.draw_surfaces()
             if request.depth:
-                seen[f"{request.name}_depth"] = self._read_depth(renderer)
+                pictures[f"{request.name}_depth"] = self._read_depth(renderer)
             for level in request.segmentations:
                 key = request.segmentation_key(level)
-                seen[key] = self._read_labels(renderer, level)
-        return seen
+                pictures[key] = self._read_labels(renderer, level)
+        return pictures
 
     def black(self) -> dict[str, Picture]:
-        """Return what is observed where nothing can be seen, by key."""
+        """Return black pictures in place of the observed ones, by key."""
         return {
             key: np.zeros(space.shape or (), space.dtype)
             for key, space in self.space.items()
@@ -133,13 +132,13 @@ class Cameras:
     def segmentation(
         self, camera: str, *, width: int, height: int, level: SegmentationLevel | str
     ) -> NDArray[np.int32]:
-        """Return numbers of `labels`, 0 for the sky, shape (height, width, 1)."""
+        """Return numbers of `labels`, background 0, shape (height, width, 1)."""
         renderer = self._aim(camera, width, height)
         renderer.draw_surfaces()
         return self._read_labels(renderer, SegmentationLevel(level))
 
     def projection(self, camera: str, *, width: int, height: int) -> Projection:
-        """Return intrinsics and extrinsics, which lead from the world to pixels."""
+        """Return intrinsics and extrinsics of a camera."""
         camera_index = camera_id(self._model, camera)
         return Projection.of(
             self._model, self._data, camera_index, width=width, height=height
@@ -156,16 +155,16 @@ class Cameras:
         return self.projection(camera, width=width, height=height).normals(depth)
 
     def upload_textures(self) -> None:
-        """Let next pictures show textures that were written into the model."""
+        """Draw next pictures with the present textures of the model."""
         self._stale = set(self._renderers)
 
     def close(self) -> None:
-        """Free the renderers; a next picture makes them anew."""
+        """Free the renderers; the next picture makes new ones."""
         while self._renderers:
             self._renderers.popitem()[1].close()
 
-    def _aim(self, camera: str, width: int, height: int) -> SceneRenderer:
-        """Return a renderer whose scene is what the camera sees now."""
+    def _aim(self, camera: str, width: int, height: int) -> Renderer:
+        """Return a renderer with the present scene of a camera."""
         index, size = camera_id(self._model, camera), (width, height)
         renderer = self._renderers.get(size)
         if renderer is None:
@@ -176,16 +175,16 @@ class Cameras:
         elif size in self._stale:
             renderer.upload_textures()
         self._stale.discard(size)
-        mujoco.mj_camlight(self._model, self._data)  # else one physics step behind
+        mujoco.mj_camlight(self._model, self._data)  # otherwise one physics step behind
         renderer.update_scene(self._data, camera=index)
         return renderer
 
     def _read_labels(
-        self, renderer: SceneRenderer, level: SegmentationLevel
+        self, renderer: Renderer, level: SegmentationLevel
     ) -> NDArray[np.int32]:
         return renderer.read_geoms(self.labels.of_geoms(level))[..., None]
 
-    def _read_depth(self, renderer: SceneRenderer) -> NDArray[np.float32]:
+    def _read_depth(self, renderer: Renderer) -> NDArray[np.float32]:
         depth = renderer.read_depth()
         return np.minimum(depth, np.float32(self.far), out=depth)[..., None]
 

@@ -1,12 +1,10 @@
-"""Which OpenGL backend MuJoCo draws with, found out once per machine.
+"""Choice of the OpenGL backend that pictures are drawn with, once per machine.
 
-MuJoCo fixes its backend when it is imported (``MUJOCO_GL``, else a window system), and
-a backend that fails poisons the process. So candidates are tried in a subprocess, the
-first that draws wins, and the verdict is kept in the user's cache folder.
+A backend that fails leaves the process unusable for the others. So candidates are tried
+in subprocesses, the first that draws is taken, and the result is kept in the user's
+cache folder. `MUJOCO_GL` overrides the choice.
 """
 
-import contextlib
-import ctypes
 import functools
 import hashlib
 import importlib
@@ -16,27 +14,35 @@ import os
 import platform
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import mujoco
-from mujoco.rendering.classic import gl_context
-
+from wbc_suite.catalogue import user_cache
 from wbc_suite.errors import DeviceError
-from wbc_suite.user_cache import user_cache
 
-__all__ = ["GlBackend", "activate", "forget", "probe"]
+__all__ = [
+    "GlBackend",
+    "activate",
+    "context_class",
+    "forget",
+    "missing_environment",
+]
 
 logger = logging.getLogger(__name__)
 
 APT_COMMAND = "sudo apt-get install libegl1 libegl-mesa0 libgl1-mesa-dri libgles2"
-"""What mends a Debian or Ubuntu machine that cannot draw."""
+"""Makes a Debian or Ubuntu machine draw."""
 
 PIP_COMMAND = "pip install --no-deps --only-binary :all: lavavu-osmesa"
-"""What mends a Linux machine without root: a wheel that carries OSMesa."""
+"""Makes a Linux machine draw without root: a wheel that contains OSMesa."""
 
 _CANDIDATES = {"Linux": ("egl", "osmesa", "wheel"), "Darwin": ("cgl",)}
+_MODULES = ("egl", "osmesa", "cgl", "glfw")
+"""Modules of MuJoCo that hold a class of contexts."""
+
 _SOFTWARE = ("llvmpipe", "softpipe", "swiftshader", "swrast")
 _PROBE_SECONDS = 60.0
 
@@ -46,9 +52,9 @@ class GlBackend:
     """A backend that drew a picture on this machine.
 
     Attributes:
-        name: ``egl``, ``osmesa``, ``wheel`` (OSMesa out of the wheel lavavu-osmesa),
-            ``cgl``, or what ``MUJOCO_GL`` says.
-        renderer: What OpenGL calls the thing that draws, ``GL_RENDERER``.
+        name: ``egl``, ``osmesa``, ``wheel`` (OSMesa of the wheel lavavu-osmesa),
+            ``cgl``, or the value of ``MUJOCO_GL``.
+        renderer: OpenGL's name of the renderer, ``GL_RENDERER``.
     """
 
     name: str
@@ -62,94 +68,103 @@ class GlBackend:
 
 @functools.cache
 def activate() -> GlBackend:
-    """Choose a backend, make MuJoCo's renderer use it, and return it.
+    """Return the backend to draw with.
 
-    ``MUJOCO_GL`` is honoured. Otherwise the order is EGL, OSMesa, then OSMesa out of
-    the wheel ``lavavu-osmesa`` (the extra ``software-gl``).
+    ``MUJOCO_GL`` is honoured. Otherwise the order is EGL, OSMesa, then OSMesa of the
+    wheel ``lavavu-osmesa`` (the extra ``software-gl``). Libraries of a wheel are found
+    only if they are on the library path when Python starts; the command line starts
+    itself again with that path (`missing_environment`), scripts have to set it.
 
     Raises:
-        DeviceError: If nothing here can draw; the message holds the cure.
+        DeviceError: If no backend draws, or the environment of the wheel is not set;
+            the message names the remedy.
     """
-    wanted = os.environ.get("MUJOCO_GL", "").strip().lower()
-    backend = _from_environment(wanted) if wanted else _remembered() or _first_found()
-    if not wanted:
-        _install(backend.name)
+    if wanted := _wanted():
+        return GlBackend(name=wanted, renderer=_gl_renderer(wanted) or "unknown")
+    backend = _remembered() or _first_that_draws()
+    if missing := _missing(backend):
+        settings = " ".join(f"{key}={value}" for key, value in missing.items())
+        raise DeviceError(
+            "Pictures can be drawn with OSMesa of the wheel lavavu-osmesa if Python "
+            "is started with its libraries. wbc-suite does so from its next start on; "
+            f"for scripts: export {settings}"
+        )
     return backend
 
 
+def context_class() -> Callable[[int, int], Any]:
+    """Return MuJoCo's class of OpenGL contexts of the active backend.
+
+    Its arguments are width and height of the largest picture, pixels.
+
+    Raises:
+        DeviceError: See `activate`.
+    """
+    name = activate().name
+    module = f"mujoco.{name}" if name in _MODULES else "mujoco"
+    return importlib.import_module(module).GLContext
+
+
+def missing_environment() -> dict[str, str]:
+    """Return environment variables that Python must be started with to draw.
+
+    They are those of the backend found on this machine earlier; empty if nothing is
+    missing or no backend is known yet.
+    """
+    backend = None if _wanted() else _remembered()
+    return _missing(backend) if backend else {}
+
+
 def forget() -> None:
-    """Drop the remembered verdict, so that the next `activate` tries again."""
+    """Delete the remembered backend, so that the next `activate` searches again."""
     activate.cache_clear()
-    _verdict_path().unlink(missing_ok=True)
+    if not _wanted():
+        _cache_file().unlink(missing_ok=True)
 
 
-def probe(name: str) -> str:
-    """Draw with one backend in this process and return ``GL_RENDERER``.
-
-    For a subprocess: a backend that fails leaves the process unusable for the others.
-    """
-    _install(name)
-    spec = "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>"
-    model = mujoco.MjModel.from_xml_string(spec)
-    with mujoco.Renderer(model, 8, 8) as renderer:
-        renderer.update_scene(mujoco.MjData(model))
-        renderer.render()
-        return _gl_renderer()
+def _wanted() -> str:
+    return os.environ.get("MUJOCO_GL", "").strip().lower()
 
 
-def _gl_renderer() -> str:
-    gl = importlib.import_module("OpenGL.GL")
-    return str(gl.glGetString(gl.GL_RENDERER).decode())
+def _missing(backend: GlBackend) -> dict[str, str]:
+    return _wheel_environment() if backend.name == "wheel" else {}
 
 
-def _install(name: str) -> None:
-    """Let `mujoco.Renderer` make its contexts with the named backend."""
-    if name == "wheel":
-        _load_osmesa_from_wheel()
-    module = "osmesa" if name == "wheel" else name
-    context: Any = importlib.import_module(f"mujoco.{module}").GLContext
-    gl_context.GLContext = context
-
-
-def _load_osmesa_from_wheel() -> None:
-    """Give PyOpenGL the OSMesa library that the wheel lavavu-osmesa carries.
-
-    PyOpenGL looks for system libraries only; so its platform object gets this one.
-    """
+def _wheel_library() -> Path | None:
+    """Return the OSMesa library of the wheel lavavu-osmesa, if it is installed."""
     folders = (Path(entry) / "lavavu_osmesa.libs" for entry in sys.path)
-    folder = next((folder for folder in folders if folder.is_dir()), None)
-    if folder is None:
+    return next((lib for f in folders for lib in f.glob("libOSMesa*.so*")), None)
+
+
+def _wheel_environment() -> dict[str, str]:
+    """Return the environment that makes PyOpenGL find the OSMesa of the wheel.
+
+    The wheel's libraries have a hash in their names, so a link of the usual name leads
+    to them.
+
+    Raises:
+        ImportError: If the wheel is not installed.
+    """
+    library = _wheel_library()
+    if library is None:
         raise ImportError("the wheel lavavu-osmesa is not installed")
-    loaded = _load_all(sorted(folder.glob("*.so*")))
-    library = next(lib for name, lib in loaded.items() if "OSMesa" in name)
-    os.environ["PYOPENGL_PLATFORM"] = "osmesa"  # what mujoco.osmesa does too
-    opengl: Any = importlib.import_module("OpenGL.platform")
-    opengl.PLATFORM.GL = opengl.PLATFORM.OSMesa = library
-    opengl.PLATFORM.install(vars(opengl))
+    link = user_cache() / "osmesa" / "libOSMesa.so.8"
+    if not (link.is_symlink() and link.readlink() == library):
+        link.parent.mkdir(parents=True, exist_ok=True)
+        partial = link.with_name(f"{link.name}.{os.getpid()}")
+        partial.symlink_to(library)
+        partial.replace(link)
+    path = [str(link.parent), str(library.parent), os.environ.get("LD_LIBRARY_PATH")]
+    return {
+        "MUJOCO_GL": "osmesa",
+        "PYOPENGL_PLATFORM": "osmesa",
+        "LD_LIBRARY_PATH": os.pathsep.join(filter(None, path)),
+    }
 
 
-def _load_all(files: list[Path]) -> dict[str, ctypes.CDLL]:
-    """Load libraries that need one another, in whatever order works."""
-    loaded: dict[str, ctypes.CDLL] = {}
-    for _ in files:
-        for file in files:
-            if file.name not in loaded:
-                with contextlib.suppress(OSError):  # what it needs comes first
-                    library = ctypes.CDLL(str(file), mode=ctypes.RTLD_GLOBAL)
-                    loaded[file.name] = library
-    if len(loaded) < len(files):
-        raise ImportError("the libraries of the wheel lavavu-osmesa do not load")
-    return loaded
-
-
-def _from_environment(wanted: str) -> GlBackend:
-    """Report the backend the user chose; MuJoCo has taken it at import already."""
-    return GlBackend(name=wanted, renderer=_ask_subprocess(wanted) or "unknown")
-
-
-def _first_found() -> GlBackend:
+def _first_that_draws() -> GlBackend:
     for name in _CANDIDATES.get(platform.system(), ()):
-        renderer = _ask_subprocess(name)
+        renderer = _gl_renderer(name)
         if renderer is not None:
             backend = GlBackend(name=name, renderer=renderer)
             logger.info("drawing with %s (%s)", name, renderer)
@@ -162,46 +177,61 @@ def _first_found() -> GlBackend:
     )
 
 
-def _ask_subprocess(name: str) -> str | None:
-    """Return ``GL_RENDERER`` of one backend, or None when it cannot draw."""
-    code = f"from {__name__} import probe; print('\\n' + probe({name!r}))"
+_PROBE = r"""
+import mujoco
+model = mujoco.MjModel.from_xml_string(
+    "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>"
+)
+with mujoco.Renderer(model, 8, 8) as renderer:
+    renderer.update_scene(mujoco.MjData(model))
+    renderer.render()
+    from OpenGL import GL
+    print("\n" + GL.glGetString(GL.GL_RENDERER).decode())
+"""
+
+
+def _gl_renderer(name: str) -> str | None:
+    """Return ``GL_RENDERER`` of one backend, or None if it cannot draw."""
     environment = dict(os.environ)
-    environment.pop("MUJOCO_GL", None)
     environment.pop("PYOPENGL_PLATFORM", None)
     try:
+        wheel = name == "wheel"
+        environment |= _wheel_environment() if wheel else {"MUJOCO_GL": name}
         result = subprocess.run(
-            [sys.executable, "-c", code],
+            [sys.executable, "-c", _PROBE],
             capture_output=True,
             text=True,
             timeout=_PROBE_SECONDS,
             env=environment,
             check=True,
         )
-    except (subprocess.CalledProcessError, subprocess.TimeoutExpired) as error:
+    except (ImportError, OSError, subprocess.SubprocessError) as error:
         logger.debug("GL backend %s cannot draw: %s", name, error)
         return None
     return result.stdout.splitlines()[-1]
 
 
-def _verdict_path() -> Path:
-    machine = f"{platform.node()} {sys.prefix} {mujoco.__version__}"
+def _cache_file() -> Path:
+    machine = f"{platform.node()} {sys.prefix} {version('mujoco')}"
     key = hashlib.sha256(machine.encode()).hexdigest()[:12]
     return user_cache() / f"gl_backend_{key}.json"
 
 
 def _remembered() -> GlBackend | None:
     try:
-        return GlBackend(**json.loads(_verdict_path().read_text()))
+        backend = GlBackend(**json.loads(_cache_file().read_text()))
     except (OSError, ValueError, TypeError):
         return None
+    gone = backend.name == "wheel" and _wheel_library() is None
+    return None if gone else backend
 
 
 def _remember(backend: GlBackend) -> None:
-    path = _verdict_path()
+    path = _cache_file()
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         partial = path.with_suffix(f".{os.getpid()}")
         partial.write_text(json.dumps(asdict(backend)))
         partial.replace(path)
     except OSError as error:
-        logger.debug("the GL verdict could not be kept: %s", error)
+        logger.debug("the GL backend could not be remembered: %s", error)

@@ -1,4 +1,4 @@
-"""Hands of a robot in a scene: where they are, and what they hold."""
+"""Hands of a robot in a scene: positions and grasps."""
 
 from collections.abc import Collection, Sequence
 
@@ -12,12 +12,12 @@ __all__ = ["Hand", "gripper_links", "hands_of", "pairs_in_contact"]
 
 
 def pairs_in_contact(data: mujoco.MjData) -> list[list[int]]:
-    """Return the two geoms of each contact; where there is none, at no cost."""
+    """Return the two geoms of each contact."""
     return data.contact.geom.tolist() if data.ncon else []
 
 
 class Hand:
-    """One hand: the site between its fingers and the bodies that can touch.
+    """One hand: the site between its fingers, and the bodies of its gripper.
 
     Args:
         state: The robot in the simulation.
@@ -27,7 +27,7 @@ class Hand:
 
     Attributes:
         site: The frame's site in the simulation.
-        gripper_bodies: The gripper's bodies, and the one that it hangs on.
+        gripper_bodies: Bodies of the gripper, with the one it is mounted on.
     """
 
     def __init__(
@@ -55,7 +55,7 @@ class Hand:
         return geom in self._body_of
 
     def grasps(self, geoms: Collection[int]) -> bool:
-        """Whether two different links of the gripper touch geoms of a thing."""
+        """Whether two different links of the gripper touch geoms of an object."""
         touching = {
             self._body_of.get(b if a in geoms else a)
             for a, b in pairs_in_contact(self._data)
@@ -74,7 +74,7 @@ def hands_of(state: RobotState) -> tuple[Hand, ...]:
 
 
 def gripper_links(robot: RobotDescription, side: str, frame: str) -> list[str]:
-    """Return the links that the side's gripper moves, and the one they hang on."""
+    """Return the links moved by the gripper of a side, and those that carry them."""
     joints = {
         joint
         for synergy in robot.synergies.get(f"{side}_gripper", ())
@@ -84,11 +84,11 @@ def gripper_links(robot: RobotDescription, side: str, frame: str) -> list[str]:
     palms: set[str] = set()
     for link in robot.links:
         joint = link.joint
-        leads = joint is not None and (
+        driven = joint is not None and (
             joint.name in joints
             or (joint.mimic is not None and joint.mimic.joint in joints)
         )
-        if leads or (joint is None and link.parent in moved):
+        if driven or (joint is None and link.parent in moved):
             moved.add(link.name)
             if link.parent is not None and link.parent not in moved:
                 palms.add(link.parent)

@@ -1,6 +1,6 @@
-"""What makes observations worse than the truth: noise, delays, filters.
+"""Noise, delays and filters of observations.
 
-Any function of the same shape serves in their place: noise takes values and a
+Any function of the same signature may take their place: noise takes values and a
 generator, a delay takes a generator and returns seconds, a filter takes values.
 """
 
@@ -61,10 +61,11 @@ class UniformDelay:
 
 
 class LowPass:
-    """Keeps a share of the old value: y = share y + (1 - share) x.
+    """First-order low-pass filter: y = share y + (1 - share) x.
 
     Args:
-        share: In [0, 1); after n samples a step is met but for share^n.
+        share: Share of the old value, in [0, 1); after n samples share^n of a step is
+            left.
     """
 
     def __init__(self, share: float) -> None:
@@ -73,7 +74,7 @@ class LowPass:
         self._value: Vector | None = None
 
     def reset(self) -> None:
-        """Forget."""
+        """Delete the past."""
         self._value = None
 
     def __call__(self, values: Vector) -> Vector:
@@ -84,10 +85,10 @@ class LowPass:
 
 
 class MovingAverage:
-    """The mean of the last samples.
+    """Mean of the last samples.
 
     Args:
-        count: How many.
+        count: Number of samples.
     """
 
     def __init__(self, count: int) -> None:
@@ -95,7 +96,7 @@ class MovingAverage:
         self._last: list[Vector] = []
 
     def reset(self) -> None:
-        """Forget."""
+        """Delete the past."""
         self._last = []
 
     def __call__(self, values: Vector) -> Vector:

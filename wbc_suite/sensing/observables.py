@@ -1,7 +1,7 @@
 """Observations that are sampled, delayed, noisy, filtered, added or left out.
 
-While nothing is changed, all of this is one call of `Observer.look` a step.
-Observations that are changed follow physics step by step.
+Unchanged observations are read once a control period, changed ones after every physics
+step.
 """
 
 import copy
@@ -15,7 +15,7 @@ import numpy as np
 
 from wbc_suite.arguments import check_number
 from wbc_suite.errors import ConfigError, UnknownNameError
-from wbc_suite.sensing.observer import Observer
+from wbc_suite.sensing.observation_buffer import ObservationBuffer
 from wbc_suite.sensing.reading import Reading
 from wbc_suite.typing import Vector
 
@@ -29,15 +29,15 @@ Maker: TypeAlias = Callable[[mujoco.MjModel, mujoco.MjData], Reading]
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Change:
-    """How an observation differs from the truth.
+    """How an observation differs from the true value.
 
     Attributes:
-        noise: Makes noisy values out of values and a generator.
-        delay: s, or what draws it for each sample.
-        filter: Makes values out of noisy ones; its `reset` is called at a reset.
-        sampling_rate: Samples a second; None for one in every physics step.
-        enabled: Whether samples are taken; else the last value stays.
-        active: Whether it is in observations and in their space.
+        noise: Function of values and a generator that returns noisy values.
+        delay: Delay, s, or a function that draws one for each sample.
+        filter: Function that returns filtered values; its `reset` is called at a reset.
+        sampling_rate: Samples per second; None for one per physics step.
+        enabled: Whether samples are taken; otherwise the last value is kept.
+        active: Whether the key is part of observations and of their space.
     """
 
     noise: Noise | None = None
@@ -61,7 +61,7 @@ class Change:
 
 
 class Observables:
-    """All that is observed of one simulation but pictures.
+    """All observations of one simulation but pictures.
 
     Args:
         model: The scene.
@@ -69,8 +69,8 @@ class Observables:
         groups: Readings by key, by the group's key.
 
     Attributes:
-        observer: What was seen last; another one after keys came or went.
-        changes: What differs from the truth, by key.
+        buffer: The last observation; a new one after keys were added or removed.
+        changes: Changes of observations, by key.
     """
 
     def __init__(
@@ -85,11 +85,11 @@ class Observables:
         self.changes: dict[str, Change] = {}
         self._channels: dict[str, _Channel] = {}
         self._rng = np.random.default_rng(0)
-        self.observer = Observer(data, self._groups)
+        self.buffer = ObservationBuffer(data, self._groups)
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Keys of all observations, also of those that are not active."""
+        """Keys of all observations, inactive ones included."""
         return tuple(key for group in self._groups.values() for key in group)
 
     def modify(self, key: str, **changes: Any) -> None:
@@ -97,7 +97,7 @@ class Observables:
 
         Raises:
             UnknownNameError: If there is no such observation, or no such change.
-            ConfigError: If a value is wrong. Then nothing has changed.
+            ConfigError: If a value is wrong; then nothing has changed.
         """
         if key not in self.names:
             raise UnknownNameError("observation", key, self.names)
@@ -114,13 +114,13 @@ class Observables:
         self._connect(key)
 
     def add(self, key: str, make: Maker, *, group: str, **changes: Any) -> None:
-        """Observe something else from now on.
+        """Add an observation from now on.
 
         Args:
-            key: Its key, a new one.
-            make: Makes the reading out of model and data; copies of the environment
-                call it again.
-            group: The key of the vector that holds it too; it may be new.
+            key: A new key.
+            make: Function of model and data that returns the reading; copies of the
+                environment call it again.
+            group: Key of the vector that includes it; it may be new.
             changes: See `modify`.
 
         Raises:
@@ -135,34 +135,32 @@ class Observables:
             self.modify(key, **changes)
 
     def start(self, rng: np.random.Generator) -> None:
-        """Begin an episode; noise is drawn from a generator that `rng` seeds."""
+        """Start an episode; noise is drawn from a generator that `rng` seeds."""
         if self.changes:
             self._rng = np.random.default_rng(rng.integers(2**63))
-        self.observer.start()
-        self.observer.look()
+        self.buffer.update()
         for channel in self._channels.values():
-            channel.start(self.observer.values, self._rng)
+            channel.start(self.buffer.values, self._rng)
         self._show()
 
-    def tick(self, tick: Callable[[int], None], n: int) -> None:
-        """Advance physics by n steps, and look at every one if anything is changed."""
-        if not self._channels:
-            tick(n)
-            return
-        for _ in range(n):
-            tick(1)
-            self.observer.look()
-            for channel in self._channels.values():
-                channel.sample(self.observer.values, self._rng)
+    @property
+    def follows_physics(self) -> bool:
+        """Whether `sample` must be called after every physics step."""
+        return bool(self._channels)
 
-    def look(self) -> None:
-        """Read everything into `observer.values`, and put in what is changed."""
-        self.observer.look()
-        if self._channels:
-            self._show()
+    def sample(self) -> None:
+        """Take the samples of changed observations after one physics step."""
+        self.buffer.update()
+        for channel in self._channels.values():
+            channel.sample(self.buffer.values, self._rng)
+
+    def update(self) -> None:
+        """Read everything into `buffer.values`, with the changes applied."""
+        self.buffer.update()
+        self._show()
 
     def state(self) -> dict[str, Any]:
-        """Return what a copy needs; see `restore`."""
+        """Return the state that `prepare` and `restore` take."""
         return {
             "added": self._added,
             "changes": self.changes,
@@ -171,7 +169,7 @@ class Observables:
         }
 
     def prepare(self, state: Mapping[str, Any]) -> None:
-        """Add and change what the original has."""
+        """Add and change the same observations as the original."""
         for key, (group, make) in state["added"].items():
             self.add(key, make, group=group)
         for key, change in state["changes"].items():
@@ -179,19 +177,19 @@ class Observables:
                 self.modify(key, **{k: getattr(change, k) for k in Change.__slots__})
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Go on from where the original stands."""
+        """Continue from the state of the original."""
         self._rng = state["rng"]
-        for key, known in state["channels"].items():
+        for key, saved in state["channels"].items():
             if key in self._channels:
-                self._channels[key].state = known
-        self.look()
+                self._channels[key].state = saved
+        self.update()
 
     def _show(self) -> None:
         for channel in self._channels.values():
-            channel.show(self.observer.values)
+            channel.show(self.buffer.values)
 
     def _rebuild(self) -> None:
-        """Make an observer of the active ones."""
+        """Make a buffer of the active observations."""
         groups = {
             name: {
                 key: reading
@@ -200,28 +198,28 @@ class Observables:
             }
             for name, group in self._groups.items()
         }
-        self.observer = Observer(self._data, groups)
+        self.buffer = ObservationBuffer(self._data, groups)
         for channel in list(self._channels):
             self._connect(channel)
-        self.look()
+        self.update()
 
     def _connect(self, key: str) -> None:
-        """Let a channel stand between truth and observation, where it is changed."""
+        """Make the channel of an observation that is changed."""
         change, old = self.changes.get(key), self._channels.pop(key, None)
         if change is None or not change.active:
             return
-        place = self.observer.places[key]
-        bound = self.observer.bounds[key]
+        place = self.buffer.places[key]
+        bound = self.buffer.bounds[key]
         channel = _Channel(change, place, bound, self._model.opt.timestep)
         if old is None:
-            channel.start(self.observer.values, self._rng)
+            channel.start(self.buffer.values, self._rng)
         else:
-            channel.state = old.state
+            channel.continue_from(old)
         self._channels[key] = channel
 
 
 class _Channel:
-    """What stands between the truth and one observation."""
+    """Sampling, noise, filter and delay of one observation."""
 
     def __init__(
         self, change: Change, place: slice, bound: float, timestep: float
@@ -236,17 +234,22 @@ class _Channel:
 
     @property
     def state(self) -> tuple[Any, ...]:
-        """Everything that changes, to go on with."""
+        """Step count, filter, shown values and samples still delayed."""
         return self._step, self._filter, self._shown, self._coming
 
     @state.setter
-    def state(self, known: tuple[Any, ...]) -> None:
-        self._step, kept, self._shown, self._coming = known
-        if type(kept) is type(self._filter):
-            self._filter = kept
+    def state(self, saved: tuple[Any, ...]) -> None:
+        self._step, self._filter, self._shown, self._coming = saved
+
+    def continue_from(self, old: "_Channel") -> None:
+        """Take over the samples of the channel before a change, and a kept filter."""
+        own = self._filter
+        self.state = old.state
+        if self._change.filter is not old._change.filter:
+            self._filter = own
 
     def start(self, values: Vector, rng: np.random.Generator) -> None:
-        """Take a first sample, and show it at once."""
+        """Take a first sample without delay."""
         self._step, self._coming = 0, deque()
         reset = getattr(self._filter, "reset", None)
         if reset is not None:
@@ -257,7 +260,7 @@ class _Channel:
         )
 
     def sample(self, values: Vector, rng: np.random.Generator) -> None:
-        """Follow one physics step."""
+        """Take a sample if one is due, and release those whose delay is over."""
         self._step += 1
         if self._change.enabled and self._step % self._period == 0:
             delay = self._change.delay
@@ -269,7 +272,7 @@ class _Channel:
             self._shown = self._coming.popleft()[1]
 
     def show(self, values: Vector) -> None:
-        """Put what is observed in the place of the truth."""
+        """Write the observed values over the true ones."""
         values[self._place] = self._shown
 
     def _taken(self, values: Vector, rng: np.random.Generator) -> Vector:

@@ -1,4 +1,4 @@
-"""From the world into a picture and back: intrinsics, extrinsics, points, normals."""
+"""Projections between the world and pictures: intrinsics, extrinsics, normals."""
 
 from dataclasses import dataclass
 
@@ -12,12 +12,12 @@ from wbc_suite.typing import Array, Matrix, Vector
 __all__ = ["Projection", "camera_id"]
 
 FLIP = np.diag([1.0, -1.0, -1.0])
-"""From OpenGL's camera axes, which MuJoCo has (y up, z back), to OpenCV's."""
+"""From the camera axes of OpenGL and MuJoCo (y up, z back) to those of OpenCV."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Projection:
-    """A pinhole camera at one moment.
+    """A pinhole camera at one time.
 
     The camera's axes are OpenCV's: x right, y down, z forward. Pixels are (u, v),
     columns before rows; whole numbers are the middles of pixels, (0, 0) is the upper
@@ -26,8 +26,8 @@ class Projection:
     Attributes:
         K: Intrinsics, pixels, shape (3, 3): (u, v, 1) ~ K (x, y, z).
         T_wc: Extrinsics: pose of the camera in the world, shape (4, 4).
-        width: Of the picture, pixels.
-        height: Of the picture, pixels.
+        width: Width of the picture, pixels.
+        height: Height of the picture, pixels.
     """
 
     K: Matrix
@@ -45,7 +45,7 @@ class Projection:
         width: int,
         height: int,
     ) -> "Projection":
-        """Return how a camera of the scene projects now."""
+        """Return the present projection of a camera of the scene."""
         mujoco.mj_camlight(model, data)  # a step leaves cameras one step behind
         T_wc = np.eye(4)
         T_wc[:3, :3] = data.cam_xmat[camera].reshape(3, 3) @ FLIP
@@ -62,17 +62,16 @@ class Projection:
 
         Returns:
             Pixels, shape (..., 2), and depths along the camera's axis, m, shape (...).
-            A depth that is not positive lies behind the camera; its pixel means
-            nothing.
+            Points with a depth <= 0 are behind the camera; their pixels are invalid.
         """
-        seen = self._from_world(np.asarray(points, dtype=np.float64))
-        depth = seen[..., 2]
+        local = self._from_world(np.asarray(points, dtype=np.float64))
+        depth = local[..., 2]
         with np.errstate(divide="ignore", invalid="ignore"):
-            pixels = (seen @ self.K.T)[..., :2] / depth[..., None]
+            pixels = (local @ self.K.T)[..., :2] / depth[..., None]
         return pixels, depth
 
     def to_world(self, pixels: ArrayLike, depth: ArrayLike) -> Array:
-        """Return the points of the world seen at pixels.
+        """Return the points of the world at pixels.
 
         Args:
             pixels: (u, v), shape (..., 2).
@@ -98,10 +97,10 @@ class Projection:
         return self.to_world(pixels, flat)
 
     def normals(self, depth: ArrayLike) -> Array:
-        """Return the surface's normal at each pixel, in the world, towards the camera.
+        """Return the surface normal at each pixel, in the world, towards the camera.
 
-        They come from differences of neighbouring points, so along edges they mix two
-        surfaces.
+        Normals are computed from differences of neighbouring points, so they are wrong
+        along edges.
 
         Args:
             depth: As `point_cloud` takes it.
@@ -125,8 +124,8 @@ class Projection:
 def camera_id(model: mujoco.MjModel, name: str) -> int:
     """Return the index of a camera.
 
-    A robot with one hand also answers to `robot0_eye_in_hand`, the name in datasets of
-    this field, for its `robot0_right_eye_in_hand`.
+    `robot0_right_eye_in_hand` of a robot with one hand may also be called
+    `robot0_eye_in_hand`, as in existing datasets.
 
     Raises:
         UnknownNameError: If there is no such camera.
@@ -143,7 +142,7 @@ def camera_id(model: mujoco.MjModel, name: str) -> int:
 
 
 def _intrinsics(model: mujoco.MjModel, camera: int, width: int, height: int) -> Matrix:
-    """Return K: of the camera's sensor where it has one, else of its field of view."""
+    """Return K from the camera's sensor, or from its field of view without one."""
     sensor = model.cam_sensorsize[camera]
     K = np.eye(3)
     if sensor[1] > 0.0:

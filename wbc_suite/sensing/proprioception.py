@@ -1,9 +1,17 @@
-"""What a robot feels of itself, under the keys that this field's datasets use."""
+"""Readings of a robot: joints, base, hands, grippers and sensors.
+
+Keys are those of existing datasets.
+"""
+
+import mujoco
+import numpy as np
 
 from wbc_suite.control import RobotState
-from wbc_suite.sensing.hands import hands_of
+from wbc_suite.robot import RobotDescription
+from wbc_suite.sensing.hands import gripper_links, hands_of
 from wbc_suite.sensing.reading import (
     Reading,
+    actuator_forces,
     body_position,
     body_quat,
     computed,
@@ -11,19 +19,27 @@ from wbc_suite.sensing.reading import (
     joint_positions,
     joint_sines,
     joint_velocities,
+    sensor_values,
     site_position,
     site_quat,
 )
 
-__all__ = ["proprioception"]
+__all__ = ["add_contact_sensors", "proprioception", "sensors_of"]
+
+FOUND, FORCE = (
+    mujoco.mjtConDataField.mjCONDATA_FOUND,
+    mujoco.mjtConDataField.mjCONDATA_FORCE,
+)
+NET_FORCE = 3
+"""MuJoCo's reduction of contacts to their sum, in world axes."""
 
 
 def proprioception(state: RobotState) -> dict[str, Reading]:
     """Return the joint, base, hand and gripper readings of one robot.
 
-    Keys begin with the robot's prefix. Joints are all but those of grippers, in the
-    robot's order; with several hands their keys begin with `right_` and `left_`.
-    Quaternions are x y z w, as in those datasets. Positions are in the world.
+    Keys start with the robot's prefix. Joints are all but those of grippers, in the
+    robot's order; with several hands their keys start with `right_` and `left_`.
+    Quaternions are x y z w, positions are in the world.
 
     Args:
         state: The robot in the simulation.
@@ -33,14 +49,7 @@ def proprioception(state: RobotState) -> dict[str, Reading]:
 
 
 def _joints(state: RobotState) -> dict[str, Reading]:
-    fingers = {joint for joints in _gripper_groups(state).values() for joint in joints}
-    q, v = state.joint_addresses(
-        tuple(
-            joint.name
-            for joint in state.robot.joints
-            if joint.name not in fingers and joint.mimic is None
-        )
-    )
+    q, v = state.joint_addresses(_body_joints(state.robot))
     return {
         "joint_pos": joint_positions(q),
         "joint_pos_cos": joint_cosines(q),
@@ -73,7 +82,7 @@ def _hands(state: RobotState) -> dict[str, Reading]:
 
 
 def _grippers(state: RobotState) -> dict[str, Reading]:
-    grippers = _gripper_groups(state)
+    grippers = _gripper_groups(state.robot)
     readings: dict[str, Reading] = {}
     for name, joints in grippers.items():
         key = name if len(grippers) > 1 else "gripper"
@@ -83,9 +92,102 @@ def _grippers(state: RobotState) -> dict[str, Reading]:
     return readings
 
 
-def _gripper_groups(state: RobotState) -> dict[str, tuple[str, ...]]:
+def _gripper_groups(robot: RobotDescription) -> dict[str, tuple[str, ...]]:
     return {
         name: tuple(joints)
-        for name, joints in state.robot.groups.items()
+        for name, joints in robot.groups.items()
         if name.endswith("gripper") and joints
     }
+
+
+def _body_joints(robot: RobotDescription) -> tuple[str, ...]:
+    """Return the independent joints but those of grippers, in the robot's order."""
+    fingers = {joint for joints in _gripper_groups(robot).values() for joint in joints}
+    return tuple(
+        joint.name
+        for joint in robot.joints
+        if joint.name not in fingers and joint.mimic is None
+    )
+
+
+def add_contact_sensors(
+    spec: mujoco.MjSpec, robot: RobotDescription, prefix: str
+) -> None:
+    """Add a sensor of the net contact force of each foot and gripper link."""
+    links = {f"{frame}_contact": link for frame, link in _feet(robot).items()}
+    for side in robot.hands:
+        links |= {f"{side}_touch_{link}": link for link in _touching(robot, side)}
+    for name, link in links.items():
+        spec.add_sensor(
+            name=prefix + name,
+            type=mujoco.mjtSensor.mjSENS_CONTACT,
+            objtype=mujoco.mjtObj.mjOBJ_BODY,
+            objname=prefix + link,
+            intprm=[1 << int(FOUND) | 1 << int(FORCE), NET_FORCE, 1],
+        )
+
+
+def sensors_of(state: RobotState) -> dict[str, Reading]:
+    """Return the readings of one robot's sensors.
+
+    - `joint_torque`: torques of the motors of all joints but the grippers'.
+    - The sensors of the description by their names: force N, torque N m, gyro rad/s,
+      accelerometer m/s^2 with gravity, touch N; in the axes of their frames.
+    - `_contact` of each foot, 1 on the ground and 0 in the air, and `_contact_force`,
+      the force on it in the world, N.
+    - `_touch` of each hand: contact force of each gripper link with a collision shape,
+      N, in the robot's order.
+
+    MuJoCo computes sensors during a step, so they are one physics step behind positions
+    unless `lite_physics=False`.
+    """
+    robot, model = state.robot, state.model
+    _, v = state.joint_addresses(_body_joints(robot))
+    readings = {"joint_torque": actuator_forces(v)}
+    for sensor in robot.sensors:
+        first, size = _place(model, state.prefix + sensor.name)
+        readings[sensor.name] = sensor_values(range(first, first + size))
+    for frame in _feet(robot):
+        first, _ = _place(model, f"{state.prefix}{frame}_contact")
+        readings[f"{frame}_contact"] = _found(state.data, first)
+        # MuJoCo gives the force of the foot on the ground.
+        readings[f"{frame}_contact_force"] = sensor_values(
+            range(first + 1, first + 4), negated=True
+        )
+    for side in robot.hands:
+        links = _touching(robot, side)
+        names = [f"{state.prefix}{side}_touch_{link}" for link in links]
+        if names:
+            firsts = [_place(model, name)[0] for name in names]
+            readings[f"{side}_touch"] = _pressed(state.data, firsts)
+    return {state.prefix + key: reading for key, reading in readings.items()}
+
+
+def _feet(robot: RobotDescription) -> dict[str, str]:
+    """Return the link of each foot by its frame."""
+    return {f.name: f.link for f in robot.frames if f.role == "foot"}
+
+
+def _touching(robot: RobotDescription, side: str) -> list[str]:
+    """Return the links of a gripper with collision shapes, in the robot's order."""
+    links = gripper_links(robot, side, robot.hands[side])
+    return [k.name for k in robot.links if k.name in links and k.collision]
+
+
+def _found(data: mujoco.MjData, first: int) -> Reading:
+    """Read whether a contact sensor has a contact."""
+    count = data.sensordata[first : first + 1]
+    return computed(1, lambda: count > 0.0)
+
+
+def _pressed(data: mujoco.MjData, firsts: list[int]) -> Reading:
+    """Read the norms of the forces of contact sensors, N."""
+    places = np.add.outer(firsts, np.arange(1, 4))
+    return computed(
+        len(firsts), lambda: np.linalg.norm(data.sensordata[places], axis=1)
+    )
+
+
+def _place(model: mujoco.MjModel, name: str) -> tuple[int, int]:
+    sensor = model.sensor(name)
+    return int(sensor.adr[0]), int(sensor.dim[0])

@@ -1,4 +1,4 @@
-"""What pixels belong to: elements, instances and classes of a scene."""
+"""Labels of segmentations: elements, instances and classes of a scene."""
 
 import re
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ __all__ = ["Labels", "SegmentationLevel"]
 
 
 class SegmentationLevel(StrEnum):
-    """How finely pixels are told apart."""
+    """Granularity of a segmentation."""
 
     ELEMENT = "element"
     """Each geom on its own."""
@@ -23,19 +23,19 @@ class SegmentationLevel(StrEnum):
     """Each robot without its grippers, each gripper, each piece of furniture and each
     object."""
     CLASS = "class"
-    """All robots of a kind, all grippers, all things whose names differ only by a
+    """All robots of a kind, all grippers, all objects whose names differ only by a
     number or a capital letter at the end (`cubeA`, `cubeB`: `cube`)."""
 
 
 class Labels:
-    """Numbers of what can be seen, 1, 2, ...; 0 is the sky.
+    """Numbers of visible geoms, 1, 2, ...; 0 is the background.
 
     Args:
         model: The scene.
         robots: The robots in it.
 
     Attributes:
-        names: What each number stands for, by level.
+        names: Name of each number, by level.
     """
 
     def __init__(self, model: mujoco.MjModel, robots: Sequence[RobotState]) -> None:
@@ -64,16 +64,16 @@ class Labels:
             self._numbers[level] = np.array([*numbers, 0], dtype=np.int32)
 
     def largest(self, level: SegmentationLevel) -> int:
-        """Return the largest number that a pixel may have."""
+        """Return the largest number of a level."""
         return max(self.names[level], default=0)
 
     def of_geoms(self, level: SegmentationLevel) -> NDArray[np.int32]:
-        """Return the number of each geom and last the sky's 0, shape (ngeom + 1,)."""
+        """Return the number of each geom, then 0, shape (ngeom + 1,)."""
         return self._numbers[level]
 
 
 def _instances(model: mujoco.MjModel, robots: Sequence[RobotState]) -> list[str]:
-    """Return the instance that each body belongs to."""
+    """Return the instance of each body."""
     found = [
         model.body(int(root)).name or f"body{int(root)}" for root in model.body_rootid
     ]

@@ -1,1 +1,1 @@
-"""How people see a simulation: pictures, pages, windows."""
+"""Pictures, browser pages and windows of simulations."""

@@ -1,4 +1,4 @@
-"""Where a camera has to stand so that all of the subject is in the picture."""
+"""Placement of a camera so that a picture contains the whole subject."""
 
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
@@ -15,15 +15,14 @@ ViewName: TypeAlias = Literal["three_quarter", "front", "side", "back"]
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class View:
-    """A direction to look along; the distance follows from what is to be seen.
+    """The direction of a camera; its distance follows from the subject.
 
     Attributes:
-        azimuth: Degrees about the world's z axis, of the direction in which the camera
-            looks: 180 looks back along -x, into the face of a robot that faces +x.
-        elevation: Degrees above the horizon of the direction in which the camera
-            looks; negative looks down.
-        fov: Vertical field of view in degrees.
-        margin: How many times larger than the subject the picture is.
+        azimuth: Viewing direction about the world's z axis, degrees; 180 is along -x,
+            into the face of a robot that faces +x.
+        elevation: Viewing direction above the horizon, degrees; negative looks down.
+        fov: Vertical field of view, degrees.
+        margin: Size of the picture over that of the subject.
     """
 
     azimuth: float
@@ -41,7 +40,7 @@ VIEWS: dict[ViewName, View] = {
 
 
 def fit_camera(view: View, points: Matrix, *, aspect: float) -> mujoco.MjvCamera:
-    """Place a free camera so that all points fit into the picture.
+    """Return a free camera that has all points in its picture.
 
     In camera axes a point at offset (r, u, f) to the right, up and forward of the
     look-at point is inside when ``|u| <= (d + f) tan(fov / 2)`` and ``|r| <= aspect
@@ -49,7 +48,7 @@ def fit_camera(view: View, points: Matrix, *, aspect: float) -> mujoco.MjvCamera
 
     Args:
         view: The direction.
-        points: What has to be seen, shape (n, 3), m, world axes.
+        points: Points of the subject, m, world axes, shape (n, 3).
         aspect: Width over height of the picture.
     """
     right, up, forward = _camera_axes(view)
@@ -88,7 +87,7 @@ def subject_corners(
     """
     signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8).T
     seen = model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE
-    seen &= model.geom_group < 3  # what MuJoCo's viewers hide by default
+    seen &= model.geom_group < 3  # hidden by default in MuJoCo's viewers
     names = (model.body(body).name for body in model.geom_bodyid)
     seen &= np.array([name.startswith(subject) for name in names])
     centre, half = model.geom_aabb[seen, :3], model.geom_aabb[seen, 3:]

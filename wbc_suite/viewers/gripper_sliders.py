@@ -1,4 +1,4 @@
-"""The sliders of one gripper: people move them, and they show what others command."""
+"""Sliders that set a gripper and display what devices and other clients command."""
 
 import time
 from typing import TYPE_CHECKING
@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wbc_suite.typing import Vector
-from wbc_suite.viewers.drivable import Drivable
-from wbc_suite.viewers.words import plain
+from wbc_suite.viewers.status_text import plain
 
 if TYPE_CHECKING:
     import viser
+
+    from wbc_suite.viewers.page_process import Session
 
     Slider = viser.GuiSliderHandle[float]
     Event = viser.GuiEvent[Slider]
@@ -18,24 +19,24 @@ if TYPE_CHECKING:
 __all__ = ["GripperSliders"]
 
 STEP = 0.02
-OWN = 1.0  # s; so long after a person's touch a slider is left to the person
+USER_TIME = 1.0  # s; after the user moved a slider, it is not updated for so long
 
 
 class GripperSliders:
     """A slider for the whole gripper and, below it, one per synergy.
 
     Args:
-        server: Server whose panel they are on.
-        session: Session that they command.
-        name: The gripper.
+        server: Server of the page.
+        session: Session with the gripper.
+        name: Name of the gripper.
     """
 
     def __init__(
-        self, server: "viser.ViserServer", session: Drivable, name: str
+        self, server: "viser.ViserServer", session: "Session", name: str
     ) -> None:
         self._server, self._session, self._name = server, session, name
         self._touched = -np.inf  # time
-        labels, goal = session.traits.grippers[name], session.snapshot.grippers[name]
+        labels, goal = session.info.grippers[name], session.snapshot.grippers[name]
         self._whole = self._add(plain(name).capitalize(), float(np.mean(goal)))
         self._fingers: list[Slider] = []
         if len(labels) > 1:
@@ -49,22 +50,22 @@ class GripperSliders:
             finger.on_update(lambda event, i=index: self._close_one(event, i))
 
     def update(self, goal: Vector) -> None:
-        """Show what is commanded, by whomever, shape (synergies,)."""
-        if time.monotonic() - self._touched < OWN:
+        """Display the commanded closing, shape (synergies,)."""
+        if time.monotonic() - self._touched < USER_TIME:
             return
         _show(self._whole, float(np.mean(goal)))
         for finger, value in zip(self._fingers, goal, strict=False):
             _show(finger, float(value))
 
     def touch(self) -> None:
-        """Note that a person moves them now."""
+        """Record that the user moves them now."""
         self._touched = time.monotonic()
 
     def _close_all(self, event: "Event") -> None:
-        if event.client is None:  # `update` moved it
+        if event.client is None:  # moved by `update`
             return
         self.touch()
-        for index in range(len(self._session.traits.grippers[self._name])):
+        for index in range(len(self._session.info.grippers[self._name])):
             self._session.set_gripper(self._name, index, self._whole.value)
         for finger in self._fingers:
             _show(finger, self._whole.value)

@@ -1,4 +1,4 @@
-"""Pictures of a robot in a studio: neutral ground, soft light, a camera that fits."""
+"""Offscreen pictures of robots and models, with a fitted camera and studio lights."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -39,12 +39,12 @@ Image: TypeAlias = NDArray[np.uint8]
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Mark:
-    """A sphere that is drawn and not simulated.
+    """A sphere that is drawn but not simulated.
 
     Attributes:
         position: Centre in the world, m, shape (3,).
         rgba: Colour and opacity.
-        radius: In m.
+        radius: m.
     """
 
     position: Vector
@@ -60,18 +60,18 @@ def render_robot(
     size: tuple[int, int] = (800, 800),
     preset: RenderPreset | str = RenderPreset.QUALITY,
 ) -> Image:
-    """Draw a robot at one of its keyframes, standing in the studio.
+    """Return a picture of a robot at one of its keyframes, in the studio.
 
     Args:
-        robot: What to draw.
-        view: A name out of `VIEWS`, or a direction of your own.
+        robot: Robot to draw.
+        view: A view, or its name in `VIEWS`.
         keyframe: A key of ``robot.keyframes``.
         size: Width and height in pixels.
-        preset: How much work goes into the picture.
+        preset: Quality; see `make_renderer`.
 
     Raises:
-        UnknownNameError: If the robot has no such keyframe, or the view is unknown.
-        DeviceError: If nothing on this machine can draw.
+        UnknownNameError: If there is no such keyframe or view.
+        DeviceError: If this machine has no renderer.
     """
     posture = robot.keyframe(keyframe)
     spec = robot.to_mjspec()
@@ -87,7 +87,7 @@ def render_robot(
 def _pose(
     spec: mujoco.MjSpec, posture: Mapping[str, float]
 ) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    """Compile a robot and put its joints where the posture has them."""
+    """Compile a robot and set its joints to a posture."""
     model = spec.compile()
     data = mujoco.MjData(model)
     for joint, value in posture.items():
@@ -105,20 +105,7 @@ def render_model(
     camera: View | str = "three_quarter",
     preset: RenderPreset | str | None = None,
 ) -> Image:
-    """Draw a model as it is lit and furnished.
-
-    Args:
-        model: What to draw.
-        data: Its state; positions are those of the last `mujoco.mj_forward`.
-        width: Of the picture, in pixels.
-        height: Of the picture, in pixels.
-        camera: A `View`, a name out of `VIEWS`, or the name of a camera of the model.
-        preset: See `make_renderer`.
-
-    Raises:
-        UnknownNameError: If neither a view nor a camera has this name.
-        DeviceError: If nothing on this machine can draw.
-    """
+    """Return a picture of a model; for arguments and errors see `Camera`."""
     with Camera(
         model, data, view=camera, width=width, height=height, preset=preset
     ) as shot:
@@ -126,20 +113,21 @@ def render_model(
 
 
 class Camera:
-    """A camera that stays where it is and takes one picture after another.
+    """A fixed camera for a sequence of pictures.
 
     Args:
-        model: What to draw.
-        data: The state at which the camera is placed so that all is seen.
-        view: A `View`, a name out of `VIEWS`, or the name of a camera of the model.
+        model: Model to draw.
+        data: State at which the camera is fitted to the subject; positions are those of
+            the last `mujoco.mj_forward`.
+        view: A `View`, its name in `VIEWS`, or the name of a camera of the model.
         width: Of the picture, in pixels.
         height: Of the picture, in pixels.
-        preset: See `make_renderer`.
-        subject: Prefix of the bodies that have to fit into the picture; all by default.
+        preset: Quality; see `make_renderer`.
+        subject: Prefix of the bodies that the picture has to contain; all by default.
 
     Raises:
-        UnknownNameError: If neither a view nor a camera has this name.
-        DeviceError: If nothing on this machine can draw.
+        UnknownNameError: If there is no such view or camera.
+        DeviceError: If this machine has no renderer.
     """
 
     def __init__(
@@ -156,19 +144,17 @@ class Camera:
         found = _find_view(model, view)
         self._view = found if isinstance(found, View) else None
         self._camera: mujoco.MjvCamera | str = (
-            found
-            if isinstance(found, str)
-            else (
-                fit_camera(
-                    found, subject_corners(model, data, subject), aspect=width / height
-                )
+            fit_camera(
+                found, subject_corners(model, data, subject), aspect=width / height
             )
+            if isinstance(found, View)
+            else found
         )
         self._fov = float(model.vis.global_.fovy)
         self._renderer = make_renderer(model, width=width, height=height, preset=preset)
 
     def take(self, data: mujoco.MjData, marks: Sequence[Mark] = ()) -> Image:
-        """Take a picture, with marks that are not in the simulation.
+        """Return a picture, with marks that are not in the simulation.
 
         Args:
             data: The state; positions are those of the last `mujoco.mj_forward`.
@@ -202,11 +188,11 @@ class Camera:
 
 
 def add_studio(spec: mujoco.MjSpec, *, ground: float = 0.0) -> None:
-    """Furnish a scene for a picture: background, ground, key, fill and rim light.
+    """Add background, ground, and key, fill and rim light to a scene.
 
     Args:
         spec: Changed in place; compile it afterwards.
-        ground: Height of the floor in m.
+        ground: Height of the floor, m.
     """
     spec.add_texture(
         name="studio_sky",
@@ -264,9 +250,8 @@ def _add_sun(
 def _find_view(model: mujoco.MjModel, camera: View | str) -> View | str:
     if isinstance(camera, View):
         return camera
-    for name, view in VIEWS.items():
-        if name == camera:
-            return view
+    if camera in VIEWS:
+        return VIEWS[camera]
     cameras = [model.camera(i).name for i in range(model.ncam)]
     if camera not in cameras:
         raise UnknownNameError("view or camera", camera, [*VIEWS, *cameras])
@@ -274,7 +259,7 @@ def _find_view(model: mujoco.MjModel, camera: View | str) -> View | str:
 
 
 def _set_field_of_view(scene: mujoco.MjvScene, old: float, new: float) -> None:
-    """Narrow the lens of a free camera, whose angle is otherwise the model's."""
+    """Set the field of view of a free camera, which otherwise is the model's."""
     ratio = np.tan(np.radians(new) / 2.0) / np.tan(np.radians(old) / 2.0)
     for camera in scene.camera:
         camera.frustum_top *= ratio

@@ -1,9 +1,9 @@
-"""The teleoperation page in a process of its own, away from the control loop.
+"""The teleoperation page in its own process, away from the control loop.
 
-Drawing a scene for several browsers takes Python's lock, and the loop would wait for
-it in the middle of a tick. So the page runs elsewhere, and what it asks for and says
-goes through a pipe, one after the other: the methods of `Drivable`. It waits only for
-answers, so that a hand that is dragged fast never waits for the loop.
+Drawing a scene for several browsers takes Python's lock, for which the loop would wait
+in the middle of a tick. So the page runs in another process, and the methods of
+`TeleopSession` are requests through a pipe, handled in order. The page waits for an
+answer only where it needs one: fast drags do not wait for the loop.
 """
 
 import contextlib
@@ -14,25 +14,24 @@ import threading
 import time
 from collections.abc import Callable
 from multiprocessing.connection import Connection
-from typing import Any
+from typing import Any, TypeAlias
 
 import pinocchio as pin
 
 from wbc_suite.errors import DeviceError
-from wbc_suite.recording.desk import Wish
-from wbc_suite.viewers.drivable import SessionTraits
-from wbc_suite.viewers.keeping_time import run_first
-from wbc_suite.viewers.snapshot import Snapshot
+from wbc_suite.recording.episode_control import EpisodeCommand
+from wbc_suite.viewers.loop_timing import raise_priority
+from wbc_suite.viewers.session_state import SessionInfo, Snapshot
 from wbc_suite.viewers.teleop_session import TeleopSession
 
-__all__ = ["PageProcess", "RemoteSession"]
+__all__ = ["PageProcess", "RemoteSession", "Session"]
 
 log = logging.getLogger(__name__)
 
-GLANCE = 0.05  # s; between looks whether the page shall end
-FAREWELL = 10.0  # s; a page that has not ended by itself then is killed
+POLL_PERIOD = 0.05  # s
+EXIT_TIMEOUT = 10.0  # s; a page that has not ended by then is killed
 
-TOLD = (
+COMMANDS = (
     "drag",
     "release",
     "leave",
@@ -40,7 +39,7 @@ TOLD = (
     "set_gripper",
     "pause",
     "reset",
-    "wish",
+    "command_episode",
 )
 """Methods of the session that the page calls without waiting for an answer."""
 
@@ -49,92 +48,92 @@ class PageProcess:
     """Serve a session's page from another process.
 
     Args:
-        session: Session to show.
-        host, port: See `Site`.
-        label: What the panel is called.
+        session: Session to display.
+        host, port: See `PageServer`.
+        label: Title of the panel.
 
     Attributes:
         url: The address that opens the page.
-        token: What people must bring; None on this machine's own address.
+        token: Secret that clients need; None on a loopback address.
     """
 
     def __init__(
         self, session: TeleopSession, host: str, port: int | None, *, label: str
     ) -> None:
         self.url, self.token = "", None
-        self._session, self._trouble = session, ""
+        self._session, self._error = session, ""
         self._opened, self._stopping = threading.Event(), threading.Event()
-        self._answers: dict[str, Callable[..., Any]] = {
-            "look": lambda: session.snapshot,
+        self._queries: dict[str, Callable[..., Any]] = {
+            "snapshot": lambda: session.snapshot,
             "grab": session.grab,
         }
-        self._deeds: dict[str, Callable[..., Any]] = {
-            "open": self._open,
-            "refuse": self._refuse,
-            **{name: getattr(session, name) for name in TOLD},
+        self._commands: dict[str, Callable[..., Any]] = {
+            "opened": self._set_opened,
+            "failed": self._set_failed,
+            **{name: getattr(session, name) for name in COMMANDS},
         }
         context = multiprocessing.get_context("spawn")
-        self._pipe, theirs = context.Pipe()
+        self._pipe, remote = context.Pipe()
         self._process = context.Process(
             target=_serve,
-            args=(theirs, session.traits, host, port, label),
+            args=(remote, session.info, host, port, label),
             name="page",
             daemon=True,
         )
         self._process.start()
-        theirs.close()
+        remote.close()
         self._thread = threading.Thread(target=self._run, name="page", daemon=True)
         self._thread.start()
 
     def wait(self) -> None:
-        """Wait until people can open the page.
+        """Wait until the page can be opened.
 
         Raises:
-            DeviceError: If the port cannot be had, or the page's process ended.
+            DeviceError: If the port is not available, or the page's process ended.
         """
         self._opened.wait()
         self.check()
 
     def check(self) -> None:
-        """Raise a `DeviceError` if the page ended by itself."""
-        if self._trouble:
-            raise DeviceError(self._trouble)
+        """Raise a `DeviceError` if the page's process ended by itself."""
+        if self._error:
+            raise DeviceError(self._error)
 
     def stop(self) -> None:
         """Close the page."""
         self._stopping.set()
         self._thread.join()
-        self._process.join(FAREWELL)
+        self._process.join(EXIT_TIMEOUT)
         if self._process.is_alive():
             self._process.kill()
             self._process.join()
 
     def _run(self) -> None:
-        # Were it stopped while it holds Python's lock, the loop would be too.
-        run_first(rank=1)
+        # If it were suspended while it holds Python's lock, the loop would be too.
+        raise_priority(rank=1)
         try:
             with contextlib.suppress(EOFError, OSError):
-                self._answer_until_stopped()
+                self._handle_requests()
         finally:
-            self._pipe.close()  # what the page's process ends at
+            self._pipe.close()  # ends the page's process
             if not self._stopping.is_set():
-                self._abandon()
+                self._end_session()
             self._opened.set()
 
-    def _answer_until_stopped(self) -> None:
+    def _handle_requests(self) -> None:
         while not self._stopping.is_set():
-            if self._pipe.poll(GLANCE):
-                self._session.beat.resting.wait(GLANCE)  # or both want Python's lock
+            if self._pipe.poll(POLL_PERIOD):
+                self._session.timer.idle.wait(POLL_PERIOD)  # both need Python's lock
                 request, arguments = self._pipe.recv()
-                if request in self._answers:
-                    self._pipe.send(self._answers[request](*arguments))
+                if request in self._queries:
+                    self._pipe.send(self._queries[request](*arguments))
                 else:
-                    self._deeds[request](*arguments)
+                    self._commands[request](*arguments)
 
-    def _abandon(self) -> None:
-        """Let go of what people held, who see nothing any more, and end the session."""
-        self._process.join(FAREWELL)
-        self._trouble = self._trouble or (
+    def _end_session(self) -> None:
+        """Release what clients held, and end the session, after the page is lost."""
+        self._process.join(EXIT_TIMEOUT)
+        self._error = self._error or (
             f"The page's process ended by itself (exit code {self._process.exitcode})."
         )
         for status in self._session.snapshot.limbs.values():
@@ -142,80 +141,80 @@ class PageProcess:
                 self._session.leave(status.holder)
         self._session.quit.set()
 
-    def _open(self, url: str, token: str | None) -> None:
+    def _set_opened(self, url: str, token: str | None) -> None:
         self.url, self.token = url, token
         self._opened.set()
 
-    def _refuse(self, trouble: str) -> None:
-        self._trouble = trouble
+    def _set_failed(self, error: str) -> None:
+        self._error = error
 
 
 class RemoteSession:
-    """A session in another process, as a page drives it; see `Drivable`.
+    """A `TeleopSession` in another process.
 
     Args:
-        pipe: To the process with the session.
-        traits: What stays as it is of the session.
+        pipe: Connection to the process with the session.
+        info: Constant properties of the session.
 
     Attributes:
-        lost: Set when the session is gone; from then on requests do nothing.
+        lost: Set when the session has ended; requests do nothing from then on.
     """
 
-    def __init__(self, pipe: Connection, traits: SessionTraits) -> None:
-        self.traits = traits
+    def __init__(self, pipe: Connection, info: SessionInfo) -> None:
+        self.info = info
         self.lost = threading.Event()
         self._pipe, self._lock = pipe, threading.Lock()
-        self._last: Snapshot = self.ask("look")
+        self._last: Snapshot = self.query("snapshot")
 
     @property
     def snapshot(self) -> Snapshot:
-        """How things stand, or stood before the session was lost."""
-        self._last = self.ask("look") or self._last
+        """The newest state, or the last one before the session was lost."""
+        self._last = self.query("snapshot") or self._last
         return self._last
 
     def grab(self, name: str, client: int, T_world_input: pin.SE3) -> bool:
-        """See `Drivable`."""
-        return bool(self.ask("grab", name, client, T_world_input))
+        """See `TeleopSession`."""
+        return bool(self.query("grab", name, client, T_world_input))
 
     def drag(self, name: str, client: int, T_world_input: pin.SE3) -> None:
-        """Move a limb's target; whether another holds it is not waited for."""
-        arrived = time.perf_counter()  # a clock that all processes share
-        self.tell("drag", name, client, T_world_input, arrived)
+        """See `TeleopSession`; returns before the session has handled it."""
+        arrived = time.perf_counter()  # the same clock in all processes
+        self.command("drag", name, client, T_world_input, arrived)
 
     def release(self, name: str, client: int) -> None:
-        """See `Drivable`."""
-        self.tell("release", name, client)
+        """See `TeleopSession`."""
+        self.command("release", name, client)
 
     def leave(self, client: int) -> None:
-        """See `Drivable`."""
-        self.tell("leave", client)
+        """See `TeleopSession`."""
+        self.command("leave", client)
 
     def enable(self, name: str, enabled: bool) -> None:
-        """See `Drivable`."""
-        self.tell("enable", name, enabled)
+        """See `TeleopSession`."""
+        self.command("enable", name, enabled)
 
     def set_gripper(self, name: str, index: int, value: float) -> None:
-        """See `Drivable`."""
-        self.tell("set_gripper", name, index, value)
+        """See `TeleopSession`."""
+        self.command("set_gripper", name, index, value)
 
     def pause(self, paused: bool) -> None:
-        """See `Drivable`."""
-        self.tell("pause", paused)
+        """See `TeleopSession`."""
+        self.command("pause", paused)
 
     def reset(self) -> None:
-        """See `Drivable`."""
-        self.tell("reset")
+        """See `TeleopSession`."""
+        self.command("reset")
 
-    def wish(self, wish: Wish) -> None:
-        """See `Drivable`."""
-        self.tell("wish", wish)
+    def command_episode(self, command: EpisodeCommand) -> None:
+        """See `TeleopSession`."""
+        self.command("command_episode", command)
 
-    def ask(self, request: str, *arguments: Any) -> Any:
-        """Ask the other process, and wait for its answer; None once it is gone."""
+    def query(self, request: str, *arguments: Any) -> Any:
+        """Send a request and return its answer; None after the session was lost."""
         return self._send(request, arguments, answered=True)
 
-    def tell(self, request: str, *arguments: Any) -> None:
-        """Tell the other process, in the order of all that is asked and told."""
+    def command(self, request: str, *arguments: Any) -> None:
+        """Send a request that has no answer."""
         self._send(request, arguments, answered=False)
 
     def _send(self, request: str, arguments: tuple[Any, ...], *, answered: bool) -> Any:
@@ -228,29 +227,29 @@ class RemoteSession:
                 return None
 
 
+Session: TypeAlias = TeleopSession | RemoteSession
+"""What a page displays and commands. Clients are numbers, one for each open page."""
+
+
 def _serve(
-    pipe: Connection,
-    traits: SessionTraits,
-    host: str,
-    port: int | None,
-    label: str,
+    pipe: Connection, info: SessionInfo, host: str, port: int | None, label: str
 ) -> None:
-    """Serve the page until the session is gone: the page's process."""
-    from wbc_suite.viewers.site import Site
+    """Serve the page until the session ends: the main function of the process."""
+    from wbc_suite.viewers.page_server import PageServer
     from wbc_suite.viewers.teleop_page import TeleopPage
 
-    for number in (signal.SIGINT, signal.SIGTERM):  # the session ends it
+    for number in (signal.SIGINT, signal.SIGTERM):  # the session ends this process
         signal.signal(number, signal.SIG_IGN)
-    session = RemoteSession(pipe, traits)
+    session = RemoteSession(pipe, info)
     if session.lost.is_set():
         return
     try:
-        site = Site(host, port)
+        site = PageServer(host, port)
     except DeviceError as error:
-        session.tell("refuse", str(error))
+        session.command("failed", str(error))
         return
     page = TeleopPage(session, site, label=label)
     page.start()
-    session.tell("open", site.url, site.token)
+    session.command("opened", site.url, site.token)
     session.lost.wait()
     page.stop()

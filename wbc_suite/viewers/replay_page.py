@@ -1,8 +1,6 @@
-"""The replay page: recorded episodes in the browser, to be played and wound."""
+"""The page of `wbc-suite replay`: recorded episodes with playback controls."""
 
 import html
-import logging
-import threading
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,81 +8,71 @@ from numpy.typing import NDArray
 
 from wbc_suite.envs import RobotEnv
 from wbc_suite.envs.states import write_physics
-from wbc_suite.viewers.scene_mirror import SceneMirror, robot_box
-from wbc_suite.viewers.site import Site
-from wbc_suite.viewers.stage import VIEWS, look_from, set_camera, set_stage
-from wbc_suite.viewers.tape import SPEEDS, Clip, Tape, TapeStatus
+from wbc_suite.viewers.episode_player import (
+    SPEEDS,
+    Clip,
+    EpisodePlayer,
+    PlayerStatus,
+)
+from wbc_suite.viewers.model_scene import ModelScene, robot_box
+from wbc_suite.viewers.page_server import PageServer
+from wbc_suite.viewers.scene_setup import VIEWS, look_from, set_camera, set_up_scene
 
 if TYPE_CHECKING:
     import viser
 
 __all__ = ["ReplayPage"]
 
-log = logging.getLogger(__name__)
-
-PUSH_RATE = 25.0  # Hz
-PANEL_EVERY = 3  # pushes
+PANEL_EVERY = 3  # updates
 PLOT_POINTS = 200
 EFFORT, REWARD, NOW = "#4a6fa5", "#3f8f5b", "#c8553d"
-PLAY, PAUSE, BACK, ON = "Play", "Pause", "Before", "Next"
+PLAY, PAUSE, PREVIOUS, NEXT = "Play", "Pause", "Previous", "Next"
 SPEED_LABELS: dict[str, float] = dict(
     zip(("¼", "½", "1", "2", "4"), SPEEDS, strict=True)
 )
 
 
 class ReplayPage:
-    """Serve a tape; it is turned, and everything is sent, by a thread of its own.
+    """Serve a player of episodes; a thread of its own advances it and sends updates.
 
     Args:
-        tape: Its clips are of `env`.
-        env: Environment that clips put their states into.
-        site: Where the page is served; the page closes it when it stops.
-        label: What the panel is called.
+        player: Player of episodes of `env`.
+        env: Environment in which states are displayed.
+        site: Server of the page, which is stopped with the page.
+        label: Title of the panel.
     """
 
-    def __init__(self, tape: Tape, env: RobotEnv, site: Site, *, label: str) -> None:
-        self.tape, self.site, self._env = tape, site, env
+    def __init__(
+        self, player: EpisodePlayer, env: RobotEnv, site: PageServer, *, label: str
+    ) -> None:
+        self.player, self.site, self._env = player, site, env
         self.server = site.server
-        set_stage(self.server, label=label)
+        set_up_scene(self.server, label=label)
         self._clip: Clip | None = None
         self._shape = np.empty(0)
         self._status = self.server.gui.add_html("")
         self._shown = ""
         self._add_controls()
         self._plot = self._add_plot()
-        self._turn(tape.turn())
+        self._display(player.advance())
         data = env.simulation.data
         self._box = robot_box(env.simulation.model, data.xpos, data.xquat)
         set_camera(self.server, *self._box)
         self.server.on_client_connect(self._connect)
-        self._stopping = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="replay", daemon=True)
 
     def start(self) -> None:
-        """Begin to play."""
-        self._thread.start()
+        """Start to play."""
+        self.site.start_updates(self._update)
 
     def stop(self) -> None:
         """Stop, and close the server."""
-        self._stopping.set()
-        if self._thread.is_alive():
-            self._thread.join()
         self.site.stop()
 
-    def _run(self) -> None:
-        count = 0
-        while not self._stopping.wait(1.0 / PUSH_RATE):
-            status = self.tape.turn()
-            try:
-                self._turn(status, panel=count % PANEL_EVERY == 0)
-            except RuntimeError:
-                # A client came or went while viser woke all of them; the next push
-                # sends what is missing.
-                log.debug("The page missed a push", exc_info=True)
-            count += 1
+    def _update(self, count: int) -> None:
+        self._display(self.player.advance(), panel=count % PANEL_EVERY == 0)
 
-    def _turn(self, status: TapeStatus, *, panel: bool = True) -> None:
-        """Show where the tape stands."""
+    def _display(self, status: PlayerStatus, *, panel: bool = True) -> None:
+        """Display the state of the playback."""
         clip, simulation = status.clip, self._env.simulation
         if clip is not None:
             if clip is not self._clip:
@@ -92,26 +80,26 @@ class ReplayPage:
             state = clip.states[status.frame]
             write_physics(simulation.model, simulation.data, state)
             simulation.forward()
-            self._mirror.update(simulation.data.xpos, simulation.data.xquat)
+            self._scene.update(simulation.data.xpos, simulation.data.xquat)
         if panel or clip is not self._clip:
             self._update_panel(status)
 
     def _insert(self, clip: Clip) -> None:
-        """Take an episode in: its objects may have other sizes and colours."""
+        """Display another episode, whose objects may have other sizes and colours."""
         model = self._env.simulation.model
         shape = np.concatenate([model.geom_size.ravel(), model.geom_rgba.ravel()])
         if not np.array_equal(shape, self._shape):
             self._shape = shape
-            self._mirror = SceneMirror(self.server, model)
+            self._scene = ModelScene(self.server, model)
         self._clip = clip
         self._time.max = max(clip.length, 1e-3)
         self._episode.value = clip.name
 
-    def _update_panel(self, status: TapeStatus) -> None:
-        text = _status_html(status, self.tape.names)
+    def _update_panel(self, status: PlayerStatus) -> None:
+        text = _status_html(status, self.player.names)
         if text != self._shown:
             self._status.content = self._shown = text
-        wanted = (BACK, PAUSE if status.playing else PLAY, ON)
+        wanted = (PREVIOUS, PAUSE if status.playing else PLAY, NEXT)
         if self._buttons.options != wanted:
             self._buttons.options = wanted
         if status.clip is not None:
@@ -120,52 +108,56 @@ class ReplayPage:
             self._plot.data = _curves(status.clip, status.position)
 
     def _add_controls(self) -> None:
-        gui, tape = self.server.gui, self.tape
+        gui, player = self.server.gui, self.player
         self._buttons = gui.add_button_group(
-            "Tape",
-            (BACK, PAUSE, ON),
-            hint="Keys: P plays and pauses; N and B: next episode, and the one before; "
-            "K and J: one step on, and back",
+            "Playback",
+            (PREVIOUS, PAUSE, NEXT),
+            hint="Keys: P play or pause, N next episode, B previous episode, "
+            "K step forward, J step back",
         )
         self._time = gui.add_slider(
             "Time [s]", min=0.0, max=1.0, step=0.01, initial_value=0.0
         )
         speed = gui.add_button_group(
-            "Speed", tuple(SPEED_LABELS), hint="Times as fast as recorded"
+            "Speed", tuple(SPEED_LABELS), hint="1 is as recorded"
         )
         self._episode = gui.add_dropdown(
-            "Episode", tape.names, initial_value=tape.names[0]
+            "Episode", player.names, initial_value=player.names[0]
         )
 
         @self._buttons.on_click
         def _(event: "viser.GuiEvent[viser.GuiButtonGroupHandle]") -> None:
             match event.target.value:
-                case value if value == BACK:
-                    tape.skip(-1)
-                case value if value == ON:
-                    tape.skip(1)
+                case value if value == PREVIOUS:
+                    player.skip(-1)
+                case value if value == NEXT:
+                    player.skip(1)
                 case _:
-                    tape.toggle()
+                    player.toggle()
 
         @self._time.on_update
         def _(event: "viser.GuiEvent[viser.GuiSliderHandle[float]]") -> None:
-            if event.client is not None:  # a person, not the tape
-                tape.seek(event.target.value)
+            if event.client is not None:  # moved by the user
+                player.seek(event.target.value)
 
         @self._episode.on_update
         def _(event: "viser.GuiEvent[viser.GuiDropdownHandle[str]]") -> None:
             if event.client is not None:
-                tape.choose(event.target.value)
+                player.choose(event.target.value)
 
-        speed.on_click(lambda _: tape.set_speed(SPEED_LABELS[speed.value]))
-        gui.add_command("Play or pause", hotkey="P").on_trigger(lambda _: tape.toggle())
-        gui.add_command("Next episode", hotkey="N").on_trigger(lambda _: tape.skip(1))
-        gui.add_command("Episode before", hotkey="B").on_trigger(
-            lambda _: tape.skip(-1)
+        speed.on_click(lambda _: player.set_speed(SPEED_LABELS[speed.value]))
+        gui.add_command("Play or pause", hotkey="P").on_trigger(
+            lambda _: player.toggle()
         )
-        gui.add_command("One step on", hotkey="K").on_trigger(lambda _: tape.nudge(1))
-        gui.add_command("One step back", hotkey="J").on_trigger(
-            lambda _: tape.nudge(-1)
+        gui.add_command("Next episode", hotkey="N").on_trigger(lambda _: player.skip(1))
+        gui.add_command("Previous episode", hotkey="B").on_trigger(
+            lambda _: player.skip(-1)
+        )
+        gui.add_command("Step forward", hotkey="K").on_trigger(
+            lambda _: player.step_frames(1)
+        )
+        gui.add_command("Step back", hotkey="J").on_trigger(
+            lambda _: player.step_frames(-1)
         )
 
     def _add_plot(self) -> "viser.GuiUplotHandle":
@@ -177,19 +169,19 @@ class ReplayPage:
                 {"label": "action", "stroke": EFFORT, "width": 2},
                 {"label": "reward", "stroke": REWARD, "width": 2},
             ),
-            title="Size of the action (blue), reward (green)",
+            title="Norm of the action (blue), reward (green)",
             scales={"x": {"time": False}},
             legend={"show": False},
             height=150,
         )
 
     def _connect(self, client: "viser.ClientHandle") -> None:
-        view = client.gui.add_button_group("See from", tuple(VIEWS))
+        view = client.gui.add_button_group("View from", tuple(VIEWS))
         view.on_click(lambda _: look_from(client, *self._box, VIEWS[view.value]))
 
 
 def _curves(clip: Clip, position: float) -> tuple[NDArray[np.float64], ...]:
-    """Return times, a peak at the position, sizes of actions, and rewards."""
+    """Return times, a peak at the position, norms of actions, and rewards."""
     every = max(1, len(clip.times) // PLOT_POINTS)
     times = np.array(clip.times[::every], dtype=np.float64)
     now = np.zeros(len(times))
@@ -198,8 +190,8 @@ def _curves(clip: Clip, position: float) -> tuple[NDArray[np.float64], ...]:
     return times, now, *(np.array(c, dtype=np.float64) for c in curves)
 
 
-def _status_html(status: TapeStatus, names: tuple[str, ...]) -> str:
-    """Write what is shown, and of what."""
+def _status_html(status: PlayerStatus, names: tuple[str, ...]) -> str:
+    """Return the state of the playback as HTML."""
     if status.clip is None:
         return (
             '<div style="padding:0.4em 0.9em;color:#c8553d">'
@@ -211,7 +203,7 @@ def _status_html(status: TapeStatus, names: tuple[str, ...]) -> str:
         '<div style="padding:0.4em 0.9em;line-height:1.5">'
         f"<b>{html.escape(clip.name)}</b> "
         f'<span style="color:#6b7787">{number} of {len(names)}</span><br>'
-        f"{html.escape(clip.told)}<br>"
+        f"{html.escape(clip.summary)}<br>"
         f'<span style="font-variant-numeric:tabular-nums">{status.position:.2f} of '
         f"{clip.length:.2f} s, step {status.frame} of {len(clip.times) - 1}</span>"
         "</div>"

@@ -1,6 +1,7 @@
-"""The view page: a robot at rest, with its joints to turn and its insides to see."""
+"""The page of `wbc-suite view`: one robot with joint sliders and overlays."""
 
 import threading
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import mujoco
@@ -8,41 +9,43 @@ import numpy as np
 
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Vector
-from wbc_suite.viewers.overlays import Overlays
-from wbc_suite.viewers.scene_mirror import SceneMirror, robot_box
-from wbc_suite.viewers.site import Site
-from wbc_suite.viewers.stage import set_camera, set_stage
-from wbc_suite.viewers.words import plain
+from wbc_suite.viewers.model_scene import ModelScene, robot_box
+from wbc_suite.viewers.page_server import PageServer
+from wbc_suite.viewers.scene_setup import set_camera, set_up_scene
+from wbc_suite.viewers.status_text import plain
 
 if TYPE_CHECKING:
     import viser
 
-__all__ = ["RobotPage"]
+__all__ = ["Overlays", "RobotPage", "equivalent_box"]
 
 SLIDER_STEP = 0.01  # rad or m
-UNBOUNDED = np.pi  # rad; how far a slider of a joint without limits goes
+UNBOUNDED = np.pi  # rad, range of a slider of a joint without limits
+COM_COLOUR, INERTIA_COLOUR = (214, 72, 60), (90, 140, 210)
+FRAME_SIZE = 0.07  # m
+LEAST_HALF = 1e-3  # m; thinner boxes of inertia would not be visible
 
 
 class RobotPage:
-    """Serve a page that shows one robot, still, in a posture that people set.
+    """Serve a page that displays one robot in the posture of its sliders.
 
     Args:
-        robot: Robot to show.
-        site: Where the page is served; the page closes it when it stops.
+        robot: Robot to display.
+        site: Server of the page, which is stopped with the page.
     """
 
-    def __init__(self, robot: RobotDescription, site: Site) -> None:
+    def __init__(self, robot: RobotDescription, site: PageServer) -> None:
         self.robot, self.site = robot, site
         self.model = robot.to_mjspec().compile()
         self.data = mujoco.MjData(self.model)
         self._lock = threading.Lock()
         self._sliders: dict[str, viser.GuiSliderHandle[float]] = {}
         self._setting = False
-        set_stage(site.server, label=f"wbc_suite · {robot.name}")
-        self.mirror = SceneMirror(site.server, self.model)
+        set_up_scene(site.server, label=f"wbc_suite · {robot.name}")
+        self.scene = ModelScene(site.server, self.model)
         self._add_facts()
         self._add_postures()
-        self._overlays = Overlays(site.server, self.model, self.data, self.mirror)
+        self._overlays = Overlays(site.server, self.model, self.data, self.scene)
         self._add_joints()
         self.set_keyframe(next(iter(robot.keyframes), None))
         set_camera(site.server, *robot_box(self.model, self.data.xpos, self.data.xquat))
@@ -52,29 +55,29 @@ class RobotPage:
         self.site.stop()
 
     def set_keyframe(self, name: str | None) -> None:
-        """Take a posture by its name; None puts every joint at zero."""
+        """Set a keyframe by its name; None sets every joint to zero."""
         values = dict.fromkeys(self.robot.joint_names, 0.0)
         if name is not None:
             values = self.robot.keyframe(name)
-        self._setting = True  # sliders then move without moving joints one by one
+        self._setting = True  # sliders then do not move joints one by one
         for joint, slider in self._sliders.items():
             slider.value = float(np.clip(values[joint], slider.min, slider.max))
         self._setting = False
         self.set_joints(values)
 
     def set_joints(self, values: dict[str, float]) -> None:
-        """Put joints at positions, in rad or m; joints that follow them follow."""
+        """Set joint positions, rad or m, and those of joints that mimic them."""
         with self._lock:
             for name, value in values.items():
                 self.data.qpos[self.model.joint(name).qposadr[0]] = value
             self._couple()
             mujoco.mj_kinematics(self.model, self.data)
             mujoco.mj_comPos(self.model, self.data)
-            self.mirror.update(self.data.xpos, self.data.xquat)
+            self.scene.update(self.data.xpos, self.data.xquat)
             self._overlays.update()
 
     def position(self, joint: str) -> float:
-        """Return where a joint is now, in rad or m."""
+        """Return the position of a joint, rad or m."""
         return float(self.data.qpos[self.model.joint(joint).qposadr[0]])
 
     def _couple(self) -> None:
@@ -138,3 +141,124 @@ def _range(model: mujoco.MjModel, name: str) -> Vector:
     if not joint.limited[0]:
         return np.array([-UNBOUNDED, UNBOUNDED])
     return np.array(joint.range, dtype=np.float64)
+
+
+class Overlays:
+    """Checkboxes that show shapes, frames, centre of mass and inertia.
+
+    Args:
+        server: Server of the page.
+        model: Model of the robot.
+        data: Its state, which `update` reads.
+        scene: The drawn robot.
+    """
+
+    def __init__(
+        self,
+        server: "viser.ViserServer",
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        scene: ModelScene,
+    ) -> None:
+        self._model, self._data = model, data
+        self._frames = [
+            server.scene.add_frame(
+                f"{scene.node(body)}/{label}",
+                axes_length=FRAME_SIZE,
+                axes_radius=0.035 * FRAME_SIZE,
+                origin_radius=0.07 * FRAME_SIZE,
+                wxyz=wxyz,
+                position=position,
+                visible=False,
+            )
+            for body, label, position, wxyz in _places(model)
+        ]
+        self._inertias = [
+            _inertia_box(server, model, body, scene.node(body))
+            for body in range(1, model.nbody)
+            if model.body_mass[body] > 0
+        ]
+        self._com = server.scene.add_icosphere(
+            "/com", radius=0.03, color=COM_COLOUR, visible=False
+        )
+        self._plumb = server.scene.add_line_segments(
+            "/com_plumb",
+            np.zeros((1, 2, 3), dtype=np.float32),
+            colors=COM_COLOUR,
+            thickness=0.006,
+            visible=False,
+        )
+        with server.gui.add_folder("Show"):
+            self._toggle(server, "Visual shapes", scene.visual_shapes, shown=True)
+            self._toggle(server, "Collision shapes", scene.collision_shapes)
+            self._toggle(server, "Frames", self._frames)
+            self._toggle(server, "Centre of mass", [self._com, self._plumb])
+            self._toggle(server, "Inertia", self._inertias)
+
+    def update(self) -> None:
+        """Move the centre of mass to that of the current posture."""
+        com = self._data.subtree_com[0].copy()
+        self._com.position = com
+        self._plumb.points = np.array([[com, [com[0], com[1], 0.0]]], dtype=np.float32)
+
+    def _toggle(
+        self,
+        server: "viser.ViserServer",
+        label: str,
+        nodes: "Sequence[viser.SceneNodeHandle]",
+        *,
+        shown: bool = False,
+    ) -> None:
+        box = server.gui.add_checkbox(label, initial_value=shown)
+
+        @box.on_update
+        def _(_: object) -> None:
+            with server.atomic():
+                for node in nodes:
+                    node.visible = box.value
+
+
+def equivalent_box(mass: float, inertia: Vector) -> Vector:
+    """Return the half sizes of the solid box that has these principal inertias.
+
+    For a box of half sizes a: I_x = m (a_y^2 + a_z^2) / 3, and so on around; so
+    a_x^2 = 3 (I_y + I_z - I_x) / (2 m).
+
+    Args:
+        mass: Mass in kg.
+        inertia: Principal moments of inertia, shape (3,), in kg m^2.
+
+    Returns:
+        Half sizes, shape (3,), in m.
+    """
+    squares = 1.5 * (inertia.sum() - 2.0 * inertia) / mass
+    return np.maximum(np.sqrt(np.maximum(squares, 0.0)), LEAST_HALF)
+
+
+def _inertia_box(
+    server: "viser.ViserServer", model: mujoco.MjModel, body: int, node: str
+) -> "viser.BoxHandle":
+    half = equivalent_box(model.body_mass[body], model.body_inertia[body])
+    return server.scene.add_box(
+        f"{node}/inertia",
+        dimensions=tuple(2.0 * half),
+        color=INERTIA_COLOUR,
+        opacity=0.45,
+        cast_shadow=False,
+        wxyz=model.body_iquat[body],
+        position=model.body_ipos[body],
+        visible=False,
+    )
+
+
+def _places(model: mujoco.MjModel) -> list[tuple[int, str, Vector, Vector]]:
+    """Return body, label, position and quaternion of the frames of links and sites."""
+    here: Vector = np.zeros(3)
+    upright: Vector = np.array([1.0, 0.0, 0.0, 0.0])
+    places: list[tuple[int, str, Vector, Vector]] = [
+        (body, "frame", here, upright) for body in range(1, model.nbody)
+    ]
+    for site in range(model.nsite):
+        body, label = int(model.site_bodyid[site]), f"frame_{model.site(site).name}"
+        places.append((body, label, model.site_pos[site], model.site_quat[site]))
+    return places

@@ -1,14 +1,14 @@
-"""The teleoperation loop: people's targets in, simulated motion out.
+"""The teleoperation loop: targets of clients and devices in, simulated motion out.
 
-It knows nothing of browsers. Whoever has an input calls `grab`, `drag`, `release` and
-`set_gripper` from any thread; whoever shows something reads `snapshot`. Both only take
-a short lock or read one reference, so that the loop never waits for a page.
+It does not depend on browsers. Inputs call `grab`, `drag`, `release` and `set_gripper`
+from any thread; displays read `snapshot`. Both take a short lock at most, so that the
+loop never waits for a page.
 """
 
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import Any
 
 import gymnasium
@@ -16,58 +16,52 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.devices import Device, DeviceState, LimbInput, Pipeline, PipelineConfig
+from wbc_suite.control.action import SliceKind
+from wbc_suite.devices import Device, DeviceState, Pipeline, PipelineConfig
 from wbc_suite.devices.pipeline.config import RatesConfig
 from wbc_suite.errors import DatasetError, UnknownNameError
-from wbc_suite.recording.desk import RecordingDesk, Wish
+from wbc_suite.recording.episode_control import EpisodeCommand, EpisodeControl
 from wbc_suite.typing import Vector
-from wbc_suite.viewers.beat import Beat
-from wbc_suite.viewers.drivable import SessionTraits
-from wbc_suite.viewers.history import History
-from wbc_suite.viewers.keeping_time import run_first
-from wbc_suite.viewers.limb import Limb, Ownership
-from wbc_suite.viewers.snapshot import LimbStatus, Snapshot
+from wbc_suite.viewers.limb_targets import LimbTargets
+from wbc_suite.viewers.loop_timing import LoopTimer, raise_priority
+from wbc_suite.viewers.session_state import (
+    SessionInfo,
+    Snapshot,
+)
 
 __all__ = ["DRAGGED", "TeleopSession"]
 
-LEAD_POSITION = 0.03  # m; a released target that is further than this from its limb ...
-LEAD_ORIENTATION = 0.2  # rad; ... or turned by more than this, goes back to it ...
-REST_SPEED = 0.02  # m/s; ... when the limb has been slower than this ...
-REST_TIME = 0.4  # s; ... for so long
-
 DRAGGED = PipelineConfig(
     jump=None,  # a page that draws slowly sends a drag in few, long steps
-    leash=None,  # a handle that is far away says so; see `_settle`
+    leash=None,  # a target out of reach is reported instead; see `LimbTargets.settle`
     linear=RatesConfig(speed=2.0, acceleration=30.0, jerk=1500.0),
     angular=RatesConfig(speed=6.0, acceleration=90.0, jerk=4500.0),
     ramp=0.0,
     return_after=None,
 )
-"""The pipeline behind handles that people drag."""
-
-
-@dataclass(slots=True)
-class _Inbox:
-    """What people asked for since the last tick."""
-
-    stamps: list[float] = field(default_factory=list)
-    reset: bool = False
+"""The pipeline of handles that are dragged on a page."""
+SMOOTHING = 0.03  # weight of the newest tick in the displayed speed
+LATENCIES = 512  # inputs over which the displayed latency is the median
 
 
 class TeleopSession:
-    """Step an environment at its own rate with the targets that people hold.
+    """Step an environment at its own rate with the targets of clients and devices.
 
     Args:
         env: Environment whose actions are absolute targets in the world.
-        period: Simulated and wall time of one step, in s.
+        period: Simulated and wall time of one step, s.
         seed: Seed of every reset.
-        clock: Source of wall time, in s.
-        device: A device that people use beside the page; it has been started.
-        pipeline: Stages between people and the controller.
-        desk: Where people ask for episodes to be recorded; None if nothing records.
+        clock: Source of wall time, s.
+        device: A device that is used beside the page; it has been started.
+        pipeline: Stages between inputs and the controller.
+        episode_control: Starts and ends recorded episodes; None if nothing records.
 
     Attributes:
-        beat: When the loop steps, and when it rests.
+        info: Constant properties.
+        snapshot: State after the last tick.
+        limbs: Targets by limb.
+        timer: Times the steps of the loop.
+        quit: Set when the device's button `quit` is pressed, or all is recorded.
     """
 
     def __init__(
@@ -79,52 +73,40 @@ class TeleopSession:
         clock: Callable[[], float] = time.perf_counter,
         device: Device | None = None,
         pipeline: PipelineConfig = DRAGGED,
-        desk: RecordingDesk | None = None,
+        episode_control: EpisodeControl | None = None,
     ) -> None:
-        self.env, self.desk = env, desk
-        self.period, self.beat = period, Beat(period, clock=clock)
-        self._seed = seed
-        self._clock = clock
-        layout = env.unwrapped.action_layout  # type: ignore[attr-defined]
+        self.env, self.episode_control = env, episode_control
+        self.period, self.timer = period, LoopTimer(period, clock=clock)
+        self._seed, self._clock = seed, clock
         self._device, self._pressed = device, frozenset[str]()
-        self._switched_to = ""
         self._simulation = env.unwrapped.simulation  # type: ignore[attr-defined]
         self.model: mujoco.MjModel = self._simulation.model
         self._lock = threading.Lock()
-        self._inbox = _Inbox()
-        self._paused = False
+        self._inputs: list[float] = []  # arrival times since the last tick
+        self._reset_requested = self._paused = False
         self._epoch = self._tick = 0
         self._thread: threading.Thread | None = None
-        self._stopping = threading.Event()
-        self.quit = threading.Event()  # by the device's button, or all is recorded
-        self._message, self._success = "", False
+        self._stopping, self.quit = threading.Event(), threading.Event()
+        self._message, self._success, self._selected = "", False, ""
         self._ik: dict[str, Any] = {}
-        self._latencies = History(1, 512)
-        self._begun = self._spent = float("nan")  # wall time of a tick, smoothed
+        self._latencies: deque[float] = deque(maxlen=LATENCIES)
+        self._last_step = self._step_time = float("nan")  # wall time, smoothed
 
         env.reset(seed=seed)
         self._controller = env.unwrapped.controllers[0]  # type: ignore[attr-defined]
         self._pipeline = Pipeline(env, pipeline)
-        self._let_go: dict[str, int] = {}  # ticks at rest, of limbs let go lately
-        stages = self._pipeline.limbs
-        self.limbs = {name: Limb(limb, Ownership()) for name, limb in stages.items()}
+        self._targets = LimbTargets(self._pipeline.limbs)
+        self.limbs = self._targets.limbs
         self._open_grippers()
-        ports = [limb.port for limb in stages.values()]
-        self.traits = SessionTraits.of(self.model, layout, ports, records=bool(desk))
+        self.info = self._describe()
         self._publish()
 
-    # What people do. Any thread.
+    # Inputs, from any thread.
 
     def grab(self, name: str, client: int, T_world_input: pin.SE3) -> bool:
-        """Take a limb and latch the input to it; False when another holds it."""
-        limb, now = self._limb(name), self._clock()
+        """Take a limb and latch the input to it; False if another client holds it."""
         with self._lock:
-            if not limb.ownership.take(client, now):
-                return False
-            if limb.enabled:
-                limb.stages.release()
-                limb.stages.follow(LimbInput(pose=T_world_input))
-            return True
+            return self._targets.grab(name, client, T_world_input, now=self._clock())
 
     def drag(
         self,
@@ -133,74 +115,68 @@ class TeleopSession:
         T_world_input: pin.SE3,
         arrived: float | None = None,
     ) -> bool:
-        """Move a limb's target with the input; False when another holds it.
+        """Move a limb's target with the input; False if another client holds it.
 
-        `arrived` is when the input came, by the session's clock; None for now.
+        `arrived` is when the input arrived, by the session's clock; None for now.
         """
-        limb, now = self._limb(name), self._clock()
+        now = self._clock()
         with self._lock:
-            if not limb.ownership.take(client, now):
-                return False
-            if limb.enabled:
-                limb.stages.follow(LimbInput(pose=T_world_input))
-                self._inbox.stamps.append(now if arrived is None else arrived)
-            return True
+            taken = self._targets.drag(name, client, T_world_input, now=now)
+            if taken and self.limbs[name].enabled:
+                self._inputs.append(now if arrived is None else arrived)
+            return taken
 
     def release(self, name: str, client: int) -> None:
-        """Let a limb go; its target stays, and the limb goes on towards it."""
-        limb = self._limb(name)
+        """Release a limb; its target stays, and the limb goes on towards it."""
         with self._lock:
-            if limb.ownership.release(client):
-                limb.stages.release()
-                self._let_go[name] = 0
+            self._targets.release(name, client)
 
     def leave(self, client: int) -> None:
-        """Release everything that a client held, for instance when its tab closes."""
+        """Release everything that a client holds, for instance when its tab closes."""
         for name in self.limbs:
             self.release(name, client)
 
     def enable(self, name: str, enabled: bool) -> None:
-        """Put a limb's clutch in or out; its target does not move by that."""
-        limb = self._limb(name)
+        """Engage or disengage a limb's clutch; its target does not move."""
         with self._lock:
-            limb.enabled = enabled
-            limb.stages.release()
+            self._targets.enable(name, enabled)
 
     def set_gripper(self, name: str, index: int, value: float) -> None:
-        """Set one synergy of a gripper, from -1 (open) to 1 (closed)."""
+        """Set one synergy of a gripper, -1 open .. 1 closed; nan is ignored."""
         if name not in self.grippers:
             raise UnknownNameError("gripper", name, self.grippers)
+        if np.isnan(value):
+            return
         now = self._clock()
         with self._lock:
             self.grippers[name][index] = float(np.clip(value, -1.0, 1.0))
-            self._inbox.stamps.append(now)
+            self._inputs.append(now)
 
     @property
     def grippers(self) -> dict[str, Vector]:
-        """How far each gripper's synergies shall close, -1 open .. 1 closed."""
+        """Goal of each gripper's synergies, -1 open .. 1 closed."""
         return {name: grip.goal for name, grip in self._pipeline.grips.items()}
 
     def pause(self, paused: bool) -> None:
-        """Let time stand still, or go on."""
+        """Pause or resume the simulation."""
         self._paused = paused
 
     def reset(self) -> None:
-        """Begin again from the start posture, at the next tick."""
-        with self._lock:
-            self._inbox.reset = True
+        """Reset the environment at the next tick."""
+        self._reset_requested = True
 
-    def wish(self, wish: Wish) -> None:
-        """Ask something of the recording; nobody hears it where nothing records."""
-        if self.desk is not None:
-            self.desk.ask(wish)
+    def command_episode(self, command: EpisodeCommand) -> None:
+        """Send a command to the recording; ignored if the session does not record."""
+        if self.episode_control is not None:
+            self.episode_control.request(command)
 
     # The loop.
 
     def start(self, *, urgent: bool = False) -> None:
-        """Run the loop in a thread of its own, at the session's rate.
+        """Run the loop in a thread, at the session's rate.
 
         Args:
-            urgent: Whether it runs before other programs, where the system lets it.
+            urgent: Whether the thread gets a real-time priority, where permitted.
         """
         self._stopping.clear()
         self._thread = threading.Thread(
@@ -210,7 +186,7 @@ class TeleopSession:
 
     @property
     def running(self) -> bool:
-        """Whether the loop's thread goes on; an error ends it."""
+        """Whether the loop's thread runs; an error ends it."""
         return self._thread is not None and self._thread.is_alive()
 
     def stop(self) -> None:
@@ -223,28 +199,29 @@ class TeleopSession:
     def tick(self) -> None:
         """Do one step, or none while paused, and publish a snapshot."""
         with self._lock:
-            inbox, self._inbox = self._inbox, _Inbox()
-        state = self._hear()
-        if inbox.reset:
+            inputs, self._inputs = self._inputs, []
+            reset, self._reset_requested = self._reset_requested, False
+        state = self._read_device()
+        if reset:
             self._reset()
-        if self.desk is not None:
-            self.desk.serve(self._reset)
-            if self.desk.finished:
+        if self.episode_control is not None:
+            self.episode_control.update(self._reset)
+            if self.episode_control.finished:
                 self.quit.set()
         if not self._paused:
-            self._step(state, inbox.stamps)
+            self._step(state, inputs)
         self._publish()
 
     def latencies(self) -> Vector:
-        """Return the times from an input's arrival to its joint target, in s.
+        """Return the times from an input's arrival to its joint target, s.
 
-        The clock starts when this process receives the input and stops when the
-        controller has found the joint targets that follow from it.
+        They end when the controller has solved for the joint targets that follow from
+        the input.
         """
-        return self._latencies.rows()[:, 0]
+        return np.array(self._latencies, dtype=np.float64)
 
-    def _hear(self) -> DeviceState:
-        """Return what the device says, and do what its buttons ask of the session."""
+    def _read_device(self) -> DeviceState:
+        """Return the device's state; handle the buttons of the session."""
         if self._device is None:
             return DeviceState(time=self._clock())
         state = self._device.read()
@@ -255,96 +232,90 @@ class TeleopSession:
             self._reset()
         if "quit" in pressed:
             self.quit.set()
-        if self.desk is not None:
-            self.desk.press(pressed)
+        if self.episode_control is not None:
+            self.episode_control.press_buttons(pressed)
         return state
 
     def _run(self, urgent: bool) -> None:
         if urgent:
-            run_first(rank=2)
-        self.beat.start()
+            raise_priority(rank=2)
+        self.timer.start()
         try:
             while not self._stopping.is_set():
                 self.tick()
-                self.beat.rest()
+                self.timer.finish_step()
         finally:
-            self.beat.stop()
-            if not self._stopping.is_set():  # an error ends the loop; people must know
+            self.timer.stop()
+            if not self._stopping.is_set():  # an error ended the loop
                 self._message = "Stopped by an error: see the terminal."
                 self._paused = True
                 self._publish()
 
-    def _step(self, state: DeviceState, stamps: list[float]) -> None:
+    def _step(self, state: DeviceState, inputs: list[float]) -> None:
         with self._lock:
             action = self._pipeline.update(state)
-        self._switched_to = self._pipeline.active if "hand" in state.limbs else ""
-        self.beat.await_step()
+        self._selected = self._pipeline.selected if "hand" in state.limbs else ""
+        self.timer.wait_for_step()
         try:
             *_, info = self.env.step(action)
-        except DatasetError as error:  # the disk is full; people go on without it
+        except DatasetError as error:  # the disk is full; teleoperation goes on
             info, self._message = {}, str(error)
         now = self._clock()
-        found = getattr(self._controller, "solved_at", now)
-        for stamp in stamps:
-            self._latencies.append(np.array([max(found, stamp) - stamp]))
+        self._latencies.extend(max(now - arrived, 0.0) for arrived in inputs)
         self._ik = info.get("ik", {})
         self._success = bool(info.get("success", False))
         if "physics_error" in info:
             self._reset()
-            self._message = f"Physics gave up ({info['physics_error']}): started again."
-        self._note_speed(now)
+            self._message = f"The simulation diverged ({info['physics_error']}): reset."
+        self._measure_speed(now)
         with self._lock:
-            self._settle()
+            self._targets.settle(self.snapshot.limbs, period=self.period, now=now)
         self._tick += 1
 
-    def _settle(self) -> None:
-        """Bring a target that was let go back to its limb, which rests short of it.
-
-        Otherwise a target pulled far out of reach would have to be pulled all the way
-        back before the limb moves again. Targets of limbs that nobody touched stay,
-        however far others drag their limbs off.
-        """
-        for name in list(self._let_go):
-            status = self.snapshot.limbs[name]
-            measured = self.limbs[name].stages.port.measure()
-            step = measured.translation - status.measured.translation
-            rests = bool(np.linalg.norm(step) < REST_SPEED * self.period)
-            self._let_go[name] = self._let_go[name] + 1 if rests else 0
-            held = self.limbs[name].ownership.holder(self._clock()) is not None
-            if held or status.reached:
-                del self._let_go[name]
-            elif self._let_go[name] * self.period > REST_TIME:
-                del self._let_go[name]
-                if _is_far(status):
-                    self.limbs[name].stages.place(measured)
-
-    def _note_speed(self, now: float) -> None:
-        if not np.isnan(self._begun):
-            spent = now - self._begun
-            old = self._spent
-            self._spent = spent if np.isnan(old) else 0.97 * old + 0.03 * spent
-        self._begun = now
+    def _measure_speed(self, now: float) -> None:
+        spent, self._last_step = now - self._last_step, now
+        if np.isnan(self._step_time):
+            self._step_time = spent
+        elif not np.isnan(spent):
+            self._step_time += SMOOTHING * (spent - self._step_time)
 
     def _reset(self, seed: int | None = None) -> None:
         self.env.reset(seed=self._seed if seed is None else seed)
         with self._lock:
             self._pipeline.reset()
+            self._targets.reset()
             self._open_grippers()
-            self._let_go.clear()
         self._message, self._success, self._ik = "", False, {}
-        self._begun = float("nan")
+        self._last_step = float("nan")
         self._epoch += 1
 
     def _open_grippers(self) -> None:
         for grip in self._pipeline.grips.values():
             grip.goal[:] = -1.0
 
-    # What is shown.
+    # What is displayed.
+
+    def _describe(self) -> SessionInfo:
+        layout = self.env.unwrapped.action_layout  # type: ignore[attr-defined]
+        return SessionInfo(
+            model=self.model,
+            limbs={name: limb.info for name, limb in self.limbs.items()},
+            grippers={
+                part.name: tuple(part.labels)
+                for part in layout.slices
+                if part.kind is SliceKind.GRIPPER
+            },
+            records=self.episode_control is not None,
+        )
 
     def _publish(self) -> None:
         data, now = self._simulation.data, self._clock()
         with self._lock:
-            limbs = {name: self._status(name, now) for name in self.limbs}
+            reports = self._ik.get("frames", {})
+            limbs = {
+                name: limb.status(reports.get(name, {}), now=now)
+                for name, limb in self.limbs.items()
+            }
             grippers = {name: goal.copy() for name, goal in self.grippers.items()}
         latencies = self.latencies()
         self.snapshot = Snapshot(
@@ -355,42 +326,13 @@ class TeleopSession:
             body_quaternions=data.xquat.copy(),
             limbs=limbs,
             grippers=grippers,
-            solve_time=float(self._ik.get("solve_time", np.nan)),
+            step_time=self._step_time,
             latency=float(np.median(latencies)) if len(latencies) else float("nan"),
-            speed=self.period / max(self._spent, 1e-9),
+            speed=self.period / max(self._step_time, 1e-9),
             paused=self._paused,
             success=self._success,
             message=self._message,
             device=self._pipeline.acting.get("device", ()),
-            switched_to=self._switched_to,
-            recording=None if self.desk is None else self.desk.status,
+            selected=self._selected,
+            recording=self.episode_control and self.episode_control.status,
         )
-
-    def _status(self, name: str, now: float) -> LimbStatus:
-        limb = self.limbs[name]
-        measured = self.limbs[name].stages.port.measure()
-        target = limb.seen_target(measured)
-        report = self._ik.get("frames", {}).get(name, {})
-        return LimbStatus(
-            measured=measured,
-            target=target,
-            position_error=float(report.get("position_error", 0.0)),
-            orientation_error=float(report.get("orientation_error", 0.0)),
-            reached=bool(report.get("reached", True)),
-            reasons=tuple(report.get("reasons", ())),
-            holder=limb.ownership.holder(now),
-            enabled=limb.enabled,
-            acting=limb.stages.acting,
-        )
-
-    def _limb(self, name: str) -> Limb:
-        if name not in self.limbs:
-            raise UnknownNameError("limb", name, self.limbs)
-        return self.limbs[name]
-
-
-def _is_far(status: LimbStatus) -> bool:
-    return (
-        status.position_error > LEAD_POSITION
-        or status.orientation_error > LEAD_ORIENTATION
-    )

@@ -1,13 +1,13 @@
-"""The page of render mode `human`: a scene in the browser, to be watched."""
+"""The page of render mode `human`: a scene in the browser."""
 
 import logging
 
 import mujoco
 
 from wbc_suite.typing import Matrix
-from wbc_suite.viewers.scene_mirror import SceneMirror
-from wbc_suite.viewers.site import Site
-from wbc_suite.viewers.stage import set_camera, set_stage
+from wbc_suite.viewers.model_scene import ModelScene
+from wbc_suite.viewers.page_server import PageServer
+from wbc_suite.viewers.scene_setup import set_camera, set_up_scene
 
 __all__ = ["WatchPage"]
 
@@ -15,23 +15,23 @@ log = logging.getLogger(__name__)
 
 
 class WatchPage:
-    """Serve a scene on this machine; its address goes to the log.
+    """Serve a scene on this machine; its address is logged.
 
     Args:
         model: The scene.
     """
 
     def __init__(self, model: mujoco.MjModel) -> None:
-        self.site = Site()
-        set_stage(self.site.server, label="wbc_suite")
-        self._mirror = SceneMirror(self.site.server, model)
+        self.site = PageServer()
+        set_up_scene(self.site.server, label="wbc_suite")
+        self._scene = ModelScene(self.site.server, model)
         middle, reach = model.stat.center, 0.5 * model.stat.extent
         set_camera(self.site.server, middle - reach, middle + reach)
-        log.warning("watch at %s", self.site.url)
+        log.warning("View the scene at %s", self.site.url)
 
     def show(self, positions: Matrix, quaternions: Matrix) -> None:
-        """Show bodies at their poses in the world; see `SceneMirror.update`."""
-        self._mirror.update(positions, quaternions)
+        """Display bodies at their poses in the world; see `ModelScene.update`."""
+        self._scene.update(positions, quaternions)
 
     def stop(self) -> None:
         """Close the page."""

@@ -1,4 +1,4 @@
-"""One vector in, one vector out: what most learning libraries want."""
+"""Observations and actions as one float32 vector each, for learning libraries."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -17,11 +17,11 @@ Flattened = NDArray[np.float32]
 class Flat(gymnasium.Wrapper[Flattened, Flattened, Any, Any]):
     """Observations as one float32 vector, actions as float32 between -1 and 1.
 
-    Stable-Baselines3's checker has nothing to say about it.
+    It passes the checker of Stable-Baselines3.
 
     Args:
         env: One of our environments.
-        keys: What is observed, in this order; by default the vectors of robots and of
+        keys: Observed keys in this order; by default the vectors of robots and of
             objects (`robot0_proprio-state`, `object-state`).
 
     Raises:

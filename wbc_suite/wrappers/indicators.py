@@ -1,4 +1,4 @@
-"""Marks in pictures that physics knows nothing of."""
+"""Visual marks in pictures, without physics."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -14,23 +14,23 @@ __all__ = ["Indicators"]
 
 
 class Indicators(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """Draws a disc into `render`'s pictures at each hand, and at places of one's own.
+    """Draws a disc into `render`'s pictures at each hand and at chosen places.
 
-    What policies observe has no marks.
+    Observed pictures have no marks.
 
     Args:
         env: One of our environments with `render_mode="rgb_array"`.
-        radius: Of a disc, m.
+        radius: Radius of a disc, m.
 
     Attributes:
-        places: Places in the world and colours, by name; change it at will.
+        places: Places in the world and colours, by name; may be changed.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], *, radius: float = 0.012) -> None:
         super().__init__(env)
         inner = env.unwrapped
         if not isinstance(inner, RobotEnv) or inner.render_mode != "rgb_array":
-            raise ConfigError("Indicators need one of our environments in rgb_array.")
+            raise ConfigError("Indicators need a RobotEnv in mode rgb_array.")
         self._inner, self._radius = inner, radius
         self.places: dict[str, tuple[ArrayLike, Sequence[int]]] = {}
 

@@ -3,33 +3,49 @@
 from collections.abc import Mapping
 from typing import Any
 
-from wbc_suite.control.composite.base import (
-    CompositeController,
-    build_composite_controller,
-    composite_names,
-    default_composite,
-    load_composite_controller_config,
-    register_composite,
-)
 from wbc_suite.control.composite.basic import (
     BasicController,
     check_basic,
     default_basic_config,
 )
-from wbc_suite.control.composite.config import default_whole_body_config
+from wbc_suite.control.composite.frame_kinds import (
+    FrameKind,
+    frame_kind_names,
+    register_frame_kind,
+)
 from wbc_suite.control.composite.hybrid import HybridMobileBase, check_hybrid
-from wbc_suite.control.composite.names import check_whole_body
+from wbc_suite.control.composite.registry import (
+    CompositeController,
+    CompositeControllerName,
+    SteppedController,
+    build_composite_controller,
+    composite_names,
+    default_composite,
+    load_composite_controller_config,
+    register_composite,
+    register_config_converter,
+)
+from wbc_suite.control.composite.whole_body_config import (
+    check_whole_body,
+    default_whole_body_config,
+)
 from wbc_suite.control.state import RobotState
 
 __all__ = [
     "BasicController",
     "CompositeController",
+    "CompositeControllerName",
+    "FrameKind",
+    "SteppedController",
     "build_composite_controller",
     "composite_names",
     "default_basic_config",
     "default_composite",
+    "frame_kind_names",
     "load_composite_controller_config",
     "register_composite",
+    "register_config_converter",
+    "register_frame_kind",
 ]
 
 

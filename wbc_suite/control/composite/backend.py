@@ -1,30 +1,30 @@
-"""What a whole-body composite asks of an inverse-kinematics solver."""
+"""The interface between a whole-body controller and an inverse-kinematics solver."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple, Protocol, TypeAlias
 
+from wbc_suite.control.reasons import Reason
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["Explanation", "IkBackend", "IkStep", "Limits"]
+__all__ = ["Explanation", "IkBackend", "IkStep"]
 
-Limits: TypeAlias = tuple[tuple[str | None, str], ...]
-Explanation: TypeAlias = Callable[[], Mapping[str, Sequence[str]]]
+Explanation: TypeAlias = Callable[[], Mapping[str, Sequence[Reason]]]
 
 
 class IkStep(NamedTuple):
-    """The answer to one solve, made anew each time: see `qp.solution`.
+    """The answer to one solve; a named tuple, since one is made in every tick.
 
     Attributes:
         v: Velocity, Pinocchio's conventions, shape (nv,).
-        limits: Tells the limits that hold joints back: joint name or None, and words.
+        limits: Returns what holds joints back.
         ok: Whether the problem was solved as stated.
-        record: Keeps what the solver knows, until the next solve; what it returns tells
-            at any later time what holds each frame back, weightiest first. None where
-            only `limits` are known.
+        record: Records the state of the solver. The record returns at any later time
+            what holds each frame back, the most important first. None where only
+            `limits` are known.
     """
 
     v: Vector
-    limits: Callable[[], Limits] = tuple
+    limits: Callable[[], tuple[Reason, ...]] = tuple
     ok: bool = True
     record: Callable[[], Explanation] | None = None
 
@@ -32,12 +32,12 @@ class IkStep(NamedTuple):
 class IkBackend(Protocol):
     """Differential inverse kinematics of one robot at its commanded configuration.
 
-    It is made with that configuration, which its owner moves. Configurations and
-    velocities are Pinocchio's, of the reduced robot.
+    Its owner moves that configuration. Configurations and velocities are Pinocchio's,
+    of the reduced robot.
     """
 
     def reset(self) -> None:
-        """Forget the past; held frames are held where they are."""
+        """Discard the state of earlier ticks; held frames stay where they are."""
         ...
 
     def set_targets(self, targets: Matrix) -> None:

@@ -6,24 +6,26 @@ from typing import Any, Literal
 import numpy as np
 
 from wbc_suite.control.action import ActionLayout
-from wbc_suite.control.composite.parts import (
-    PartConfig,
-    check_part,
-    hands_of,
-    make_part,
-    motors,
-    parts_of,
+from wbc_suite.control.law.joint_laws import JointLaw, JointLawConfig
+from wbc_suite.control.law.law import Law, ServoLaw
+from wbc_suite.control.part.controller import (
+    UNTIL_NEXT_ACTION,
+    PartController,
+    PoseInput,
 )
-from wbc_suite.control.composite.standing import StanceConfig, StanceController
-from wbc_suite.control.part.controller import WHENEVER, PartController
 from wbc_suite.control.part.gripper import GripperController
-from wbc_suite.control.part.ik_pose import IkPoseController
-from wbc_suite.control.part.joint import JointLaw, JointLawConfig
-from wbc_suite.control.part.law import Law, ServoLaw, commands
+from wbc_suite.control.part.part_settings import PartSettings
+from wbc_suite.control.part.registry import (
+    check_part,
+    make_part,
+    parse_part,
+    part_controller,
+)
+from wbc_suite.control.robot_parts import hands_of, motors, parts_of
 from wbc_suite.control.state import RobotState
 from wbc_suite.errors import ConfigError
 from wbc_suite.robot import RobotDescription
-from wbc_suite.robot.parts import Name
+from wbc_suite.robot.elements import Name
 from wbc_suite.tomlfile import FrozenModel, parse_model
 from wbc_suite.typing import Vector
 
@@ -44,7 +46,7 @@ class BasicConfig(FrozenModel):
 
     format: Literal[1] = 1
     type: str = "BASIC"
-    body_parts: dict[Name, PartConfig]
+    body_parts: dict[Name, FrozenModel]
     may_fall: bool = False
 
 
@@ -70,10 +72,11 @@ class BasicController:
         hands = hands_of(state.robot)
         for name, part in self.config.body_parts.items():
             gripper = f"{name}_gripper"
-            if part.gripper is not None and gripper in state.robot.synergies:
+            grip = part.gripper if isinstance(part, PartSettings) else None
+            if grip is not None and gripper in state.robot.synergies:
                 synergies, grasp = state.robot.synergies[gripper], hands.get(name)
                 self.parts[gripper] = GripperController(
-                    gripper, synergies, state, part.gripper, grasp
+                    gripper, synergies, state, grip, grasp
                 )
         self.layout = ActionLayout(s for p in self.parts.values() for s in p.slices)
         self._places = [
@@ -85,18 +88,12 @@ class BasicController:
             for part in self.parts.values()
             if part.slices
         ]
-        self._ik_parts = {
-            name: part
-            for name, part in self.parts.items()
-            if isinstance(part, IkPoseController)
-        }
         driven = {joint for part in self.parts.values() for joint in part.law.joints}
         self._idle = _holding_laws(state, driven)
-        stances = [p for p in self.parts.values() if isinstance(p, StanceController)]
         self.laws: tuple[Law, ...] = (
             *(part.law for part in self.parts.values()),
             *self._idle,
-            *(part.stance for part in stances),
+            *(law for part in self.parts.values() for law in part.other_laws),
         )
         self.reset(state)
 
@@ -117,12 +114,9 @@ class BasicController:
     def prepare(self, state: RobotState) -> int:
         """Let parts do what is due."""
         return min(
-            (part.prepare(state) for part in self.parts.values()), default=WHENEVER
+            (part.prepare(state) for part in self.parts.values()),
+            default=UNTIL_NEXT_ACTION,
         )
-
-    def compute(self, state: RobotState) -> Vector:
-        """Return actuator commands by the readable forms of the laws."""
-        return commands(state, self.laws)
 
     @property
     def hold_action(self) -> Vector:
@@ -130,17 +124,23 @@ class BasicController:
         held = [part.hold_action for part in self.parts.values()]
         return np.concatenate([np.zeros(0), *held])
 
+    def pose_inputs(self) -> tuple[PoseInput, ...]:
+        """Return how devices move the hands of the parts."""
+        given = (part.pose_input() for part in self.parts.values())
+        return tuple(pose_input for pose_input in given if pose_input is not None)
+
     def info(self, state: RobotState) -> dict[str, Any]:
-        """Return `{"ik": ...}` of parts with inverse kinematics, if there are any."""
-        if not self._ik_parts:
+        """Return `{"ik": ...}` with the reports of parts, if there are any."""
+        reports = {name: part.report(state) for name, part in self.parts.items()}
+        frames = {name: report for name, report in reports.items() if report}
+        if not frames:
             return {}
-        frames = {name: part.report(state) for name, part in self._ik_parts.items()}
         reached = all(frame["reached"] for frame in frames.values())
         return {"ik": {"reached": reached, "frames": frames}}
 
 
 def _holding_laws(state: RobotState, driven: set[str]) -> tuple[JointLaw, ServoLaw]:
-    """Return laws of the joints that no part drives, by torque and by set point."""
+    """Return laws that hold the joints of no part, by torque and by setpoint."""
     idle = [joint for joint in state.actuators if joint not in driven]
     torques, gains = set(motors(state.robot)), JointLawConfig()
     return (
@@ -158,6 +158,10 @@ def check_basic(
         ConfigError: If it breaks a rule of the format, names a part that the robot
             does not have, or would let it fall.
     """
+    parts = config.get("body_parts")
+    if isinstance(parts, Mapping):
+        models = {k: parse_part(str(k), part, source) for k, part in parts.items()}
+        config = {**config, "body_parts": models}
     read = parse_model(BasicConfig, config, source=source)
     if robot is None:
         return read
@@ -166,7 +170,8 @@ def check_basic(
             check_part(name, part, robot)
         except ConfigError as error:
             raise ConfigError(f"{source}: key 'body_parts.{name}': {error}") from error
-    stands = any(isinstance(part, StanceConfig) for part in read.body_parts.values())
+    kinds = [part_controller(part) for part in read.body_parts.values()]
+    stands = any(kind.holds_root for kind in kinds)
     if robot.root.kind == "free" and not (stands or read.may_fall):
         raise ConfigError(
             f"{source}: key 'body_parts': {robot.name} is free to fall, and no part "

@@ -1,4 +1,4 @@
-"""HYBRID_MOBILE_BASE: BASIC on a base that drives, and what hands keep to meanwhile."""
+"""HYBRID_MOBILE_BASE: BASIC on a mobile base; hands hold in the base or the world."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.control.action import ActionLayout, ActionPart
+from wbc_suite.control.action import ActionLayout, ActionPart, SliceKind, Unit
 from wbc_suite.control.composite.basic import BasicConfig, BasicController, check_basic
 from wbc_suite.control.part.osc_controller import OscController
 from wbc_suite.control.state import RobotState
@@ -21,21 +21,21 @@ WORLD = 0
 
 MODE = ActionPart(
     name="base_mode",
-    kind="base",
+    kind=SliceKind.BASE,
     labels=("hands_keep_to",),
-    units=("-1 base .. 1 world",),
+    units=(Unit("-1 base .. 1 world"),),
     low=(-1.0,),
     high=(1.0,),
 )
 
 
 class HybridMobileBase(BasicController):
-    """Drives parts as BASIC does; one more value says what goals of hands move with.
+    """Drives parts as BASIC does; one more value sets the frame that hands hold in.
 
-    `base_mode`, the last value of the action: up to 0 goals ride on the base, as in
+    `base_mode`, the last value of the action: up to 0 goals move with the base, as in
     BASIC with `input_ref_frame = "base"`; above 0 they stay in the world while the base
-    drives under them. A goal never jumps: in the moment of the change it is where it
-    was. How goals are given (`input_ref_frame`) is another matter, and does not change.
+    drives. A change of the mode does not move a goal, nor change the meaning of the
+    input (`input_ref_frame`).
 
     Args:
         config: Plain data of a `BasicConfig`.
@@ -64,7 +64,7 @@ class HybridMobileBase(BasicController):
         self._keep_to_mode(in_world=False)
 
     def set_goal(self, action: Vector, period: float = 0.05) -> None:
-        """Hand each part its values, as they are meant, and then keep to the mode."""
+        """Set the goals in the frame of the input, then move them to the mode's."""
         for hand, own in self._hands:
             keep_with(hand, own, self._state)
         super().set_goal(action[:-1], period)
@@ -82,7 +82,7 @@ class HybridMobileBase(BasicController):
 
 
 def keep_with(hand: OscController, body: int, state: RobotState) -> None:
-    """Let a goal, and a target on its way there, move with a body from now on."""
+    """Express a goal, and a reference on its way there, in the axes of a body."""
     record = hand.law.record[0]
     if record["reference"] == body:
         return
@@ -107,13 +107,12 @@ def check_hybrid(
     """Return the config as a model.
 
     Raises:
-        ConfigError: What `check_basic` says, or the robot has no base that drives.
+        ConfigError: See `check_basic`, or the robot has no base that drives.
     """
     read = check_basic(config, robot, source)
     if robot is not None and not (robot.root.kind == "planar" and robot.root.actuated):
         raise ConfigError(
-            f"{source}: {robot.name} has no base that drives; HYBRID_MOBILE_BASE is "
-            "for those that have. Use BASIC, or load it on one, such as "
-            "base='OmronMobileBase'."
+            f"{source}: {robot.name} has no base that drives, which HYBRID_MOBILE_BASE "
+            "needs. Use BASIC, or load it on one, such as base='OmronMobileBase'."
         )
     return read

@@ -3,12 +3,18 @@
 from functools import partial
 
 import mink
+import mujoco
 import numpy as np
 
-from wbc_suite.control.composite.backend import IkStep, Limits
-from wbc_suite.control.composite.config import ControlledFrame, WholeBodyIKConfig
-from wbc_suite.control.composite.tasks import FOLLOW, frame_costs, travel_costs
+from wbc_suite.control.composite.backend import IkStep
+from wbc_suite.control.composite.qp_tasks import TRACKING_COST, travel_costs
+from wbc_suite.control.composite.whole_body_config import (
+    ControlledFrame,
+    WholeBodyIKConfig,
+)
+from wbc_suite.control.reasons import NoSolution, Reason
 from wbc_suite.kinematics import Configuration, Conversion
+from wbc_suite.qp import ActiveLimit, LimitKind
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Matrix, Vector
 
@@ -112,7 +118,7 @@ class MinkBackend:
         weight = LEVEL_FACTOR**frame.level
         if frame.frame is None:
             return mink.ComTask(weight * frame.position_cost, gain=frame.gain)
-        position, orientation = frame_costs(frame)
+        position, orientation = frame.behaviour.costs(frame)
         return mink.FrameTask(
             frame.frame,
             self._frame_type(frame.frame),
@@ -140,7 +146,7 @@ class MinkBackend:
 
     def _joint_costs(self, robot: RobotDescription) -> Vector:
         costs = np.zeros(self._model.nv)  # a free root's stay
-        for joint, cost in travel_costs(robot, FOLLOW).items():
+        for joint, cost in travel_costs(robot, TRACKING_COST).items():
             costs[self._model.joint(joint).dofadr[0]] = cost
         return costs
 
@@ -168,21 +174,28 @@ class MinkBackend:
         )
         return [position, mink.VelocityLimit(self._model, speeds)]
 
-    def _active(self, q: Vector, v: Vector, dt: float) -> Limits:
+    def _active(self, q: Vector, v: Vector, dt: float) -> tuple[Reason, ...]:
         """Return joints that the step brings to a position limit."""
-        found: list[tuple[str | None, str]] = []
+        found: list[Reason] = []
         margin = self._config.limits.position_margin + 1e-6
         for k in range(self._model.njnt):
             if not self._model.jnt_limited[k]:
                 continue
-            name = self._model.joint(k).name
             dof, place = self._model.jnt_dofadr[k], self._model.jnt_qposadr[k]
             reached = q[place] + dt * v[dof]
             low, high = self._model.jnt_range[k]
-            if reached <= low + margin:
-                found.append((name, f"joint limit: {name} (lower)"))
-            elif reached >= high - margin:
-                found.append((name, f"joint limit: {name} (upper)"))
+            if low + margin < reached < high - margin:
+                continue
+            slides = self._model.jnt_type[k] == mujoco.mjtJoint.mjJNT_SLIDE
+            limit = ActiveLimit(
+                kind=LimitKind.POSITION,
+                subject=self._model.joint(k).name,
+                side="lower" if reached <= low + margin else "upper",
+                is_joint=True,
+                unit="m" if slides else "rad",
+                multiplier=0.0,  # mink returns none
+            )
+            found.append(limit)
         return tuple(found)
 
 
@@ -191,5 +204,5 @@ def _split(target: Vector) -> tuple[Matrix, Vector]:
     return T[:, :3], T[:, 3]
 
 
-def _unsolved() -> Limits:
-    return ((None, "no solution"),)
+def _unsolved() -> tuple[Reason, ...]:
+    return (NoSolution(),)

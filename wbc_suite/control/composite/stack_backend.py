@@ -1,54 +1,37 @@
 """Inverse kinematics by this package's own QP task stack."""
 
-from collections.abc import Callable
 from functools import partial
 
 import numpy as np
 
-from wbc_suite.compiling import compiled
-from wbc_suite.compiling_ahead import compile_ahead
-from wbc_suite.control.composite.backend import Explanation, IkStep
-from wbc_suite.control.composite.config import WholeBodyIKConfig
-from wbc_suite.control.composite.effort import EffortGuard
-from wbc_suite.control.composite.tasks import (
-    FOLLOW,
-    HURRY,
+from wbc_suite.control.composite.backend import IkStep
+from wbc_suite.control.composite.frame_kinds import NO_SPEED_LIMIT
+from wbc_suite.control.composite.qp_tasks import (
+    TRACKING_COST,
     accelerations,
     held_equality,
     make_limits,
-    make_task,
     travel_costs,
 )
+from wbc_suite.control.composite.torque_limiter import TorqueLimiter
+from wbc_suite.control.composite.whole_body_config import WholeBodyIKConfig
+from wbc_suite.control.reasons import Reason
 from wbc_suite.kinematics import Configuration
-from wbc_suite.kinematics.array_table import vector_at
 from wbc_suite.qp import (
+    Conflict,
     Equality,
     FrameEquality,
     FrameTask,
-    LimitKind,
     PostureTask,
     Solution,
     SupportLimit,
     TaskStack,
     TickRecord,
 )
-from wbc_suite.qp.lower_levels import lower_tick
-from wbc_suite.qp.tick import tick
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["StackBackend"]
-
-_ROWS = (
-    LimitKind.SELF_COLLISION,
-    LimitKind.BALANCE,
-    LimitKind.EFFORT,
-    LimitKind.FLOOR,
-)
-"""Limits of no single joint."""
-
-POSE, POSITION = 12, 3
-"""How many numbers a task keeps of its target, which come first in what it packs."""
 
 
 class StackBackend:
@@ -58,6 +41,11 @@ class StackBackend:
         robot: The reduced robot.
         config: Tasks, limits and contacts.
         commanded: The commanded configuration; read, and moved by the owner.
+
+    Attributes:
+        stack: The stack of frames and posture.
+        torque_limiter: Limits what it solves for.
+        v: Velocity of the last tick, shape (nv,), for whoever solves the next one.
     """
 
     def __init__(
@@ -66,7 +54,6 @@ class StackBackend:
         config: WholeBodyIKConfig,
         commanded: Configuration,
     ) -> None:
-        compile_ahead(tick, lower_tick)  # half of the first compiling, needed last
         self._config, self._commanded = config, commanded
         self._posture = PostureTask(
             config.posture.cost,
@@ -74,11 +61,7 @@ class StackBackend:
             gain=config.posture.gain,
             level=config.posture.level,
         )
-        self._tasks = [make_task(frame) for frame in config.frames]
-        places = [task.packed.ctypes.data for task in self._tasks]
-        sizes = [POSE if isinstance(t, FrameTask) else POSITION for t in self._tasks]
-        self._places: Indices = np.array(places, dtype=np.int64)
-        self._sizes: Indices = np.array(sizes, dtype=np.int64)
+        self._tasks = [frame.behaviour.task(frame) for frame in config.frames]
         self._held = [held_equality(held) for held in config.held]
         equalities: list[Equality] = list(self._held)
         if robot.root.kind == "planar" and robot.root.drive == "differential":
@@ -87,19 +70,20 @@ class StackBackend:
             equalities.append(sideways)
         limits = make_limits(robot, config)
         self._support = [x for x in limits if isinstance(x, SupportLimit)]
-        self._stack = TaskStack(
+        self.stack = TaskStack(
             commanded,
             [*self._tasks, self._posture],
             limits=limits,
             equalities=equalities,
             escape=False,
         )
-        able = accelerations(robot, config, commanded)
-        self._guard = EffortGuard(robot, commanded, able)
+        self.v: Vector = np.zeros(commanded.nv)
+        max_acceleration = accelerations(robot, config, commanded)
+        self.torque_limiter = TorqueLimiter(robot, commanded, max_acceleration)
         self._joints = PostureTask(
             1.0,
-            costs=travel_costs(robot, FOLLOW),
-            max_speed=HURRY,
+            costs=travel_costs(robot, TRACKING_COST),
+            max_speed=NO_SPEED_LIMIT,
             name="configuration",
         )
         self._joint_stack = TaskStack(
@@ -111,72 +95,80 @@ class StackBackend:
         )
 
     def reset(self) -> None:
-        """Forget the past; hold feet and centre of mass where they are."""
+        """Discard the state of earlier ticks; hold feet and centre of mass."""
         for held in self._held:
             held.set_target(self._commanded.frame_pose(held.frame))
         for limit in self._support:
             limit.reset()
-        self._stack.reset()
+        self.stack.reset()
         self._joint_stack.reset()
+        self.v[:] = 0.0
 
     def set_targets(self, targets: Matrix) -> None:
         """Set the targets of all controlled frames."""
-        _hand_on(self._places, self._sizes, targets)
+        for task, row in zip(self._tasks, targets, strict=True):
+            task.target_row.set(row if isinstance(task, FrameTask) else row[3::4])
 
     def set_posture(self, q: Vector) -> None:
         """Set the posture to prefer."""
-        self._posture.target[:] = q
+        self._posture.set_target(q)
 
     def solve(self, dt: float) -> IkStep:
         """Solve one tick of the stack."""
-        return self._step(self._stack, self._joint_stack, dt, record=self._record)
+        self.stack.v_previous[:] = self.v
+        return self._step(self.stack, self.stack.solve(dt), dt)
 
     def solve_posture(self, posture: Vector, dt: float) -> IkStep:
         """Solve one tick of the stack without frames."""
         self._joints.set_target(posture)
-        return self._step(self._joint_stack, self._stack, dt)
+        self._joint_stack.v_previous[:] = self.v
+        return self._step(self._joint_stack, self._joint_stack.solve(dt), dt)
 
-    def _record(self) -> Explanation:
-        return partial(_reasons, self._stack.record())
+    def finish(self, dt: float, status: int, level: int) -> IkStep:
+        """Finish a tick of the stack that `solve_tick` has begun.
 
-    def _step(
-        self,
-        stack: TaskStack,
-        other: TaskStack,
-        dt: float,
-        record: Callable[[], Explanation] | None = None,
-    ) -> IkStep:
-        solution = stack.solve(dt)
-        v = self._guard.able(other.v_previous, solution.v, dt)
-        stack.v_previous[:] = other.v_previous[:] = v
-        limits = partial(_words, solution)
-        return IkStep(v=v, limits=limits, ok=solution.ok, record=record)
+        Args:
+            dt: Step, s.
+            status: The `TickStatus` that it returned.
+            level: Level at which it ended.
+        """
+        return self._step(self.stack, self.stack.complete(dt, status, level), dt)
+
+    def last_step(self) -> IkStep:
+        """Return the answer of a tick of the stack that `solve_tick` has solved."""
+        return self._answer(self.stack, self.stack.solution(), self.v.copy())
+
+    @property
+    def task_levels(self) -> Indices:
+        """Place of each frame's task among the strict levels, then the posture's."""
+        tasks = [*self._tasks, self._posture]
+        levels = sorted({task.level for task in tasks})
+        return np.array([levels.index(task.level) for task in tasks], dtype=np.int64)
+
+    @property
+    def is_compiled(self) -> bool:
+        """Whether `solve_tick` needs no Python."""
+        return self.stack.is_compiled
+
+    def _step(self, stack: TaskStack, solution: Solution, dt: float) -> IkStep:
+        v = self.torque_limiter.apply(self.v, solution.v, dt)
+        self.v[:] = v
+        return self._answer(stack, solution, v)
+
+    def _answer(self, stack: TaskStack, solution: Solution, v: Vector) -> IkStep:
+        explains = stack is self.stack
+        return IkStep(
+            v=v,
+            limits=partial(_limits, solution),
+            ok=solution.ok,
+            record=partial(partial, _reasons, solution.record) if explains else None,
+        )
 
 
-@compiled
-def _hand_on(places: Indices, sizes: Indices, targets: Matrix) -> None:
-    """Write targets where tasks keep them.
-
-    Args:
-        places: Address of each task's target.
-        sizes: Length of it: `POSE`, or `POSITION`.
-        targets: Poses, [R p] row by row, shape (n, 12).
-    """
-    for k in range(places.shape[0]):
-        target = vector_at(places[k], sizes[k])
-        for i in range(sizes[k]):
-            target[i] = targets[k, i if sizes[k] == POSE else 4 * i + 3]
-
-
-def _reasons(tick: TickRecord) -> dict[str, tuple[str, ...]]:
+def _reasons(tick: TickRecord) -> dict[str, tuple[Reason, ...]]:
     reports = tick.explain(position_tolerance=0.0, orientation_tolerance=0.0)
     return {name: report.reasons for name, report in reports.items()}
 
 
-def _words(solution: Solution) -> tuple[tuple[str | None, str], ...]:
-    found = [
-        (None if limit.kind in _ROWS else limit.name, str(limit))
-        for limit in solution.active
-    ]
-    found += [(None, f"conflict: {name}") for name in solution.conflicts]
-    return tuple(found)
+def _limits(solution: Solution) -> tuple[Reason, ...]:
+    return (*solution.active, *(Conflict(name) for name in solution.conflicts))

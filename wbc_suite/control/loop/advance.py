@@ -1,108 +1,87 @@
-"""The compiled control loop: physics and laws, n steps in one call."""
+"""The compiled control loop: n physics steps with all laws in one call."""
 
-import numpy as np
+from typing import Any
 
-from wbc_suite.compiling import compiled_unlocked
-from wbc_suite.control.loop.haste import (
-    begin_haste,
-    end_haste,
-    let_fixed_rest,
-    may_haste,
-    may_hide,
-    show_bodies,
-    start_profiler,
-    stop_profiler,
-)
-from wbc_suite.control.loop.kernels import Needed, command
-from wbc_suite.control.loop.neighbours import SKIN, hide_far_bodies, way
-from wbc_suite.control.loop.physics import (
+from wbc_suite.compiling import compiled, compiled_nogil
+from wbc_suite.control.composite.tick import Ticks, run_tick
+from wbc_suite.control.loop.inverse_dynamics import CustomLaw, Needed, write_commands
+from wbc_suite.control.loop.mujoco_functions import (
     mj_comPos,
     mj_kinematics,
     mj_step1,
     mj_step2,
-    physics_of,
 )
-from wbc_suite.control.loop.sound import begins_sound, ends_sound
-from wbc_suite.control.loop.table import CompiledRecords, LawKind, Records
-from wbc_suite.typing import Indices
+from wbc_suite.control.loop.physics import Physics
+from wbc_suite.control.loop.records import CompiledRecords
+from wbc_suite.control.loop.state_checks import (
+    CheckedState,
+    check_after,
+    check_before,
+)
 
-__all__ = ["advance", "needed"]
-
-WORTH = 8
-"""Steps that must be left for it to pay to look which bodies are far."""
-
-
-def needed(laws: Records) -> tuple[Needed, Needed]:
-    """Return which laws of hands and of feet `advance` is to know: those of a table."""
-    hands, feet = laws["kind"] == LawKind.OSC, laws["kind"] >= LawKind.STANCE
-    return bool(hands.any()) or None, bool(feet.any()) or None
+__all__ = ["advance"]
 
 
-@compiled_unlocked
+@compiled_nogil
 def advance(
-    model: int,
-    data: int,
-    timestep: float,
-    table: Indices,
-    haste: Indices,
-    sound: Indices,
+    model: Any,
+    data: Any,
+    physics: Physics,
+    state: CheckedState,
     laws: CompiledRecords,
     drives: CompiledRecords,
     hands: Needed,
     feet: Needed,
+    custom_law: CustomLaw,
+    ticks: Ticks,
     steps: int,
-    seen: bool,
-) -> bool:
-    """Advance physics under all laws; holds no lock, so threads run side by side.
+) -> int:
+    """Advance physics under all laws, without the interpreter's lock.
 
-    Positions of bodies and sites are brought up to date at the end: MuJoCo's own step
-    leaves them one step behind the joints. All steps are hasty but one that somebody
-    looks at, the last: see `haste` and `neighbours`.
+    Poses of bodies and sites are updated at the end: a step of MuJoCo leaves them one
+    step behind the joints.
 
     Args:
-        model: Address of the model.
-        data: Address of its data.
-        timestep: Duration of a step, s.
-        table: Where their arrays are, see `physics_table`.
-        haste: Where is what a step may leave out, see `bind_haste`.
-        sound: Where what may be broken is, see `bind_sound`.
+        model: Address of the model; the model itself in plain Python.
+        data: Address of its data; the data in plain Python.
+        physics: Views of their arrays.
+        state: What is checked before the first and after the last step.
         laws: `LAW` records.
         drives: `DRIVE` records.
-        hands: Whether a law is in operational space, see `needed`.
-        feet: Whether a law is of feet.
-        steps: How many steps of physics.
-        seen: Whether somebody looks at more than joints afterwards: at poses, sensors.
+        hands: Whether there are laws in operational space, see `needed_kernels`.
+        feet: Whether there are laws of feet.
+        custom_law: Kernel of users' laws.
+        ticks: Whole-body ticks that run here.
+        steps: Number of physics steps.
 
     Returns:
-        Whether all numbers were and are usable, and MuJoCo did not warn. Where they are
-        not to begin with, there is no step.
+        Number of steps that were made, fewer where a tick needs Python to be finished.
+        -1 if numbers were or are not usable, or MuJoCo warned. Where they are not to
+        begin with, there is no step.
     """
-    if not begins_sound(sound):
-        return False
-    physics = physics_of(table, timestep)
-    clock = stop_profiler(haste)
-    hasty, hides = (steps > 1 or not seen) and may_haste(haste), False
-    moved = np.inf  # by how much two geoms may be nearer than when bodies were hidden
-    if hasty:
-        begin_haste(haste)
-    for k in range(steps):
-        if hasty and seen and k == steps - 1:
-            end_haste(haste)
-        elif hasty and k > 0:
-            let_fixed_rest(haste)
-            if hides and moved > SKIN:
-                show_bodies(haste)
+    if not check_before(state):
+        return -1
+    done = 0
+    while done < steps and _run_ticks(physics, laws, drives, ticks):
         mj_step1(model, data)
-        command(physics, laws, drives, hands, feet)
-        if hasty and moved > SKIN and steps - k > WORTH and may_hide(haste):
-            hide_far_bodies(haste)
-            moved, hides = 0.0, True
+        write_commands(physics, laws, drives, hands, feet, custom_law)
         mj_step2(model, data)
-        moved += way(haste, timestep)
-    if seen:
-        mj_kinematics(model, data)
-        mj_comPos(model, data)
-    elif hasty:
-        end_haste(haste)
-    start_profiler(haste, clock)
-    return ends_sound(sound)
+        done += 1
+    mj_kinematics(model, data)
+    mj_comPos(model, data)
+    return done if check_after(state) else -1
+
+
+@compiled
+def _run_ticks(
+    physics: Physics, laws: CompiledRecords, drives: CompiledRecords, ticks: Ticks
+) -> bool:
+    """Run the ticks that are due; return whether all of them are done."""
+    if ticks is not None:
+        for tick in ticks:
+            is_due = tick.state[0].countdown <= 0
+            if is_due and not run_tick(tick, physics.qpos, laws, drives):
+                return False
+        for tick in ticks:
+            tick.state[0].countdown -= 1
+    return True

@@ -1,28 +1,29 @@
-"""Grippers: one number per synergy moves joints together from open to closed."""
+"""GRIP: one value per synergy moves joints together from open to closed."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
+import mujoco
 import numpy as np
 
-from wbc_suite.control.action import ActionPart
-from wbc_suite.control.part.config import GripConfig
-from wbc_suite.control.part.controller import WHENEVER
-from wbc_suite.control.part.gripper_width import OpeningTable
-from wbc_suite.control.part.joint_step import grip
-from wbc_suite.control.part.law import ServoLaw
+from wbc_suite.control.action import ActionPart, SliceKind, Unit
+from wbc_suite.control.law.law import ServoLaw
+from wbc_suite.control.part.controller import PartController
+from wbc_suite.control.part.part_settings import GripConfig
 from wbc_suite.control.state import RobotState
 from wbc_suite.errors import ConfigError
-from wbc_suite.robot.parts import Synergy
+from wbc_suite.robot.elements import Synergy
 from wbc_suite.typing import Indices, Vector
 
-__all__ = ["GripperController"]
+__all__ = ["GripperController", "OpeningTable"]
+
+SAMPLES = 41
 
 
-class GripperController:
-    """Set points of a gripper's servos from its synergies.
+class GripperController(PartController[ServoLaw]):
+    """Setpoints of a gripper's servos from its synergies.
 
     The action has one value per synergy, -1 open to 1 closed:
-    `q* = open + (a + 1) / 2 (closed - open)`, the set point of the joint's servo. With
+    `q* = open + (a + 1) / 2 (closed - open)`, the setpoint of the joint's servo. With
     the input `width` it is the width between the fingers of a parallel gripper.
 
     Args:
@@ -34,11 +35,11 @@ class GripperController:
 
     Attributes:
         slices: The action slice.
-        law: The servos' set points.
+        law: The servos' setpoints.
         goal: Present action, shape (number of synergies,).
 
     Raises:
-        ConfigError: If widths are asked for, and it has no two fingers opposite each
+        ConfigError: If the input is `width`, and it has no two fingers opposite each
             other.
     """
 
@@ -87,7 +88,7 @@ class GripperController:
             self.goal[:] = self._table.width(float(command[0]))
         else:
             self.goal[:] = command
-        self.law.aim(self._set_points(command))
+        self.law.aim(self._setpoints(command))
 
     def set_goal(self, values: Vector, period: float) -> None:
         """Take the slice's values, shape (number of synergies,)."""
@@ -96,53 +97,172 @@ class GripperController:
         if self._table is not None:
             command = np.array([self._table.command(float(values[0]))])
         if self.config.speed is None:
-            law = self.law
-            grip(law.record, law.drives, command, self._synergy, self._open, self._span)
+            self.law.rest_at(self._setpoints(command))
         else:
             duration = self._duration(command, self.config.speed)
-            self.law.move(self._set_points(command), duration)
-
-    def prepare(self, state: RobotState) -> int:
-        """Do nothing: servos do the rest."""
-        return WHENEVER
+            self.law.move(self._setpoints(command), duration)
 
     @property
     def hold_action(self) -> Vector:
         """The present goal."""
         return self.goal.copy()
 
-    def _set_points(self, command: Vector) -> Vector:
-        """Return set points of the joints for commands of the synergies."""
+    def _setpoints(self, command: Vector) -> Vector:
+        """Return setpoints of the joints for commands of the synergies."""
         closed = 0.5 * (command[self._synergy] + 1.0)
         return self._open + closed * self._span
 
     def _duration(self, command: Vector, speed: float) -> float:
-        """Return how long the set points take from where they are, s."""
+        """Return how long the setpoints take from their present place, s."""
         now = (self.law.target()[0] - self._open) / np.where(
             self._span == 0.0, np.inf, self._span
         )
         before = 2.0 * now[self._leading] - 1.0
-        way = float(np.abs(command - before).max())
+        distance = float(np.abs(command - before).max())
         if self._table is not None:
-            way = abs(
-                self._table.width(float(command[0]))
-                - self._table.width(float(before[0]))
-            )
-        return way / speed
+            width = self._table.width
+            distance = abs(width(float(command[0])) - width(float(before[0])))
+        return distance / speed
 
     def _part(self, synergies: Sequence[Synergy]) -> ActionPart:
         count = len(synergies)
         labels = tuple(s.name for s in synergies)
-        units = ("-1 open .. 1 closed",) * count
+        units = (Unit("-1 open .. 1 closed"),) * count
         low, high = (-1.0,) * count, (1.0,) * count
         if self._table is not None:
-            labels, units = ("width",), ("m",)
+            labels, units = ("width",), (Unit("m"),)
             low, high = (self._table.least,), (self._table.greatest,)
         return ActionPart(
             name=self.name,
-            kind="gripper",
+            kind=SliceKind.GRIPPER,
             labels=labels,
             units=units,
             low=low,
             high=high,
         )
+
+
+class OpeningTable:
+    """Width between two fingers against the synergy's command.
+
+    The width is measured along the y axis of the grasp frame, from its origin to the
+    fingers on both sides, by their collision shapes; linkages follow their drives by
+    the ratios of the description. Between samples it is interpolated linearly.
+
+    Args:
+        synergy: Moves the fingers.
+        grasp: Frame between them.
+        state: The robot in the simulation; its state is not changed.
+
+    Attributes:
+        least: Width when closed, m.
+        greatest: Width when open, m.
+
+    Raises:
+        ConfigError: If there are no two fingers opposite each other.
+    """
+
+    def __init__(self, synergy: Synergy, grasp: str, state: RobotState) -> None:
+        self._state, self._grasp = state, state.prefix + grasp
+        self._data = mujoco.MjData(state.model)
+        self._commands = np.linspace(-1.0, 1.0, SAMPLES)
+        self._moving = self._moving_shapes(_followers(synergy, state))
+        sides = self._hits(synergy, -1.0)
+        if None in [body for _, body in sides]:
+            raise ConfigError(
+                f"key 'input': gripper '{synergy.gripper}' has no two fingers opposite "
+                f"each other at frame '{grasp}', so it has no width. Use "
+                "'synergy'."
+            )
+        widths = []
+        for command in self._commands:
+            now = self._hits(synergy, float(command))
+            # Fingers that overlap when closed would meet each other's inside.
+            widths.append(
+                sum(
+                    distance
+                    for (distance, body), (_, own) in zip(now, sides, strict=True)
+                    if body == own
+                )
+            )
+        self._widths: Vector = np.minimum.accumulate(widths)
+        self.greatest, self.least = float(self._widths[0]), float(self._widths[-1])
+
+    def command(self, width: float) -> float:
+        """Return the synergy's command that opens the gripper so wide, m."""
+        return float(np.interp(width, self._widths[::-1], self._commands[::-1]))
+
+    def width(self, command: float) -> float:
+        """Return the width, m, of a synergy's command."""
+        return float(np.interp(command, self._commands, self._widths))
+
+    def _hits(self, synergy: Synergy, command: float) -> list[tuple[float, int | None]]:
+        """Return distance and body of the nearest shape along y, and along -y."""
+        model, data = self._state.model, self._data
+        for name, value in _joint_values(synergy, command, self._state).items():
+            joint = model.joint(self._state.prefix + name)
+            data.qpos[joint.qposadr[0]] = value
+        mujoco.mj_kinematics(model, data)
+        frame = data.site(self._grasp)
+        y = frame.xmat.reshape(3, 3)[:, 1].copy()
+        return [self._nearest(frame.xpos, sign * y) for sign in (1.0, -1.0)]
+
+    def _nearest(self, start: Vector, direction: Vector) -> tuple[float, int | None]:
+        model, data = self._state.model, self._data
+        found: tuple[float, int | None] = (np.inf, None)
+        for geom in self._moving:
+            if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH:
+                distance = mujoco.mj_rayMesh(model, data, geom, start, direction)
+            else:
+                distance = mujoco.mju_rayGeom(
+                    data.geom_xpos[geom],
+                    data.geom_xmat[geom],
+                    model.geom_size[geom],
+                    start,
+                    direction,
+                    int(model.geom_type[geom]),
+                )
+            if 0.0 <= distance < found[0]:
+                found = distance, int(model.geom_bodyid[geom])
+        return found
+
+    def _moving_shapes(self, joints: Iterable[str]) -> list[int]:
+        """Return the collision shapes that some joints move."""
+        model, prefix = self._state.model, self._state.prefix
+        bodies = {int(model.jnt_bodyid[model.joint(prefix + j).id]) for j in joints}
+        for body in range(model.nbody):
+            if int(model.body_parentid[body]) in bodies:
+                bodies.add(body)
+        return [
+            geom
+            for geom in range(model.ngeom)
+            if int(model.geom_bodyid[geom]) in bodies and model.geom_contype[geom]
+        ]
+
+
+def _joint_values(
+    synergy: Synergy, command: float, state: RobotState
+) -> dict[str, float]:
+    """Return positions of the synergy's joints and of those that follow them."""
+    closed = 0.5 * (command + 1.0)
+    values = {
+        joint: (1.0 - closed) * value + closed * synergy.closed[joint]
+        for joint, value in synergy.open.items()
+    }
+    followers = {j.name: j.mimic for j in state.robot.joints if j.mimic is not None}
+    for name in _followers(synergy, state):  # a leader comes before its followers
+        if name in followers:
+            mimic = followers[name]
+            values[name] = mimic.ratio * values[mimic.joint] + mimic.offset
+    return values
+
+
+def _followers(synergy: Synergy, state: RobotState) -> dict[str, None]:
+    """Return the synergy's joints and all that follow them, leaders first."""
+    found = dict.fromkeys(synergy.open)
+    mimics = [(j.name, j.mimic.joint) for j in state.robot.joints if j.mimic]
+    while True:
+        more = [a for a, leader in mimics if leader in found and a not in found]
+        if not more:
+            return found
+        found |= dict.fromkeys(more)

@@ -1,4 +1,4 @@
-"""IK_POSE: actions are poses of the hand, inverse kinematics finds the joints."""
+"""IK_POSE: actions are poses of the hand; inverse kinematics gives joint references."""
 
 from typing import Annotated, Any, Literal
 
@@ -6,35 +6,34 @@ import numpy as np
 import pinocchio as pin
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
-from wbc_suite.control.action import ActionPart
-from wbc_suite.control.part.config import (
+from wbc_suite.control.action import ActionPart, Axis, SliceKind, Unit
+from wbc_suite.control.law.joint_laws import JointLaw
+from wbc_suite.control.part.controller import PartController
+from wbc_suite.control.part.hand_goal import HandGoal
+from wbc_suite.control.part.part_ik import IkMotion, PartIk
+from wbc_suite.control.part.part_settings import (
+    REACH,
+    ROUNDING,
     InputFrame,
     InputScaling,
     InputType,
     Numbers,
     PartSettings,
-    Span,
+    Range,
+    apply_torque_settings,
     damping_of,
-    limits_of,
-    set_torque_rules,
 )
-from wbc_suite.control.part.joint import JointLaw
-from wbc_suite.control.part.osc_goal import GoalLimits, step_origin, stepped
-from wbc_suite.control.part.part_ik import IkMotion, PartIk
+from wbc_suite.control.robot_parts import RobotPart
 from wbc_suite.control.state import RobotState
 from wbc_suite.typing import Vector
 
 __all__ = ["IkPoseConfig", "IkPoseController"]
 
-REACH = 10.0
-"""Bound of absolute positions, m: a typing error, not a place to reach for."""
-
-NOTHING = 1e-12
-"""m and rad; rounding of a step that is none."""
+AXES = (Axis.X, Axis.Y, Axis.Z, Axis.QX, Axis.QY, Axis.QZ, Axis.QW)
 
 
 class IkPoseConfig(PartSettings):
-    """Joints follow what inverse kinematics finds for poses of the hand.
+    """Joints follow the inverse kinematics of poses of the hand.
 
     Attributes:
         input_type: `delta` steps, see `goal_update_mode`, or `absolute` poses.
@@ -58,8 +57,8 @@ class IkPoseConfig(PartSettings):
     output_min: Numbers = -0.05
     output_max: Numbers = 0.05
     turn_limit: PositiveFloat = 0.5
-    position_limits: Span | None = None
-    orientation_limits: Span | None = None
+    position_limits: Range | None = None
+    orientation_limits: Range | None = None
     solve_hz: Annotated[float, Field(ge=10.0, le=1000.0)] = 100.0
     motion: IkMotion = IkMotion()
     kp: PositiveFloat = 900.0
@@ -76,81 +75,73 @@ class IkPoseConfig(PartSettings):
         return self
 
 
-class IkPoseController:
+class IkPoseController(PartController[JointLaw]):
     """Moves a hand's goal by actions of a position and a quaternion, x y z w.
 
     The quaternion is the pose's, or in delta mode that of the turn; it is normalised,
-    and one of length 0 asks for no turn.
+    and one of length 0 is no turn.
 
     Args:
-        name: The part, and its slice.
+        part: The arm.
         config: Gains and meaning of the input.
         state: The robot in the simulation.
-        joints: Joints of the arm.
-        site: Frame of the hand.
 
     Attributes:
-        goal: Pose to go to, in the reference's axes.
-        law: Follows the joints' targets, which are smooth between two solves.
+        law: Tracks the joints' references, which are smooth between two solves.
     """
 
+    needs_hand = True
+
     def __init__(
-        self,
-        name: str,
-        config: IkPoseConfig,
-        state: RobotState,
-        joints: tuple[str, ...],
-        site: str,
+        self, part: RobotPart, config: IkPoseConfig, state: RobotState
     ) -> None:
+        assert part.hand is not None
         self.config, self._state = config, state
-        self.law = JointLaw(
-            state, joints, kp=config.kp, kd=damping_of(config.kp, config.damping_ratio)
-        )
-        set_torque_rules(self.law, config)
+        kd = damping_of(config.kp, config.damping_ratio)
+        self.law = JointLaw(state, part.joints, kp=config.kp, kd=kd)
+        apply_torque_settings(self.law, config)
         self.law.keep_limits(state)
         step = float(state.model.opt.timestep)
         self._steps = max(1, round(1.0 / (config.solve_hz * step)))
+        period = self._steps * step
         self._ik = PartIk(
-            state, joints, site, motion=config.motion, period=self._steps * step
+            state, part.joints, part.hand, motion=config.motion, period=period
         )
         self._base = state.model.body(state.prefix + state.robot.links[0].name).id
         if config.input_ref_frame == "world":
             self._base = 0
         self._scaling = InputScaling(3, config, config.output_min, config.output_max)
-        self.slices = (_pose_part(name, config, self._scaling),)
-        everywhere = (-np.inf, np.inf)
-        self._limits = GoalLimits(
-            position=np.array(
-                limits_of(config.position_limits or everywhere, 3, "position_limits")
-            ),
-            turn=np.array(
-                limits_of(
-                    config.orientation_limits or everywhere, 3, "orientation_limits"
-                )
-            ),
-        )
-        self.goal = pin.SE3.Identity()
-        self._home = np.eye(3)
+        self.slices = (_pose_part(part.name, config, self._scaling),)
+        self._goal = HandGoal(config)
         self._due = 0.0
+
+    @property
+    def goal(self) -> pin.SE3:
+        """Pose to go to, in the reference's axes."""
+        return self._goal.pose
 
     def reset(self, state: RobotState) -> None:
         """Hold the hand where it is, and the posture that it has."""
         self._ik.reset(state)
-        self.goal = self._reference().actInv(self._ik.measured(state))
-        self._home = self.goal.rotation.copy()
+        hand = self._hand()
+        self._goal.reset(hand.rotation, hand.translation)
         self.law.aim(state.data.qpos[self.law.drives["qpos"]])
         self._due = state.time
 
     def set_goal(self, values: Vector, period: float) -> None:
         """Take a position and a quaternion, x y z w, shape (7,)."""
-        length = float(np.linalg.norm(values[3:]))
-        turn = pin.Quaternion(*values[[6, 3, 4, 5]]).normalized().matrix()
-        if self.config.input_type == "delta":
-            turn = np.eye(3) if length < NOTHING else turn
-            self._step(self._scaling(values[:3]), pin.log3(turn))
-        else:
-            turn = self.goal.rotation if length < NOTHING else turn
-            self._move_goal(pin.SE3(turn, values[:3].copy()))
+        turn = None
+        if float(np.linalg.norm(values[3:])) >= ROUNDING:
+            turn = pin.Quaternion(*values[[6, 3, 4, 5]]).normalized().matrix()
+        if self.config.input_type == "absolute":
+            rotation = self.goal.rotation if turn is None else turn
+            self._goal.set(rotation, values[:3])
+            return
+        rotation = np.zeros(3) if turn is None else pin.log3(turn)
+        angle = float(np.linalg.norm(rotation))
+        rotation = rotation * min(1.0, self.config.turn_limit / max(angle, ROUNDING))
+        step, hand = np.concatenate([self._scaling(values[:3]), rotation]), self._hand()
+        self._goal.step(step, hand.rotation, hand.translation)
 
     def prepare(self, state: RobotState) -> int:
         """Solve when it is time to; return how many physics steps are left."""
@@ -159,7 +150,7 @@ class IkPoseController:
         if left > 0:
             return left
         self._due = state.time + self._steps * step
-        self.law.aim(*self._ik.solve(state, self._reference() * self.goal))
+        self.law.follow(self._ik.solve(state, self._reference() * self.goal))
         return self._steps
 
     @property
@@ -188,22 +179,9 @@ class IkPoseController:
             "reasons": () if near else self._ik.reasons(),
         }
 
-    def _step(self, shift: Vector, turn: Vector) -> None:
-        """Move the goal by a step in the input's axes."""
-        angle = float(np.linalg.norm(turn))
-        turn = turn * min(1.0, self.config.turn_limit / max(angle, NOTHING))
-        step, axes, start = np.concatenate([shift, turn]), np.eye(3), self.goal
-        if self.config.input_ref_frame == "eef":
-            axes = self.goal.rotation
-        if not np.abs(step).max() > NOTHING:
-            return
-        if self.config.goal_update_mode == "achieved":
-            hand = self._reference().actInv(self._ik.measured(self._state))
-            start = step_origin(self.goal, hand, step, axes)
-        self._move_goal(stepped(start, step, axes))
-
-    def _move_goal(self, goal: pin.SE3) -> None:
-        self.goal = self._limits.nearest(goal, self._home)
+    def _hand(self) -> pin.SE3:
+        """Return the measured pose of the hand in the goals' axes."""
+        return self._reference().actInv(self._ik.measured(self._state))
 
     def _reference(self) -> pin.SE3:
         """Return the pose of the goals' axes in the world."""
@@ -214,15 +192,15 @@ class IkPoseController:
 
 def _pose_part(name: str, config: IkPoseConfig, scaling: InputScaling) -> ActionPart:
     """Return the action slice: x y z, and a quaternion."""
-    units, high = ("m",) * 3, np.full(3, REACH)
+    units, high = (Unit("m"),) * 3, np.full(3, REACH)
     low = -high
     if config.input_type == "delta":
         low, high, units = scaling.low, scaling.high, scaling.units(units)
     return ActionPart(
         name=name,
-        kind="pose",
-        labels=("x", "y", "z", "qx", "qy", "qz", "qw"),
-        units=(*units, *("quaternion",) * 4),
+        kind=SliceKind.POSE,
+        labels=AXES,
+        units=(*units, *(Unit("quaternion"),) * 4),
         low=(*low.tolist(), *(-1.0,) * 4),
         high=(*high.tolist(), *(1.0,) * 4),
     )

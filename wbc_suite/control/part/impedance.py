@@ -1,12 +1,17 @@
-"""Stiffness and damping of a part, fixed or told by the action."""
+"""Stiffness and damping of a part, fixed or set by the action."""
 
 from typing import Literal, TypeAlias
 
 import numpy as np
 from pydantic import NonNegativeFloat
 
-from wbc_suite.control.action import ActionPart
-from wbc_suite.control.part.config import PartSettings, damping_of, limits_of, spread
+from wbc_suite.control.action import ActionPart, SliceKind, Unit
+from wbc_suite.control.part.part_settings import (
+    PartSettings,
+    damping_of,
+    limits_of,
+    spread,
+)
 from wbc_suite.typing import Vector
 
 __all__ = ["Gains", "Impedance", "ImpedanceSettings"]
@@ -20,8 +25,8 @@ class ImpedanceSettings(PartSettings):
 
     Attributes:
         impedance_mode: `fixed`: gains are those of the config. `variable_kp`: the
-            action tells the stiffness as well, and damping is critical. `variable`: it
-            tells stiffness and damping.
+            action sets the stiffness, and damping is critical. `variable`: it sets
+            stiffness and damping.
         kp: Stiffness, 1/s^2.
         damping_ratio: 1 is critically damped; `kd = 2 damping_ratio sqrt(kp)`.
         kd: Damping, 1/s, in place of the ratio.
@@ -38,12 +43,12 @@ class ImpedanceSettings(PartSettings):
 
 
 class Impedance:
-    """Gains of a part, and the slices of the action that tell them.
+    """Gains of a part, and the slices of the action that set them.
 
     Args:
         name: The part.
         labels: One word per axis or joint.
-        config: Gains, limits and what the action tells.
+        config: Gains, their limits, and which of them the action sets.
 
     Attributes:
         slices: Slices after those of the motion: none, kp, or kp and kd.
@@ -72,9 +77,9 @@ class Impedance:
             self.slices = (
                 ActionPart(
                     name=f"{name}_kp",
-                    kind="stiffness",
+                    kind=SliceKind.STIFFNESS,
                     labels=labels,
-                    units=("1/s^2",) * size,
+                    units=(Unit("1/s^2"),) * size,
                     low=tuple(low.tolist()),
                     high=tuple(high.tolist()),
                 ),
@@ -86,9 +91,9 @@ class Impedance:
             self.slices += (
                 ActionPart(
                     name=f"{name}_kd",
-                    kind="damping",
+                    kind=SliceKind.DAMPING,
                     labels=labels,
-                    units=("1/s",) * size,
+                    units=(Unit("1/s"),) * size,
                     low=tuple(kd_low.tolist()),
                     high=tuple(kd_high.tolist()),
                 ),

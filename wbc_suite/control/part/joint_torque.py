@@ -4,27 +4,29 @@ from typing import Literal
 
 import numpy as np
 
-from wbc_suite.control.part.config import (
+from wbc_suite.control.action import SliceKind
+from wbc_suite.control.law.law import TorqueLaw
+from wbc_suite.control.part.controller import PartController
+from wbc_suite.control.part.joint_input import JointInput
+from wbc_suite.control.part.part_settings import (
     InputType,
     Numbers,
     PartSettings,
-    set_torque_rules,
+    apply_torque_settings,
 )
-from wbc_suite.control.part.controller import WHENEVER
-from wbc_suite.control.part.joint_input import JointInput
-from wbc_suite.control.part.law import TorqueLaw
+from wbc_suite.control.robot_parts import RobotPart
 from wbc_suite.control.state import RobotState
 from wbc_suite.typing import Vector
 
 __all__ = ["JointTorqueConfig", "JointTorqueController"]
 
 SHARE = 0.1
-"""Of the greatest torque, at full input: 8.7 N m at Panda's shoulder, 1.2 N m at its
-wrist. The peer's 0.1 N m for all joints moves nothing that one could see."""
+"""Part of the greatest torque at full input: 8.7 N m at Panda's shoulder, 1.2 N m at
+its wrist. robosuite's 0.1 N m for all joints moves nothing visibly."""
 
 
 class JointTorqueConfig(PartSettings):
-    """Joints are given torques on top of what carries them; see `TorqueLaw`.
+    """Torques on top of those that compensate gravity; see `TorqueLaw`.
 
     Attributes:
         input_type: `delta`: values are scaled to torques. `absolute`: they are torques.
@@ -38,53 +40,48 @@ class JointTorqueConfig(PartSettings):
     output_max: Numbers | None = None
 
 
-class JointTorqueController:
+class JointTorqueController(PartController[TorqueLaw]):
     """Sets joint torques by actions.
 
     Args:
-        name: The part, and its slice.
+        part: Its joints.
         config: Limits and meaning of the input.
         state: The robot in the simulation.
-        joints: Joints of the part.
 
     Attributes:
-        goal: Torques asked for, shape (n,), N m or N.
+        goal: Commanded torques, shape (n,), N m or N.
 
     Raises:
         ConfigError: If a number of values is wrong, or a range is empty.
     """
 
     def __init__(
-        self,
-        name: str,
-        config: JointTorqueConfig,
-        state: RobotState,
-        joints: tuple[str, ...],
+        self, part: RobotPart, config: JointTorqueConfig, state: RobotState
     ) -> None:
         self.config = config
-        self.law = TorqueLaw(state, joints)
-        set_torque_rules(self.law, config)
-        limits = self.law.drives["low"].copy(), self.law.drives["high"].copy()
+        self.law = TorqueLaw(state, part.joints)
+        apply_torque_settings(self.law, config)
+        drives = self.law.drives
+        limits = drives["command_min"].copy(), drives["command_max"].copy()
         given = config.output_min, config.output_max
         least, greatest = (
             tuple((SHARE * limit).tolist()) if output is None else output
             for output, limit in zip(given, limits, strict=True)
         )
         self._input = JointInput(
-            name,
-            "torque",
+            part,
+            SliceKind.TORQUE,
             state,
-            joints,
             config=config,
             outputs=(least, greatest),
             scaled=config.input_type == "delta",
             limits=limits,
         )
-        self.slices = (self._input.part,)
-        self.goal: Vector = np.zeros(len(joints))
+        self.slices = (self._input.action,)
+        self.goal: Vector = np.zeros(len(part.joints))
 
     def reset(self, state: RobotState) -> None:
-        """Ask for no torque."""
+        """Command zero torque."""
         self.goal = np.zeros(len(self.law.joints))
         self.law.aim(self.goal)
 
@@ -93,11 +90,7 @@ class JointTorqueController:
         self.goal = self._input(values)
         self.law.move(self.goal, self.config.ramp(period))
 
-    def prepare(self, state: RobotState) -> int:
-        """Do nothing: the law acts."""
-        return WHENEVER
-
     @property
     def hold_action(self) -> Vector:
-        """The action that asks for no torque."""
+        """The action of zero torque."""
         return self._input.neutral

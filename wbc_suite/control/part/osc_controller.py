@@ -1,81 +1,130 @@
-"""OSC_POSE and OSC_POSITION: actions move a hand's goal, which `OscLaw` follows."""
+"""OSC_POSE and OSC_POSITION: actions move a hand's goal, which `OscLaw` tracks."""
+
+from typing import Literal
 
 import numpy as np
 import pinocchio as pin
+from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
-from wbc_suite.control.action import ActionPart
-from wbc_suite.control.part.config import (
+from wbc_suite.control.action import ActionPart, Axis, SliceKind, Unit
+from wbc_suite.control.law.osc import OscLaw
+from wbc_suite.control.part.controller import PartController, PoseInput
+from wbc_suite.control.part.hand_goal import HandGoal
+from wbc_suite.control.part.impedance import Gains, Impedance, ImpedanceSettings
+from wbc_suite.control.part.part_settings import (
+    REACH,
+    InputFrame,
     InputScaling,
-    Span,
+    InputType,
+    Numbers,
+    Range,
+    apply_torque_settings,
     damping_of,
-    limits_of,
-    set_torque_rules,
 )
-from wbc_suite.control.part.controller import WHENEVER
-from wbc_suite.control.part.impedance import Impedance
-from wbc_suite.control.part.osc import OscLaw
-from wbc_suite.control.part.osc_config import OscConfig
-from wbc_suite.control.part.osc_goal import GoalLimits
-from wbc_suite.control.part.osc_step import (
-    GoalField,
-    bound_goal,
-    move_goal,
-    relative_pose,
-)
+from wbc_suite.control.robot_parts import RobotPart
 from wbc_suite.control.state import RobotState
 from wbc_suite.errors import UnknownNameError
-from wbc_suite.kinematics.array_table import ArrayTable
-from wbc_suite.typing import Matrix, Vector
+from wbc_suite.typing import Vector
 
 __all__ = ["OscConfig", "OscController"]
 
-AXES = ("x", "y", "z", "rx", "ry", "rz")
-UNITS = ("m", "m", "m", "rad", "rad", "rad")
+AXES = (Axis.X, Axis.Y, Axis.Z, Axis.RX, Axis.RY, Axis.RZ)
+UNITS = (*(Unit("m"),) * 3, *(Unit("rad"),) * 3)
 
-REACH = 10.0
-"""Bound of absolute positions, m: a typing error, not a place to reach for."""
+STEP = (0.05, 0.05, 0.05, 0.5, 0.5, 0.5)
+"""m and rad; steps of a full action, which are those of this field's data sets."""
 
 
-class OscController:
+class OscConfig(ImpedanceSettings):
+    """The hand follows poses in operational space; see `OscLaw`.
+
+    Critically damped, a step is within 2 % of its end after `5.83 / sqrt(kp)` seconds:
+    0.29 s at the default of 400 /s^2, unless a joint reaches its greatest velocity.
+
+    Attributes:
+        type: `OSC_POSE`, or `OSC_POSITION`, which holds the orientation that the hand
+            has at the start.
+        kp: Stiffness, 1/s^2, for all axes or each: linear then angular, in both types.
+        input_type: `delta` steps, see `goal_update_mode`, or `absolute` goals.
+        input_ref_frame: Axes of the input: those of the world; of the robot's first
+            link, with which goals move; or of the hand's goal, for deltas only.
+        output_min: Step at `input_min`, m and rad.
+        output_max: Step at `input_max`, m and rad.
+        position_limits: Least and greatest coordinates of goals in the reference, m.
+        orientation_limits: Least and greatest components of the rotation vector from
+            the orientation at the start to a goal's, axes of the reference, rad.
+        velocity_limits: Greatest velocities of the hand, m/s and rad/s.
+        saturation: Where joints saturate in torque or velocity: each is clipped
+            (`clip`), or the hand's acceleration is scaled down and keeps its direction
+            (`qp`).
+        posture: Joint positions for the null space; those at the start for joints that
+            are not named.
+        posture_kp: Stiffness of the posture, 1/s^2, critically damped.
+    """
+
+    type: Literal["OSC_POSE", "OSC_POSITION"] = "OSC_POSE"
+    kp: Gains = 400.0
+    kp_limits: tuple[Gains, Gains] = (0.0, 500.0)
+    input_type: InputType = "delta"
+    input_ref_frame: InputFrame = "base"
+    output_min: Numbers = tuple(-x for x in STEP)
+    output_max: Numbers = STEP
+    position_limits: Range | None = None
+    orientation_limits: Range | None = None
+    velocity_limits: tuple[PositiveFloat, PositiveFloat] | None = None
+    saturation: Literal["clip", "qp"] = "qp"
+    posture: dict[str, float] = {}
+    posture_kp: NonNegativeFloat = 10.0
+
+    @model_validator(mode="after")
+    def _check(self) -> "OscConfig":
+        if self.input_type == "absolute" and self.input_ref_frame == "eef":
+            raise ValueError(
+                "input_ref_frame 'eef' is for input_type 'delta': a goal that is given "
+                "in the hand's own axes would move with the hand. Use 'base' or 'world'"
+            )
+        return self
+
+    @property
+    def size(self) -> int:
+        """How many values of the action move the goal."""
+        return 6 if self.type == "OSC_POSE" else 3
+
+    def outputs(self) -> tuple[Numbers, Numbers]:
+        """Return the steps at `input_min` and `input_max`, those of this type."""
+        low, high = self.output_min, self.output_max
+        if self.size == 3:  # without the angular ones, which may be given
+            low, high = (tuple(np.atleast_1d(x)[:3].tolist()) for x in (low, high))
+        return low, high
+
+
+class OscController(PartController[OscLaw]):
     """Moves a hand's goal by actions.
 
     Args:
-        name: The part, and its slice; gains have slices of their own.
+        part: The arm; gains have slices of their own.
         config: Gains and meaning of the input.
         state: The robot in the simulation.
-        joints: Joints of the arm.
-        site: Frame of the hand.
 
     Raises:
         ConfigError: If a number of values is wrong, or a range is empty.
         UnknownNameError: If the posture names a joint that the arm does not have.
     """
 
-    def __init__(
-        self,
-        name: str,
-        config: OscConfig,
-        state: RobotState,
-        joints: tuple[str, ...],
-        site: str,
-    ) -> None:
+    needs_hand = True
+
+    def __init__(self, part: RobotPart, config: OscConfig, state: RobotState) -> None:
+        assert part.hand is not None
         self.config, self._state = config, state
-        self._size, self._absolute = config.size, config.input_type == "absolute"
-        self._ramp = config.ramp(1.0)
-        self._impedance = Impedance(name, AXES, config)
+        self._impedance = Impedance(part.name, AXES, config)
         self._scaling = InputScaling(config.size, config, *config.outputs())
-        self._limits = GoalLimits(
-            position=_limits(config.position_limits, "position_limits"),
-            turn=_limits(config.orientation_limits, "orientation_limits"),
-        )
+        self._goal, self._step = HandGoal(config), np.zeros(6)
         for joint in config.posture:
-            if joint not in joints:
-                raise UnknownNameError(f"joint of '{name}'", joint, joints)
-        self.law = self._make_law(joints, site)
-        self.slices = (self._motion_part(name), *self._impedance.slices)
-        self._goal, self._start = np.zeros(12), np.zeros(9)
-        self._frames = self.law.frames(state)
-        self._table = self._bind()
+            if joint not in part.joints:
+                raise UnknownNameError(f"joint of '{part.name}'", joint, part.joints)
+        self.law = self._make_law(part.joints, part.hand)
+        self.slices = (self._action(part.name), *self._impedance.slices)
+        self._R_body, self._p_body, self._R_site, self._p_site = self._frames()
         self._write_gains()
         self.reset(state)
 
@@ -85,37 +134,35 @@ class OscController:
         for k, joint in enumerate(self.law.joints):
             posture[k] = self.config.posture.get(joint, posture[k])
         self.law.drives["position"] = posture
-        relative_pose(*self._frames, self._goal)
-        self._start[:] = self._goal[:9]
-        self.law.jump(self._goal)
+        self._goal.reset(*self._hand())
+        self.law.jump(self._goal.flat)
 
     def set_goal(self, values: Vector, period: float) -> None:
         """Take a step or a goal, shape (6,) or (3,), and gains as the mode has them."""
-        size, ramp = self._size, self._ramp * period
+        size, ramp = self.config.size, self.config.ramp(period)
         if self._impedance.slices:
             self._impedance.take(values[size:])
             self._write_gains()
         start = self.law.target_pose()[0] if ramp > 0.0 else None
-        if self._absolute:
-            self._go_to(values[:size])
-            self.law.jump(self._goal)
+        if self.config.input_type == "absolute":
+            turn = pin.exp3(values[3:6]) if size == 6 else self._goal.start
+            self._goal.set(turn, values[:3])
         else:
-            move_goal(values[:size], self._table.table, self.law.record)
-        if start is not None:
+            self._step[:size] = self._scaling(values[:size])
+            self._goal.step(self._step, *self._hand())
+        if start is None:
+            self.law.jump(self._goal.flat)
+        else:
             self.law.set_goal(self.goal, start=start, duration=ramp)
 
     @property
     def goal(self) -> pin.SE3:
         """Pose to hold, in the reference's axes."""
-        return pin.SE3(self._goal[:9].reshape(3, 3), self._goal[9:])
+        return self._goal.pose
 
     @goal.setter
     def goal(self, pose: pin.SE3) -> None:
-        self._goal[:9], self._goal[9:] = pose.rotation.ravel(), pose.translation
-
-    def prepare(self, state: RobotState) -> int:
-        """Do nothing: the law follows."""
-        return WHENEVER
+        self._goal.pose = pose
 
     @property
     def hold_action(self) -> Vector:
@@ -126,45 +173,60 @@ class OscController:
             motion = np.concatenate(pose)[: self.config.size]
         return np.concatenate([motion, self._impedance.hold_action])
 
-    def _go_to(self, values: Vector) -> None:
-        """Take a goal: a position, and a rotation vector or the first orientation."""
-        goal, limits = self._goal, self._limits
-        turned = len(values) == 6
-        goal[:9] = pin.exp3(values[3:]).ravel() if turned else self._start
-        goal[9:] = values[:3]
-        bound_goal(goal, self._start, limits.position, limits.turn)
+    def pose_input(self) -> PoseInput:
+        """Return how to send the hand to a pose in the world.
 
-    def _bind(self) -> ArrayTable:
-        """Return where what moves the goal is; see `move_goal`."""
-        config, limits = self.config, self._limits
-        in_hand = config.input_ref_frame == "eef"
-        from_hand = config.goal_update_mode == "achieved"
-        return ArrayTable(
-            GoalField,
-            {
-                GoalField.GOAL: self._goal,
-                GoalField.START: self._start,
-                GoalField.GAIN: self._scaling.gain,
-                GoalField.OFFSET: self._scaling.offset,
-                GoalField.R_BODY: self._frames[0],
-                GoalField.P_BODY: self._frames[1],
-                GoalField.R_SITE: self._frames[2],
-                GoalField.P_SITE: self._frames[3],
-                GoalField.POSITION: limits.position,
-                GoalField.TURN: limits.turn,
-                GoalField.RULES: np.array([in_hand, from_hand], dtype=np.int64),
-            },
+        Steps are counted as `set_goal` counts them, so the goal becomes the target
+        wherever that is within a full step.
+        """
+        action, site = self.slices[0], int(self.law.record["site"][0])
+
+        def reference() -> pin.SE3:
+            return pin.SE3(self._R_body.copy(), self._p_body.copy())
+
+        def measure() -> pin.SE3:
+            return pin.SE3(self._R_site.copy(), self._p_site.copy())
+
+        def encode(target: pin.SE3) -> Vector:
+            goal = reference().actInv(target)
+            if self.config.input_type == "absolute":
+                values = np.concatenate([goal.translation, pin.log3(goal.rotation)])
+            else:
+                hand = reference().actInv(measure())
+                values = self._goal.step_to(goal, hand)
+            values = values[: self.config.size]
+            if self.config.input_type == "delta":
+                values = self._scaling.inverse(values)
+            return np.clip(values, action.low, action.high)
+
+        fixed = self._state.robot.root.kind == "fixed"
+        return PoseInput(
+            action=action,
+            body=int(self._state.model.site_bodyid[site]),
+            measure=measure,
+            encode=encode,
+            reference=None if fixed else reference,
         )
+
+    def _hand(self) -> tuple[Vector, Vector]:
+        """Return rotation, (3, 3), and position of the hand in the reference."""
+        R_bw = self._R_body.T
+        return R_bw @ self._R_site, R_bw @ (self._p_site - self._p_body)
+
+    def _frames(self) -> tuple[Vector, Vector, Vector, Vector]:
+        """Return views of rotation and position of the reference, then of the hand."""
+        R_body, p_body, R_site, p_site = self.law.frames(self._state)
+        return R_body.reshape(3, 3), p_body, R_site.reshape(3, 3), p_site
 
     def _make_law(self, joints: tuple[str, ...], site: str) -> OscLaw:
         config, state = self.config, self._state
         law = OscLaw(state, joints, site)
-        set_torque_rules(law, config)
+        apply_torque_settings(law, config)
         law.keep_limits(state)
         law.drives["kp"] = config.posture_kp
         law.drives["kd"] = damping_of(config.posture_kp, 1.0)
         law.record["speed"] = config.velocity_limits or np.inf
-        law.record["straight"] = float(config.saturation == "qp")
+        law.record["keep_direction"] = float(config.saturation == "qp")
         if config.input_ref_frame != "world":
             base = state.prefix + state.robot.links[0].name
             law.record["reference"] = state.model.body(base).id
@@ -174,7 +236,7 @@ class OscController:
         self.law.record["kp"] = self._impedance.kp
         self.law.record["kd"] = self._impedance.kd
 
-    def _motion_part(self, name: str) -> ActionPart:
+    def _action(self, name: str) -> ActionPart:
         """Return the slice that moves the goal."""
         size = self.config.size
         units, (low, high) = UNITS[:size], self._bounds()
@@ -183,7 +245,7 @@ class OscController:
             units = self._scaling.units(units)
         return ActionPart(
             name=name,
-            kind="pose" if size == 6 else "position",
+            kind=SliceKind.POSE if size == 6 else SliceKind.POSITION,
             labels=AXES[:size],
             units=units,
             low=tuple(low.tolist()),
@@ -192,14 +254,7 @@ class OscController:
 
     def _bounds(self) -> tuple[Vector, Vector]:
         """Return least and greatest absolute goals."""
-        turn = np.full(3, np.pi)
-        low = np.concatenate([np.maximum(self._limits.position[0], -REACH), -turn])
-        high = np.concatenate([np.minimum(self._limits.position[1], REACH), turn])
+        turn, (low, high) = np.full(3, np.pi), self._goal.position_limits
+        low = np.concatenate([np.maximum(low, -REACH), -turn])
+        high = np.concatenate([np.minimum(high, REACH), turn])
         return low[: self.config.size], high[: self.config.size]
-
-
-def _limits(span: Span | None, key: str) -> Matrix:
-    """Return least and greatest values, shape (2, 3), infinite without a span."""
-    if span is None:
-        return np.array([[-np.inf] * 3, [np.inf] * 3])
-    return np.array(limits_of(span, 3, key))

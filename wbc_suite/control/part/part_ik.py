@@ -1,4 +1,4 @@
-"""Inverse kinematics of one part: its joints, seen from what carries them."""
+"""Inverse kinematics of one part, relative to the link that carries it."""
 
 from functools import partial
 
@@ -6,10 +6,10 @@ import numpy as np
 import pinocchio as pin
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
-from wbc_suite.control.part.able import able_accelerations
 from wbc_suite.control.part.approach import approach_pose
-from wbc_suite.control.part.reference import Reference, mean_over
-from wbc_suite.control.reasons import Reasons
+from wbc_suite.control.part.feasible_acceleration import feasible_accelerations
+from wbc_suite.control.part.spline_reference import SplineReference, window_length
+from wbc_suite.control.reasons import LazyReasons, Reason
 from wbc_suite.control.state import RobotState
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp import (
@@ -22,16 +22,16 @@ from wbc_suite.qp import (
     VelocityLimit,
 )
 from wbc_suite.tomlfile import FrozenModel
-from wbc_suite.typing import Vector
+from wbc_suite.typing import Matrix
 
 __all__ = ["IkMotion", "PartIk"]
 
-HURRY = 1e3
-"""Speed limit, m/s and rad/s, of a task that the approach slows."""
+UNLIMITED = 1e3
+"""m/s and rad/s; velocities are limited by `approach_pose`."""
 
 
 class IkMotion(FrozenModel):
-    """How a hand goes to its goal.
+    """Motion of a hand to its goal.
 
     Attributes:
         gain: Part of the error that one solve removes, (0, 1].
@@ -55,10 +55,10 @@ class IkMotion(FrozenModel):
 
 
 class PartIk:
-    """Moves the commanded joints of a part so that its hand goes to a pose.
+    """Moves the joint references of a part so that its hand goes to a pose.
 
-    A task stack over these joints alone; all others are taken as they are, since only
-    the measured pose of the link that carries the part counts:
+    A task stack over these joints alone; all others enter by the measured pose of the
+    link that carries the part:
 
         minimise    || J dq - gain e ||^2,  then  || q + dq - q_rest ||^2
         subject to  limits of position, velocity and acceleration
@@ -69,9 +69,6 @@ class PartIk:
         hand: Frame to move.
         motion: How to move.
         period: Time between two solves, s.
-
-    Attributes:
-        q: Commanded positions of the stack's joints.
     """
 
     def __init__(
@@ -98,11 +95,14 @@ class PartIk:
         )
         self._carrier = state.model.body(f"{state.prefix}{carrier}").id
         self._T_oc = self._configuration.frame_pose(str(carrier))
-        able = able_accelerations(
+        feasible = feasible_accelerations(
             state.robot, most=motion.acceleration, effort_share=motion.effort_share
         )
         self._task = FrameTask(
-            hand, gain=motion.gain, max_linear_speed=HURRY, max_angular_speed=HURRY
+            hand,
+            gain=motion.gain,
+            max_linear_speed=UNLIMITED,
+            max_angular_speed=UNLIMITED,
         )
         self._posture = PostureTask(
             motion.posture_cost, gain=motion.posture_gain, level=1
@@ -114,35 +114,36 @@ class PartIk:
                 PositionLimit(margin=1e-3),
                 VelocityLimit(),
                 AccelerationLimit(
-                    motion.acceleration, joints={j: able[j] for j in joints}
+                    motion.acceleration, joints={j: feasible[j] for j in joints}
                 ),
             ],
             escape=False,
         )
-        most = max(able[joint] for joint in joints)
-        mean = mean_over(most, motion.jerk, period)
-        self._reference = Reference(model, self._places, speeds, period, mean=mean)
-        self.q: Vector = pin.neutral(model)
+        most = max(feasible[joint] for joint in joints)
+        self._reference = SplineReference(
+            self._configuration,
+            self._places,
+            speeds,
+            period,
+            mean=window_length(most, motion.jerk, period),
+        )
 
     def reset(self, state: RobotState) -> None:
-        """Forget the past; the present posture is the one to prefer."""
-        self.q[self._places] = state.data.qpos[self._addresses]
-        self._configuration.update(self.q)
+        """Start from rest; the present posture becomes the preferred one."""
+        self._configuration.q[self._places] = state.data.qpos[self._addresses]
+        self._configuration.refresh()
         self._stack.reset()
-        self._posture.set_target(self.q)
-        self._reference.reset(self.q)
+        self._posture.set_target(self._configuration.q)
+        self._reference.reset()
 
-    def solve(
-        self, state: RobotState, goal: pin.SE3
-    ) -> tuple[Vector, Vector, Vector, Vector]:
-        """Go on for a period towards a pose in the world.
+    def solve(self, state: RobotState, goal: pin.SE3) -> Matrix:
+        """Plan the next period towards a pose in the world.
 
         Returns:
-            p, v, a and j of the joints until the next solve; see `Reference`.
+            Motion of the joints until the next solve, see `SplineReference`: a buffer.
         """
         R = state.data.xmat[self._carrier].reshape(3, 3)
         T_wc = pin.SE3(R, state.data.xpos[self._carrier])
-        self._configuration.update(self.q)
         target = approach_pose(
             self._configuration.frame_pose(self._hand),
             self._T_oc * T_wc.actInv(goal),
@@ -152,8 +153,8 @@ class PartIk:
             acceleration=self._motion.braking,
         )
         self._task.set_target(target)
-        self.q = self._reference.extend(self._stack.solve(self._period).v)
-        return self._reference.polynomial()
+        self._reference.extend(self._stack.solve(self._period).v)
+        return self._reference.motion
 
     def measured(self, state: RobotState) -> pin.SE3:
         """Return the pose of the hand in the world."""
@@ -161,12 +162,12 @@ class PartIk:
         R = data.site_xmat[self._site].reshape(3, 3)
         return pin.SE3(R.copy(), data.site_xpos[self._site].copy())
 
-    def reasons(self) -> Reasons:
-        """Return what keeps the hand from its goal now, in words, told when read."""
-        return Reasons(partial(_words, self._stack.record(), self._hand))
+    def reasons(self) -> LazyReasons:
+        """Return why the hand is not at its goal; computed when first read."""
+        return LazyReasons(partial(_reasons, self._stack.record(), self._hand))
 
 
-def _words(record: TickRecord, hand: str) -> tuple[str, ...]:
+def _reasons(record: TickRecord, hand: str) -> tuple[Reason, ...]:
     reports = record.explain(position_tolerance=0.0, orientation_tolerance=0.0)
     return reports[hand].reasons if hand in reports else ()
 

@@ -1,4 +1,4 @@
-"""The clutch: it couples an input pose to a target pose, and lets go again."""
+"""The clutch: it couples an input pose to a target pose while it is engaged."""
 
 import pinocchio as pin
 
@@ -6,17 +6,17 @@ __all__ = ["Clutch"]
 
 
 class Clutch:
-    """Carry the motion of an input over to a target, from where each one stands.
+    """Repeat the motion of an input with a target.
 
-    Engaging latches both poses, so that the target moves by nothing at that moment,
-    however far apart the two are. From then on the target repeats the input's motion
-    in world axes, positions times a scale s:
+    Engaging latches both poses; the target does not move then, however far apart they
+    are. Afterwards the target repeats the input's motion in world axes, with positions
+    scaled by s:
 
         p_target = p_target0 + s (p_input - p_input0)
         R_target = R_input R_input0^T R_target0
 
-    The first line keeps a hand moving straight when the input moves straight, which
-    composing the two poses as rigid motions would not do.
+    With the first line the target moves straight if the input does, which a composition
+    of rigid motions would not ensure.
     """
 
     def __init__(self, target: pin.SE3, scale: float = 1.0) -> None:
@@ -36,12 +36,12 @@ class Clutch:
         return self._target.copy()
 
     def engage(self, T_input: pin.SE3) -> None:
-        """Couple the input to the target; the target itself does not move."""
+        """Couple the input to the target, which does not move."""
         self._latch = (T_input.copy(), self._target.copy())
         self._input = T_input.copy()
 
     def move(self, T_input: pin.SE3) -> None:
-        """Follow the input; without effect while released."""
+        """Follow the input; no effect while released."""
         if self._latch is None:
             return
         self._input = T_input.copy()
@@ -53,16 +53,16 @@ class Clutch:
         )
 
     def release(self) -> None:
-        """Let go; the target stays where it is."""
+        """Release the input; the target stays."""
         self._latch = None
 
     def place(self, T_target: pin.SE3) -> None:
-        """Put the target somewhere else and let go of the input."""
+        """Set the target and release the input."""
         self._latch = None
         self._target = T_target.copy()
 
     def slip(self, T_target: pin.SE3) -> None:
-        """Put the target somewhere else and stay engaged, latched from there."""
+        """Set the target and stay engaged, latched at the new target."""
         self._target = T_target.copy()
         if self._latch is not None:
             self._latch = (self._input, self._target)

@@ -1,4 +1,4 @@
-"""The switches of the pipeline: one field per stage, None where it may be off."""
+"""Settings of the pipeline, one field per stage; None disables a stage."""
 
 from typing import Literal
 
@@ -13,7 +13,7 @@ Point = tuple[float, float, float]
 
 
 class RatesConfig(FrozenModel):
-    """Greatest derivatives of a target, in units / s, / s^2 and / s^3."""
+    """Limits of a target's derivatives, units / s, / s^2 and / s^3."""
 
     speed: PositiveFloat
     acceleration: PositiveFloat
@@ -21,12 +21,12 @@ class RatesConfig(FrozenModel):
 
     @property
     def rates(self) -> Rates:
-        """The same as a plain value."""
+        """The limits as a plain value."""
         return Rates(self.speed, self.acceleration, self.jerk)
 
 
 class WorkspaceBox(FrozenModel):
-    """Where targets may be, m, in the world.
+    """Box in which targets are kept, m, in the world.
 
     Attributes:
         low: Least coordinates.
@@ -44,7 +44,7 @@ class WorkspaceBox(FrozenModel):
 
 
 class Leash(FrozenModel):
-    """How far a target may lead the limb.
+    """How far a target may be ahead of its limb.
 
     Attributes:
         distance: m.
@@ -70,32 +70,32 @@ class OneEuro(FrozenModel):
 
 
 class PipelineConfig(FrozenModel):
-    """What happens between a device and the controller.
+    """Settings of the stages between a device and the controller.
 
     Attributes:
-        mode: `relative`: targets repeat the input's motions from where they are.
-            `absolute`: targets are where the input is, in the world.
+        mode: `relative`: targets repeat the input's motion from where they are.
+            `absolute`: targets are at the input's pose, in the world.
         scale: Motion of a target per motion of the input. In absolute mode, about the
-            place where the limb was at the start.
-        mirror: Swap left and right, as for a person who faces the robot.
+            position of the limb at the reset.
+        mirror: Swap left and right, for a user who faces the robot.
         jump: An input that moves further than this in one message, m, has lost track
-            and is latched anew; None takes everything as motion.
-        one_euro: Smoothing of a trembling input; None for none.
-        workspace: Where targets may be; None for anywhere.
-        leash: How far targets may lead; None for any distance.
+            and is latched again; None follows all motion.
+        one_euro: Filter for a trembling input; None for none.
+        workspace: Box in which targets are kept; None for no bound.
+        leash: How far targets may be ahead; None for no bound.
         linear: Limits of positions, m.
         angular: Limits of orientations, rad.
         grip: Limits of grippers, whose values go from -1 to 1.
-        fingers: What closes the robot's hand, when a device sees the person's: the
+        fingers: What closes the robot's hand if a device tracks the user's: the
             `joints` of each finger, or the `pinch` of thumb and index; None for
             neither.
-        joint: Limits of joints that a device places, rad or m, each for itself.
+        joint: Limits of each joint that a device commands, rad or m.
         base_speed: Greatest speed of the base, m/s and rad/s.
-        base_rise: Limits of that speed's own changes, m/s and rad/s.
-        ramp: Time over which speeds rise to their limits after a start, s.
-        hold_after: A device that says nothing new for so long is let go of, s.
-        return_after: And after so long limbs go back to where they started, s; None
-            for never.
+        base_rise: Limits of the derivatives of that speed, m/s and rad/s.
+        ramp: Time over which the permitted speed rises after a reset, s.
+        hold_after: Time without new data after which limbs are held, s.
+        return_after: Time without new data after which limbs move home, s; None for
+            never.
     """
 
     mode: Literal["relative", "absolute"] = "relative"

@@ -1,4 +1,4 @@
-"""Limits of speed, acceleration and jerk: what makes any input a motion."""
+"""The input limiter: speed, acceleration and jerk of targets."""
 
 import math
 from dataclasses import dataclass
@@ -10,8 +10,8 @@ from wbc_suite.typing import Vector
 
 __all__ = ["LimitedMotion", "MotionLimit", "Rates"]
 
-HALVINGS = 20
-STILL = 1e-12  # units, units / s and / s^2; what is smaller is none
+BISECTIONS = 20
+STILL = 1e-12  # units, units / s and / s^2; smaller values count as zero
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,15 +26,15 @@ class Rates:
 class LimitedMotion:
     """A point that follows a goal, within bounds of speed, acceleration and jerk.
 
-    Every tick chooses the next acceleration a' among those that keep
+    Every tick chooses the next acceleration a' such that
 
         |a' - a| <= J dt,   |a'| <= A,   |v + a' dt| + |a'|^2 / 2J <= V,
 
-    in the Euclidean norm. The last says that the speed stays within V even while the
-    acceleration is taken back at full jerk. Shrinking a by J dt satisfies all three if
-    they held before, so there is always a choice; and since they are convex, the best
-    one on the line from there to the acceleration that is wanted is found by halving.
-    Differences of the positions over dt are v, a and j exactly.
+    in the Euclidean norm. The last condition keeps the speed within V while the
+    acceleration is reduced to zero at full jerk. Reducing a by J dt satisfies all three
+    if they held before, so there is always a solution. They are convex: the best
+    acceleration between that one and the desired one is found by bisection. Differences
+    of the positions over dt are exactly v, a and j.
 
     Args:
         size: Number of coordinates.
@@ -52,7 +52,7 @@ class LimitedMotion:
         return bool(_norm(self._v) > 0.97 * self._rates.speed)
 
     def stop(self) -> None:
-        """Stand still at once, as after a reset."""
+        """Set velocity and acceleration to zero, as after a reset."""
         self._v[:], self._a[:], self._still = 0.0, 0.0, True
 
     def step(self, error: Vector, pace: float = 1.0) -> Vector:
@@ -60,7 +60,7 @@ class LimitedMotion:
 
         Args:
             error: Goal less position.
-            pace: Fraction of the greatest speed that is wanted now.
+            pace: Fraction of the speed limit that is permitted.
         """
         dt = self._dt
         if self._still and float(error @ error) < STILL**2:
@@ -71,7 +71,7 @@ class LimitedMotion:
         wanted = self._wanted(error, pace)
         low, high = 0.0, 1.0
         if not self._allowed(wanted):
-            for _ in range(HALVINGS):
+            for _ in range(BISECTIONS):
                 middle = 0.5 * (low + high)
                 if self._allowed(calm + middle * (wanted - calm)):
                     low = middle
@@ -118,33 +118,35 @@ class LimitedMotion:
 
 
 class MotionLimit:
-    """A pose that follows another one within limits: linear and angular apart."""
+    """A pose that follows another one within linear and angular limits."""
 
     def __init__(self, linear: Rates, angular: Rates, dt: float) -> None:
         self._linear = LimitedMotion(3, linear, dt)
         self._angular = LimitedMotion(3, angular, dt)
         self.pose: pin.SE3 = pin.SE3.Identity()
-        self.pace = 1.0
 
     @property
-    def acting(self) -> str:
-        """What the stage does, in words; empty when it lets the target pass."""
-        if self._linear.at_limit or self._angular.at_limit:
-            return "at its top speed"
-        return ""
+    def at_speed_limit(self) -> bool:
+        """Whether the last tick moved at nearly the greatest speed."""
+        return self._linear.at_limit or self._angular.at_limit
 
     def reset(self, pose: pin.SE3) -> None:
-        """Stand still at a pose."""
+        """Stop at a pose."""
         self.pose = pose.copy()
         self._linear.stop()
         self._angular.stop()
 
-    def apply(self, target: pin.SE3, measured: pin.SE3) -> pin.SE3:
-        """Move on towards the target by one tick; return where that is."""
+    def apply(self, target: pin.SE3, pace: float = 1.0) -> pin.SE3:
+        """Move towards the target by one tick; return the new pose.
+
+        Args:
+            target: In the world.
+            pace: Fraction of the speed limits that is permitted.
+        """
         away = target.translation - self.pose.translation
         turn = pin.log3(target.rotation @ self.pose.rotation.T)
-        step = self._linear.step(away, self.pace)
-        rotation = pin.exp3(self._angular.step(turn, self.pace)) @ self.pose.rotation
+        step = self._linear.step(away, pace)
+        rotation = pin.exp3(self._angular.step(turn, pace)) @ self.pose.rotation
         self.pose = pin.SE3(rotation, self.pose.translation + step)
         return self.pose
 

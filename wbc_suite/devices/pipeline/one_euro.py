@@ -1,4 +1,4 @@
-"""The one-euro filter: still when the input is, quick when it is."""
+"""The one-euro filter: a low-pass filter with a cutoff that rises with speed."""
 
 import math
 
@@ -26,8 +26,6 @@ class OneEuroFilter:
         dt: Time between two ticks, s.
     """
 
-    acting = ""
-
     def __init__(self, config: OneEuro, dt: float) -> None:
         self._config, self._dt = config, dt
         self.reset(pin.SE3.Identity())
@@ -37,7 +35,7 @@ class OneEuroFilter:
         self._pose, self._before = pose.copy(), pose.copy()
         self._speed = np.zeros(2)
 
-    def apply(self, target: pin.SE3, measured: pin.SE3) -> pin.SE3:
+    def apply(self, target: pin.SE3) -> pin.SE3:
         """Return the smoothed target."""
         moved = target.translation - self._before.translation
         turned = pin.log3(target.rotation @ self._before.rotation.T)
@@ -48,10 +46,10 @@ class OneEuroFilter:
         linear = self._alpha(config.cutoff + config.linear_rise * self._speed[0])
         angular = self._alpha(config.cutoff + config.angular_rise * self._speed[1])
         here = self._pose
-        away = target.translation - here.translation
+        offset = target.translation - here.translation
         turn = pin.log3(target.rotation @ here.rotation.T)
         self._pose = pin.SE3(
-            pin.exp3(angular * turn) @ here.rotation, here.translation + linear * away
+            pin.exp3(angular * turn) @ here.rotation, here.translation + linear * offset
         )
         return self._pose
 

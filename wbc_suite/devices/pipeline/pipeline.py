@@ -1,49 +1,56 @@
-"""The pipeline: what a device says becomes an action."""
+"""The pipeline: from the states of a device to actions."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.devices.limbs import LimbKind, LimbPort, robot_of, side_of
+from wbc_suite.devices.action_ports import (
+    LimbKind,
+    LimbPort,
+    joint_ports,
+    limb_ports,
+    robot_of,
+    side_of,
+    speed_ports,
+)
 from wbc_suite.devices.pipeline.config import PipelineConfig
-from wbc_suite.devices.pipeline.drives import BaseDrive, GripDrive, JointDrive
-from wbc_suite.devices.pipeline.limb import LimbPipeline
-from wbc_suite.devices.pipeline.mirror import mirrored
+from wbc_suite.devices.pipeline.limb_pipeline import LimbPipeline
+from wbc_suite.devices.pipeline.part_targets import (
+    BaseVelocity,
+    GripTarget,
+    JointTargets,
+)
 from wbc_suite.devices.pipeline.retarget import retarget
-from wbc_suite.devices.pipeline.switch import Switch
 from wbc_suite.devices.pipeline.watchdog import Phase, Watchdog
-from wbc_suite.devices.ports import joint_ports, limb_ports, speed_ports
-from wbc_suite.devices.state import DeviceState, LimbInput
+from wbc_suite.devices.state import DeviceState, LimbInput, mirrored
 from wbc_suite.errors import ConfigError
 from wbc_suite.typing import Vector
 
 __all__ = ["Pipeline"]
 
-FIRST_PACE = 0.1  # of the greatest speed, at the beginning of the start ramp
+FIRST_PACE = 0.1  # of the speed limits, at the start of the ramp
 
 
 class Pipeline:
-    """Turns states of a device into actions, one for each step of an environment.
+    """Compute an action from the state of a device, once for each environment step.
 
-    The way of a state: watchdog, mirror, switch; then for each limb clutch, workspace,
-    leash, filter and limits; and all of them are packed into one action. Whatever the
-    device says, `update` returns an action, and targets keep the limits of
-    `PipelineConfig`.
+    Stages: watchdog, mirror, selection of the limb; then for each limb clutch,
+    workspace, leash, filter and motion limit. Whatever the device sends, `update`
+    returns an action whose targets keep the limits of `PipelineConfig`.
 
     Args:
         env: Environment to act in.
-        config: Which stages there are.
+        config: Settings of the stages.
 
     Raises:
-        ConfigError: If the environment's controllers cannot be driven by hand.
+        ConfigError: If no slice of the action can be commanded by a device.
 
     Attributes:
-        limbs: Each limb's stages, by slice.
-        grips: Each gripper's goal and limits, by slice.
-        acting: Which stages did something at the last `update`, in words, by limb and
-            for the `device`.
+        limbs: Stages of each limb, by slice.
+        grips: Goal and limits of each gripper, by slice.
+        acting: What stages did at the last `update`, by limb and for the `device`.
     """
 
     def __init__(self, env: Any, config: PipelineConfig | None = None) -> None:
@@ -53,30 +60,30 @@ class Pipeline:
         ports = limb_ports(env)
         self.limbs = {n: LimbPipeline(p, settings, dt) for n, p in ports.items()}
         self.grips = {
-            s.name: GripDrive(len(s.labels), settings, dt)
+            s.name: GripTarget(len(s.labels), settings, dt)
             for s in self._layout.slices
             if s.kind == "gripper"
         }
         self._bases = {
-            name: BaseDrive(port, settings, dt)
+            name: BaseVelocity(port, settings, dt)
             for name, port in speed_ports(env).items()
         }
         self._joints = {
-            name: JointDrive(port, settings, dt)
+            name: JointTargets(port, settings, dt)
             for name, port in joint_ports(env).items()
         }
         if not (ports or self._joints):
             raise ConfigError(
-                "Nothing in the action can be moved by hand: no frame that is placed, "
-                "and no joint position. Use a whole-body controller, or OSC_POSE or "
+                "The action has no slice that a device can command: no frame and no "
+                "joint position. Use a whole-body controller, or OSC_POSE or "
                 "JOINT_POSITION for the arms."
             )
-        self._switch = Switch(list(ports), _hands(ports, self.grips))
+        self._selector = LimbSelector(list(ports), _hands(ports, self.grips))
         self._watchdog = Watchdog(settings.hold_after, settings.return_after, dt)
         self.reset()
 
     def reset(self) -> None:
-        """Begin an episode: every target is where its limb is."""
+        """Start an episode: every target is at its limb."""
         for drive in (*self.limbs.values(), *self._joints.values()):
             drive.reset()
         held = self._layout.unpack(self._env.hold_action)
@@ -87,38 +94,38 @@ class Pipeline:
         self._watchdog.reset()
         self._mirror, self._pressed = self._config.mirror, frozenset[str]()
         self._time, self._height = 0.0, 0.0
-        self._said: dict[str, LimbInput] = {}
+        self._inputs: dict[str, LimbInput] = {}
         self._driven: set[str] = set()
         self.acting: dict[str, tuple[str, ...]] = {}
 
     @property
-    def active(self) -> str:
-        """The limb that a device for one hand moves now."""
-        return self._switch.active
+    def selected(self) -> str:
+        """The limb that a device for one hand moves."""
+        return self._selector.selected
 
     def update(self, state: DeviceState) -> Vector:
         """Return the action of one step; call it once per step."""
-        news = self._watchdog.look(state)
-        if news is not None:
-            self._press(news.buttons)
-            self._take(mirrored(news) if self._mirror else news)
+        new = self._watchdog.check(state)
+        if new is not None:
+            self._press(new.buttons)
+            self._read(mirrored(new) if self._mirror else new)
         if self._watchdog.phase is not Phase.LIVE:
-            self._let_go()
+            self._hold_or_return()
         action = self._layout.pack(self._move(), base=self._env.hold_action)
-        words = {name: limb.acting for name, limb in self.limbs.items()}
-        words["device"] = tuple(filter(None, [self._watchdog.acting]))
-        self.acting = {name: told for name, told in words.items() if told}
+        notes = {name: limb.acting for name, limb in self.limbs.items()}
+        notes["device"] = tuple(filter(None, [self._watchdog.acting]))
+        self.acting = {name: texts for name, texts in notes.items() if texts}
         return action
 
     def _press(self, buttons: frozenset[str]) -> None:
-        """Do what buttons ask for that were not down before."""
+        """Handle the buttons that were not pressed before."""
         for button in buttons - self._pressed:
             match button:
                 case "next" if self.limbs:
-                    self.limbs[self._switch.active].release()
-                    self._switch.next()
+                    self.limbs[self._selector.selected].release()
+                    self._selector.next()
                 case "grip":
-                    name = _gripper_of(self.active, self.grips)
+                    name = _gripper_of(self.selected, self.grips)
                     if name is not None:
                         self.grips[name].toggle()
                 case "mirror":
@@ -129,31 +136,31 @@ class Pipeline:
                         limb.go_home()
         self._pressed = buttons
 
-    def _take(self, state: DeviceState) -> None:
-        """Note what is said of each limb, gripper, joint and base."""
-        self._said = {}
-        for name, said in state.limbs.items():
-            limb = self._switch.find(name)
+    def _read(self, state: DeviceState) -> None:
+        """Read the inputs of limbs, grippers, joints and base."""
+        self._inputs = {}
+        for name, given in state.limbs.items():
+            limb = self._selector.find(name)
             if limb is not None:
-                self._said[limb] = said
-            self._close(limb or name, said)  # a leader arm places joints, not a limb
+                self._inputs[limb] = given
+            self._close(limb or name, given)  # a leader arm has no limb
         for joints in self._joints.values():
             joints.aim(state.joints)
         self._height = state.height
         if state.base is not None:
             self._steer(self._bounded(state.base))
-        self._driven |= self._said.keys()
+        self._driven |= self._inputs.keys()
 
-    def _close(self, limb: str, said: LimbInput) -> None:
-        """Aim the gripper of a limb: at what is said, else at what fingers show."""
-        name, way = _gripper_of(limb, self.grips), self._config.fingers
-        if name is None or not said.engaged:
+    def _close(self, limb: str, given: LimbInput) -> None:
+        """Set the goal of a limb's gripper, by the grip or the fingers of an input."""
+        name, method = _gripper_of(limb, self.grips), self._config.fingers
+        if name is None or not given.engaged:
             return
-        if said.grip is not None:
-            self.grips[name].aim(said.grip)
-        elif said.fingers is not None and way is not None:
+        if given.grip is not None:
+            self.grips[name].aim(given.grip)
+        elif given.fingers is not None and method is not None:
             labels = self._layout[name].labels
-            grip = retarget(said.fingers, labels, by_pinch=way == "pinch")
+            grip = retarget(given.fingers, labels, by_pinch=method == "pinch")
             self.grips[name].aim(grip)
 
     def _bounded(self, velocity: Vector) -> Vector:
@@ -163,8 +170,8 @@ class Pipeline:
         return np.array([velocity[0] / fast, velocity[1] / fast, turn])
 
     def _steer(self, velocity: Vector) -> None:
-        """Let the base of the robot that is switched to drive: forward, left, turn."""
-        robot = robot_of(self._switch.active)
+        """Drive the base of the selected hand's robot: forward, left, turn."""
+        robot = robot_of(self._selector.selected)
         for base in self._bases.values():
             base.goal = velocity if base.robot == robot else np.zeros(3)
         for name, limb in self.limbs.items():
@@ -172,10 +179,10 @@ class Pipeline:
                 R = limb.clutch.target.rotation
                 along = R @ np.array([velocity[0], velocity[1], 0.0])
                 twist = np.array([*along, 0.0, 0.0, velocity[2]])
-                self._said[name] = LimbInput(twist=twist)
+                self._inputs[name] = LimbInput(twist=twist)
 
     def _move(self) -> dict[str, Vector]:
-        """Move everything on by one tick; return the action's values by slice."""
+        """Advance all targets by one tick; return the action's values by slice."""
         self._time += self._dt
         pace = self._pace()
         values: dict[str, Vector] = {}
@@ -183,7 +190,7 @@ class Pipeline:
         for name in (*planar, *(n for n in self.limbs if n not in planar)):
             limb = self.limbs[name]
             before = limb.target
-            values[name] = limb.update(self._said.get(name), pace)
+            values[name] = limb.update(self._inputs.get(name), pace)
             if name in planar:
                 self._carry(name, limb.target * before.inverse())
         values |= {name: grip.update() for name, grip in self.grips.items()}
@@ -194,20 +201,20 @@ class Pipeline:
         return values
 
     def _carry(self, base: str, T_step: pin.SE3) -> None:
-        """Let the targets of a robot's hands ride on its base."""
+        """Move the targets of a robot's hands with its base."""
         for name, limb in self.limbs.items():
             if limb.port.kind is LimbKind.POSE and robot_of(name) == robot_of(base):
                 limb.carry(T_step)
 
     def _pace(self) -> float:
-        """Return the start ramp's fraction of the greatest speeds."""
+        """Return the fraction of the speed limits that the start ramp permits."""
         ramp = self._config.ramp
         done = 1.0 if ramp == 0.0 else min(1.0, self._time / ramp)
         return FIRST_PACE + (1.0 - FIRST_PACE) * done
 
-    def _let_go(self) -> None:
-        """Hold what the device drove, or bring it home when it was silent for long."""
-        self._said, self._height = {}, 0.0
+    def _hold_or_return(self) -> None:
+        """Hold the limbs that the device moved, or move them home."""
+        self._inputs, self._height = {}, 0.0
         for base in self._bases.values():
             base.goal = np.zeros(3)
         for joints in self._joints.values():
@@ -223,14 +230,52 @@ class Pipeline:
             self.limbs[name].release()
 
 
-def _gripper_of(limb: str, grippers: dict[str, GripDrive]) -> str | None:
+class LimbSelector:
+    """Maps the names of inputs to limbs, and selects the limb of a one-hand device.
+
+    An input `hand` is for the selected hand; `right` and `left` are for the hands, or
+    other limbs, of that hand's robot; any other name is that of a slice.
+
+    Args:
+        names: Names of all limbs, in the order of the action.
+        hands: Limbs that can be selected.
+    """
+
+    def __init__(self, names: Sequence[str], hands: Sequence[str]) -> None:
+        self._names, self._hands = tuple(names), tuple(hands or names)
+        self._index = 0
+
+    @property
+    def selected(self) -> str:
+        """The selected limb; empty if there is none."""
+        return self._hands[self._index] if self._hands else ""
+
+    def next(self) -> str:
+        """Select the next hand; the first follows the last."""
+        self._index = (self._index + 1) % len(self._hands)
+        return self.selected
+
+    def find(self, name: str) -> str | None:
+        """Return the limb of an input, or None."""
+        if name in self._names:
+            return name
+        if name == "hand":
+            return self.selected or None
+        prefix = robot_of(self.selected)
+        if prefix + name in self._names:
+            return prefix + name
+        near = (n for n in (*self._hands, *self._names) if robot_of(n) == prefix)
+        return next((n for n in near if side_of(n) == name), None)
+
+
+def _gripper_of(limb: str, grippers: dict[str, GripTarget]) -> str | None:
     """Return the gripper on the same side of the same robot as a limb."""
     name = f"{robot_of(limb)}{side_of(limb)}_gripper"
     return name if name in grippers else None
 
 
-def _hands(ports: dict[str, LimbPort], grippers: dict[str, GripDrive]) -> list[str]:
-    """Return the limbs that a device for one hand goes through."""
+def _hands(ports: dict[str, LimbPort], grippers: dict[str, GripTarget]) -> list[str]:
+    """Return the limbs that a device for one hand can select."""
     placed = [n for n, port in ports.items() if port.kind is LimbKind.POSE]
     hands = [n for n in placed if "hand" in n.split("_") or _gripper_of(n, grippers)]
     return hands or placed or list(ports)

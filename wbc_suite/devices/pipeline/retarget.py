@@ -1,4 +1,4 @@
-"""Hand retargeting: how a person's fingers close a robot's hand."""
+"""Hand retargeting: from the user's fingers to the synergies of a robot's hand."""
 
 from collections.abc import Sequence
 
@@ -18,17 +18,16 @@ FINGERS = {
 """Joints of each finger from palm to tip, in the order of WebXR; the wrist is 0."""
 
 FIST = {"thumb": 1.6}
-FIST_FINGER = 3.6  # rad; bends of a finger's three joints in a fist, added up
+FIST_FINGER = 3.6  # rad; sum of a finger's three joint angles in a fist
 OPEN_PINCH, CLOSED_PINCH = 0.9, 0.15  # thumb to index, in widths of the palm
 FAR_THUMB, NEAR_THUMB = 1.6, 0.5  # thumb's tip to the ring finger's root, likewise
 SPREAD_WORDS = ("yaw", "rotation", "opposition", "abduction")
 
 
 def curls(joints: Matrix) -> dict[str, float]:
-    """Return how far each finger is bent, 0 straight .. 1 as in a fist.
+    """Return the flexion of each finger, 0 straight .. 1 as in a fist.
 
-    Only angles between bones count, so it does not matter where the hand is, how it is
-    turned, or how large it is.
+    Only angles between bones count, so pose and size of the hand do not matter.
 
     Args:
         joints: Positions, shape (25, 3).
@@ -44,26 +43,26 @@ def curls(joints: Matrix) -> dict[str, float]:
 
 
 def pinch(joints: Matrix) -> float:
-    """Return how far thumb and index are closed, 0 apart .. 1 together."""
+    """Return the pinch of thumb and index, 0 apart .. 1 together."""
     return _closeness(joints, 4, 9, OPEN_PINCH, CLOSED_PINCH)
 
 
 def opposition(joints: Matrix) -> float:
-    """Return how far the thumb lies across the palm, 0 beside .. 1 across."""
+    """Return the opposition of the thumb, 0 beside the palm .. 1 across it."""
     return _closeness(joints, 4, 16, FAR_THUMB, NEAR_THUMB)
 
 
 def retarget(joints: Matrix, labels: Sequence[str], *, by_pinch: bool) -> Vector:
     """Return a value for each synergy of a robot's hand, -1 open .. 1 closed.
 
-    A synergy that is named after a finger follows it; one that turns the thumb follows
-    its opposition; any other closes with the four fingers together. A gripper of one
-    synergy, and all of them if asked, close with the pinch.
+    A synergy named after a finger follows it; one that rotates the thumb follows its
+    opposition; any other follows the mean of the four fingers. A gripper of one synergy
+    follows the pinch, and with `by_pinch` every synergy does.
 
     Args:
-        joints: The person's hand, shape (25, 3).
+        joints: The user's hand, m, shape (25, 3).
         labels: Names of the synergies.
-        by_pinch: Whether the whole hand follows thumb and index.
+        by_pinch: Whether the whole hand follows the pinch.
     """
     if by_pinch or len(labels) == 1:
         return np.full(len(labels), 2.0 * pinch(joints) - 1.0)
@@ -80,7 +79,7 @@ def retarget(joints: Matrix, labels: Sequence[str], *, by_pinch: bool) -> Vector
 
 
 def _closeness(joints: Matrix, a: int, b: int, far: float, near: float) -> float:
-    """Return 0 .. 1 as two joints come closer, measured in widths of the palm."""
+    """Return the closeness of two joints, 0 .. 1, measured in widths of the palm."""
     palm = max(float(np.linalg.norm(joints[6] - joints[21])), 1e-9)
     distance = float(np.linalg.norm(joints[a] - joints[b])) / palm
     return float(np.clip((far - distance) / (far - near), 0.0, 1.0))

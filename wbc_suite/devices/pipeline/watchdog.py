@@ -1,4 +1,4 @@
-"""The watchdog: which messages count, and what happens when none come."""
+"""The watchdog: it detects devices that send no valid new data."""
 
 import math
 from enum import StrEnum
@@ -9,7 +9,7 @@ __all__ = ["Phase", "Watchdog"]
 
 
 class Phase(StrEnum):
-    """How long the device has been silent."""
+    """What the pipeline does, by the time without new data."""
 
     LIVE = "live"
     HOLD = "hold"
@@ -17,17 +17,16 @@ class Phase(StrEnum):
 
 
 class Watchdog:
-    """Judges a device by whether its own time moves on.
+    """Detects whether a device sends new data, by the device's own time.
 
-    A state counts if its time is later than that of all before, and all its numbers are
-    finite. So a device that stalls, repeats itself or goes back in time is silent, and
-    so is one that says NaN. When it has been silent long enough to be held, its time
-    may begin anew: it was restarted.
+    A state is new if its time is later than all before and all its numbers are finite.
+    So a device that stalls, repeats itself, goes back in time or sends NaN has no new
+    data. After `hold_after` its time may start again: the device was restarted.
 
     Args:
-        hold_after: Silence before limbs are held, s.
-        return_after: Silence before they go home, s; None for never.
-        dt: Time between two looks, s.
+        hold_after: Time without new data before limbs are held, s.
+        return_after: Time without new data before limbs move home, s; None for never.
+        dt: Time between two calls of `check`, s.
     """
 
     def __init__(
@@ -38,42 +37,42 @@ class Watchdog:
         self.reset()
 
     def reset(self) -> None:
-        """Wait for a first message."""
+        """Wait for a first state."""
         self._latest, self._last = -math.inf, -math.inf
-        self._silent, self._spoke = math.inf, False
+        self._silent, self._has_data = math.inf, False
         self._fault = ""
 
     @property
     def phase(self) -> Phase:
-        """What to do now."""
+        """What the pipeline has to do."""
         if self._silent <= self._hold:
             return Phase.LIVE
-        silent = self._silent if self._spoke else 0.0
+        silent = self._silent if self._has_data else 0.0
         return Phase.RETURN if silent > self._return else Phase.HOLD
 
     @property
     def acting(self) -> str:
-        """What it does, in words; empty while all is well."""
+        """What the watchdog reports; empty while the device sends new data."""
         if self.phase is Phase.LIVE:
             return self._fault
-        if not self._spoke:
+        if not self._has_data:
             return "waiting for the device"
-        doing = "going back" if self.phase is Phase.RETURN else "holding"
-        return f"{self._fault or 'the device is silent'}: {doing}"
+        doing = "returning" if self.phase is Phase.RETURN else "holding"
+        return f"{self._fault or 'no data from the device'}: {doing}"
 
-    def look(self, state: DeviceState) -> DeviceState | None:
-        """Return the state if it is news, else None."""
+    def check(self, state: DeviceState) -> DeviceState | None:
+        """Return the state if it is new, else None."""
         self._silent += self._dt
         if not state.finite:
-            self._fault = "the device says what is no number"
+            self._fault = "the device sends invalid numbers"
             return None
         held = self.phase is not Phase.LIVE
         moved_on = state.time > self._latest or (held and state.time > self._last)
         if state.time < self._latest and not moved_on:
-            self._fault = "the device goes back in time"
+            self._fault = "the device's time goes backwards"
         self._last = state.time
         if not moved_on:
             return None
-        self._latest, self._silent, self._spoke = state.time, 0.0, True
+        self._latest, self._silent, self._has_data = state.time, 0.0, True
         self._fault = ""
         return state

@@ -7,15 +7,15 @@
     data/chunk-000/file-000.parquet               one row per action
     videos/KEY/chunk-000/file-000.mp4             pictures, episode after episode
 
-Where the work is shared out, each piece writes a `file-N` of its own.
+`observation.state` is the robots' `proprio-state`, or all observed vectors if there is
+none; `observation.environment_state` is `object-state`; `observation.images.CAMERA` are
+videos. Each piece of a conversion writes a `file-N` of its own.
 
 Source: the documentation of LeRobotDataset v3.0 (huggingface.co/docs/lerobot).
 """
 
-import importlib
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from fractions import Fraction
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -23,13 +23,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc_suite.errors import DatasetError
-from wbc_suite.executors.item import Json
-from wbc_suite.recording.converting.piece import Piece, whole
+from wbc_suite.executors.executor import Json
+from wbc_suite.recording.atomic_files import new_folder, write_bytes
+from wbc_suite.recording.converting.layout import Layout, Piece, Progress
 from wbc_suite.recording.dataset import Dataset
 from wbc_suite.recording.episode import Episode
-from wbc_suite.recording.files import new_folder
+from wbc_suite.recording.extras import import_extra
+from wbc_suite.recording.mp4_writer import Mp4Writer
 
-__all__ = ["begin_lerobot", "finish_lerobot", "write_lerobot", "write_lerobot_piece"]
+__all__ = ["LEROBOT"]
 
 CHUNK = 1000  # files in a folder
 QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
@@ -41,49 +43,30 @@ PICTURES_IN_STATS = 20
 Stats = dict[str, Any]
 
 
-def write_lerobot(
-    dataset: Dataset, out: Path, tell: Callable[[Episode], None] = lambda _: None
-) -> Path:
-    """Write a dataset into a new folder.
-
-    `observation.state` is the robots' `proprio-state`, else all observed vectors;
-    `observation.environment_state` is `object-state`; `observation.images.CAMERA` are
-    videos; `action` is the action.
-
-    Raises:
-        DatasetError: If a package is missing, the folder is not empty, or episodes
-            differ in what they hold.
-    """
-    begin_lerobot(out)
-    finish_lerobot(
-        dataset, out, [write_lerobot_piece(dataset, whole(dataset), out, tell)]
-    )
-    return out
-
-
-def begin_lerobot(out: Path) -> None:
-    """Make the new folder, where the packages are there."""
-    for package in ("pyarrow", "pyarrow.parquet"):
-        _need(package, "lerobot")
+def _begin(out: Path) -> None:
+    _import_pyarrow()
     new_folder(out, "a LeRobot dataset")
 
 
-def write_lerobot_piece(
-    dataset: Dataset,
-    piece: Piece,
-    out: Path,
-    tell: Callable[[Episode], None] = lambda _: None,
+def _import_pyarrow() -> tuple[Any, Any]:
+    return import_extra("pyarrow", "lerobot"), import_extra(
+        "pyarrow.parquet", "lerobot"
+    )
+
+
+def _write(
+    dataset: Dataset, piece: Piece, out: Path, on_progress: Progress
 ) -> dict[str, Json]:
     """Write frames and videos of some episodes as files of their own.
 
     Returns:
-        `rows`: what the table of episodes says of them.
+        `rows`: rows of the table of episodes.
     """
-    arrow, parquet = _need("pyarrow", "lerobot"), _need("pyarrow.parquet", "lerobot")
+    arrow, parquet = _import_pyarrow()
     rate, place = _rate(dataset), _place(piece.number)
     first = dataset.episode(piece.names[0])
     writers = {
-        key: _Video(out / f"videos/{_feature(key)}/{place}.mp4", rate)
+        key: _open_video(out / f"videos/{_feature(key)}/{place}.mp4", rate)
         for key in _pictures(first)
     }
     tables, rows, start = [], [], piece.start
@@ -100,31 +83,29 @@ def write_lerobot_piece(
             rows.append(_episode_row(dataset, piece, number, episode, start, writers))
             rows[-1] |= {
                 f"stats/{feature}/{name}": value
-                for feature, told in stats.items()
-                for name, value in told.items()
+                for feature, figures in stats.items()
+                for name, value in figures.items()
             }
             start += episode.length
-            tell(episode)
+            on_progress(1)
         table = arrow.concat_tables(tables)
     except (KeyError, arrow.ArrowInvalid) as error:
         raise DatasetError(f"Episodes differ in what they hold: {error}") from error
     finally:
         for writer in writers.values():
             writer.close()
-    _write(parquet, table, out / f"data/{place}.parquet")
+    _write_table(parquet, table, out / f"data/{place}.parquet")
     return {"rows": rows}
 
 
-def finish_lerobot(
-    dataset: Dataset, out: Path, pieces: Sequence[Mapping[str, Json]]
-) -> None:
-    """Write what is said of all pieces together, in the order of the episodes."""
-    arrow, parquet = _need("pyarrow", "lerobot"), _need("pyarrow.parquet", "lerobot")
+def _finish(dataset: Dataset, out: Path, pieces: Sequence[Mapping[str, Json]]) -> None:
+    """Write the files about all pieces, in the order of the episodes."""
+    arrow, parquet = _import_pyarrow()
     rows: list[Any] = [row for piece in pieces for row in cast(list, piece["rows"])]
     frames = [out / f"data/{_place(number)}.parquet" for number in range(len(pieces))]
     table = arrow.concat_tables([parquet.ParquetFile(path).read() for path in frames])
     episodes = arrow.Table.from_pylist(rows)
-    _write(parquet, episodes, out / f"meta/episodes/{_place(0)}.parquet")
+    _write_table(parquet, episodes, out / f"meta/episodes/{_place(0)}.parquet")
     tasks = arrow.table({"task_index": arrow.array([0]), "task": [_task(dataset)]})
     pandas = {
         "index_columns": ["task"],
@@ -137,7 +118,7 @@ def finish_lerobot(
         "pandas_version": "2.0.0",
     }
     tasks = tasks.replace_schema_metadata({"pandas": json.dumps(pandas)})
-    _write(parquet, tasks, out / "meta/tasks.parquet")
+    _write_table(parquet, tasks, out / "meta/tasks.parquet")
     first = dataset.episode(dataset.names[0])
     _write_json(out / "meta/info.json", _info(dataset, first, len(table)))
     _write_json(out / "meta/stats.json", _all_stats(table, rows))
@@ -158,16 +139,6 @@ def _pictures(episode: Episode) -> list[str]:
 def _place(number: int) -> str:
     """Return where the files of a piece are, without their ends."""
     return f"chunk-{number // CHUNK:03d}/file-{number % CHUNK:03d}"
-
-
-def _need(package: str, extra: str) -> Any:
-    try:
-        return importlib.import_module(package)
-    except ImportError as error:
-        raise DatasetError(
-            f"This layout needs the package '{package.split('.')[0]}': "
-            f"pip install 'wbc-suite[{extra}]'."
-        ) from error
 
 
 def _feature(key: str) -> str:
@@ -208,7 +179,7 @@ def _frames(
 
 def _stats(column: NDArray[Any]) -> Stats:
     values = np.asarray(column, dtype=np.float64)
-    told: Stats = {
+    found: Stats = {
         "min": values.min(axis=0).tolist(),
         "max": values.max(axis=0).tolist(),
         "mean": values.mean(axis=0).tolist(),
@@ -216,16 +187,16 @@ def _stats(column: NDArray[Any]) -> Stats:
         "count": [len(values)],
     }
     for name, share in QUANTILES.items():
-        told[name] = np.quantile(values, share, axis=0).tolist()
-    return told
+        found[name] = np.quantile(values, share, axis=0).tolist()
+    return found
 
 
 def _picture_stats(pictures: NDArray[np.uint8]) -> Stats:
     """Return the stats of a few pictures by colour, 0 to 1, of shape (3, 1, 1)."""
     at = np.linspace(0, len(pictures) - 1, PICTURES_IN_STATS).round().astype(int)
     chosen = pictures[np.unique(at)]
-    told = _stats(chosen.reshape(-1, 3) / 255.0)
-    shaped = {n: [[[v]] for v in values] for n, values in told.items() if n != "count"}
+    found = _stats(chosen.reshape(-1, 3) / 255.0)
+    shaped = {n: [[[v]] for v in values] for n, values in found.items() if n != "count"}
     return {**shaped, "count": [len(chosen)]}
 
 
@@ -302,18 +273,18 @@ def _info(dataset: Dataset, first: Episode, frames: int) -> dict[str, Any]:
 
 
 def _robot(dataset: Dataset) -> str:
-    told = json.loads(str(dataset.header.get("env_args", "{}")))
-    robots = told.get("env_kwargs", {}).get("robots", "unknown")
+    found = json.loads(str(dataset.header.get("env_args", "{}")))
+    robots = found.get("env_kwargs", {}).get("robots", "unknown")
     return " ".join(robots) if isinstance(robots, list) else str(robots)
 
 
 def _all_stats(table: Any, rows: list[dict[str, Any]]) -> dict[str, Stats]:
     """Return the stats of all frames; those of pictures from those of episodes."""
-    told = {}
+    found = {}
     for name in table.column_names:
         column = np.array(table[name].to_pylist(), dtype=np.float64)
-        told[name] = _stats(column.reshape(len(column), -1))
-    keys = {k.split("/")[1] for k in rows[0] if k.startswith("stats/")} - set(told)
+        found[name] = _stats(column.reshape(len(column), -1))
+    keys = {k.split("/")[1] for k in rows[0] if k.startswith("stats/")} - set(found)
     for key in keys:
         held = {
             name: np.array([row[f"stats/{key}/{name}"] for row in rows])
@@ -321,14 +292,14 @@ def _all_stats(table: Any, rows: list[dict[str, Any]]) -> dict[str, Stats]:
         }
         mean = held["mean"].mean(axis=0)
         spread = held["std"] ** 2 + (held["mean"] - mean) ** 2
-        told[key] = {q: held[q].mean(axis=0).tolist() for q in QUANTILES} | {
+        found[key] = {q: held[q].mean(axis=0).tolist() for q in QUANTILES} | {
             "min": held["min"].min(axis=0).tolist(),
             "max": held["max"].max(axis=0).tolist(),
             "mean": mean.tolist(),
             "std": np.sqrt(spread.mean(axis=0)).tolist(),
             "count": [int(held["count"].sum())],
         }
-    return told
+    return found
 
 
 def _pandas_column(name: str, kind: str) -> dict[str, Any]:
@@ -341,7 +312,7 @@ def _pandas_column(name: str, kind: str) -> dict[str, Any]:
     }
 
 
-def _write(parquet: Any, table: Any, path: Path) -> None:
+def _write_table(parquet: Any, table: Any, path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     try:
         parquet.write_table(table, path)
@@ -349,35 +320,14 @@ def _write(parquet: Any, table: Any, path: Path) -> None:
         raise DatasetError(f"'{path}' cannot be written: {error}.") from error
 
 
-def _write_json(path: Path, told: Mapping[str, Any]) -> None:
-    path.write_text(json.dumps(told, indent=1))
+def _write_json(path: Path, content: Mapping[str, Any]) -> None:
+    write_bytes(path, json.dumps(content, indent=1).encode())
 
 
-class _Video:
-    """Pictures of episodes in one H.264 file, a key frame every other picture."""
+def _open_video(path: Path, rate: int) -> Mp4Writer:
+    """Open a video with a key frame every other picture, as LeRobot writes it."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return Mp4Writer(path, rate=rate, extra="lerobot", options={"g": "2", "crf": "23"})
 
-    def __init__(self, path: Path, rate: int) -> None:
-        self._av = _need("av", "lerobot")
-        path.parent.mkdir(parents=True, exist_ok=True)
-        self._film = self._av.open(str(path), "w")
-        self._rate, self._stream, self._count = rate, None, 0
 
-    def add(self, pictures: NDArray[np.uint8]) -> None:
-        """Add the pictures of an episode."""
-        for picture in pictures:
-            if self._stream is None:
-                self._stream = self._film.add_stream(
-                    "libx264", rate=self._rate, options={"g": "2", "crf": "23"}
-                )
-                self._stream.height, self._stream.width = picture.shape[:2]
-                self._stream.pix_fmt = "yuv420p"
-            frame = self._av.VideoFrame.from_ndarray(np.ascontiguousarray(picture))
-            frame.pts, frame.time_base = self._count, Fraction(1, self._rate)
-            self._film.mux(self._stream.encode(frame))
-            self._count += 1
-
-    def close(self) -> None:
-        """Finish the file."""
-        if self._stream is not None:
-            self._film.mux(self._stream.encode())
-        self._film.close()
+LEROBOT = Layout(begin=_begin, write=_write, finish=_finish, in_pieces=True)

@@ -1,18 +1,19 @@
-"""Recordings as MCAP logs of JSON messages, for Foxglove, rerun and ROS's tools.
+"""Recordings as MCAP logs of JSON messages, for Foxglove, rerun and ROS tools.
+
+Written by the package `mcap` (extra `mcap`), in chunks compressed with Zstandard.
 
 Episodes follow each other in time, a second apart. Topics are the columns' names:
 
     /episode            wbc_suite.Episode: name, length, success, seed; at its beginning
     /actions /states /rewards /obs/KEY ...
-                        wbc_suite.Array: `data`, in row-major order of the shape that
-                        the channel's metadata tell
+                        wbc_suite.Array: `data`, in row-major order of the `shape` in
+                        the channel's metadata
     /obs/CAMERA_image   foxglove.CompressedImage: PNG
 """
 
 import base64
 import io
 import json
-from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -22,13 +23,14 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from wbc_suite import __version__
-from wbc_suite.errors import DatasetError
-from wbc_suite.recording.converting.mcap_file import McapFile
+from wbc_suite.executors.executor import Json
+from wbc_suite.recording.atomic_files import check_folder, replace_file
+from wbc_suite.recording.converting.layout import Layout, Piece, Progress
 from wbc_suite.recording.dataset import Dataset
 from wbc_suite.recording.episode import Episode
-from wbc_suite.recording.files import check_folder, replace_file
+from wbc_suite.recording.extras import import_extra
 
-__all__ = ["write_mcap"]
+__all__ = ["MCAP"]
 
 SECOND = 1_000_000_000  # ns
 YEAR = 3e7  # s; no episode is as long
@@ -51,82 +53,92 @@ SCHEMAS: dict[str, dict[str, Any]] = {
         "format": {"type": "string"},
     },
 }
-"""Properties of the kinds of message."""
+"""JSON Schema properties of each message type."""
 
 
-def write_mcap(
-    dataset: Dataset, out: Path, tell: Callable[[Episode], None] = lambda _: None
-) -> Path:
-    """Write a dataset as one log.
-
-    Raises:
-        DatasetError: If it cannot be written; then an old file is as it was.
-    """
-    if not len(dataset):
-        raise DatasetError(f"'{dataset.path}' has no episodes.")
+def _begin(out: Path) -> None:
+    import_extra("mcap.writer", "mcap")
     check_folder(out.parent)
 
-    def write(aside: Path) -> None:
-        with (
-            aside.open("wb") as stream,
-            McapFile(stream, f"wbc-suite {__version__}") as log,
-        ):
-            told = {k: str(v) for k, v in dataset.header.items()}
-            log.metadata("wbc_suite", told)
-            episodes = _Episodes(log, float(dataset.header.get("control_freq", 20.0)))
-            for episode in dataset:
+
+def _write(
+    dataset: Dataset, piece: Piece, out: Path, on_progress: Progress
+) -> dict[str, Json]:
+    """Write the episodes as one log."""
+    writer = import_extra("mcap.writer", "mcap")
+
+    def write(temporary: Path) -> None:
+        with temporary.open("wb") as stream:
+            log = writer.Writer(stream)
+            log.start(library=f"wbc-suite {__version__}")
+            header = {name: str(fact) for name, fact in dataset.header.items()}
+            log.add_metadata("wbc_suite", header)
+            rate = float(dataset.header.get("control_freq", 20.0))
+            episodes = _EpisodeWriter(log, rate)
+            for episode in map(dataset.episode, piece.names):
                 episodes.add(episode)
-                tell(episode)
+                on_progress(1)
+            log.finish()
 
     replace_file(out, write)
-    return out
+    return {}
 
 
-class _Episodes:
-    """Puts episodes into a log, one after the other."""
+class _EpisodeWriter:
+    """Writes episodes into a log, one after the other.
 
-    def __init__(self, log: McapFile, rate: float) -> None:
+    Args:
+        log: An `mcap.writer.Writer`, started.
+        rate: Actions per second where an episode has no times, Hz.
+    """
+
+    def __init__(self, log: Any, rate: float) -> None:
         self._log, self._rate = log, rate
+        self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
-        self._free = 0  # ns; when the next episode may begin at the earliest
+        self._earliest_start = 0  # ns, of the next episode
 
     def add(self, episode: Episode) -> None:
-        start = max(self._free, _began(episode))
+        start = max(self._earliest_start, _start_time(episode))
         times = start + _since_start(episode, self._rate)
         names = ("success", "seed")
-        told = {k: episode.facts[k] for k in names if k in episode.facts}
-        self._say(
-            *("/episode", "wbc_suite.Episode", start, {}),
-            {"name": episode.name, "length": episode.length, **told},
-        )
+        summary = {"name": episode.name, "length": episode.length}
+        summary |= {k: episode.facts[k] for k in names if k in episode.facts}
+        self._write("/episode", "wbc_suite.Episode", start, summary, {})
         for k, time in enumerate(times.tolist()):
             for name, column in episode.columns.items():
-                facts = {"shape": json.dumps(column.shape[1:])}
                 if _is_picture(column):
-                    kind, message = (
-                        "foxglove.CompressedImage",
-                        _picture(column[k], time),
-                    )
-                    message["frame_id"] = name
+                    schema = "foxglove.CompressedImage"
+                    message = _picture(column[k], time, name)
                 else:
-                    kind = "wbc_suite.Array"
-                    message = {"data": _numbers(column[k])}
-                self._say(f"/{name}", kind, time, facts, message)
-        self._free = int(times.max(initial=start)) + SECOND
+                    schema, message = "wbc_suite.Array", {"data": _numbers(column[k])}
+                metadata = {"shape": json.dumps(column.shape[1:])}
+                self._write(f"/{name}", schema, time, message, metadata)
+        self._earliest_start = int(times.max(initial=start)) + SECOND
 
-    def _say(
-        self, topic: str, kind: str, time: int, facts: dict[str, str], message: Any
+    def _write(
+        self, topic: str, schema: str, time: int, message: Any, metadata: dict[str, str]
     ) -> None:
         if topic not in self._channels:
-            schema = {"title": kind, "type": "object", "properties": SCHEMAS[kind]}
-            definition = json.dumps(schema).encode()
-            self._channels[topic] = self._log.channel(topic, kind, definition, facts)
+            self._channels[topic] = self._log.register_channel(
+                topic, "json", self._schema(schema), metadata
+            )
         content = json.dumps(message, allow_nan=False).encode()
-        self._log.message(self._channels[topic], time, content)
+        self._log.add_message(
+            self._channels[topic], log_time=time, publish_time=time, data=content
+        )
+
+    def _schema(self, name: str) -> int:
+        if name not in self._schemas:
+            schema = {"title": name, "type": "object", "properties": SCHEMAS[name]}
+            self._schemas[name] = self._log.register_schema(
+                name, "jsonschema", json.dumps(schema).encode()
+            )
+        return self._schemas[name]
 
 
-def _began(episode: Episode) -> int:
-    """Return when an episode began, in ns since 1970; 0 when nobody said."""
+def _start_time(episode: Episode) -> int:
+    """Return when an episode began, in ns since 1970; 0 if unknown."""
     try:
         moment = datetime.fromisoformat(str(episode.facts.get("began")))
         return max(0, round(moment.timestamp() * 1000)) * (SECOND // 1000)
@@ -140,10 +152,10 @@ def _since_start(episode: Episode, rate: float) -> NDArray[np.int64]:
     if "states" not in episode.columns or not episode.length:
         return even
     time = episode.columns["states"][:, 0]
-    passed = time - time[0]
-    if passed[-1] > YEAR or not (np.diff(passed) > 0).all():
+    elapsed = time - time[0]
+    if elapsed[-1] > YEAR or not (np.diff(elapsed) > 0).all():
         return even
-    return np.round(passed * SECOND).astype(np.int64)
+    return np.round(elapsed * SECOND).astype(np.int64)
 
 
 def _numbers(row: Any) -> list[Any]:
@@ -158,11 +170,15 @@ def _is_picture(column: NDArray[Any]) -> bool:
     return column.dtype == np.uint8 and column.ndim == 4 and column.shape[-1] == 3
 
 
-def _picture(pixels: NDArray[np.uint8], time: int) -> dict[str, Any]:
+def _picture(pixels: NDArray[np.uint8], time: int, frame: str) -> dict[str, Any]:
     memory = io.BytesIO()
     Image.fromarray(pixels).save(memory, format="PNG", compress_level=1)
     return {
         "timestamp": {"sec": time // SECOND, "nsec": time % SECOND},
+        "frame_id": frame,
         "data": base64.b64encode(memory.getvalue()).decode(),
         "format": "png",
     }
+
+
+MCAP = Layout(begin=_begin, write=_write)

@@ -12,7 +12,7 @@ Source: minari 0.5.4, `minari/dataset/_storages/hdf5_storage.py`.
 
 import json
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -21,12 +21,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc_suite.errors import DatasetError
+from wbc_suite.executors.executor import Json
+from wbc_suite.recording.atomic_files import new_folder, replace_file, write_bytes
+from wbc_suite.recording.converting.layout import Layout, Piece, Progress
 from wbc_suite.recording.dataset import Dataset
 from wbc_suite.recording.episode import Episode
-from wbc_suite.recording.files import new_folder, replace_file, write_bytes
 from wbc_suite.registration import BENCHMARKS
 
-__all__ = ["write_minari"]
+__all__ = ["MINARI"]
 
 VERSION = "0.5.4"
 _NAME = re.compile(r"[-\w]+?-v\d+\Z")
@@ -34,39 +36,39 @@ _INFOS = ("states", "clipped", "step_time", "stamp")
 """Columns of ours that are Minari's `infos`."""
 
 
-def write_minari(
-    dataset: Dataset, out: Path, tell: Callable[[Episode], None] = lambda _: None
-) -> Path:
-    """Write a dataset into a new folder.
+def _begin(out: Path) -> None:
+    new_folder(out, "a Minari dataset")
 
-    Observations are a dictionary of what was observed. The one after the last action
-    repeats the one before it where `next_obs` was not recorded. Pictures are stored as
-    they are, not as JPEG.
+
+def _write(
+    dataset: Dataset, piece: Piece, out: Path, on_progress: Progress
+) -> dict[str, Json]:
+    """Write the episodes into a folder.
+
+    The observation after the last action repeats the one before it where `next_obs`
+    was not recorded. Pictures are stored uncompressed, not as JPEG.
 
     Raises:
-        DatasetError: If the folder is not empty or cannot be written, or episodes
-            differ in what they hold.
+        DatasetError: If the folder cannot be written, or episodes differ in their
+            columns.
     """
-    new_folder(out, "a Minari dataset")
-    if not len(dataset):
-        raise DatasetError(f"'{dataset.path}' has no episodes.")
-    first = dataset.episode(dataset.names[0])
+    first = dataset.episode(piece.names[0])
     steps = 0
 
-    def write(aside: Path) -> None:
+    def write(temporary: Path) -> None:
         nonlocal steps
-        with h5py.File(aside, "w", track_order=True) as file:
-            for number, episode in enumerate(dataset):
+        with h5py.File(temporary, "w", track_order=True) as file:
+            for number, episode in enumerate(map(dataset.episode, piece.names)):
                 if set(episode.columns) != set(first.columns):
-                    raise DatasetError(f"'{episode.name}' holds other columns.")
+                    raise DatasetError(f"'{episode.name}' has other columns.")
                 _write_episode(file.create_group(f"episode_{number}"), number, episode)
                 steps += episode.length
-                tell(episode)
+                on_progress(1)
 
-    (out / "data").mkdir()
+    (out / "data").mkdir(parents=True)
     main = out / "data/main_data.hdf5"
     replace_file(main, write)
-    told = {
+    metadata = {
         "total_episodes": len(dataset),
         "total_steps": steps,
         "data_format": "hdf5",
@@ -80,9 +82,9 @@ def write_minari(
         "requirements": ["wbc-suite"],
         "description": "Converted by wbc-suite from a recording in robomimic's layout.",
     }
-    content = json.dumps({k: v for k, v in told.items() if v != "null"}, indent=1)
+    content = json.dumps({k: v for k, v in metadata.items() if v != "null"}, indent=1)
     write_bytes(out / "data/metadata.json", content.encode())
-    return out
+    return {}
 
 
 def _write_episode(group: h5py.Group, number: int, episode: Episode) -> None:
@@ -92,11 +94,11 @@ def _write_episode(group: h5py.Group, number: int, episode: Episode) -> None:
     for name in ("seed", "success", "uid"):
         if name in episode.facts:
             group.attrs[name] = episode.facts[name]
-    seen = group.create_group("observations")
+    observations = group.create_group("observations")
     for key in episode.observed:
         before = columns[f"obs/{key}"]
         last = columns.get(f"next_obs/{key}", before)[-1:]
-        seen[key] = np.concatenate([before, last])
+        observations[key] = np.concatenate([before, last])
     group["actions"] = columns["actions"]
     group["rewards"] = columns.get("rewards", np.zeros(episode.length))
     ended = np.arange(episode.length) == episode.length - 1
@@ -150,11 +152,11 @@ def _box(column: NDArray[Any]) -> dict[str, Any]:
 def _env_spec(dataset: Dataset) -> Mapping[str, Any] | None:
     """Return Gymnasium's description of the environment, if it is registered."""
     try:
-        told = json.loads(str(dataset.header.get("env_args", "{}")))
-        name, arguments = told["env_name"], dict(told.get("env_kwargs", {}))
+        source = json.loads(str(dataset.header.get("env_args", "{}")))
+        name, arguments = source["env_name"], dict(source.get("env_kwargs", {}))
     except (ValueError, KeyError, TypeError):
         return None
-    if told.get("package") != "wbc_suite" or name not in BENCHMARKS:
+    if source.get("package") != "wbc_suite" or name not in BENCHMARKS:
         return None
     return {
         "id": f"wbc_suite/{name}-v0",
@@ -176,3 +178,6 @@ def _dataset_id(dataset: Dataset, out: Path) -> str:
         return out.name
     word = re.sub(r"\W+", "-", str(dataset.header.get("env", "demonstrations")))
     return f"{word.strip('-').lower() or 'demonstrations'}-v0"
+
+
+MINARI = Layout(begin=_begin, write=_write)

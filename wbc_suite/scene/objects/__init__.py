@@ -1,17 +1,21 @@
-"""Objects: each is a `Thing`, made by a function of its own name.
+"""Objects: each is a `SceneObject`, made by a function of its own name.
 
     objects.can("can").add_to(spec)
 
-A new object is a function that returns a `Thing`: a name and a few parts. `MjcfThing`
-reads one from a file.
+A new object is a function that returns a `SceneObject`: a name and a few parts.
+`MjcfObject` reads one from a file.
 """
 
 from wbc_suite.scene.objects.door import door
 from wbc_suite.scene.objects.food import bottle, bread, can, cereal, lemon, milk
-from wbc_suite.scene.objects.mjcf_thing import MjcfThing
+from wbc_suite.scene.objects.object_state import Extent, ObjectState
 from wbc_suite.scene.objects.primitives import ball, box, capsule, cylinder, hull
-from wbc_suite.scene.objects.state import Extent, ThingState
-from wbc_suite.scene.objects.thing import Hinge, Part, Thing
+from wbc_suite.scene.objects.scene_object import (
+    Hinge,
+    MjcfObject,
+    Part,
+    SceneObject,
+)
 from wbc_suite.scene.objects.tools import (
     hammer,
     hanging_frame,
@@ -26,10 +30,10 @@ from wbc_suite.scene.objects.vessels import hollow_cylinder, lid, open_bin, pot
 __all__ = [
     "Extent",
     "Hinge",
-    "MjcfThing",
+    "MjcfObject",
+    "ObjectState",
     "Part",
-    "Thing",
-    "ThingState",
+    "SceneObject",
     "ball",
     "bottle",
     "box",

@@ -1,11 +1,14 @@
-"""A door on a frame, with or without a latch that its handle draws back."""
+"""A door on a frame, with or without a latch that its lever draws back."""
 
-from wbc_suite.scene.objects.thing import Color, Hinge, Part, Thing
+from functools import partial
+
+from wbc_suite.scene.objects.scene_object import Color, Hinge, Part, SceneObject
 
 __all__ = ["door"]
 
 FRAME: Color = (0.62, 0.64, 0.67, 1.0)
 PANEL: Color = (0.42, 0.27, 0.16, 1.0)
+INLAY: Color = (0.50, 0.33, 0.20, 1.0)
 BRASS: Color = (0.83, 0.62, 0.27, 1.0)
 
 HALF_WIDTH, HALF_HEIGHT, HALF_THICK = 0.145, 0.165, 0.012
@@ -18,9 +21,12 @@ HANDLE_OUT = 0.058
 LEVER = 0.055
 """Half length of the lever, m."""
 
+metal = partial(Part, color=FRAME, material="metal")
+brass = partial(Part, color=BRASS, material="metal")
 
-def door(name: str, *, latch: bool = True) -> Thing:
-    """Make a door that stands across y; it opens towards +y, hinged at its -x end.
+
+def door(name: str, *, latch: bool = True) -> SceneObject:
+    """Make a door across y that opens towards +y and is hinged at its -x end.
 
     Its origin is on the floor, below the middle of the panel. The panel is the body
     `{name}_panel`, the lever `{name}_handle`; their joints are `{name}_panel_joint` (0
@@ -29,55 +35,42 @@ def door(name: str, *, latch: bool = True) -> Thing:
     Args:
         name: Its name.
         latch: Whether a bolt behind the far post keeps it shut until the lever is
-            turned by 80 degrees. Without it the lever is just a handle.
+            turned by 80 degrees; otherwise the lever is fixed.
     """
     hinge_x = -(HALF_WIDTH + GAP)
-    posts = tuple(
-        Part(
-            kind="cylinder",
-            size=(POST, HALF_HEIGHT + 0.03),
-            pos=(x, 0.0, HALF_HEIGHT + 0.03),
-            color=FRAME,
-            material="metal",
-        )
-        for x in (hinge_x - POST, -hinge_x + POST)
+    places, half = (hinge_x - POST, -hinge_x + POST), HALF_HEIGHT + 0.03
+    post = partial(metal, kind="cylinder", size=(POST, half))
+    foot = partial(metal, kind="box", size=(0.03, 0.07, 0.006))
+    posts = [post(pos=(x, 0.0, half)) for x in places]
+    feet = [foot(pos=(x, 0.0, 0.006)) for x in places]
+    return SceneObject(
+        name=name,
+        parts=(*posts, *feet),
+        motion="fixed",
+        children=(_panel(name, hinge_x, latch),),
     )
-    feet = tuple(
-        Part(
-            kind="box",
-            size=(0.03, 0.07, 0.006),
-            pos=(x, 0.0, 0.006),
-            color=FRAME,
-            material="metal",
-        )
-        for x in (hinge_x - POST, -hinge_x + POST)
-    )
-    panel = _panel(name, hinge_x, latch)
-    return Thing(name=name, parts=(*posts, *feet), motion="fixed", children=(panel,))
 
 
-def _panel(name: str, hinge_x: float, latch: bool) -> Thing:
-    middle = (HALF_WIDTH + GAP, 0.0, 0.0)
+def _panel(name: str, hinge_x: float, latch: bool) -> SceneObject:
+    middle = HALF_WIDTH + GAP
     board = Part(
         kind="box",
         size=(HALF_WIDTH, HALF_THICK, HALF_HEIGHT),
-        pos=middle,
+        pos=(middle, 0.0, 0.0),
         color=PANEL,
         material="wood",
         friction=(0.3, 0.005, 0.0001),
     )
-    inlays = tuple(
-        Part(
-            kind="box",
-            size=(HALF_WIDTH - 0.035, HALF_THICK + 0.002, 0.058),
-            pos=(middle[0], 0.0, z),
-            color=(0.50, 0.33, 0.20, 1.0),
-            material="wood",
-            solid=False,
-        )
-        for z in (-0.085, 0.085)
+    inlay = partial(
+        Part,
+        kind="box",
+        size=(HALF_WIDTH - 0.035, HALF_THICK + 0.002, 0.058),
+        color=INLAY,
+        material="wood",
+        solid=False,
     )
-    return Thing(
+    inlays = [inlay(pos=(middle, 0.0, z)) for z in (-0.085, 0.085)]
+    return SceneObject(
         name=f"{name}_panel",
         parts=(board, *inlays),
         motion=Hinge(axis=(0.0, 0.0, 1.0), range=(0.0, 1.4), damping=0.1, friction=0.1),
@@ -86,47 +79,33 @@ def _panel(name: str, hinge_x: float, latch: bool) -> Thing:
     )
 
 
-def _handle(name: str, latch: bool) -> Thing:
-    """Return the lever; its bolt leaves the post's shadow as it turns."""
-    out = HANDLE_OUT
-    spindle = Part(
+def _handle(name: str, latch: bool) -> SceneObject:
+    """Return the lever; its bolt leaves the post as it turns."""
+    out, axis = HANDLE_OUT, (0.0, -1.0, 0.0)
+    hinge = partial(Hinge, axis=axis, damping=0.05)
+    turned = hinge(range=(0.0, 1.6), stiffness=0.2, friction=0.03)
+    fixed = hinge(range=(0.0, 0.001))
+    spindle = brass(
         kind="cylinder",
         size=(0.009, HANDLE_OUT / 2),
         pos=(0.0, out / 2, 0.0),
         quat=(0.7071067811865476, 0.7071067811865476, 0.0, 0.0),
-        color=BRASS,
-        material="metal",
     )
-    lever = Part(
+    lever = brass(
         kind="box",
         size=(LEVER, 0.011, 0.011),
         pos=(-LEVER + 0.011, out, 0.0),
-        color=BRASS,
-        material="metal",
         density=500.0,
     )
-    bolt = Part(
+    bolt = metal(
         kind="box",
         size=(0.045, 0.005, 0.006),
         pos=(0.045, -(HALF_THICK + POST + 0.008), 0.0),
-        color=FRAME,
-        material="metal",
     )
-    turn = (
-        Hinge(
-            axis=(0.0, -1.0, 0.0),
-            range=(0.0, 1.6),
-            damping=0.05,
-            stiffness=0.2,
-            friction=0.03,
-        )
-        if latch
-        else Hinge(axis=(0.0, -1.0, 0.0), range=(0.0, 0.001), damping=0.05)
-    )
-    return Thing(
+    return SceneObject(
         name=f"{name}_handle",
         parts=(spindle, lever, bolt) if latch else (spindle, lever),
         sites={"grip": (-LEVER, out, 0.0)},
-        motion=turn,
+        motion=turned if latch else fixed,
         pos=(2 * HALF_WIDTH + GAP - 0.03, 0.0, 0.0),
     )

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from wbc_suite.robot.shapes import Hull, Vector3
-from wbc_suite.scene.objects.thing import Color, Part, Thing
+from wbc_suite.scene.objects.scene_object import Color, Part, SceneObject
 
 __all__ = ["ball", "box", "capsule", "cylinder", "hull"]
 
@@ -17,20 +17,20 @@ def box(
     color: Color = GREY,
     material: str = "wood",
     density: float | None = None,
-) -> Thing:
+) -> SceneObject:
     """Make a box with the half lengths of its edges, m."""
     part = Part(
         kind="box", size=half_size, color=color, material=material, density=density
     )
-    return Thing(name=name, parts=(part,))
+    return SceneObject(name=name, parts=(part,))
 
 
 def ball(
     name: str, radius: float, *, color: Color = GREY, material: str = "plastic"
-) -> Thing:
+) -> SceneObject:
     """Make a ball, radius in m."""
     part = Part(kind="ball", size=(radius,), color=color, material=material)
-    return Thing(name=name, parts=(part,))
+    return SceneObject(name=name, parts=(part,))
 
 
 def cylinder(
@@ -40,11 +40,11 @@ def cylinder(
     *,
     color: Color = GREY,
     material: str = "metal",
-) -> Thing:
+) -> SceneObject:
     """Make an upright cylinder, sizes in m."""
     size = (radius, half_height)
     part = Part(kind="cylinder", size=size, color=color, material=material)
-    return Thing(name=name, parts=(part,))
+    return SceneObject(name=name, parts=(part,))
 
 
 def capsule(
@@ -54,11 +54,11 @@ def capsule(
     *,
     color: Color = GREY,
     material: str = "plastic",
-) -> Thing:
-    """Make an upright cylinder with round ends; `half_length` is without them, m."""
+) -> SceneObject:
+    """Make an upright cylinder with round ends; `half_length` excludes them, m."""
     size = (radius, half_length)
     part = Part(kind="capsule", size=size, color=color, material=material)
-    return Thing(name=name, parts=(part,))
+    return SceneObject(name=name, parts=(part,))
 
 
 def hull(
@@ -67,8 +67,8 @@ def hull(
     *,
     color: Color = GREY,
     material: str = "plastic",
-) -> Thing:
+) -> SceneObject:
     """Make the convex hull of spheres `(x, y, z, radius)`, m; a radius may be 0."""
     surface = Hull(shape="hull", spheres=tuple(spheres))
     part = Part(kind="mesh", surface=surface, color=color, material=material)
-    return Thing(name=name, parts=(part,))
+    return SceneObject(name=name, parts=(part,))

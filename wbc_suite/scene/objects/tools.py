@@ -1,10 +1,11 @@
-"""Tools and fittings: hammer, plate with a hole, nuts, wrench, hanging frame."""
+"""Tools and fittings: hammer, plate with a hole, nuts, wrench, stand, hanging frame."""
 
 import math
 from dataclasses import replace
+from functools import partial
 
 from wbc_suite.robot.shapes import Vector3
-from wbc_suite.scene.objects.thing import Color, Part, Thing
+from wbc_suite.scene.objects.scene_object import Color, Part, SceneObject
 from wbc_suite.scene.objects.vessels import ring_of_boxes
 
 __all__ = [
@@ -19,12 +20,13 @@ __all__ = [
 
 WOOD: Color = (0.72, 0.50, 0.28, 1.0)
 STEEL: Color = (0.62, 0.64, 0.67, 1.0)
-BRASS: Color = (0.80, 0.58, 0.24, 1.0)
 BLACK: Color = (0.13, 0.13, 0.14, 1.0)
 ALONG_X = (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
 HAMMER_LYING = (0.5, 0.5, 0.5, 0.5)
 """Turns a hammer on its side: its handle, z, to x, and its head, x, to y."""
-ALONG_Y = (math.sqrt(0.5), -math.sqrt(0.5), 0.0, 0.0)
+
+steel_box = partial(Part, kind="box", color=STEEL, material="metal")
+wooden_box = partial(Part, kind="box", color=WOOD, material="wood")
 
 
 def hammer(
@@ -34,58 +36,36 @@ def hammer(
     handle_length: float = 0.18,
     head_half_size: float = 0.02,
     mass: float = 0.18,
-) -> Thing:
-    """Make a hammer whose handle points along z, its head above; origin in the handle.
+) -> SceneObject:
+    """Make a hammer with its handle along z and its head above; origin in the handle.
 
-    Sites: `handle` (the handle's middle, the origin), `head`.
+    Sites: `handle` (the middle of the handle, the origin), `head`.
 
     Args:
         name: Its name.
         handle_radius: m.
         handle_length: m.
-        head_half_size: Of the head's middle block, m.
+        head_half_size: Half size of the middle block of the head, m.
         mass: kg.
     """
     h, top = head_half_size, handle_length / 2
     middle = top + h
+    head = partial(Part, color=STEEL, material="metal", density=2000.0)
+    face = head(
+        kind="cylinder",
+        size=(0.8 * h, 0.6 * h),
+        pos=(1.6 * h, 0.0, middle),
+        quat=ALONG_X,
+    )
+    claw = partial(head, kind="box", size=(0.75 * h, 0.28 * h, 0.22 * h))
     parts = (
-        Part(
-            kind="cylinder",
-            size=(handle_radius, handle_length / 2),
-            color=WOOD,
-            material="wood",
-        ),
-        Part(
-            kind="box",
-            size=(h, h, h),
-            pos=(0.0, 0.0, middle),
-            color=STEEL,
-            material="metal",
-            density=2000.0,
-        ),
-        Part(
-            kind="cylinder",
-            size=(0.8 * h, 0.6 * h),
-            pos=(1.6 * h, 0.0, middle),
-            quat=ALONG_X,
-            color=STEEL,
-            material="metal",
-            density=2000.0,
-        ),
-        *(
-            Part(
-                kind="box",
-                size=(0.75 * h, 0.28 * h, 0.22 * h),
-                pos=(-1.6 * h, side * 0.5 * h, middle),
-                color=STEEL,
-                material="metal",
-                density=2000.0,
-            )
-            for side in (-1.0, 1.0)
-        ),
+        wooden_box(kind="cylinder", size=(handle_radius, handle_length / 2)),
+        head(kind="box", size=(h, h, h), pos=(0.0, 0.0, middle)),
+        face,
+        *(claw(pos=(-1.6 * h, side * 0.5 * h, middle)) for side in (-1.0, 1.0)),
     )
     sites = {"handle": (0.0, 0.0, 0.0), "head": (0.0, 0.0, middle)}
-    return Thing(name=name, parts=parts, sites=sites).with_mass(mass)
+    return SceneObject(name=name, parts=parts, sites=sites).with_mass(mass)
 
 
 def plate_with_hole(
@@ -95,15 +75,17 @@ def plate_with_hole(
     hole: float = 0.045,
     half_thickness: float = 0.01,
     color: Color = (0.30, 0.48, 0.68, 1.0),
-) -> Thing:
-    """Make a square plate across z with a square hole in its middle; sizes in m.
+) -> SceneObject:
+    """Make a square plate across z with a square hole in its middle.
+
+    Site: `hole`, its middle.
 
     Args:
         name: Its name.
-        half_size: Half of the plate's edge.
-        hole: Half of the hole's edge.
-        half_thickness: Half of the plate's thickness.
-        color: Its colour.
+        half_size: Half of the edge of the plate, m.
+        hole: Half of the edge of the hole, m.
+        half_thickness: m.
+        color: Red green blue alpha.
     """
     band, middle = (half_size - hole) / 2, (half_size + hole) / 2
     parts = tuple(
@@ -115,7 +97,7 @@ def plate_with_hole(
             ((band, hole), (-middle, 0.0)),
         )
     )
-    return Thing(name=name, parts=parts, sites={"hole": (0.0, 0.0, 0.0)})
+    return SceneObject(name=name, parts=parts, sites={"hole": (0.0, 0.0, 0.0)})
 
 
 def square_nut(
@@ -125,17 +107,17 @@ def square_nut(
     outer: float = 0.0445,
     half_height: float = 0.01,
     handle: float = 0.028,
-) -> Thing:
+) -> SceneObject:
     """Make a square nut of wood across z, with a handle along x.
 
-    Sites: `center` (the hole's middle, the origin), `handle`.
+    Sites: `center` (the middle of the hole, the origin), `handle`.
 
     Args:
         name: Its name.
-        hole: Half of the hole's edge, m.
-        outer: Half of the nut's edge, m.
+        hole: Half of the edge of the hole, m.
+        outer: Half of the edge of the nut, m.
         half_height: m.
-        handle: How far the handle stands off, m.
+        handle: Length of the handle, m.
     """
     plate = plate_with_hole(
         name, half_size=outer, hole=hole, half_thickness=half_height
@@ -151,37 +133,34 @@ def round_nut(
     outer: float = 0.045,
     half_height: float = 0.01,
     handle: float = 0.028,
-) -> Thing:
+) -> SceneObject:
     """Make an eight-sided nut of metal across z, with a handle along x.
 
-    Sites: `center` (the hole's middle, the origin), `handle`.
+    Sites: `center` (the middle of the hole, the origin), `handle`.
 
     Args:
         name: Its name.
-        hole: Radius of the circle in the hole, m.
-        outer: Radius of the circle that the outer faces touch, m.
+        hole: Radius of the inscribed circle of the hole, m.
+        outer: Radius of the inscribed circle of the nut, m.
         half_height: m.
-        handle: How far the handle stands off, m.
+        handle: Length of the handle, m.
     """
-    parts = ring_of_boxes(
-        hole, outer, half_height, sides=8, color=STEEL, material="metal"
-    )
+    parts = ring_of_boxes(hole, outer, half_height, sides=8, color=STEEL)
     return _with_handle(name, parts, outer, half_height, handle)
 
 
 def _with_handle(
     name: str, ring: tuple[Part, ...], outer: float, half_height: float, handle: float
-) -> Thing:
+) -> SceneObject:
     at = (outer + handle / 2, 0.0, 0.0)
-    grip = Part(
-        kind="box",
+    grip = replace(
+        ring[0],
         size=(handle / 2, 0.013, half_height),
         pos=at,
-        color=ring[0].color,
-        material=ring[0].material,
+        quat=(1.0, 0.0, 0.0, 0.0),
     )
     sites = {"center": (0.0, 0.0, 0.0), "handle": at}
-    return Thing(name=name, parts=(*ring, grip), sites=sites).with_mass(0.04)
+    return SceneObject(name=name, parts=(*ring, grip), sites=sites).with_mass(0.04)
 
 
 def wrench(
@@ -192,16 +171,16 @@ def wrench(
     ring: float = 0.021,
     half_height: float = 0.005,
     mass: float = 0.09,
-) -> Thing:
-    """Make a ring spanner that lies across z, its shaft along x, a ring at each end.
+) -> SceneObject:
+    """Make a lying ring spanner, its shaft along x, a ring across z at each end.
 
     Sites: `hole1` (at +x), `hole2` (at -x), `grip` (the origin).
 
     Args:
         name: Its name.
-        length: Between the holes' middles, m.
-        hole: Radius of the circle in a hole, m.
-        ring: Radius of the circle that a ring's faces touch, m.
+        length: Distance of the middles of the holes, m.
+        hole: Radius of the inscribed circle of a hole, m.
+        ring: Radius of the inscribed circle of a ring, m.
         half_height: m.
         mass: kg.
     """
@@ -214,12 +193,7 @@ def wrench(
         )
     ]
     shaft = (
-        Part(
-            kind="box",
-            size=(end - ring + 0.002, 0.007, half_height),
-            color=STEEL,
-            material="metal",
-        ),
+        steel_box(size=(end - ring + 0.002, 0.007, half_height)),
         Part(kind="box", size=(0.034, 0.012, 0.010), color=BLACK, density=1200.0),
     )
     sites = {
@@ -227,7 +201,7 @@ def wrench(
         "hole2": (-end, 0.0, 0.0),
         "grip": (0.0, 0.0, 0.0),
     }
-    return Thing(name=name, parts=(*rings, *shaft), sites=sites).with_mass(mass)
+    return SceneObject(name=name, parts=(*rings, *shaft), sites=sites).with_mass(mass)
 
 
 def stand(
@@ -237,18 +211,18 @@ def stand(
     hole: float = 0.011,
     wall: float = 0.005,
     height: float = 0.10,
-) -> Thing:
-    """Make a board with a square socket that something can be put into from above.
+) -> SceneObject:
+    """Make a board with a square socket that is open above.
 
-    Its origin is the middle of the board's lower face. Sites: `socket` (the middle of
-    the socket's upper end), `floor` (its lower end).
+    Its origin is the middle of the lower face of the board. Sites: `socket` (the middle
+    of the upper end of the socket), `floor` (its lower end).
 
     Args:
         name: Its name.
-        half_size: Of the board, m.
-        hole: Half of the socket's inner edge, m.
-        wall: Thickness of its walls, m.
-        height: Of its walls, m.
+        half_size: Half size of the board, m.
+        hole: Half of the inner edge of the socket, m.
+        wall: Thickness of the walls of the socket, m.
+        height: Height of the walls, m.
     """
     board = 2 * half_size[2]
     side, middle, up = hole + wall, hole + wall / 2, board + height / 2
@@ -259,26 +233,11 @@ def stand(
         ((wall / 2, hole), (-middle, 0.0)),
     )
     parts = (
-        Part(
-            kind="box",
-            size=half_size,
-            pos=(0.0, 0.0, half_size[2]),
-            color=WOOD,
-            material="wood",
-        ),
-        *(
-            Part(
-                kind="box",
-                size=(*size, height / 2),
-                pos=(*at, up),
-                color=WOOD,
-                material="wood",
-            )
-            for size, at in walls
-        ),
+        wooden_box(size=half_size, pos=(0.0, 0.0, half_size[2])),
+        *(wooden_box(size=(*s, height / 2), pos=(*at, up)) for s, at in walls),
     )
     sites = {"socket": (0.0, 0.0, board + height), "floor": (0.0, 0.0, board)}
-    return Thing(name=name, parts=parts, sites=sites)
+    return SceneObject(name=name, parts=parts, sites=sites)
 
 
 def hanging_frame(
@@ -288,41 +247,26 @@ def hanging_frame(
     arm: float = 0.085,
     radius: float = 0.005,
     mass: float = 0.05,
-) -> Thing:
+) -> SceneObject:
     """Make a rod along z with an arm along x at its upper end, whose tip is bent up.
 
-    Its origin is the middle of the rod. Sites: `tip` (the rod's lower end), `corner`,
-    `hook` (where something hangs), `bend`, `hook_tip`, `grip`.
+    Its origin is the middle of the rod. Sites: `tip` (the lower end of the rod),
+    `corner`, `hook` (where a tool hangs), `bend`, `hook_tip`, `grip`.
 
     Args:
         name: Its name.
-        length: Of the rod, m.
+        length: Length of the rod, m.
         arm: Length of the arm, m.
-        radius: Half of the bars' thickness, m.
+        radius: Half of the thickness of the bars, m.
         mass: kg.
     """
-    end, bend = length / 2, 0.018
-    steel = {"color": STEEL, "material": "metal"}
+    end, bend, r = length / 2, 0.018, radius
+    grip = (0.0, 0.0, 0.5 * end)
     parts = (
-        Part(kind="box", size=(radius, radius, end), **steel),
-        Part(
-            kind="box",
-            size=(arm / 2, radius, radius),
-            pos=(arm / 2, 0.0, end),
-            **steel,
-        ),
-        Part(
-            kind="box",
-            size=(radius, radius, bend / 2),
-            pos=(arm, 0.0, end + bend / 2),
-            **steel,
-        ),
-        Part(
-            kind="box",
-            size=(2 * radius, 2 * radius, 0.025),
-            pos=(0.0, 0.0, 0.5 * end),
-            color=BLACK,
-        ),
+        steel_box(size=(r, r, end)),
+        steel_box(size=(arm / 2, r, r), pos=(arm / 2, 0.0, end)),
+        steel_box(size=(r, r, bend / 2), pos=(arm, 0.0, end + bend / 2)),
+        Part(kind="box", size=(2 * r, 2 * r, 0.025), pos=grip, color=BLACK),
     )
     sites = {
         "tip": (0.0, 0.0, -end),
@@ -330,6 +274,6 @@ def hanging_frame(
         "hook": (0.6 * arm, 0.0, end),
         "bend": (arm, 0.0, end),
         "hook_tip": (arm, 0.0, end + bend),
-        "grip": (0.0, 0.0, 0.5 * end),
+        "grip": grip,
     }
-    return Thing(name=name, parts=parts, sites=sites).with_mass(mass)
+    return SceneObject(name=name, parts=parts, sites=sites).with_mass(mass)

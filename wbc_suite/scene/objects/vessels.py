@@ -1,9 +1,11 @@
-"""Vessels and what covers them: walls of boxes, and rings of boxes."""
+"""Vessels and lids: walls of boxes, and rings of boxes."""
 
 import math
+from dataclasses import replace
+from functools import partial
 
 from wbc_suite.robot.shapes import Vector3
-from wbc_suite.scene.objects.thing import Color, Part, Thing
+from wbc_suite.scene.objects.scene_object import Color, Part, SceneObject
 
 __all__ = ["hollow_cylinder", "lid", "open_bin", "pot", "ring_of_boxes"]
 
@@ -21,15 +23,17 @@ def open_bin(
     wall: float = 0.01,
     color: Color = WOOD,
     material: str = "wood",
-) -> Thing:
-    """Make a bin that is open above; its origin is the middle of its bottom's face.
+) -> SceneObject:
+    """Make a bin that is open above; its origin is the middle of its lower face.
+
+    Site: `floor`, the middle of its floor.
 
     Args:
         name: Its name.
-        size: Outer length, width and height, m; the bottom is `wall` thick.
-        wall: Thickness of the walls, m.
-        color: Of all parts.
-        material: Of all parts.
+        size: Outer length, width and height, m.
+        wall: Thickness of walls and floor, m.
+        color: Colour of all parts.
+        material: Material of all parts.
     """
     x, y, z = (s / 2 for s in size)
     side, end = (wall / 2, y, z), (x - wall, wall / 2, z)
@@ -44,38 +48,33 @@ def open_bin(
         Part(kind="box", size=s, pos=p, color=color, material=material)
         for s, p in walls
     )
-    return Thing(name=name, parts=parts, sites={"floor": (0.0, 0.0, wall)})
+    return SceneObject(name=name, parts=parts, sites={"floor": (0.0, 0.0, wall)})
 
 
 def lid(
-    name: str,
-    size: Vector3,
-    *,
-    color: Color = WOOD,
-    material: str = "wood",
-) -> Thing:
-    """Make a board with a handle on top; its origin is the middle of the board.
+    name: str, size: Vector3, *, color: Color = WOOD, material: str = "wood"
+) -> SceneObject:
+    """Make a board with a dark handle on top; its origin is the middle of the board.
+
+    Site: `handle`.
 
     Args:
         name: Its name.
         size: Length, width and thickness of the board, m.
-        color: Of the board; the handle is dark.
-        material: Of the board.
+        color: Colour of the board.
+        material: Material of the board.
     """
     x, y, z = (s / 2 for s in size)
     grip, post, reach = 0.008, 0.02, min(0.05, 0.6 * y)
     above = z + 2 * post
+    dark = partial(Part, kind="box", color=DARK)
     parts = (
         Part(kind="box", size=(x, y, z), color=color, material=material),
-        _dark((grip, grip, post), (0.0, reach, z + post)),
-        _dark((grip, grip, post), (0.0, -reach, z + post)),
-        _dark((grip, reach + grip, grip), (0.0, 0.0, above)),
+        dark(size=(grip, grip, post), pos=(0.0, reach, z + post)),
+        dark(size=(grip, grip, post), pos=(0.0, -reach, z + post)),
+        dark(size=(grip, reach + grip, grip), pos=(0.0, 0.0, above)),
     )
-    return Thing(name=name, parts=parts, sites={"handle": (0.0, 0.0, above)})
-
-
-def _dark(size: Vector3, pos: Vector3) -> Part:
-    return Part(kind="box", size=size, pos=pos, color=DARK)
+    return SceneObject(name=name, parts=parts, sites={"handle": (0.0, 0.0, above)})
 
 
 def ring_of_boxes(
@@ -88,32 +87,32 @@ def ring_of_boxes(
     color: Color = ENAMEL,
     material: str = "metal",
 ) -> tuple[Part, ...]:
-    """Return a ring about z as boxes, side by side; half of a convex engine's trouble.
+    """Return a ring about z made of boxes, since collision shapes are convex.
 
     Args:
-        inner: Radius of the circle inside, m.
-        outer: Radius of the circle that the boxes' outer faces touch, m.
+        inner: Radius of the inscribed circle of the hole, m.
+        outer: Radius of the circle that the outer faces touch, m.
         half_height: m.
-        sides: How many boxes.
-        pos: Its middle.
-        color: Of all boxes.
-        material: Of all boxes.
+        sides: Number of boxes.
+        pos: Middle of the ring, m.
+        color: Colour of all boxes.
+        material: Material of all boxes.
     """
     middle, thick = (inner + outer) / 2, (outer - inner) / 2
     width = outer * math.tan(math.pi / sides)
+    box = partial(
+        Part,
+        kind="box",
+        size=(thick, width, half_height),
+        color=color,
+        material=material,
+    )
     parts = []
     for k in range(sides):
         angle = 2 * math.pi * k / sides
-        c, s = math.cos(angle), math.sin(angle)
-        part = Part(
-            kind="box",
-            size=(thick, width, half_height),
-            pos=(pos[0] + middle * c, pos[1] + middle * s, pos[2]),
-            quat=(math.cos(angle / 2), 0.0, 0.0, math.sin(angle / 2)),
-            color=color,
-            material=material,
-        )
-        parts.append(part)
+        x, y = middle * math.cos(angle), middle * math.sin(angle)
+        turn = (math.cos(angle / 2), 0.0, 0.0, math.sin(angle / 2))
+        parts.append(box(pos=(pos[0] + x, pos[1] + y, pos[2]), quat=turn))
     return tuple(parts)
 
 
@@ -126,12 +125,12 @@ def hollow_cylinder(
     sides: int = 16,
     color: Color = (0.62, 0.64, 0.67, 1.0),
     material: str = "metal",
-) -> Thing:
+) -> SceneObject:
     """Make a tube about z, its wall of boxes; radii and half height in m."""
     parts = ring_of_boxes(
         inner, outer, half_height, sides=sides, color=color, material=material
     )
-    return Thing(name=name, parts=parts)
+    return SceneObject(name=name, parts=parts)
 
 
 def pot(
@@ -143,8 +142,8 @@ def pot(
     handle_width: float = 0.09,
     handle_radius: float = 0.01,
     handle_colors: tuple[Color, Color] = (GREEN, BLUE),
-) -> Thing:
-    """Make an angular pot with a handle on each side along y.
+) -> SceneObject:
+    """Make a square pot with a handle on each side along y.
 
     Its origin is its middle. Sites: `handle0` (at +y), `handle1` (at -y), `center`,
     `bottom`.
@@ -153,42 +152,32 @@ def pot(
         name: Its name.
         half_size: Half of its outer length, width and height, m.
         wall: Thickness of walls and bottom, m.
-        handle_length: How far a handle stands off, m.
-        handle_width: Of a handle, along x, m.
-        handle_radius: Of its bars, m.
-        handle_colors: Of `handle0` and `handle1`.
+        handle_length: Length of a handle along y, m.
+        handle_width: Width of a handle along x, m.
+        handle_radius: Half of the thickness of its bars, m.
+        handle_colors: Colours of `handle0` and `handle1`.
     """
     x, y, z = half_size
-    vessel = open_bin("", (2 * x, 2 * y, 2 * z), wall=wall, color=ENAMEL)
+    outer = (2 * x, 2 * y, 2 * z)
+    vessel = open_bin("", outer, wall=wall, color=ENAMEL, material="ceramic")
     parts = [
-        Part(
-            kind="box",
-            size=p.size,
-            pos=(p.pos[0], p.pos[1], p.pos[2] - z),
-            color=ENAMEL,
-            material="ceramic",
-        )
-        for p in vessel.parts
+        replace(part, pos=(part.pos[0], part.pos[1], part.pos[2] - z))
+        for part in vessel.parts
     ]
-    half, height = handle_width / 2, z - 2 * handle_radius
-    r = handle_radius
+    r, half, height = handle_radius, handle_width / 2, z - 2 * handle_radius
+    along, grip = (r, handle_length / 2, r), y + handle_length - r
     for side, color in zip((1.0, -1.0), handle_colors, strict=True):
-        out = side * (y + handle_length - r)
-        along = (r, handle_length / 2, r)
         near = side * (y + handle_length / 2)
+        bar = partial(Part, kind="box", color=color)
         parts += [
-            Part(kind="box", size=size, pos=(x_bar, y_bar, height), color=color)
-            for size, x_bar, y_bar in (
-                (along, half - r, near),
-                (along, r - half, near),
-                ((half, r, r), 0.0, out),
-            )
+            bar(size=along, pos=(half - r, near, height)),
+            bar(size=along, pos=(r - half, near, height)),
+            bar(size=(half, r, r), pos=(0.0, side * grip, height)),
         ]
-    grip = y + handle_length - r
     sites = {
         "handle0": (0.0, grip, height),
         "handle1": (0.0, -grip, height),
         "center": (0.0, 0.0, 0.0),
         "bottom": (0.0, 0.0, -z),
     }
-    return Thing(name=name, parts=tuple(parts), sites=sites)
+    return SceneObject(name=name, parts=tuple(parts), sites=sites)

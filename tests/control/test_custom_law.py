@@ -1,0 +1,107 @@
+"""A law written outside the package runs in the compiled loop, and in plain Python."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+from wbc_suite.compiling import compiled
+from wbc_suite.control.law.custom import custom_kernel, register_law
+from wbc_suite.control.law.joint_laws import JointLaw
+from wbc_suite.control.law.law import Law
+from wbc_suite.control.loop.records import LawKind
+from wbc_suite.envs import Simulation
+
+
+@compiled
+def oscillator(physics, law, drives):
+    """Write `-k (q - q*)` of each joint, k = parameters[0]."""
+    for j in range(law.first, law.last):
+        drive = drives[j]
+        error = drive.position - physics.qpos[drive.qpos]
+        physics.acceleration[drive.dof] = law.parameters[0] * error
+
+
+@compiled
+def brake(physics, law, drives):
+    """Write `-v / parameters[0]` of each joint."""
+    for j in range(law.first, law.last):
+        dof = drives[j].dof
+        physics.acceleration[dof] = -physics.qvel[dof] / law.parameters[0]
+
+
+class OwnController:
+    """A controller that is nothing but laws."""
+
+    def __init__(self, *laws):
+        self.laws = laws
+
+    def prepare(self, state):
+        return 1 << 30
+
+
+def simulated(alone, *, is_compiled, steps):
+    """Return joint positions of a Panda's arm after each step."""
+    robot = alone("Panda", "BASIC", body_parts={"right": {"type": "JOINT_TORQUE"}})
+    state, part = robot.state, robot.controller.parts["right"]
+    rest = [law for law in robot.controller.laws if law is not part.law]
+    joints = part.law.joints
+    swing = Law(register_law(oscillator), state, joints[:1])
+    swing.record["parameters"][0, 0] = 100.0
+    stop = Law(register_law(brake), state, joints[1:])
+    stop.record["parameters"][0, 0] = 0.01
+    pairs = [(state, OwnController(swing, stop, *rest))]
+    simulation = Simulation(state.model, state.data, pairs, compiled=is_compiled)
+    start = state.data.qpos[swing.drives["qpos"]]
+    swing.aim(start + 0.1)
+    q = []
+    for _ in range(steps):
+        simulation.tick(1)
+        q.append(state.data.qpos[swing.drives["qpos"][0]] - start[0])
+    return np.array(q), simulation.timestep
+
+
+def test_a_registered_law_moves_joints_as_its_formula_says(alone):
+    """`q'' = 100 (0.1 - q)` from rest: `q = 0.1 (1 - cos 10 t)`."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        q, dt = simulated(alone, is_compiled=True, steps=300)
+    t = dt * np.arange(1, 301)
+    np.testing.assert_allclose(q, 0.1 * (1.0 - np.cos(10.0 * t)), atol=2e-3)
+    assert np.ptp(q) > 0.15
+
+
+@pytest.mark.slow
+def test_a_registered_law_runs_as_plain_python(alone):
+    compiled_q, _ = simulated(alone, is_compiled=True, steps=20)
+    plain_q, _ = simulated(alone, is_compiled=False, steps=20)
+    np.testing.assert_allclose(plain_q, compiled_q, atol=1e-12)
+
+
+def test_a_kernel_has_one_kind():
+    kind = register_law(oscillator)
+    assert kind == register_law(oscillator) >= LawKind.CUSTOM
+    assert register_law(brake) != kind
+    assert custom_kernel(np.array([int(LawKind.JOINT), int(LawKind.OSC)])) is None
+
+
+def test_joint_limits_hold_for_a_registered_law(alone):
+    """The loop clips the accelerations of users' laws as it does ours."""
+    robot = alone("Panda", "BASIC", body_parts={"right": {"type": "JOINT_TORQUE"}})
+    state, part = robot.state, robot.controller.parts["right"]
+    rest = [law for law in robot.controller.laws if law is not part.law]
+    joints = part.law.joints
+    swing = Law(register_law(oscillator), state, joints[:1])
+    hold = JointLaw(state, joints[1:], kp=400.0, kd=40.0)
+    swing.keep_limits(state)
+    swing.record["parameters"][0, 0] = 100.0
+    pairs = [(state, OwnController(swing, hold, *rest))]
+    simulation = Simulation(state.model, state.data, pairs)
+    hold.aim(state.data.qpos[hold.drives["qpos"]])
+    swing.aim(state.data.qpos[swing.drives["qpos"]] + 3.0)
+    fastest = 0.0
+    for _ in range(500):
+        simulation.tick(1)
+        fastest = max(fastest, abs(float(state.data.qvel[swing.drives["dof"][0]])))
+    velocity_max = float(swing.drives["velocity_max"][0])
+    assert 0.9 * velocity_max < fastest < 1.02 * velocity_max

@@ -1,0 +1,58 @@
+"""Names that editors complete are those of the registries and of the catalogue."""
+
+from typing import get_args
+
+import pytest
+
+from wbc_suite.catalogue import Catalogue
+from wbc_suite.control import composite_names, load_composite_controller_config
+from wbc_suite.control.composite import register_config_converter
+from wbc_suite.control.composite.registry import _CONVERTERS, CompositeControllerName
+from wbc_suite.errors import ConfigError, UnknownNameError
+from wbc_suite.typing import RobotName
+
+
+def test_composite_names_are_those_registered_by_the_package():
+    assert {*get_args(CompositeControllerName)} <= {*composite_names()}
+
+
+def test_robot_names_are_those_of_the_catalogue():
+    assert get_args(RobotName) == Catalogue().called("robots")
+
+
+@pytest.mark.parametrize("name", get_args(CompositeControllerName))
+def test_each_composite_has_a_config_for_a_mobile_arm(name):
+    config = load_composite_controller_config(name, "PandaOmron")
+    assert config["type"] == name
+
+
+def test_the_name_of_a_part_controller_stands_for_all_arms():
+    parts = load_composite_controller_config("joint_position", "GR1")["body_parts"]
+    assert parts["right"] == parts["left"] == {"type": "JOINT_POSITION"}
+    assert parts["head"]["type"] == "JOINT_POSITION"
+    with pytest.raises(ConfigError, match="name the robot"):
+        load_composite_controller_config("OSC_POSE")
+    with pytest.raises(UnknownNameError, match="Did you mean 'OSC_POSE'"):
+        load_composite_controller_config("OSC_POS", "GR1")
+
+
+def convert(config, robot, source, named):
+    """Read `{"arms": type}`, another layout."""
+    if "arms" not in config:
+        return None
+    ours = named("BASIC")
+    return ours | {"body_parts": {"right": {"type": config["arms"]}}}
+
+
+def test_another_layout_is_read_by_its_converter():
+    config = {"type": "BASIC", "arms": "JOINT_TORQUE"}
+    with pytest.raises(ConfigError, match="body_parts"):
+        load_composite_controller_config(config, "Panda")
+    register_config_converter("test_names:convert")
+    try:
+        found = load_composite_controller_config(config, "Panda")
+        plain = load_composite_controller_config("BASIC", "Panda")
+    finally:
+        _CONVERTERS.remove("test_names:convert")
+    assert found["body_parts"] == {"right": {"type": "JOINT_TORQUE"}}
+    assert plain["body_parts"]["right"]["type"] == "OSC_POSE"

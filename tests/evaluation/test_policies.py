@@ -1,0 +1,111 @@
+"""Policies by name, without an environment's simulation."""
+
+import sys
+import types
+
+import numpy as np
+import pytest
+
+from wbc_suite.errors import ConfigError
+from wbc_suite.evaluation import POLICIES, make_policy
+
+
+class Part:
+    def __init__(self, name, start):
+        self.name, self.start = name, start
+
+
+class Lift:
+    """What policies use of an environment: an arm with 6 numbers and a gripper."""
+
+    def __init__(self, name="Lift", parts=("right", "right_gripper")):
+        self.benchmark = types.SimpleNamespace(name=name)
+        self.action_layout = types.SimpleNamespace(
+            slices=[Part(part, 6 * k) for k, part in enumerate(parts)],
+            low=np.full(7, -1.0),
+            high=np.linspace(0.1, 1.0, 7),
+        )
+
+    @property
+    def hold_action(self):
+        return np.full(7, 0.25)
+
+
+def make(name, env, seed=0):
+    return make_policy(name, env, seed)
+
+
+def observe(cube, hand):
+    return {"cube_pos": np.array(cube), "robot0_eef_pos": np.array(hand)}
+
+
+def test_hold_keeps_all_targets():
+    env = Lift()
+    np.testing.assert_array_equal(make("hold", env)({}), env.hold_action)
+
+
+def test_random_actions_fill_the_action_space_and_follow_the_seed():
+    env = Lift()
+    policy = make("random", env, seed=4)
+    drawn = np.array([policy({}) for _ in range(2000)])
+    low, high = env.action_layout.low, env.action_layout.high
+    assert (drawn >= low).all()
+    assert (drawn <= high).all()
+    mean = (low + high) / 2.0
+    spread = (high - low) / np.sqrt(12.0 * len(drawn))
+    assert (np.abs(drawn.mean(axis=0) - mean) < 5.0 * spread).all()
+    again = make("random", env, seed=4)
+    np.testing.assert_array_equal(drawn[0], again({}))
+    assert not np.array_equal(drawn[0], make("random", env, seed=5)({}))
+
+
+def test_the_scripted_policy_goes_above_the_cube_then_down_then_lifts():
+    policy = make("scripted", Lift())
+    above = policy(observe([0.1, 0.0, 0.8], [0.0, 0.0, 0.8]))
+    assert above[0] > 0.0  # towards the cube
+    assert above[2] > 0.0  # and above it
+    assert above[6] == -1.0  # open
+    down = policy(observe([0.0, 0.0, 0.8], [0.001, 0.0, 0.88]))
+    assert down[2] < 0.0
+    assert down[6] == -1.0
+    closing = [policy(observe([0.0, 0.0, 0.8], [0.0, 0.0, 0.8])) for _ in range(25)]
+    assert all(action[6] == 1.0 for action in closing)
+    np.testing.assert_array_equal(closing[-1][:3], 0.0)
+    lift = policy(observe([0.0, 0.0, 0.8], [0.0, 0.0, 0.8]))
+    assert lift[2] > 0.0
+
+
+def test_scripted_actions_stay_within_their_bounds():
+    policy = make("scripted", Lift())
+    action = policy(observe([5.0, -5.0, 0.8], [0.0, 0.0, 0.8]))
+    np.testing.assert_array_equal(action[:2], [1.0, -1.0])
+
+
+@pytest.mark.parametrize(
+    "env", [Lift(name="Door"), Lift(parts=("right", "left")), Lift(parts=("right",))]
+)
+def test_the_scripted_policy_refuses_other_environments(env):
+    with pytest.raises(ConfigError, match=f"cannot drive {env.benchmark.name}"):
+        make("scripted", env)
+
+
+def test_a_policy_of_a_users_module_gets_environment_and_generator(monkeypatch):
+    module = types.ModuleType("my_policies")
+    module.__dict__["noise"] = lambda env, rng: lambda _: env.hold_action + rng.random()
+    monkeypatch.setitem(sys.modules, "my_policies", module)
+    env = Lift()
+    first, again, other = (
+        make("my_policies:noise", env, seed)({}) for seed in (1, 1, 2)
+    )
+    np.testing.assert_array_equal(first, again)
+    assert not np.array_equal(first, other)
+
+
+@pytest.mark.parametrize("name", ["my.missing.module:f", "math:no_such_function"])
+def test_modules_and_functions_that_do_not_exist_are_named(name):
+    with pytest.raises(ConfigError, match=f"'{name}' cannot be found"):
+        make(name, Lift())
+
+
+def test_every_policy_is_a_factory():
+    assert set(POLICIES) == {"hold", "random", "scripted"}

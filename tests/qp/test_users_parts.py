@@ -1,0 +1,226 @@
+"""Tasks, limits and equalities written outside the package: as fast, as explained."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from wbc_suite.qp import (
+    AccelerationLimit,
+    Equality,
+    FrameTask,
+    JointTask,
+    Kernel,
+    LimitKind,
+    PositionLimit,
+    PostureTask,
+    RowLimit,
+    RowTask,
+    SelfCollisionLimit,
+    TaskStack,
+    VelocityLimit,
+)
+
+DT = 5e-3
+
+
+class HeightTask(RowTask):
+    """Brings a frame to a height, m."""
+
+    def __init__(self, frame, height, **options):
+        super().__init__(f"height of {frame}", dim=1, **options)
+        self.frame, self.height = frame, height
+
+    def evaluate(self, configuration, error, jacobian):
+        error[0] = self.height - configuration.frame_pose(self.frame).translation[2]
+        jacobian[0] = configuration.frame_jacobian(self.frame, "aligned")[2]
+
+
+class CeilingLimit(RowLimit):
+    """Keeps a frame below a height."""
+
+    dim = 1
+
+    def __init__(self, frame, height):
+        self.frame, self.height = frame, height
+
+    def rows(self, configuration, dt, G, h):
+        G[0] = configuration.frame_jacobian(self.frame, "aligned")[2]
+        h[0] = self.height - configuration.frame_pose(self.frame).translation[2]
+
+    def subject(self, row):
+        return f"{self.frame} below {self.height:g} m"
+
+
+class FixedJoint(Equality):
+    """Lets a joint stand still."""
+
+    dim = 1
+
+    def __init__(self, index):
+        self.name, self.index = f"joint {index} stands", index
+
+    def rows(self, configuration, dt, A, b):
+        A[0], b[0] = np.eye(configuration.nv)[self.index], 0.0
+
+
+class Comfort(JointTask):
+    """Pulls all joints to the middle of their ranges."""
+
+    def evaluate(self, configuration, error):
+        model = configuration.model
+        middle = 0.5 * (model.lowerPositionLimit + model.upperPositionLimit)
+        error[:] = middle - configuration.q
+
+
+class OwnFrameTask(FrameTask):
+    """The frame task, computed once more with Pinocchio."""
+
+    def evaluate(self, configuration, error, jacobian):
+        pose = configuration.frame_pose(self.frame)
+        error[:3] = self.target.translation - pose.translation
+        error[3:] = pin.log3(pose.rotation.T @ self.target.rotation)
+        J = configuration.frame_jacobian(self.frame, "aligned")
+        jacobian[:3] = J[:3]
+        jacobian[3:] = pin.Jlog3(pin.exp3(-error[3:])) @ pose.rotation.T @ J[3:]
+
+
+def run(stack, seconds):
+    solution = None
+    for _ in range(round(seconds / DT)):
+        solution = stack.solve(DT)
+        stack.configuration.update(stack.configuration.integrate(solution.dq))
+    return solution
+
+
+def limits(*more):
+    return [PositionLimit(), VelocityLimit(), AccelerationLimit(), *more]
+
+
+def test_a_users_task_is_met_and_reported(arm):
+    height = arm.frame_pose("hand").translation[2] + 0.1
+    task = HeightTask("hand", height, cost=5.0, max_speed=0.5)
+    stack = TaskStack(arm, [task, PostureTask(1e-2)])
+    assert not stack.is_compiled
+    stack.solve(DT)
+    assert stack.levels[0].tasks.e[0] == pytest.approx(5.0 * 0.5 * DT)  # saturated
+    report = stack.explain()["height of hand"]
+    assert not report.reached
+    assert report.position_error == pytest.approx(0.1)
+    run(stack, 3.0)
+    assert arm.frame_pose("hand").translation[2] == pytest.approx(height, abs=1e-3)
+    assert stack.explain()["height of hand"].reached
+
+
+def test_a_users_limit_holds_a_task_and_is_named_by_its_own_words(arm):
+    height = arm.frame_pose("hand").translation[2] + 0.1
+    ceiling = CeilingLimit("hand", height - 0.05)
+    task = HeightTask("hand", height)
+    stack = TaskStack(arm, [task, PostureTask(1e-3)], limits=limits(ceiling))
+    solution = run(stack, 3.0)
+    at = arm.frame_pose("hand").translation[2]
+    assert at == pytest.approx(height - 0.05, abs=1e-6)
+    (limit,) = [x for x in solution.active if not x.is_joint]
+    assert limit.kind is LimitKind.OTHER
+    assert str(limit) == f"limit: {ceiling.subject(0)}"
+    assert "self-collision" not in str(limit)
+    assert limit in solution.explain()["height of hand"].reasons
+
+
+def test_a_users_equality_is_kept_and_named_in_conflicts(arm):
+    stack = TaskStack(
+        arm, [HeightTask("hand", 2.0)], equalities=[FixedJoint(1), FixedJoint(3)]
+    )
+    before = arm.q.copy()
+    run(stack, 0.5)
+    np.testing.assert_allclose(arm.q[[1, 3]], before[[1, 3]], atol=1e-9)
+    assert np.abs(arm.q - before).max() > 1e-2
+    reasons = stack.explain()["height of hand"].reasons
+    assert "conflict: joint 3 stands" in [str(reason) for reason in reasons]
+
+
+def test_a_users_joint_task_weighs_as_the_posture_task_does(arm):
+    model = arm.model
+    middle = 0.5 * (model.lowerPositionLimit + model.upperPositionLimit)
+    q = arm.q.copy()
+    own = TaskStack(arm, [Comfort("comfort", cost=0.5, max_speed=1.0)]).solve(DT)
+    arm.update(q)
+    posture = PostureTask(0.5, target=middle, max_speed=1.0)
+    ours = TaskStack(arm, [posture]).solve(DT)
+    np.testing.assert_allclose(own.dq, ours.dq, atol=1e-12)
+    assert np.abs(own.dq).max() > 1e-3
+
+
+def test_a_subclass_of_a_compiled_task_is_evaluated_itself(arm):
+    """Its error may be another; here it is the same, so that both must agree."""
+    target = arm.frame_pose("hand") * pin.exp6(np.array([0.1, 0, 0.2, 0.3, 0, 0.1]))
+    solutions = []
+    for kind in (FrameTask, OwnFrameTask):
+        stack = TaskStack(arm, [kind("hand", target=target), PostureTask(1e-2)])
+        assert stack.is_compiled == (kind is FrameTask)
+        solutions.append(stack.solve(DT).dq)
+    np.testing.assert_allclose(*solutions, atol=1e-11)
+
+
+def test_a_subclass_that_declares_its_kernel_stays_compiled(arm):
+    class NamedFrameTask(FrameTask):
+        kernel = Kernel.FRAME
+
+    assert TaskStack(arm, [NamedFrameTask("hand")]).is_compiled
+
+
+def test_an_error_that_is_not_finite_holds_and_is_reported(arm):
+    task = HeightTask("hand", np.nan)
+    stack = TaskStack(arm, [task, PostureTask(1e-2)])
+    solution = run(stack, 0.2)
+    assert solution.held == ("height of hand",)
+    assert not solution.ok
+    np.testing.assert_allclose(solution.dq, 0.0, atol=1e-9)
+
+
+def test_targets_follow_a_task_into_all_stacks_that_hold_it(arm):
+    task = FrameTask("hand")
+    stacks = [TaskStack(arm, [task]) for _ in range(2)]
+    del stacks[0]  # its copy of the target goes with it
+    far = task.target
+    far.translation = far.translation + np.array([0.0, 0.1, 0.0])
+    task.set_target(far)
+    task.set_costs(position=3.0)
+    stack = stacks[0]
+    stack.solve(DT)
+    assert stack.explain()["hand"].position_error == pytest.approx(0.1)
+    np.testing.assert_allclose(stack.levels[0].tasks.cost[:3], 3.0)
+
+
+def test_a_solution_prints_what_tasks_lack_and_what_holds_them(arm):
+    height = arm.frame_pose("hand").translation[2] + 0.1
+    ceiling = CeilingLimit("hand", height - 0.05)
+    task = HeightTask("hand", height)
+    stack = TaskStack(arm, [task, PostureTask(1e-3)], limits=limits(ceiling))
+    text = str(run(stack, 3.0))
+    assert text.startswith("Solution: solved as stated")
+    assert "fastest joint: joint" in text
+    assert "rad/s" in text
+    line = f"height of hand: 0.05 m from its target; limit: {ceiling.subject(0)}"
+    assert line in text
+    assert f"active: limit: {ceiling.subject(0)}" in text
+
+
+def test_a_record_explains_its_own_tick_after_the_next_ones(arm):
+    task = HeightTask("hand", arm.frame_pose("hand").translation[2] + 0.1)
+    stack = TaskStack(arm, [task])
+    first = stack.solve(DT)
+    text = str(first)
+    run(stack, 1.0)
+    assert str(first) == text
+    assert str(stack.solution()) != text
+
+
+def test_two_self_collision_limits_are_both_kept(arm):
+    """Only the first has a kernel; the second is evaluated in Python."""
+    stack = TaskStack(
+        arm,
+        [FrameTask("hand")],
+        limits=[SelfCollisionLimit((), (), nearest=2), SelfCollisionLimit((), ())],
+    )
+    assert not stack.is_compiled
+    assert stack.solve(DT).ok

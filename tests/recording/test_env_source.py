@@ -1,0 +1,106 @@
+"""The description of an environment: plain data in, the same environment out."""
+
+import json
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pytest
+
+import wbc_suite
+from wbc_suite.errors import DatasetError
+from wbc_suite.recording import EnvSource
+
+
+def parse(name="Lift", **arguments):
+    return EnvSource.parse(json.dumps({"env_name": name, "env_kwargs": arguments}))
+
+
+def test_a_description_survives_a_round_trip():
+    source = EnvSource(
+        benchmark="Door",
+        arguments={"robots": ["Panda"], "control_freq": 20.0, "horizon": 70},
+    )
+    again = EnvSource.parse(source.text)
+    assert again == source
+    assert again.text == source.text
+
+
+def test_paths_arrays_and_numbers_of_numpy_become_plain_data():
+    source = EnvSource(
+        benchmark="Lift",
+        arguments={
+            "robots": Path("a") / "b.toml",
+            "horizon": np.int64(7),
+            "reward_scale": np.float32(0.5),
+            "camera_heights": np.array([8, 9]),
+        },
+    )
+    arguments = EnvSource.parse(source.text).arguments
+    assert arguments == {
+        "robots": "a/b.toml",
+        "horizon": 7,
+        "reward_scale": 0.5,
+        "camera_heights": [8, 9],
+    }
+
+
+def test_robomimics_keys_are_written():
+    fields = json.loads(EnvSource(benchmark="Lift", arguments={}).text)
+    assert fields["type"] == 2  # Gymnasium, in robomimic's EnvType
+    assert fields["package"] == "wbc_suite"
+    assert fields["env_version"] == wbc_suite.__version__
+    assert "missing" not in fields
+
+
+def test_other_packages_and_missing_arguments_are_kept():
+    text = '{"env_name": "Lift", "package": "other", "missing": ["robots", 3]}'
+    source = EnvSource.parse(text)
+    assert (source.package, source.missing) == ("other", ("robots", "3"))
+    with pytest.raises(DatasetError, match="does not contain 3, robots"):
+        source.build()
+
+
+@pytest.mark.parametrize("text", [None, "", "null", "3", '{"name": 1}'])
+def test_texts_that_name_no_environment_are_refused(text):
+    with pytest.raises(DatasetError):
+        EnvSource.parse(text)
+
+
+def test_an_environment_of_another_package_is_refused():
+    env = gymnasium.make("CartPole-v1")
+    with pytest.raises(DatasetError, match="Only environments of wbc_suite"):
+        EnvSource.of(env)
+    env.close()
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"robots": "/etc/passwd"},
+        {"robots": ["Panda", "..\\robot"]},
+        {"robots": "robot.URDF"},
+        {"controller_configs": "mine.toml"},
+        {"controller_configs": {"body_parts": {"right": {"file": "a/b"}}}},
+        {"gripper_types": [["x.xml"]]},
+        {"base_types": "module.py"},
+    ],
+)
+def test_paths_are_refused_wherever_they_stand(arguments):
+    with pytest.raises(DatasetError, match=r"names a file.*--trust-files"):
+        parse(**arguments).build()
+
+
+def test_a_benchmark_that_is_a_path_is_refused():
+    with pytest.raises(DatasetError, match="names a file"):
+        parse("/tmp/task.toml").build()
+
+
+def test_a_trusted_path_is_read_and_its_error_is_reported():
+    with pytest.raises(DatasetError, match=r"cannot be made here.*none\.toml"):
+        parse(robots="/nowhere/none.toml").build(trust_files=True)
+
+
+def test_an_unknown_benchmark_names_what_is_meant():
+    with pytest.raises(DatasetError, match=r"cannot be made here.*Lift"):
+        parse("Lyft", robots="Panda").build()

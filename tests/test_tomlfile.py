@@ -1,0 +1,133 @@
+"""TOML files become frozen models, or errors that name file, key, value and rule."""
+
+from typing import Annotated, Literal
+
+import pytest
+from pydantic import Field, ValidationError
+
+from wbc_suite import tomlfile
+from wbc_suite.errors import ConfigError, DescriptionError
+from wbc_suite.tomlfile import FrozenModel, load_model, parse_model, parse_toml
+
+
+class Round(FrozenModel):
+    shape: Literal["round"]
+    radius: float = Field(gt=0.0)
+
+
+class Square(FrozenModel):
+    shape: Literal["square"]
+    size: float
+
+
+class Item(FrozenModel):
+    name: str = Field(default="", alias="title")
+    mode: Literal["slow", "fast"] = "slow"
+    size: float | tuple[float, float] = 1.0
+    form: Annotated[Round | Square, Field(discriminator="shape")] | None = None
+
+
+class File(FrozenModel):
+    format: Literal[1]
+    items: tuple[Item, ...] = Field(default=(), alias="item")
+    table: dict[str, Item] = {}
+
+
+def message(text, **options):
+    with pytest.raises(ConfigError) as caught:
+        parse_model(File, parse_toml(text, source="f"), source="f.toml", **options)
+    return str(caught.value)
+
+
+def test_a_file_becomes_a_frozen_model(tmp_path):
+    path = tmp_path / "f.toml"
+    path.write_text('format = 1\n[[item]]\ntitle = "a"\nsize = [1, 2]\n')
+    file = load_model(File, path)
+    assert (file.items[0].name, file.items[0].size) == ("a", (1.0, 2.0))
+    with pytest.raises(ValidationError, match="frozen"):
+        file.format = 1
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("", "f.toml: missing key 'format'"),
+        ("format = 2", "f.toml: key 'format' = 2: Input should be 1."),
+        (
+            "format = 1\nitm = 3",
+            "f.toml: unknown key 'itm'. Did you mean 'item'? "
+            "Known: format, item, table",
+        ),
+        (
+            'format = 1\n[[item]]\n[[item]]\nmode = "fats"',
+            "f.toml: key 'item[1].mode' = 'fats': Input should be 'slow' or 'fast'. "
+            "Did you mean 'fast'?",
+        ),
+        (
+            'format = 1\n[[item]]\ntitel = "x"',
+            "f.toml: unknown key 'item[0].titel'. Did you mean 'title'? "
+            "Known: form, mode, size, title",
+        ),
+        (
+            'format = 1\n[[item]]\nform = { shape = "round", radius = -1 }',
+            "f.toml: key 'item[0].form.radius' = -1: Input should be greater than 0.",
+        ),
+        (
+            'format = 1\n[[item]]\nform = { shape = "square", size = 1, radius = 2 }',
+            "f.toml: unknown key 'item[0].form.radius'. Known: shape, size",
+        ),
+        (
+            'format = 1\n[table.a]\nmode = "slo"',
+            "f.toml: key 'table.a.mode' = 'slo': Input should be 'slow' or 'fast'. "
+            "Did you mean 'slow'?",
+        ),
+    ],
+)
+def test_each_fault_names_key_value_rule_and_nearest_name(text, expected):
+    assert message(text) == expected
+
+
+def test_a_union_without_tag_names_the_key_for_each_type():
+    text = message('format = 1\n[[item]]\nsize = "x"')
+    assert text.count("key 'item[0].size' = 'x'") == 2
+
+
+def test_infinities_are_refused():
+    assert "finite" in message("format = 1\n[[item]]\nsize = inf")
+
+
+def test_many_faults_are_counted():
+    text = message("format = 1\n" + "".join(f"wrong_{k} = 1\n" for k in range(12)))
+    assert text.endswith(" and 4 more")
+    assert text.count("unknown key") == 8
+
+
+def test_the_class_of_the_error_can_be_chosen():
+    with pytest.raises(DescriptionError):
+        parse_model(File, {}, source="f", error=DescriptionError)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("a = ", "f: not a readable TOML file"),
+        ("a = " + "9" * 5000, "f: not a readable TOML file"),
+        ("a = " + "[" * 100_000, "nested too deeply|not a readable TOML"),
+    ],
+)
+def test_text_that_is_not_toml_is_refused(text, expected):
+    with pytest.raises(ConfigError, match=expected):
+        parse_toml(text, source="f")
+
+
+def test_files_that_cannot_be_read_are_named(tmp_path, monkeypatch):
+    path = tmp_path / "f.toml"
+    with pytest.raises(ConfigError, match=r"f\.toml: cannot be read \(No such file"):
+        load_model(File, path)
+    path.write_bytes(b"\xff\xfe")
+    with pytest.raises(ConfigError, match=r"f\.toml: not a readable TOML file"):
+        load_model(File, path)
+    path.write_text("format = 1")
+    monkeypatch.setattr(tomlfile, "MAX_BYTES", 9)
+    with pytest.raises(ConfigError, match="has 10 bytes; at most 9 are read"):
+        load_model(File, path)

@@ -1,0 +1,170 @@
+"""viser through its proxy: pages and messages pass, the share tunnel does not."""
+
+import gzip
+import threading
+import time
+import urllib.error
+import urllib.request
+
+import msgspec
+import pytest
+import viser
+import websockets
+from websockets.sync.client import connect
+from websockets.sync.server import serve
+from websockets.typing import Subprotocol
+
+from wbc_suite.devices.web_server import WebServer
+from wbc_suite.viewers.page_server import PageServer, proxy
+
+PATIENCE = 60.0  # s, for a busy machine
+BIG = 5_000_000  # bytes; a robot's meshes take a few million
+
+
+@pytest.fixture
+def site():
+    site = PageServer(port=0)
+    yield site
+    site.stop()
+
+
+@pytest.fixture
+def open_site():
+    site = PageServer(host="0.0.0.0", port=0)
+    yield site
+    site.stop()
+
+
+@pytest.fixture
+def echo():
+    """The port of a proxy in front of a server that sends every message back."""
+
+    def answer(connection):
+        for message in connection:
+            if message == "close":
+                connection.close(1002, "as asked")
+            else:
+                connection.send(message)
+
+    upstream = serve(
+        answer,
+        "127.0.0.1",
+        0,
+        subprotocols=[Subprotocol("b")],
+        select_subprotocol=lambda _, offered: offered[-1] if offered else None,
+        max_size=None,
+    )
+    thread = threading.Thread(target=upstream.serve_forever, daemon=True)
+    thread.start()
+    server = WebServer(
+        "127.0.0.1", 0, proxy(upstream.socket.getsockname()[1]), token=None
+    )
+    yield server.port
+    server.stop()
+    upstream.shutdown()
+    thread.join()
+
+
+def socket_to(port, path="/", protocol=f"viser-v{viser.__version__}"):
+    return connect(
+        f"ws://127.0.0.1:{port}{path}",
+        subprotocols=[Subprotocol(protocol)],
+        open_timeout=PATIENCE,
+        max_size=None,
+    )
+
+
+def receive_until_closed(client):
+    while True:
+        client.recv(timeout=PATIENCE)
+
+
+def test_page_arrives_whole_and_compressed(site):
+    assert site.token is None
+    assert site.url == f"http://127.0.0.1:{site.port}/"
+    with urllib.request.urlopen(site.url, timeout=PATIENCE) as answer:
+        page = answer.read()
+        assert answer.headers["Content-Type"].startswith("text/html")
+    assert b"<html" in page
+    assert len(page) > 100_000
+    packed = urllib.request.Request(site.url, headers={"Accept-Encoding": "gzip"})
+    with urllib.request.urlopen(packed, timeout=PATIENCE) as answer:
+        assert answer.headers["Content-Encoding"] == "gzip"
+        assert gzip.decompress(answer.read()) == page
+
+
+def test_missing_files_stay_missing(site):
+    for path in ("nothing.js", "..%2f..%2f__init__.py"):
+        with pytest.raises(urllib.error.HTTPError, match="404"):
+            urllib.request.urlopen(site.url + path, timeout=PATIENCE)
+
+
+def test_messages_of_viser_arrive(site):
+    with socket_to(site.port) as client:
+        assert len(client.recv(timeout=PATIENCE)) > 16
+
+
+def test_page_of_another_version_learns_so(site):
+    closed = pytest.raises(websockets.ConnectionClosed, match=r"[Vv]ersion")
+    with socket_to(site.port, protocol="viser-v0.0.0") as client, closed:
+        receive_until_closed(client)
+
+
+def test_open_address_has_a_token_and_needs_it(open_site):
+    assert f"?token={open_site.token}" in open_site.url
+    assert len(open_site.token) >= 20
+    with pytest.raises(websockets.InvalidStatus, match="401"):
+        socket_to(open_site.port)
+    with socket_to(open_site.port, f"/?token={open_site.token}") as client:
+        assert len(client.recv(timeout=PATIENCE)) > 16
+
+
+def test_share_tunnel_cannot_be_requested(monkeypatch):
+    opened = threading.Event()
+    monkeypatch.setattr(
+        viser.ViserServer, "request_share_url", lambda *_, **__: opened.set()
+    )
+    site = PageServer(port=0)
+    with socket_to(site.port) as client:
+        client.send(msgspec.msgpack.encode({"type": "ShareUrlRequest"}))
+        assert not opened.wait(0.5)
+    site.stop()
+
+
+def test_messages_pass_both_ways_with_their_type_order_and_protocol(echo):
+    with socket_to(echo, protocol="b") as client:
+        assert client.subprotocol == "b"
+        sent = ["text", b"\x00binary", "", b"x" * BIG]
+        for message in sent:
+            client.send(message)
+        assert [client.recv(timeout=PATIENCE) for _ in sent] == sent
+
+
+def test_reason_for_which_the_page_server_closes_arrives(echo):
+    with socket_to(echo, protocol="b") as client:
+        client.send("close")
+        with pytest.raises(websockets.ConnectionClosed, match=r"1002.*as asked"):
+            client.recv(timeout=PATIENCE)
+
+
+def test_relayed_drag_at_100_hz_comes_back_within_a_frame(echo):
+    delays = []
+    with socket_to(echo, protocol="b") as client:
+        for _ in range(60):
+            began = time.perf_counter()
+            client.send(b"x" * 200)
+            client.recv(timeout=PATIENCE)
+            delays.append(time.perf_counter() - began)
+            time.sleep(0.01)
+    assert sorted(delays)[len(delays) // 2] < 0.02
+
+
+def test_page_server_that_is_gone_is_a_bad_gateway():
+    server = WebServer("127.0.0.1", 0, proxy(9), token=None)
+    try:
+        with pytest.raises(urllib.error.HTTPError, match="502"):
+            urllib.request.urlopen(f"http://127.0.0.1:{server.port}/", timeout=PATIENCE)
+        with pytest.raises(websockets.InvalidStatus, match="502"):
+            socket_to(server.port)
+    finally:
+        server.stop()

@@ -1,0 +1,96 @@
+"""Arrangement of one robot, or of two arms, in front of a task."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
+from wbc_suite.errors import ConfigError
+from wbc_suite.robot import RobotDescription
+from wbc_suite.scene import place_robot
+
+__all__ = ["TwoArmPlaces", "arrange_one", "arrange_two_arms"]
+
+
+class TwoArmPlaces(Protocol):
+    """Places of robots in the file of a two-arm benchmark; distances in m.
+
+    Attributes:
+        name: Name of the benchmark.
+        places: Place of a single robot, and of two in parallel; `default` is for all
+            others.
+        opposed: Distance of each of two robots that face one another from the middle.
+        apart: Distance of each of two robots in parallel from its place.
+    """
+
+    name: str
+    places: dict[str, tuple[float, float]]
+    opposed: dict[str, float]
+    apart: float
+
+
+def arrange_one(
+    name: str,
+    robots: Sequence[RobotDescription],
+    configuration: str,
+    places: Mapping[str, tuple[float, float]],
+) -> tuple[RobotDescription, ...]:
+    """Return the only robot at its place, facing +x.
+
+    Raises:
+        ConfigError: If there are several robots, or the configuration is for several.
+    """
+    if len(robots) != 1:
+        raise ConfigError(f"{name} has a place for 1 robot(s), not {len(robots)}.")
+    if configuration not in ("default", "single-robot"):
+        raise ConfigError(
+            f"{name}: one robot cannot stand '{configuration}'; leave "
+            "env_configuration at 'default'."
+        )
+    (robot,) = robots
+    return (place_robot(robot, places.get(robot.name, places["default"]), 0.0),)
+
+
+def arrange_two_arms(
+    config: TwoArmPlaces, robots: Sequence[RobotDescription], configuration: str
+) -> tuple[RobotDescription, ...]:
+    """Return two robots opposed or in parallel, or one with two arms at its place.
+
+    Arm 0 is that of the first robot, or the right one, and starts towards -y; arm 1 is
+    that of the second robot, or the left one. Opposed robots stand on the y axis and
+    face one another; the others face +x.
+
+    Raises:
+        ConfigError: If the robots do not have two arms, or cannot stand so.
+    """
+    if sum(len(robot.hands) for robot in robots) != 2 or len(robots) > 2:
+        names = ", ".join(f"{r.name} with {len(r.hands)}" for r in robots)
+        raise ConfigError(
+            f"{config.name} needs two arms: robots=['Panda', 'Panda'], or one robot "
+            f"with two, such as 'Baxter'; not {names}."
+        )
+    alone = len(robots) == 1
+    if configuration == "default":
+        configuration = "single-robot" if alone else "opposed"
+    if alone != (configuration == "single-robot"):
+        raise ConfigError(
+            f"{config.name}: {len(robots)} robot(s) cannot stand '{configuration}'; "
+            "two stand 'opposed' or 'parallel', one is a 'single-robot'."
+        )
+    if alone:
+        return arrange_one(config.name, robots, configuration, config.places)
+    stand = _opposed if configuration == "opposed" else _parallel
+    return stand(config, robots[0], -1), stand(config, robots[1], 1)
+
+
+def _opposed(
+    config: TwoArmPlaces, robot: RobotDescription, side: int
+) -> RobotDescription:
+    distance = config.opposed.get(robot.name, config.opposed["default"])
+    return place_robot(robot, (0.0, side * distance), -side * math.pi / 2)
+
+
+def _parallel(
+    config: TwoArmPlaces, robot: RobotDescription, side: int
+) -> RobotDescription:
+    x, y = config.places.get(robot.name, config.places["default"])
+    return place_robot(robot, (x, y + side * config.apart), 0.0)

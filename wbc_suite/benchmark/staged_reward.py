@@ -1,0 +1,78 @@
+"""Staged reward of bringing one object to a target: reach, grasp, lift, hover."""
+
+import math
+
+from pydantic import NonNegativeFloat, PositiveFloat, model_validator
+
+from wbc_suite.tomlfile import FrozenModel
+
+__all__ = ["StagedReward"]
+
+
+class StagedReward(FrozenModel):
+    """Rewards of the stages, all below 1, and their scales.
+
+    Attributes:
+        reach: Largest reward of a hand near the object.
+        grasp: Reward of a grasp.
+        lift: Largest reward of lifting.
+        hover: Largest reward above the target.
+        reach_scale: 1/m.
+        lift_scale: 1/m.
+        hover_scale: 1/m.
+        withdrawn: A hand has left a placed object if its reach term is less.
+    """
+
+    reach: NonNegativeFloat
+    grasp: NonNegativeFloat
+    lift: NonNegativeFloat
+    hover: NonNegativeFloat
+    reach_scale: PositiveFloat
+    lift_scale: PositiveFloat
+    hover_scale: PositiveFloat
+    withdrawn: PositiveFloat
+
+    @model_validator(mode="after")
+    def _rises_to_one(self) -> "StagedReward":
+        if not self.reach <= self.grasp <= self.lift <= self.hover < 1.0:
+            raise ValueError("stages rise: reach <= grasp <= lift <= hover < 1")
+        return self
+
+    def has_left(self, distance: float) -> bool:
+        """Whether a hand at a distance, m, has left the object."""
+        return 1.0 - math.tanh(self.reach_scale * distance) < self.withdrawn
+
+    def value(
+        self,
+        *,
+        distance: float,
+        grasped: bool,
+        missing: float,
+        aside: float,
+        over: bool,
+    ) -> float:
+        """Return the reward of one object.
+
+        The largest of
+
+            reach (1 - tanh(reach_scale d))
+            grasp + (lift - grasp) (1 - tanh(lift_scale m))             if grasped
+            base + (hover - lift) (1 - tanh(hover_scale a))             if grasped
+
+        where `base` is `lift` above the target, and the lifting term elsewhere.
+
+        Args:
+            distance: Distance of the nearest hand, d, m.
+            grasped: Whether a hand grasps the object.
+            missing: Height below the goal of lifting, m >= 0, m.
+            aside: Horizontal distance to the target, a, m.
+            over: Whether the object is above its target.
+        """
+        reward = self.reach * (1.0 - math.tanh(self.reach_scale * distance))
+        if not grasped:
+            return reward
+        high = 1.0 - math.tanh(self.lift_scale * missing)
+        lifted = self.grasp + (self.lift - self.grasp) * high
+        near = 1.0 - math.tanh(self.hover_scale * aside)
+        base = max(self.lift, lifted) if over else lifted
+        return max(reward, base + (self.hover - self.lift) * near)

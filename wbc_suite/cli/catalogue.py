@@ -1,0 +1,231 @@
+"""`wbc-suite list | check | schema`: what the catalogue has, and files for it."""
+
+import json
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from wbc_suite.cli.options import CatalogueOption
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from wbc_suite.catalogue import Catalogue
+
+__all__ = ["check_file", "list_catalogue", "print_schema"]
+
+
+class Kind(StrEnum):
+    """What can be listed."""
+
+    ROBOTS = "robots"
+    GRIPPERS = "grippers"
+    BASES = "bases"
+    BENCHMARKS = "benchmarks"
+    CONTROLLERS = "controllers"
+
+
+_FOLDERS = {
+    Kind.GRIPPERS: "robots/gripper",
+    Kind.BASES: "robots/base",
+    Kind.BENCHMARKS: "tasks",
+    Kind.CONTROLLERS: "controllers",
+}
+
+
+def list_catalogue(
+    kind: Annotated[
+        Kind | None, typer.Argument(help="Everything when left out.")
+    ] = None,
+    catalogue: CatalogueOption = None,
+) -> None:
+    """Show the robots, grippers, bases, benchmarks and controllers there are."""
+    from rich.console import Console
+
+    from wbc_suite.catalogue import Catalogue
+
+    console = Console(soft_wrap=True)
+    known = Catalogue()
+    for chosen in [kind] if kind else Kind:
+        if chosen is Kind.ROBOTS:
+            console.print(_robots(known))
+        elif chosen in (Kind.GRIPPERS, Kind.BASES):
+            console.print(_components(known, chosen))
+        else:
+            console.print(_files(known, chosen))
+
+
+def _robots(catalogue: "Catalogue") -> "Table":
+    from wbc_suite.robot import load_robot
+
+    table = _table("Robots", "name", "", "dof", "kg", "root")
+    for name in catalogue.names("robots"):
+        robot = load_robot(name, catalogue=catalogue)
+        table.add_row(
+            robot.name,
+            robot.title,
+            str(robot.dof),
+            f"{robot.mass:.1f}",
+            robot.root.kind,
+        )
+    return table
+
+
+def _components(catalogue: "Catalogue", kind: Kind) -> "Table":
+    """List grippers with the side they fit, bases with the root they bring."""
+    from wbc_suite.robot.robot_file import Component, read_robot_file
+
+    what = "side" if kind is Kind.GRIPPERS else "root"
+    table = _table(kind.capitalize(), "name", "", what, "kg")
+    for path in catalogue.files(_FOLDERS[kind]):
+        component = read_robot_file(path)
+        if not isinstance(component, Component):
+            continue
+        header = component.component
+        side = header.side or "both"
+        table.add_row(
+            header.name,
+            header.title,
+            side if kind is Kind.GRIPPERS else component.root.kind,
+            f"{sum(link.mass for link in component.links):.2f}",
+        )
+    return table
+
+
+def _files(catalogue: "Catalogue", kind: Kind) -> "Table":
+    table = _table(kind.capitalize(), "name", "")
+    if kind is Kind.CONTROLLERS:
+        from wbc_suite.control.composite import composite_names
+        from wbc_suite.control.part.registry import part_models
+
+        for name in composite_names():
+            table.add_row(name, "for any robot, with its file below when there is one")
+        for name, model in part_models().items():
+            about = str(model.__doc__).split("\n")[0].partition(";")[0]
+            table.add_row(name, f"of one part: {about}")
+    for path in catalogue.files(_FOLDERS[kind]):
+        table.add_row(*_name_and_title(path, kind))
+    return table
+
+
+def _name_and_title(path: Path, kind: Kind) -> tuple[str, str]:
+    """Return the name and the title of a file."""
+    from wbc_suite.tomlfile import read_toml
+
+    content = read_toml(path)
+    if kind is Kind.CONTROLLERS:
+        return path.stem, _controlled(content)
+    if kind is Kind.BENCHMARKS:
+        return content["name"], content["title"]
+    tables = [content, *(t for t in content.values() if isinstance(t, dict))]
+    titles = (t.get("title") or t.get("description") for t in tables)
+    return path.stem, next((title for title in titles if isinstance(title, str)), "")
+
+
+def _controlled(content: dict[str, Any]) -> str:
+    """Return what a controller's file controls."""
+    if "frame" in content:
+        return ", ".join(frame["name"] for frame in content["frame"])
+    parts = content["body_parts"].items()
+    return ", ".join(f"{name}: {part['type']}" for name, part in parts)
+
+
+def _table(title: str, *columns: str) -> "Table":
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left", title_style="bold", box=None)
+    for column in columns:
+        right = column in ("dof", "kg")
+        table.add_column(
+            column, justify="right" if right else "left", no_wrap=column == "name"
+        )
+    return table
+
+
+def check_file(
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="A .toml, .json, .urdf or .xml file.")
+    ],
+    robot: Annotated[
+        str | None,
+        typer.Option(metavar="ROBOT", help="Check a controller's names against it."),
+    ] = None,
+    catalogue: CatalogueOption = None,
+) -> None:
+    """Check a robot, benchmark or controller file, and print a summary.
+
+    The file is read as loading reads it, and a robot's models are built for both
+    engines. The first error names the file, the key, the value and the rule. A JSON
+    file is a controller of robosuite, which needs its robot.
+    """
+    from wbc_suite.tomlfile import read_toml
+
+    content = read_toml(file) if file.suffix == ".toml" else {"component": None}
+    controls = "body_parts" in content or "frame" in content
+    if "name" in content:
+        print(f"{file}: fine. {_benchmark(file)}")
+    elif file.suffix == ".json" or (controls and "component" not in content):
+        print(f"{file}: fine. {_controller(file, robot)}")
+    elif "provider" in content:
+        print(f"{file}: fine. {_skin(file)}")
+    else:
+        print(f"{file}: fine. {_robot(file)}")
+
+
+def _robot(file: Path) -> str:
+    from wbc_suite.robot import load_robot
+
+    robot = load_robot(file)
+    simulated = robot.to_mjspec().compile()
+    computed = robot.to_pinocchio()
+    return (
+        f"Robot '{robot.name}': {len(robot.links)} links, {robot.dof} dof, "
+        f"{robot.mass:.1f} kg, {robot.root.kind} root; MuJoCo and Pinocchio models "
+        f"with nv = {simulated.nv} and {computed.nv}."
+    )
+
+
+def _skin(file: Path) -> str:
+    from wbc_suite.robot.skins import read_skin
+
+    table = read_skin(file)
+    meshes = sum(len(pieces) for pieces in table.link.values())
+    return f"Skin of {len(table.link)} links with {meshes} meshes of {table.provider}."
+
+
+def _benchmark(file: Path) -> str:
+    from wbc_suite.benchmark import load_benchmark
+
+    benchmark = load_benchmark(file)
+    return f"Benchmark '{benchmark.name}': {benchmark.horizon} actions an episode."
+
+
+def _controller(file: Path, robot: str | None) -> str:
+    from wbc_suite.control import load_composite_controller_config
+
+    config = load_composite_controller_config(file, robot)
+    given = config.get("body_parts")
+    if given is None:
+        frames = ", ".join(frame["name"] for frame in config["frame"])
+        return f"{config['type']} of {frames}."
+    parts = ", ".join(f"{name} ({part['type']})" for name, part in given.items())
+    return f"{config['type']} of {parts}."
+
+
+def print_schema(
+    kind: Annotated[
+        Literal["component", "assembly", "frame"],
+        typer.Argument(help="Kind of robot file, or a stream's pose frame."),
+    ],
+) -> None:
+    """Print the JSON Schema of robot files, or of the frames that a stream takes."""
+    if kind == "frame":
+        from wbc_suite.devices.pose_frame import frame_schema
+
+        print(json.dumps(frame_schema(), indent=2))
+        return
+    from wbc_suite.robot.robot_file import robot_schema
+
+    print(json.dumps(robot_schema(kind), indent=2))

@@ -1,0 +1,192 @@
+"""`wbc-suite view | render | export | describe-action`: commands about one robot."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from wbc_suite.cli.options import (
+    BaseOption,
+    CatalogueOption,
+    GripperOption,
+    HostOption,
+    PortOption,
+    RobotArgument,
+    SkinOption,
+    chosen,
+    serve_until_interrupted,
+    writing,
+)
+
+if TYPE_CHECKING:
+    from wbc_suite.control import ActionSlice
+    from wbc_suite.typing import Vector
+
+__all__ = ["describe_action", "export_robot", "render", "view"]
+
+
+def view(
+    robot: RobotArgument,
+    gripper: GripperOption = None,
+    base: BaseOption = None,
+    skin: SkinOption = None,
+    host: HostOption = "127.0.0.1",
+    port: PortOption = None,
+    catalogue: CatalogueOption = None,
+) -> None:
+    """Show a robot: joints, frames, collision shapes, centre of mass, inertia."""
+    from wbc_suite.robot import load_robot
+    from wbc_suite.viewers.page_server import PageServer
+    from wbc_suite.viewers.robot_page import RobotPage
+
+    description = load_robot(robot, gripper=chosen(gripper), base=base, skin=skin)
+    page = RobotPage(description, PageServer(host, port))
+    serve_until_interrupted(page.site, description.title or description.name)
+    page.stop()
+
+
+class ViewChoice(StrEnum):
+    """Where the camera stands."""
+
+    THREE_QUARTER = "three_quarter"
+    FRONT = "front"
+    SIDE = "side"
+    BACK = "back"
+
+
+def render(
+    robot: RobotArgument,
+    *,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Picture to write.")],
+    view: Annotated[
+        ViewChoice, typer.Option(help="Where the camera stands.")
+    ] = ViewChoice.THREE_QUARTER,
+    keyframe: Annotated[str, typer.Option(help="Posture of the robot.")] = "ready",
+    width: Annotated[int, typer.Option(min=16, max=8192, help="Pixels.")] = 800,
+    height: Annotated[int, typer.Option(min=16, max=8192, help="Pixels.")] = 800,
+    gripper: GripperOption = None,
+    base: BaseOption = None,
+    skin: SkinOption = None,
+    catalogue: CatalogueOption = None,
+) -> None:
+    """Draw a robot in the studio, without a display."""
+    from PIL import Image
+
+    from wbc_suite.robot import load_robot
+    from wbc_suite.viewers.offscreen import render_robot
+
+    picture = render_robot(
+        load_robot(robot, gripper=chosen(gripper), base=base, skin=skin),
+        view=view.value,
+        keyframe=keyframe,
+        size=(width, height),
+    )
+    with writing(output):
+        Image.fromarray(picture).save(output)
+    print(f"Wrote {output}.")
+
+
+class Format(StrEnum):
+    """Formats that other programs read, and our own for editing an imported robot."""
+
+    MJCF = "mjcf"
+    URDF = "urdf"
+    TOML = "toml"
+
+
+def export_robot(
+    robot: RobotArgument,
+    *,
+    to: Annotated[Format, typer.Option(help="Format to write.")],
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="File to write; otherwise it is printed."),
+    ] = None,
+    mend_inertias: Annotated[
+        bool,
+        typer.Option(help="Replace inertias that no body has (of a URDF file)."),
+    ] = False,
+    gripper: GripperOption = None,
+    base: BaseOption = None,
+    catalogue: CatalogueOption = None,
+) -> None:
+    """Write a robot for other programs, or a URDF or MJCF file as a TOML to edit."""
+    from wbc_suite.robot import load_robot
+    from wbc_suite.robot.urdf_import import read_urdf
+
+    if mend_inertias and robot.endswith(".urdf"):
+        description = read_urdf(robot, mend_inertias=True)
+    else:
+        description = load_robot(robot, gripper=chosen(gripper), base=base)
+    text = {
+        Format.MJCF: description.to_mjcf,
+        Format.URDF: description.to_urdf,
+        Format.TOML: description.to_toml,
+    }[to]()
+    if output is None:
+        print(text)
+        return
+    with writing(output):
+        output.write_text(text, encoding="utf-8")
+    print(f"Wrote {output} ({len(text) / 1000:.0f} kB).")
+
+
+ZEROS = {
+    "base": "stands still",
+    "velocity": "stands still",
+    "torque": "only its own weight is carried",
+    "gripper": "half closed",
+    "stiffness": "limp: no stiffness",
+    "damping": "no damping",
+}
+"""What zeros mean, by kind of slice; all other kinds hold or go to an origin."""
+
+
+def describe_action(
+    robot: RobotArgument,
+    *,
+    controller: Annotated[
+        str | None,
+        typer.Option(help="Name or file of a controller; else the robot's usual one."),
+    ] = None,
+    benchmark: Annotated[str, typer.Option(help="Where the robot stands.")] = "Lift",
+    gripper: GripperOption = None,
+    base: BaseOption = None,
+    catalogue: CatalogueOption = None,
+) -> None:
+    """Show the slices of an action: names, places, units, bounds, and what 0 means."""
+    import wbc_suite
+
+    built = wbc_suite.load_robot(robot, gripper=chosen(gripper), base=base)
+    config = wbc_suite.load_composite_controller_config(controller, built)
+    env = wbc_suite.make(benchmark, robots=built, controller_configs=config)
+    env.reset(seed=0)
+    held = env.action_layout.unpack(env.hold_action)
+    print(f"{config['type']}: {env.action_layout.size} values")
+    print(env.action_layout)
+    print("Zeros:")
+    width = max((len(name) for name in held), default=0)
+    for part in env.action_layout.slices:
+        print(f"  {part.name.ljust(width)}  {_zeros(part, held[part.name])}")
+    env.close()
+
+
+def _zeros(part: "ActionSlice", held: "Vector") -> str:
+    """Return what zeros mean in a slice.
+
+    Args:
+        part: The slice.
+        held: Its values that keep the present goal.
+    """
+    if part.name == "base_mode":
+        return "goals of hands ride on the base"
+    if part.kind == "base" and len(held) == 3 and held.any():
+        return "go to the origin; hold_action stays"
+    if part.kind in ZEROS:
+        return ZEROS[part.kind]
+    if not held.any():
+        return "hold the present goal"
+    places = {"posture": "all joints at 0", "orientation": "no turn from the origin's"}
+    place = places.get(part.kind, "the origin")
+    return f"go to {place}; hold_action holds"

@@ -1,0 +1,287 @@
+"""robosuite's environment and `GymWrapper` around ours."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from wbc_suite.compat.robosuite_sim import Model, RobotView, Sim
+from wbc_suite.envs import RobotEnv
+from wbc_suite.errors import ConfigError, DatasetError
+
+__all__ = ["GymWrapper", "RobosuiteEnv"]
+
+Observation = dict[str, Any]
+
+
+class RobosuiteEnv:
+    """An environment with robosuite's calls.
+
+    Args:
+        env_name: Name of the benchmark.
+        ignore_done: Whether steps after the end of an episode are allowed.
+        seed: Seed of the first episode.
+        kwargs: Our arguments.
+
+    Attributes:
+        env: Our environment.
+        sim: Model and state, under robosuite's names.
+        robots: The robots, likewise.
+        viewer: Stand-in for robosuite's window; does nothing.
+        name: Name of the benchmark.
+    """
+
+    def __init__(
+        self,
+        env_name: str,
+        *,
+        ignore_done: bool = False,
+        seed: int | None = None,
+        **kwargs: Any,
+    ) -> None:
+        self.ignore_done, self._seed = bool(ignore_done), seed
+        self.env = RobotEnv(env_name, **kwargs)
+        self.name = env_name
+        self.sim, self.viewer = Sim(self.env), Viewer()
+        simulation = self.env.simulation
+        self.robots = tuple(
+            RobotView(state, controller)
+            for state, controller in zip(
+                simulation.robots, simulation.controllers, strict=True
+            )
+        )
+        self.timestep, self.done = 0, False
+        self._ep_meta: dict[str, Any] = {}
+
+    def reset(self) -> Observation:
+        """Start an episode; return the observation."""
+        observation, _ = self.env.reset(seed=self._seed)
+        self._seed = None  # the first episode's only
+        self.timestep, self.done = 0, False
+        return self._in_their_form(observation)
+
+    def step(self, action: Any) -> tuple[Observation, float, bool, dict[str, Any]]:
+        """Advance one control period.
+
+        Raises:
+            ValueError: If the episode is over and `ignore_done` is not set.
+        """
+        if self.done:
+            raise ValueError("executing action in terminated episode")
+        observation, reward, terminated, truncated, info = self.env.step(action)
+        self.timestep += 1
+        self.done = (terminated or truncated) and not self.ignore_done
+        return self._in_their_form(observation), reward, self.done, info
+
+    def reward(self, action: Any = None) -> float:
+        """Return the reward of the present state."""
+        config = self.env.config
+        given = self.env.benchmark.reward(shaped=config.reward_shaping)
+        return given * config.reward_scale
+
+    def render(self) -> None:
+        """Show the scene on a page, if `has_renderer` was set."""
+        self.env.render()
+
+    def close(self) -> None:
+        """Close renderers and page."""
+        self.env.close()
+
+    def seed(self, seed: int) -> None:
+        """Seed the next episode."""
+        self._seed = seed
+
+    @property
+    def action_spec(self) -> tuple[np.ndarray, np.ndarray]:
+        """Least and greatest actions."""
+        layout = self.env.action_layout
+        return layout.low.copy(), layout.high.copy()
+
+    @property
+    def action_dim(self) -> int:
+        """Length of an action."""
+        return int(self.action_spec[0].size)
+
+    @property
+    def unwrapped(self) -> "RobosuiteEnv":
+        """This environment."""
+        return self
+
+    @property
+    def model(self) -> Model:
+        """The scene."""
+        return self.sim.model
+
+    @property
+    def model_timestep(self) -> float:
+        """Duration of a physics step, s."""
+        return self.env.simulation.timestep
+
+    @property
+    def horizon(self) -> int:
+        """Actions in an episode."""
+        return self.env.horizon
+
+    @property
+    def control_freq(self) -> float:
+        """Actions a second."""
+        return self.env.config.control_freq
+
+    @property
+    def observation_names(self) -> set[str]:
+        """Keys of all observations."""
+        return {*self.env.observables.names, *self.env.cameras.space}
+
+    def observation_spec(self) -> Observation:
+        """Return an example of the observations."""
+        return self._get_observations()
+
+    def modify_observable(
+        self, observable_name: str, attribute: str, modifier: Any
+    ) -> None:
+        """Change an observation; `corrupter` and `delayer` as in robosuite."""
+        if attribute == "corrupter" and modifier is not None:
+            attribute, inner = "noise", modifier
+            modifier = lambda values, rng: inner(values)  # noqa: E731
+        elif attribute == "delayer" and modifier is not None:
+            attribute, late = "delay", modifier
+            modifier = lambda rng: late()  # noqa: E731
+        attribute = {"corrupter": "noise", "delayer": "delay"}.get(attribute, attribute)
+        self.env.observables.modify(observable_name, **{attribute: modifier})
+
+    def get_ep_meta(self) -> dict[str, Any]:
+        """Return the value of `set_ep_meta`."""
+        return dict(self._ep_meta)
+
+    def set_ep_meta(self, meta: dict[str, Any]) -> None:
+        """Store data of the episode."""
+        self._ep_meta = dict(meta)
+
+    def unset_ep_meta(self) -> None:
+        """Delete the data of the episode."""
+        self._ep_meta = {}
+
+    def visualize(self, vis_settings: dict[str, bool]) -> None:
+        """Do nothing: scenes have no visual marks; see `Indicators`."""
+
+    def edit_model_xml(self, xml: str) -> str:
+        """Return the text unchanged: it has no paths to edit."""
+        return xml
+
+    def reset_from_xml_string(self, xml: str) -> None:
+        """Start an episode in the scene of a recording, which must be this one.
+
+        Raises:
+            DatasetError: If the text is another scene's, such as robosuite's own.
+        """
+        if xml != self.sim.model.get_xml():
+            raise DatasetError(
+                "The recording's scene is not this environment's: states of other "
+                "scenes do not fit. Actions do: play those."
+            )
+        self.reset()
+
+    def _get_observations(self, force_update: bool = False) -> Observation:
+        """Return the present observation."""
+        return self._in_their_form(self.sim.observe())
+
+    def _check_success(self) -> bool:
+        """Whether the benchmark is solved now."""
+        return self.env.benchmark.success()
+
+    def _in_their_form(self, observation: Observation) -> Observation:
+        """Flip pictures, and map depths to 0 to 1, as OpenGL has them."""
+        model = self.env.simulation.model
+        near = model.vis.map.znear * model.stat.extent
+        far = model.vis.map.zfar * model.stat.extent
+        for key in self.env.cameras.space:
+            picture = observation[key][::-1]
+            if key.endswith("_depth"):
+                picture = (1.0 - near / np.maximum(picture, near)) / (1.0 - near / far)
+                picture = picture.astype(np.float32)
+            observation[key] = np.ascontiguousarray(picture)
+        return observation
+
+
+class Viewer:
+    """Stand-in for robosuite's window."""
+
+    def set_camera(self, camera_id: int) -> None:
+        """Do nothing."""
+
+    def update(self) -> None:
+        """Do nothing: a page follows every step."""
+
+
+class GymWrapper(gymnasium.Env[Any, Any]):
+    """Gymnasium's five-tuple around `RobosuiteEnv`; observations in one vector.
+
+    Args:
+        env: The environment.
+        keys: Observed keys; by default objects, pictures and robots, in this order.
+        flatten_obs: Whether they are one vector; otherwise a dictionary.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": []}
+
+    def __init__(
+        self,
+        env: RobosuiteEnv,
+        keys: Sequence[str] | None = None,
+        flatten_obs: bool = True,
+    ) -> None:
+        self.env, self.flatten_obs = env, flatten_obs
+        example = env.observation_spec()
+        if keys is None:
+            keys = [key for key in ("object-state",) if key in example]
+            keys += [key for key in example if key.endswith("_image")]
+            keys += [key for key in example if key.endswith("proprio-state")]
+        self.keys = list(keys)
+        first = self._chosen(example)
+        self.observation_space = (
+            _box(first)
+            if flatten_obs
+            else gymnasium.spaces.Dict({k: _box(v) for k, v in first.items()})
+        )
+        low, high = env.action_spec
+        self.action_space = gymnasium.spaces.Box(
+            np.float32(low), np.float32(high), dtype=np.float32
+        )
+        self.name = f"{'_'.join(r.name for r in env.robots)}_{env.name}"
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Start an episode."""
+        if options:
+            raise ConfigError(f"reset: there are no options, got {options!r:.60}.")
+        if seed is not None:
+            self.env.seed(seed)
+        return self._chosen(self.env.reset()), {}
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Advance one control period; the end of an episode is a truncation."""
+        observation, reward, done, info = self.env.step(action)
+        return self._chosen(observation), reward, False, done, info
+
+    def close(self) -> None:
+        """Close the environment."""
+        self.env.close()
+
+    def compute_reward(
+        self, achieved_goal: Any, desired_goal: Any, info: dict[str, Any]
+    ) -> float:
+        """Return the reward, under the name that goal-based learners call."""
+        return self.env.reward()
+
+    def _chosen(self, observation: Observation) -> Any:
+        if not self.flatten_obs:
+            return {key: observation[key] for key in self.keys}
+        return np.concatenate([np.ravel(observation[key]) for key in self.keys])
+
+
+def _box(values: Any) -> gymnasium.spaces.Box:
+    if values.dtype == np.uint8:
+        return gymnasium.spaces.Box(0, 255, values.shape, np.uint8)
+    return gymnasium.spaces.Box(-np.inf, np.inf, values.shape, values.dtype)

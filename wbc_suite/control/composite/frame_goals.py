@@ -1,0 +1,234 @@
+"""Goals of controlled frames: from slices of an action to poses in the world."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from wbc_suite.compiling import as_argument, compiled, struct
+from wbc_suite.control.action import ActionLayout
+from wbc_suite.control.composite.frame_targets import FrameArrays, write_frame_pose
+from wbc_suite.control.composite.whole_body_config import WholeBodyIKConfig
+from wbc_suite.kinematics import Configuration
+from wbc_suite.kinematics.forward import RobotArrays, compute_joint_poses
+from wbc_suite.qp.lie import exp3, log3
+from wbc_suite.robot import RobotDescription
+from wbc_suite.typing import Matrix, Vector
+
+__all__ = ["FrameGoals", "GoalArrays", "place_goals"]
+
+SAME_GOAL = 1e-9
+"""m and rad; changes below are rounding."""
+
+
+@struct
+class GoalArrays(NamedTuple):
+    """Goals of controlled frames; poses are rows [R p] of 3 by 4 numbers.
+
+    Attributes:
+        goal: Goals in the reference frame of the input, shape (n, 12).
+        home: Poses in the world that ranges are measured from, shape (n, 12).
+        range: Greatest distances from home, m and rad, shape (n, 2).
+        base: Pose of the robot's base, as commanded, shape (12,).
+        base_joint: Joint that carries the base.
+        base_offset: Pose of the base in that joint, shape (12,).
+        is_in_base: Whether goals are relative to the base.
+        follows_base: Whether the base moves as commanded.
+        root: Index of a free root in qpos, -1 without one.
+    """
+
+    goal: Matrix
+    home: Matrix
+    range: Matrix
+    base: Vector
+    base_joint: int
+    base_offset: Vector
+    is_in_base: bool
+    follows_base: bool
+    root: int
+
+
+@compiled
+def place_goals(
+    goals: GoalArrays, robot: RobotArrays, frames: FrameArrays, qpos: Vector
+) -> None:
+    """Write the goals of the frames in the world of the commanded robot.
+
+    They are within the frames' ranges. With a free root they are corrected by how far
+    the measured root is from the commanded one, so that hands arrive although legs
+    yield.
+
+    Args:
+        goals: Goals as they are given.
+        robot: The robot at the commanded configuration.
+        frames: Controlled frames; `goal` is written.
+        qpos: Measured positions of the simulation, as MuJoCo has them.
+    """
+    correction, pose = np.empty(12), np.empty(12)
+    if goals.follows_base:
+        compute_joint_poses(robot)
+        write_frame_pose(robot.pose[goals.base_joint], goals.base_offset, goals.base)
+    if goals.root >= 0:
+        _write_inverse_root(qpos[goals.root :], pose)
+        _multiply(goals.base, pose, correction)
+    for k in range(goals.goal.shape[0]):
+        out = frames.goal[k]
+        if goals.is_in_base:
+            _multiply(goals.base, goals.goal[k], out)
+        else:
+            out[:] = goals.goal[k]
+        if np.isfinite(goals.range[k, 0]):
+            _bound(out, goals.home[k], goals.range[k])
+        if goals.root >= 0:
+            pose[:] = out
+            _multiply(correction, pose, out)
+
+
+@compiled
+def _multiply(A: Vector, B: Vector, out: Vector) -> None:
+    """Write the pose `A B`."""
+    for row in range(0, 12, 4):
+        for j in range(4):
+            out[row + j] = A[row + 3] if j == 3 else 0.0
+            for k in range(3):
+                out[row + j] += A[row + k] * B[4 * k + j]
+
+
+@compiled
+def _write_inverse_root(root: Vector, out: Vector) -> None:
+    """Write the inverse of a pose that is given as position and quaternion w x y z."""
+    w, x, y, z = root[3], root[4], root[5], root[6]
+    scale = 2.0 / (w * w + x * x + y * y + z * z)
+    out[0] = 1.0 - scale * (y * y + z * z)
+    out[5] = 1.0 - scale * (x * x + z * z)
+    out[10] = 1.0 - scale * (x * x + y * y)
+    out[1], out[4] = scale * (x * y + w * z), scale * (x * y - w * z)
+    out[2], out[8] = scale * (x * z - w * y), scale * (x * z + w * y)
+    out[6], out[9] = scale * (y * z + w * x), scale * (y * z - w * x)
+    for row in range(0, 12, 4):
+        out[row + 3] = 0.0
+        for k in range(3):
+            out[row + 3] -= out[row + k] * root[k]
+
+
+@compiled
+def _bound(goal: Vector, home: Vector, limits: Vector) -> None:
+    """Move a goal towards home until it is within limits, m and rad."""
+    turn, vector, R = np.empty((3, 3)), np.empty(3), np.empty((3, 3))
+    square = 0.0
+    for i in range(3):
+        square += (goal[4 * i + 3] - home[4 * i + 3]) ** 2
+        for j in range(3):
+            turn[i, j] = 0.0
+            for k in range(3):
+                turn[i, j] += home[4 * k + i] * goal[4 * k + j]
+    share = min(1.0, limits[0] / max(np.sqrt(square), 1e-12))
+    share_of_turn = min(1.0, limits[1] / max(log3(turn, vector), 1e-12))
+    for i in range(3):
+        vector[i] *= share_of_turn
+    exp3(vector[0], vector[1], vector[2], R)
+    for i in range(3):
+        goal[4 * i + 3] = home[4 * i + 3] + share * (goal[4 * i + 3] - home[4 * i + 3])
+        for j in range(3):
+            goal[4 * i + j] = 0.0
+            for k in range(3):
+                goal[4 * i + j] += home[4 * i + k] * R[k, j]
+
+
+class FrameGoals:
+    """Goals in the reference frame of the input: the world, or the robot's base.
+
+    Args:
+        config: Controlled frames, and how their actions are given.
+        layout: Layout whose first slices are those of the frames.
+        robot: The reduced robot.
+        configuration: Its commanded configuration.
+        root: Index of a free root in the simulation's qpos, -1 without one.
+
+    Attributes:
+        poses: Goal of each frame, in the reference frame.
+        argument: The argument of kernels that stands for the goals.
+    """
+
+    def __init__(
+        self,
+        config: WholeBodyIKConfig,
+        layout: ActionLayout,
+        robot: RobotDescription,
+        configuration: Configuration,
+        root: int,
+    ) -> None:
+        self._config = config
+        count = len(config.frames)
+        self._slices = [slice(part.start, part.stop) for part in layout.slices[:count]]
+        self.poses: list[pin.SE3] = []
+        in_base = config.input_ref_frame == "base"
+        model = configuration.model
+        base = model.frames[configuration.frame_id(robot.links[0].name)]
+        kind, unlimited = robot.root.kind, (np.inf, np.inf)
+        ranges = [frame.range or unlimited for frame in config.frames]
+        self._arrays = GoalArrays(
+            goal=np.zeros((count, 12)),
+            home=np.zeros((count, 12)),
+            range=np.array(ranges, dtype=np.float64),
+            base=np.zeros(12),
+            base_joint=int(base.parentJoint),
+            base_offset=_row(base.placement),
+            is_in_base=in_base,
+            follows_base=kind == "free" or (kind == "planar" and in_base),
+            root=root,
+        )
+        self.argument = as_argument(self._arrays)
+
+    @property
+    def base(self) -> pin.SE3:
+        """Pose of the robot's base, as commanded."""
+        T = self._arrays.base.reshape(3, 4)
+        return pin.SE3(T[:, :3], T[:, 3])
+
+    def reset(self, poses: Sequence[pin.SE3], base: pin.SE3) -> None:
+        """Take the present poses of the frames in the world as goals.
+
+        Args:
+            poses: Poses of the frames.
+            base: Pose of the robot's base.
+        """
+        arrays, in_base = self._arrays, self._arrays.is_in_base
+        arrays.home[:], arrays.base[:] = [_row(pose) for pose in poses], _row(base)
+        self.poses = [base.actInv(p) if in_base else p.copy() for p in poses]
+        arrays.goal[:] = [_row(pose) for pose in self.poses]
+
+    def set(self, action: Vector) -> bool:
+        """Read an action; return whether a goal has changed."""
+        before, config = self.poses, self._config
+        self.poses = []
+        for frame, own, goal in zip(config.frames, self._slices, before, strict=True):
+            if config.input_type == "absolute":
+                new = frame.behaviour.pose(action[own], goal)
+            else:
+                is_own = config.input_ref_frame == "eef"
+                axes = goal.rotation if is_own else np.eye(3)
+                new = frame.behaviour.moved(action[own], goal, axes)
+            self.poses.append(new)
+        self._arrays.goal[:] = [_row(pose) for pose in self.poses]
+        pairs = zip(before, self.poses, strict=True)
+        return not all(a.isApprox(b, SAME_GOAL) for a, b in pairs)
+
+    def hold(self, action: Vector) -> None:
+        """Write the slices that keep the goals."""
+        for frame, own, goal in zip(
+            self._config.frames, self._slices, self.poses, strict=True
+        ):
+            absolute = self._config.input_type == "absolute"
+            action[own] = frame.behaviour.values(goal) if absolute else 0.0
+
+    def in_world(self) -> list[pin.SE3]:
+        """Return the goals in the world."""
+        base = self.base
+        return [base * p if self._arrays.is_in_base else p for p in self.poses]
+
+
+def _row(T: pin.SE3) -> Vector:
+    """Return a pose as [R p] row by row, shape (12,)."""
+    return T.homogeneous.ravel()[:12]

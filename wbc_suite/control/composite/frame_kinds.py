@@ -1,0 +1,253 @@
+"""Kinds of controlled frames, and where to register one's own.
+
+A kind defines which components of a pose a slice of the action commands. The classes
+below are registered like one's own: by `register_frame_kind`.
+"""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, ClassVar, TypeVar
+
+import numpy as np
+import pinocchio as pin
+
+from wbc_suite.control.action import ActionPart, Axis, SliceKind, Unit
+from wbc_suite.errors import ConfigError, UnknownNameError
+from wbc_suite.qp import ComTask, FrameTask
+from wbc_suite.typing import Matrix, Vector
+
+if TYPE_CHECKING:
+    from wbc_suite.control.composite.whole_body_config import (
+        ControlledFrame,
+        WholeBodyIKConfig,
+    )
+
+__all__ = [
+    "FrameKind",
+    "GoalTask",
+    "find_frame_kind",
+    "frame_kind_names",
+    "register_frame_kind",
+]
+
+MAX_POSITION = 10.0
+"""Bound of absolute positions, m: no robot here reaches farther."""
+
+NO_SPEED_LIMIT = 1e3
+"""m/s and rad/s; the speeds of targets are bounded elsewhere."""
+
+AXES = (Axis.X, Axis.Y, Axis.Z, Axis.RX, Axis.RY, Axis.RZ)
+"""Components of a pose's error: position, and rotation vector, rad."""
+
+GoalTask = FrameTask | ComTask
+"""QP tasks of the kinds here."""
+
+Kind = TypeVar("Kind", bound="FrameKind")
+
+
+class FrameKind:
+    """Commands some components of a frame's pose.
+
+    Values of a slice are `x`, `y`, `z` (m), and either `rx`, `ry`, `rz` (a rotation
+    vector, rad) or `yaw` (rad). Subclasses set the attributes, and override the methods
+    whose meaning differs.
+
+    Attributes:
+        name: Name in controller files, `kind = "..."`.
+        labels: Components that a slice commands, in order.
+        slice_kind: How the action layout classifies the slice.
+        needs_frame: Whether it is the kind of a frame or link of the robot.
+    """
+
+    name: ClassVar[str]
+    labels: ClassVar[tuple[str, ...]]
+    slice_kind: ClassVar[SliceKind] = SliceKind.POSE
+    needs_frame: ClassVar[bool] = True
+
+    @property
+    def counted(self) -> tuple[bool, ...]:
+        """Which components of the error (world position, own rotation) count, (6,)."""
+        labels = ["rz" if label == "yaw" else label for label in self.labels]
+        return tuple(axis in labels for axis in AXES)
+
+    def action_part(
+        self, frame: "ControlledFrame", config: "WholeBodyIKConfig"
+    ) -> ActionPart:
+        """Return the slice of a frame of this kind."""
+        absolute = config.input_type == "absolute"
+        far = MAX_POSITION if absolute else config.delta_position
+        turn = float(np.pi) if absolute else config.delta_rotation
+        linear = [label in AXES[:3] for label in self.labels]
+        bounds = tuple(far if is_linear else turn for is_linear in linear)
+        return ActionPart(
+            name=frame.name,
+            kind=self.slice_kind,
+            labels=self.labels,
+            units=tuple(Unit("m" if is_linear else "rad") for is_linear in linear),
+            low=tuple(-bound for bound in bounds),
+            high=bounds,
+        )
+
+    def values(self, pose: pin.SE3) -> Vector:
+        """Return the absolute values that command a pose."""
+        x, y, z = pose.translation
+        rx, ry, rz = pin.log3(pose.rotation)
+        yaw = np.arctan2(pose.rotation[1, 0], pose.rotation[0, 0])
+        known = {"x": x, "y": y, "z": z, "rx": rx, "ry": ry, "rz": rz, "yaw": yaw}
+        return np.array([known[label] for label in self.labels])
+
+    def pose(self, values: Vector, now: pin.SE3) -> pin.SE3:
+        """Return the pose that absolute values command.
+
+        Args:
+            values: The slice.
+            now: The present goal; gives the components that are not commanded.
+        """
+        given = dict(zip(self.labels, values.tolist(), strict=True))
+        position = [
+            given.get(label, x)
+            for label, x in zip("xyz", now.translation.tolist(), strict=True)
+        ]
+        turn = _rotation_vector(given)
+        rotates = any(label not in "xyz" for label in given)
+        rotation = pin.exp3(turn) if rotates else now.rotation.copy()
+        return pin.SE3(rotation, np.array(position))
+
+    def moved(self, values: Vector, goal: pin.SE3, axes: Matrix) -> pin.SE3:
+        """Return a goal moved by a delta slice, in the given axes, shape (3, 3)."""
+        given = dict(zip(self.labels, values.tolist(), strict=True))
+        step = np.array([given.get(label, 0.0) for label in "xyz"])
+        rotation = pin.exp3(axes @ _rotation_vector(given)) @ goal.rotation
+        return pin.SE3(rotation, goal.translation + axes @ step)
+
+    def task(self, frame: "ControlledFrame", *, whole_error: bool = False) -> GoalTask:
+        """Return the QP task of a frame of this kind.
+
+        Args:
+            frame: The frame.
+            whole_error: Whether to ask for the whole error in one step, on level 0.
+        """
+        assert frame.frame is not None
+        position, orientation = self.costs(frame, whole_error=whole_error)
+        return FrameTask(
+            frame.frame,
+            position_cost=position,
+            orientation_cost=orientation,
+            gain=1.0 if whole_error else frame.gain,
+            level=0 if whole_error else frame.level,
+            max_linear_speed=NO_SPEED_LIMIT,
+            max_angular_speed=NO_SPEED_LIMIT,
+            name=frame.name,
+        )
+
+    def set_target(self, task: GoalTask, pose: pin.SE3) -> None:
+        """Set a pose in the world as the target of the kind's task."""
+        assert isinstance(task, FrameTask)
+        task.set_target(pose)
+
+    def costs(
+        self, frame: "ControlledFrame", *, whole_error: bool = False
+    ) -> tuple[Vector, Vector]:
+        """Return costs of position (world axes) and orientation (the frame's axes)."""
+        counted = np.array(self.counted, dtype=float)
+        if whole_error:
+            return counted[:3], counted[3:]
+        return frame.position_cost * counted[:3], frame.orientation_cost * counted[3:]
+
+
+def _rotation_vector(values: dict[str, float]) -> Vector:
+    turn = [values.get(label, 0.0) for label in AXES[3:]]
+    turn[2] += values.get("yaw", 0.0)
+    return np.array(turn)
+
+
+_KINDS: dict[str, FrameKind] = {}
+
+
+def register_frame_kind(kind: type[Kind]) -> type[Kind]:
+    """Register a class of `FrameKind` under its name; also as a decorator.
+
+    Raises:
+        ConfigError: If the name is taken, or a label is unknown.
+    """
+    if kind.name in _KINDS:
+        raise ConfigError(f"A kind of controlled frame '{kind.name}' exists already.")
+    known: Sequence[str] = (*AXES, "yaw")
+    for label in kind.labels:
+        if label not in known:
+            raise ConfigError(str(UnknownNameError("component", label, known)))
+    _KINDS[kind.name] = kind()
+    return kind
+
+
+def find_frame_kind(name: str) -> FrameKind:
+    """Return a registered kind.
+
+    Raises:
+        UnknownNameError: If there is none of that name.
+    """
+    if name not in _KINDS:
+        raise UnknownNameError("kind of controlled frame", name, _KINDS)
+    return _KINDS[name]
+
+
+def frame_kind_names() -> tuple[str, ...]:
+    """Return the names of all registered kinds."""
+    return tuple(_KINDS)
+
+
+@register_frame_kind
+class Pose(FrameKind):
+    """Position and orientation of a frame."""
+
+    name = "pose"
+    labels = AXES
+
+
+@register_frame_kind
+class Position(FrameKind):
+    """Position of a frame; its orientation is free."""
+
+    name = "position"
+    labels = AXES[:3]
+    slice_kind = SliceKind.POSITION
+
+
+@register_frame_kind
+class Orientation(FrameKind):
+    """Orientation of a frame; its position is free."""
+
+    name = "orientation"
+    labels = AXES[3:]
+    slice_kind = SliceKind.ORIENTATION
+
+
+@register_frame_kind
+class Base(FrameKind):
+    """Place on the floor and heading of a frame."""
+
+    name = "base"
+    labels = (Axis.X, Axis.Y, Axis.YAW)
+    slice_kind = SliceKind.BASE
+
+
+@register_frame_kind
+class CentreOfMass(Position):
+    """Position of the robot's centre of mass."""
+
+    name = "com"
+    needs_frame = False
+
+    def task(self, frame: "ControlledFrame", *, whole_error: bool = False) -> GoalTask:
+        """Return the QP task of the centre of mass."""
+        return ComTask(
+            1.0 if whole_error else frame.position_cost,
+            gain=1.0 if whole_error else frame.gain,
+            level=0 if whole_error else frame.level,
+            max_speed=NO_SPEED_LIMIT,
+            name=frame.name,
+        )
+
+    def set_target(self, task: GoalTask, pose: pin.SE3) -> None:
+        """Set the position of a pose in the world as the target."""
+        assert isinstance(task, ComTask)
+        task.set_target(pose.translation)

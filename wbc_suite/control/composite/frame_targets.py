@@ -1,0 +1,237 @@
+"""The targets of one tick of whole-body control: compiled functions on arrays.
+
+A tick takes the goals of the controlled frames and the preferred posture, and writes
+targets near enough that the robot can brake for them. The QP then solves for the
+targets. Poses are rows [R p] of 3 by 4 numbers, shape (12,).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from wbc_suite.compiling import compiled, struct
+from wbc_suite.control.part.approach import approach_speed, step_share
+from wbc_suite.kinematics.forward import (
+    JointKind,
+    RobotArrays,
+    compute_com,
+    compute_joint_poses,
+)
+from wbc_suite.qp.lie import exp3, log3
+from wbc_suite.typing import Indices, Matrix, Vector
+
+__all__ = [
+    "CENTRE_OF_MASS",
+    "FrameArrays",
+    "PostureArrays",
+    "lower_level_rate",
+    "measure_frames",
+    "posture_step",
+    "write_frame_pose",
+    "write_targets",
+]
+
+CENTRE_OF_MASS = -1
+"""Stands for the joint of the centre of mass, which has none."""
+
+
+@struct
+class FrameArrays(NamedTuple):
+    """The controlled frames, a row for each.
+
+    Attributes:
+        joint: Joint that carries the frame, or `CENTRE_OF_MASS`.
+        offset: Pose in the joint, shape (n, 12).
+        counted: Components of the error that count, 0 or 1, shape (n, 6).
+        gain: Fraction of the error that one solve removes.
+        max_speed: Greatest speeds towards the goal, m/s and rad/s, shape (n, 2).
+        braking: Decelerations towards the goal, m/s^2 and rad/s^2, shape (n, 2).
+        level: Strict priority.
+        tolerance: Errors that count as none, m and rad, shape (2,).
+        pose: Present poses in the world, shape (n, 12).
+        goal: Goals in the world, shape (n, 12).
+        target: Targets of this tick in the world, shape (n, 12).
+        error: Position error (world axes) and rotation vector (own axes), (n, 6).
+        distance: Lengths of the components that count, m and rad, shape (n, 2).
+    """
+
+    joint: Indices
+    offset: Matrix
+    counted: Matrix
+    gain: Vector
+    max_speed: Matrix
+    braking: Matrix
+    level: Indices
+    tolerance: Vector
+    pose: Matrix
+    goal: Matrix
+    target: Matrix
+    error: Matrix
+    distance: Matrix
+
+
+@struct
+class PostureArrays(NamedTuple):
+    """The preferred posture.
+
+    Attributes:
+        goal: The posture, shape (nq,).
+        target: Target of this tick, shape (nq,); a free root stays.
+        max_speed: Greatest speeds, shape (nv,).
+        braking: Decelerations towards the posture, shape (nv,).
+    """
+
+    goal: Vector
+    target: Vector
+    max_speed: Vector
+    braking: Vector
+
+
+@compiled
+def write_targets(
+    robot: RobotArrays,
+    frames: FrameArrays,
+    posture: PostureArrays,
+    dt: float,
+    settling: float,
+    half_speed_error: float,
+    has_arrived: bool,
+) -> float:
+    """Write the targets of frames and posture, on straight lines to their goals.
+
+    Args:
+        robot: The robot at its configuration.
+        frames: Controlled frames; targets, poses and errors are written.
+        posture: The posture; its target is written.
+        dt: Step, s.
+        settling: Time constant of the end of the posture's motion, s.
+        half_speed_error: See `lower_level_rate`.
+        has_arrived: Whether level 0 has been at its goals before.
+
+    Returns:
+        The greatest error of level 0, as a multiple of the tolerance.
+    """
+    error = measure_frames(robot, frames)
+    rate = 1.0
+    if has_arrived or error < 1.0:
+        rate = lower_level_rate(error, half_speed_error)
+    _write_frame_targets(frames, dt, rate)
+    _write_posture_target(robot, posture, settling, rate)
+    return error
+
+
+@compiled
+def lower_level_rate(error: float, half_speed_error: float) -> float:
+    """Return the fraction of its speed that a lower level may use, 0 to 1.
+
+    Args:
+        error: Greatest error of level 0, as a multiple of the tolerance.
+        half_speed_error: Error at which it is a half; 0: always all.
+    """
+    if half_speed_error <= 0.0:
+        return 1.0
+    return 1.0 / (1.0 + (error / half_speed_error) ** 2)
+
+
+@compiled
+def measure_frames(robot: RobotArrays, frames: FrameArrays) -> float:
+    """Write poses, errors and distances; return what `write_targets` does."""
+    compute_joint_poses(robot)
+    worst, turn = 0.0, np.empty((3, 3))
+    for k in range(frames.joint.shape[0]):
+        pose, goal, error = frames.pose[k], frames.goal[k], frames.error[k]
+        if frames.joint[k] == CENTRE_OF_MASS:
+            compute_com(robot)
+            _write_com(robot.com, pose)
+        else:
+            write_frame_pose(robot.pose[frames.joint[k]], frames.offset[k], pose)
+        for i in range(3):
+            error[i] = goal[4 * i + 3] - pose[4 * i + 3]
+            for j in range(3):
+                turn[i, j] = pose[i] * goal[j]
+                turn[i, j] += pose[4 + i] * goal[4 + j] + pose[8 + i] * goal[8 + j]
+        log3(turn, error[3:])
+        for part in range(2):
+            square = 0.0
+            for i in range(3 * part, 3 * part + 3):
+                square += frames.counted[k, i] * error[i] * error[i]
+            frames.distance[k, part] = np.sqrt(square)
+            if frames.level[k] == 0:
+                worst = max(worst, frames.distance[k, part] / frames.tolerance[part])
+    return worst
+
+
+@compiled
+def _write_com(com: Vector, pose: Vector) -> None:
+    for i in range(3):
+        for j in range(3):
+            pose[4 * i + j] = 1.0 if i == j else 0.0
+        pose[4 * i + 3] = com[i]
+
+
+@compiled
+def write_frame_pose(joint: Vector, offset: Vector, pose: Vector) -> None:
+    """Write the pose of a frame from its joint's, which has R column by column."""
+    for i in range(3):
+        for j in range(4):
+            pose[4 * i + j] = joint[9 + i] if j == 3 else 0.0
+            for n in range(3):
+                pose[4 * i + j] += joint[3 * n + i] * offset[4 * n + j]
+
+
+@compiled
+def _write_frame_targets(frames: FrameArrays, dt: float, rate: float) -> None:
+    """Write targets: position on a straight line, orientation about one axis.
+
+    Args:
+        frames: Controlled frames, measured.
+        dt: Step, s.
+        rate: Fraction of its speed that a frame below level 0 may use.
+    """
+    turn = np.empty((3, 3))
+    for k in range(frames.joint.shape[0]):
+        pose, target, error = frames.pose[k], frames.target[k], frames.error[k]
+        most, braking = frames.max_speed[k], frames.braking[k]
+        gain, share = frames.gain[k], rate if frames.level[k] > 0 else 1.0
+        step = step_share(error[:3], dt, gain, share * most[0], braking[0])
+        spin = step_share(error[3:], dt, gain, share * most[1], braking[1])
+        exp3(spin * error[3], spin * error[4], spin * error[5], turn)
+        for i in range(3):
+            row, out = pose[4 * i : 4 * i + 4], target[4 * i : 4 * i + 4]
+            out[3] = row[3] + step * error[i]
+            for j in range(3):
+                out[j] = row[0] * turn[0, j] + row[1] * turn[1, j] + row[2] * turn[2, j]
+
+
+@compiled
+def _write_posture_target(
+    robot: RobotArrays, posture: PostureArrays, settling: float, rate: float
+) -> None:
+    """Write the next posture; every joint moves by itself."""
+    posture.target[:] = robot.q
+    for j in range(1, robot.kind.shape[0]):
+        if robot.kind[j] == JointKind.FREE:
+            continue
+        q, v = robot.q_start[j], robot.v_start[j]
+        posture.target[q] += posture_step(
+            float(posture.goal[q] - robot.q[q]),
+            settling,
+            float(rate * posture.max_speed[v]),
+            float(posture.braking[v]),
+        )
+
+
+@compiled
+def posture_step(
+    difference: float, settling: float, max_speed: float, braking: float
+) -> float:
+    """Return the step of one joint in a time constant towards its goal.
+
+    Args:
+        difference: From here to there, rad or m.
+        settling: Step, and time constant of the end of the motion, s.
+        max_speed: Greatest speed.
+        braking: Deceleration.
+    """
+    speed = min(approach_speed(abs(difference), settling, braking), max_speed)
+    return settling * speed if difference > 0.0 else -settling * speed

@@ -1,0 +1,253 @@
+"""Reports of a whole-body controller: errors of its frames, and why they remain."""
+
+from collections import defaultdict
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+from functools import cache, partial
+from typing import Any
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+
+from wbc_suite.control.composite.backend import IkStep
+from wbc_suite.control.composite.controlled_frames import ControlledFrames
+from wbc_suite.control.composite.whole_body_config import (
+    ControlledFrame,
+    WholeBodyIKConfig,
+)
+from wbc_suite.control.reasons import (
+    Contact,
+    InMotion,
+    LazyReasons,
+    Reason,
+    TorqueLimit,
+    TrackingError,
+)
+from wbc_suite.control.state import RobotState
+from wbc_suite.kinematics import Configuration
+from wbc_suite.qp import ActiveLimit, Conflict, OutOfReach
+from wbc_suite.typing import Vector
+
+__all__ = ["Body", "IkReport", "contacts_of", "lagging_joint"]
+
+COMMAND_STANDSTILL = 1e-3
+"""rad/s or m/s; a command slower than that stands."""
+
+BODY_STANDSTILL = 0.02
+"""rad/s or m/s; a robot slower than that stands."""
+
+CONTACT_SPEED = 0.1
+"""rad/s or m/s; a robot that presses on something may still move this fast."""
+
+MIN_FORCE = 1.0
+"""N; lighter contacts hold nothing back."""
+
+Reasons = Sequence[Sequence[Reason]]
+"""Reasons of each controlled frame."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Body:
+    """How a robot follows its commands.
+
+    Attributes:
+        commanded: Commanded configuration.
+        goals: Goals in the world of the commanded robot.
+        speed: Returns the present speed of the fastest joint, rad/s or m/s.
+        contacts: Returns what the robot presses on now.
+        lagging: Returns which joint is farthest from its command now.
+    """
+
+    commanded: Vector
+    goals: Sequence[pin.SE3]
+    speed: Callable[[], float]
+    contacts: Callable[[], Sequence[Contact]]
+    lagging: Callable[[], Reason]
+
+
+class IkReport:
+    """Compares poses with goals, and finds the reasons of remaining errors.
+
+    Args:
+        config: Controlled frames and tolerances.
+        configuration: The reduced robot, for the report's own use.
+    """
+
+    def __init__(self, config: WholeBodyIKConfig, configuration: Configuration) -> None:
+        self._config, self._configuration = config, configuration
+        self._frames = ControlledFrames(config, configuration)
+        names = configuration.velocity_names()
+        self._support = [
+            {names[i] for i in _support(configuration, frame)}
+            for frame in config.frames
+        ]
+
+    def frames(
+        self, q: Vector, goals: Sequence[pin.SE3], answer: IkStep, body: Body
+    ) -> dict[str, dict[str, Any]]:
+        """Return what `info["ik"]["frames"]` holds.
+
+        Reasons are those of this moment, and are computed when they are read.
+
+        Args:
+            q: Measured configuration.
+            goals: Goals in the world.
+            answer: The last solve.
+            body: How the robot follows.
+        """
+        errors, reached = self._compare(q, goals)
+        reasons: Callable[[], Reasons] = tuple
+        if not all(reached):
+            reasons = cache(self._reasons(reached, answer, body))
+        return {
+            frame.name: {
+                "reached": is_reached,
+                "position_error": position,
+                "orientation_error": angle,
+                "reasons": []
+                if is_reached
+                else LazyReasons(partial(_pick, reasons, k)),
+            }
+            for k, (frame, is_reached, (position, angle)) in enumerate(
+                zip(self._config.frames, reached, errors, strict=True)
+            )
+        }
+
+    def _compare(
+        self, q: Vector, goals: Sequence[pin.SE3]
+    ) -> tuple[list[list[float]], list[bool]]:
+        """Return each frame's distances, and whether they are within tolerance."""
+        self._configuration.update(q)
+        errors = self._frames.measure(goals).tolist()
+        linear, angular = self._config.tolerance
+        return errors, [p <= linear and r <= angular for p, r in errors]
+
+    def _reasons(
+        self, reached: Sequence[bool], answer: IkStep, body: Body
+    ) -> Callable[[], Reasons]:
+        """Return a function that finds each frame's reasons, now or later.
+
+        Where the commanded robot is at its goal, the reason is why the body is not;
+        else it is the solver's, or the limits where the solver has none.
+        """
+        standing = float(np.abs(answer.v).max(initial=0.0)) < COMMAND_STANDSTILL
+        explain = answer.record() if answer.record is not None else dict
+        held_back: Reasons = [()] * len(reached)
+        compare = cache(partial(self._compare, body.commanded, body.goals))
+        if standing and any(compare()[1]):
+            held_back = self._held_back(body)
+
+        def find() -> Reasons:
+            solver, commanded = explain(), compare()[1]
+            found: list[Sequence[Reason]] = []
+            for k, frame in enumerate(self._config.frames):
+                if commanded[k]:
+                    why: Sequence[Reason] = held_back[k]
+                elif frame.name in solver:
+                    why = solver[frame.name]
+                else:
+                    why = self._from_limits(k, reached, answer)
+                if not why and standing and not commanded[k]:
+                    why = [OutOfReach()]
+                found.append(why or [InMotion()])
+            return found
+
+        return find
+
+    def _held_back(self, body: Body) -> Reasons:
+        """Return what each frame's limb presses on, or else the joint that lags."""
+        speed = body.speed()
+        if speed > CONTACT_SPEED:
+            return [()] * len(self._support)
+        contacts = [(self._joints_of(x.link), x) for x in body.contacts()]
+        lagging = [body.lagging()] if speed < BODY_STANDSTILL else []
+        return [
+            [contact for joints, contact in contacts if support & joints] or lagging
+            for support in self._support
+        ]
+
+    def _joints_of(self, frame: str) -> set[str]:
+        names = self._configuration.velocity_names()
+        return {names[i] for i in self._configuration.support(frame)}
+
+    def _from_limits(
+        self, k: int, reached: Sequence[bool], answer: IkStep
+    ) -> Sequence[Reason]:
+        """Return the limits on the frame's joints, or else the frames in conflict."""
+        support = self._support[k]
+        limits = [
+            reason
+            for reason in answer.limits()
+            if not (isinstance(reason, ActiveLimit) and reason.is_joint)
+            or reason.name in support
+        ]
+        return limits or [
+            Conflict(other.name)
+            for i, other in enumerate(self._config.frames)
+            if i != k
+            and not reached[i]
+            and other.level <= self._config.frames[k].level
+            and support & self._support[i]
+        ]
+
+
+def _support(configuration: Configuration, frame: ControlledFrame) -> Sequence[int]:
+    if frame.frame is None:
+        return range(configuration.nv)
+    return [int(i) for i in configuration.support(frame.frame)]
+
+
+def _pick(reasons: Callable[[], Reasons], k: int) -> list[Reason]:
+    """Return the k-th reasons, each once."""
+    return list(dict.fromkeys(reasons()[k]))
+
+
+def contacts_of(
+    state: RobotState, *, except_links: Collection[str] = ()
+) -> list[Contact]:
+    """Return what the robot presses on, the greatest force first.
+
+    Args:
+        state: The robot in the simulation.
+        except_links: Links whose contacts are left out, such as feet.
+    """
+    forces: dict[tuple[str, str], float] = defaultdict(float)
+    wrench = np.zeros(6)
+    for i, geoms in enumerate(state.data.contact.geom):
+        links = [_link(state, int(geom)) for geom in geoms]
+        if (links[0] is None) == (links[1] is None):
+            continue
+        own = 0 if links[0] is not None else 1
+        link = str(links[own])
+        if link not in except_links:
+            mujoco.mj_contactForce(state.model, state.data, i, wrench)
+            forces[link, _object(state, int(geoms[1 - own]))] += float(wrench[0])
+    found = [Contact(link=a, other=b, force=f) for (a, b), f in forces.items()]
+    return sorted((x for x in found if x.force > MIN_FORCE), key=lambda x: -x.force)
+
+
+def lagging_joint(
+    state: RobotState, joints: tuple[str, ...], targets: Vector
+) -> TorqueLimit | TrackingError:
+    """Return which joint is farthest from its target, shape (n,), and why."""
+    addresses, _ = state.joint_addresses(joints)
+    errors = np.abs(targets - state.data.qpos[addresses])
+    worst = int(np.argmax(errors))
+    actuator = state.actuator_ids[state.actuators.index(joints[worst])]
+    low, high = state.model.actuator_ctrlrange[actuator]
+    saturated = not low < state.data.ctrl[actuator] < high
+    reason = TorqueLimit if saturated else TrackingError
+    return reason(joints[worst], float(errors[worst]))
+
+
+def _link(state: RobotState, geom: int) -> str | None:
+    name = state.model.body(int(state.model.geom_bodyid[geom])).name
+    own = state.prefix and name.startswith(state.prefix)
+    return name.removeprefix(state.prefix) if own else None
+
+
+def _object(state: RobotState, geom: int) -> str:
+    body = int(state.model.geom_bodyid[geom])
+    names = state.model.body(body).name, state.model.geom(geom).name
+    return names[0] if body else names[1] or "world"

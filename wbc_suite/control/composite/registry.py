@@ -1,0 +1,349 @@
+"""Composite controllers: what drives a whole robot, and where they are found."""
+
+import importlib
+import logging
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Literal, Protocol, TypeAlias, runtime_checkable
+
+from wbc_suite.catalogue import Catalogue
+from wbc_suite.control.action import ActionLayout
+from wbc_suite.control.composite.tick import WholeBodyArrays
+from wbc_suite.control.law.law import Law
+from wbc_suite.control.part.registry import (
+    PartControllerName,
+    is_part_controller,
+    part_models,
+)
+from wbc_suite.control.robot_parts import hands_of
+from wbc_suite.control.state import RobotState
+from wbc_suite.errors import ConfigError, UnknownNameError
+from wbc_suite.robot import RobotDescription, load_robot
+from wbc_suite.tomlfile import read_json, read_toml
+from wbc_suite.typing import RobotName, Vector
+
+__all__ = [
+    "CompositeController",
+    "CompositeControllerName",
+    "CompositeKind",
+    "SteppedController",
+    "TickedController",
+    "build_composite_controller",
+    "composite_names",
+    "default_composite",
+    "load_composite_controller_config",
+    "register_composite",
+    "register_config_converter",
+]
+
+log = logging.getLogger(__name__)
+
+CompositeControllerName: TypeAlias = Literal[
+    "BASIC", "HYBRID_MOBILE_BASE", "WHOLE_BODY_IK", "WHOLE_BODY_MINK_IK"
+]
+"""Names of the built-in composite controllers."""
+
+
+class CompositeController(Protocol):
+    """Drives all actuators of one robot.
+
+    The order of calls is `reset`, then `set_goal` once per action, then `prepare`
+    before the first physics step and whenever its answer has expired. The laws act
+    between `mj_step1` and `mj_step2` of every step, in the compiled loop.
+
+    Attributes:
+        layout: Slices of the action.
+        laws: Laws of the control loop.
+    """
+
+    layout: ActionLayout
+    laws: tuple[Law, ...]
+
+    @property
+    def hold_action(self) -> Vector:
+        """The action that keeps the present goals."""
+        ...
+
+    def info(self, state: RobotState) -> dict[str, Any]:
+        """Return entries of the environment's `info`, by key."""
+        ...
+
+    def reset(self, state: RobotState) -> None:
+        """Start from the robot's state; goals hold it there."""
+        ...
+
+    def set_goal(self, action: Vector, period: float = 0.05) -> None:
+        """Take an action that `layout` has checked and clipped.
+
+        Args:
+            action: Shape (layout.size,).
+            period: Time until the next one, s.
+        """
+        ...
+
+    def prepare(self, state: RobotState) -> int:
+        """Update the laws; return for how many physics steps that is enough."""
+        ...
+
+
+@runtime_checkable
+class SteppedController(CompositeController, Protocol):
+    """A composite controller that computes commands in Python at every physics step.
+
+    Its laws act first; `compute` overrides their commands.
+    """
+
+    def compute(self, state: RobotState) -> Vector:
+        """Return one command per actuator, in the order of `state.actuators`.
+
+        Called after `mj_step1`. A command is a torque, or a setpoint where the actuator
+        is a servo.
+        """
+        ...
+
+
+@runtime_checkable
+class TickedController(CompositeController, Protocol):
+    """A composite controller whose ticks the control loop can run."""
+
+    def loop_tick(self) -> WholeBodyArrays | None:
+        """Return the tick, or None where each needs Python.
+
+        Called once the laws are in the loop's table. Without a tick `prepare` is
+        called as for other controllers.
+        """
+        ...
+
+    def finish_tick(self) -> None:
+        """Finish a tick that the loop has begun, if there is one."""
+        ...
+
+
+Builder = Callable[[Mapping[str, Any], RobotState], CompositeController]
+Check = Callable[[Mapping[str, Any], RobotDescription | None, str], object]
+DefaultConfig = Callable[[RobotDescription], dict[str, Any]]
+
+
+class CompositeKind:
+    """A registered kind of composite controller.
+
+    Args:
+        build: Makes a controller out of a config and the robot in a simulation.
+        family: Files `controllers/{robot}_{family}.toml` hold its configs.
+        default: Makes a config for a robot that has no file.
+        check: Raises ConfigError for what is wrong in a config, for a robot or for
+            none, and names the source.
+    """
+
+    def __init__(
+        self, build: Builder, family: str, default: DefaultConfig, check: Check
+    ) -> None:
+        self.build, self.family, self.default = build, family, default
+        self.check = check
+
+
+_KINDS: dict[str, CompositeKind] = {}
+
+_CONVERTERS = ["wbc_suite.compat.robosuite_json:convert"]
+"""Functions that read configs in other projects' layouts, imported when needed."""
+
+
+def _accept(
+    config: Mapping[str, Any], robot: RobotDescription | None, source: str
+) -> None:
+    """Check nothing: `build` will."""
+
+
+def register_composite(
+    name: str,
+    build: Builder,
+    *,
+    family: str,
+    default: DefaultConfig,
+    check: Check = _accept,
+) -> None:
+    """Make a kind of composite controller known under a name, case ignored.
+
+    Raises:
+        ConfigError: If the name is taken.
+    """
+    if name.upper() in _KINDS:
+        raise ConfigError(f"A composite controller named '{name}' exists already.")
+    _KINDS[name.upper()] = CompositeKind(build, family, default, check)
+
+
+def register_config_converter(path: str) -> None:
+    """Let `load_composite_controller_config` read another layout of configs.
+
+    Args:
+        path: `module:function` of a function `(config, robot, source, named)`, which
+            returns our config of the same meaning, or None for what is not in its
+            layout. `named(type)` returns the robot's usual config of a composite.
+    """
+    _CONVERTERS.append(path)
+
+
+def composite_names() -> tuple[str, ...]:
+    """Return the names of all registered kinds."""
+    return tuple(sorted(_KINDS))
+
+
+def load_composite_controller_config(
+    controller: CompositeControllerName
+    | PartControllerName
+    | str
+    | Path
+    | Mapping[str, Any]
+    | None = None,
+    robot: RobotName | str | Path | RobotDescription | None = None,
+    *,
+    catalogue: Catalogue | None = None,
+) -> dict[str, Any]:
+    """Return a composite controller's config as plain data, `{"type": ..., ...}`.
+
+    Args:
+        controller: A registered name such as `BASIC`, the name of a part controller
+            such as `OSC_POSE` (BASIC with that in all arms), a path to a TOML file or
+            to a JSON file of robosuite, or a config, which is returned as a copy.
+            None: that of `default_composite`.
+        robot: The robot; needed with a name. Names in the config are checked against
+            it.
+        catalogue: Where to look for the robot's file; ours by default.
+
+    Raises:
+        UnknownNameError: If the controller or robot is unknown.
+        ConfigError: If the file cannot be read, or the robot is missing.
+    """
+    catalogue = catalogue or Catalogue()
+    if robot is not None and not isinstance(robot, RobotDescription):
+        robot = load_robot(robot, catalogue=catalogue)
+    config, source = _read(controller, robot, catalogue)
+    _kind_of(config).check(config, robot, source)
+    return config
+
+
+def _read(
+    controller: object, robot: RobotDescription | None, catalogue: Catalogue
+) -> tuple[dict[str, Any], str]:
+    """Return a config, and what to call it in messages."""
+    if isinstance(controller, Mapping):
+        source = str(controller.get("type"))
+        return _converted(dict(controller), source, robot, catalogue), source
+    if not isinstance(controller, str | Path | None):
+        raise UnknownNameError("composite controller", controller, _KINDS)
+    name = str(controller or (default_composite(robot) if robot else "BASIC"))
+    if name.endswith(".json"):
+        return _converted(read_json(Path(name)), name, robot, catalogue), name
+    if is_part_controller(name.upper()):
+        return _of_arms({"type": name.upper()}, name, robot, catalogue), name
+    if name.endswith(".toml"):
+        config = read_toml(Path(name))
+        kind = "BASIC" if "body_parts" in config else "WHOLE_BODY_IK"
+        return {"type": kind} | config, name
+    return _named(name, robot, catalogue)
+
+
+def _converted(
+    config: dict[str, Any],
+    source: str,
+    robot: RobotDescription | None,
+    catalogue: Catalogue,
+) -> dict[str, Any]:
+    """Return a config in our layout, whichever it has."""
+
+    def named(name: str) -> dict[str, Any]:
+        return _named(name, robot, catalogue)[0]
+
+    for path in _CONVERTERS:
+        module, _, function = path.partition(":")
+        convert = getattr(importlib.import_module(module), function)
+        found = convert(config, robot, source, named)
+        if found is not None:
+            return found
+    return config
+
+
+def _of_arms(
+    part: dict[str, Any],
+    source: str,
+    robot: RobotDescription | None,
+    catalogue: Catalogue,
+) -> dict[str, Any]:
+    """Return BASIC with a part's controller in every arm."""
+    if robot is None:
+        raise ConfigError(f"{source}: name the robot: parts depend on it.")
+    basic, _ = _named("BASIC", robot, catalogue)
+    arms = {name: dict(part) for name in hands_of(robot)}
+    return basic | {"body_parts": basic["body_parts"] | arms}
+
+
+def default_composite(robot: RobotDescription) -> str:
+    """Return the composite of a robot that is asked for none.
+
+    What has feet or no hand: WHOLE_BODY_IK. Arms on a base that drives:
+    HYBRID_MOBILE_BASE. Other arms: BASIC.
+    """
+    if not robot.hands or any(frame.role == "foot" for frame in robot.frames):
+        return "WHOLE_BODY_IK"
+    driven = robot.root.kind == "planar" and robot.root.actuated
+    return "HYBRID_MOBILE_BASE" if driven else "BASIC"
+
+
+def _named(
+    name: str, robot: RobotDescription | None, catalogue: Catalogue
+) -> tuple[dict[str, Any], str]:
+    """Return the config of a registered name, from the robot's file if there is one."""
+    kind = _find(name)
+    if robot is None:
+        raise ConfigError(f"Controller '{name}' needs a robot to be configured for.")
+    own_type = {"type": name.upper()}
+    try:
+        file = catalogue.find(
+            "controllers", f"{robot.name}_{kind.family}", kind="controller file"
+        )
+    except UnknownNameError:
+        return kind.default(robot) | own_type, f"{name} for {robot.name}"
+    config = read_toml(file) | own_type
+    if catalogue.is_ours(file) and not _fits(kind, config, robot):
+        log.warning("%s is not for this '%s': names differ.", file.name, robot.name)
+        return kind.default(robot) | own_type, f"{name} for {robot.name}"
+    return config, str(file)
+
+
+def _fits(
+    kind: CompositeKind, config: Mapping[str, Any], robot: RobotDescription
+) -> bool:
+    """Whether the robot is ours, and not another of the same name."""
+    try:
+        kind.check(config, robot, "")
+    except ConfigError:
+        return False
+    return True
+
+
+def build_composite_controller(
+    config: Mapping[str, Any], state: RobotState
+) -> CompositeController:
+    """Make the controller that a config describes for a robot in a simulation.
+
+    Raises:
+        UnknownNameError: If the type, or a frame or joint in it, is unknown.
+        ConfigError: If a key or a value is wrong.
+    """
+    return _kind_of(config).build(config, state)
+
+
+def _kind_of(config: Mapping[str, Any]) -> CompositeKind:
+    if not isinstance(config.get("type"), str):
+        raise ConfigError(
+            f"A controller config needs a key 'type', one of: "
+            f"{', '.join(composite_names())}."
+        )
+    return _find(config["type"])
+
+
+def _find(name: str) -> CompositeKind:
+    if name.upper() not in _KINDS:
+        known = {**_KINDS, **part_models()}
+        raise UnknownNameError("composite controller or part controller", name, known)
+    return _KINDS[name.upper()]

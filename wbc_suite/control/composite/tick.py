@@ -1,0 +1,186 @@
+"""One tick of whole-body inverse kinematics, compiled.
+
+    goals -> targets nearby -> QP -> motors suffice? -> spline -> references of the laws
+
+The control loop calls `run_tick` between two physics steps. Where Python has to think,
+it returns: for the planner, for a QP whose active set is not found, and for motors that
+saturate. The controller then finishes the tick, see `WholeBodyIK.finish_tick`.
+"""
+
+from enum import IntEnum
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+
+from wbc_suite.compiling import compiled, struct
+from wbc_suite.control.composite.frame_goals import GoalArrays, place_goals
+from wbc_suite.control.composite.frame_targets import (
+    CENTRE_OF_MASS,
+    FrameArrays,
+    PostureArrays,
+)
+from wbc_suite.control.composite.progress import (
+    Event,
+    ProgressArrays,
+    approach_goals,
+    record_state,
+    watch_progress,
+)
+from wbc_suite.control.composite.torque_limiter import TorqueArrays, motors_suffice
+from wbc_suite.control.law.reference import set_reference
+from wbc_suite.control.loop.records import CompiledRecords, Records
+from wbc_suite.control.part.spline_reference import (
+    SplineArrays,
+    extend_spline,
+    lead_root,
+)
+from wbc_suite.qp.tick import TickArrays, TickStatus, solve_tick
+from wbc_suite.typing import Indices, Vector
+
+__all__ = ["TICK", "Stage", "Ticks", "WholeBodyArrays", "run_tick"]
+
+
+_FIRST_LEVEL: int = np.int64(0)  # pyright: ignore[reportAssignmentType]
+"""Typed, since a literal would be compiled once more."""
+
+
+class Stage(IntEnum):
+    """Where a tick is."""
+
+    DONE = 0
+    PLAN = 1
+    """The planner has to act."""
+    SOLVE = 2
+    """The QP is stated, and not solved."""
+    LIMIT = 3
+    """The QP is solved, and a motor saturates."""
+    DONE_IN_PYTHON = 4
+
+
+TICK = np.dtype(
+    [
+        ("stage", "i8"),  # `Stage`
+        ("event", "i8"),  # `Event` of the planner
+        ("status", "i8"),  # `TickStatus` of the QP
+        ("level", "i8"),  # at which it ended
+        ("countdown", "i8"),  # physics steps until the next tick
+    ]
+)
+"""State of a tick."""
+
+
+@struct
+class WholeBodyArrays(NamedTuple):
+    """What a tick reads and writes.
+
+    Attributes:
+        state: `TICK` record, shape (1,).
+        goals: Goals as they are given.
+        frames: Controlled frames.
+        posture: The preferred posture.
+        progress: Progress towards the goals.
+        qp: The stack of tasks; its robot is at the commanded configuration.
+        task_level: Strict level of the task of each frame, shape (n,).
+        task_row: Place of the task on its level, shape (n,).
+        posture_level: Strict level of the posture.
+        motors: The motors.
+        spline: References until the next tick.
+        v: Velocity of the last tick, shape (nv,).
+        joint_law: Index of the law of joints in the loop's table.
+        stance_law: That of the law of feet, -1 without one.
+        steps: Physics steps between two ticks.
+    """
+
+    state: Records
+    goals: GoalArrays
+    frames: FrameArrays
+    posture: PostureArrays
+    progress: ProgressArrays
+    qp: TickArrays
+    task_level: Indices
+    task_row: Indices
+    posture_level: int
+    motors: TorqueArrays
+    spline: SplineArrays
+    v: Vector
+    joint_law: int
+    stance_law: int
+    steps: int
+
+
+Ticks: TypeAlias = Any
+"""A tuple of `WholeBodyArrays`, one for each robot whose ticks the loop runs; None
+without any, which leaves them out of the machine code."""
+
+
+@compiled
+def run_tick(
+    tick: WholeBodyArrays, qpos: Vector, laws: CompiledRecords, drives: CompiledRecords
+) -> bool:
+    """Run a tick as far as it needs no Python.
+
+    Args:
+        tick: The tick.
+        qpos: Measured positions of the simulation.
+        laws: `LAW` records of the loop.
+        drives: `DRIVE` records of the loop.
+
+    Returns:
+        Whether it is done; see `Stage` where it is not.
+    """
+    state, qp, robot = tick.state[0], tick.qp, tick.qp.robot
+    place_goals(tick.goals, robot, tick.frames, qpos)
+    state.event = watch_progress(tick.progress, robot, tick.frames, tick.v)
+    if state.event != Event.NONE:
+        state.stage = Stage.PLAN.value
+        return False
+    record_state(tick.progress, robot, tick.v)
+    approach_goals(tick.progress, robot, tick.frames, tick.posture)
+    _write_task_targets(tick)
+    qp.v[:] = tick.v
+    state.status, state.level = solve_tick(qp, tick.progress.dt, _FIRST_LEVEL)
+    if state.status != TickStatus.SOLVED:
+        state.stage = Stage.SOLVE.value
+        return False
+    if not motors_suffice(tick.motors, robot, tick.v, qp.v, tick.progress.dt):
+        state.stage = Stage.LIMIT.value
+        return False
+    tick.v[:] = qp.v
+    extend_spline(tick.spline, tick.v)
+    _lead_laws(tick, laws, drives)
+    state.stage, state.countdown = Stage.DONE.value, tick.steps
+    return True
+
+
+@compiled
+def _write_task_targets(tick: WholeBodyArrays) -> None:
+    """Write the targets of frames and posture into the tasks of the stack."""
+    frames, levels = tick.frames, tick.qp.levels
+    for k in range(frames.joint.shape[0]):
+        target, found = (
+            levels[tick.task_level[k]].tasks.target[tick.task_row[k]],
+            frames.target[k],
+        )
+        if frames.joint[k] == CENTRE_OF_MASS:
+            for i in range(3):
+                target[i] = found[4 * i + 3]
+        else:
+            for i in range(12):
+                target[i] = found[i]
+    posture = levels[tick.posture_level].tasks.joint_target[0]
+    for i in range(posture.shape[0]):
+        posture[i] = tick.posture.target[i]
+
+
+@compiled
+def _lead_laws(
+    tick: WholeBodyArrays, laws: CompiledRecords, drives: CompiledRecords
+) -> None:
+    """Hand the spline to the laws."""
+    law, stance = tick.joint_law, tick.stance_law
+    own = drives[laws[law].first : laws[law].last]
+    set_reference(laws[law : law + 1], own, tick.spline.motion)
+    if stance >= 0:
+        own = drives[laws[stance].first : laws[stance].last]
+        set_reference(laws[stance : stance + 1], own, tick.spline.motion)
+        lead_root(tick.spline, laws[stance : stance + 1])

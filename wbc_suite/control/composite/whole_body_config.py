@@ -1,0 +1,324 @@
+"""Config of the whole-body composites: `controllers/{robot}_whole_body_ik.toml`."""
+
+from collections.abc import Collection, Iterator, Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import (
+    AfterValidator,
+    Field,
+    NonNegativeFloat,
+    PositiveFloat,
+    model_validator,
+)
+
+from wbc_suite.control.composite.frame_kinds import FrameKind, find_frame_kind
+from wbc_suite.control.composite.reduced_robot import gripper_groups
+from wbc_suite.control.law.joint_laws import JointLawConfig
+from wbc_suite.control.part.stance_controller import HeldFrame
+from wbc_suite.errors import ConfigError, UnknownNameError
+from wbc_suite.robot import RobotDescription
+from wbc_suite.robot.elements import Name
+from wbc_suite.robot.mjcf_export import STOP_MARGIN
+from wbc_suite.tomlfile import FrozenModel, parse_model
+
+__all__ = [
+    "ControlledFrame",
+    "HeldFrame",
+    "InputFrame",
+    "InputType",
+    "LimitsConfig",
+    "PostureConfig",
+    "WholeBodyIKConfig",
+    "check_whole_body",
+    "default_whole_body_config",
+    "read_whole_body",
+]
+
+InputType = Literal["absolute", "delta"]
+InputFrame = Literal["world", "base", "eef"]
+
+
+def _registered(kind: str) -> str:
+    try:
+        return find_frame_kind(kind).name
+    except UnknownNameError as error:
+        raise ValueError(str(error)) from error
+
+
+class ControlledFrame(FrozenModel):
+    """A frame that an action slice moves.
+
+    Attributes:
+        name: Name of the slice.
+        frame: Frame or link of the robot; absent for the centre of mass.
+        kind: A registered kind: `pose`, `position`, `orientation`, `com` (the centre of
+            mass), `base` (x, y and yaw), or one's own; see `frame_kinds`.
+        position_cost: [cost]/m.
+        orientation_cost: [cost]/rad.
+        gain: Fraction of the error that one solve removes, (0, 1].
+        level: Strict priority, 0 first.
+        max_linear_speed: Greatest speed asked for, m/s.
+        max_angular_speed: Greatest angular speed asked for, rad/s.
+        linear_braking: Deceleration towards the goal, m/s^2.
+        angular_braking: Deceleration towards the goal, rad/s^2.
+        range: How far from its pose at reset the frame may be sent, m and rad; goals
+            beyond are brought back to there. Keeps a standing robot on its feet.
+    """
+
+    name: Name
+    frame: Name | None = None
+    kind: Annotated[str, AfterValidator(_registered)] = "pose"
+    position_cost: NonNegativeFloat = 1.0
+    orientation_cost: NonNegativeFloat = 1.0
+    gain: float = Field(default=0.5, gt=0.0, le=1.0)
+    level: int = Field(default=0, ge=0, le=3)
+    max_linear_speed: PositiveFloat = 2.0
+    max_angular_speed: PositiveFloat = 6.0
+    linear_braking: PositiveFloat = 4.0
+    angular_braking: PositiveFloat = 12.0
+    range: tuple[PositiveFloat, PositiveFloat] | None = None
+
+    @model_validator(mode="after")
+    def _frame_given(self) -> "ControlledFrame":
+        if (self.frame is not None) != self.behaviour.needs_frame:
+            rule = "is needed" if self.behaviour.needs_frame else "must be absent"
+            raise ValueError(f"'frame' {rule} for kind '{self.kind}'")
+        return self
+
+    @property
+    def behaviour(self) -> FrameKind:
+        """What frames of the kind have in common."""
+        return find_frame_kind(self.kind)
+
+
+class PostureConfig(FrozenModel):
+    """Pull to a posture, on the last level.
+
+    Attributes:
+        keyframe: The posture.
+        cost: [cost]/rad or [cost]/m for all joints.
+        costs: Costs of single joints, in place of `cost`.
+        level: Strict priority.
+        gain: Fraction of the difference that one solve removes, (0, 1].
+        speed: Greatest joint speed asked for, rad/s or m/s.
+        braking: Deceleration towards the posture, as a part of the joints' limits.
+    """
+
+    keyframe: Name = "ready"
+    cost: PositiveFloat = 0.1
+    costs: dict[Name, NonNegativeFloat] = {}
+    level: int = Field(default=1, ge=0, le=3)
+    gain: float = Field(default=0.1, gt=0.0, le=1.0)
+    speed: PositiveFloat = 1.0
+    braking: float = Field(default=0.8, gt=0.0, le=1.0)
+
+
+class LimitsConfig(FrozenModel):
+    """Limits of the command.
+
+    Attributes:
+        position_margin: Distance kept from joint limits, rad or m.
+        positions: Narrower ranges of single joints, rad or m.
+        velocity_scale: Factor on the robot's own velocity limits.
+        acceleration: Greatest joint acceleration, rad/s^2 or m/s^2.
+        base_acceleration: Greatest acceleration of a moving root, m/s^2 and rad/s^2.
+        jerk: Greatest jerk of a joint's target, rad/s^3 or m/s^3; targets lag by
+            `acceleration / jerk`.
+        effort_share: Part of a motor's effort that acceleration may take; it bounds
+            the joint's acceleration through the inertia at the posture.
+        self_collision: Whether links are kept apart.
+        collision_pairs: How many of the nearest pairs of links are watched.
+        collision_distance: Distance kept between links, m.
+        floor: Height in the world of what a robot on its feet stands on, m; all but its
+            legs keep the same distance from it.
+        weight_shares: Part of a joint's effort that holding still may take, by joint.
+        balance_margin: Distance kept from the edges of the soles, m.
+    """
+
+    position_margin: NonNegativeFloat = STOP_MARGIN
+    positions: dict[Name, tuple[float, float]] = {}
+    velocity_scale: float = Field(default=1.0, gt=0.0, le=1.0)
+    acceleration: PositiveFloat = 50.0
+    base_acceleration: tuple[PositiveFloat, PositiveFloat] = (5.0, 10.0)
+    jerk: float = Field(default=5000.0, ge=100.0)
+    effort_share: float = Field(default=0.6, gt=0.0, le=1.0)
+    self_collision: bool = True
+    collision_pairs: int = Field(default=20, ge=1, le=200)
+    collision_distance: PositiveFloat = 0.005
+    floor: float = 0.0
+    weight_shares: dict[Name, PositiveFloat] = {}
+    balance_margin: NonNegativeFloat = 0.03
+
+
+class WholeBodyIKConfig(FrozenModel):
+    """Config of a whole-body IK controller.
+
+    Attributes:
+        format: Version of the format, 1.
+        type: Registered name.
+        frames: Controlled frames, in the order of the action.
+        held: Frames in contact.
+        locked: Groups of joints that are kept at the posture.
+        posture: Pull to a posture.
+        limits: Limits of the command.
+        input_type: `absolute` targets, or `delta` steps from the last target.
+        input_ref_frame: Axes of targets and steps: `world`, the robot's `base`, or the
+            controlled frame's own (`eef`, deltas only).
+        delta_position: Largest step of a delta action, m.
+        delta_rotation: Largest step of a delta action, rad.
+        solve_hz: Solves per second.
+        joint_law: Gains of the joint-position law.
+        planning: Whether to plan motions around obstacles and local minima; else all
+            goals are approached on straight lines.
+        far: Distances of a goal, m and rad, from which on a goal configuration is
+            searched and a joint-space motion to it planned.
+        search_iterations: Iterations of that search in one solve; twice as many while
+            the robot stands.
+        tolerance: Errors below which a frame counts as reached, m and rad.
+    """
+
+    format: Literal[1] = 1
+    type: str = "WHOLE_BODY_IK"
+    frames: tuple[ControlledFrame, ...] = Field(alias="frame", min_length=1)
+    held: tuple[HeldFrame, ...] = ()
+    locked: tuple[Name, ...] = ()
+    posture: PostureConfig = PostureConfig()
+    limits: LimitsConfig = LimitsConfig()
+    input_type: InputType = "absolute"
+    input_ref_frame: InputFrame = "world"
+    delta_position: PositiveFloat = 0.05
+    delta_rotation: PositiveFloat = 0.5
+    solve_hz: Annotated[float, Field(ge=10.0, le=1000.0)] = 100.0
+    joint_law: JointLawConfig = JointLawConfig()
+    planning: bool = True
+    far: tuple[PositiveFloat, PositiveFloat] = (0.15, 0.6)
+    search_iterations: int = Field(default=25, ge=0)
+    tolerance: tuple[PositiveFloat, PositiveFloat] = (1e-3, 3.5e-3)
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "WholeBodyIKConfig":
+        names = [frame.name for frame in self.frames]
+        if len(set(names)) != len(names):
+            raise ValueError(f"controlled frames share a name: {names}")
+        if self.input_type == "absolute" and self.input_ref_frame == "eef":
+            raise ValueError(
+                "input_ref_frame 'eef' needs input_type 'delta': a frame is always at "
+                "the origin of its own axes"
+            )
+        return self
+
+
+def default_whole_body_config(robot: RobotDescription) -> dict[str, Any]:
+    """Return a config for a robot without a file: hands as poses, feet held.
+
+    A base that glides is moved where the hands leave it free. A robot without hands is
+    moved by its trunk or its head.
+    """
+    frames = [
+        {"name": _hand_name(side, len(robot.hands)), "frame": frame, "kind": "pose"}
+        for side, frame in robot.hands.items()
+    ]
+    if robot.root.kind == "planar":
+        frames.append(_gliding_base(robot))
+    frames = frames or [{"name": name, "frame": name} for name in [_foremost(robot)]]
+    feet = [f.name for f in robot.frames if f.role == "foot"]
+    held = feet if robot.root.kind == "free" else []
+    keyframe = "ready" if "ready" in robot.keyframes else ""
+    config: dict[str, Any] = {"format": 1, "frame": frames}
+    contact = "surface" if len(held) < 3 else "point"  # a biped balances on its soles
+    config["held"] = [{"frame": name, "contact": contact} for name in held]
+    if held:  # no faster than pressure under the feet can follow
+        config["limits"] = {"acceleration": 12.0, "base_acceleration": (1.0, 2.0)}
+        for frame in frames:
+            frame |= {"linear_braking": 1.0, "angular_braking": 2.0}
+    if keyframe:
+        config["posture"] = {"keyframe": keyframe}
+    return config
+
+
+def _hand_name(side: str, count: int) -> str:
+    if side in ("right", "left"):
+        return f"{side}_hand"
+    return "right_hand" if count == 1 else side
+
+
+def _gliding_base(robot: RobotDescription) -> dict[str, Any]:
+    """Return the frame of a planar root, with the pace of a careful driver."""
+    root = robot.links[0].name
+    found = [f.name for f in robot.frames if f.role == "base" and f.link == root]
+    return {
+        "name": "base",
+        "frame": (found or [root])[0],
+        "kind": "base",
+        "level": 1,
+        "position_cost": 5.0,  # above the posture, which is on the same level
+        "orientation_cost": 5.0,
+        "max_linear_speed": 0.3,
+        "max_angular_speed": 0.4,
+        "linear_braking": 0.5,
+        "angular_braking": 0.8,
+    }
+
+
+def _foremost(robot: RobotDescription) -> str:
+    """Return the frame, or else the link, that moves a robot without hands."""
+    moving: list[str] = []
+    for link in robot.links:
+        root_moves = link.parent is None and robot.root.kind != "fixed"
+        if root_moves or link.joint is not None or link.parent in moving:
+            moving.append(link.name)
+    if not moving:
+        raise ConfigError(f"{robot.name}: it has no joint, so nothing can be moved.")
+    frames = {f.role: f.name for f in robot.frames if f.link in moving}
+    roles = ("torso", "base", "head")
+    last = robot.links[0].name if robot.root.kind == "free" else moving[-1]
+    return next((frames[r] for r in roles if r in frames), last)
+
+
+def check_whole_body(
+    config: Mapping[str, Any], robot: RobotDescription | None, source: str
+) -> None:
+    """Raise what `read_whole_body` raises; without a robot only the format's rules."""
+    if robot is None:
+        parse_model(WholeBodyIKConfig, config, source=source)
+    else:
+        read_whole_body(config, robot, source)
+
+
+def read_whole_body(
+    config: Mapping[str, Any], robot: RobotDescription, source: str
+) -> WholeBodyIKConfig:
+    """Return the config as a model.
+
+    Raises:
+        ConfigError: If it breaks a rule of the format, or names what the robot does
+            not have. It names the source, the key, the value and the nearest name.
+    """
+    read = parse_model(WholeBodyIKConfig, config, source=source)
+    for key, kind, name, known in _names(read, robot):
+        if name not in known:
+            unknown = UnknownNameError(kind, name, known)
+            raise ConfigError(f"{source}: key '{key}': {robot.name}: {unknown}")
+    return read
+
+
+def _names(
+    config: WholeBodyIKConfig, robot: RobotDescription
+) -> Iterator[tuple[str, str, str, Collection[str]]]:
+    frames = [*(f.name for f in robot.frames), *(x.name for x in robot.links)]
+    for k, frame in enumerate(config.frames):
+        if frame.frame is not None:
+            yield f"frame[{k}].frame", "frame", frame.frame, frames
+    for k, held in enumerate(config.held):
+        yield f"held[{k}].frame", "frame", held.frame, frames
+    for k, group in enumerate(config.locked):
+        yield f"locked[{k}]", "group", group, robot.groups
+    if "keyframe" in config.posture.model_fields_set:
+        keyframe = config.posture.keyframe
+        yield "posture.keyframe", "keyframe", keyframe, robot.keyframes
+    rigid = {*config.locked, *gripper_groups(robot)}
+    fixed = {j for group in rigid for j in robot.groups.get(group, ())}
+    moving = [j for j in robot.joint_names if j not in fixed]
+    for joint in config.posture.costs:
+        known = [*moving, *robot.root_joint_names]
+        yield f"posture.costs.{joint}", "moving joint", joint, known

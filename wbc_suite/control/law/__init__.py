@@ -1,0 +1,1 @@
+"""Control laws: one module for each, with its kernel."""

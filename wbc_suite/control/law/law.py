@@ -1,0 +1,188 @@
+"""Control laws: references of joints, and the records that the loop reads."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from wbc_suite.control.law.reference import hold_reference, set_reference
+from wbc_suite.control.loop.records import DRIVE, LAW, LawKind, Records, new_records
+from wbc_suite.control.state import RobotState
+from wbc_suite.errors import ConfigError
+from wbc_suite.typing import Indices, Matrix, Vector
+
+__all__ = ["Law", "ServoLaw", "TorqueLaw"]
+
+DECELERATION = 10.0
+"""rad/s^2 or m/s^2; joints stop at their limits with it unless the robot's description
+gives another. Arms of the catalogue can do so carrying themselves."""
+
+FOREVER = np.inf
+"""s; a reference that moves until it is replaced."""
+
+
+class Law:
+    """A law for some driven joints; its numbers are in records that the loop reads.
+
+    The kernel of each kind stands beside its class; `loop.inverse_dynamics` computes
+    torques from the accelerations that all laws ask for.
+
+    Args:
+        kind: Selects the kernel: a `LawKind`, or what `register_law` returned.
+        state: The robot in the simulation.
+        joints: Driven joints; each has an actuator.
+
+    Attributes:
+        joints: The driven joints.
+        record: Its `LAW` record, shape (1,).
+        drives: Its `DRIVE` records, shape (n,).
+        index: Its place in the table of a simulation.
+
+    Raises:
+        ConfigError: If a joint has no actuator.
+    """
+
+    index: int = 0
+
+    def __init__(self, kind: int, state: RobotState, joints: Sequence[str]) -> None:
+        self.joints = tuple(joints)
+        places = {name: i for i, name in enumerate(state.actuators)}
+        for name in joints:
+            if name not in places:
+                raise ConfigError(f"{state.robot.name}: joint '{name}' has no motor.")
+        self.outputs: Indices = np.array([places[j] for j in joints], dtype=np.int64)
+        self.record: Records = new_records(1, LAW)
+        self.drives: Records = new_records(len(self.joints), DRIVE)
+        self.record["kind"], self.record["compensation"] = kind, 1.0
+        self.record["duration"] = FOREVER
+        drives = self.drives
+        drives["qpos"], drives["dof"] = state.joint_addresses(self.joints)
+        drives["ctrl"] = state.actuator_ids[self.outputs]
+        limits = state.model.actuator_ctrlrange[drives["ctrl"]]
+        limited = state.model.actuator_ctrllimited[drives["ctrl"]].astype(bool)
+        drives["command_min"] = np.where(limited, limits[:, 0], -np.inf)
+        drives["command_max"] = np.where(limited, limits[:, 1], np.inf)
+        drives["position_min"], drives["position_max"] = -np.inf, np.inf
+        drives["velocity_max"], drives["deceleration"] = np.inf, DECELERATION
+        drives["windup_max"], drives["correction_max"] = np.inf, np.inf
+
+    def reset(self, state: RobotState) -> None:
+        """Reset the disturbance observer."""
+        drives = self.drives
+        drives["desired"] = drives["saturation"] = drives["disturbance"] = 0.0
+        drives["last_velocity"] = state.data.qvel[drives["dof"]]
+
+    def keep_limits(self, state: RobotState) -> None:
+        """Keep the robot's position and velocity limits; see `acceleration_limits`.
+
+        Positions end where the joint's stop begins to act.
+        """
+        for drive, name in zip(self.drives, self.joints, strict=True):
+            joint = state.robot.joint(name)
+            margin = state.model.joint(state.prefix + name).margin.item()
+            low, high = joint.range or (-np.inf, np.inf)
+            drive["position_min"], drive["position_max"] = low + margin, high - margin
+            drive["velocity_max"] = joint.velocity or np.inf
+            drive["deceleration"] = joint.acceleration or DECELERATION
+
+    def adopt(self, record: Records, drives: Records, index: int = 0) -> None:
+        """Use these records, which hold the same values: those of a simulation.
+
+        Args:
+            record: Shape (1,).
+            drives: Shape (n,).
+            index: Place of the law in the simulation's table.
+        """
+        self.record, self.drives, self.index = record, drives, index
+
+    def aim(
+        self,
+        position: Vector,
+        velocity: Vector | float = 0.0,
+        acceleration: Vector | float = 0.0,
+        jerk: Vector | float = 0.0,
+        *,
+        duration: float = FOREVER,
+    ) -> None:
+        """Set the reference from now on.
+
+            position + velocity s + acceleration s^2 / 2 + jerk s^3 / 6
+
+        Args:
+            position: Shape (n,), rad or m (N m or N of a torque law).
+            velocity: Shape (n,).
+            acceleration: Shape (n,).
+            jerk: Shape (n,).
+            duration: The reference stands still after so many seconds.
+        """
+        drives = self.drives
+        drives["position"], drives["velocity"] = position, velocity
+        drives["acceleration"], drives["jerk"] = acceleration, jerk
+        self.record["since"], self.record["duration"] = 0.0, duration
+
+    def rest_at(self, position: Vector) -> None:
+        """Set a constant reference: `aim` in one compiled call.
+
+        Args:
+            position: Shape (n,), contiguous.
+        """
+        assert len(position) == len(self.drives), "one position for each drive"
+        hold_reference(self.record, self.drives, position)
+
+    def follow(self, motion: Matrix) -> None:
+        """Set a moving reference: `aim` in one compiled call.
+
+        Args:
+            motion: Positions, velocities, accelerations and jerks, shape (4, n),
+                contiguous.
+        """
+        assert motion.shape == (4, len(self.drives)), "one column for each drive"
+        set_reference(self.record, self.drives, motion)
+
+    def move(self, position: Vector, duration: float) -> None:
+        """Move the reference to a position at constant velocity.
+
+        Args:
+            position: Shape (n,).
+            duration: Time of the motion, s; at 0 the reference jumps.
+        """
+        if duration > 0.0:
+            now, _, _ = self.target()
+            self.aim(now, (position - now) / duration, duration=duration)
+        else:
+            self.rest_at(position)
+
+    def narrow(self, low: Vector | float, high: Vector | float) -> None:
+        """Keep commands within these limits as well as the actuators', N m or N."""
+        drives = self.drives
+        drives["command_min"] = np.maximum(drives["command_min"], low)
+        drives["command_max"] = np.minimum(drives["command_max"], high)
+
+    def target(self) -> tuple[Vector, Vector, Vector]:
+        """Return position, velocity and acceleration of the reference, (n,) each."""
+        since, duration = float(self.record["since"][0]), self.record["duration"][0]
+        s, moving = min(since, duration), float(since <= duration)
+        drives = self.drives
+        rate, curve, bend = drives["velocity"], drives["acceleration"], drives["jerk"]
+        position = drives["position"] + s * (rate + s * (0.5 * curve + s / 6.0 * bend))
+        velocity = moving * (rate + s * (curve + 0.5 * s * bend))
+        return position, velocity, moving * (curve + s * bend)
+
+
+class ServoLaw(Law):
+    """Setpoints of actuators that are servos themselves, such as fingers'."""
+
+    def __init__(self, state: RobotState, joints: Sequence[str]) -> None:
+        super().__init__(LawKind.SERVO, state, joints)
+
+
+class TorqueLaw(Law):
+    """Torques on top of those that compensate gravity and Coriolis forces.
+
+        tau = tau* + h
+
+    It minimises `|| tau - h - tau* ||^2`. The joints' own friction stays, so motion
+    decays; other laws' accelerations have no effect, so joints at rest stay at rest.
+    """
+
+    def __init__(self, state: RobotState, joints: Sequence[str]) -> None:
+        super().__init__(LawKind.TORQUE, state, joints)

@@ -1,0 +1,285 @@
+"""The law in operational space: its class, and its kernel."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pinocchio as pin
+
+from wbc_suite.compiling import compiled
+from wbc_suite.control.law.law import Law
+from wbc_suite.control.law.osc_saturation import keep_direction
+from wbc_suite.control.loop.acceleration_limits import limit_accelerations
+from wbc_suite.control.loop.physics import OscWork, Physics
+from wbc_suite.control.loop.records import CompiledRecords, LawKind
+from wbc_suite.control.loop.rigid_body import (
+    matrix_product,
+    moves_body,
+    point_jacobian_column,
+    point_velocity_and_drift,
+    rotation,
+    write_inertia,
+)
+from wbc_suite.control.state import RobotState
+from wbc_suite.linear_algebra import (
+    cholesky,
+    inverse_trace,
+    lq_factor,
+    lq_solve,
+    solve_lower,
+    solve_upper,
+)
+from wbc_suite.qp.lie import exp3, log3, saturate
+from wbc_suite.typing import Matrix, Vector
+
+__all__ = ["LEAST_DAMPING", "SINGULAR", "OscLaw", "osc_law"]
+
+SINGULAR = 1e-4
+"""1/kg or 1/(kg m^2); directions in which the hand is less mobile are damped."""
+
+LEAST_DAMPING = 1e-9
+"""1/s; the velocity that stiffness asks for is kp / kd."""
+
+
+class OscLaw(Law):
+    """A site follows its goal; joints hold a posture in its null space.
+
+    Among all joint accelerations that move the site as wanted, the nearest to those
+    that the posture asks for, measured by inertia:
+
+        minimise    (a - a0)^T M (a - a0)
+        subject to  J a = x'' - J' v,     x'' = kd (u - v_s),  u = kp / kd e + v*
+
+    Its KKT conditions give, with the inertia L = (J M^-1 J^T)^-1 at the site,
+
+        a = a0 + M^-1 J^T L (x'' - J' v - J a0),    tau = M a + h.
+
+    e is the error of pose (rotation vector of `R* R^T`), v_s the site's velocity and v*
+    that of the reference, all in the axes of the reference body, in which kp and kd may
+    differ by axis: `x'' = kp e + kd e'`. The velocity u is saturated at `speed`, for
+    linear and angular motion each. A goal in a moving reference body moves with it. A
+    wrench f displaces the site by `(L kp)^-1 f`.
+
+    Where joints saturate, see `osc_saturation`.
+
+    Args:
+        state: The robot in the simulation.
+        joints: Joints that move the site.
+        site: The site's name in the robot.
+
+    Source: Khatib (1987), "A unified approach for motion and force control of robot
+    manipulators: the operational space formulation", IEEE J. Robotics and Automation.
+    """
+
+    def __init__(self, state: RobotState, joints: Sequence[str], site: str) -> None:
+        super().__init__(LawKind.OSC, state, joints)
+        self.record["site"] = state.model.site(state.prefix + site).id
+        self.record["speed"] = np.inf
+
+    def set_goal(
+        self, goal: pin.SE3, *, start: pin.SE3 | None = None, duration: float = 0.0
+    ) -> None:
+        """Set the goal in the axes of the reference body.
+
+        Args:
+            goal: Final pose.
+            start: Pose of the reference now; the goal when absent.
+            duration: Time of the motion from there, s, at constant velocities.
+        """
+        start = goal if start is None else start
+        record = self.record
+        record["start"][0] = (*start.rotation.ravel(), *start.translation)
+        record["shift"][0] = goal.translation - start.translation
+        record["turn"][0] = pin.log3(start.rotation.T @ goal.rotation)
+        record["since"], record["duration"] = 0.0, duration
+
+    def jump(self, goal: Vector) -> None:
+        """Set the goal at once: rotation row by row, and position, shape (12,)."""
+        record = self.record
+        record["start"][0], record["shift"], record["turn"] = goal, 0.0, 0.0
+        record["since"] = record["duration"] = 0.0
+
+    def frames(self, state: RobotState) -> tuple[Vector, Vector, Vector, Vector]:
+        """Return views of rotation and position of the reference, then of the site."""
+        body, site = int(self.record["reference"][0]), int(self.record["site"][0])
+        data = state.data
+        return (
+            data.xmat[body],
+            data.xpos[body],
+            data.site_xmat[site],
+            data.site_xpos[site],
+        )
+
+    def target_pose(self) -> tuple[pin.SE3, Vector]:
+        """Return pose and twist of the reference, in the reference body's axes."""
+        record = self.record[0]
+        duration = float(record["duration"])
+        phase = min(1.0, float(record["since"]) / duration) if duration > 0.0 else 1.0
+        moving = 1.0 / duration if 0.0 < duration >= record["since"] else 0.0
+        start, turn = record["start"][:9].reshape(3, 3), record["turn"]
+        pose = pin.SE3(
+            start @ pin.exp3(phase * turn),
+            record["start"][9:] + phase * record["shift"],
+        )
+        return pose, moving * np.concatenate([record["shift"], start @ turn])
+
+    def site_pose(self, state: RobotState) -> pin.SE3:
+        """Return the site's pose in the axes of the reference body."""
+        R_wb, p_wb, R_ws, p_ws = self.frames(state)
+        T_wb = pin.SE3(R_wb.reshape(3, 3), p_wb)
+        return T_wb.actInv(pin.SE3(R_ws.reshape(3, 3), p_ws))
+
+
+@compiled
+def osc_law(physics: Physics, law: CompiledRecords, drives: CompiledRecords) -> None:
+    """Write the joint accelerations of `OscLaw`, within the joints' limits.
+
+    With `M = C C^T` and `z = C^T (a - a0)` the law is the shortest z with
+
+        Y z = x'' - J' v - J a0,    Y = J C^-T,    Y Y^T = J M^-1 J^T,
+
+    found by an LQ factorisation of Y: as exact as Y itself, where the mobility `Y Y^T`
+    of a stretched arm has lost half of the digits.
+    """
+    n, work = law.last - law.first, physics.osc
+    J, C, wanted, posture, z = work.J, work.C, work.wanted, work.posture, work.z
+    for j in range(n):
+        drive = drives[law.first + j]
+        work.dofs[j] = drive.dof
+        error = drive.position - physics.qpos[drive.qpos]
+        posture[j] = drive.kp * error - drive.kd * physics.qvel[drive.dof]
+    _write_task_acceleration(physics, law)
+    _write_site_jacobian(physics, law, n)
+    write_inertia(physics, work.dofs, n, C)
+    cholesky(C, n, 0.0)
+    for i in range(6):
+        for j in range(n):
+            wanted[i] -= J[i, j] * posture[j]
+        solve_lower(C, J[i], n)
+    _write_damped_factors(J, n, work.L, work.Q, work.column)
+    solve_lower(work.L, wanted, 6)
+    lq_solve(work.Q, n + 6, wanted, z)
+    solve_upper(C, z, n)
+    for j in range(n):
+        physics.acceleration[work.dofs[j]] = posture[j] + z[j]
+    if law.keep_direction > 0.0:
+        keep_direction(physics, law, drives)
+    limit_accelerations(physics, law, drives)
+
+
+@compiled
+def _write_damped_factors(
+    Y: Matrix, n: int, L: Matrix, Q: Matrix, column: Vector
+) -> None:
+    """Write L, (6, 6), and Q, (6, n + 6), of `[Y, s I] = L Q`; L's diagonal inverted.
+
+    The least mobility `m = 1 / trace((Y Y^T)^-1)` is at most its least eigenvalue.
+    Where it is below `SINGULAR` the law is damped by `s^2 = SINGULAR - m`.
+    """
+    missing = 0.0
+    for _ in range(2):
+        for i in range(6):
+            for j in range(n):
+                Q[i, j] = Y[i, j]
+            for j in range(6):
+                Q[i, n + j] = np.sqrt(missing) if i == j else 0.0
+        lq_factor(Q, n + 6, L)
+        missing = SINGULAR - inverse_trace(L, column)
+        if missing <= 0.0:
+            break
+
+
+@compiled
+def _write_site_jacobian(physics: Physics, law: CompiledRecords, n: int) -> None:
+    """Write the site's Jacobian; subtract what other joints add from `wanted`.
+
+    Other joints are those of laws before this one. Joints that carry the reference body
+    as well move the goal with the site.
+    """
+    work = physics.osc
+    body = int(physics.site_bodyid[law.site])
+    p = physics.site_xpos[law.site]
+    for i in range(6):
+        for j in range(n):
+            work.J[i, j] = 0.0
+    dof = int(physics.body_last_dof[body])
+    while dof >= 0:
+        point_jacobian_column(physics, dof, body, p, work.column)
+        own = -1
+        for j in range(n):
+            if work.dofs[j] == dof:
+                own = j
+        if own >= 0:
+            for i in range(6):
+                work.J[i, own] = work.column[i]
+        elif not moves_body(physics, dof, law.reference):
+            for i in range(6):
+                work.wanted[i] -= work.column[i] * physics.acceleration[dof]
+        dof = int(physics.dof_parentid[dof])
+
+
+@compiled
+def _write_task_acceleration(physics: Physics, law: CompiledRecords) -> None:
+    """Write `wanted = x'' - J' v`, and its part `pull = kd u` towards the goal."""
+    work, phase, rate = physics.osc, 1.0, 0.0
+    if law.duration > 0.0:
+        phase = min(law.since / law.duration, 1.0)
+        rate = 1.0 / law.duration if law.since <= law.duration else 0.0
+    p_ws, R_ws = physics.site_xpos[law.site], rotation(physics.site_xmat, law.site)
+    p_wb, R_wb = physics.xpos[law.reference], rotation(physics.xmat, law.reference)
+    error, twist, p_goal = work.error, work.twist, work.p_goal
+    _write_goal_rotation(R_wb, law, phase, work)
+    matrix_product(work.R_goal, R_ws.T, work.R_error)
+    log3(work.R_error, error[3:])
+    for i in range(3):
+        p_goal[i] = p_wb[i]
+        twist[i] = twist[3 + i] = 0.0
+        for k in range(3):
+            p_goal[i] += R_wb[i, k] * (law.start[9 + k] + phase * law.shift[k])
+            twist[i] += rate * R_wb[i, k] * law.shift[k]
+            twist[3 + i] += rate * work.R_start[i, k] * law.turn[k]
+        error[i] = p_goal[i] - p_ws[i]
+    body, site_body = law.reference, int(physics.site_bodyid[law.site])
+    point_velocity_and_drift(physics, body, p_goal, work.velocity, work.wanted)
+    point_velocity_and_drift(physics, site_body, p_ws, work.column, work.drift)
+    for i in range(6):
+        work.velocity[i] -= work.column[i]
+        work.wanted[i] -= work.drift[i]
+    _add_feedback(law, R_wb, work)
+
+
+@compiled
+def _write_goal_rotation(
+    R_wb: Matrix, law: CompiledRecords, phase: float, work: OscWork
+) -> None:
+    """Write the rotation of the reference, at its start and now, world axes."""
+    R_turned, R_start = work.R_error, work.R_goal
+    for i in range(3):
+        for k in range(3):
+            R_start[i, k] = law.start[3 * i + k]
+    matrix_product(R_wb, R_start, work.R_start)
+    exp3(phase * law.turn[0], phase * law.turn[1], phase * law.turn[2], R_turned)
+    matrix_product(work.R_start, R_turned, work.R_goal)
+
+
+@compiled
+def _add_feedback(law: CompiledRecords, R_wb: Matrix, work: OscWork) -> None:
+    """Write `pull = kd u`; add `kd (u + v)` to wanted. Gains are in the axes R_wb.
+
+    v is the velocity of the goal by the reference body, less that of the site.
+    """
+    u, pull, wanted = work.u, work.pull, work.wanted
+    for half in range(2):
+        f = 3 * half
+        for k in range(3):
+            rate = law.kp[f + k] / max(law.kd[f + k], LEAST_DAMPING)
+            u[k] = pull[f + k] = 0.0
+            for i in range(3):
+                u[k] += R_wb[i, k] * (rate * work.error[f + i] + work.twist[f + i])
+        saturate(u, law.speed[half])
+        for k in range(3):
+            kd, v = max(law.kd[f + k], LEAST_DAMPING), 0.0
+            for i in range(3):
+                v += R_wb[i, k] * work.velocity[f + i]
+            for i in range(3):
+                pull[f + i] += R_wb[i, k] * kd * u[k]
+                wanted[f + i] += R_wb[i, k] * kd * (u[k] + v)

@@ -1,0 +1,52 @@
+"""References of joints, as kernels read and write them."""
+
+import numpy as np
+
+from wbc_suite.compiling import compiled
+from wbc_suite.control.loop.records import CompiledRecords
+from wbc_suite.typing import Matrix, Vector
+
+__all__ = ["hold_reference", "reference_at", "set_reference"]
+
+
+@compiled
+def reference_at(
+    law: CompiledRecords, drive: CompiledRecords
+) -> tuple[float, float, float]:
+    """Return position, velocity and acceleration of a drive's reference now."""
+    s = min(law.since, law.duration)
+    v, a, j = drive.velocity, drive.acceleration, drive.jerk
+    position = drive.position + s * (v + s * (0.5 * a + s / 6.0 * j))
+    if law.since > law.duration:
+        return position, 0.0, 0.0
+    return position, v + s * (a + 0.5 * s * j), a + s * j
+
+
+@compiled
+def set_reference(
+    record: CompiledRecords, drives: CompiledRecords, motion: Matrix
+) -> None:
+    """Set a law's reference from now on; see `Law.aim`.
+
+    Args:
+        record: The law's, shape (1,).
+        drives: Its drives, shape (n,).
+        motion: Positions, velocities, accelerations and jerks, shape (4, n).
+    """
+    for j in range(drives.shape[0]):
+        drive = drives[j]
+        drive.position, drive.velocity = motion[0, j], motion[1, j]
+        drive.acceleration, drive.jerk = motion[2, j], motion[3, j]
+    record[0].since, record[0].duration = 0.0, np.inf
+
+
+@compiled
+def hold_reference(
+    record: CompiledRecords, drives: CompiledRecords, position: Vector
+) -> None:
+    """Set a constant reference, shape (n,); see `Law.aim`."""
+    for j in range(drives.shape[0]):
+        drive = drives[j]
+        drive.position, drive.velocity = position[j], 0.0
+        drive.acceleration, drive.jerk = 0.0, 0.0
+    record[0].since, record[0].duration = 0.0, np.inf

@@ -1,0 +1,137 @@
+"""From the accelerations that laws ask for to commands of the actuators.
+
+    tau = M a + h - d - J^T f
+
+with M and h of the whole scene, so that moving parts do not disturb each other; a are
+the desired accelerations of all laws, d the estimated disturbances, f the contact
+forces that laws of feet plan.
+"""
+
+from typing import Any, TypeAlias
+
+from wbc_suite.compiling import compiled
+from wbc_suite.control.law.balance import balance_law
+from wbc_suite.control.law.custom import custom_kernel
+from wbc_suite.control.law.free_root import is_of_feet, subtract_contact_forces
+from wbc_suite.control.law.joint_laws import base_law, joint_law, velocity_law
+from wbc_suite.control.law.osc import osc_law
+from wbc_suite.control.law.reference import reference_at
+from wbc_suite.control.law.stance import stance_law
+from wbc_suite.control.loop.acceleration_limits import limit_accelerations
+from wbc_suite.control.loop.disturbance_observer import observe_disturbances
+from wbc_suite.control.loop.physics import Physics
+from wbc_suite.control.loop.records import CompiledRecords, LawKind, Records
+from wbc_suite.control.loop.rigid_body import multiply_inertia
+
+__all__ = ["CustomLaw", "Needed", "needed_kernels", "write_commands"]
+
+_JOINT, _OSC = int(LawKind.JOINT), int(LawKind.OSC)
+_BASE, _VELOCITY = int(LawKind.BASE), int(LawKind.VELOCITY)
+_TORQUE, _SERVO = int(LawKind.TORQUE), int(LawKind.SERVO)
+_STANCE, _BALANCE = int(LawKind.STANCE), int(LawKind.BALANCE)
+
+
+CustomLaw: TypeAlias = Any
+"""One kernel for all laws of users, see `control.law.custom`; None without any."""
+
+Needed: TypeAlias = bool | None
+"""True, or None to leave a group of laws out of the machine code: numba drops what
+depends on an argument that is None, which halves the time to compile."""
+
+
+@compiled
+def write_commands(
+    physics: Physics,
+    laws: CompiledRecords,
+    drives: CompiledRecords,
+    hands: Needed,
+    feet: Needed,
+    custom_law: CustomLaw,
+) -> None:
+    """Write the commands of all actuators; runs between `mj_step1` and `mj_step2`.
+
+    Each group of laws builds on those before it: hands on the joints that carry them,
+    feet on everything that they carry.
+    """
+    observe_disturbances(physics, laws, drives)
+    physics.acceleration[:] = 0.0
+    for k in range(laws.shape[0]):
+        laws[k].since += physics.timestep
+        joint_space_law(physics, laws[k], drives)
+        if custom_law is not None:
+            custom_law(physics, laws[k], drives)
+    if hands is not None:
+        for k in range(laws.shape[0]):
+            if laws[k].kind == _OSC:
+                osc_law(physics, laws[k], drives)
+    if feet is not None:
+        for k in range(laws.shape[0]):
+            law_of_feet(physics, laws[k], drives)
+    multiply_inertia(physics, physics.acceleration, physics.force)
+    subtract_contact_forces(physics, laws, drives)
+    for k in range(laws.shape[0]):
+        write_law_commands(physics, laws[k], drives)
+
+
+@compiled
+def law_of_feet(
+    physics: Physics, law: CompiledRecords, drives: CompiledRecords
+) -> None:
+    """Write accelerations and contact forces of a law of feet."""
+    if law.kind == _STANCE:
+        stance_law(physics, law, drives)
+    elif law.kind == _BALANCE:
+        balance_law(physics, law, drives)
+
+
+@compiled
+def joint_space_law(
+    physics: Physics, law: CompiledRecords, drives: CompiledRecords
+) -> None:
+    """Write the accelerations of a law of joints, within the joints' limits."""
+    if law.kind == _JOINT:
+        joint_law(physics, law, drives)
+    elif law.kind == _VELOCITY:
+        velocity_law(physics, law, drives)
+    elif law.kind == _BASE:
+        base_law(physics, law, drives)
+    else:
+        return
+    limit_accelerations(physics, law, drives)
+
+
+@compiled
+def write_law_commands(
+    physics: Physics, law: CompiledRecords, drives: CompiledRecords
+) -> None:
+    """Write `M a + h - d - J^T f` within the limits of actuators, or setpoints.
+
+    `physics.force` holds `M a - J^T f`. A torque law adds its torques to Coriolis,
+    centrifugal and gravity forces; passive forces stay. Laws of feet drive no joint.
+    """
+    if is_of_feet(law):
+        return
+    for j in range(law.first, law.last):
+        drive = drives[j]
+        dof = drive.dof
+        bias = law.compensation * physics.qfrc_bias[dof]
+        if law.kind == _SERVO:
+            command = reference_at(law, drive)[0]
+        elif law.kind == _TORQUE:
+            command = reference_at(law, drive)[0] + bias
+        else:
+            bias -= law.compensation * physics.qfrc_passive[dof]
+            command = physics.force[dof] + bias - drive.disturbance
+        drive.command = min(max(command, drive.command_min), drive.command_max)
+        drive.saturation = drive.command - command
+        drive.desired = physics.acceleration[dof]
+        drive.last_velocity = physics.qvel[dof]
+        physics.ctrl[drive.ctrl] = drive.command
+
+
+def needed_kernels(laws: Records) -> tuple[Needed, Needed, CustomLaw]:
+    """Return the last three arguments of `write_commands` for a table of laws."""
+    kinds = laws["kind"]
+    hands = kinds == LawKind.OSC
+    feet = (kinds == LawKind.STANCE) | (kinds == LawKind.BALANCE)
+    return bool(hands.any()) or None, bool(feet.any()) or None, custom_kernel(kinds)

@@ -1,0 +1,29 @@
+"""MuJoCo's functions and the addresses of its structures, for compiled code.
+
+Numba calls a C function by its symbol, and passes models and data as addresses. MuJoCo
+documents neither for Python, so this is the one module that reaches past the package's
+documentation: all others use its arrays and functions.
+"""
+
+from pathlib import Path
+
+import llvmlite.binding
+import mujoco
+from numba import types
+
+__all__ = ["addresses", "mj_comPos", "mj_kinematics", "mj_step1", "mj_step2"]
+
+_MODEL_AND_DATA = types.void(types.intp, types.intp)
+
+_LIBRARY = next(Path(mujoco.__file__).parent.glob("libmujoco*"))
+llvmlite.binding.load_library_permanently(str(_LIBRARY))
+
+mj_step1 = types.ExternalFunction("mj_step1", _MODEL_AND_DATA)
+mj_step2 = types.ExternalFunction("mj_step2", _MODEL_AND_DATA)
+mj_kinematics = types.ExternalFunction("mj_kinematics", _MODEL_AND_DATA)
+mj_comPos = types.ExternalFunction("mj_comPos", _MODEL_AND_DATA)
+
+
+def addresses(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[int, int]:
+    """Return the addresses of a model and its data, valid as long as both live."""
+    return model._address, data._address

@@ -1,0 +1,79 @@
+"""Check that a simulation's state is usable: finite numbers, and no new warning."""
+
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from wbc_suite.compiling import compiled, struct
+from wbc_suite.typing import Indices, Matrix, Vector
+
+__all__ = ["LARGEST", "CheckedState", "check_after", "check_before", "checked_state"]
+
+LARGEST = float(mujoco.mjMAXVAL)
+"""MuJoCo calls larger numbers bad, as it does NaN."""
+
+
+@struct
+class CheckedState(NamedTuple):
+    """Arrays that MuJoCo checks in each step, and its counts of warnings."""
+
+    qpos: Vector
+    qvel: Vector
+    qfrc_applied: Vector
+    xfrc_applied: Matrix
+    warnings: Indices
+    """How often each warning was raised."""
+    warnings_before: Indices
+    """The same at the last `check_before`."""
+
+
+def checked_state(data: mujoco.MjData) -> CheckedState:
+    """Return the view of a simulation's data that the checks read."""
+    warnings = data.warning.number
+    return CheckedState(
+        qpos=data.qpos,
+        qvel=data.qvel,
+        qfrc_applied=data.qfrc_applied,
+        xfrc_applied=data.xfrc_applied,
+        warnings=warnings,
+        warnings_before=np.array(warnings),
+    )
+
+
+@compiled
+def check_before(state: CheckedState) -> bool:
+    """Note the warnings so far; return whether all numbers are usable."""
+    for k in range(state.warnings.shape[0]):
+        state.warnings_before[k] = state.warnings[k]
+    return _all_usable(state)
+
+
+@compiled
+def check_after(state: CheckedState) -> bool:
+    """Return whether there is no new warning, and all numbers are usable."""
+    for k in range(state.warnings.shape[0]):
+        if state.warnings[k] != state.warnings_before[k]:
+            return False
+    return _all_usable(state)
+
+
+@compiled
+def _all_usable(state: CheckedState) -> bool:
+    if not is_usable(state.qpos) or not is_usable(state.qvel):
+        return False
+    if not is_usable(state.qfrc_applied):
+        return False
+    for body in range(state.xfrc_applied.shape[0]):
+        if not is_usable(state.xfrc_applied[body]):
+            return False
+    return True
+
+
+@compiled
+def is_usable(values: Vector) -> bool:
+    """Return whether MuJoCo accepts all numbers: finite, none too large."""
+    usable = True
+    for value in values:
+        usable &= abs(value) <= LARGEST  # not so for NaN
+    return usable

@@ -1,0 +1,57 @@
+"""Feasible accelerations of joints, from the effort of their motors."""
+
+import numpy as np
+import pinocchio as pin
+
+from wbc_suite.kinematics.configuration import random_configuration
+from wbc_suite.robot import RobotDescription
+from wbc_suite.typing import Vector
+
+__all__ = ["feasible_accelerations", "greatest_loads"]
+
+LOAD_SAMPLES = 50
+LEAST_ACCELERATION = 2.0
+"""rad/s^2 or m/s^2; where holding the load takes nearly the whole effort."""
+
+
+def feasible_accelerations(
+    robot: RobotDescription, *, most: float, effort_share: float
+) -> dict[str, float]:
+    """Return the feasible acceleration of each joint, rad/s^2 or m/s^2.
+
+    The least of a common limit, the robot's own, and a share of the motor's effort,
+    less the greatest gravity torque, over the greatest inertia M_ii of random
+    configurations. It is at least `LEAST_ACCELERATION`.
+
+    Args:
+        robot: The robot.
+        most: Limit of all joints.
+        effort_share: Share of the effort that acceleration may take.
+    """
+    model = robot.to_pinocchio()
+    inertia, weight = greatest_loads(model)
+    found: dict[str, float] = {}
+    for joint in robot.joints:
+        limit = most
+        if joint.acceleration is not None:
+            limit = min(limit, joint.acceleration)
+        if joint.effort is not None:
+            v = model.joints[model.getJointId(joint.name)].idx_v
+            left = max(joint.effort - float(weight[v]), 0.2 * joint.effort)
+            feasible = effort_share * left / float(inertia[v])
+            limit = min(limit, max(feasible, LEAST_ACCELERATION))
+        found[joint.name] = limit
+    return found
+
+
+def greatest_loads(model: pin.Model) -> tuple[Vector, Vector]:
+    """Return the greatest inertia and gravity torque of each joint, over postures."""
+    data = model.createData()
+    inertia, weight = np.zeros(model.nv), np.zeros(model.nv)
+    rng = np.random.default_rng(0)
+    for _ in range(LOAD_SAMPLES):
+        q = random_configuration(model, pin.neutral(model), rng)
+        np.maximum(inertia, np.diag(pin.crba(model, data, q)), out=inertia)
+        gravity = pin.computeGeneralizedGravity(model, data, q)
+        np.maximum(weight, np.abs(gravity), out=weight)
+    return inertia, weight

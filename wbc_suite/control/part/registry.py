@@ -1,0 +1,163 @@
+"""Part controllers by name: their classes and the models of their configs."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias, get_args
+
+from wbc_suite.control.part.controller import PartController
+from wbc_suite.control.robot_parts import RobotPart, hands_of, robot_part
+from wbc_suite.control.state import RobotState
+from wbc_suite.errors import ConfigError, UnknownNameError
+from wbc_suite.robot import RobotDescription
+from wbc_suite.tomlfile import FrozenModel, parse_model
+
+__all__ = [
+    "PartControllerName",
+    "check_part",
+    "is_part_controller",
+    "load_part_controller_config",
+    "make_part",
+    "parse_part",
+    "part_controller",
+    "part_models",
+    "register_part_controller",
+]
+
+PartControllerName: TypeAlias = Literal[
+    "OSC_POSE",
+    "OSC_POSITION",
+    "IK_POSE",
+    "JOINT_POSITION",
+    "JOINT_VELOCITY",
+    "JOINT_TORQUE",
+    "BASE_VELOCITY",
+    "STANCE",
+]
+"""Names of the built-in part controllers."""
+
+Builder: TypeAlias = Callable[[RobotPart, Any, RobotState], PartController]
+
+
+@dataclass(frozen=True, slots=True)
+class _Kind:
+    controller: type[PartController]
+    build: Builder  # the class, by the arguments of its constructor
+    model: type[FrozenModel]
+
+
+_KINDS: dict[str, _Kind] = {}
+
+
+def register_part_controller(
+    name: str, controller: type[PartController], config: type[FrozenModel]
+) -> None:
+    """Add a part controller to those that controller files may name.
+
+    With `register_part_controller("MINE", MyController, MyConfig)` in a module that is
+    imported, `make(..., controller_configs="MINE")` uses it in all arms, and
+    `{"type": "MINE", ...}` in `body_parts` to one part.
+
+    Args:
+        name: Its name, in capitals.
+        controller: Class; `controller(part, config, state)` makes one.
+        config: Model of its config, with the field `type: Literal[name] = name`. Derive
+            it from `PartSettings`, or from `FrozenModel` for one without gripper.
+
+    Raises:
+        ConfigError: If the name is taken or not in capitals, or the config's type is
+            not that name.
+    """
+    if name in _KINDS or name != name.upper():
+        reason = "exists already" if name in _KINDS else "needs a name in capitals"
+        raise ConfigError(f"The part controller '{name}' {reason}.")
+    field = config.model_fields.get("type")
+    if field is None or name not in get_args(field.annotation):
+        raise ConfigError(
+            f"{config.__name__}: part controller '{name}' needs the field "
+            f"type: Literal['{name}'] = '{name}'."
+        )
+    _KINDS[name] = _Kind(controller, controller, config)
+
+
+def is_part_controller(name: object) -> bool:
+    """Whether a part controller of this name is registered."""
+    return name in _KINDS
+
+
+def part_models() -> dict[str, type[FrozenModel]]:
+    """Return the config model of each part controller by name."""
+    return {name: kind.model for name, kind in _KINDS.items()}
+
+
+def part_controller(config: Any) -> type[PartController]:
+    """Return the class of the part controller that a config is for."""
+    return _kind(config.type).controller
+
+
+def load_part_controller_config(controller: PartControllerName | str) -> dict[str, Any]:
+    """Return the defaults of a part controller as plain data, `{"type": ...}`.
+
+    Raises:
+        UnknownNameError: If there is none of this name.
+    """
+    config = _kind(controller).model.model_validate({"type": controller})
+    return config.model_dump(mode="json", exclude_none=True)
+
+
+def parse_part(name: str, given: object, source: str) -> FrozenModel:
+    """Return the config of a part as a model.
+
+    Args:
+        name: The part.
+        given: Plain data, or a model.
+        source: The config's name in messages.
+
+    Raises:
+        ConfigError: If the type is unknown, or a key or a value is wrong.
+    """
+    key = f"body_parts.{name}"
+    if isinstance(given, FrozenModel):
+        return given
+    if not isinstance(given, Mapping):
+        raise ConfigError(f"{source}: key '{key}' = {given!r:.80}: not a table.")
+    if "type" not in given:
+        raise ConfigError(f"{source}: missing key '{key}.type'")
+    try:
+        model = _kind(given["type"]).model
+    except UnknownNameError as error:
+        raise ConfigError(f"{source}: key '{key}.type': {error}") from error
+    return parse_model(model, given, source=source, within=key)
+
+
+def check_part(name: str, config: Any, robot: RobotDescription) -> None:
+    """Check the config of a part against a robot.
+
+    Raises:
+        ConfigError: If the robot has no such part, or the controller cannot drive it.
+    """
+    part, controller = robot_part(robot, name), part_controller(config)
+    if controller.needs_hand and part.hand is None:
+        raise ConfigError(
+            f"{config.type} needs a hand, and {robot.name}'s '{name}' does not end in "
+            f"one. Parts that do: {', '.join(hands_of(robot)) or 'none'}."
+        )
+    is_base = part.joints == robot.root_joint_names
+    if controller.drives_base and name != "base":
+        raise ConfigError(f"{config.type} drives the part 'base', not '{name}'.")
+    if is_base and not controller.drives_base:
+        of_bases = [k for k, kind in _KINDS.items() if kind.controller.drives_base]
+        raise ConfigError(
+            f"a base is driven by {' or '.join(of_bases)}, not by {config.type}."
+        )
+    controller.check(config, part, robot)
+
+
+def make_part(name: str, config: Any, state: RobotState) -> PartController:
+    """Make the controller of a part that `check_part` has accepted."""
+    return _kind(config.type).build(robot_part(state.robot, name), config, state)
+
+
+def _kind(name: object) -> _Kind:
+    if not isinstance(name, str) or name not in _KINDS:
+        raise UnknownNameError("part controller", name, _KINDS)
+    return _KINDS[name]

@@ -1,0 +1,251 @@
+"""References between two solves: cubic splines within the limits of the solves."""
+
+from math import ceil
+from typing import NamedTuple
+
+import numpy as np
+
+from wbc_suite.compiling import as_argument, compiled, struct
+from wbc_suite.control.loop.records import CompiledRecords
+from wbc_suite.kinematics import Configuration
+from wbc_suite.kinematics.forward import RobotArrays
+from wbc_suite.kinematics.tangent_space import (
+    difference,
+    integrate,
+    integrate_joints,
+)
+from wbc_suite.typing import Indices, Matrix, Vector
+
+__all__ = ["SplineArrays", "SplineReference", "extend_spline", "lead_root"]
+__all__ += ["window_length"]
+
+ROUNDING = 1e-9
+
+
+def window_length(acceleration: float, jerk: float, period: float) -> int:
+    """Return over how many solves to take the mean, so that a jerk limit is kept.
+
+    A mean over n solves changes its acceleration by `2 acceleration / n` at most from
+    one solve to the next.
+
+    Args:
+        acceleration: Limit of what is solved, rad/s^2 or m/s^2.
+        jerk: Limit to keep, rad/s^3 or m/s^3.
+        period: Time between solves, s.
+    """
+    return max(1, ceil(2.0 * acceleration / (jerk * period) - ROUNDING))
+
+
+@struct
+class SplineArrays(NamedTuple):
+    """A spline through solved configurations; see `SplineReference`.
+
+    Attributes:
+        robot: The robot at the configuration solved last.
+        q_index: Places of the driven joints in q, shape (m,).
+        v_index: Their places in v, shape (m,).
+        window: The last n solved configurations, newest last, shape (n, nq).
+        points: The last three points, shape (3, nq).
+        rates: Velocities of the last three steps of the points, shape (3, nv).
+        motion: Output in its first m columns: position, velocity, acceleration and
+            jerk of the driven joints, shape (4, m or more).
+        period: Time between two solves, s.
+    """
+
+    robot: RobotArrays
+    q_index: Indices
+    v_index: Indices
+    window: Matrix
+    points: Matrix
+    rates: Matrix
+    motion: Matrix
+    period: float
+
+
+class SplineReference:
+    """A cubic B-spline through means of the solved configurations.
+
+    The points are the means of the last n solved configurations, taken in the tangent
+    space, with `n = window_length(...)`. Between two solves,
+    with v_1, v_2, v_3 the velocities of the last three steps of the points, and p the
+    point before the last two of them,
+
+        q(s) = p + T (v_2 - v_1) / 6 + (v_1 + v_2) / 2 s + a s^2 / 2 + j s^3 / 6
+        a = (v_2 - v_1) / T,    j = (v_3 - 2 v_2 + v_1) / T^2,
+
+    so accelerations have no steps and can be fed forward. Position, velocity and
+    acceleration are means of solved ones, hence within the limits of those, and the
+    jerk is within `2 a_limit / (n T)`. It lags by `(n + 1) T / 2`.
+
+    Args:
+        configuration: The robot that is solved for; `extend` moves it.
+        q_index: Places of the driven joints in q.
+        v_index: Their places in v.
+        period: T, s.
+        mean: n.
+        width: Columns of `motion`, if there are more joints than these.
+
+    Attributes:
+        arrays: Its arrays.
+        argument: The argument of kernels that stands for them.
+        motion: p, v, a and j of the driven joints after a solve: they are at
+            `p + v s + a s^2 / 2 + j s^3 / 6`, s counted from that solve up to the
+            period. For joints of one parameter.
+    """
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        q_index: Indices,
+        v_index: Indices,
+        period: float,
+        *,
+        mean: int = 1,
+        width: int = 0,
+    ) -> None:
+        nq, nv = configuration.nq, configuration.nv
+        self._configuration = configuration
+        self.arrays = SplineArrays(
+            robot=configuration.robot,
+            q_index=q_index,
+            v_index=v_index,
+            window=np.zeros((mean, nq)),
+            points=np.zeros((3, nq)),
+            rates=np.zeros((3, nv)),
+            motion=np.zeros((4, max(width, len(q_index)))),
+            period=float(period),
+        )
+        self.argument = as_argument(self.arrays)
+        self.motion: Matrix = self.arrays.motion
+        self.reset()
+
+    def reset(self) -> None:
+        """Stand still where the robot is."""
+        arrays, q = self.arrays, self._configuration.q
+        arrays.window[:], arrays.points[:], arrays.rates[:] = q, q, 0.0
+        joints = slice(len(arrays.q_index))
+        arrays.motion[:, joints] = 0.0
+        arrays.motion[0, joints] = q[arrays.q_index]
+
+    def extend(self, v: Vector) -> None:
+        """Move the robot by v over one period, and write `motion`."""
+        extend_spline(self.argument, v)
+
+    def targets(self) -> Vector:
+        """Return where the driven joints are to be when the next solve is due, (m,)."""
+        arrays = self.arrays
+        change = arrays.rates[2] - arrays.rates[1]
+        lead = arrays.period / 6.0 * change[arrays.v_index]
+        return arrays.points[1][arrays.q_index] + lead
+
+
+@compiled
+def extend_spline(spline: SplineArrays, v: Vector) -> None:
+    """Move the robot by v over one period, and write the motion until the next solve.
+
+    Args:
+        spline: The spline.
+        v: Velocity, shape (nv,).
+    """
+    robot, window, points, rates = (
+        spline.robot,
+        spline.window,
+        spline.points,
+        spline.rates,
+    )
+    step = np.empty(v.shape[0])
+    for i in range(v.shape[0]):
+        step[i] = spline.period * v[i]
+    integrate_joints(robot, step)
+    _append(window, robot.q)
+    _append(points, robot.q)
+    _append(rates, v)
+    if window.shape[0] > 1:
+        _write_mean(robot, window, points[2])
+        difference(robot, points[1], points[2], rates[2])
+        for i in range(v.shape[0]):
+            rates[2, i] /= spline.period
+    _write_motion(
+        points[0], rates, spline.q_index, spline.v_index, spline.period, spline.motion
+    )
+
+
+@compiled
+def _append(rows: Matrix, new: Vector) -> None:
+    """Drop the first row, and put a new one after the last."""
+    last = rows.shape[0] - 1
+    for i in range(new.shape[0]):
+        for row in range(last):
+            rows[row, i] = rows[row + 1, i]
+        rows[last, i] = new[i]
+
+
+@compiled
+def _write_mean(robot: RobotArrays, window: Matrix, out: Vector) -> None:
+    """Write the mean of configurations, in the tangent space of the first."""
+    count, total = window.shape[0], np.zeros(robot.jacobian.shape[0])
+    step = np.empty(total.shape[0])
+    for row in range(1, count):
+        difference(robot, window[0], window[row], step)
+        for i in range(total.shape[0]):
+            total[i] += step[i] / count
+    for i in range(out.shape[0]):
+        out[i] = window[0, i]
+    integrate(robot, out, total)
+
+
+@compiled
+def lead_root(spline: SplineArrays, record: CompiledRecords) -> None:
+    """Set the reference of a free root, which comes first in v.
+
+    Args:
+        spline: The spline.
+        record: Record of a law of feet, shape (1,); see `StanceLaw.lead`.
+    """
+    law, period = record[0], spline.period
+    q, rates = spline.points[0], spline.rates
+    x, y, z, w = q[3], q[4], q[5], q[6]
+    start = law.start
+    start[0] = 1.0 - 2.0 * (y * y + z * z)
+    start[4] = 1.0 - 2.0 * (x * x + z * z)
+    start[8] = 1.0 - 2.0 * (x * x + y * y)
+    start[1], start[3] = 2.0 * (x * y - w * z), 2.0 * (x * y + w * z)
+    start[2], start[6] = 2.0 * (x * z + w * y), 2.0 * (x * z - w * y)
+    start[5], start[7] = 2.0 * (y * z - w * x), 2.0 * (y * z + w * x)
+    for i in range(3):
+        start[9 + i] = q[i]
+    for i in range(6):
+        first, second, third = rates[0, i], rates[1, i], rates[2, i]
+        law.stance.behind[i] = period / 6.0 * (second - first)
+        law.stance.twist[i] = 0.5 * (first + second)
+        law.stance.curve[i] = (second - first) / period
+        law.stance.bend[i] = (third - 2.0 * second + first) / period**2
+    law.since = 0.0
+
+
+@compiled
+def _write_motion(
+    q: Vector,
+    rates: Matrix,
+    q_index: Indices,
+    v_index: Indices,
+    period: float,
+    motion: Matrix,
+) -> None:
+    """Write position, velocity, acceleration and jerk of the spline, as rows.
+
+    Args:
+        q: The point before the last two steps, shape (nq,).
+        rates: Velocities of the last three steps, newest last, shape (3, nv).
+        q_index: Places of the n driven joints in q.
+        v_index: Their places in v.
+        period: Time between solves, s.
+        motion: Output in its first n columns, shape (4, n or more).
+    """
+    for j in range(q_index.shape[0]):
+        i = v_index[j]
+        first, second, third = rates[0, i], rates[1, i], rates[2, i]
+        motion[0, j] = q[q_index[j]] + period / 6.0 * (second - first)
+        motion[1, j] = 0.5 * (first + second)
+        motion[2, j] = (second - first) / period
+        motion[3, j] = (third - 2.0 * second + first) / period**2

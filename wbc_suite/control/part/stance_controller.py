@@ -1,0 +1,179 @@
+"""STANCE: legs that keep a robot with a free root on its feet."""
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+import pinocchio as pin
+from pydantic import model_validator
+
+from wbc_suite.control.law.free_root import RootMotion
+from wbc_suite.control.law.joint_laws import JointLaw, JointLawConfig
+from wbc_suite.control.law.law import Law
+from wbc_suite.control.law.stance import StanceContact, StanceLaw
+from wbc_suite.control.part.controller import PartController
+from wbc_suite.control.robot_parts import RobotPart, motors
+from wbc_suite.control.state import RobotState
+from wbc_suite.errors import ConfigError, UnknownNameError
+from wbc_suite.qp import Sole
+from wbc_suite.robot import RobotDescription
+from wbc_suite.robot.elements import Name
+from wbc_suite.tomlfile import FrozenModel
+from wbc_suite.typing import Vector
+
+__all__ = [
+    "HeldFrame",
+    "StanceConfig",
+    "StanceController",
+    "held_frames",
+    "soles_of",
+    "stance_law",
+]
+
+
+class HeldFrame(FrozenModel):
+    """A frame in contact that must not move, such as a foot.
+
+    Attributes:
+        frame: Frame or link of the robot.
+        contact: `point` resists forces, `surface` torques as well.
+        sole: Edges of a surface in the frame's axes, m: heel, toes (along x), right,
+            left (along y). With all soles known the robot is kept from tipping over.
+    """
+
+    frame: Name
+    contact: Literal["point", "surface"] = "point"
+    sole: tuple[float, float, float, float] | None = None
+
+    @model_validator(mode="after")
+    def _sole_is_a_rectangle(self) -> "HeldFrame":
+        if self.sole is not None:
+            heel, toes, right, left = self.sole
+            if self.contact != "surface" or not (heel < toes and right < left):
+                raise ValueError(
+                    "'sole' is [heel, toes, right, left] of a 'surface', with heel < "
+                    "toes and right < left"
+                )
+        return self
+
+
+class StanceConfig(FrozenModel):
+    """Legs that carry the root while the other parts move; see `StanceLaw`.
+
+    Attributes:
+        held: Frames on the ground; the robot's feet when empty, as soles of a biped
+            and as points otherwise.
+        joint_law: Gains of root and legs.
+        gripper: Legs have none.
+    """
+
+    type: Literal["STANCE"] = "STANCE"
+    held: tuple[HeldFrame, ...] = ()
+    joint_law: JointLawConfig = JointLawConfig(kp=400.0)
+    gripper: None = None
+
+
+def held_frames(config: StanceConfig, robot: RobotDescription) -> tuple[HeldFrame, ...]:
+    """Return the frames that a robot stands on.
+
+    Raises:
+        ConfigError: If neither config nor robot names a foot, or the root is not free.
+    """
+    if robot.root.kind != "free":
+        raise ConfigError(
+            f"{robot.name} has a {robot.root.kind} root and cannot fall: STANCE has "
+            "nothing to do. Give the part a joint controller, such as JOINT_POSITION."
+        )
+    feet = [f.name for f in robot.frames if f.role == "foot"]
+    contact = "surface" if len(feet) < 3 else "point"
+    found = config.held or tuple(HeldFrame(frame=f, contact=contact) for f in feet)
+    if not found:
+        raise ConfigError(
+            f"{robot.name}: STANCE finds no foot. Name the feet in 'held', or give "
+            "frames of the robot the role 'foot'."
+        )
+    return found
+
+
+def soles_of(held: Sequence[HeldFrame]) -> list[Sole]:
+    """Return the soles of held frames; none unless all are known."""
+    soles = [
+        Sole(frame=h.frame, x=h.sole[:2], y=h.sole[2:])
+        for h in held
+        if h.sole is not None
+    ]
+    return soles if len(soles) == len(held) else []
+
+
+def stance_law(
+    state: RobotState,
+    joints: tuple[str, ...],
+    held: Sequence[HeldFrame],
+    gains: JointLawConfig,
+) -> StanceLaw:
+    """Return the law that computes contact forces; it balances on known soles."""
+    contacts = [
+        StanceContact(site=state.model.site(state.prefix + h.frame).id, kind=h.contact)
+        for h in held
+    ]
+    return StanceLaw(state, joints, contacts, gains, soles_of(held))
+
+
+class StanceController(PartController[JointLaw]):
+    """Holds root and legs at their pose of reset while the other parts move.
+
+    It has no slice of the action. The accelerations of all laws determine the contact
+    forces; see `StanceLaw`.
+
+    Args:
+        part: The legs.
+        config: Feet and gains.
+        state: The robot in the simulation.
+
+    Attributes:
+        law: Holds the legs' joints where the contacts leave them free.
+        stance: Computes the contact forces, for all laws.
+        slices: None.
+    """
+
+    holds_root = True
+
+    def __init__(
+        self, part: RobotPart, config: StanceConfig, state: RobotState
+    ) -> None:
+        gains = config.joint_law
+        self.law = JointLaw(state, part.joints, kp=gains.kp, kd=gains.kd)
+        self.slices = ()
+        held = held_frames(config, state.robot)
+        self.stance = stance_law(state, motors(state.robot), held, gains)
+        self.reset(state)
+
+    @classmethod
+    def check(
+        cls, config: StanceConfig, part: RobotPart, robot: RobotDescription
+    ) -> None:
+        """Raise ConfigError if the robot cannot fall, or lacks a frame."""
+        sites = {frame.name for frame in robot.frames}
+        for held in held_frames(config, robot):
+            if held.frame not in sites:
+                raise ConfigError(str(UnknownNameError("frame", held.frame, sites)))
+
+    @property
+    def other_laws(self) -> tuple[Law, ...]:
+        """The law of the contacts."""
+        return (self.stance,)
+
+    def reset(self, state: RobotState) -> None:
+        """Stand in the present pose."""
+        data = state.data
+        self.law.aim(data.qpos[self.law.drives["qpos"]])
+        self.stance.aim(data.qpos[self.stance.drives["qpos"]])
+        self.stance.lead(RootMotion.still(pin.XYZQUATToSE3(state.q[:7])))
+
+    def set_goal(self, values: Vector, period: float) -> None:
+        """Do nothing: there are no values."""
+
+    @property
+    def hold_action(self) -> Vector:
+        """No values."""
+        return np.zeros(0)

@@ -1,0 +1,173 @@
+"""Stages of one limb: clutch, workspace, leash, filter and motion limit."""
+
+import numpy as np
+import pinocchio as pin
+
+from wbc_suite.devices.action_ports import LimbPort
+from wbc_suite.devices.pipeline.clutch import Clutch
+from wbc_suite.devices.pipeline.config import Leash, PipelineConfig, WorkspaceBox
+from wbc_suite.devices.pipeline.motion_limit import MotionLimit
+from wbc_suite.devices.pipeline.one_euro import OneEuroFilter
+from wbc_suite.devices.state import LimbInput
+from wbc_suite.typing import Vector
+
+__all__ = ["LimbPipeline", "clip_to_box", "clip_to_leash"]
+
+NEAR = 1e-9  # m or rad
+
+
+class LimbPipeline:
+    """Compute the target of a limb from the input of a device.
+
+    Args:
+        port: The limb.
+        config: Settings of the stages.
+        dt: Time between two ticks, s.
+
+    Attributes:
+        home: Pose of the limb at the last reset.
+        clutch: Couples the input to the requested target, before bounds and limits.
+        acting: What stages did to the last target.
+    """
+
+    def __init__(self, port: LimbPort, config: PipelineConfig, dt: float) -> None:
+        self.port, self._config, self._dt = port, config, dt
+        smooth = config.one_euro
+        self._filter = None if smooth is None else OneEuroFilter(smooth, dt)
+        self._limit = MotionLimit(config.linear.rates, config.angular.rates, dt)
+        self.reset()
+
+    def reset(self) -> None:
+        """Set the target to the pose of the limb."""
+        self.home: pin.SE3 = self.port.measure()
+        self.clutch = Clutch(self.home, self._config.scale)
+        self._last_input: pin.SE3 | None = None
+        self._ground = None if self.port.ground is None else self.port.ground()
+        self._limit.reset(self.home)
+        if self._filter is not None:
+            self._filter.reset(self.home)
+        self.acting: tuple[str, ...] = ()
+        self._clutch_note = ""
+
+    @property
+    def target(self) -> pin.SE3:
+        """The last target, in the world."""
+        return self._limit.pose.copy()
+
+    def release(self) -> None:
+        """Release the clutch; the limb stays at its target."""
+        self.clutch.release()
+        self._last_input = None
+
+    def go_home(self) -> None:
+        """Release the clutch, and move to where the limb was at the reset."""
+        self.place(self.home)
+
+    def update(self, given: LimbInput | None, pace: float = 1.0) -> Vector:
+        """Advance by one tick; return the values of the limb's slice.
+
+        Args:
+            given: Input of the device; None if there is no new one.
+            pace: Fraction of the speed limits that is permitted.
+        """
+        if given is not None:
+            self.follow(given)
+        self._move_with_ground()
+        notes, self._clutch_note = [self._clutch_note], ""
+        measured, target = self.port.measure(), self.clutch.target
+        if self._config.workspace is not None:
+            target, clipped = clip_to_box(target, self._config.workspace)
+            notes.append("at the workspace limit" if clipped else "")
+        if self._config.leash is not None:
+            target, clipped = clip_to_leash(target, measured, self._config.leash)
+            notes.append("limited by the leash" if clipped else "")
+        self.clutch.slip(target)
+        if self._filter is not None:
+            target = self._filter.apply(target)
+        target = self._limit.apply(target, pace)
+        notes.append("at the speed limit" if self._limit.at_speed_limit else "")
+        self.acting = tuple(filter(None, notes))
+        return self.port.encode(target)
+
+    def follow(self, given: LimbInput) -> None:
+        """Move the clutch by an input; may be called often between two ticks."""
+        if not given.engaged:
+            self.release()
+            self._clutch_note = "clutch disengaged"
+            return
+        if given.twist is not None:
+            self.clutch.place(_moved(self.clutch.target, given.twist * self._dt))
+            self._last_input = None
+        if given.pose is None:
+            return
+        jumped = self._jumps(given.pose)
+        self._last_input = given.pose
+        if self._config.mode == "absolute":
+            self.clutch.place(self._scaled(given.pose))
+            return
+        if jumped or not self.clutch.engaged:
+            self.clutch.engage(given.pose)
+            self._clutch_note = "input jumped: clutch latched again" if jumped else ""
+        self.clutch.move(given.pose)
+
+    def place(self, T_target: pin.SE3) -> None:
+        """Release the clutch, and move to a pose in the world."""
+        self._last_input = None
+        self.clutch.place(T_target)
+
+    def carry(self, T_step: pin.SE3) -> None:
+        """Move the target with the base that it stands on; it stays engaged."""
+        self.clutch.slip(T_step * self.clutch.target)
+
+    def _move_with_ground(self) -> None:
+        if self.port.ground is None or self._ground is None:
+            return
+        ground = self.port.ground()
+        step, self._ground = ground * self._ground.inverse(), ground
+        self.carry(step)
+        self._limit.pose = step * self._limit.pose
+
+    def _jumps(self, pose: pin.SE3) -> bool:
+        last, limit = self._last_input, self._config.jump
+        if last is None or limit is None:
+            return False
+        return bool(np.linalg.norm(pose.translation - last.translation) > limit)
+
+    def _scaled(self, pose: pin.SE3) -> pin.SE3:
+        origin = self.home.translation
+        offset = self._config.scale * (pose.translation - origin)
+        return pin.SE3(pose.rotation, origin + offset)
+
+
+def clip_to_box(target: pin.SE3, box: WorkspaceBox) -> tuple[pin.SE3, bool]:
+    """Return the nearest target inside a box, and whether it is at its boundary."""
+    inside = np.clip(target.translation, box.low, box.high)
+    distance = np.minimum(inside - box.low, box.high - inside).min()
+    return pin.SE3(target.rotation, inside), bool(distance < NEAR)
+
+
+def clip_to_leash(
+    target: pin.SE3, measured: pin.SE3, leash: Leash
+) -> tuple[pin.SE3, bool]:
+    """Return the target moved towards the limb to within the leash, and if it is tight.
+
+    Args:
+        target: Requested pose, in the world.
+        measured: Pose of the limb.
+        leash: Greatest distance and angle between the two.
+    """
+    offset = target.translation - measured.translation
+    turn = pin.log3(target.rotation @ measured.rotation.T)
+    distance, angle = float(np.linalg.norm(offset)), float(np.linalg.norm(turn))
+    tight = distance > leash.distance - NEAR or angle > leash.angle - NEAR
+    position, rotation = target.translation, target.rotation
+    if distance > leash.distance:
+        position = measured.translation + leash.distance / distance * offset
+    if angle > leash.angle:
+        rotation = pin.exp3(leash.angle / angle * turn) @ measured.rotation
+    return pin.SE3(rotation, position), tight
+
+
+def _moved(pose: pin.SE3, step: Vector) -> pin.SE3:
+    """Return a pose moved and turned by a step in world axes, shape (6,)."""
+    return pin.SE3(pin.exp3(step[3:]) @ pose.rotation, pose.translation + step[:3])

@@ -1,0 +1,105 @@
+"""Targets of grippers, joints and base velocities, each within its limits."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from wbc_suite.devices.action_ports import JointPort, SpeedPort, robot_of
+from wbc_suite.devices.pipeline.config import PipelineConfig
+from wbc_suite.devices.pipeline.motion_limit import LimitedMotion
+from wbc_suite.typing import Vector
+
+__all__ = ["BaseVelocity", "GripTarget", "JointTargets"]
+
+
+class GripTarget:
+    """The closing of a gripper, which moves to a goal.
+
+    Attributes:
+        goal: Requested closing of each synergy, -1 open .. 1 closed.
+    """
+
+    def __init__(self, size: int, config: PipelineConfig, dt: float) -> None:
+        self._motion = LimitedMotion(size, config.grip.rates, dt)
+        self.reset(np.zeros(size))
+
+    def reset(self, values: Vector) -> None:
+        """Stop at these values."""
+        self.goal, self._values = values.copy(), values.copy()
+        self._motion.stop()
+
+    def aim(self, grip: Vector) -> None:
+        """Set the goal: one value for all synergies, or one for each."""
+        self.goal[:] = np.clip(np.resize(grip, self.goal.shape), -1.0, 1.0)
+
+    def toggle(self) -> None:
+        """Open the gripper if it is more closed than open; else close it."""
+        self.aim(np.array(-1.0 if self.goal.mean() > 0.0 else 1.0))
+
+    def update(self) -> Vector:
+        """Advance by one tick; return the values of the slice."""
+        self._values = self._values + self._motion.step(self.goal - self._values)
+        return np.clip(self._values, -1.0, 1.0)
+
+
+class JointTargets:
+    """Positions of joints, each of which moves to that of a leader arm."""
+
+    def __init__(self, port: JointPort, config: PipelineConfig, dt: float) -> None:
+        self._port = port
+        rates = config.joint.rates
+        self._motions = [LimitedMotion(1, rates, dt) for _ in port.joints]
+        self.reset()
+
+    def reset(self) -> None:
+        """Stop at the measured positions."""
+        self._target = self._port.measure()
+        self._goal = self._target.copy()
+        for motion in self._motions:
+            motion.stop()
+
+    def aim(self, joints: Mapping[str, float]) -> bool:
+        """Set goals by joint; return whether the slice has one of these joints."""
+        own = [k for k, name in enumerate(self._port.joints) if name in joints]
+        for k in own:
+            self._goal[k] = joints[self._port.joints[k]]
+        return bool(own)
+
+    def lift(self, step: float) -> None:
+        """Move the torso's goal by a step, m."""
+        for k, name in enumerate(self._port.joints):
+            if "torso" in name or "lift" in name:
+                self._goal[k] += step
+
+    def hold(self) -> None:
+        """Stop at the current targets."""
+        self._goal = self._target.copy()
+
+    def update(self, pace: float) -> Vector:
+        """Advance by one tick; return the values of the slice."""
+        error = self._goal - self._target
+        for k, motion in enumerate(self._motions):
+            self._target[k] += motion.step(error[k : k + 1], pace)[0]
+        return self._port.encode(self._target)
+
+
+class BaseVelocity:
+    """Velocity of a base, which changes towards a goal."""
+
+    def __init__(self, port: SpeedPort, config: PipelineConfig, dt: float) -> None:
+        self.robot = robot_of(port.name)
+        self._port = port
+        self._change = LimitedMotion(3, config.base_rise.rates, dt)
+        self.reset()
+
+    def reset(self) -> None:
+        """Stop."""
+        self.goal: Vector = np.zeros(3)
+        self._velocity: Vector = np.zeros(3)
+        self._change.stop()
+
+    def update(self) -> Vector:
+        """Advance by one tick; return the values of the slice."""
+        step = self._change.step(self.goal - self._velocity)
+        self._velocity = self._velocity + step
+        return self._port.encode(self._velocity)

@@ -1,0 +1,144 @@
+"""The HTTP server of pages and streams: aiohttp in a thread, behind `AccessRules`."""
+
+import asyncio
+import logging
+import socket
+import ssl
+import threading
+from collections.abc import Iterable
+
+from aiohttp import web
+from aiohttp.typedefs import Handler
+
+from wbc_suite.devices.access_rules import AccessRules
+from wbc_suite.errors import DeviceError
+
+__all__ = ["WebServer", "listen"]
+
+CONNECTIONS = 256  # at a time; a browser opens one, and a few more while it loads
+HEAD_TIMEOUT = 10.0  # s, from a connection to its first complete request
+SHUTDOWN_TIMEOUT = 0.2  # s; handlers of open WebSockets are cancelled after it
+
+
+def listen(host: str, port: int) -> socket.socket:
+    """Return a listening socket; port 0 takes any free port.
+
+    Raises:
+        DeviceError: If the address or the port is not available.
+    """
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    try:
+        return socket.create_server((host, port), family=family)
+    except OSError as error:
+        raise DeviceError(
+            f"Cannot listen on {host}, port {port}: {error.strerror}. "
+            "Choose another port, or 0 for any free one."
+        ) from error
+
+
+class WebServer:
+    """Serve routes to the clients that the access rules admit.
+
+    aiohttp limits the size of request lines and header fields (8 kB each). Connections
+    beyond `CONNECTIONS`, and those without a request for `HEAD_TIMEOUT`, are closed.
+
+    Args:
+        host: Address to listen on.
+        port: Port to listen on; 0 takes any free port.
+        routes: Handlers of admitted requests.
+        token: Secret that clients need; None if `host` is a loopback address.
+        tls: Server side of TLS; None for plain HTTP.
+
+    Attributes:
+        port: Port that is listened on.
+
+    Raises:
+        DeviceError: If the port is not available, or a token is missing.
+    """
+
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        routes: Iterable[web.AbstractRouteDef],
+        *,
+        token: str | None,
+        tls: ssl.SSLContext | None = None,
+    ) -> None:
+        AccessRules(host, token)  # checked before anything listens
+        self._socket = listen(host, port)
+        self.port: int = self._socket.getsockname()[1]
+        self._rules = AccessRules(host, token, cookie=f"wbc_token_{self.port}")
+        self._routes, self._tls = tuple(routes), tls
+        self._no_request_yet: set[web.RequestHandler] = set()
+        started = threading.Event()
+        self._thread = threading.Thread(
+            target=lambda: asyncio.run(self._serve(started)), name="web", daemon=True
+        )
+        self._thread.start()
+        started.wait()
+
+    def stop(self) -> None:
+        """Close the port and every connection."""
+        if self._thread.is_alive():
+            self._loop.call_soon_threadsafe(self._stopping.set)
+            self._thread.join()
+
+    async def _serve(self, started: threading.Event) -> None:
+        self._loop, self._stopping = asyncio.get_running_loop(), asyncio.Event()
+        app = web.Application(middlewares=[self._admit])
+        app.add_routes(self._routes)
+        runner = web.AppRunner(
+            app,
+            access_log=None,
+            shutdown_timeout=SHUTDOWN_TIMEOUT,
+            logger=logging.Logger("web", logging.CRITICAL),  # malformed requests
+        )
+        await runner.setup()
+        listener = await self._loop.create_server(
+            lambda: self._accept(runner.server), sock=self._socket, ssl=self._tls
+        )
+        started.set()
+        try:
+            await self._stopping.wait()
+        finally:
+            listener.close()
+            await runner.cleanup()
+
+    def _accept(self, server: web.Server | None) -> asyncio.Protocol:
+        """Return the protocol of a new connection."""
+        if server is None or len(server.connections) >= CONNECTIONS:
+            return _Refused()
+        connection = server()
+        self._no_request_yet.add(connection)
+        self._loop.call_later(HEAD_TIMEOUT, self._close_without_request, connection)
+        return connection
+
+    def _close_without_request(self, connection: web.RequestHandler) -> None:
+        if connection in self._no_request_yet:
+            self._no_request_yet.discard(connection)
+            connection.force_close()
+
+    @web.middleware
+    async def _admit(
+        self, request: web.Request, handler: Handler
+    ) -> web.StreamResponse:
+        """Refuse a request that the rules keep out; handle any other."""
+        self._no_request_yet.discard(request.protocol)
+        refusal = self._rules.check(
+            request.method, str(request.rel_url), request.headers
+        )
+        if refusal is None:
+            return await handler(request)
+        return web.Response(
+            status=refusal.status,
+            text=refusal.text,
+            headers={"Cache-Control": "no-store", **dict(refusal.headers)},
+        )
+
+
+class _Refused(asyncio.Protocol):
+    """A connection beyond the limit: closed at once."""
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        transport.close()

@@ -1,0 +1,141 @@
+"""Episodes of policies in environments, as work items of an executor."""
+
+import hashlib
+import json
+import re
+import shutil
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+
+from wbc_suite.envs import RobotEnv, make
+from wbc_suite.errors import ConfigError
+from wbc_suite.evaluation.policies import make_policy
+from wbc_suite.executors import WorkItem
+from wbc_suite.recording.dataset import parts_folder
+from wbc_suite.wrappers import DataCollection
+
+__all__ = ["Case", "plan_rollouts", "run_rollouts"]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Case:
+    """An environment and the policy that acts in it.
+
+    Attributes:
+        benchmark: Its name, or a file.
+        robots: Their names.
+        controller: A name or a file; None for each robot's own.
+        policy: See `make_policy`.
+        record: Whether episodes are recorded.
+        arguments: Further arguments of `wbc_suite.make`, plain JSON data, sorted.
+    """
+
+    benchmark: str
+    robots: tuple[str, ...]
+    controller: str | None = None
+    policy: str = "random"
+    record: bool = False
+    arguments: tuple[tuple[str, str | int | float | bool], ...] = ()
+
+    @property
+    def title(self) -> str:
+        """The case in one line."""
+        parts = (self.benchmark, "+".join(self.robots), self.controller, self.policy)
+        return " ".join(p for p in parts if p)
+
+
+def plan_rollouts(cases: Iterable[Case], *, seeds: range, chunk: int) -> list[WorkItem]:
+    """Split the episodes of all cases into items of `chunk` seeds each.
+
+    An item depends on its own case and seeds only, so that results are found again
+    when other cases are added.
+
+    Raises:
+        ConfigError: If there are no seeds, or the chunk is empty.
+    """
+    if len(seeds) == 0 or seeds.start < 0 or seeds.step != 1 or chunk < 1:
+        raise ConfigError(f"Seeds {seeds} in chunks of {chunk}: at least one of each.")
+    starts = range(seeds.start, seeds.stop, chunk)
+    return [
+        _item(case, start, min(start + chunk, seeds.stop))
+        for case in cases
+        for start in starts
+    ]
+
+
+def _item(case: Case, start: int, stop: int) -> WorkItem:
+    payload = {
+        "benchmark": case.benchmark,
+        "robots": list(case.robots),
+        "controller": case.controller,
+        "policy": case.policy,
+        "record": case.record,
+        "arguments": dict(case.arguments),
+        "seeds": [start, stop],
+    }
+    text = json.dumps(payload, sort_keys=True)
+    digest = hashlib.sha256(text.encode()).hexdigest()[:8]
+    title = re.sub(r"[^A-Za-z0-9]+", "-", case.title).strip("-")[:90]
+    return WorkItem(name=f"{title}-{start:06d}-{digest}", payload=payload)
+
+
+def run_rollouts(item: WorkItem, folder: Path) -> dict[str, Any]:
+    """Run the episodes of an item; the work of `run_items`.
+
+    An episode counts as a success if the benchmark is solved at any step
+    (`succeeded`), or at the last step (`success`). A physics error ends it as a
+    failure.
+
+    Args:
+        item: See `plan_rollouts`.
+        folder: Folder of the results; recordings go to `episodes`, one file per item.
+
+    Returns:
+        `episodes`: one dictionary per episode.
+    """
+    payload: Any = item.payload
+    env = inner = make(
+        payload["benchmark"],
+        robots=payload["robots"],
+        controller_configs=payload["controller"] or None,
+        **payload["arguments"],
+    )
+    if payload["record"]:
+        path = folder / "episodes" / f"{item.name}.hdf5"
+        path.unlink(missing_ok=True)  # a killed worker may have left a part
+        shutil.rmtree(parts_folder(path), ignore_errors=True)
+        env = DataCollection(inner, path)
+    try:
+        seeds = range(*payload["seeds"])
+        episodes = [_run_episode(env, inner, s, payload["policy"]) for s in seeds]
+    finally:
+        env.close()
+    return {"episodes": episodes}
+
+
+def _run_episode(
+    env: gymnasium.Env[Any, Any], inner: RobotEnv, seed: int, name: str
+) -> dict[str, Any]:
+    observation, info = env.reset(seed=seed)
+    policy = make_policy(name, inner, seed)
+    start, steps, total, succeeded, over = time.perf_counter(), 0, 0.0, False, False
+    while not over:
+        action = policy(observation)
+        observation, reward, terminated, truncated, info = env.step(action)
+        steps, total = steps + 1, total + float(reward)
+        succeeded = succeeded or bool(info["success"])
+        over = terminated or truncated
+    return {
+        "seed": seed,
+        "success": bool(info["success"]),
+        "succeeded": succeeded,
+        "return": total,
+        "steps": steps,
+        "seconds": round(time.perf_counter() - start, 4),
+        "physics_error": info.get("physics_error"),
+    }

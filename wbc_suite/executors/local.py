@@ -1,0 +1,113 @@
+"""Executors of this machine: in this process, or in worker processes."""
+
+import multiprocessing
+import os
+from collections import deque
+from collections.abc import Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
+
+from wbc_suite.errors import ConfigError
+from wbc_suite.executors.executor import Outcome, Work, WorkItem, run_item
+
+__all__ = ["Processes", "Serial"]
+
+
+class Serial:
+    """Runs items in this process, in their order; for debugging."""
+
+    def run(
+        self, work: Work, items: Sequence[WorkItem], folder: Path
+    ) -> Iterator[Outcome]:
+        """Run all items; see `Executor`."""
+        for item in items:
+            yield run_item(work, item, folder)
+
+
+class Processes:
+    """Runs items in newly started processes.
+
+    When a worker dies (killed, out of memory, a crash in C), the pool is started
+    again. The items that were running are suspects: each runs again alone, so that the
+    one which kills its worker is identified and no other item fails with it.
+
+    Args:
+        workers: Number of processes; None for one per processor.
+        attempts: How often an item may kill its worker, running alone, before it
+            fails.
+    """
+
+    def __init__(self, workers: int | None = None, *, attempts: int = 3) -> None:
+        if (workers is not None and workers < 1) or attempts < 1:
+            raise ConfigError(
+                f"{workers} workers and {attempts} attempts: at least one of each."
+            )
+        self.workers = workers or os.cpu_count() or 1
+        self.attempts = attempts
+
+    def run(
+        self, work: Work, items: Sequence[WorkItem], folder: Path
+    ) -> Iterator[Outcome]:
+        """Run all items; see `Executor`."""
+        waiting = deque(items)
+        deaths: dict[str, int] = {}
+        while waiting:
+            yield from self._run_until_a_death(work, waiting, deaths, folder)
+
+    def _run_until_a_death(
+        self,
+        work: Work,
+        waiting: deque[WorkItem],
+        deaths: dict[str, int],
+        folder: Path,
+    ) -> Iterator[Outcome]:
+        """Run waiting items; items of a dead worker go back to the front."""
+        busy: dict[Future[Outcome], WorkItem] = {}
+        context = multiprocessing.get_context("spawn")
+        pool = ProcessPoolExecutor(min(self.workers, len(waiting)), mp_context=context)
+        try:
+            while waiting or busy:
+                while waiting and self._may_start(waiting[0], busy, deaths):
+                    future = pool.submit(run_item, work, waiting[0], folder)
+                    busy[future] = waiting.popleft()  # not before: `submit` may fail
+                for future in wait(busy, return_when=FIRST_COMPLETED).done:
+                    outcome = future.result()
+                    del busy[future]
+                    yield outcome
+        except BrokenProcessPool:
+            yield from self._put_back(busy, waiting, deaths)
+        finally:
+            pool.shutdown(wait=True, cancel_futures=True)
+
+    def _may_start(
+        self,
+        item: WorkItem,
+        busy: dict[Future[Outcome], WorkItem],
+        deaths: dict[str, int],
+    ) -> bool:
+        """Return whether an item may start now: suspects run alone."""
+        if any(other.name in deaths for other in busy.values()):
+            return False
+        return len(busy) < (1 if item.name in deaths else self.workers)
+
+    def _put_back(
+        self,
+        busy: dict[Future[Outcome], WorkItem],
+        waiting: deque[WorkItem],
+        deaths: dict[str, int],
+    ) -> Iterator[Outcome]:
+        for future, item in busy.items():
+            if future.done() and future.exception() is None:
+                yield future.result()
+                continue
+            # An item that ran beside others may not be the cause; one alone is.
+            deaths[item.name] = deaths.get(item.name, 0) + (len(busy) == 1)
+            if deaths[item.name] < self.attempts:
+                waiting.appendleft(item)
+                continue
+            yield Outcome(
+                name=item.name,
+                error=f"Its worker died {self.attempts} times (killed, out of memory, "
+                "or a crash). Run it alone with the serial executor to see why.",
+            )

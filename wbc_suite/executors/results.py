@@ -1,0 +1,118 @@
+"""Results of work items in a folder, so that stopped work continues later."""
+
+import json
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from wbc_suite.errors import DatasetError
+from wbc_suite.executors.executor import Executor, Json, Outcome, Work, WorkItem
+
+__all__ = ["ResultFolder", "run_items"]
+
+MAX_BYTES = 64 << 20
+"""Larger result files are not read."""
+
+
+class ResultFolder:
+    """One JSON file per finished item, in the subfolder `results`.
+
+    A file is complete or absent: it is written under another name and renamed.
+
+    Args:
+        folder: Folder of the whole work; made when it is missing.
+
+    Raises:
+        DatasetError: If the folder cannot be written to.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._results = folder / "results"
+        try:
+            self._results.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise DatasetError(f"'{folder}' cannot be written to: {error}.") from error
+
+    def write(self, item: WorkItem, outcome: Outcome) -> None:
+        """Write an item's outcome, in place of an earlier one."""
+        record = {
+            "item": item.name,
+            "payload": item.payload,
+            "error": outcome.error,
+            "result": outcome.result,
+        }
+        path = self._path(item)
+        temporary = path.with_suffix(f".{os.getpid()}.tmp")
+        text = json.dumps(record, indent=1, sort_keys=True)
+        try:
+            temporary.write_text(text + "\n", encoding="utf-8")
+            temporary.replace(path)
+        except OSError as error:
+            raise DatasetError(f"'{path}' cannot be written: {error}.") from error
+
+    def read(self, item: WorkItem) -> dict[str, Json] | None:
+        """Return an item's result; None if it has none, or had another payload."""
+        path = self._path(item)
+        try:
+            if path.stat().st_size > MAX_BYTES:
+                return None
+            record = json.loads(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError, RecursionError):
+            return None
+        if not isinstance(record, dict) or record.get("error") is not None:
+            return None
+        same = record.get("payload") == json.loads(json.dumps(item.payload))
+        result = record.get("result")
+        return result if same and isinstance(result, dict) else None
+
+    def _path(self, item: WorkItem) -> Path:
+        return self._results / f"{item.name}.json"
+
+
+def run_items(
+    work: Work,
+    items: Sequence[WorkItem],
+    *,
+    folder: Path,
+    executor: Executor,
+    on_outcome: Callable[[WorkItem, Outcome], None] | None = None,
+) -> list[Outcome]:
+    """Run the items that have no result yet, and write each outcome as it ends.
+
+    The call can be stopped at any time and repeated: finished items do not run again,
+    failed ones do.
+
+    Args:
+        work: Function of an importable module; see `Work`.
+        items: All items, finished or not; their names must differ.
+        folder: Folder of the results, and of what the work writes.
+        executor: Runs the items.
+        on_outcome: Called with every item and its outcome; at once for items that
+            finished in an earlier call.
+
+    Returns:
+        All outcomes, in the order of the items.
+
+    Raises:
+        DatasetError: If two items have one name, or the folder cannot be written to.
+    """
+    by_name = {item.name: item for item in items}
+    if len(by_name) != len(items):
+        raise DatasetError("Two items have the same name: their results would be one.")
+    results = ResultFolder(folder)
+    outcomes: dict[str, Outcome] = {}
+
+    def add(outcome: Outcome) -> None:
+        outcomes[outcome.name] = outcome
+        if on_outcome is not None:
+            on_outcome(by_name[outcome.name], outcome)
+
+    for item in items:
+        if (result := results.read(item)) is not None:
+            add(Outcome(name=item.name, result=result))
+    missing = [item for item in items if item.name not in outcomes]
+    for outcome in executor.run(work, missing, folder):
+        results.write(by_name[outcome.name], outcome)
+        add(outcome)
+    return [outcomes[item.name] for item in items]

@@ -1,0 +1,292 @@
+"""Dense linear algebra on small matrices, for compiled code.
+
+Triangular factors hold the inverses of their diagonals, because those are what the
+solvers use. Functions take the size n of the system, so that buffers may be larger.
+"""
+
+import numba
+import numpy as np
+
+from wbc_suite.compiling import compiled
+from wbc_suite.typing import Matrix, Vector
+
+__all__ = [
+    "cholesky",
+    "dot",
+    "inverse_trace",
+    "lq_factor",
+    "lq_solve",
+    "pseudo_inverse",
+    "row_space",
+    "solve",
+    "solve_lower",
+    "solve_upper",
+    "subtract_projection",
+]
+
+_SMALLEST = 1e-30
+"""Square of a length that counts as zero."""
+
+_JACOBI_SWEEPS = 12
+"""Greatest number of sweeps; 6 make a matrix of 6 rows diagonal."""
+
+
+# Sums may be reassociated, which makes them vector instructions. NaN stays NaN.
+@numba.njit(nogil=True, fastmath={"reassoc", "contract"})
+def dot(a: Vector, b: Vector, n: int) -> float:
+    """Return the sum of `a[i] b[i]` over the first n entries."""
+    total = 0.0
+    for i in range(n):
+        total += a[i] * b[i]
+    return total
+
+
+@compiled
+def cholesky(A: Matrix, n: int, tolerance: float) -> int:
+    """Factorise `A = L L^T` in place; L has an inverted diagonal.
+
+    A row that depends on the rows above it gets a zero in place of its inverted
+    diagonal entry: `solve_lower` and `solve_upper` then leave it out, with x = 0.
+
+    Args:
+        A: Symmetric positive semidefinite, shape (n, n) or larger; only the lower
+            triangle is read and written.
+        n: Size of the system.
+        tolerance: Part of a diagonal entry that the rows above must leave.
+
+    Returns:
+        The number of independent rows; less than n where A is singular or not finite.
+    """
+    rank = 0
+    for i in range(n):
+        row = A[i]
+        for j in range(i):
+            row[j] = (row[j] - dot(row, A[j], j)) * A[j, j]
+        pivot = row[i] - dot(row, row, i)
+        if pivot > tolerance * row[i]:
+            row[i] = 1.0 / np.sqrt(pivot)
+            rank += 1
+        else:
+            row[i] = 0.0
+    return rank
+
+
+@compiled
+def solve_lower(L: Matrix, x: Vector, n: int) -> None:
+    """Solve `L x = b` in place; the diagonal of L is inverted."""
+    for i in range(n):
+        x[i] = (x[i] - dot(L[i], x, i)) * L[i, i]
+
+
+@compiled
+def solve_upper(L: Matrix, x: Vector, n: int) -> None:
+    """Solve `L^T x = b` in place; the diagonal of L is inverted."""
+    for i in range(n - 1, -1, -1):
+        x[i] *= L[i, i]
+        row, value = L[i], x[i]
+        for j in range(i):
+            x[j] -= row[j] * value
+
+
+@compiled
+def solve(A: Matrix, B: Matrix, n: int) -> None:  # noqa: C901, one elimination
+    """Solve `A X = B` in place by Gaussian elimination with partial pivoting.
+
+    Args:
+        A: Square, not singular, shape (n, n); destroyed.
+        B: Right-hand sides, shape (n, k); becomes X.
+        n: Size of the system.
+    """
+    for i in range(n):
+        pivot = i
+        for k in range(i + 1, n):
+            if abs(A[k, i]) > abs(A[pivot, i]):
+                pivot = k
+        for j in range(n):
+            A[i, j], A[pivot, j] = A[pivot, j], A[i, j]
+        for j in range(B.shape[1]):
+            B[i, j], B[pivot, j] = B[pivot, j], B[i, j]
+        for k in range(i + 1, n):
+            part = A[k, i] / A[i, i]
+            for j in range(i, n):
+                A[k, j] -= part * A[i, j]
+            for j in range(B.shape[1]):
+                B[k, j] -= part * B[i, j]
+    for i in range(n - 1, -1, -1):
+        for j in range(B.shape[1]):
+            for k in range(i + 1, n):
+                B[i, j] -= A[i, k] * B[k, j]
+            B[i, j] /= A[i, i]
+
+
+@compiled
+def lq_factor(Q: Matrix, n: int, L: Matrix) -> None:
+    """Factorise `A = L Q` by modified Gram-Schmidt; Q overwrites A.
+
+    Args:
+        Q: A, shape (m, n) or wider, m <= n; becomes orthonormal rows.
+        n: Number of columns.
+        L: Output, lower triangular with an inverted diagonal, shape (m, m).
+    """
+    for i in range(Q.shape[0]):
+        row = Q[i]
+        for k in range(i):
+            other = Q[k]
+            part = dot(other, row, n)
+            L[i, k] = part
+            for j in range(n):
+                row[j] -= part * other[j]
+        L[i, i] = 1.0 / np.sqrt(max(dot(row, row, n), _SMALLEST))
+        for j in range(n):
+            row[j] *= L[i, i]
+
+
+@compiled
+def lq_solve(Q: Matrix, n: int, y: Vector, x: Vector) -> None:
+    """Write the shortest x with `Q x = y`: the least squares solution of `A x = b`.
+
+    With `A = L Q` from `lq_factor`, y solves `L y = b`. Where rows of A are nearly
+    dependent, Q is not quite orthonormal, and `Q^T y` loses digits. Row by row from
+    the last, x is as exact as A.
+
+    Args:
+        Q: Orthonormal rows, shape (m, n) or wider.
+        n: Number of columns.
+        y: Right-hand side, shape (m,).
+        x: Output, shape (n,) or longer.
+
+    Source: Björck, Paige (1992), "Loss and recapture of orthogonality in the modified
+    Gram-Schmidt algorithm", SIAM J. Matrix Anal. Appl. 13(1).
+    """
+    for j in range(n):
+        x[j] = 0.0
+    for i in range(Q.shape[0] - 1, -1, -1):
+        row = Q[i]
+        missing = y[i] - dot(row, x, n)
+        for j in range(n):
+            x[j] += row[j] * missing
+
+
+@compiled
+def inverse_trace(L: Matrix, column: Vector) -> float:
+    """Return `1 / trace((L L^T)^-1)`, a lower bound of the least eigenvalue.
+
+    Args:
+        L: Lower triangular with an inverted diagonal, shape (m, m).
+        column: Scratch, shape (m,).
+    """
+    total, m = 0.0, L.shape[0]
+    for j in range(m):
+        for i in range(j, m):
+            value = 1.0 if i == j else 0.0
+            for k in range(j, i):
+                value -= L[i, k] * column[k]
+            column[i] = value * L[i, i]
+            total += column[i] * column[i]
+    return 1.0 / total
+
+
+@compiled
+def row_space(W: Matrix, tolerance: float, V: Matrix, lengths: Vector) -> int:
+    """Write an orthonormal basis of the rows of W, longest first; return the rank.
+
+    Gram-Schmidt with pivoting; each vector is orthogonalised twice ("twice is enough",
+    Giraud et al. 2005). Rows that are left shorter than the tolerance are dropped.
+
+    Args:
+        W: Rows, shape (m, n); destroyed.
+        tolerance: Absolute length below which a row counts as dependent.
+        V: Output, shape (at least min(m, n), n).
+        lengths: Output, what was left of each chosen row, descending.
+    """
+    m, n = W.shape
+    rank = 0
+    for _ in range(min(m, V.shape[0])):
+        best, pivot = 0.0, -1
+        for i in range(m):
+            square = dot(W[i], W[i], n)
+            if square > best:
+                best, pivot = square, i
+        if best <= tolerance * tolerance:
+            break
+        row, v = W[pivot], V[rank]
+        lengths[rank] = np.sqrt(best)
+        for j in range(n):
+            v[j] = row[j] / lengths[rank]
+        subtract_projection(V, rank, v)
+        scale = 1.0 / np.sqrt(dot(v, v, n))
+        for j in range(n):
+            v[j] *= scale
+            row[j] = 0.0
+        rank += 1
+        for i in range(m):
+            along = dot(W[i], v, n)
+            if along != 0.0:
+                for j in range(n):
+                    W[i, j] -= along * v[j]
+    return rank
+
+
+@compiled
+def subtract_projection(V: Matrix, count: int, v: Vector) -> None:
+    """Subtract from v, in place, its projection onto the first rows of V."""
+    n = v.shape[0]
+    for i in range(count):
+        along = dot(V[i], v, n)
+        for j in range(n):
+            v[j] -= along * V[i, j]
+
+
+@compiled
+def pseudo_inverse(A: Matrix, tolerance: float, out: Matrix) -> None:
+    """Write the pseudo-inverse of a symmetric matrix, by Jacobi's method.
+
+    Args:
+        A: Positive semidefinite, shape (n, n); destroyed.
+        tolerance: Part of the largest eigenvalue below which others count as zero.
+        out: Output, shape (n, n).
+
+    Source: Golub and Van Loan (2013), "Matrix Computations", section 8.5.
+    """
+    n = A.shape[0]
+    V = np.eye(n)
+    for _ in range(_JACOBI_SWEEPS):
+        if not _jacobi_sweep(A, V):
+            break
+    largest = 0.0
+    for i in range(n):
+        largest = max(largest, A[i, i])
+    for i in range(n):
+        for j in range(n):
+            out[i, j] = 0.0
+            for k in range(n):
+                if A[k, k] > tolerance * largest:
+                    out[i, j] += V[i, k] * V[j, k] / A[k, k]
+
+
+@compiled
+def _jacobi_sweep(A: Matrix, V: Matrix) -> bool:
+    """Rotate all off-diagonal entries to zero once; return whether there were any."""
+    n, rotated, size = A.shape[0], False, 0.0
+    for i in range(n):
+        size = max(size, abs(A[i, i]))
+    for i in range(n):
+        for j in range(i + 1, n):
+            if abs(A[i, j]) <= 1e-15 * size:
+                continue
+            rotated = True
+            ratio = 0.5 * (A[j, j] - A[i, i]) / A[i, j]
+            t = 1.0 / (abs(ratio) + np.sqrt(1.0 + ratio * ratio))
+            if ratio < 0.0:
+                t = -t
+            c = 1.0 / np.sqrt(1.0 + t * t)
+            s = c * t
+            for k in range(n):
+                x, y = A[k, i], A[k, j]
+                A[k, i], A[k, j] = c * x - s * y, s * x + c * y
+            for k in range(n):
+                x, y = A[i, k], A[j, k]
+                A[i, k], A[j, k] = c * x - s * y, s * x + c * y
+                x, y = V[k, i], V[k, j]
+                V[k, i], V[k, j] = c * x - s * y, s * x + c * y
+    return rotated

@@ -1,0 +1,110 @@
+"""Strict priorities: what the levels above leave to a level."""
+
+from typing import NamedTuple
+
+from wbc_suite.compiling import compiled, struct
+from wbc_suite.linear_algebra import row_space, subtract_projection
+from wbc_suite.qp.active_set import QpArrays
+from wbc_suite.qp.problem import UNBOUNDED
+from wbc_suite.qp.task_kernels import TaskArrays
+from wbc_suite.typing import Indices, Matrix, Vector
+
+__all__ = ["MAX_LEVELS", "LevelArrays", "restrict_level"]
+
+MAX_LEVELS = 6
+"""Greatest number of strict levels of a stack."""
+
+_LOST_DIRECTION = 0.05  # share of a unit vector outside the present basis
+_SINGULAR = 2e-2  # shortest over longest row, under which a singularity is near
+_RANK_TOLERANCE = 1e-6  # rows of an upper level shorter than this bind nothing
+
+
+@struct
+class LevelArrays(NamedTuple):
+    """One strict level.
+
+    Attributes:
+        tasks: Its tasks.
+        qp: Its problem. Below level 0, equality rows are an orthonormal basis of what
+            the levels above decide.
+        above: Scratch, rows of all levels above and of the equalities, shape (m, nv).
+        lengths: Scratch of `row_space`, shape (nv,).
+        kept: The basis of the last tick, shape (nv, nv).
+        kept_counts: Its size, and the greatest rank so far, shape (2,).
+    """
+
+    tasks: TaskArrays
+    qp: QpArrays
+    above: Matrix
+    lengths: Vector
+    kept: Matrix
+    kept_counts: Indices
+
+
+@compiled
+def restrict_level(levels: tuple[LevelArrays, ...], k: int, x: Vector) -> None:
+    """State that level k may move in ways that all levels above rate like their step.
+
+    Those are `V dq = V x`, where V is an orthonormal basis of the equality rows and of
+    all rows above. x itself is one of them, so the problem has a solution.
+
+    Args:
+        levels: All levels.
+        k: The level.
+        x: The step of the level above, shape (nv,).
+    """
+    level, first, nv = levels[k], levels[0].qp, x.shape[0]
+    qp, p, count = level.qp, first.counts[0], first.counts[1]
+    above, rows, upper_rows = level.above, qp.rows, first.rows
+    for row in range(count):
+        for i in range(nv):
+            above[row, i] = upper_rows[p + row, i]
+    for j in range(k):
+        W = levels[j].qp.W
+        for row in range(W.shape[0]):
+            for i in range(nv):
+                above[count + row, i] = W[row, i]
+        count += W.shape[0]
+    rank = _decided_directions(above, rows[p:], level)
+    qp.counts[1] = rank
+    for i in range(nv):
+        qp.lower[i], qp.upper[i] = first.lower[i], first.upper[i]
+    for row in range(p + rank):
+        y = 0.0
+        for i in range(nv):
+            if row < p:
+                rows[row, i] = upper_rows[row, i]
+            y += rows[row, i] * x[i]
+        qp.upper[nv + row] = max(first.wanted[row], y) if row < p else y
+        qp.lower[nv + row] = -UNBOUNDED if row < p else y
+
+
+@compiled
+def _decided_directions(rows: Matrix, V: Matrix, level: LevelArrays) -> int:
+    """Write an orthonormal basis of what the levels above decide; return its size.
+
+    Near a singularity the direction that they are losing turns quickly. Were it handed
+    over meanwhile, the lower level would bend a stretched arm and the upper stretch it
+    again, at full acceleration. So until the singularity is left, what was theirs at
+    the last tick stays theirs.
+
+    Args:
+        rows: Rows of all levels above and of the equalities; destroyed.
+        V: Output, shape (nv, nv).
+        level: Holds the basis of the last tick.
+    """
+    kept, counts, lengths = level.kept, level.kept_counts, level.lengths
+    rank = row_space(rows, _RANK_TOLERANCE, V, lengths)
+    counts[1] = max(counts[1], rank)
+    clear = rank == counts[1]
+    if rank > 0:
+        clear = clear and lengths[rank - 1] > _SINGULAR * lengths[0]
+    if not clear and counts[0] > 0:
+        for i in range(counts[0]):
+            subtract_projection(V, rank, kept[i])
+        rank += row_space(kept[: counts[0]], _LOST_DIRECTION, V[rank:], lengths)
+    for i in range(rank):
+        for j in range(V.shape[1]):
+            kept[i, j] = V[i, j]
+    counts[0] = rank
+    return rank

@@ -1,0 +1,145 @@
+"""Conversion of recordings, in this process or in pieces by workers."""
+
+import shutil
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from wbc_suite.errors import DatasetError, UnknownNameError
+from wbc_suite.executors import Executor, WorkItem
+from wbc_suite.executors.executor import Json
+from wbc_suite.recording.converting.layout import (
+    Layout,
+    Piece,
+    Progress,
+    split_dataset,
+    whole_dataset,
+)
+from wbc_suite.recording.converting.lerobot import LEROBOT
+from wbc_suite.recording.converting.mcap import MCAP
+from wbc_suite.recording.converting.minari import MINARI
+from wbc_suite.recording.converting.npz import NPZ
+from wbc_suite.recording.converting.robomimic import ROBOMIMIC
+from wbc_suite.recording.dataset import Dataset
+from wbc_suite.recording.resumable_work import run_pieces, work_folder
+
+__all__ = ["LAYOUTS", "convert", "convert_piece"]
+
+LAYOUTS: Mapping[str, Layout] = MappingProxyType(
+    {
+        "robomimic": ROBOMIMIC,
+        "npz": NPZ,
+        "lerobot": LEROBOT,
+        "minari": MINARI,
+        "mcap": MCAP,
+    }
+)
+
+
+def convert(
+    source: str | Path,
+    out: str | Path,
+    layout: str,
+    on_progress: Progress = lambda _: None,
+    *,
+    executor: Executor | None = None,
+    workers: int = 1,
+) -> Path:
+    """Write a recording in another layout; return the path that was written.
+
+    With an executor, finished pieces wait in `OUT.work` until all are finished: a
+    stopped conversion continues when called again. Layouts of one file are one piece.
+
+    Args:
+        source: The recording.
+        out: File or folder to write.
+        layout: One of `LAYOUTS`.
+        on_progress: Called with the number of episodes since the last call.
+        executor: Runs the pieces; this process, in one piece, when left out.
+        workers: Number of workers that the episodes are split among.
+
+    Raises:
+        UnknownNameError: If there is no such layout.
+        DatasetError: If the recording cannot be read, a package is missing, or the
+            path cannot be written.
+    """
+    source, out = Path(source), Path(out)
+    if layout not in LAYOUTS:
+        raise UnknownNameError("layout", layout, LAYOUTS)
+    chosen = LAYOUTS[layout]
+    with Dataset(source) as dataset:
+        if not len(dataset):
+            raise DatasetError(f"'{source}' has no episodes.")
+        chosen.begin(out)
+        if executor is None:
+            whole = whole_dataset(dataset)
+            results = [chosen.write(dataset, whole, out, on_progress)]
+            _finish(chosen, dataset, out, results)
+            return out
+        pieces = [whole_dataset(dataset)]
+        if chosen.in_pieces:
+            pieces = split_dataset(dataset, workers)
+        payloads: list[dict[str, Json]] = [
+            {
+                "layout": layout,
+                "out": out.name,
+                "piece": {**asdict(piece), "names": list(piece.names)},
+            }
+            for piece in pieces
+        ]
+        done = run_pieces(
+            convert_piece,
+            payloads,
+            source=source,
+            out=out,
+            executor=executor,
+            on_piece=lambda item: on_progress(len(_piece(item).names)),
+        )
+        written = _written(work_folder(out), out.name)
+        _finish(chosen, dataset, written, [result for _, result in done])
+    _move(written, out)
+    shutil.rmtree(work_folder(out), ignore_errors=True)
+    return out
+
+
+def convert_piece(item: WorkItem, folder: Path) -> Mapping[str, Json]:
+    """Write one piece into the work folder, in place of what a dead worker left."""
+    layout = LAYOUTS[str(item.payload["layout"])]
+    written = _written(folder, str(item.payload["out"]))
+    if not layout.in_pieces:
+        shutil.rmtree(written, ignore_errors=True)
+    written.parent.mkdir(parents=True, exist_ok=True)
+    with Dataset(str(item.payload["source"])) as dataset:
+        return layout.write(dataset, _piece(item), written, lambda _: None)
+
+
+def _finish(
+    layout: Layout, dataset: Dataset, out: Path, results: list[Mapping[str, Json]]
+) -> None:
+    if layout.finish is not None:
+        layout.finish(dataset, out, results)
+
+
+def _written(folder: Path, name: str) -> Path:
+    """Return where pieces are written, under the final name, which layouts may use."""
+    return folder / "written" / name
+
+
+def _piece(item: WorkItem) -> Piece:
+    fields: Any = item.payload["piece"]
+    return Piece(**{**fields, "names": tuple(fields["names"])})
+
+
+def _move(written: Path, out: Path) -> None:
+    """Move a file into place, or the content of a folder."""
+    try:
+        if not written.is_dir():
+            written.replace(out)
+            return
+        out.mkdir(parents=True, exist_ok=True)
+        for path in sorted(written.iterdir()):
+            path.replace(out / path.name)
+    except OSError as error:
+        raise DatasetError(f"'{out}' cannot be written: {error}.") from error

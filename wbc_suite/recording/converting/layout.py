@@ -1,0 +1,72 @@
+"""The interface of a layout that recordings are converted to."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeAlias
+
+from wbc_suite.executors.executor import Json
+from wbc_suite.recording.dataset import Dataset
+
+__all__ = ["Layout", "Piece", "Progress", "split_dataset", "whole_dataset"]
+
+MAX_EPISODES = 50
+"""Episodes of a piece, which are lost with a killed worker."""
+
+Progress: TypeAlias = Callable[[int], None]
+"""Called with the number of episodes that were written since the last call."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Piece:
+    """Successive episodes of a dataset that one worker converts.
+
+    Attributes:
+        number: Number of the piece.
+        names: Names of its episodes.
+        start: Actions of the dataset before its first episode.
+        before: Episodes of the dataset before its first one.
+    """
+
+    number: int
+    names: tuple[str, ...]
+    start: int
+    before: int
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Layout:
+    """How recordings are written in a format of another project.
+
+    Attributes:
+        begin: Checks that packages are installed and the path can be written.
+        write: Writes the episodes of a piece; returns what `finish` needs of it.
+        finish: Writes files about all pieces, given their results in order; None if
+            there are none.
+        in_pieces: Whether several workers may each write a piece.
+    """
+
+    begin: Callable[[Path], None]
+    write: Callable[[Dataset, Piece, Path, Progress], Mapping[str, Json]]
+    finish: Callable[[Dataset, Path, Sequence[Mapping[str, Json]]], None] | None = None
+    in_pieces: bool = False
+
+
+def whole_dataset(dataset: Dataset) -> Piece:
+    """Return the piece that contains all episodes."""
+    return Piece(number=0, names=dataset.names, start=0, before=0)
+
+
+def split_dataset(dataset: Dataset, workers: int) -> list[Piece]:
+    """Split a dataset among workers, in pieces of at most `MAX_EPISODES`."""
+    names = dataset.names
+    size = min(MAX_EPISODES, math.ceil(len(names) / workers))
+    pieces, start = [], 0
+    for before in range(0, len(names), size):
+        chosen = names[before : before + size]
+        pieces.append(
+            Piece(number=len(pieces), names=chosen, start=start, before=before)
+        )
+        start += sum(dataset.length(name) for name in chosen)
+    return pieces

@@ -1,0 +1,223 @@
+"""The description of an environment in a dataset, and the environment made from it."""
+
+import json
+import platform
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+from wbc_suite import __version__
+from wbc_suite.control import load_composite_controller_config
+from wbc_suite.envs import RobotEnv
+from wbc_suite.envs.config import EnvConfig
+from wbc_suite.errors import DatasetError, WbcError
+from wbc_suite.recording.dataset import Dataset
+from wbc_suite.recording.episode import Fact
+
+__all__ = ["EnvSource", "header_of", "rebuild"]
+
+GYM_TYPE = 2
+"""Type of Gymnasium environments in robomimic's `env_args`."""
+PACKAGES = ("mujoco", "pin", "numpy", "gymnasium", "h5py", "daqp")
+MAX_TEXT = 1_000_000  # characters of env_args
+_SHOWN = {"render_mode", "render_camera", "render_size", "render_preset", "skin"}
+"""Arguments of rendering, which do not change an episode."""
+_NAMES = ("robots", "controller_configs", "gripper_types", "base_types")
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class EnvSource:
+    """Name and arguments of an environment.
+
+    Attributes:
+        benchmark: Its name.
+        arguments: Plain data.
+        package: Package of the environment: `wbc_suite`, or another one.
+        missing: Arguments that are not plain data, such as a user's sampler.
+    """
+
+    benchmark: str
+    arguments: Mapping[str, Any]
+    package: str = "wbc_suite"
+    missing: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, env: Any) -> "EnvSource":
+        """Describe an environment.
+
+        Raises:
+            DatasetError: If it is not an environment of this package.
+        """
+        inner = env.unwrapped
+        if not isinstance(inner, RobotEnv):
+            raise DatasetError(
+                f"Only environments of wbc_suite are recorded, not {inner}."
+            )
+        benchmark, given = inner.made_of
+        kept = {k: v for k, v in given.items() if k not in _SHOWN}
+        plain = {k: v for k, v in kept.items() if _is_plain(v)}
+        missing = sorted(set(kept) - set(plain))
+        if not isinstance(benchmark, str):
+            missing.append("benchmark")
+        name = inner.benchmark.name
+        return cls(benchmark=name, arguments=plain, missing=tuple(missing))
+
+    @classmethod
+    def parse(cls, env_args: str | None) -> "EnvSource":
+        """Parse `env_args` of a dataset.
+
+        Raises:
+            DatasetError: If it is missing or is no description of an environment.
+        """
+        if not env_args:
+            raise DatasetError("The dataset does not name its environment.")
+        fields = _parse_json(env_args)
+        if not isinstance(fields, dict) or "env_name" not in fields:
+            raise DatasetError("`env_args` does not name an environment.")
+        name, arguments = fields["env_name"], fields.get("env_kwargs", {})
+        if not isinstance(name, str) or not isinstance(arguments, dict):
+            raise DatasetError("`env_args` has no name, or no arguments by name.")
+        return cls(
+            benchmark=name,
+            arguments=arguments,
+            package=str(fields.get("package", "elsewhere")),
+            missing=tuple(map(str, fields.get("missing") or ())),
+        )
+
+    @property
+    def text(self) -> str:
+        """The description in the form of robomimic's `env_args`."""
+        fields = {
+            "env_name": self.benchmark,
+            "env_version": __version__,
+            "type": GYM_TYPE,
+            "env_kwargs": dict(self.arguments),
+            "package": self.package,
+        }
+        if self.missing:
+            fields["missing"] = list(self.missing)
+        return json.dumps(fields, sort_keys=True, default=_plain)
+
+    def build(self, *, trust_files: bool = False, **changes: Any) -> RobotEnv:
+        """Make the environment for replay; rendering arguments are left out.
+
+        Args:
+            trust_files: Whether names in the dataset may be paths of files here.
+            changes: Arguments that replace recorded ones.
+
+        Raises:
+            DatasetError: If it cannot be made from the description.
+        """
+        lost = set(self.missing) - set(changes)
+        if lost:
+            raise DatasetError(
+                f"The dataset does not contain {', '.join(sorted(lost))}: make the "
+                "environment yourself and replay in that."
+            )
+        known = {k: v for k, v in self.arguments.items() if k in EnvConfig.model_fields}
+        known = {k: v for k, v in known.items() if k not in _SHOWN}
+        if not trust_files:
+            _refuse_paths([self.benchmark, *(known.get(k) for k in _NAMES)])
+        try:
+            return RobotEnv(self.benchmark, **{**known, **changes})
+        except WbcError as error:
+            raise DatasetError(
+                f"The environment {self.benchmark} with {dict(known)!s:.200} "
+                f"cannot be made here: {error}"
+            ) from error
+
+
+def header_of(env: Any) -> dict[str, Fact]:
+    """Return the attributes of `data`, common to all episodes of an environment."""
+    inner = env.unwrapped
+    versions = {name: _version(name) for name in PACKAGES}
+    versions |= {
+        "wbc-suite": __version__,
+        "python": platform.python_version(),
+        "system": platform.system(),
+    }
+    source = EnvSource.of(env)
+    controllers = [
+        load_composite_controller_config(given, robot)
+        for given, robot in zip(inner.config.controller_list, inner.robots, strict=True)
+    ]
+    layout = [
+        {"name": s.name, "kind": str(s.kind), "labels": list(s.labels)}
+        for s in inner.action_layout.slices
+    ]
+    return {
+        "env_args": source.text,
+        "env": source.benchmark,
+        "control_freq": float(inner.config.control_freq),
+        "repository_version": __version__,
+        "versions": json.dumps(versions),
+        "controller_config": json.dumps(controllers, default=_plain),
+        "action_layout": json.dumps(layout),
+        "action_bounds": json.dumps(
+            [inner.action_space.low.tolist(), inner.action_space.high.tolist()]
+        ),
+    }
+
+
+def rebuild(dataset: Dataset, *, trust_files: bool = False, **changes: Any) -> RobotEnv:
+    """Make the environment that a dataset is of; see `EnvSource.build`."""
+    header = dataset.header
+    env_args = header.get("env_args")
+    if env_args is None and "env" in header:  # robosuite's raw files
+        arguments = _parse_json(str(header.get("env_info", "{}")))
+        env_args = json.dumps({"env_name": header["env"], "env_kwargs": arguments})
+    source = EnvSource.parse(None if env_args is None else str(env_args))
+    return source.build(trust_files=trust_files, **changes)
+
+
+def _parse_json(text: str) -> Any:
+    try:
+        return json.loads(text[:MAX_TEXT])
+    except (ValueError, RecursionError) as error:
+        raise DatasetError(
+            f"The description of its environment is not JSON: {error}."
+        ) from error
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def _is_plain(value: Any) -> bool:
+    try:
+        json.dumps(value, default=_plain)
+    except TypeError:
+        return False
+    return True
+
+
+def _plain(value: Any) -> Any:
+    """Convert paths, arrays and NumPy numbers for JSON."""
+    if hasattr(value, "__fspath__"):
+        return str(value)
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    raise TypeError(type(value).__name__)
+
+
+def _refuse_paths(values: list[Any]) -> None:
+    """Refuse arguments that would make the package read files named by a dataset."""
+    for value in values:
+        if isinstance(value, dict):
+            _refuse_paths(list(value.values()))
+        elif isinstance(value, list):
+            _refuse_paths(value)
+        elif isinstance(value, str) and _looks_like_path(value):
+            raise DatasetError(
+                f"The dataset names a file, '{value[:80]}'. If you trust it, use "
+                "--trust-files."
+            )
+
+
+def _looks_like_path(text: str) -> bool:
+    ends = (".toml", ".json", ".xml", ".urdf", ".py")
+    return "/" in text or "\\" in text or text.lower().endswith(ends)

@@ -1,0 +1,166 @@
+"""A trial read of HDF5 files in a child process, before this process opens them.
+
+HDF5 trusts the sizes that a file declares: a damaged one can make it loop without end,
+crash or take all memory. The child reads the structure, the attributes, the names and
+the headers of all datasets under limits of time and memory. Numbers are not read.
+"""
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from pathlib import Path
+
+import h5py
+
+import wbc_suite
+from wbc_suite.errors import DatasetError
+from wbc_suite.recording import hdf5_reader
+
+__all__ = ["check_files", "open_safely"]
+
+CPU_SECONDS = 10
+"""Processor time for the start and for small files, s."""
+BYTES_PER_SECOND = 10_000_000
+"""Larger files get one second more for so many bytes."""
+MEMORY_BYTES = 4 << 30
+"""Address space of the child."""
+WALL_FACTOR = 10
+"""Wall time over processor time, for a busy machine or a slow disk."""
+SPARSE_FROM, SPARSE = 1 << 30, 20
+"""A file this large, with less than one in so many bytes on disk, is a bomb."""
+OUT_OF_MEMORY = 3
+"""Exit code of the child."""
+TOLERATED = (*hdf5_reader.ERRORS, DatasetError)
+"""Errors that the child leaves to the parent, which meets them where they matter."""
+COMMAND = "from wbc_suite.recording.hdf5_check import read_files; read_files()"
+
+
+def open_safely(path: Path, *, checked: bool = False) -> h5py.File:
+    """Open a file for reading.
+
+    Args:
+        path: The file.
+        checked: Whether `check_files` has read it before; it is called if not.
+
+    Raises:
+        DatasetError: If it is missing, no HDF5 file or too damaged to be read.
+    """
+    if not path.is_file():
+        raise DatasetError(f"There is no file '{path}'.")
+    size = path.stat()
+    held = getattr(size, "st_blocks", size.st_size) * 512
+    if size.st_size > SPARSE_FROM and held * SPARSE < size.st_size:
+        raise DatasetError(f"'{path}' claims {size.st_size} bytes, and holds {held}.")
+    if not h5py.is_hdf5(path):
+        raise DatasetError(
+            f"'{path}' is not an HDF5 file, or its start is damaged. If it was "
+            "being recorded, `wbc-suite repair` restores what is beside it."
+        )
+    if not checked:
+        check_files([path])
+    with hdf5_reader.reading(path):
+        return h5py.File(path, "r")
+
+
+def check_files(paths: Sequence[Path]) -> None:
+    """Read files in one child process; missing files are skipped.
+
+    Raises:
+        DatasetError: If the child ran into a limit or crashed; it names the file.
+    """
+    paths = [path for path in paths if path.is_file()]
+    if not paths:
+        return
+    size = sum(path.stat().st_size for path in paths)
+    seconds = CPU_SECONDS + size // BYTES_PER_SECOND
+    roots = [str(Path(wbc_suite.__file__).parents[1]), os.environ.get("PYTHONPATH", "")]
+    search_path = os.pathsep.join(filter(None, roots))
+    environment = os.environ | {"PYTHONPATH": search_path, "OPENBLAS_NUM_THREADS": "1"}
+    try:
+        child = subprocess.run(
+            [sys.executable, "-P", "-c", COMMAND, str(seconds)],
+            input=b"\0".join(os.fsencode(path.absolute()) for path in paths),
+            capture_output=True,
+            timeout=WALL_FACTOR * seconds,
+            env=environment,
+            check=False,
+        )
+        code, output, messages = child.returncode, child.stdout, child.stderr
+    except subprocess.TimeoutExpired as error:
+        code, output, messages = -signal.SIGXCPU, error.stdout or b"", b""
+    if code != 0:
+        damaged = paths[min(output.count(b"\n"), len(paths) - 1)]
+        raise DatasetError(f"'{damaged}' {_reason(code, seconds, messages)}")
+
+
+def _reason(code: int, seconds: int, messages: bytes) -> str:
+    """Return why the child failed, as the end of a sentence about the file."""
+    if code in (-signal.SIGXCPU, -signal.SIGKILL):
+        return f"is damaged: its structure cannot be read in {seconds} s."
+    if code == OUT_OF_MEMORY:
+        return f"is damaged: its structure takes more than {MEMORY_BYTES >> 30} GiB."
+    if code < 0:
+        name = signal.Signals(-code).name
+        return f"is damaged: HDF5 crashes while reading it ({name})."
+    last = messages.decode(errors="replace").strip().splitlines()[-1:]
+    return f"cannot be checked in a child process: {''.join(last)}"
+
+
+def read_files() -> None:
+    """Read the files that standard input names; the child's main function.
+
+    A line is written for each file when it is done. Errors that h5py reports are left
+    to the parent, which finds them where they matter.
+    """
+    seconds = int(sys.argv[1])
+    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    try:
+        for name in sys.stdin.buffer.read().split(b"\0"):
+            with suppress(*TOLERATED):
+                _read_structure(Path(os.fsdecode(name)))
+            os.write(1, b"\n")
+    except MemoryError:
+        sys.exit(OUT_OF_MEMORY)
+
+
+def _read_structure(path: Path) -> None:
+    with h5py.File(path, "r") as file:
+        groups, seen = [h5py.Group(file.id)], set()
+        while groups:
+            group = groups.pop()
+            if group in seen:  # by another name, or a cycle
+                continue
+            seen.add(group)
+            _read_attributes(group)
+            for node in _children(group):
+                if isinstance(node, h5py.Group):
+                    groups.append(node)
+                elif isinstance(node, h5py.Dataset):
+                    _read_attributes(node)
+                    with suppress(*TOLERATED):
+                        hdf5_reader.read_names(node)
+
+
+def _children(group: h5py.Group) -> Iterator[object]:
+    names: list[str] = []
+    with suppress(*TOLERATED):
+        names = hdf5_reader.child_names(group)
+    for name in names:
+        with suppress(*TOLERATED):
+            if isinstance(group.get(name, getlink=True), h5py.HardLink):
+                yield group[name]
+
+
+def _read_attributes(node: h5py.Group | h5py.Dataset) -> None:
+    names: list[str] = []
+    with suppress(*TOLERATED):
+        names = hdf5_reader.attribute_names(node)
+    for name in names:
+        with suppress(*TOLERATED):
+            hdf5_reader.attribute(node, name)

@@ -1,0 +1,68 @@
+"""Work on a recording that is split into pieces and continues after a stop."""
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+from wbc_suite.errors import DatasetError
+from wbc_suite.executors import Executor, Outcome, Serial, WorkItem, run_items
+from wbc_suite.executors.executor import Json, Work
+from wbc_suite.recording.atomic_files import check_folder
+
+__all__ = ["run_pieces", "work_folder"]
+
+
+def work_folder(out: Path) -> Path:
+    """Return the folder of finished pieces until all are finished; `OUT.work`."""
+    return out.with_name(out.name + ".work")
+
+
+def run_pieces(
+    work: Work,
+    payloads: Sequence[Mapping[str, Json]],
+    *,
+    source: Path,
+    out: Path,
+    executor: Executor | None,
+    on_piece: Callable[[WorkItem], None],
+) -> list[tuple[WorkItem, Mapping[str, Json]]]:
+    """Run the pieces that are not finished; return all, in order, with their results.
+
+    Args:
+        work: See `Work`; its payload contains the `source` too.
+        payloads: Arguments of each piece.
+        source: The recording; results of another or a changed one are not used.
+        out: What is being written.
+        executor: Runs the pieces; this process when left out.
+        on_piece: Called with every finished piece.
+
+    Raises:
+        DatasetError: If a piece fails; results of the others are kept.
+    """
+    folder = work_folder(out)
+    check_folder(folder)
+    stat = source.stat() if source.exists() else None
+    common: dict[str, Json] = {
+        "source": str(source.resolve()),
+        "written": None if stat is None else [stat.st_size, stat.st_mtime_ns],
+    }
+    items = []
+    for k, payload in enumerate({**common, **payload} for payload in payloads):
+        text = json.dumps(payload, sort_keys=True)
+        digest = hashlib.sha256(text.encode()).hexdigest()[:12]
+        items.append(WorkItem(name=f"{k:06d}-{digest}", payload=payload))
+
+    def report(item: WorkItem, outcome: Outcome) -> None:
+        if outcome.error is None:
+            on_piece(item)
+
+    outcomes = run_items(
+        work, items, folder=folder, executor=executor or Serial(), on_outcome=report
+    )
+    failed = [outcome.error for outcome in outcomes if outcome.error is not None]
+    if failed:
+        reason = failed[0].removeprefix("DatasetError: ")
+        raise DatasetError(f"{len(failed)} of {len(items)} pieces failed: {reason}")
+    results = (outcome.result for outcome in outcomes)
+    return list(zip(items, results, strict=True))

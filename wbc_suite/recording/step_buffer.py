@@ -1,0 +1,223 @@
+"""Steps of the episode in progress, in rows that go to disk in blocks."""
+
+import mmap
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from wbc_suite.envs import RobotEnv
+from wbc_suite.errors import DatasetError
+from wbc_suite.recording.episode import Column
+
+__all__ = ["RowBuffer", "StepBuffer"]
+
+BLOCK_BYTES = 1 << 16
+"""Rows are written to disk in blocks of at most so many bytes."""
+MAX_ROWS = 512
+"""... or so many rows."""
+
+OUTCOME = (
+    ("rewards", "f8"),
+    ("dones", "i8"),
+    ("clipped", "i8"),
+    ("step_time", "f8"),
+    ("stamp", "f8"),
+)
+"""Columns of numbers that a step returns."""
+
+
+class RowBuffer:
+    """Rows of one structured type; a full block goes to a file without a name.
+
+    The row at `at` is in progress, and so may be the next one: there is always room
+    for both. `advance` completes the first.
+
+    Args:
+        folder: Folder of the file. Nothing is left in it, also after a crash.
+
+    Attributes:
+        block: Rows in memory, shape (n + 1,); another array after each `begin`.
+        at: Index of the row in progress, less than n.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._file: Any = None
+        self.close()
+
+    def __len__(self) -> int:
+        """Return the number of complete rows."""
+        return self._written + self.at
+
+    def begin(self, kind: np.dtype[Any]) -> None:
+        """Delete all rows, and take rows of a type."""
+        self.close()
+        rows = int(np.clip(BLOCK_BYTES // max(kind.itemsize, 1), 1, MAX_ROWS))
+        self.block, self._full = np.zeros(rows + 1, dtype=kind), rows
+
+    def advance(self) -> None:
+        """Complete the row in progress; the next one begins.
+
+        Raises:
+            DatasetError: If the disk is full.
+        """
+        self.at += 1
+        if self.at == self._full:
+            self._spill()
+
+    def rows(self) -> NDArray[Any]:
+        """Return all complete rows and the one in progress, read-only.
+
+        Rows on disk are read when they are used. Later rows do not change them, but
+        for the last.
+
+        Raises:
+            DatasetError: If the disk is full.
+        """
+        if self._file is None:
+            rows = self.block[: self.at + 1].copy()
+            rows.flags.writeable = False
+            return rows
+        self._spill()
+        self._write(1)
+        self._file.seek(self._written * self.block.itemsize)
+        held = mmap.mmap(self._file.fileno(), 0, access=mmap.ACCESS_READ)
+        return np.ndarray((self._written + 1,), self.block.dtype, buffer=held)
+
+    def close(self) -> None:
+        """Delete all rows."""
+        if self._file is not None:
+            self._file.close()
+        self._file = None
+        self.block: NDArray[Any] = np.empty(0)
+        self.at = self._written = self._full = 0
+
+    def _spill(self) -> None:
+        """Move complete rows to the file."""
+        self._write(self.at)
+        self._written += self.at
+        self.block[0] = self.block[self.at]
+        self.at = 0
+
+    def _write(self, count: int) -> None:
+        rest = self.block.view(np.uint8).data[: count * self.block.itemsize]
+        try:
+            if self._file is None:
+                self._file = tempfile.TemporaryFile(dir=self._folder, buffering=0)  # noqa: SIM115 - closed by close()
+            while rest:  # a disk that fills up takes a part first
+                rest = rest[self._file.write(rest) :]
+        except OSError as error:
+            raise DatasetError(
+                f"'{self._folder}' cannot be written: {error.strerror}. The episode in "
+                "progress is lost; finished ones are safe."
+            ) from error
+
+
+class StepBuffer:
+    """Steps of the episode in progress: state and observation, action, outcome.
+
+    Args:
+        env: An environment of this package, wrapped or not.
+        folder: See `RowBuffer`.
+    """
+
+    def __init__(self, env: Any, folder: Path) -> None:
+        self._env: RobotEnv = env.unwrapped
+        self._rows = RowBuffer(folder)
+
+    def __len__(self) -> int:
+        """Return the number of steps."""
+        return len(self._rows)
+
+    def begin(self) -> None:
+        """Begin an episode in the present state of the environment."""
+        env = self._env
+        observation = {k: np.asarray(v) for k, v in env.observation().items()}
+        self._places, size = {}, 0
+        for key, value in observation.items():
+            if value.dtype == np.float64 and value.ndim == 1:
+                self._places[key] = slice(size, size + value.size)
+                size += value.size
+        apart = {k: v for k, v in observation.items() if k not in self._places}
+        self._keys = tuple(observation)
+        fields = [("states", "f8", env.physics_state.shape), ("vectors", "f8", (size,))]
+        fields += [(f"obs/{key}", a.dtype, a.shape) for key, a in apart.items()]
+        fields += [("actions", "f8", (env.action_layout.size,))]
+        fields += [(name, kind, ()) for name, kind in OUTCOME]
+        self._rows.begin(np.dtype(fields, align=True))
+        block = self._rows.block
+        self._states, self._vectors = block["states"], block["vectors"]
+        self._actions = block["actions"]
+        self._outcome = [block[name] for name, _ in OUTCOME]
+        self._apart = [(key, block[f"obs/{key}"]) for key in apart]
+        self._write_state(0, observation)
+
+    def add(
+        self,
+        action: ArrayLike,
+        observation: Mapping[str, Any],
+        outcome: tuple[float, int, int, float, float],
+    ) -> None:
+        """Complete a step, and begin the next one.
+
+        Args:
+            action: The action that was taken.
+            observation: Observation after it.
+            outcome: Values of `OUTCOME`.
+
+        Raises:
+            DatasetError: If shapes or keys differ from the first step's, or the disk
+                is full.
+        """
+        at = self._rows.at
+        try:
+            self._actions[at] = action
+            for column, value in zip(self._outcome, outcome, strict=True):
+                column[at] = value
+            self._write_state(at + 1, observation)
+        except KeyError as error:
+            raise DatasetError(
+                f"An observation lacks {error}, which the first one of the episode has."
+            ) from error
+        except ValueError as error:
+            raise DatasetError(
+                f"The shapes of a step differ from those of the first: {error}."
+            ) from error
+        self._rows.advance()
+
+    def columns(self, *, next_obs: bool = False) -> tuple[dict[str, Column], Column]:
+        """Return columns by name, read-only, and the state after the last action.
+
+        Args:
+            next_obs: Whether observations after each action are included.
+
+        Raises:
+            DatasetError: If the disk is full.
+        """
+        rows = self._rows.rows()
+        before, after = rows[:-1], rows[1:]
+        names = "states", "actions", *(name for name, _ in OUTCOME)
+        columns = {name: before[name] for name in names}
+        for group, some in (("obs", before), ("next_obs", after))[: 1 + next_obs]:
+            columns |= {f"{group}/{key}": self._column(some, key) for key in self._keys}
+        return columns, rows["states"][-1].copy()
+
+    def close(self) -> None:
+        """Delete all steps."""
+        self._rows.close()
+
+    def _write_state(self, at: int, observation: Mapping[str, Any]) -> None:
+        self._states[at] = self._env.physics_state
+        vectors = [observation[key] for key in self._places]
+        if vectors:
+            np.concatenate(vectors, out=self._vectors[at])
+        for key, column in self._apart:
+            column[at] = observation[key]
+
+    def _column(self, rows: Column, key: str) -> Column:
+        place = self._places.get(key)
+        return rows[f"obs/{key}"] if place is None else rows["vectors"][:, place]

@@ -1,0 +1,157 @@
+"""Episodes as videos (.mp4, .webp, .gif) and as contact sheets."""
+
+from collections.abc import Iterable, Iterator
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw
+
+from wbc_suite.envs import RobotEnv
+from wbc_suite.errors import DatasetError
+from wbc_suite.recording.dataset import Dataset
+from wbc_suite.recording.env_source import rebuild
+from wbc_suite.recording.episode import Episode
+from wbc_suite.recording.extras import import_extra
+from wbc_suite.recording.mp4_writer import Mp4Writer
+from wbc_suite.recording.plots import save_picture
+from wbc_suite.recording.replaying import play_actions, play_states
+
+__all__ = ["check_video", "episode_pictures", "write_sheet", "write_video"]
+
+Picture = NDArray[np.uint8]
+
+RATE = 20.0  # pictures per second, at most
+PILLOW = {".gif": "GIF", ".webp": "WEBP"}
+SHEET_ROWS, SHEET_COLUMNS, SHEET_SIZE = 12, 6, 128  # episodes, pictures, pixels
+LABEL = 14  # pixels
+
+
+def check_video(path: Path) -> None:
+    """Check that a video can be written, before anything is drawn.
+
+    Raises:
+        DatasetError: If the format is unknown, or its package is not installed.
+    """
+    suffix = path.suffix.lower()
+    if suffix == ".mp4":
+        import_extra("av", "video")
+    elif suffix not in PILLOW:
+        raise DatasetError(
+            f"'{path}': videos are .mp4, .webp or .gif, not '{path.suffix}'."
+        )
+
+
+def episode_pictures(
+    env: RobotEnv, episode: Episode, *, by_states: bool, every: int = 1
+) -> Iterator[Picture]:
+    """Play an episode, and draw it as `env.render` does.
+
+    Args:
+        env: Made with `render_mode="rgb_array"`.
+        episode: What is played.
+        by_states: Whether states are shown as recorded; else actions are taken.
+        every: Draw every so many actions.
+    """
+    if by_states:
+        played: Iterator[Any] = play_states(env, episode)
+    else:
+        played = play_actions(env, episode)
+    for k, _ in enumerate(played):
+        if k % every == 0:
+            yield np.asarray(env.render())
+
+
+def write_video(pictures: Iterable[Picture], path: Path, *, rate: float) -> None:
+    """Write pictures as .mp4 (H.264, needs `av`), .webp or .gif.
+
+    Raises:
+        DatasetError: If it cannot be written.
+    """
+    check_video(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if path.suffix.lower() in PILLOW:
+            _write_animation(pictures, path, rate)
+            return
+        with closing(Mp4Writer(path, rate=round(rate), extra="video")) as writer:
+            for picture in pictures:
+                writer.add(picture)
+    except OSError as error:
+        raise DatasetError(f"'{path}' cannot be written: {error}.") from error
+
+
+def write_sheet(dataset: Dataset, path: Path, *, camera: str = "agentview") -> None:
+    """Draw episodes, one per row, from their beginning to their end.
+
+    Recorded pictures of the camera are used if there are any; otherwise recorded
+    states are rendered.
+
+    Raises:
+        DatasetError: If there is nothing to draw, or the file cannot be written.
+    """
+    names = dataset.names[:SHEET_ROWS]
+    if not names:
+        raise DatasetError(f"'{dataset.path}' has no episodes to draw.")
+    env: RobotEnv | None = None
+    rows = []
+    for name in names:
+        episode = dataset.episode(name)
+        pictures = episode.columns.get(f"obs/{camera}_image")
+        at = np.linspace(0, episode.length - 1, SHEET_COLUMNS).round().astype(int)
+        if pictures is None:
+            env = env or rebuild(
+                dataset,
+                render_mode="rgb_array",
+                render_camera=camera,
+                render_size=(SHEET_SIZE, SHEET_SIZE),
+                use_camera_obs=False,
+            )
+            wanted = set(at.tolist())
+            drawn = {
+                k: np.asarray(env.render())
+                for k in play_states(env, episode)
+                if k in wanted
+            }
+            row = [drawn[k] for k in at.tolist()]
+        else:
+            row = [pictures[k] for k in at.tolist()]
+        rows.append((_caption(episode), row))
+    if env is not None:
+        env.close()
+    save_picture(_tile(rows), path)
+
+
+def _caption(episode: Episode) -> str:
+    word = {None: "", True: ", success", False: ", no success"}[episode.success]
+    return f"{episode.name}: {episode.length} actions{word}"
+
+
+def _tile(rows: list[tuple[str, list[Picture]]]) -> Image.Image:
+    """Put pictures beside each other, each row under its words."""
+    height = SHEET_SIZE + LABEL
+    sheet = Image.new("RGB", (SHEET_COLUMNS * SHEET_SIZE, len(rows) * height), "white")
+    pen = ImageDraw.Draw(sheet)
+    for k, (caption, pictures) in enumerate(rows):
+        pen.text((4, k * height + 1), caption, fill="black")
+        for j, picture in enumerate(pictures):
+            image = Image.fromarray(picture).resize((SHEET_SIZE, SHEET_SIZE))
+            sheet.paste(image, (j * SHEET_SIZE, k * height + LABEL))
+    return sheet
+
+
+def _write_animation(pictures: Iterable[Picture], path: Path, rate: float) -> None:
+    images = (Image.fromarray(picture) for picture in pictures)
+    first = next(images, None)
+    if first is None:
+        raise DatasetError("There are no pictures for a video.")
+    first.save(
+        path,
+        format=PILLOW[path.suffix.lower()],
+        save_all=True,
+        append_images=images,
+        duration=round(1000.0 / rate),
+        loop=0,
+    )

@@ -1,0 +1,197 @@
+"""Capsules and spheres that enclose collision shapes, for the QP's distance limits.
+
+A capsule distance takes six multiplications, a mesh distance takes a search. The
+controller keeps the capsules apart and the simulator collides the exact shapes. Each
+capsule encloses its shape, so separated capsules mean separated shapes.
+"""
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+
+from wbc_suite.robot.description import RobotDescription
+from wbc_suite.robot.elements import rigid_bodies
+from wbc_suite.robot.poses import rotation_matrix
+from wbc_suite.robot.shape_geometry import hull_spheres, support_points
+from wbc_suite.robot.shapes import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
+from wbc_suite.typing import Matrix, Vector
+
+__all__ = [
+    "EnclosingCapsule",
+    "collision_pairs",
+    "collision_spheres",
+    "enclosing_capsules",
+]
+
+MAX_STRIPS = 4
+"""Largest number of parallel capsules for a flat box."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class EnclosingCapsule:
+    """All points within `radius` of a segment.
+
+    Attributes:
+        link: Link that carries it.
+        start: One end of the segment in the link's frame, m, shape (3,).
+        end: The other end; equal to `start` for a sphere.
+        radius: Radius, m.
+    """
+
+    link: str
+    start: Vector
+    end: Vector
+    radius: float
+
+
+def enclosing_capsules(robot: RobotDescription) -> tuple[EnclosingCapsule, ...]:
+    """Compute the capsules around all collision shapes, in the order of the links."""
+    capsules: list[EnclosingCapsule] = []
+    for link in robot.links:
+        for shape in link.collision:
+            rotation, offset = rotation_matrix(shape), np.asarray(shape.pos)
+            for start, end, radius in _capsules(shape):
+                capsules.append(
+                    EnclosingCapsule(
+                        link=link.name,
+                        start=offset + rotation @ start,
+                        end=offset + rotation @ end,
+                        radius=radius,
+                    )
+                )
+    return tuple(capsules)
+
+
+def collision_spheres(robot: RobotDescription) -> dict[str, Matrix]:
+    """Return the spheres whose hulls are the collision shapes, by link.
+
+    The lowest sphere gives a shape's exact height over a plane. Links without
+    collision shapes are left out.
+
+    Returns:
+        For each link rows x, y, z in the link's frame and the radius, m, shape (n, 4).
+    """
+    return {
+        link.name: np.concatenate([_in_link(shape) for shape in link.collision])
+        for link in robot.links
+        if link.collision
+    }
+
+
+def _in_link(shape: Shape) -> Matrix:
+    spheres, R = hull_spheres(shape), rotation_matrix(shape)
+    return np.column_stack([spheres[:, :3] @ R.T + shape.pos, spheres[:, 3]])
+
+
+def collision_pairs(robot: RobotDescription) -> frozenset[frozenset[str]]:
+    """Return the pairs of links that can collide with each other.
+
+    Excluded are pairs on one rigid body, neighbours over a joint, the pairs of
+    `contacts.exclude`, and pairs of links of one gripper. All but the last are
+    the simulator's own rules.
+    """
+    rigid = rigid_bodies(robot.links)
+    parent = {link.name: rigid[link.parent] for link in robot.links if link.parent}
+    grippers = _gripper_links(robot)
+    excluded = {frozenset(pair) for pair in robot.contacts.exclude}
+    shaped = [link.name for link in robot.links if link.collision]
+    pairs: set[frozenset[str]] = set()
+    for a, b in itertools.combinations(shaped, 2):
+        body_a, body_b = rigid[a], rigid[b]
+        neighbours = parent.get(body_a) == body_b or parent.get(body_b) == body_a
+        same_gripper = a in grippers and grippers[a] == grippers.get(b)
+        if body_a != body_b and not neighbours and not same_gripper:
+            pairs.add(frozenset((a, b)))
+    return frozenset(pairs - excluded)
+
+
+def _gripper_links(robot: RobotDescription) -> dict[str, str]:
+    """Map the moving links of grippers to their gripper."""
+    owner = {
+        joint: group
+        for group in robot.synergies
+        for joint in robot.groups.get(group, ())
+    }
+    links: dict[str, str] = {}
+    for link in robot.links:
+        joint = link.joint
+        name = joint and (joint.mimic.joint if joint.mimic else joint.name)
+        group = owner.get(name or "") or links.get(link.parent or "")
+        if group is not None:
+            links[link.name] = group
+    return links
+
+
+Segment = tuple[Vector, Vector, float]
+
+
+def _capsules(shape: Shape) -> list[Segment]:
+    match shape:
+        case Sphere(radius=radius):
+            return [(np.zeros(3), np.zeros(3), radius)]
+        case Capsule(start=start, end=end, radius=radius):
+            return [(np.asarray(start), np.asarray(end), radius)]
+        case Cylinder(start=start, end=end, radius=radius):
+            wide = max(radius, shape.radius_to or 0.0)
+            return [_around_cylinder(np.asarray(start), np.asarray(end), wide)]
+        case Ellipsoid(size=size):
+            return [_around_ellipsoid(np.asarray(size))]
+        case Box(size=size):
+            return _around_box(np.asarray(size))
+        case _:
+            return [_around_points(support_points(shape))]
+
+
+def _around_cylinder(start: Vector, end: Vector, radius: float) -> Segment:
+    """Return the capsule of least volume on a cylinder's axis.
+
+    Its segment ends a distance `u` before the cylinder's end faces. Its radius reaches
+    their rims: `rho^2 = r^2 + u^2`. With u = 0 a flat cylinder would grow by its radius
+    at either face.
+    """
+    length = float(np.linalg.norm(end - start))
+    u = np.linspace(0.0, length / 2, 101)
+    rho = np.hypot(radius, u)
+    best = int(np.argmin(rho**2 * (length - 2.0 * u + 4.0 / 3.0 * rho)))
+    step = u[best] / length * (end - start)
+    return start + step, end - step, float(rho[best])
+
+
+def _around_ellipsoid(size: Vector) -> Segment:
+    """Return a segment of half length a - b, radius b, for half axes a >= b."""
+    axis = int(np.argmax(size))
+    radius = float(np.max(np.delete(size, axis)))
+    half = np.zeros(3)
+    half[axis] = size[axis] - radius
+    return -half, half, radius
+
+
+def _around_box(size: Vector) -> list[Segment]:
+    """Return parallel capsules along the longest axis, side by side in a flat box."""
+    thin, middle, long = np.argsort(size)
+    strips = int(np.clip(np.round(size[middle] / size[thin]), 1, MAX_STRIPS))
+    width = size[middle] / strips
+    radius = float(np.hypot(width, size[thin]))
+    half = np.zeros(3)
+    half[long] = size[long]
+    found: list[Segment] = []
+    for k in range(strips):
+        centre = np.zeros(3)
+        centre[middle] = -size[middle] + (2 * k + 1) * width
+        found.append(_around_cylinder(centre - half, centre + half, radius))
+    return found
+
+
+def _around_points(points: Matrix) -> Segment:
+    """Return a capsule along the longest principal axis of a point cloud."""
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    axis = np.linalg.svd(points - middle, full_matrices=False)[2][0]
+    along = (points - middle) @ axis
+    across = np.linalg.norm(points - middle - np.outer(along, axis), axis=1)
+    radius = float(across.max())
+    reach = np.sqrt(np.maximum(radius**2 - across**2, 0.0))
+    low, high = float((along + reach).min()), float((along - reach).max())
+    if low > high:
+        low = high = (low + high) / 2
+    return middle + low * axis, middle + high * axis, radius

@@ -1,0 +1,345 @@
+"""The elements of a robot description: links, joints, frames and the others.
+
+Each model is one table of a component's TOML file; `docs/robots.md` is the reference of
+the format. SI units, radians, quaternions w x y z. A link's frame is at its joint.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal, TypeAlias
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    Field,
+    PositiveInt,
+    field_validator,
+    model_validator,
+)
+
+from wbc_suite.robot.shapes import ROUNDING, Posed, Real, Shape, Vector3
+from wbc_suite.tomlfile import FROZEN, FrozenModel
+
+__all__ = [
+    "Actuator",
+    "Camera",
+    "Channel",
+    "Connect",
+    "Contacts",
+    "Elements",
+    "Frame",
+    "Joint",
+    "Link",
+    "Mimic",
+    "Mount",
+    "Name",
+    "Rgba",
+    "Root",
+    "Sensor",
+    "Synergy",
+    "rigid_bodies",
+]
+
+Name: TypeAlias = Annotated[
+    str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=80)
+]
+Range: TypeAlias = tuple[Real, Real]
+Positive: TypeAlias = Annotated[float, Field(gt=0.0, le=1e9)]
+NotNegative: TypeAlias = Annotated[float, Field(ge=0.0, le=1e9)]
+Command: TypeAlias = Annotated[float, Field(ge=-1.0, le=1.0)]
+Moment: TypeAlias = Annotated[float, Field(ge=-1e6, le=1e6)]
+
+
+Channel: TypeAlias = Annotated[float, Field(ge=0.0, le=1.0)]
+Rgb: TypeAlias = tuple[Channel, Channel, Channel]
+
+
+def _with_alpha(color: Any) -> Any:
+    """Append alpha 1 to a colour of three channels."""
+    match color:
+        case [red, green, blue]:
+            return (red, green, blue, 1.0)
+        case _:
+            return color
+
+
+Rgba: TypeAlias = Annotated[
+    tuple[Channel, Channel, Channel, Channel],
+    BeforeValidator(
+        _with_alpha,
+        json_schema_input_type=Rgb | tuple[Channel, Channel, Channel, Channel],
+    ),
+]
+"""Red green blue alpha from 0 to 1; files may leave out alpha."""
+
+
+def _rising(limits: Range) -> Range:
+    if not limits[0] < limits[1]:
+        raise ValueError(f"the lower limit {limits[0]} must be below {limits[1]}")
+    return limits
+
+
+Limits: TypeAlias = Annotated[Range, AfterValidator(_rising)]
+
+
+class Mimic(FrozenModel):
+    """A joint that follows another: `q = ratio * q_joint + offset`.
+
+    Attributes:
+        joint: The leading joint.
+        ratio: Motion of this joint per unit of the leader's motion.
+        offset: Position of this joint when the leader is at zero.
+        closed: Whether a `[[connect]]` enforces the relation in MuJoCo. MuJoCo then
+            gets no second constraint; other engines use this relation.
+    """
+
+    joint: Name
+    ratio: Real = 1.0
+    offset: Real = 0.0
+    closed: bool = False
+
+
+class Joint(FrozenModel):
+    """One degree of freedom between a link and its parent.
+
+    Attributes:
+        name: Unique name.
+        type: `hinge` (radians) or `slide` (metres).
+        axis: Axis in the link's frame; normalised on reading.
+        range: Position limits; absent for an unlimited joint.
+        velocity: Largest speed, rad/s or m/s.
+        acceleration: Largest acceleration, rad/s^2 or m/s^2; optional.
+        effort: Largest torque or force, N m or N; a joint without effort has no motor.
+        armature: Rotor inertia seen at the joint, kg m^2 or kg.
+        damping: Viscous friction, N m s/rad or N s/m (MuJoCo only).
+        frictionloss: Dry friction, N m or N (MuJoCo only).
+        mimic: Coupling to a leading joint.
+        passive: A joint without motor that belongs to no group, such as a caster.
+    """
+
+    name: Name
+    type: Literal["hinge", "slide"] = "hinge"
+    axis: Vector3 = (0.0, 0.0, 1.0)
+    range: Limits | None = None
+    velocity: Positive | None = None
+    acceleration: Positive | None = None
+    effort: Positive | None = None
+    armature: NotNegative = 0.0
+    damping: NotNegative = 0.0
+    frictionloss: NotNegative = 0.0
+    mimic: Mimic | None = None
+    passive: bool = False
+
+    @property
+    def independent(self) -> bool:
+        """Whether the joint follows no other and is not passive."""
+        return self.mimic is None and not self.passive
+
+    @field_validator("axis")
+    @classmethod
+    def _normalise_axis(cls, axis: Vector3) -> Vector3:
+        norm = math.hypot(*axis)
+        if abs(norm - 1.0) > 1e-3:
+            raise ValueError(f"an axis must have length 1, this one has {norm:.6g}")
+        if abs(norm - 1.0) < ROUNDING:
+            return axis
+        x, y, z = (component / norm for component in axis)
+        return (x, y, z)
+
+
+class Link(Posed):
+    """A rigid body; `pos` and `quat` place its frame in its parent's frame.
+
+    Attributes:
+        name: Unique name.
+        parent: Parent link; absent for the root of a component.
+        mass: Mass in kg; a link with a joint needs one.
+        com: Centre of mass in the link's frame, m.
+        inertia: Inertia about the centre of mass in the link's axes, kg m^2, in the
+            order xx yy zz xy xz yz.
+        joint: Joint to the parent; absent for a fixed link.
+        visual: Shapes to draw.
+        collision: Shapes to collide with (primitives and hulls).
+        accept: Plausibility rules (`com`, `inertia`) that this link may violate, each
+            with the reason.
+    """
+
+    name: Name
+    parent: Name | None = None
+    mass: NotNegative = 0.0
+    com: Vector3 = (0.0, 0.0, 0.0)
+    inertia: tuple[Moment, Moment, Moment, Moment, Moment, Moment] = (0, 0, 0, 0, 0, 0)
+    joint: Joint | None = None
+    visual: tuple[Shape, ...] = ()
+    collision: tuple[Shape, ...] = ()
+    accept: dict[Literal["com", "inertia"], str] = {}
+
+
+class Frame(Posed):
+    """A named pose on a link, for tasks, grasps and sensors."""
+
+    name: Name
+    link: Name
+    role: Literal[
+        "eef", "tcp", "foot", "head", "torso", "base", "tip", "imu", "wrist", "other"
+    ] = "other"
+
+
+class Mount(Posed):
+    """A named pose on a link where another component can be mounted."""
+
+    name: Name
+    link: Name
+
+
+class Camera(Posed):
+    """A camera; it looks along its -z axis with y up, as in MuJoCo.
+
+    Attributes:
+        name: Unique name.
+        link: Link that carries it.
+        fovy: Vertical field of view, degrees (the unit of MuJoCo).
+        resolution: Width and height in pixels.
+    """
+
+    name: Name
+    link: Name
+    fovy: float = Field(default=45.0, gt=1.0, lt=175.0)
+    resolution: tuple[PositiveInt, PositiveInt] = (640, 480)
+
+
+class Actuator(FrozenModel):
+    """An actuator that differs from the default of one torque motor per joint.
+
+    Attributes:
+        joint: Joint that it drives.
+        kind: `motor` takes a torque, `position` a setpoint with gains kp and kd,
+            `velocity` a speed with gain kd.
+        kp: Stiffness, N m/rad or N/m.
+        kd: Damping, N m s/rad or N s/m.
+        effort: Largest effort; the joint's own when absent.
+    """
+
+    joint: Name
+    kind: Literal["motor", "position", "velocity"]
+    kp: NotNegative = 0.0
+    kd: NotNegative = 0.0
+    effort: Positive | None = None
+
+
+class Sensor(FrozenModel):
+    """A sensor at a frame, read from MuJoCo under its own name."""
+
+    name: Name
+    kind: Literal["force", "torque", "gyro", "accelerometer", "touch"]
+    frame: Name
+    noise: NotNegative = 0.0
+
+
+class Synergy(FrozenModel):
+    """One gripper command that moves several joints from open to closed.
+
+    Attributes:
+        name: Unique name within the gripper.
+        gripper: Name of the gripper; needed only in a component with several. In an
+            assembly a gripper has the name of its part.
+        open: Joint values when open.
+        closed: The same joints' values when closed.
+        grasps: Commands (-1 open to 1 closed) before and after closing, by name of a
+            grasp, such as `pinch`; -1 and 1 for other grasps. The frame of the same
+            name, or else the `tcp`, gives the pose: the gripper approaches along z,
+            fingers close along y and a bar lies along x.
+    """
+
+    name: Name
+    gripper: Name = "gripper"
+    open: dict[Name, Real]
+    closed: dict[Name, Real]
+    grasps: dict[Name, tuple[Command, Command]] = {}
+
+    @model_validator(mode="after")
+    def _same_joints(self) -> "Synergy":
+        if set(self.open) != set(self.closed) or not self.open:
+            raise ValueError("'open' and 'closed' must have the same joints")
+        return self
+
+
+class Connect(FrozenModel):
+    """A ball joint between two links that closes a loop (MuJoCo only)."""
+
+    link: Name
+    other: Name
+    anchor: Vector3
+
+
+class Contacts(FrozenModel):
+    """Pairs of links that never collide with each other."""
+
+    exclude: tuple[tuple[Name, Name], ...] = ()
+
+
+class Root(Posed):
+    """Connection of the robot's first link to the world.
+
+    Attributes:
+        kind: `fixed`; `planar` (slides along x and y, turns about z); `free`.
+        drive: Whether a planar base can move sideways (`holonomic`) or not
+            (`differential`).
+        actuated: Whether the planar joints have motors.
+        velocity: Speed limits of a moving root, m/s and rad/s.
+        effort: Force and torque limits of an actuated planar root, N and N m.
+        damping: Viscous friction of planar joints, N s/m and N m s/rad.
+    """
+
+    kind: Literal["fixed", "planar", "free"] = "fixed"
+    drive: Literal["holonomic", "differential"] = "holonomic"
+    actuated: bool = True
+    velocity: tuple[Positive, Positive] = (1.0, 1.5)
+    effort: tuple[Positive, Positive] = (2000.0, 1000.0)
+    damping: tuple[NotNegative, NotNegative] = (0.0, 0.0)
+
+
+class Elements(BaseModel):
+    """The elements that a component and a robot have in common.
+
+    The keys of tables are singular, as TOML writes them: `[[link]]`, `[[frame]]`.
+
+    Attributes:
+        materials: Colours by name, red green blue alpha; alpha may be left out.
+        links: Links, parents before children.
+        frames: Named poses on links.
+        mounts: Poses where components can be mounted.
+        cameras: Cameras.
+        actuators: Actuators that differ from the default.
+        sensors: Sensors.
+        connects: Closed loops.
+        groups: Joint names by group, such as `right_arm`.
+        keyframes: Joint values by name of the posture; other joints are zero.
+        contacts: Pairs of links that do not collide.
+        root: Connection of the first link to the world.
+    """
+
+    model_config = FROZEN
+
+    materials: dict[Name, Rgba] = {}
+    links: tuple[Link, ...] = Field(alias="link")
+    frames: tuple[Frame, ...] = Field(default=(), alias="frame")
+    mounts: tuple[Mount, ...] = Field(default=(), alias="mount")
+    cameras: tuple[Camera, ...] = Field(default=(), alias="camera")
+    actuators: tuple[Actuator, ...] = Field(default=(), alias="actuator")
+    sensors: tuple[Sensor, ...] = Field(default=(), alias="sensor")
+    connects: tuple[Connect, ...] = Field(default=(), alias="connect")
+    groups: dict[Name, tuple[Name, ...]] = {}
+    keyframes: dict[Name, dict[Name, float]] = Field(default={}, alias="keyframe")
+    contacts: Contacts = Contacts()
+    root: Root = Root()
+
+
+def rigid_bodies(links: Sequence[Link]) -> dict[str, str]:
+    """Map each link to the moving (or first) link that it is rigidly fixed to."""
+    owner: dict[str, str] = {}
+    for link in links:
+        fixed = link.joint is None and link.parent in owner
+        owner[link.name] = owner[str(link.parent)] if fixed else link.name
+    return owner

@@ -1,0 +1,265 @@
+"""Infer groups, end-effector frames and a ready posture of an imported robot.
+
+URDF and MJCF define neither. The inference uses the words of link and joint names and
+the structure of the tree. Users edit the result after `to_toml()`.
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from wbc_suite.robot.elements import Frame, Joint, Link, rigid_bodies
+
+if TYPE_CHECKING:
+    from wbc_suite.robot.importing import NameTable
+
+__all__ = ["Limb", "infer_frames", "infer_limbs", "infer_ready", "infer_role"]
+
+KINDS = {
+    "gripper": "finger fingers thumb gripper index middle ring pinky jaw knuckle",
+    "head": "head neck",
+    "torso": "torso waist trunk spine chest lift",
+    "leg": "leg hip knee ankle thigh calf shin foot toe haa hfe kfe",
+    "arm": "arm shoulder elbow wrist forearm upperarm",
+    "base": "wheel caster",
+}
+"""Words of each kind of limb."""
+KIND_OF = {word: kind for kind, words in KINDS.items() for word in words.split()}
+
+SIDE_OF = {"left": "left", "l": "left", "right": "right", "r": "right"}
+PAIRS = {
+    "front_left": "fl lf",
+    "front_right": "fr rf",
+    "rear_left": "hl lh rl bl",
+    "rear_right": "hr rh rr br",
+}
+"""Words for the legs of quadrupeds."""
+PAIR_OF = {word: pair for pair, words in PAIRS.items() for word in words.split()}
+ENDS = {"front": "front", "fore": "front", "rear": "rear", "hind": "rear"}
+
+END_OF = {
+    "arm": "eef",
+    "gripper": "tcp",
+    "leg": "foot",
+    "head": "head",
+    "torso": "torso",
+}
+"""Role of the frame at the end of a limb."""
+
+END_WORDS = {
+    "arm": {"eef", "ee", "effector", "tcp", "tool", "flange", "grasp", "grasping"},
+    "gripper": {"tcp", "grasp", "grasping", "tool"},
+    "leg": {"foot", "sole", "toe"},
+}
+"""Words in the names of frames and links at the end of a limb."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Limb:
+    """Joints of one arm, gripper, head, torso, base, or of all legs.
+
+    Attributes:
+        name: Name of the group, such as `right_arm`.
+        kind: One of `KINDS`.
+        links: Links that its joints move, in depth-first order.
+    """
+
+    name: str
+    kind: str
+    links: tuple[Link, ...]
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the independent joints."""
+        joints = (link.joint for link in self.links)
+        return tuple(j.name for j in joints if j is not None and j.independent)
+
+
+class _Traits(NamedTuple):
+    """Kind and side of a moving link's limb, and the first link of the limb."""
+
+    kind: str = ""
+    side: str = ""
+    top: str = ""
+
+
+def infer_limbs(links: Sequence[Link]) -> tuple[Limb, ...]:
+    """Sort the moving links into limbs.
+
+    A link without a known word in its names belongs to the limb of its parent. Branches
+    of an arm form a gripper; a chain below a torso or the root is an arm. A single arm
+    is the right one, as everywhere in this package. Several arms without a side are
+    numbered.
+    """
+    traits = _traits(links)
+    arms = list(dict.fromkeys(x.top for x in traits.values() if x.kind == "arm"))
+    unnamed = [top for top in arms if not traits[top].side]
+    grippers = [x.side for x in traits.values() if x.kind == "gripper"]
+    single = len(arms) == len(unnamed) == 1 and not any(grippers)
+    members: dict[tuple[str, str], list[Link]] = {}
+    for link in links:
+        if link.joint is None:
+            continue
+        kind, side, top = traits[link.name]
+        side = "right" if single else side
+        name = "legs" if kind == "leg" else kind
+        if kind in ("arm", "gripper") and side:
+            name = f"{side}_{kind}"
+        elif kind == "arm" and len(unnamed) > 1:
+            name = f"arm_{unnamed.index(top) + 1}"
+        members.setdefault((name, kind), []).append(link)
+    return tuple(
+        Limb(name=name, kind=kind, links=tuple(own))
+        for (name, kind), own in members.items()
+    )
+
+
+def _traits(links: Sequence[Link]) -> dict[str, _Traits]:
+    """Return kind, side and top of each moving link, by name."""
+    parents = _moving_parents(links)
+    owners = list(parents.values())
+    traits: dict[str, _Traits] = {}
+    for link in links:
+        if link.joint is None:
+            continue
+        parent = parents[link.name]
+        above = traits.get(parent or "", _Traits())
+        words = [*_words(link.joint.name), *_words(link.name)]
+        kind = next((KIND_OF[w] for w in words if w in KIND_OF), None)
+        kind = kind or _inherited_kind(above.kind, branches=owners.count(parent) > 1)
+        same_limb = above.kind in ("arm", "leg", "gripper")
+        side = above.side if same_limb else ""
+        if not (kind == "gripper" and same_limb):  # "left finger" of a right hand
+            side = _side(words, pairs=kind == "leg") or side
+        top = above.top if above.kind == kind else link.name
+        traits[link.name] = _Traits(kind, side, top)
+    return traits
+
+
+def _inherited_kind(above: str, *, branches: bool) -> str:
+    if above == "arm" and branches:
+        return "gripper"
+    return above if above in ("arm", "leg", "gripper", "head") else "arm"
+
+
+def infer_frames(
+    links: Sequence[Link],
+    limbs: Sequence[Limb],
+    given: Sequence[Frame],
+    names: "NameTable",
+) -> tuple[Frame, ...]:
+    """Return the given frames, and `eef`, `foot`, `head`, `torso` at the limbs' ends.
+
+    A given frame of the right name is used. Otherwise a new frame is placed at a given
+    frame or link with a word of `END_WORDS`. A gripper gets a `tcp` only there.
+    """
+    frames = {frame.name: frame for frame in given}
+    for limb in limbs:
+        role = END_OF.get(limb.kind)
+        for tip in _tips(links, limb) if role else ():
+            name = limb.name.replace(limb.kind, str(role))
+            if limb.kind == "leg":
+                side = _side(_words(tip.name), pairs=True)
+                name = "_".join(filter(None, (side, role)))
+            placed = _placed(links, limb, tip, given)
+            if name in frames:
+                frames[name] = frames[name].model_copy(update={"role": role})
+            elif placed is not None:
+                name = names.take(name, "frame")
+                fields = {"name": name, "role": role, **placed}
+                frames[name] = Frame.model_validate(fields)
+    return tuple(frames.values())
+
+
+def infer_role(name: str) -> str:
+    """Return the role of a frame in the file if its name is unambiguous."""
+    words = _words(name)
+    if name in ("head", "torso", "base"):
+        return name
+    if words and words[-1] in ("tip", "foot"):
+        return words[-1]
+    return "imu" if "imu" in words else "other"
+
+
+def infer_ready(links: Sequence[Link]) -> dict[str, float]:
+    """Return a posture with each joint at the value in its range nearest to zero."""
+    joints = [link.joint for link in links if link.joint is not None]
+    return {j.name: _nearest_zero(j) for j in joints if j.independent}
+
+
+def _nearest_zero(joint: Joint) -> float:
+    low, high = joint.range or (0.0, 0.0)
+    return min(max(0.0, low), high)
+
+
+def _words(name: str) -> list[str]:
+    """Split a name: `LHipYaw` gives l, hip, yaw; `arm_left_1` gives arm, left."""
+    parts = re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)
+    return [part.lower() for part in parts]
+
+
+def _side(words: Sequence[str], *, pairs: bool) -> str:
+    """Return `left`, with `pairs` also `front_left`, or "" if no word gives a side."""
+    side = next((SIDE_OF[w] for w in words if w in SIDE_OF), "")
+    if not pairs:
+        return side
+    pair = next((PAIR_OF[w] for w in words if w in PAIR_OF), "")
+    end = next((ENDS[w] for w in words if w in ENDS), "")
+    return pair or (f"{end}_{side}" if end and side else side)
+
+
+def _moving_parents(links: Sequence[Link]) -> dict[str, str | None]:
+    """Map each moving link to its closest moving ancestor."""
+    rigid = rigid_bodies(links)
+    moving = {link.name for link in links if link.joint is not None}
+    above: dict[str, str | None] = {}
+    for link in links:
+        if link.joint is not None:
+            owner = rigid[str(link.parent)]
+            above[link.name] = owner if owner in moving else None
+    return above
+
+
+def _tips(links: Sequence[Link], limb: Limb) -> list[Link]:
+    """Return the last moving links of legs, and the deepest one of other limbs."""
+    above = _moving_parents(links)
+    followed = {above[link.name] for link in limb.links}
+    tips = [link for link in limb.links if link.name not in followed]
+    if limb.kind == "leg":
+        return tips
+    return [max(tips, key=lambda tip: _depth(tip.name, above))]
+
+
+def _depth(name: str | None, above: dict[str, str | None]) -> int:
+    return 0 if name is None else 1 + _depth(above[name], above)
+
+
+def _placed(
+    links: Sequence[Link], limb: Limb, tip: Link, given: Sequence[Frame]
+) -> dict[str, Any] | None:
+    """Return the pose of an inferred frame: at a frame or link with an end word.
+
+    Otherwise it is at the tip. For a gripper the palm is searched, and the result is
+    None if no word is found.
+    """
+    rigid = rigid_bodies(links)
+    if limb.kind == "gripper":
+        palm = rigid[str(limb.links[0].parent)]
+        tip = next(link for link in links if link.name == palm)
+    end_words = END_WORDS.get(limb.kind, set[str]())
+    for frame in given:
+        if rigid[frame.link] == tip.name and end_words.intersection(_words(frame.name)):
+            return {"link": frame.link, "pos": frame.pos, "quat": frame.quat}
+    fixed = [link for link in links if rigid[link.name] == tip.name]
+    for link in fixed:
+        if end_words.intersection(_words(link.name)):
+            return {"link": link.name}
+    if limb.kind == "gripper":
+        return None
+    if limb.kind == "arm":
+        carriers = {link.parent for link in links if link.joint is not None}
+        palms = [link for link in fixed if link.name in carriers]
+        if palms:
+            return {"link": palms[-1].name}
+    return {"link": tip.name}

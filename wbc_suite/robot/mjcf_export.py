@@ -1,0 +1,296 @@
+"""Build the MuJoCo model of a robot from its description."""
+
+from collections.abc import Iterable
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+
+from wbc_suite.robot.description import RobotDescription
+from wbc_suite.robot.elements import Actuator, Joint, Link, rigid_bodies
+from wbc_suite.robot.inertia import inertia_matrix
+from wbc_suite.robot.mjcf_export_geoms import VisualGeoms, add_collision_geoms
+from wbc_suite.robot.poses import se3_of
+
+__all__ = ["SENSOR_TYPES", "STOP_MARGIN", "build_mjspec", "write_mjcf"]
+
+STOP_SOLREF = (0.004, 1.0)
+"""Time constant in s and damping ratio of joint limits, the stiffest that is stable
+with a step of 2 ms. With MuJoCo's default of 20 ms a joint overshoots its limit by
+3.7 mrad at 0.5 rad/s, and a head of 4 kg by 20 mrad; limits of real joints are hard."""
+STOP_SOLIMP = (0.95, 0.99, 0.001)
+"""Smallest and largest impedance of joint limits, and the width between, m or rad."""
+STOP_MARGIN = 3e-3
+"""Distance in rad at which the limit of a limb joint becomes active. MuJoCo tests
+limits only at the start of a step (2 ms), and contacts accelerate joints to up to
+2.6 rad/s. Controllers keep limbs at least this far inside. Fingers rest at their limits
+and have no margin."""
+SITE_GROUP = 4
+"""Site group of frames, hidden by default."""
+
+STIFF = (0.005, 1.0)
+"""Time constant in s and damping ratio of couplings, stable with a step of 2 ms."""
+
+SENSOR_TYPES = {
+    "force": mujoco.mjtSensor.mjSENS_FORCE,
+    "torque": mujoco.mjtSensor.mjSENS_TORQUE,
+    "gyro": mujoco.mjtSensor.mjSENS_GYRO,
+    "accelerometer": mujoco.mjtSensor.mjSENS_ACCELEROMETER,
+    "touch": mujoco.mjtSensor.mjSENS_TOUCH,
+}
+"""MuJoCo's sensor types by the kinds of the description."""
+
+
+def build_mjspec(robot: RobotDescription, *, merged: bool = True) -> mujoco.MjSpec:
+    """Build the MuJoCo specification of a robot.
+
+    Links become bodies, frames become sites, and each joint with an effort gets a
+    torque motor of its own name unless the description gives another.
+
+    Args:
+        robot: The robot.
+        merged: Whether the visual shapes of a link become one mesh, which is faster to
+            simulate and to draw.
+    """
+    spec = mujoco.MjSpec()
+    spec.modelname = robot.name
+    spec.compiler.degree = False
+    spec.compiler.savecompiled = False
+    bodies = {"world": spec.worldbody}
+    inertias = _inertias(robot)
+    limbs = robot.groups.keys() - robot.synergies.keys()
+    limb_joints = {joint for name in limbs for joint in robot.groups[name]}
+    visual = VisualGeoms(spec, robot, merged=merged)
+    for link in robot.links:
+        parent = bodies[link.parent or "world"]
+        bodies[link.name] = body = _add_body(parent, robot, link)
+        if link.joint is not None:
+            _add_joint(body, link.joint, limb=link.joint.name in limb_joints)
+        _set_inertia(body, inertias[link.name])
+        visual.add(body, link)
+        add_collision_geoms(spec, body, robot, link)
+    for frame in robot.frames:
+        bodies[frame.link].add_site(
+            name=frame.name, pos=frame.pos, quat=frame.quat, group=SITE_GROUP
+        )
+    for camera in robot.cameras:
+        bodies[camera.link].add_camera(
+            name=camera.name,
+            pos=camera.pos,
+            quat=camera.quat,
+            fovy=camera.fovy,
+            resolution=camera.resolution,
+        )
+    _add_actuators(spec, robot)
+    _add_sensors(spec, robot)
+    _add_constraints(spec, robot)
+    _add_keyframes(spec, robot)
+    return spec
+
+
+def write_mjcf(robot: RobotDescription) -> str:
+    """Return MJCF text with all digits, with one geom per visual shape."""
+    spec = build_mjspec(robot, merged=False)
+    spec.compile()
+    return spec.to_xml()
+
+
+def _add_body(
+    parent: mujoco.MjsBody, robot: RobotDescription, link: Link
+) -> mujoco.MjsBody:
+    placed = robot.root if link.parent is None else link
+    body = parent.add_body(name=link.name, pos=placed.pos, quat=placed.quat)
+    if link.parent is None:
+        _add_root_joints(body, robot)
+    return body
+
+
+def _add_root_joints(body: mujoco.MjsBody, robot: RobotDescription) -> None:
+    if robot.root.kind == "free":
+        body.add_joint(name="root", type=mujoco.mjtJoint.mjJNT_FREE)
+    if robot.root.kind == "planar":
+        slide, hinge = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
+        kinds = ((slide, (1, 0, 0)), (slide, (0, 1, 0)), (hinge, (0, 0, 1)))
+        linear, angular = robot.root.damping
+        for name, (kind, axis), damping in zip(
+            robot.root_joint_names, kinds, (linear, linear, angular), strict=True
+        ):
+            joint = body.add_joint(name=name, type=kind, axis=axis)
+            joint.damping[0] = damping
+
+
+def _add_joint(body: mujoco.MjsBody, joint: Joint, *, limb: bool) -> None:
+    """Add a joint; hinges of limbs have a margin before their limits."""
+    kinds = {
+        "hinge": mujoco.mjtJoint.mjJNT_HINGE,
+        "slide": mujoco.mjtJoint.mjJNT_SLIDE,
+    }
+    added = body.add_joint(
+        name=joint.name,
+        type=kinds[joint.type],
+        axis=joint.axis,
+        armature=joint.armature,
+        frictionloss=joint.frictionloss,
+    )
+    added.damping[0] = joint.damping
+    added.limited = mujoco.mjtLimited.mjLIMITED_FALSE
+    if joint.range is not None:
+        added.limited = mujoco.mjtLimited.mjLIMITED_TRUE
+        added.solref_limit = STOP_SOLREF
+        added.solimp_limit[:3] = STOP_SOLIMP
+        added.range = joint.range
+        if joint.type == "hinge" and limb:
+            added.margin = STOP_MARGIN
+
+
+def _inertias(robot: RobotDescription) -> dict[str, pin.Inertia]:
+    """Return the inertias of the links in their axes.
+
+    MuJoCo needs mass on each moving body. A moving link without mass therefore gets the
+    inertia of the links that are fixed to it, which does not change the dynamics.
+    """
+    inertias = {
+        link.name: pin.Inertia(
+            link.mass, np.asarray(link.com), inertia_matrix(link.inertia)
+        )
+        for link in robot.links
+    }
+    rigid = rigid_bodies(robot.links)
+    placement: dict[str, pin.SE3] = {}
+    for link in robot.links:
+        owner = rigid[link.name]
+        if owner == link.name:
+            placement[link.name] = pin.SE3.Identity()
+            continue
+        placement[link.name] = placement[str(link.parent)] * se3_of(link)
+        moves = owner != robot.links[0].name or robot.root.kind != "fixed"
+        if moves and robot.link(owner).mass == 0.0 and link.mass > 0.0:
+            inertias[owner] += placement[link.name].act(inertias[link.name])
+            inertias[link.name] = pin.Inertia.Zero()
+    return inertias
+
+
+def _set_inertia(body: mujoco.MjsBody, inertia: pin.Inertia) -> None:
+    if inertia.mass == 0.0:
+        return
+    about = inertia.inertia
+    body.explicitinertial = True
+    body.mass = inertia.mass
+    body.ipos = inertia.lever
+    if not about.any():  # a point mass, which MuJoCo refuses as a full tensor
+        body.inertia = np.zeros(3)
+        return
+    body.fullinertia = [
+        about[0, 0], about[1, 1], about[2, 2], about[0, 1], about[0, 2], about[1, 2]
+    ]  # fmt: skip
+
+
+def _add_actuators(spec: mujoco.MjSpec, robot: RobotDescription) -> None:
+    if robot.root.kind == "planar" and robot.root.actuated:
+        force, torque = robot.root.effort
+        efforts = (force, force, torque)
+        for name, effort in zip(robot.root_joint_names, efforts, strict=True):
+            motor = Actuator(joint=name, kind="motor")
+            _add_actuator(spec, Joint(name=name, effort=effort), motor)
+    given = {actuator.joint: actuator for actuator in robot.actuators}
+    for joint in robot.joints:
+        actuator = given.get(joint.name)
+        if actuator is None and joint.effort and joint.independent:
+            actuator = Actuator(joint=joint.name, kind="motor")
+        if actuator is not None:
+            _add_actuator(spec, joint, actuator)
+
+
+def _add_actuator(spec: mujoco.MjSpec, joint: Joint, actuator: Actuator) -> None:
+    added = spec.add_actuator(
+        name=joint.name, target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT
+    )
+    limits: tuple[float, float] | None = None
+    if actuator.kind == "position":
+        added.set_to_position(kp=actuator.kp, kv=actuator.kd)
+        limits = joint.range
+    elif actuator.kind == "velocity":
+        added.set_to_velocity(kv=actuator.kd)
+        limits = (-joint.velocity, joint.velocity) if joint.velocity else None
+    else:
+        added.set_to_motor()
+    effort = actuator.effort or joint.effort
+    if effort is not None:
+        added.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
+        added.forcerange = (-effort, effort)
+        limits = (-effort, effort) if actuator.kind == "motor" else limits
+    if limits is not None:
+        added.ctrllimited = mujoco.mjtLimited.mjLIMITED_TRUE
+        added.ctrlrange = limits
+
+
+def _add_sensors(spec: mujoco.MjSpec, robot: RobotDescription) -> None:
+    for sensor in robot.sensors:
+        spec.add_sensor(
+            name=sensor.name,
+            type=SENSOR_TYPES[sensor.kind],
+            objtype=mujoco.mjtObj.mjOBJ_SITE,
+            objname=sensor.frame,
+            noise=sensor.noise,
+        )
+
+
+def _add_constraints(spec: mujoco.MjSpec, robot: RobotDescription) -> None:
+    for joint in robot.joints:
+        if joint.mimic is None or joint.mimic.closed:
+            continue
+        equality = spec.add_equality(
+            type=mujoco.mjtEq.mjEQ_JOINT,
+            objtype=mujoco.mjtObj.mjOBJ_JOINT,
+            name=f"{joint.name}_mimic",
+            name1=joint.name,
+            name2=joint.mimic.joint,
+        )
+        equality.data[:5] = (joint.mimic.offset, joint.mimic.ratio, 0, 0, 0)
+        equality.solref[:2] = STIFF
+    for index, connect in enumerate(robot.connects):
+        equality = spec.add_equality(
+            type=mujoco.mjtEq.mjEQ_CONNECT,
+            objtype=mujoco.mjtObj.mjOBJ_BODY,
+            name=f"connect{index}_{connect.link}_{connect.other}",
+            name1=connect.link,
+            name2=connect.other,
+        )
+        equality.data[:3] = connect.anchor
+        equality.solref[:2] = STIFF
+    pairs = {*robot.contacts.exclude, *_welded_neighbours(robot)}
+    for first, second in sorted(pairs):
+        spec.add_exclude(name=f"{first}_{second}", bodyname1=first, bodyname2=second)
+
+
+def _welded_neighbours(robot: RobotDescription) -> Iterable[tuple[str, str]]:
+    """Yield pairs of a static link of a fixed robot and a link that moves on it.
+
+    MuJoCo excludes contacts between a body and its parent, unless the parent is welded
+    to the world.
+    """
+    if robot.root.kind != "fixed":
+        return
+    rigid = rigid_bodies(robot.links)
+    static = robot.links[0].name
+    moving = {a.name for a in robot.links if rigid.get(a.parent or "") == static}
+    shaped = [link.name for link in robot.links if link.collision]
+    given = {frozenset(pair) for pair in robot.contacts.exclude}
+    for first in (name for name in shaped if rigid[name] == static):
+        for second in (n for n in shaped if rigid[n] != static and rigid[n] in moving):
+            if frozenset((first, second)) not in given:
+                yield first, second
+
+
+def _add_keyframes(spec: mujoco.MjSpec, robot: RobotDescription) -> None:
+    for name in robot.keyframes:
+        values = robot.keyframe(name)
+        joints = [values[joint] for joint in robot.joint_names]
+        spec.add_key(name=name, qpos=np.array([*_root_qpos(robot), *joints]))
+
+
+def _root_qpos(robot: RobotDescription) -> Iterable[float]:
+    """Return the root coordinates of the robot's own pose, in MuJoCo's order."""
+    if robot.root.kind == "free":
+        return (*robot.root.pos, *robot.root.quat)
+    return (0.0,) * len(robot.root_joint_names)

@@ -1,0 +1,160 @@
+"""Read geoms and actuators of a compiled MuJoCo model as fields of a description."""
+
+import logging
+from typing import Any
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+
+from wbc_suite.robot.poses import pose_fields
+from wbc_suite.robot.shape_geometry import fit_hull
+from wbc_suite.typing import Vector
+
+__all__ = ["pose_at", "read_actuators", "read_shapes"]
+
+LOG = logging.getLogger(__name__)
+
+VISUAL_GROUPS = 3
+"""Groups 0, 1 and 2 are drawn, as in MuJoCo's own viewer."""
+UNSUPPORTED = (
+    mujoco.mjtGeom.mjGEOM_PLANE,
+    mujoco.mjtGeom.mjGEOM_HFIELD,
+    mujoco.mjtGeom.mjGEOM_SDF,
+)
+"""Geoms of terrains, which robots do not have."""
+DEFAULTS = {"friction": (1.0, 0.005, 0.0001), "solref": (0.02, 1.0)}
+
+
+def pose_at(pos: Vector, quat: Vector) -> pin.SE3:
+    """Return the pose of MuJoCo's pos and quat (w x y z)."""
+    return pin.SE3(pin.Quaternion(*quat).matrix(), np.array(pos))
+
+
+def read_shapes(
+    m: mujoco.MjModel, body: int, offset: Vector
+) -> dict[str, list[dict[str, Any]]]:
+    """Return the visual and the collision shapes of a body.
+
+    Args:
+        m: The compiled model.
+        body: Id of the body.
+        offset: Origin of the body in the link's frame, m.
+    """
+    visual: list[dict[str, Any]] = []
+    collision: list[dict[str, Any]] = []
+    first, count = int(m.body_geomadr[body]), int(m.body_geomnum[body])
+    for g in range(first, first + count):
+        if m.geom_type[g] in UNSUPPORTED:
+            continue
+        shape = _shape(m, g)
+        own = pin.SE3(np.eye(3), np.asarray(shape.pop("pos", np.zeros(3))))
+        pose = pose_at(m.geom_pos[g] + offset, m.geom_quat[g]) * own
+        shape |= pose_fields(pose)
+        if m.geom_group[g] < VISUAL_GROUPS:
+            visual.append(shape | {"color": _color(m, g)})
+        if m.geom_contype[g] or m.geom_conaffinity[g]:
+            collision.append(shape | _contact(m, g))
+    return {"visual": visual, "collision": collision}
+
+
+def _shape(m: mujoco.MjModel, g: int) -> dict[str, Any]:
+    kinds = mujoco.mjtGeom
+    size = m.geom_size[g].tolist()
+    match m.geom_type[g]:
+        case kinds.mjGEOM_BOX:
+            return {"shape": "box", "size": size}
+        case kinds.mjGEOM_SPHERE:
+            return {"shape": "sphere", "radius": size[0]}
+        case kinds.mjGEOM_ELLIPSOID:
+            return {"shape": "ellipsoid", "size": size}
+        case kinds.mjGEOM_CAPSULE | kinds.mjGEOM_CYLINDER:
+            capsule = m.geom_type[g] == kinds.mjGEOM_CAPSULE
+            return {
+                "shape": "capsule" if capsule else "cylinder",
+                "from": [0.0, 0.0, -size[1]],
+                "to": [0.0, 0.0, size[1]],
+                "radius": size[0],
+            }
+        case _:
+            mesh = m.geom_dataid[g]
+            first, count = m.mesh_vertadr[mesh], m.mesh_vertnum[mesh]
+            points = np.array(m.mesh_vert[first : first + count], dtype=np.float64)
+            return fit_hull(points)
+
+
+def _color(m: mujoco.MjModel, g: int) -> list[float]:
+    material = m.geom_matid[g]
+    rgba = m.mat_rgba[material] if material >= 0 else m.geom_rgba[g]
+    return [round(min(max(float(c), 0.0), 1.0), 4) for c in rgba]
+
+
+def _contact(m: mujoco.MjModel, g: int) -> dict[str, Any]:
+    """Return the contact parameters of a geom that are not MuJoCo's defaults."""
+    fields: dict[str, Any] = {
+        key: values
+        for key, default in DEFAULTS.items()
+        if (values := getattr(m, f"geom_{key}")[g].tolist()) != list(default)
+    }
+    if m.geom_condim[g] != 3:
+        fields["condim"] = int(m.geom_condim[g])
+    if m.geom_margin[g] != 0.0:
+        fields["margin"] = float(m.geom_margin[g])
+    return fields
+
+
+def read_actuators(
+    m: mujoco.MjModel, joints: dict[int, str]
+) -> tuple[dict[int, float], list[dict[str, Any]]]:
+    """Return the largest effort by joint id, and the fields of special actuators.
+
+    With gain g, bias b0 + b1 l + b2 dl/dt and gear r, the effort at a joint q = l / r
+    is r (g u + b0 + b1 r q + b2 r dq/dt): a servo of stiffness -b1 r^2 and damping
+    -b2 r^2, or a motor when b1 = b2 = 0.
+    """
+    efforts: dict[int, float] = {}
+    special: list[dict[str, Any]] = []
+    driven: set[int] = set()
+    for a in range(m.nactuator):
+        joint = int(m.actuator_trnid[a, 0])
+        name = m.actuator(a).name or f"number {a}"
+        if m.actuator_trntype[a] != mujoco.mjtTrn.mjTRN_JOINT or joint not in joints:
+            LOG.warning("Actuator '%s' does not drive a single joint; ignored.", name)
+            continue
+        if joint in driven:
+            LOG.warning("Actuator '%s' is the second of its joint; ignored.", name)
+            continue
+        driven.add(joint)
+        fields, effort = _actuator_kind(m, a), _largest_effort(m, a)
+        if effort is not None:
+            efforts[joint] = effort
+        if fields["kind"] != "motor" or effort is None:
+            special.append({"joint": joints[joint], **fields})
+    return efforts, special
+
+
+def _largest_effort(m: mujoco.MjModel, a: int) -> float | None:
+    """Return the smallest limit of the effort at the joint; None without a limit."""
+    gear = abs(float(m.actuator_gear[a, 0]))
+    joint = int(m.actuator_trnid[a, 0])
+    bounds: list[float] = []
+    if m.actuator_forcelimited[a]:
+        bounds.append(gear * float(np.abs(m.actuator_forcerange[a]).max()))
+    control = int(m.actuator_ctrladr[a])
+    if m.actuator_ctrllimited[control] and _actuator_kind(m, a)["kind"] == "motor":
+        gain = abs(float(m.actuator_gainprm[a, 0]))
+        bounds.append(gear * gain * float(np.abs(m.actuator_ctrlrange[control]).max()))
+    if m.jnt_actfrclimited[joint]:
+        bounds.append(float(np.abs(m.jnt_actfrcrange[joint]).max()))
+    return min(bounds, default=None)
+
+
+def _actuator_kind(m: mujoco.MjModel, a: int) -> dict[str, Any]:
+    gear = float(m.actuator_gear[a, 0])
+    _, stiffness, damping = (float(b) for b in m.actuator_biasprm[a, :3])
+    if m.actuator_biastype[a] != mujoco.mjtBias.mjBIAS_AFFINE:
+        return {"kind": "motor"}
+    kd = max(0.0, -damping * gear**2)
+    if stiffness < 0.0:
+        return {"kind": "position", "kp": -stiffness * gear**2, "kd": kd}
+    return {"kind": "velocity", "kd": kd}

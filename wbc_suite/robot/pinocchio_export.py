@@ -1,0 +1,147 @@
+"""Build the Pinocchio model of a robot from its description."""
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from wbc_suite.robot.description import RobotDescription
+from wbc_suite.robot.elements import Joint, Link
+from wbc_suite.robot.inertia import inertia_matrix
+from wbc_suite.robot.poses import se3_of
+from wbc_suite.typing import Vector
+
+__all__ = ["build_pinocchio"]
+
+GRAVITY = np.array([0.0, 0.0, -9.81])
+"""m/s^2; the default of MuJoCo."""
+
+
+def build_pinocchio(robot: RobotDescription) -> Any:
+    """Build `pinocchio.Model`; see `RobotDescription.to_pinocchio`.
+
+    Each link is a BODY frame and each described frame an OP_FRAME. Unlimited joints
+    have infinite limits. Keyframes are reference configurations.
+    """
+    model = pin.Model()
+    model.name = robot.name
+    model.gravity.linear = GRAVITY
+    joint_of: dict[str, int] = {}
+    pose_in_joint: dict[str, Any] = {}
+    for link in robot.links:
+        if link.parent is None:
+            joint, pose = _add_root(model, robot)
+        else:
+            joint = joint_of[link.parent]
+            pose = pose_in_joint[link.parent] * se3_of(link)
+        if link.joint is not None:
+            joint = _add_joint(model, link.joint, joint, pose)
+            pose = pin.SE3.Identity()
+        joint_of[link.name], pose_in_joint[link.name] = joint, pose
+        _add_body(model, link, joint, pose)
+    for frame in robot.frames:
+        pose = pose_in_joint[frame.link] * se3_of(frame)
+        parent = model.getFrameId(frame.link, pin.FrameType.BODY)
+        joint = joint_of[frame.link]
+        model.addFrame(
+            pin.Frame(frame.name, joint, parent, pose, pin.FrameType.OP_FRAME)
+        )
+    for name in robot.keyframes:
+        model.referenceConfigurations[name] = _configuration(model, robot, name)
+    return model
+
+
+def _add_root(model: Any, robot: RobotDescription) -> tuple[int, Any]:
+    """Add the root's joints; return the first link's joint and its pose in that joint.
+
+    A planar root is a chain of three joints with the equations of MuJoCo's three
+    joints of one body.
+    """
+    pose = se3_of(robot.root)
+    linear, angular = robot.root.velocity
+    if robot.root.kind == "fixed":
+        return 0, pose
+    if robot.root.kind == "free":
+        lower = np.array([-np.inf] * 3 + [-1.01] * 4)
+        velocity = np.array([linear] * 3 + [angular] * 3)
+        free = pin.JointModelFreeFlyer()
+        effort = np.zeros(6)
+        name = robot.root_joint_names[0]
+        joint = model.addJoint(
+            0, free, pin.SE3.Identity(), name, effort, velocity, lower, -lower
+        )
+        model.addJointFrame(joint)
+        return joint, pin.SE3.Identity()
+    joint = 0
+    chain = (pin.JointModelPX(), pin.JointModelPY(), pin.JointModelRZ())
+    force, torque = robot.root.effort
+    damp, damp_yaw = robot.root.damping
+    bound = np.array([np.inf])
+    for name, kind, speed, effort, damping in zip(
+        robot.root_joint_names,
+        chain,
+        (linear, linear, angular),
+        (force, force, torque),
+        (damp, damp, damp_yaw),
+        strict=True,
+    ):
+        limits = (np.array([effort]), np.array([speed]), -bound, bound)
+        joint = model.addJoint(joint, kind, pose, name, *limits)
+        model.damping[model.joints[joint].idx_v] = damping
+        model.addJointFrame(joint)
+        pose = pin.SE3.Identity()
+    return joint, pose
+
+
+def _add_joint(model: Any, joint: Joint, parent: int, pose: Any) -> int:
+    low, high = joint.range or (-np.inf, np.inf)
+    index = model.addJoint(
+        parent,
+        _joint_model(np.asarray(joint.axis), hinge=joint.type == "hinge"),
+        pose,
+        joint.name,
+        np.array([joint.effort or np.inf]),
+        np.array([joint.velocity or np.inf]),
+        np.array([low]),
+        np.array([high]),
+    )
+    v = model.joints[index].idx_v
+    model.armature[v] = joint.armature
+    model.damping[v] = joint.damping
+    model.friction[v] = joint.frictionloss
+    model.addJointFrame(index)
+    return index
+
+
+def _joint_model(axis: Vector, *, hinge: bool) -> Any:
+    """Return the joint model of an axis; for exactly x, y or z the faster one."""
+    aligned = (
+        (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ)
+        if hinge
+        else (pin.JointModelPX, pin.JointModelPY, pin.JointModelPZ)
+    )
+    for k in range(3):
+        if np.array_equal(axis, np.eye(3)[k]):
+            return aligned[k]()
+    if hinge:
+        return pin.JointModelRevoluteUnaligned(axis)
+    return pin.JointModelPrismaticUnaligned(axis)
+
+
+def _add_body(model: Any, link: Link, joint: int, pose: Any) -> None:
+    if link.mass > 0.0:
+        tensor = inertia_matrix(link.inertia)
+        inertia = pin.Inertia(link.mass, np.asarray(link.com), tensor)
+        model.appendBodyToJoint(joint, inertia, pose)
+    parent = model.getFrameId(model.names[joint], pin.FrameType.JOINT) if joint else -1
+    model.addBodyFrame(link.name, joint, pose, parent)
+
+
+def _configuration(model: Any, robot: RobotDescription, name: str) -> Vector:
+    q = pin.neutral(model)
+    if robot.root.kind == "free":
+        w, x, y, z = robot.root.quat
+        q[:7] = (*robot.root.pos, x, y, z, w)
+    for joint, value in robot.keyframe(name).items():
+        q[model.joints[model.getJointId(joint)].idx_q] = value
+    return q

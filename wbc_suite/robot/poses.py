@@ -1,0 +1,70 @@
+"""Poses of description items as `pinocchio.SE3`, and back."""
+
+from typing import Any, Protocol
+
+import numpy as np
+import pinocchio as pin
+from scipy.spatial.transform import Rotation
+
+from wbc_suite.robot.shapes import Vector3
+from wbc_suite.typing import Matrix, Vector
+
+__all__ = [
+    "HasPose",
+    "compose",
+    "joint_motion",
+    "pose_fields",
+    "rotation_matrix",
+    "se3_of",
+]
+
+
+class HasPose(Protocol):
+    """An item of a description with a pose: a link, a frame, a shape, ..."""
+
+    @property
+    def pos(self) -> Vector3:
+        """Position, m."""
+        ...
+
+    @property
+    def quat(self) -> tuple[float, float, float, float]:
+        """Orientation, w x y z."""
+        ...
+
+
+def se3_of(posed: HasPose) -> Any:
+    """Return the pose of an item as `pinocchio.SE3`."""
+    return pin.SE3(pin.Quaternion(*posed.quat).matrix(), np.asarray(posed.pos))
+
+
+def rotation_matrix(posed: HasPose) -> Matrix:
+    """Return the orientation of an item as a matrix, shape (3, 3)."""
+    return Rotation.from_quat(posed.quat, scalar_first=True).as_matrix()
+
+
+def pose_fields(pose: Any) -> dict[str, Any]:
+    """Return `pos` and `quat` (w x y z) of a `pinocchio.SE3`."""
+    x, y, z, w = pin.Quaternion(pose.rotation).normalized().coeffs().tolist()
+    return {"pos": tuple(pose.translation.tolist()), "quat": (w, x, y, z)}
+
+
+def compose(*items: HasPose) -> dict[str, Any]:
+    """Return the fields of the product of poses.
+
+    Identity poses are skipped, so that a single other pose keeps all its digits.
+    """
+    moved = [i for i in items if i.pos != (0, 0, 0) or i.quat != (1, 0, 0, 0)]
+    if len(moved) == 1:
+        return {"pos": moved[0].pos, "quat": moved[0].quat}
+    pose = pin.SE3.Identity()
+    for item in moved:
+        pose = pose * se3_of(item)
+    return pose_fields(pose)
+
+
+def joint_motion(axis: Vector, value: float, *, slide: bool) -> Any:
+    """Return the displacement of a slide (m) or hinge (rad) joint, `pinocchio.SE3`."""
+    if slide:
+        return pin.SE3(np.eye(3), value * axis)
+    return pin.SE3(pin.AngleAxis(value, axis).matrix(), np.zeros(3))

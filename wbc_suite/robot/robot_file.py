@@ -1,0 +1,222 @@
+"""Robot files (TOML): components, assemblies of components, and their JSON Schema."""
+
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import Field
+
+from wbc_suite.errors import ConfigError, DescriptionError, UnknownNameError
+from wbc_suite.robot.elements import (
+    Camera,
+    Contacts,
+    Elements,
+    Frame,
+    Link,
+    Name,
+    Root,
+    Sensor,
+    Synergy,
+)
+from wbc_suite.robot.mirror import Mirror, reflect_component
+from wbc_suite.robot.shapes import Posed, as_table
+from wbc_suite.tomlfile import FrozenModel, parse_model, parse_toml, read_text
+
+__all__ = [
+    "Assembly",
+    "Component",
+    "Header",
+    "Part",
+    "read_robot_file",
+    "robot_schema",
+]
+
+
+class Header(FrozenModel):
+    """Name, kind and sources of a component.
+
+    Attributes:
+        name: Unique name.
+        kind: Its folder in the catalogue.
+        side: The only side that a hand fits; absent if it fits both.
+        extends: Another component of the same folder; tables of this file, such as
+            `synergy`, replace its tables.
+        title: Display name.
+        source: Source of the figures.
+        license: Licence of the figures.
+        deviations: Each deliberate difference from the source, with its reason.
+    """
+
+    name: Name
+    kind: Literal["arm", "body", "gripper", "base"]
+    side: Literal["left", "right"] | None = None
+    extends: Name | None = None
+    title: str = ""
+    source: str = ""
+    license: str = ""
+    deviations: tuple[str, ...] = ()
+
+
+class Component(Elements):
+    """One component file, such as `robots/arm/panda.toml`.
+
+    Attributes:
+        format: Version of the format.
+        component: Name, kind and sources.
+        synergies: Gripper commands.
+        mirror: How the other side is generated; None to define all links.
+    """
+
+    format: Literal[1]
+    component: Header
+    links: tuple[Link, ...] = Field(alias="link", max_length=500)
+    synergies: tuple[Synergy, ...] = Field(default=(), alias="synergy")
+    mirror: Mirror | None = None
+
+
+class Part(Posed):
+    """One component of an assembly.
+
+    Attributes:
+        name: Name of the part, such as `arm` or `right_gripper`.
+        component: Catalogue name with folder, such as `gripper/panda_hand`, or a path
+            to a TOML file relative to the assembly's file.
+        on: Mount that carries it, `part.mount`; absent for the first part.
+        side: Prefix of the component's frames, groups, cameras and sensors, so that
+            `tcp` becomes `right_tcp`.
+        rename: Whether links and joints get that prefix too; by default if two parts
+            have the same component.
+        choice: Argument of `load_robot` that replaces the component.
+    """
+
+    name: Name
+    component: str
+    on: str | None = None
+    side: Name | None = None
+    rename: bool | None = None
+    choice: Literal["gripper", "base"] | None = None
+
+
+class AssemblyHeader(FrozenModel):
+    """Name of the whole robot."""
+
+    name: Name
+    title: str = ""
+    extends: str | None = None
+    deviations: tuple[str, ...] = ()
+
+
+class Assembly(FrozenModel):
+    """One assembly file, such as `robots/panda.toml`.
+
+    Attributes:
+        format: Version of the format.
+        assembly: Name; `extends` names another assembly that this one changes.
+        parts: Components, each mounted on an earlier one.
+        root: Connection to the world; by default that of the first part.
+        lock: Groups whose joints are fixed at the `ready` posture.
+        frames: Further frames.
+        cameras: Further cameras.
+        sensors: Further sensors.
+        keyframes: Postures of the whole robot; they override those of components.
+        contacts: Pairs of links, across components too, that never collide.
+    """
+
+    format: Literal[1]
+    assembly: AssemblyHeader
+    parts: tuple[Part, ...] = Field(default=(), alias="part", max_length=50)
+    root: Root | None = None
+    lock: tuple[Name, ...] = ()
+    frames: tuple[Frame, ...] = Field(default=(), alias="frame")
+    cameras: tuple[Camera, ...] = Field(default=(), alias="camera")
+    sensors: tuple[Sensor, ...] = Field(default=(), alias="sensor")
+    keyframes: dict[Name, dict[Name, float]] = Field(default={}, alias="keyframe")
+    contacts: Contacts = Contacts()
+
+
+def read_robot_file(path: Path) -> Component | Assembly:
+    """Read a file that holds a component or an assembly.
+
+    A file is parsed again only if its text has changed.
+
+    Raises:
+        ConfigError: If the file is neither, or violates the format.
+        UnknownNameError: If it extends a component that does not exist.
+    """
+    text = read_text(path)
+    base = _extended_file(path, text)
+    return _parsed(str(path), text, base and read_text(base))
+
+
+@lru_cache(maxsize=256)
+def _tables(source: str, text: str) -> dict[str, Any]:
+    """Parse TOML; callers must not change the result."""
+    return parse_toml(text, source=source)
+
+
+@lru_cache(maxsize=256)
+def _parsed(source: str, text: str, base: str | None) -> Component | Assembly:
+    """Parse the text of a robot file, and that of the component it extends."""
+    data = _tables(source, text)
+    if "component" in data:
+        if base is not None:
+            data = _extended(data, _tables(source, base), source=source)
+        component = parse_model(Component, data, source=source, error=DescriptionError)
+        return reflect_component(component, source=source)
+    if "assembly" in data:
+        return parse_model(Assembly, data, source=source, error=DescriptionError)
+    raise ConfigError(
+        f"{source}: a robot file needs a table [component] (links and joints) or "
+        f"[assembly] (parts); found {', '.join(sorted(data)) or 'nothing'}."
+    )
+
+
+def _extended_file(path: Path, text: str) -> Path | None:
+    """Return the file in the same folder that a component extends."""
+    name = as_table(_tables(str(path), text).get("component")).get("extends")
+    if not isinstance(name, str):
+        return None
+    beside = [p.stem for p in path.parent.glob("*.toml") if p != path]
+    if name not in beside:
+        raise UnknownNameError("component to extend", name, beside)
+    return path.with_name(f"{name}.toml")
+
+
+def _extended(
+    data: dict[str, Any], base: dict[str, Any], *, source: str
+) -> dict[str, Any]:
+    """Return the tables of a component with those that it inherits."""
+    header, inherited = as_table(data["component"]), as_table(base.get("component"))
+    if "extends" in inherited:
+        raise ConfigError(
+            f"{source}: '{header['extends']}' itself extends another component; extend "
+            f"'{inherited['extends']}' instead."
+        )
+    return base | data | {"component": inherited | header}
+
+
+RPY: dict[str, Any] = {
+    "type": "array",
+    "items": {"type": "number"},
+    "minItems": 3,
+    "maxItems": 3,
+    "title": "Rpy",
+    "description": "Roll, pitch, yaw in radians about fixed axes, instead of 'quat'.",
+}
+
+
+def robot_schema(kind: Literal["component", "assembly"]) -> dict[str, Any]:
+    """Return the JSON Schema of a robot file, for completion in editors.
+
+    It covers names, types, choices and simple bounds. `wbc-suite check` covers
+    references, the tree and physics.
+    """
+    model = Component if kind == "component" else Assembly
+    schema = model.model_json_schema(by_alias=True)
+    if kind == "component":  # a component that extends another may inherit its links
+        schema["required"].remove("link")
+    for table in (schema, *schema.get("$defs", {}).values()):
+        properties = table.get("properties", {})
+        if "quat" in properties:
+            properties["rpy"] = RPY
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}

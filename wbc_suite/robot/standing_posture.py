@@ -1,0 +1,96 @@
+"""Compute a standing posture of legs: knees bent, feet below the hips."""
+
+import numpy as np
+import pinocchio as pin
+from scipy.optimize import least_squares
+
+from wbc_suite.robot.description import RobotDescription
+from wbc_suite.robot.elements import Frame
+from wbc_suite.typing import Vector
+
+__all__ = ["standing_legs"]
+
+TOLERANCE = 0.02
+"""Largest residual in m of a posture that is accepted."""
+
+MIN_COSINE = 0.9
+"""Smallest cosine between the axis of a pitch joint and y."""
+
+START = {2: ((0.55, -1.1), 0.85), 3: ((-0.3, 0.6, -0.3), 0.95)}
+"""By number of hinges: initial angles about y, rad, and height of the hip as part of
+the leg's length. Knees of quadrupeds point backward, those of humanoids forward."""
+
+
+def standing_legs(robot: RobotDescription) -> dict[str, float]:
+    """Return positions of the pitch joints of legs, by name, rad.
+
+    In each leg the hinges about y are moved so that the foot is below the uppermost of
+    them and its sole keeps the inclination of the posture `ready`. A leg without such a
+    posture has no entry.
+
+    Args:
+        robot: Chains to a frame with role `foot` are legs; other joints keep the
+            posture `ready`.
+    """
+    model = robot.to_pinocchio()
+    data = model.createData()
+    q = pin.neutral(model)
+    for name, value in robot.keyframe("ready").items():
+        q[model.joints[model.getJointId(name)].idx_q] = value
+    found: dict[str, float] = {}
+    for frame in robot.frames:
+        if frame.role == "foot":
+            found |= _bent_leg(robot, model, data, q, frame)
+    return found
+
+
+def _bent_leg(
+    robot: RobotDescription,
+    model: pin.Model,
+    data: pin.Data,
+    q: Vector,
+    frame: Frame,
+) -> dict[str, float]:
+    foot = model.getFrameId(frame.name)
+    pin.framesForwardKinematics(model, data, q)
+    chain = model.supports[model.frames[foot].parentJoint].tolist()
+    along = {joint: _along_y(robot, model, data, joint) for joint in chain}
+    hinges = [joint for joint in chain if abs(along[joint]) > MIN_COSINE]
+    if len(hinges) not in START:
+        return {}
+    angles, left = START[len(hinges)]
+    places = np.array([model.joints[joint].idx_q for joint in hinges])
+    points = np.array(
+        [*(data.oMi[j].translation for j in hinges), data.oMf[foot].translation]
+    )
+    length = float(np.linalg.norm(np.diff(points[:, [0, 2]], axis=0), axis=1).sum())
+    level = data.oMf[foot].rotation.copy()
+    low, high = model.lowerPositionLimit[places], model.upperPositionLimit[places]
+
+    def residuals(angles: Vector) -> Vector:
+        """Return the errors of the foot's x and z, m, and of its tilt times length."""
+        moved = q.copy()
+        moved[places] = angles
+        pin.framesForwardKinematics(model, data, moved)
+        off = data.oMf[foot].translation - data.oMi[hinges[0]].translation
+        tilt = pin.log3(level.T @ data.oMf[foot].rotation)[1]
+        tilt = tilt if len(hinges) > 2 else 0.0  # a point foot has no sole
+        return np.array([off[0], off[2] + left * length, length * tilt])
+
+    signs = np.sign([along[joint] for joint in hinges])
+    start: Vector = np.clip(signs * np.asarray(angles), low, high)
+    best = least_squares(residuals, start, bounds=(low - 1e-9, high + 1e-9))
+    if not np.linalg.norm(best.fun) < TOLERANCE:
+        return {}
+    names = [model.names[joint] for joint in hinges]
+    return dict(zip(names, best.x.clip(low, high).round(4).tolist(), strict=True))
+
+
+def _along_y(
+    robot: RobotDescription, model: pin.Model, data: pin.Data, joint: int
+) -> float:
+    """Return the cosine between a hinge's axis and y; 0 for other joints."""
+    name = model.names[joint]
+    if name not in robot.keyframes["ready"] or robot.joint(name).type != "hinge":
+        return 0.0  # a root joint, a follower or a slide
+    return float(data.oMi[joint].rotation[1] @ np.asarray(robot.joint(name).axis))

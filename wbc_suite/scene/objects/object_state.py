@@ -1,0 +1,200 @@
+"""An object in a simulation: its pose, size and bounding cylinder."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from wbc_suite.robot.shapes import Vector3
+from wbc_suite.scene.objects.scene_object import STANDING, Quat, SceneObject
+from wbc_suite.typing import Matrix, Vector
+
+__all__ = ["Extent", "ObjectState"]
+
+DIRECTIONS = 64
+"""Horizontal directions along which an object is measured; 0.1 % below the circle."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Extent:
+    """Upright bounding cylinder of an object about its origin, m.
+
+    Attributes:
+        radius: Its radius.
+        bottom: Its extent below the origin.
+        top: Its extent above the origin.
+    """
+
+    radius: float
+    bottom: float
+    top: float
+
+
+class ObjectState:
+    """One body of a compiled scene.
+
+    Args:
+        model: Compiled scene.
+        data: Its state.
+        name: Name of the body.
+
+    Attributes:
+        body: Its index.
+        geoms: Its solid geoms, and those of its children.
+        position: Position of its origin in the world, m. A view.
+    """
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, name: str) -> None:
+        self.model, self.data, self.name = model, data, name
+        self.body: int = model.body(name).id
+        solid = (model.geom_contype | model.geom_conaffinity) > 0
+        under = _bodies_under(model, self.body)
+        self.geoms = frozenset(
+            np.flatnonzero(solid & under[model.geom_bodyid]).tolist()
+        )
+        self.position: Vector = data.xpos[self.body]
+        self._rotation: Matrix = data.xmat[self.body].reshape(3, 3)
+        joint = model.body_jntadr[self.body]
+        free = mujoco.mjtJoint.mjJNT_FREE
+        self._q = self._v = -1
+        if joint >= 0 and model.jnt_type[joint] == free:
+            self._q = int(model.jnt_qposadr[joint])
+            self._v = int(model.jnt_dofadr[joint])
+
+    @property
+    def is_free(self) -> bool:
+        """Whether it has a free joint."""
+        return self._q >= 0
+
+    @property
+    def rotation(self) -> Matrix:
+        """Rotation R_wb of its frame, shape (3, 3). A view."""
+        return self._rotation
+
+    def move(self, position: Sequence[float], quat: Quat = STANDING) -> None:
+        """Write its pose, at rest; the simulation is not updated."""
+        if self._q < 0:
+            self.model.body_pos[self.body] = position
+            self.model.body_quat[self.body] = quat
+            return
+        q, v = self.data.qpos, self.data.qvel
+        q[self._q : self._q + 3] = position
+        q[self._q + 3 : self._q + 7] = quat
+        v[self._v : self._v + 6] = 0.0
+
+    def resize_box(self, half_size: Vector3, *, density: float) -> None:
+        """Write another size into the compiled model of a free box.
+
+        Everything that the compiler derives from it follows: with the old bounds of the
+        broadphase, a larger box would penetrate before a contact is found.
+        """
+        model, body, v = self.model, self.body, self._v
+        (geom,) = self.geoms
+        size = np.asarray(half_size)
+        mass = density * 8.0 * float(np.prod(size))
+        squares = size**2
+        inertia = mass / 3.0 * (squares.sum() - squares)
+        model.geom_size[geom] = model.geom_aabb[geom, 3:] = size
+        model.geom_rbound[geom] = np.linalg.norm(size)
+        model.bvh_aabb[model.body_bvhadr[body], 3:] = size
+        model.body_mass[body] = model.body_subtreemass[body] = mass
+        model.body_inertia[body] = inertia
+        model.body_invweight0[body] = 1.0 / mass, np.mean(1.0 / inertia)
+        model.dof_invweight0[v : v + 3] = 1.0 / mass
+        model.dof_invweight0[v + 3 : v + 6] = np.mean(1.0 / inertia)
+        # MuJoCo takes the mass matrix of bodies without offset from here.
+        model.dof_M0[v : v + 3], model.dof_M0[v + 3 : v + 6] = mass, inertia
+
+    def reshape(self, changed: SceneObject) -> None:
+        """Write the object with other sizes of its parts into the compiled model.
+
+        All values are those that the compiler computes for the object alone: places and
+        sizes, bounds of the broadphase, mass and inertia. The mass of an object that is
+        fixed to another body must not change.
+        """
+        model, alone, body = self.model, changed.compiled_alone(), self.body
+        for array, first, count in (
+            ("geom", model.body_geomadr[body], alone.ngeom),
+            ("site", _first_site(model, body), alone.nsite),
+            ("bvh", model.body_bvhadr[body], alone.body_bvhnum[1]),
+        ):
+            for field in _SHAPE_FIELDS[array]:
+                getattr(model, field)[first : first + count] = getattr(alone, field)
+        first = model.body_bvhadr[body]
+        nodes = model.bvh_nodeid[first : first + alone.body_bvhnum[1]]
+        nodes[nodes >= 0] += model.body_geomadr[body]
+        for field in _BODY_FIELDS:
+            getattr(model, field)[body] = getattr(alone, field)[1]
+        if self.is_free:
+            model.body_invweight0[body] = alone.body_invweight0[1]
+            model.dof_invweight0[self._v : self._v + 6] = alone.dof_invweight0
+            model.dof_M0[self._v : self._v + 6] = alone.dof_M0
+
+    def extent(self, quat: Quat = STANDING) -> Extent:
+        """Return the extent of its present solid geoms when it is turned by `quat`."""
+        turn = np.empty(9)
+        mujoco.mju_quat2Mat(turn, np.asarray(quat))
+        R = turn.reshape(3, 3)
+        angles = np.linspace(0.0, 2 * np.pi, DIRECTIONS, endpoint=False)
+        flat = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(DIRECTIONS)])
+        ways = np.vstack([flat, (0.0, 0.0, -1.0), (0.0, 0.0, 1.0)]) @ R
+        own = [g for g in self.geoms if self.model.geom_bodyid[g] == self.body]
+        reach = np.max([_support(self.model, g, ways) for g in own], axis=0)
+        return Extent(
+            radius=float(reach[:-2].max()),
+            bottom=float(reach[-2]),
+            top=float(reach[-1]),
+        )
+
+
+_SHAPE_FIELDS = {
+    "geom": ("geom_pos", "geom_quat", "geom_size", "geom_aabb", "geom_rbound"),
+    "site": ("site_pos",),
+    "bvh": ("bvh_aabb", "bvh_child", "bvh_depth", "bvh_nodeid"),
+}
+_BODY_FIELDS = (
+    *("body_mass", "body_subtreemass", "body_inertia"),
+    *("body_ipos", "body_iquat"),
+)
+
+
+def _first_site(model: mujoco.MjModel, body: int) -> int:
+    """Return the index of a body's first site; sites are ordered by body."""
+    return int(np.searchsorted(model.site_bodyid, body))
+
+
+def _bodies_under(model: mujoco.MjModel, body: int) -> np.ndarray:
+    """Mark a body and its descendants, shape (nbody,)."""
+    marked = np.zeros(model.nbody, dtype=bool)
+    marked[body] = True
+    for child in range(body + 1, model.nbody):
+        marked[child] |= marked[model.body_parentid[child]]
+    return marked
+
+
+def _support(model: mujoco.MjModel, geom: int, ways: Matrix) -> Vector:
+    """Return the support function of a geom along unit vectors of its body's frame.
+
+    h(u) is the largest u . p over the points p of the geom.
+    """
+    turn = np.empty(9)
+    mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
+    u = ways @ turn.reshape(3, 3)
+    kinds, size = mujoco.mjtGeom, model.geom_size[geom]
+    match model.geom_type[geom]:
+        case kinds.mjGEOM_SPHERE:
+            reach = np.full(len(u), size[0])
+        case kinds.mjGEOM_CAPSULE:
+            reach = size[0] + size[1] * np.abs(u[:, 2])
+        case kinds.mjGEOM_CYLINDER:
+            reach = size[0] * np.hypot(u[:, 0], u[:, 1]) + size[1] * np.abs(u[:, 2])
+        case kinds.mjGEOM_ELLIPSOID:
+            reach = np.linalg.norm(u * size, axis=1)
+        case kinds.mjGEOM_MESH:
+            mesh = model.geom_dataid[geom]
+            first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+            reach = (u @ model.mesh_vert[first : first + count].T).max(axis=1)
+        case _:
+            reach = np.abs(u) @ size
+    return ways @ model.geom_pos[geom] + reach

@@ -1,0 +1,217 @@
+"""Targets of the limbs that clients drag: ownership, clutch, and release."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from wbc_suite.devices.action_ports import LimbKind
+from wbc_suite.devices.pipeline.limb_pipeline import LimbPipeline
+from wbc_suite.devices.state import LimbInput
+from wbc_suite.errors import UnknownNameError
+from wbc_suite.viewers.session_state import LimbInfo, LimbStatus
+
+__all__ = ["LimbTarget", "LimbTargets", "Ownership"]
+
+HOLD_TIMEOUT = 20.0  # s; a client that sends nothing for so long loses its limb
+MAX_POSITION_ERROR = 0.03  # m; a released target further than this from its limb ...
+MAX_ORIENTATION_ERROR = 0.2  # rad; ... or turned by more, moves back to the limb ...
+REST_SPEED = 0.02  # m/s; ... after the limb has been slower than this ...
+REST_TIME = 0.4  # s; ... for so long
+MAX_COORDINATE = 1e3  # m; inputs beyond it are invalid
+
+
+class Ownership:
+    """Which client may move a limb: the first to take it.
+
+    It holds the limb until it releases it or sends nothing for `timeout` seconds.
+    """
+
+    def __init__(self, timeout: float = HOLD_TIMEOUT) -> None:
+        self.timeout = timeout
+        self._holder: int | None = None
+        self._last_input = 0.0
+
+    def holder(self, now: float) -> int | None:
+        """Return the client that holds the limb at time `now`, or None."""
+        if self._holder is not None and now - self._last_input > self.timeout:
+            self._holder = None
+        return self._holder
+
+    def take(self, client: int, now: float) -> bool:
+        """Take or keep the limb; False if another client holds it."""
+        if self.holder(now) not in (None, client):
+            return False
+        self._holder, self._last_input = client, now
+        return True
+
+    def release(self, client: int) -> bool:
+        """Release the limb; False if this client was not the holder."""
+        if self._holder != client:
+            return False
+        self._holder = None
+        return True
+
+
+@dataclass(slots=True)
+class LimbTarget:
+    """A limb of the pipeline that several clients may drag.
+
+    Attributes:
+        stages: Pipeline from the clients' input to the limb's target.
+        ownership: Which client holds the limb.
+        enabled: Whether the clutch is engaged.
+        rest: Number of ticks that the limb has rested since its release; None if it
+            was not released lately.
+    """
+
+    stages: LimbPipeline
+    ownership: Ownership
+    enabled: bool = True
+    rest: int | None = None
+
+    @property
+    def info(self) -> LimbInfo:
+        """Constant properties of the limb."""
+        port = self.stages.port
+        return LimbInfo(name=port.name, kind=port.kind, body=port.body)
+
+    def status(self, report: Mapping[str, Any], *, now: float) -> LimbStatus:
+        """Return the state of the limb.
+
+        Args:
+            report: The controller's report of its frame; empty before a solve.
+            now: Wall time, s.
+        """
+        measured = self.stages.port.measure()
+        return LimbStatus(
+            measured=measured,
+            target=self.shown_target(measured),
+            position_error=float(report.get("position_error", 0.0)),
+            orientation_error=float(report.get("orientation_error", 0.0)),
+            reached=bool(report.get("reached", True)),
+            reasons=tuple(report.get("reasons", ())),
+            holder=self.ownership.holder(now),
+            enabled=self.enabled,
+            acting=self.stages.acting,
+        )
+
+    def shown_target(self, measured: pin.SE3) -> pin.SE3:
+        """Return the requested pose; components that are not commanded as measured."""
+        target = self.stages.clutch.target
+        match self.stages.port.kind:
+            case LimbKind.POSE:
+                return target
+            case LimbKind.POSITION:
+                return pin.SE3(measured.rotation, target.translation)
+            case LimbKind.ORIENTATION:
+                return pin.SE3(target.rotation, measured.translation)
+            case LimbKind.PLANAR:
+                position = np.append(target.translation[:2], measured.translation[2])
+                return pin.SE3(target.rotation, position)
+
+
+class LimbTargets:
+    """All limbs of a session; its methods are called under the session's lock.
+
+    Args:
+        stages: Pipeline of each limb.
+
+    Attributes:
+        limbs: Targets by limb name.
+    """
+
+    def __init__(self, stages: Mapping[str, LimbPipeline]) -> None:
+        self.limbs = {
+            name: LimbTarget(limb, Ownership()) for name, limb in stages.items()
+        }
+
+    def grab(
+        self, name: str, client: int, T_world_input: pin.SE3, *, now: float
+    ) -> bool:
+        """Take a limb and latch the input to it.
+
+        Returns:
+            False if another client holds it, or the pose is invalid.
+        """
+        limb = self._limb(name)
+        if not (_is_valid(T_world_input) and limb.ownership.take(client, now)):
+            return False
+        if limb.enabled:
+            limb.stages.release()
+            limb.stages.follow(LimbInput(pose=T_world_input))
+        return True
+
+    def drag(
+        self, name: str, client: int, T_world_input: pin.SE3, *, now: float
+    ) -> bool:
+        """Move a limb's target with the input; returns as `grab`."""
+        limb = self._limb(name)
+        if not (_is_valid(T_world_input) and limb.ownership.take(client, now)):
+            return False
+        if limb.enabled:
+            limb.stages.follow(LimbInput(pose=T_world_input))
+        return True
+
+    def release(self, name: str, client: int) -> None:
+        """Release a limb; its target stays, and the limb goes on towards it."""
+        limb = self._limb(name)
+        if limb.ownership.release(client):
+            limb.stages.release()
+            limb.rest = 0
+
+    def enable(self, name: str, enabled: bool) -> None:
+        """Engage or disengage a limb's clutch; its target does not move."""
+        limb = self._limb(name)
+        limb.enabled = enabled
+        limb.stages.release()
+
+    def settle(
+        self, status: Mapping[str, LimbStatus], *, period: float, now: float
+    ) -> None:
+        """Move a released target back to its limb once the limb rests short of it.
+
+        Otherwise a target that was dragged far out of reach would have to be dragged
+        all the way back before the limb moves again. Targets of limbs that were not
+        released lately stay.
+
+        Args:
+            status: Status of all limbs before this tick.
+            period: Time since then, s.
+            now: Wall time, s.
+        """
+        for name, limb in self.limbs.items():
+            if limb.rest is None:
+                continue
+            before, measured = status[name], limb.stages.port.measure()
+            step = np.linalg.norm(measured.translation - before.measured.translation)
+            limb.rest = limb.rest + 1 if step < REST_SPEED * period else 0
+            if limb.ownership.holder(now) is not None or before.reached:
+                limb.rest = None
+            elif limb.rest * period > REST_TIME:
+                limb.rest = None
+                if (
+                    before.position_error > MAX_POSITION_ERROR
+                    or before.orientation_error > MAX_ORIENTATION_ERROR
+                ):
+                    limb.stages.place(measured)
+
+    def reset(self) -> None:
+        """Forget which limbs were released."""
+        for limb in self.limbs.values():
+            limb.rest = None
+
+    def _limb(self, name: str) -> LimbTarget:
+        if name not in self.limbs:
+            raise UnknownNameError("limb", name, self.limbs)
+        return self.limbs[name]
+
+
+def _is_valid(T_world_input: pin.SE3) -> bool:
+    """Return whether all numbers of a pose are finite and not excessive."""
+    position, rotation = T_world_input.translation, T_world_input.rotation
+    return bool(
+        (np.abs(position) < MAX_COORDINATE).all() and np.isfinite(rotation).all()
+    )

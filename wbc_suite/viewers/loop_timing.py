@@ -1,0 +1,103 @@
+"""Timing of the control loop: its period, thread priority and interpreter settings."""
+
+import contextlib
+import gc
+import os
+import sys
+import threading
+import time
+from collections.abc import Callable
+
+__all__ = ["SWITCH_INTERVAL", "LoopTimer", "prepare_interpreter", "raise_priority"]
+
+LEAD = 3e-3  # s; for GR1 1 ms is enough, 2 ms on a shared processor
+MAX_BACKLOG = 5  # periods; a loop that is further behind does not catch up
+SWITCH_INTERVAL = 1e-4  # s; at 1 ms, or Python's own 5, other threads delay the loop
+
+
+class LoopTimer:
+    """Start the steps of a loop one period apart.
+
+    The work before a step takes a varying time. So the loop wakes `LEAD` before the
+    step, prepares it, and waits for the moment at which it is due:
+
+        timer.start()
+        while ...:
+            ...  # prepare
+            timer.wait_for_step()
+            ...  # the step
+            timer.finish_step()
+        timer.stop()
+
+    Args:
+        period: Time between two steps, s.
+        clock: Source of wall time, s.
+        sleep: Suspends the thread for a time, s.
+
+    Attributes:
+        idle: Set while the loop sleeps between two ticks or does not run. Other threads
+            then take Python's lock without delaying it.
+    """
+
+    def __init__(
+        self,
+        period: float,
+        *,
+        clock: Callable[[], float] = time.perf_counter,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self._period, self._clock, self._sleep = period, clock, sleep
+        self.idle = threading.Event()
+        self.stop()
+
+    def start(self) -> None:
+        """Start; the first step is due after `LEAD`."""
+        self.idle.clear()
+        self._due = self._clock() + LEAD
+
+    def stop(self) -> None:
+        """Stop; `wait_for_step` returns at once from now on."""
+        self._due = -float("inf")
+        self.idle.set()
+
+    def wait_for_step(self) -> None:
+        """Sleep until the step is due."""
+        self._sleep_until(self._due)
+
+    def finish_step(self) -> None:
+        """Sleep until the next step has to be prepared."""
+        self._due += self._period
+        if self._due < self._clock() - MAX_BACKLOG * self._period:
+            self._due = self._clock()
+        self.idle.set()
+        self._sleep_until(self._due - LEAD)
+        self.idle.clear()
+
+    def _sleep_until(self, moment: float) -> None:
+        if (wait := moment - self._clock()) > 0.0:
+            self._sleep(wait)
+
+
+def prepare_interpreter() -> None:
+    """Shorten thread switches and garbage collections of this interpreter.
+
+    A collection that visits all objects created so far takes many periods; those that
+    the loop creates are few.
+    """
+    sys.setswitchinterval(SWITCH_INTERVAL)
+    gc.collect()
+    gc.freeze()
+
+
+def raise_priority(rank: int) -> None:
+    """Give this thread a real-time priority, if the system permits it.
+
+    Linux permits it to administrators and to users with `rtprio` in
+    /etc/security/limits.conf. Threads that this one starts do not inherit it.
+
+    Args:
+        rank: Priority from 1; the highest runs first.
+    """
+    with contextlib.suppress(AttributeError, OSError):
+        policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
+        os.sched_setscheduler(0, policy, os.sched_param(rank))

@@ -1,0 +1,271 @@
+"""A MuJoCo model as a scene in the browser.
+
+Every body is a frame under its parent's frame, as in MuJoCo, and only relative poses
+are sent: a hinge that turns is one message, whatever it carries.
+"""
+
+import math
+from typing import TYPE_CHECKING, TypeAlias
+
+import mujoco
+import numpy as np
+
+from wbc_suite.robot.triangle_meshes import (
+    TriangleMesh,
+    box_mesh,
+    capsule_mesh,
+    cylinder_mesh,
+    ellipsoid_mesh,
+    merge,
+)
+from wbc_suite.typing import Matrix, Vector
+
+if TYPE_CHECKING:
+    import viser
+
+__all__ = [
+    "COLLISION_GROUP",
+    "ModelScene",
+    "colored_meshes",
+    "geom_mesh",
+    "relative_poses",
+    "robot_box",
+]
+
+Rgba: TypeAlias = tuple[float, float, float, float]
+
+COLLISION_GROUP = 3  # geoms of this group and above are collision geoms
+TOLERANCE = 1e-4  # m, and quaternion units: 0.2 mm at a distance of 1 m
+DEFAULT_COLOR = (0.5, 0.5, 0.5, 1.0)
+"""Of a geom without a colour of its own; its material's is drawn then."""
+
+
+class ModelScene:
+    """Draws the geoms of a model and moves them.
+
+    Args:
+        server: Server whose scene is drawn on.
+        model: Model to draw; static geoms are drawn, planes are not.
+        root: Name of the scene node above all bodies.
+    """
+
+    def __init__(
+        self, server: "viser.ViserServer", model: mujoco.MjModel, root: str = "/world"
+    ) -> None:
+        self._server = server
+        self._parents = model.body_parentid.copy()
+        self._names = _node_names(model, root)
+        self._frames = [
+            server.scene.add_frame(name, show_axes=False) for name in self._names
+        ]
+        self._shown = np.tile([0.0, 0, 0, 1, 0, 0, 0], (model.nbody, 1))
+        self.collision_shapes: list[viser.MeshHandle] = []
+        self.visual_shapes: list[viser.MeshHandle] = []
+        for (body, collision, colour), parts in _parts(model).items():
+            self._add_mesh(body, collision, colour, merge(parts))
+
+    def node(self, body: int) -> str:
+        """Return the name of a body's scene node."""
+        return self._names[body]
+
+    def update(self, positions: Matrix, quaternions: Matrix) -> int:
+        """Send the poses that changed since the last call.
+
+        Args:
+            positions: Positions of all bodies in the world, shape (nbody, 3).
+            quaternions: Their orientations (wxyz), shape (nbody, 4).
+
+        Returns:
+            Number of positions and orientations that were sent.
+        """
+        poses = relative_poses(positions, quaternions, self._parents)
+        change = np.abs(poses - self._shown)
+        moved = np.flatnonzero(change[:, :3].max(axis=1) > TOLERANCE)
+        turned = np.flatnonzero(change[:, 3:].max(axis=1) > TOLERANCE)
+        with self._server.atomic():
+            for body in moved:
+                self._frames[body].position = poses[body, :3]
+            for body in turned:
+                self._frames[body].wxyz = poses[body, 3:]
+        self._shown[moved, :3] = poses[moved, :3]
+        self._shown[turned, 3:] = poses[turned, 3:]
+        return len(moved) + len(turned)
+
+    def _add_mesh(
+        self,
+        body: int,
+        collision: bool,
+        colour: tuple[float, ...],
+        mesh: TriangleMesh,
+    ) -> None:
+        shapes = self.collision_shapes if collision else self.visual_shapes
+        kind = "collision" if collision else "visual"
+        handle = self._server.scene.add_mesh_simple(
+            f"{self._names[body]}/{kind}_{len(shapes)}",
+            mesh.vertices,
+            mesh.faces,
+            color=tuple(round(255 * c) for c in colour[:3]),  # type: ignore[arg-type]
+            opacity=0.35 if collision else (colour[3] if colour[3] < 1 else None),
+            cast_shadow=not collision,
+            visible=not collision,
+        )
+        shapes.append(handle)
+
+
+def relative_poses(
+    positions: Matrix, quaternions: Matrix, parents: np.ndarray
+) -> Matrix:
+    """Return the pose of every body in its parent's frame.
+
+    Args:
+        positions: Positions in the world, shape (n, 3).
+        quaternions: Orientations in the world (wxyz), shape (n, 4).
+        parents: Index of each body's parent, shape (n,); the world is its own.
+
+    Returns:
+        Position and quaternion (wxyz, w >= 0) side by side, shape (n, 7).
+    """
+    w, xyz = quaternions[parents, :1], -quaternions[parents, 1:]  # inverse rotation
+    offset = positions - positions[parents]
+    cross = np.cross(xyz, offset)
+    local = offset + 2.0 * (w * cross + np.cross(xyz, cross))
+    w_b, xyz_b = quaternions[:, :1], quaternions[:, 1:]
+    real = w * w_b - np.sum(xyz * xyz_b, axis=1, keepdims=True)
+    imaginary = w * xyz_b + w_b * xyz + np.cross(xyz, xyz_b)
+    sign = np.where(real < 0.0, -1.0, 1.0)
+    return np.concatenate([local, sign * real, sign * imaginary], axis=1)
+
+
+def robot_box(
+    model: mujoco.MjModel, positions: Matrix, quaternions: Matrix
+) -> tuple[Vector, Vector]:
+    """Return two corners of a box around the first robot, m.
+
+    Robots in a scene carry the prefix `robot0_`; a model without it is all robot.
+
+    Args:
+        model: Model with at least one geom that is not a plane.
+        positions: Positions of all bodies in the world, shape (nbody, 3).
+        quaternions: Their orientations (wxyz), shape (nbody, 4).
+    """
+    bodies = [model.body(body).name for body in range(model.nbody)]
+    prefix = "robot0_" if any(n.startswith("robot0_") for n in bodies) else ""
+    corners = []
+    reach = np.abs(model.geom_aabb[:, :3]) + model.geom_aabb[:, 3:]
+    radii = np.linalg.norm(reach, axis=1)
+    for geom in np.flatnonzero(model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE):
+        body, radius = model.geom_bodyid[geom], radii[geom]
+        if body == 0 or not bodies[body].startswith(prefix):
+            continue
+        place = np.empty(3)
+        mujoco.mju_rotVecQuat(place, model.geom_pos[geom], quaternions[body])
+        corners.append(positions[body] + place + np.array([[-radius], [radius]]))
+    box = np.array(corners)
+    return box[:, 0].min(axis=0), box[:, 1].max(axis=0)
+
+
+def _node_names(model: mujoco.MjModel, root: str) -> list[str]:
+    names = [root]
+    for body in range(1, model.nbody):
+        own = model.body(body).name.replace("/", "_") or f"body_{body}"
+        names.append(f"{names[model.body_parentid[body]]}/{own}")
+    return names
+
+
+def _parts(
+    model: mujoco.MjModel,
+) -> dict[tuple[int, bool, tuple[float, ...]], list[TriangleMesh]]:
+    """Return the meshes by body, kind and colour; each group becomes one mesh."""
+    parts: dict[tuple[int, bool, tuple[float, ...]], list[TriangleMesh]] = {}
+    for geom in range(model.ngeom):
+        rotation = np.empty(9)
+        mujoco.mju_quat2Mat(rotation, model.geom_quat[geom])
+        collision = bool(model.geom_group[geom] >= COLLISION_GROUP)
+        for rgba, mesh in colored_meshes(model, geom):
+            if rgba[3] > 0.0:
+                placed = mesh.moved(model.geom_pos[geom], rotation.reshape(3, 3))
+                key = int(model.geom_bodyid[geom]), collision, rgba
+                parts.setdefault(key, []).append(placed)
+    return parts
+
+
+def geom_mesh(model: mujoco.MjModel, geom: int) -> TriangleMesh | None:
+    """Return the mesh of a geom in its own frame; None for planes and others."""
+    size = model.geom_size[geom]
+    match model.geom_type[geom]:
+        case mujoco.mjtGeom.mjGEOM_BOX:
+            return box_mesh(size)
+        case mujoco.mjtGeom.mjGEOM_SPHERE:
+            return ellipsoid_mesh(np.full(3, size[0]))
+        case mujoco.mjtGeom.mjGEOM_ELLIPSOID:
+            return ellipsoid_mesh(size)
+        case mujoco.mjtGeom.mjGEOM_CAPSULE:
+            return capsule_mesh(size[0], size[1])
+        case mujoco.mjtGeom.mjGEOM_CYLINDER:
+            return cylinder_mesh(size[0], size[1])
+        case mujoco.mjtGeom.mjGEOM_MESH:
+            return _asset_mesh(model, int(model.geom_dataid[geom]))
+        case _:
+            return None
+
+
+def colored_meshes(model: mujoco.MjModel, geom: int) -> list[tuple[Rgba, TriangleMesh]]:
+    """Return the meshes of a geom in its own frame, one for each of its colours.
+
+    Links have several colours from a palette, which is a texture of one row. Other
+    textures are drawn in their mean colour times the geom's own.
+    """
+    mesh, material = geom_mesh(model, geom), int(model.geom_matid[geom])
+    if mesh is None:
+        return []
+    rgba, pixels = _color_of(model, geom), _pixels_of(model, material)
+    if pixels is None:
+        return [(_rgba(rgba), mesh)]
+    if len(pixels) > 1 or model.geom_type[geom] != mujoco.mjtGeom.mjGEOM_MESH:
+        mean = pixels.mean(axis=(0, 1)) / 255.0
+        return [(_rgba([*(mean * rgba[:3]), rgba[3]]), mesh)]
+    data, palette = int(model.geom_dataid[geom]), pixels[0]
+    first, start = model.mesh_faceadr[data], model.mesh_texcoordadr[data]
+    corner = model.mesh_facetexcoord[first : first + len(mesh.faces), 0]
+    column = (model.mesh_texcoord[start + corner, 0] * len(palette)).astype(np.int64)
+    return [
+        (_rgba([*palette[k] / 255.0, rgba[3]]), _submesh(mesh, column == k))
+        for k in np.unique(column)
+    ]
+
+
+def _color_of(model: mujoco.MjModel, geom: int) -> np.ndarray:
+    """Return the colour that MuJoCo draws: the geom's, or else its material's."""
+    own, material = model.geom_rgba[geom], model.geom_matid[geom]
+    is_default = material >= 0 and np.array_equal(own, DEFAULT_COLOR)
+    return model.mat_rgba[material] if is_default else own
+
+
+def _rgba(values: np.ndarray | list[float]) -> Rgba:
+    red, green, blue, alpha = map(float, values)
+    return red, green, blue, alpha
+
+
+def _pixels_of(model: mujoco.MjModel, material: int) -> np.ndarray | None:
+    """Return the texture of a material, shape (height, width, 3)."""
+    role = mujoco.mjtTextureRole.mjTEXROLE_RGB
+    texture = -1 if material < 0 else int(model.mat_texid[material, role])
+    if texture < 0 or model.tex_nchannel[texture] != 3:
+        return None
+    first = model.tex_adr[texture]
+    shape = int(model.tex_height[texture]), int(model.tex_width[texture]), 3
+    return model.tex_data[first : first + math.prod(shape)].reshape(shape)
+
+
+def _submesh(mesh: TriangleMesh, chosen: np.ndarray) -> TriangleMesh:
+    """Return some faces of a mesh and the vertices that they use."""
+    used, faces = np.unique(mesh.faces[chosen], return_inverse=True)
+    return TriangleMesh(mesh.vertices[used], faces.reshape(-1, 3))
+
+
+def _asset_mesh(model: mujoco.MjModel, mesh: int) -> TriangleMesh:
+    vertex, face = model.mesh_vertadr[mesh], model.mesh_faceadr[mesh]
+    return TriangleMesh(
+        model.mesh_vert[vertex : vertex + model.mesh_vertnum[mesh]].astype(np.float64),
+        model.mesh_face[face : face + model.mesh_facenum[mesh]].astype(np.int64),
+    )

@@ -1,0 +1,235 @@
+"""The server of every browser page: viser, behind a reverse proxy that checks access.
+
+viser serves pages and messages on 127.0.0.1 without tokens or origins. The proxy
+listens where clients connect, admits them by `AccessRules`, fetches pages and relays
+WebSocket messages.
+"""
+
+import asyncio
+import contextlib
+import io
+import logging
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterable
+from http import HTTPStatus
+from typing import TYPE_CHECKING, TypeAlias
+from urllib.parse import quote
+
+from aiohttp import (
+    ClientError,
+    ClientSession,
+    ClientWebSocketResponse,
+    TCPConnector,
+    WSMessage,
+    WSMsgType,
+    hdrs,
+    web,
+)
+
+from wbc_suite.devices.access_rules import is_loopback, new_token
+from wbc_suite.devices.web_server import WebServer
+from wbc_suite.errors import DeviceError
+
+if TYPE_CHECKING:
+    import viser
+
+__all__ = ["PageServer", "proxy"]
+
+log = logging.getLogger(__name__)
+
+UPDATE_RATE = 25.0  # Hz
+PORTS = range(8080, 8100)  # tried in turn if no port is given
+MESSAGE_LIMIT = 50 * 1024 * 1024  # bytes, viser's own limit
+HEARTBEAT = 30.0  # s between pings that find clients that are gone
+
+WebSocket: TypeAlias = web.WebSocketResponse | ClientWebSocketResponse
+
+
+class PageServer:
+    """A viser server, the proxy in front of it, and the address that opens the page.
+
+    Args:
+        host: Address to listen on. Any but a loopback address creates a token.
+        port: Port to listen on; 0 takes any free port, None the first free of `PORTS`.
+
+    Attributes:
+        server: The viser server.
+        token: Secret that clients need; None on a loopback address.
+        update_times: Processor time of the last updates, s.
+
+    Raises:
+        DeviceError: If the port is not available.
+    """
+
+    def __init__(self, host: str = "127.0.0.1", port: int | None = None) -> None:
+        self.host = host
+        self.token = None if is_loopback(host) else new_token()
+        self.server = _start_viser()
+        try:
+            self._proxy = self._start_proxy(PORTS if port is None else [port])
+        except DeviceError:
+            self.server.stop()
+            raise
+        self.port = self._proxy.port
+        self.update_times: list[float] = []
+        self._stopping = threading.Event()
+        self._updates: threading.Thread | None = None
+
+    @property
+    def url(self) -> str:
+        """The address that opens the page, with the token if there is one."""
+        name = _reachable(self.host)
+        shown = f"[{name}]" if ":" in name else name
+        query = "" if self.token is None else f"?token={self.token}"
+        return f"http://{shown}:{self.port}/{query}"
+
+    def start_updates(self, update: Callable[[int], None]) -> None:
+        """Call a function with a count at `UPDATE_RATE`, in a thread, until `stop`."""
+        self._updates = threading.Thread(
+            target=self._run_updates, args=(update,), name="updates", daemon=True
+        )
+        self._updates.start()
+
+    def stop(self) -> None:
+        """Stop the updates, and close the proxy and the viser server."""
+        self._stopping.set()
+        if self._updates is not None:
+            self._updates.join()
+        self._proxy.stop()
+        with contextlib.redirect_stdout(io.StringIO()):
+            self.server.stop()
+
+    def _run_updates(self, update: Callable[[int], None]) -> None:
+        count = 0
+        while not self._stopping.wait(1.0 / UPDATE_RATE):
+            began = time.thread_time()
+            try:
+                update(count)
+            except RuntimeError:
+                # A client connected or left while viser iterated over them. What was
+                # not sent still differs from what is displayed: it is sent next time.
+                log.debug("The page missed an update", exc_info=True)
+            self.update_times = [*self.update_times[-999:], time.thread_time() - began]
+            count += 1
+
+    def _start_proxy(self, ports: "range | list[int]") -> WebServer:
+        routes = proxy(self.server.get_port())
+        for port in ports:
+            try:
+                return WebServer(self.host, port, routes, token=self.token)
+            except DeviceError:
+                if port == ports[-1]:
+                    raise
+        raise AssertionError("there is at least one port")
+
+
+def _start_viser() -> "viser.ViserServer":
+    """Start viser on 127.0.0.1, silent and without its public share tunnel."""
+    import viser
+
+    class Server(viser.ViserServer):
+        """A server whose clients cannot publish it through viser's share service."""
+
+        def request_share_url(self, verbose: bool = True) -> str | None:
+            return None
+
+    with contextlib.redirect_stdout(io.StringIO()):
+        return Server(host="127.0.0.1", port=0, verbose=False)
+
+
+def proxy(port: int) -> list[web.AbstractRouteDef]:
+    """Return routes that pass every GET request on to a port of 127.0.0.1."""
+
+    async def handle(request: web.Request) -> web.StreamResponse:
+        target = f"http://127.0.0.1:{port}{quote(request.path)}"
+        try:
+            if request.headers.get(hdrs.UPGRADE, "").lower() == "websocket":
+                return await _relay(request, target)
+            return await _fetch(request, target)
+        except (ClientError, TimeoutError):
+            return web.Response(status=HTTPStatus.BAD_GATEWAY)
+
+    return [web.get("/{path:.*}", handle, allow_head=False)]
+
+
+async def _fetch(request: web.Request, target: str) -> web.Response:
+    """Fetch a page or a file; its encoding is left as it is."""
+    accepted = {
+        hdrs.ACCEPT_ENCODING: request.headers.get(hdrs.ACCEPT_ENCODING, "identity")
+    }
+    async with (
+        ClientSession(
+            auto_decompress=False, connector=TCPConnector(force_close=True)
+        ) as session,
+        session.get(target, headers=accepted, allow_redirects=False) as answer,
+    ):
+        kept = (hdrs.CONTENT_TYPE, hdrs.CONTENT_ENCODING)
+        headers = {
+            name: answer.headers[name] for name in kept if name in answer.headers
+        }
+        return web.Response(
+            status=answer.status, body=await answer.read(), headers=headers
+        )
+
+
+async def _relay(request: web.Request, target: str) -> web.WebSocketResponse:
+    """Relay the messages of a WebSocket both ways until one side closes it."""
+    offered = request.headers.get(hdrs.SEC_WEBSOCKET_PROTOCOL, "").split(",")
+    async with (
+        ClientSession() as session,
+        session.ws_connect(
+            target,
+            protocols=[name.strip() for name in offered if name.strip()],
+            max_msg_size=MESSAGE_LIMIT,
+        ) as upstream,
+    ):
+        client = web.WebSocketResponse(
+            protocols=[upstream.protocol] if upstream.protocol else (),
+            max_msg_size=MESSAGE_LIMIT,
+            heartbeat=HEARTBEAT,
+            compress=False,
+        )
+        await client.prepare(request)
+        last = await _first((_copy(client, upstream), _copy(upstream, client)))
+        if last is not None and last.type is WSMsgType.CLOSE:  # with viser's reason
+            await client.close(code=last.data, message=(last.extra or "").encode())
+        return client
+
+
+async def _copy(source: WebSocket, sink: WebSocket) -> WSMessage:
+    """Copy messages until the source closes; return its last one."""
+    while True:
+        message = await source.receive()
+        if message.type is WSMsgType.BINARY:
+            await sink.send_bytes(message.data)
+        elif message.type is WSMsgType.TEXT:
+            await sink.send_str(message.data)
+        else:
+            return message
+
+
+async def _first(copies: Iterable) -> WSMessage | None:
+    """Run until one of the copies ends; return its last message, None on an error."""
+    tasks = [asyncio.ensure_future(copy) for copy in copies]
+    try:
+        done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        with contextlib.suppress(ConnectionError):
+            return done.pop().result()
+        return None
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+
+def _reachable(host: str) -> str:
+    """Return a name for `host` under which other machines reach it."""
+    if host not in ("0.0.0.0", "::"):
+        return host
+    probe = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    with probe, contextlib.suppress(OSError):
+        probe.connect(("192.0.2.1", 9))  # sends nothing; selects the outgoing address
+        return probe.getsockname()[0]
+    return socket.gethostname()

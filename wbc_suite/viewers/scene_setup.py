@@ -1,0 +1,141 @@
+"""Floor, light, camera, theme and colours of every page."""
+
+import colorsys
+from collections.abc import Iterable
+from types import MappingProxyType
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+import pinocchio as pin
+
+from wbc_suite.typing import Vector
+
+if TYPE_CHECKING:
+    import viser
+
+__all__ = [
+    "VIEWS",
+    "Colour",
+    "css",
+    "limb_colours",
+    "look_from",
+    "place",
+    "set_camera",
+    "set_up_scene",
+]
+
+Colour: TypeAlias = tuple[int, int, int]
+"""Red, green and blue, 0 to 255."""
+
+FIELD_OF_VIEW = np.deg2rad(42.0)  # vertical
+VIEWS = MappingProxyType(
+    {
+        "Front": np.array([1.0, -0.62, 0.5]),
+        "Left": np.array([0.1, 1.0, 0.25]),
+        "Behind": np.array([-1.0, -0.35, 0.6]),
+        "Above": np.array([-0.15, 0.0, 1.0]),
+    }
+)
+"""Direction from the robot, which faces x, to the camera."""
+BRAND = (38, 98, 132)
+
+# Right is warm, left is cool, the middle of the body is green and violet.
+_BY_WORD: tuple[tuple[tuple[str, ...], Colour], ...] = (
+    (("right", "foot"), (196, 92, 60)),
+    (("left", "foot"), (52, 104, 178)),
+    (("right",), (235, 131, 45)),
+    (("left",), (20, 152, 168)),
+    (("head",), (138, 102, 190)),
+    (("torso",), (88, 148, 88)),
+    (("com",), (88, 148, 88)),
+    (("base",), (94, 106, 126)),
+    (("hand",), (235, 131, 45)),
+    (("gripper",), (235, 131, 45)),
+)
+
+
+def set_up_scene(server: "viser.ViserServer", *, label: str) -> None:
+    """Add the floor and the lights, and set the theme."""
+    server.gui.configure_theme(
+        show_logo=False, show_share_button=False, brand_color=BRAND
+    )
+    server.gui.set_panel_label(label)
+    server.gui.main_panel.dock_right()
+    server.scene.world_axes.visible = False
+    server.scene.add_grid(
+        "/floor",
+        infinite_grid=True,
+        cell_size=0.25,
+        cell_color=(208, 214, 222),
+        section_color=(184, 192, 204),
+        section_size=1.0,
+        fade_distance=14.0,
+        fade_strength=2.0,
+        shadow_opacity=0.22,
+    )
+    server.scene.configure_environment_map(
+        "studio",
+        background=True,
+        background_blurriness=1.0,
+        background_intensity=0.65,
+        environment_intensity=0.3,
+    )
+
+
+def set_camera(server: "viser.ViserServer", low: Vector, high: Vector) -> None:
+    """Point the cameras of new clients at a box, from its front right and above.
+
+    Args:
+        server: Server of the clients.
+        low: Corner of the box with the smallest coordinates, shape (3,), in m.
+        high: The opposite corner.
+    """
+    position, look_at = _camera(low, high, VIEWS["Front"])
+    server.initial_camera.position = tuple(position)
+    server.initial_camera.look_at = tuple(look_at)
+    server.initial_camera.fov = FIELD_OF_VIEW
+
+
+def look_from(
+    client: "viser.ClientHandle", low: Vector, high: Vector, direction: Vector
+) -> None:
+    """Point one client's camera at a box, from a direction."""
+    position, look_at = _camera(low, high, direction)
+    with client.atomic():
+        client.camera.position = position
+        client.camera.look_at = look_at
+
+
+def _camera(low: Vector, high: Vector, direction: Vector) -> tuple[Vector, Vector]:
+    """Return the position of the camera and the point that it looks at."""
+    middle = (low + high) / 2.0
+    distance = 1.3 * max(float(np.linalg.norm(high - low)), 0.8)
+    return middle + distance * direction / np.linalg.norm(direction), middle
+
+
+def place(node: "viser.SceneNodeHandle", T_world_node: pin.SE3) -> None:
+    """Set the pose of a scene node whose parent is the world."""
+    position_xyzw = pin.SE3ToXYZQUAT(T_world_node)
+    node.position = position_xyzw[:3]
+    node.wxyz = np.roll(position_xyzw[3:], 1)
+
+
+def limb_colours(names: Iterable[str]) -> MappingProxyType[str, Colour]:
+    """Return a different colour for every limb, the same in all parts of the page."""
+    colours: dict[str, Colour] = {}
+    for name in names:
+        known = (c for words, c in _BY_WORD if all(w in name for w in words))
+        colour = next((c for c in known if c not in colours.values()), None)
+        colours[name] = colour or _spare(len(colours))
+    return MappingProxyType(colours)
+
+
+def css(colour: Colour) -> str:
+    """Return a colour in CSS notation."""
+    return f"#{colour[0]:02x}{colour[1]:02x}{colour[2]:02x}"
+
+
+def _spare(index: int) -> Colour:
+    """Return a muted colour; steps of the golden ratio separate neighbours."""
+    r, g, b = colorsys.hls_to_rgb((0.11 + 0.618 * index) % 1.0, 0.48, 0.45)
+    return round(255 * r), round(255 * g), round(255 * b)

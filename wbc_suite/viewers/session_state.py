@@ -1,0 +1,122 @@
+"""State of a teleoperation session as its page displays it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import mujoco
+import pinocchio as pin
+
+from wbc_suite.control.reasons import Reason
+from wbc_suite.devices.action_ports import LimbKind
+from wbc_suite.recording.episode_control import EpisodeStatus
+from wbc_suite.typing import Matrix, Vector
+
+__all__ = ["LimbInfo", "LimbStatus", "SessionInfo", "Snapshot"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LimbInfo:
+    """Constant properties of a limb.
+
+    Attributes:
+        name: Name of its slice of the action.
+        kind: Which part of a pose is commanded.
+        body: Body that carries the controlled frame; -1 for none.
+    """
+
+    name: str
+    kind: LimbKind
+    body: int
+
+    @property
+    def title(self) -> str:
+        """The name as it is displayed: `right_hand` becomes `Right hand`."""
+        if self.name == "com":
+            return "Centre of mass"
+        return self.name.replace("_", " ").capitalize()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SessionInfo:
+    """Constant properties of a session.
+
+    Attributes:
+        model: The simulated model.
+        limbs: Limbs that can be dragged, by name.
+        grippers: Names of each gripper's synergies, by the gripper's name.
+        records: Whether the session can record episodes.
+    """
+
+    model: mujoco.MjModel
+    limbs: Mapping[str, LimbInfo]
+    grippers: Mapping[str, tuple[str, ...]]
+    records: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LimbStatus:
+    """State of one limb after a tick.
+
+    Attributes:
+        measured: Pose of the simulated frame in the world.
+        target: Requested pose in the world; components that are not commanded are as
+            measured.
+        position_error: Tracking error of the commanded position, m.
+        orientation_error: Tracking error of the commanded orientation, rad.
+        reached: Whether the controller can bring the frame to its target.
+        reasons: Why it cannot.
+        holder: Client that holds the limb, or None.
+        enabled: Whether the limb's clutch is engaged.
+        acting: What stages of the pipeline do to the target.
+    """
+
+    measured: pin.SE3
+    target: pin.SE3
+    position_error: float
+    orientation_error: float
+    reached: bool
+    reasons: tuple[Reason, ...]
+    holder: int | None
+    enabled: bool
+    acting: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Snapshot:
+    """State of a session at one tick.
+
+    Attributes:
+        tick: Number of ticks since the session was created.
+        epoch: Number of resets; a reset moves all targets.
+        time: Simulated time, s.
+        body_positions: Positions of all bodies in the world, m, shape (nbody, 3).
+        body_quaternions: Their orientations (wxyz), shape (nbody, 4).
+        limbs: Status by limb name.
+        grippers: Commanded closing of each gripper's synergies, -1 open .. 1 closed.
+        step_time: Duration of a step of control and physics, s.
+        latency: Median time from an input to its joint target, s; nan before any.
+        speed: Simulated time per wall time.
+        paused: Whether the simulation is paused.
+        success: Whether the benchmark counts as solved.
+        message: Message to the user, possibly empty.
+        device: State of the device beside the page, as the pipeline reports it.
+        selected: Limb that a device for one hand moves; empty if none is used.
+        recording: State of the recording; None if the session cannot record.
+    """
+
+    tick: int
+    epoch: int
+    time: float
+    body_positions: Matrix
+    body_quaternions: Matrix
+    limbs: Mapping[str, LimbStatus]
+    grippers: Mapping[str, Vector]
+    step_time: float
+    latency: float
+    speed: float
+    paused: bool
+    success: bool
+    message: str
+    device: tuple[str, ...]
+    selected: str
+    recording: EpisodeStatus | None

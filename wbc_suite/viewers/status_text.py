@@ -1,0 +1,176 @@
+"""Texts and HTML of the teleoperation page: session, recording, limbs and reasons."""
+
+import html
+from collections.abc import Mapping
+
+import numpy as np
+
+from wbc_suite.control.reasons import (
+    Contact,
+    Reason,
+    TorqueLimit,
+    TrackingError,
+    is_transient,
+)
+from wbc_suite.devices.action_ports import LimbKind
+from wbc_suite.qp import ActiveLimit, Conflict, LimitKind, LinkPair, OutOfReach
+from wbc_suite.viewers.scene_setup import Colour, css
+from wbc_suite.viewers.session_state import LimbInfo, LimbStatus, Snapshot
+
+__all__ = ["describe_reason", "explain", "limbs_html", "plain", "status_html"]
+
+GREEN, YELLOW, RED = "#3f8f5b", "#b08a2e", "#c8553d"
+
+
+def plain(name: str) -> str:
+    """Return a joint or link name as words: `right_elbow_joint`, `right elbow`."""
+    return name.removesuffix("_joint").removesuffix("_link").replace("_", " ").strip()
+
+
+def describe_reason(reason: Reason) -> str:
+    """Return one of the controller's reasons as part of a sentence."""
+    match reason:
+        case ActiveLimit():
+            return _describe_limit(reason)
+        case Conflict(other):
+            return f"conflict with {plain(other)}"
+        case Contact(link, other):
+            return f"{plain(link)} presses on {plain(other)}"
+        case TorqueLimit(joint):
+            return f"{plain(joint)} is at its torque limit"
+        case TrackingError(joint):
+            return f"{plain(joint)} lags behind its target"
+        case OutOfReach():
+            return "out of reach"
+    return str(reason)
+
+
+def _describe_limit(limit: ActiveLimit) -> str:
+    match limit.kind, limit.subject:
+        case LimitKind.POSITION, joint:
+            return f"{plain(str(joint))} is at its {limit.side} limit"
+        case LimitKind.VELOCITY, joint:
+            return f"{plain(str(joint))} is at its velocity limit"
+        case LimitKind.SELF_COLLISION, LinkPair(first, second):
+            return f"{plain(first)} would touch {plain(second)}"
+        case LimitKind.FLOOR, link:
+            return f"{plain(str(link))} would touch the floor"
+    return str(limit)
+
+
+def explain(status: LimbStatus, *, at_most: int = 3) -> str:
+    """Return why a limb is not at its target; empty if it is, or moves there.
+
+    Args:
+        status: State of the limb.
+        at_most: Number of reasons to name.
+    """
+    error = _tracking_error(status)
+    reasons = [r for r in status.reasons if not is_transient(r)]
+    if status.reached or not error or (status.reasons and not reasons):
+        return ""
+    parts = [describe_reason(reason) for reason in reasons[:at_most]]
+    return f"{error} short: {', '.join(parts) or 'out of reach'}"
+
+
+def status_html(
+    snapshot: Snapshot,
+    limbs: Mapping[str, LimbInfo],
+    colours: Mapping[str, Colour],
+) -> str:
+    """Return the state of the session, with reasons of limbs that miss their target."""
+    state, dot = _state(snapshot)
+    figures = (
+        ("input to joint target", _or_dash(1e3 * snapshot.latency, "ms")),
+        ("step time", _or_dash(1e3 * snapshot.step_time, "ms", digits=1)),
+        ("real time", _or_dash(snapshot.speed, "x", digits=2)),
+    )
+    cells = "".join(
+        "<div style='flex:auto'><div style='font-size:1.05em;font-weight:600'>"
+        f"{value}</div><div style='opacity:.6;font-size:.78em'>{label}</div></div>"
+        for label, value in figures
+    )
+    reasons = "".join(
+        "<div style='margin-top:.6em;padding:.4em .6em;border-radius:.3em;"
+        f"border-left:.25em solid {css(colours[name])};"
+        "background:rgba(200,120,60,.10);font-size:.88em'>"
+        f"<b>{html.escape(limbs[name].title)}</b>: {html.escape(text)}</div>"
+        for name, status in snapshot.limbs.items()
+        if (text := explain(status))
+    )
+    return (
+        "<div style='padding:.5em .7em .6em'>"
+        "<div style='font-weight:600;margin-bottom:.5em'>"
+        f"<span style='color:{dot}'>&#9679;</span> {html.escape(state)}</div>"
+        f"<div style='display:flex;gap:.4em'>{cells}</div>"
+        f"{_recording_html(snapshot)}{reasons}</div>"
+    )
+
+
+def limbs_html(
+    snapshot: Snapshot,
+    limbs: Mapping[str, LimbInfo],
+    colours: Mapping[str, Colour],
+) -> str:
+    """Return a table of the limbs: who holds them, and their tracking error."""
+    rows = "".join(
+        f"<tr><td><span style='color:{css(colours[name])}'>&#9632;</span> "
+        f"{html.escape(limbs[name].title)}</td>"
+        f"<td style='opacity:.65'>{html.escape(_notes(snapshot, name))}</td>"
+        f"<td style='text-align:right'>{_error_cell(limbs[name], status)}</td></tr>"
+        for name, status in snapshot.limbs.items()
+    )
+    return f"<table style='width:100%;padding:.2em .7em;font-size:.88em'>{rows}</table>"
+
+
+def _state(snapshot: Snapshot) -> tuple[str, str]:
+    """Return the state of the session and its colour."""
+    if snapshot.message:
+        return snapshot.message, RED
+    if snapshot.paused:
+        return "Paused", YELLOW
+    if snapshot.device:
+        return ", ".join(snapshot.device).capitalize(), YELLOW
+    if snapshot.success:
+        return "Solved", GREEN
+    return f"Running, {snapshot.time:.0f} s", GREEN
+
+
+def _recording_html(snapshot: Snapshot) -> str:
+    """Return the state of the recording; empty before its first command."""
+    status = snapshot.recording
+    if status is None or not (status.message or status.recording):
+        return ""
+    dot, episodes = "", f"{status.kept} episode{'s' * (status.kept != 1)} in the file."
+    text = f"{status.message} {episodes}"
+    if status.recording:
+        dot = f"<span style='color:{RED}'>&#9679;</span> "
+        text = f"Recording episode {status.kept + 1}: {status.length} actions"
+    return f"<div style='margin-top:.5em'>{dot}{html.escape(text)}</div>"
+
+
+def _notes(snapshot: Snapshot, name: str) -> str:
+    status = snapshot.limbs[name]
+    notes = ["selected"] if name == snapshot.selected else []
+    if status.holder is not None:
+        notes.append(f"held by viewer {status.holder + 1}")
+    return ", ".join([*notes, *status.acting])
+
+
+def _error_cell(limb: LimbInfo, status: LimbStatus) -> str:
+    if limb.kind is LimbKind.ORIENTATION:
+        return f"{np.rad2deg(status.orientation_error):.0f}°"
+    return f"{1e3 * status.position_error:.0f} mm"
+
+
+def _tracking_error(status: LimbStatus) -> str:
+    """Return the tracking error with its unit; empty if it is hardly visible."""
+    if status.position_error >= 0.005:
+        return f"{100 * status.position_error:.0f} cm"
+    if status.orientation_error >= 0.05:
+        return f"{np.rad2deg(status.orientation_error):.0f}°"
+    return ""
+
+
+def _or_dash(value: float, unit: str, *, digits: int = 0) -> str:
+    return "&ndash;" if np.isnan(value) else f"{value:.{digits}f} {unit}"

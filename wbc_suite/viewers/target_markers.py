@@ -1,0 +1,140 @@
+"""Markers of targets: a translucent copy of each limb, a line and a label."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+
+from wbc_suite.robot.triangle_meshes import TriangleMesh, ellipsoid_mesh, merge
+from wbc_suite.viewers.model_scene import COLLISION_GROUP, geom_mesh
+from wbc_suite.viewers.scene_setup import Colour, place
+from wbc_suite.viewers.session_state import LimbStatus, Snapshot
+
+if TYPE_CHECKING:
+    import viser
+
+__all__ = ["TargetMarkers"]
+
+NEAR = 0.012  # m; a copy nearer than this to its limb would only tint it
+TURNED = 0.12  # rad
+BALL = 0.04  # m, radius of the marker of a frame without geoms
+
+
+class TargetMarkers:
+    """A translucent copy of each limb at its target, with a line to the limb.
+
+    Args:
+        server: Server whose scene is drawn on.
+        model: Model that the limbs belong to.
+        bodies: Body of each limb, by limb name; -1 for a limb without one.
+        snapshot: State at the start; copies are taken in this posture.
+        colours: Colour of each limb.
+    """
+
+    def __init__(
+        self,
+        server: "viser.ViserServer",
+        model: mujoco.MjModel,
+        bodies: Mapping[str, int],
+        snapshot: Snapshot,
+        colours: Mapping[str, Colour],
+    ) -> None:
+        self._nodes: dict[str, viser.SceneNodeHandle] = {}
+        self._lines: dict[str, viser.LineSegmentsHandle] = {}
+        self._labels: dict[str, viser.LabelHandle] = {}
+        for name, status in snapshot.limbs.items():
+            mesh = _copy(model, name, bodies, snapshot, status)
+            self._nodes[name] = server.scene.add_mesh_simple(
+                f"/targets/{name}",
+                mesh.vertices,
+                mesh.faces,
+                color=colours[name],
+                opacity=0.38,
+                cast_shadow=False,
+                receive_shadow=False,
+                visible=False,
+            )
+            self._lines[name] = server.scene.add_line_segments(
+                f"/target_lines/{name}",
+                np.zeros((1, 2, 3), dtype=np.float32),
+                colors=colours[name],
+                thickness=0.006,
+                visible=False,
+            )
+            self._labels[name] = server.scene.add_label(
+                f"/target_labels/{name}", "", anchor="bottom-center", visible=False
+            )
+
+    def update(self, snapshot: Snapshot, notes: Mapping[str, str]) -> None:
+        """Move the markers; `notes` are the labels of limbs, possibly empty."""
+        for name, status in snapshot.limbs.items():
+            apart = status.position_error > NEAR or status.orientation_error > TURNED
+            node, line = self._nodes[name], self._lines[name]
+            node.visible = apart
+            line.visible = status.position_error > NEAR
+            if apart:
+                place(node, status.target)
+            if line.visible:
+                line.points = np.array(
+                    [[status.measured.translation, status.target.translation]],
+                    dtype=np.float32,
+                )
+            self._note(name, status, notes.get(name, ""))
+
+    def _note(self, name: str, status: LimbStatus, text: str) -> None:
+        label = self._labels[name]
+        if text != label.text and text:
+            label.text = text
+        label.visible = bool(text)
+        if text:
+            label.position = status.target.translation + np.array([0.0, 0.0, 0.12])
+
+
+def _copy(
+    model: mujoco.MjModel,
+    name: str,
+    bodies: Mapping[str, int],
+    snapshot: Snapshot,
+    status: LimbStatus,
+) -> TriangleMesh:
+    """Return the mesh of a limb in its controlled frame."""
+    others = {body for other, body in bodies.items() if other != name}
+    chosen = _own_bodies(model, bodies[name], others)
+    parts = [
+        part
+        for geom in range(model.ngeom)
+        if model.geom_bodyid[geom] in chosen
+        and model.geom_group[geom] < COLLISION_GROUP
+        and (part := _in_frame(model, geom, snapshot, status)) is not None
+    ]
+    return merge(parts) if parts else ellipsoid_mesh(np.full(3, BALL))
+
+
+def _own_bodies(model: mujoco.MjModel, root: int, others: set[int]) -> set[int]:
+    """Return a limb's bodies: its subtree, unless another limb is part of it."""
+    if root < 0:
+        return set()
+    carried = {root}
+    for body in range(root + 1, model.nbody):
+        if model.body_parentid[body] in carried:
+            carried.add(body)
+    return {root} if carried & others else carried
+
+
+def _in_frame(
+    model: mujoco.MjModel, geom: int, snapshot: Snapshot, status: LimbStatus
+) -> TriangleMesh | None:
+    mesh = geom_mesh(model, geom)
+    if mesh is None:
+        return None
+    body = model.geom_bodyid[geom]
+    T_body_geom = _pose(model.geom_pos[geom], model.geom_quat[geom])
+    T_world_body = _pose(snapshot.body_positions[body], snapshot.body_quaternions[body])
+    T = status.measured.inverse() * T_world_body * T_body_geom
+    return mesh.moved(T.translation, T.rotation)
+
+
+def _pose(position: np.ndarray, wxyz: np.ndarray) -> pin.SE3:
+    return pin.XYZQUATToSE3(np.concatenate([position, np.roll(wxyz, -1)]))
