@@ -33,6 +33,7 @@ from harness.stand import Stand
 from wbc_suite.control.composite.distance_limits import distance_limits
 from wbc_suite.control.composite.qp_tasks import joint_accelerations
 from wbc_suite.control.composite.whole_body import WholeBodyIK
+from wbc_suite.kinematics import Configuration
 from wbc_suite.planning import LinkDistanceChecker
 
 ROBOTS = ("Panda", "GR1", "Tiago", "SpotWithArm")
@@ -62,11 +63,9 @@ class Bench(Stand):
     def __init__(self, name, controller):
         super().__init__(name, controller)
         assert isinstance(self.controller, WholeBodyIK)
-        self.hands = [
-            k
-            for k, frame in enumerate(self.controller.config.frames)
-            if frame.name.endswith("hand")
-        ]
+        frames = self.controller.config.frames
+        self.hands = [frame for frame in frames if frame.name.endswith("hand")]
+        self.body = Configuration(self.controller.robot.to_pinocchio())
         self.links = LinkDistanceChecker(
             self.controller.robot.to_pinocchio(),
             distance_limits(self.controller.robot, self.controller.config),
@@ -81,7 +80,7 @@ class Bench(Stand):
 
     def random_poses(self, rng):
         """Return poses of all hands at a random configuration free of collision."""
-        model = self.controller._configuration.model
+        model = self.body.model
         q0 = self.controller._conversion.q_to_pinocchio(self.data.qpos)
         resting = self._touching(self.data.qpos)
         for _ in range(1000):
@@ -90,8 +89,8 @@ class Bench(Stand):
             self.controller._conversion.q_to_mujoco(q, self.free.qpos)
             apart = self.links.clearance(q) > 0.0
             if apart and self._touching(self.free.qpos) <= resting:
-                self.controller._configuration.update(q)
-                return [self.controller.frames.pose(k) for k in self.hands]
+                self.body.update(q)
+                return [self.body.frame_pose(hand.frame) for hand in self.hands]
         raise RuntimeError("no configuration free of collision in 1000 draws")
 
     def _touching(self, qpos):
@@ -130,10 +129,8 @@ class Bench(Stand):
         """Set the hands' goals."""
         layout = self.controller.layout
         values = {
-            layout.slices[k].name: np.concatenate(
-                [pose.translation, pin.log3(pose.rotation)]
-            )
-            for k, pose in zip(self.hands, poses, strict=True)
+            hand.name: np.concatenate([pose.translation, pin.log3(pose.rotation)])
+            for hand, pose in zip(self.hands, poses, strict=True)
         }
         action = layout.pack(values, base=self.controller.hold_action)
         self.controller.set_goal(layout.clip(action)[0])
@@ -141,10 +138,10 @@ class Bench(Stand):
     def errors(self, poses):
         """Return the worst hand's errors in the simulation, m and rad."""
         q = self.controller._conversion.q_to_pinocchio(self.data.qpos)
-        self.controller._configuration.update(q)
+        self.body.update(q)
         worst = np.zeros(2)
-        for k, goal in zip(self.hands, poses, strict=True):
-            pose = self.controller.frames.pose(k)
+        for hand, goal in zip(self.hands, poses, strict=True):
+            pose = self.body.frame_pose(hand.frame)
             error = (
                 np.linalg.norm(goal.translation - pose.translation),
                 np.linalg.norm(pin.log3(pose.rotation.T @ goal.rotation)),
@@ -183,7 +180,7 @@ def reachable(bench, trial, seed):
     history = [bench.errors(poses)]
     bench.run(1.0, lambda: history.append(bench.errors(poses)))
     info = bench.controller.info(bench.state)["ik"]["frames"]
-    frames = [info[bench.controller.config.frames[k].name] for k in bench.hands]
+    frames = [info[hand.name] for hand in bench.hands]
     return {
         "mm": 1e3 * float(history[-1][0]),
         "deg": float(np.rad2deg(history[-1][1])),
@@ -196,8 +193,8 @@ def ball(bench, trial, seed):
     """Send the hands somewhere in the ball, then home; return a row."""
     rng = np.random.default_rng((seed, 1, trial))
     bench.reset()
-    names = [bench.controller.config.frames[k].name for k in bench.hands]
-    home = [bench.controller.goals_in_world[name].copy() for name in names]
+    goals = bench.controller.goals_in_world
+    home = [goals[hand.name].copy() for hand in bench.hands]
     poses = []
     for _ in bench.hands:
         direction = rng.normal(size=3)
