@@ -23,8 +23,9 @@ print(env.action_layout)
 
 site = env.simulation.data.site("robot0_right_tcp")
 goal = env.action_layout.pack({"right_hand": site.xpos[2:] + 0.1}, base=env.hold_action)
-for _ in range(30):
-    *_, info = env.step(goal)
+for _ in range(29):
+    env.step(goal)
+*_, info = env.step(goal)
 print("height:", np.round(site.xpos[2], 3), "m of", np.round(goal[0], 3), "m")
 print(info["ik"]["frames"]["right_hand"])
 env.close()

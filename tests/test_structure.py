@@ -225,7 +225,6 @@ def test_every_test_file_has_its_own_name():
     assert not [name for name in set(names) if names.count(name) > 1]
 
 
-@pytest.mark.xfail(reason=PENDING, strict=False)
 def test_inheritance_is_shallow():
     errors = depths({PACKAGE: TREES[PACKAGE / "errors.py"]})
     deep = {

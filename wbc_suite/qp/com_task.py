@@ -19,8 +19,8 @@ class ComTask(RowTask):
     Args:
         cost: [cost]/m, one number or one per world axis.
         target: Point p*, m, shape (3,); without one the point at binding time.
-        gain: See `Task`.
-        level: See `Task`.
+        gain: See `RowTask`.
+        level: See `RowTask`.
         max_speed: Greatest speed asked for, m/s.
         name: How reports call the task.
     """

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from itertools import pairwise
+from types import UnionType
 from typing import cast
 
 import numpy as np
@@ -164,9 +165,9 @@ def check_parts(
         raise ConfigError(
             f"TaskStack needs a Configuration, not {type(configuration).__name__}."
         )
-    _check_list("limits", limits if limits is not None else (), Limit)
-    _check_list("equalities", equalities, Equality)
-    checked = cast("Sequence[Task]", _check_list("tasks", tasks, Task))
+    _check_list("limits", limits if limits is not None else (), "Limit", Limit)
+    _check_list("equalities", equalities, "Equality", Equality)
+    checked = cast("Sequence[Task]", _check_list("tasks", tasks, "Task", Task))
     levels = {task.level for task in checked}
     if len(levels) > MAX_LEVELS:
         raise ConfigError(
@@ -181,13 +182,15 @@ def check_parts(
             )
 
 
-def _check_list(what: str, given: object, kind: type) -> Sequence[object]:
+def _check_list(
+    what: str, given: object, name: str, kind: type | UnionType
+) -> Sequence[object]:
     if not isinstance(given, Sequence) or isinstance(given, str):
         raise ConfigError(f"TaskStack: {what} are a list, not {given!r:.60}.")
     items = cast("Sequence[object]", given)
     for item in items:
         if not isinstance(item, kind):
             raise ConfigError(
-                f"TaskStack: {what} hold {kind.__name__} objects, not {item!r:.60}."
+                f"TaskStack: {what} hold {name} objects, not {item!r:.60}."
             )
     return items

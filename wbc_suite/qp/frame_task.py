@@ -36,8 +36,8 @@ class FrameTask(RowTask):
         position_cost: [cost]/m, one number or one per world axis.
         orientation_cost: [cost]/rad, one number or one per axis of the frame.
         target: Target pose; without one the pose at binding time is held.
-        gain: See `Task`.
-        level: See `Task`.
+        gain: See `RowTask`.
+        level: See `RowTask`.
         max_linear_speed: Greatest speed asked for, m/s.
         max_angular_speed: Greatest angular speed asked for, rad/s.
         name: How reports call the task; the frame's name when absent.

@@ -23,8 +23,8 @@ class JointCouplingTask(RowTask):
         ratio: Radians (or metres) of the follower per radian (or metre) of the leader.
         offset: The follower's position when the leader is at zero, rad or m.
         cost: [cost]/rad or [cost]/m.
-        gain: See `Task`.
-        level: See `Task`.
+        gain: See `RowTask`.
+        level: See `RowTask`.
         max_speed: Greatest speed asked for, rad/s or m/s.
         name: How reports call the task; "follower - leader" when absent.
     """

@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import ClassVar
+from typing import ClassVar, TypeAlias
 
 import numpy as np
 
@@ -36,20 +36,18 @@ class LimitKind(IntEnum):
         return self.name.lower().replace("_", "-")
 
 
-class Limit(ABC):  # noqa: B024, what a stack takes is either of the two below
-    """A constraint that a solution never violates as long as one exists."""
-
-
-class BoxLimit(Limit):
-    """A limit on single joints."""
+class BoxLimit(ABC):
+    """A limit on single joints, which a solution never violates."""
 
     @abstractmethod
     def apply(self, configuration: Configuration, bounds: "JointBounds") -> None:
         """Tighten the bounds; called once, when a stack is built."""
 
 
-class RowLimit(Limit):
+class RowLimit(ABC):
     """A limit `G dq <= h` of a fixed number of rows.
+
+    A solution never violates it as long as one exists.
 
     A subclass sets `dim` and writes `rows`; `subject` and `kind` are for reports:
 
@@ -78,7 +76,7 @@ class RowLimit(Limit):
     unit: str = "m"
     relax_speed: float = np.inf
 
-    def bind(self, configuration: Configuration) -> None:
+    def bind(self, configuration: Configuration) -> None:  # noqa: B027, may be empty
         """Resolve names in a model; called when a stack is built."""
 
     @abstractmethod
@@ -94,12 +92,16 @@ class RowLimit(Limit):
             h: Output.
         """
 
-    def reset(self) -> None:
+    def reset(self) -> None:  # noqa: B027, may be empty
         """Discard memory of earlier ticks; called by a stack's `reset`."""
 
     def subject(self, row: int) -> object:
         """Return what a row of the last tick limits: a value that prints itself."""
         return f"{type(self).__name__}[{row}]"
+
+
+Limit: TypeAlias = BoxLimit | RowLimit
+"""What a stack takes as a limit."""
 
 
 @dataclass(slots=True)

@@ -37,8 +37,8 @@ class LookAtTask(RowTask):
         target: Point p, m, world axes, shape (3,); without one, 1 m along the axis at
             binding time.
         cost: [cost]/rad.
-        gain: See `Task`.
-        level: See `Task`.
+        gain: See `RowTask`.
+        level: See `RowTask`.
         max_angular_speed: Greatest speed asked for, rad/s.
         name: How reports call the task; "frame looks" when absent.
 

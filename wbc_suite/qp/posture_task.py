@@ -23,8 +23,8 @@ class PostureTask(JointTask):
             zero unless named.
         costs: Costs of single joints by name, in place of `cost`.
         target: Posture q*, shape (nq,); without one the posture at binding time.
-        gain: See `Task`.
-        level: See `Task`.
+        gain: See `RowTask`.
+        level: See `RowTask`.
         max_speed: Greatest speed asked for, rad/s or m/s.
         name: How reports call the task.
     """
@@ -93,7 +93,7 @@ class DampingTask(JointTask):
         cost: [cost]/rad or [cost]/m for all joints; free and planar roots have cost
             zero unless named.
         costs: Costs of single joints by name, in place of `cost`.
-        level: See `Task`.
+        level: See `RowTask`.
         name: How reports call the task.
     """
 

@@ -29,8 +29,8 @@ class RelativeFrameTask(RowTask):
         position_cost: [cost]/m, one number or one per axis of r.
         orientation_cost: [cost]/rad, one number or one per axis of f.
         target: Pose T_rt; without one the pose at binding time is held.
-        gain: See `Task`.
-        level: See `Task`.
+        gain: See `RowTask`.
+        level: See `RowTask`.
         max_linear_speed: Greatest relative speed asked for, m/s.
         max_angular_speed: Greatest relative angular speed asked for, rad/s.
         name: How reports call the task; "frame in root" when absent.

@@ -55,7 +55,7 @@ class TaskStack:
 
     Args:
         configuration: The robot; `solve` reads it, the caller moves it.
-        tasks: Tasks, see `Task.level` for priorities. The stack binds them: frames are
+        tasks: Tasks, see `RowTask` for priorities. The stack binds them: frames are
             resolved, and targets that were not set hold the present pose.
         limits: Limits; position, velocity and acceleration limits with their defaults
             when absent.

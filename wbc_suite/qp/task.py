@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import ClassVar, TypeAlias
 from weakref import ref
 
 import numpy as np
@@ -53,46 +53,12 @@ class SharedRow:
         self._copies.append(ref(copy))
 
 
-class Task(ABC):  # noqa: B024, what a stack takes is either of the two below
-    """One term `|| W (J dq - gain e) ||^2` of a stack's cost.
+class RowTask(ABC):
+    """One term `|| W (J dq - gain e) ||^2` of a stack's cost, with a few dense rows.
 
     `e` is the task's error and `J` its derivative: `d(e) = -J dq`. The wanted step
     `gain e` is shortened to the task's greatest speed, because errors without bound
     are what makes joints flip at limits. `W` is the diagonal of costs.
-
-    Args:
-        name: How reports call the task.
-        gain: Fraction of the error that one step should remove, in (0, 1].
-        level: Strict priority; level 0 is served first, and level 1 moves only in ways
-            that leave the rows of level 0 as they are.
-
-    Attributes:
-        kernel: What computes error and Jacobian. A class says so in its own body; its
-            subclasses, whose error may be another, do not inherit it.
-        target_row: Target of a task with a kernel, as the kernel reads it.
-
-    Raises:
-        ConfigError: If the gain or the level is out of range.
-    """
-
-    kernel: ClassVar[Kernel] = Kernel.PYTHON
-
-    def __init__(self, name: str, *, gain: float = 1.0, level: int = 0) -> None:
-        self.name = str(name)
-        self.gain = check_number(f"Task '{name}': gain", gain, above=0.0, most=1.0)
-        self.level = check_count(f"Task '{name}': level", level)
-        self.target_row = SharedRow(0)
-
-    def bind(self, configuration: Configuration) -> None:  # noqa: B027, may be empty
-        """Resolve names in a model. A stack calls it once.
-
-        Raises:
-            UnknownNameError: If the model lacks a frame or joint of this task.
-        """
-
-
-class RowTask(Task):
-    """A task with a few dense rows.
 
     A subclass writes `evaluate`; weights, saturation, damping and reports are the
     stack's work:
@@ -108,16 +74,24 @@ class RowTask(Task):
         name: How reports call the task.
         dim: Number of rows.
         cost: [cost] per unit of the error, one number or one per row.
-        gain: See `Task`.
-        level: See `Task`.
+        gain: Fraction of the error that one step should remove, in (0, 1].
+        level: Strict priority; level 0 is served first, and level 1 moves only in ways
+            that leave the rows of level 0 as they are.
         max_speed: Greatest speed asked for, in the error's unit per second.
         max_angular_speed: The same for the rows from `angular_start` on, rad/s.
         angular_start: First row that is an angle; `dim` when absent.
 
     Attributes:
+        kernel: What computes error and Jacobian. A class says so in its own body; its
+            subclasses, whose error may be another, do not inherit it.
+        target_row: Target of a task with a kernel, as the kernel reads it.
         unit: Unit of the rows before `angular_start`, for reports.
+
+    Raises:
+        ConfigError: If a cost, the gain, the level or a speed is out of range.
     """
 
+    kernel: ClassVar[Kernel] = Kernel.PYTHON
     unit: str = "m"
 
     def __init__(
@@ -132,7 +106,8 @@ class RowTask(Task):
         max_angular_speed: float = np.inf,
         angular_start: int | None = None,
     ) -> None:
-        super().__init__(name, gain=gain, level=level)
+        self.name, self.target_row = str(name), SharedRow(0)
+        self.gain, self.level = _priority(name, gain, level)
         self.dim = check_count(f"Task '{name}': dim", dim, least=1)
         self.cost_row = SharedRow(self.dim)
         self.cost_row.set(cost_vector(self.name, cost, self.dim))
@@ -146,6 +121,13 @@ class RowTask(Task):
     def cost(self) -> Vector:
         """Cost of each row, [cost] per unit of the error, shape (dim,). A view."""
         return self.cost_row.values
+
+    def bind(self, configuration: Configuration) -> None:  # noqa: B027, may be empty
+        """Resolve names in a model. A stack calls it once.
+
+        Raises:
+            UnknownNameError: If the model lacks a frame or joint of this task.
+        """
 
     @abstractmethod
     def evaluate(
@@ -179,21 +161,25 @@ class RowTask(Task):
         return error, jacobian
 
 
-class JointTask(Task):
-    """A task whose Jacobian is the identity: one row per velocity.
+class JointTask(ABC):
+    """A term of a stack's cost whose Jacobian is the identity: one row per velocity.
 
     Args:
         name: How reports call the task.
         cost: [cost]/rad or [cost]/m for all joints; free and planar roots have cost
             zero unless named.
         costs: Costs of single joints by name, in place of `cost`.
-        gain: See `Task`.
-        level: See `Task`.
+        gain: See `RowTask`.
+        level: See `RowTask`.
         max_speed: Greatest speed of each joint, rad/s or m/s.
 
     Attributes:
+        kernel: See `RowTask`.
+        target_row: See `RowTask`.
         squared_costs: Squared cost of each velocity once bound, shape (nv,).
     """
+
+    kernel: ClassVar[Kernel] = Kernel.PYTHON
 
     def __init__(
         self,
@@ -205,7 +191,8 @@ class JointTask(Task):
         level: int = 0,
         max_speed: float = np.inf,
     ) -> None:
-        super().__init__(name, gain=gain, level=level)
+        self.name, self.target_row = str(name), SharedRow(0)
+        self.gain, self.level = _priority(name, gain, level)
         self.cost, self.costs = cost, dict(costs or {})
         for value in (cost, *self.costs.values()):
             cost_vector(name, value, 1)
@@ -227,6 +214,18 @@ class JointTask(Task):
         error = np.zeros(configuration.nv)
         self.evaluate(configuration, error)
         return error
+
+
+Task: TypeAlias = RowTask | JointTask
+"""What a stack takes as a task."""
+
+
+def _priority(name: str, gain: float, level: int) -> tuple[float, int]:
+    """Return gain and strict level of a task, checked."""
+    return (
+        check_number(f"Task '{name}': gain", gain, above=0.0, most=1.0),
+        check_count(f"Task '{name}': level", level),
+    )
 
 
 def cost_vector(owner: str, cost: float | Vector, size: int) -> Vector:

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any, Literal
 
 import numpy as np
+from pydantic import BaseModel, InstanceOf
 
 from wbc_suite.control.action import ActionLayout
 from wbc_suite.control.law.joint_laws import JointLaw, JointLawConfig
@@ -46,7 +47,7 @@ class BasicConfig(FrozenModel):
 
     format: Literal[1] = 1
     type: str = "BASIC"
-    body_parts: dict[Name, FrozenModel]
+    body_parts: dict[Name, InstanceOf[BaseModel]]
     may_fall: bool = False
 
 

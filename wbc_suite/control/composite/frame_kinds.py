@@ -231,10 +231,12 @@ class Base(FrameKind):
 
 
 @register_frame_kind
-class CentreOfMass(Position):
+class CentreOfMass(FrameKind):
     """Position of the robot's centre of mass."""
 
     name = "com"
+    labels = AXES[:3]
+    slice_kind = SliceKind.POSITION
     needs_frame = False
 
     def task(self, frame: "ControlledFrame", *, whole_error: bool = False) -> GoalTask:

@@ -3,15 +3,15 @@
 from typing import Literal, TypeAlias
 
 import numpy as np
-from pydantic import NonNegativeFloat
+from pydantic import BaseModel, NonNegativeFloat
 
 from wbc_suite.control.action import ActionPart, SliceKind, Unit
 from wbc_suite.control.part.part_settings import (
-    PartSettings,
     damping_of,
     limits_of,
     spread,
 )
+from wbc_suite.tomlfile import FROZEN
 from wbc_suite.typing import Vector
 
 __all__ = ["Gains", "Impedance", "ImpedanceSettings"]
@@ -20,8 +20,8 @@ Gains: TypeAlias = NonNegativeFloat | tuple[NonNegativeFloat, ...]
 """One gain for all axes or joints, or one for each."""
 
 
-class ImpedanceSettings(PartSettings):
-    """Settings of controllers with stiffness and damping.
+class ImpedanceSettings(BaseModel):
+    """Settings of controllers with stiffness and damping, beside `PartSettings`.
 
     Attributes:
         impedance_mode: `fixed`: gains are those of the config. `variable_kp`: the
@@ -33,6 +33,8 @@ class ImpedanceSettings(PartSettings):
         kp_limits: Least and greatest stiffness of an action, 1/s^2.
         kd_limits: Least and greatest damping of an action, 1/s.
     """
+
+    model_config = FROZEN
 
     impedance_mode: Literal["fixed", "variable_kp", "variable"] = "fixed"
     kp: Gains = 150.0

@@ -18,6 +18,7 @@ from wbc_suite.control.part.part_settings import (
     ROUNDING,
     InputType,
     Numbers,
+    PartSettings,
     Range,
     apply_torque_settings,
 )
@@ -28,7 +29,7 @@ from wbc_suite.typing import Vector
 __all__ = ["JointPositionConfig", "JointPositionController"]
 
 
-class JointPositionConfig(ImpedanceSettings):
+class JointPositionConfig(ImpedanceSettings, PartSettings):
     """Joints follow positions; see `JointLaw`.
 
     Attributes:

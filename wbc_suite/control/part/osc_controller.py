@@ -17,6 +17,7 @@ from wbc_suite.control.part.part_settings import (
     InputScaling,
     InputType,
     Numbers,
+    PartSettings,
     Range,
     apply_torque_settings,
     damping_of,
@@ -35,7 +36,7 @@ STEP = (0.05, 0.05, 0.05, 0.5, 0.5, 0.5)
 """m and rad; steps of a full action, which are those of this field's data sets."""
 
 
-class OscConfig(ImpedanceSettings):
+class OscConfig(ImpedanceSettings, PartSettings):
     """The hand follows poses in operational space; see `OscLaw`.
 
     Critically damped, a step is within 2 % of its end after `5.83 / sqrt(kp)` seconds:

@@ -4,12 +4,12 @@ from collections.abc import Sequence
 from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
-from pydantic import Field, NonNegativeFloat
+from pydantic import BaseModel, Field, NonNegativeFloat
 
 from wbc_suite.control.action import Unit
 from wbc_suite.control.law.law import Law
 from wbc_suite.errors import ConfigError
-from wbc_suite.tomlfile import FrozenModel
+from wbc_suite.tomlfile import FROZEN, FrozenModel
 from wbc_suite.typing import Vector
 
 __all__ = [
@@ -58,7 +58,7 @@ class GripConfig(FrozenModel):
     speed: Annotated[float, Field(gt=0.0)] | None = None
 
 
-class PartSettings(FrozenModel):
+class PartSettings(BaseModel):
     """Settings of every part controller that reads the action.
 
     Attributes:
@@ -77,6 +77,8 @@ class PartSettings(FrozenModel):
         use_torque_compensation: Whether gravity and Coriolis forces are compensated.
         gripper: The gripper at the end of the part.
     """
+
+    model_config = FROZEN
 
     input_min: Numbers = -1.0
     input_max: Numbers = 1.0

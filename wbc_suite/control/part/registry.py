@@ -4,12 +4,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias, get_args
 
+from pydantic import BaseModel
+
 from wbc_suite.control.part.controller import PartController
 from wbc_suite.control.robot_parts import RobotPart, hands_of, robot_part
 from wbc_suite.control.state import RobotState
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.robot import RobotDescription
-from wbc_suite.tomlfile import FrozenModel, parse_model
+from wbc_suite.tomlfile import parse_model
 
 __all__ = [
     "PartControllerName",
@@ -42,14 +44,14 @@ Builder: TypeAlias = Callable[[RobotPart, Any, RobotState], PartController]
 class _Kind:
     controller: type[PartController]
     build: Builder  # the class, by the arguments of its constructor
-    model: type[FrozenModel]
+    model: type[BaseModel]
 
 
 _KINDS: dict[str, _Kind] = {}
 
 
 def register_part_controller(
-    name: str, controller: type[PartController], config: type[FrozenModel]
+    name: str, controller: type[PartController], config: type[BaseModel]
 ) -> None:
     """Add a part controller to those that controller files may name.
 
@@ -84,7 +86,7 @@ def is_part_controller(name: object) -> bool:
     return name in _KINDS
 
 
-def part_models() -> dict[str, type[FrozenModel]]:
+def part_models() -> dict[str, type[BaseModel]]:
     """Return the config model of each part controller by name."""
     return {name: kind.model for name, kind in _KINDS.items()}
 
@@ -104,7 +106,7 @@ def load_part_controller_config(controller: PartControllerName | str) -> dict[st
     return config.model_dump(mode="json", exclude_none=True)
 
 
-def parse_part(name: str, given: object, source: str) -> FrozenModel:
+def parse_part(name: str, given: object, source: str) -> BaseModel:
     """Return the config of a part as a model.
 
     Args:
@@ -116,7 +118,7 @@ def parse_part(name: str, given: object, source: str) -> FrozenModel:
         ConfigError: If the type is unknown, or a key or a value is wrong.
     """
     key = f"body_parts.{name}"
-    if isinstance(given, FrozenModel):
+    if isinstance(given, BaseModel):
         return given
     if not isinstance(given, Mapping):
         raise ConfigError(f"{source}: key '{key}' = {given!r:.80}: not a table.")
