@@ -90,11 +90,12 @@ def test_each_environment_does_what_it_does_alone(threads, controller):
     ("more", "expected"),
     [
         ({"controller_configs": "BASIC"}, 2),
-        ({"controller_configs": "WHOLE_BODY_IK"}, 1),
+        ({"controller_configs": "WHOLE_BODY_IK"}, 2),
+        ({"controller_configs": "WHOLE_BODY_MINK_IK"}, 1),
         ({"controller_configs": "BASIC", "compiled": False}, 1),
-        ({"controller_configs": "WHOLE_BODY_IK", "threads": 2}, 2),
+        ({"controller_configs": "WHOLE_BODY_MINK_IK", "threads": 2}, 2),
     ],
-    ids=["laws", "planning", "plain", "planning, but told to"],
+    ids=["laws", "whole body", "mink", "plain", "mink, but told to"],
 )
 def test_threads_share_what_holds_no_lock_unless_told_otherwise(
     monkeypatch, more, expected

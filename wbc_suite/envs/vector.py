@@ -56,6 +56,7 @@ class VectorRobotEnv(gymnasium.vector.VectorEnv[Observations, Array, NDArray[Any
         **RobotEnv.metadata,
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
+    closed = True  # until it is made: Gymnasium closes what is not
 
     def __init__(
         self,
@@ -89,6 +90,7 @@ class VectorRobotEnv(gymnasium.vector.VectorEnv[Observations, Array, NDArray[Any
         self._may_choose = threads is None
         self._helpers = min(threads or _processors(), num_envs) - 1
         self._pool = ThreadPoolExecutor(max(1, self._helpers), "wbc_suite-env")
+        self.closed = False
 
     def reset(
         self,
