@@ -72,6 +72,8 @@ def killed_once(item, folder):
     result = convert_piece(item, folder)
     if item.name.startswith("000000") and not begun.exists():
         begun.touch()
+        written = next(folder.rglob("demo_*.npz"))
+        written.with_name(f".{written.name}.1.tmp").touch()  # of one it was writing
         os.kill(os.getpid(), signal.SIGKILL)
     return result
 

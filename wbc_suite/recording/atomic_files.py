@@ -7,7 +7,8 @@ from pathlib import Path
 
 from wbc_suite.errors import DatasetError
 
-__all__ = ["check_folder", "new_folder", "replace_file", "write_bytes"]
+__all__ = ["check_folder", "delete_temporaries", "new_folder", "replace_file"]
+__all__ += ["write_bytes"]
 
 RESERVE = 1 << 20
 """Bytes that must be left on the disk after a file is written."""
@@ -86,6 +87,12 @@ def replace_file(path: Path, write: Callable[[Path], object]) -> None:
             f"'{path}' cannot be written: {error.strerror or error}. What was there "
             "before is as it was."
         ) from error
+
+
+def delete_temporaries(folder: Path) -> None:
+    """Delete what killed processes left of files that they were writing."""
+    for temporary in folder.rglob(".*.tmp"):
+        temporary.unlink()
 
 
 def _sync(path: Path) -> None:

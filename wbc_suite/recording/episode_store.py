@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import IO, Self
 
 from wbc_suite.errors import DatasetError
-from wbc_suite.recording.atomic_files import check_folder
+from wbc_suite.recording.atomic_files import check_folder, delete_temporaries
 from wbc_suite.recording.dataset import Dataset, part_files, parts_folder
 from wbc_suite.recording.episode import Episode, Fact
 from wbc_suite.recording.hdf5_writer import uncompressed_bytes, write_dataset
@@ -111,8 +111,7 @@ class Store:
 
     def _take_over(self) -> None:
         """Count the episodes, and delete temporary files of a killed recording."""
-        for aside in self._parts.glob(".*.tmp"):
-            aside.unlink()
+        delete_temporaries(self._parts)
         self._own: list[Path] = []
         self._closed, self._next = 0, 0
         if not self.path.exists() and not part_files(self.path):

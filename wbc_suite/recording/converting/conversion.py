@@ -10,6 +10,7 @@ from typing import Any
 from wbc_suite.errors import DatasetError, UnknownNameError
 from wbc_suite.executors import Executor, WorkItem
 from wbc_suite.executors.executor import Json
+from wbc_suite.recording.atomic_files import delete_temporaries
 from wbc_suite.recording.converting.layout import (
     Layout,
     Piece,
@@ -99,6 +100,7 @@ def convert(
         )
         written = _written(work_folder(out), out.name)
         _finish(chosen, dataset, written, [result for _, result in done])
+    delete_temporaries(written)
     _move(written, out)
     shutil.rmtree(work_folder(out), ignore_errors=True)
     return out
