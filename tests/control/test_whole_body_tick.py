@@ -34,7 +34,7 @@ def states(env, *, far=0.15, actions=24, weaken=1.0):
     return np.array(found), calls
 
 
-@pytest.mark.parametrize("robot", ["Tiago", "SpotWithArm"])
+@pytest.mark.parametrize("robot", ["Tiago", "SpotWithArm", "GR1FreeBody"])
 def test_loop_and_python_move_alike(robot, monkeypatch):
     by_loop, calls = states(made(robot, monkeypatch, in_loop=True))
     by_python, _ = states(made(robot, monkeypatch, in_loop=False))

@@ -223,7 +223,7 @@ class TaskStack:
         return self.complete(dt, status, k)
 
     def complete(self, dt: float, status: int, k: int) -> Solution:
-        """Return the solution of a tick, after solving what the kernel did not solve.
+        """Return the solution of a tick, after doing what the kernel could not do.
 
         Args:
             dt: Duration of the step, s.
@@ -231,6 +231,9 @@ class TaskStack:
             k: Level that it returned.
         """
         fallback = Fallback.NONE
+        if status == TickStatus.NEEDS_PYTHON:
+            self.prepare(dt)
+            status, k = solve_tick(self.arrays, dt, 0)
         while status != TickStatus.SOLVED:
             if status == TickStatus.BAD_POSITION:
                 self._tick.x[:] = self._tick.v[:] = self._tick.residual[:] = 0.0

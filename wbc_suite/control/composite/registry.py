@@ -107,7 +107,7 @@ class TickedController(CompositeController, Protocol):
     """A composite controller whose ticks the control loop can run."""
 
     def loop_tick(self) -> WholeBodyArrays | None:
-        """Return the tick, or None where each needs Python.
+        """Return the tick, or None where Python computes each.
 
         Called once the laws are in the loop's table. Without a tick `prepare` is
         called as for other controllers.

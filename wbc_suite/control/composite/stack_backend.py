@@ -145,11 +145,6 @@ class StackBackend:
         levels = sorted({task.level for task in tasks})
         return np.array([levels.index(task.level) for task in tasks], dtype=np.int64)
 
-    @property
-    def is_compiled(self) -> bool:
-        """Whether `solve_tick` needs no Python."""
-        return self.stack.is_compiled
-
     def _step(self, stack: TaskStack, solution: Solution, dt: float) -> IkStep:
         v = self.torque_limiter.apply(self.v, solution.v, dt)
         self.v[:] = v

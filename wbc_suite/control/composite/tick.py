@@ -2,9 +2,10 @@
 
     goals -> targets nearby -> QP -> motors suffice? -> spline -> references of the laws
 
-The control loop calls `run_tick` between two physics steps. Where Python has to think,
-it returns: for the planner, for a QP whose active set is not found, and for motors that
-saturate. The controller then finishes the tick, see `WholeBodyIK.finish_tick`.
+The control loop calls `run_tick` between two physics steps. It returns where Python has
+to act: the planner; tasks and limits without a kernel; a QP whose active set is not
+found; motors that saturate. The controller then finishes the tick, see
+`WholeBodyIK.finish_tick`.
 """
 
 from enum import IntEnum

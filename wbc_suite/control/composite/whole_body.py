@@ -68,7 +68,8 @@ class WholeBodyIK:
 
     Solves at `solve_hz` on the commanded configuration, which it integrates; the joint
     law tracks it, interpolated to the physics step. A free root is commanded too.
-    The control loop runs ticks itself where no task needs Python, see `loop_tick`.
+    The control loop runs ticks itself, see `loop_tick`; what has no kernel is evaluated
+    in Python in between.
 
     Args:
         config: Plain data of a `WholeBodyIKConfig`.
@@ -200,12 +201,12 @@ class WholeBodyIK:
         return self._steps_per_solve
 
     def loop_tick(self) -> WholeBodyArrays | None:
-        """Return the tick for the control loop, or None where each needs Python.
+        """Return the tick for the control loop, or None where mink solves it.
 
         The laws are in the loop's table.
         """
         backend = self._backend
-        if not isinstance(backend, StackBackend) or not backend.is_compiled:
+        if not isinstance(backend, StackBackend):
             return None
         levels = backend.task_levels
         rows = [int((levels[:k] == levels[k]).sum()) for k in range(len(levels) - 1)]
