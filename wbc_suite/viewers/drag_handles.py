@@ -15,11 +15,7 @@ import pinocchio as pin
 
 from wbc_suite.devices.action_ports import LimbKind
 from wbc_suite.viewers.scene_setup import place
-from wbc_suite.viewers.session_state import (
-    LimbInfo,
-    LimbStatus,
-    Snapshot,
-)
+from wbc_suite.viewers.session_state import LimbInfo, LimbStatus, Snapshot
 
 if TYPE_CHECKING:
     import viser
@@ -118,7 +114,7 @@ class DragHandles:
             handle.node.disable_axes = handle.node.disable_sliders = not moves
             handle.node.disable_rotations = not turns
 
-    def show(self, client: int, name: str, *, shown: bool) -> None:
+    def show(self, client: int, name: str, shown: bool) -> None:
         """Show or hide one limb's handle to one client."""
         with self._lock:
             self._clients[client].handles[name].hidden = not shown

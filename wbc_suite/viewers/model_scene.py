@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import mujoco
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from wbc_suite.robot.triangle_meshes import (
     TriangleMesh,
@@ -125,15 +126,11 @@ def relative_poses(
     Returns:
         Position and quaternion (wxyz, w >= 0) side by side, shape (n, 7).
     """
-    w, xyz = quaternions[parents, :1], -quaternions[parents, 1:]  # inverse rotation
-    offset = positions - positions[parents]
-    cross = np.cross(xyz, offset)
-    local = offset + 2.0 * (w * cross + np.cross(xyz, cross))
-    w_b, xyz_b = quaternions[:, :1], quaternions[:, 1:]
-    real = w * w_b - np.sum(xyz * xyz_b, axis=1, keepdims=True)
-    imaginary = w * xyz_b + w_b * xyz + np.cross(xyz, xyz_b)
-    sign = np.where(real < 0.0, -1.0, 1.0)
-    return np.concatenate([local, sign * real, sign * imaginary], axis=1)
+    rotations = Rotation.from_quat(quaternions, scalar_first=True)
+    to_parents = rotations[parents].inv()
+    local = to_parents.apply(positions - positions[parents])
+    wxyz = (to_parents * rotations).as_quat(canonical=True, scalar_first=True)
+    return np.concatenate([local, wxyz], axis=1)
 
 
 def robot_box(
@@ -148,20 +145,16 @@ def robot_box(
         positions: Positions of all bodies in the world, shape (nbody, 3).
         quaternions: Their orientations (wxyz), shape (nbody, 4).
     """
-    bodies = [model.body(body).name for body in range(model.nbody)]
-    prefix = "robot0_" if any(n.startswith("robot0_") for n in bodies) else ""
-    corners = []
-    reach = np.abs(model.geom_aabb[:, :3]) + model.geom_aabb[:, 3:]
-    radii = np.linalg.norm(reach, axis=1)
-    for geom in np.flatnonzero(model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE):
-        body, radius = model.geom_bodyid[geom], radii[geom]
-        if body == 0 or not bodies[body].startswith(prefix):
-            continue
-        place = np.empty(3)
-        mujoco.mju_rotVecQuat(place, model.geom_pos[geom], quaternions[body])
-        corners.append(positions[body] + place + np.array([[-radius], [radius]]))
-    box = np.array(corners)
-    return box[:, 0].min(axis=0), box[:, 1].max(axis=0)
+    names = [model.body(body).name for body in range(model.nbody)]
+    prefix = "robot0_" if any(n.startswith("robot0_") for n in names) else ""
+    own = np.array([body > 0 and n.startswith(prefix) for body, n in enumerate(names)])
+    bodies = model.geom_bodyid
+    drawn = own[bodies] & (model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE)
+    rotations = Rotation.from_quat(quaternions[bodies], scalar_first=True)
+    centres = (positions[bodies] + rotations.apply(model.geom_pos))[drawn]
+    reach = np.abs(model.geom_aabb[drawn, :3]) + model.geom_aabb[drawn, 3:]
+    radii = np.linalg.norm(reach, axis=1, keepdims=True)
+    return (centres - radii).min(axis=0), (centres + radii).max(axis=0)
 
 
 def _node_names(model: mujoco.MjModel, root: str) -> list[str]:

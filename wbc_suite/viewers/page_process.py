@@ -7,6 +7,7 @@ answer only where it needs one: fast drags do not wait for the loop.
 """
 
 import contextlib
+import functools
 import logging
 import multiprocessing
 import signal
@@ -19,7 +20,6 @@ from typing import Any, TypeAlias
 import pinocchio as pin
 
 from wbc_suite.errors import DeviceError
-from wbc_suite.recording.episode_control import EpisodeCommand
 from wbc_suite.viewers.loop_timing import raise_priority
 from wbc_suite.viewers.session_state import SessionInfo, Snapshot
 from wbc_suite.viewers.teleop_session import TeleopSession
@@ -32,7 +32,6 @@ POLL_PERIOD = 0.05  # s
 EXIT_TIMEOUT = 10.0  # s; a page that has not ended by then is killed
 
 COMMANDS = (
-    "drag",
     "release",
     "leave",
     "enable",
@@ -41,7 +40,7 @@ COMMANDS = (
     "reset",
     "command_episode",
 )
-"""Methods of the session that the page calls without waiting for an answer."""
+"""Methods of the session that the page calls as they are, without an answer."""
 
 
 class PageProcess:
@@ -70,6 +69,7 @@ class PageProcess:
         self._commands: dict[str, Callable[..., Any]] = {
             "opened": self._set_opened,
             "failed": self._set_failed,
+            "drag": session.drag,
             **{name: getattr(session, name) for name in COMMANDS},
         }
         context = multiprocessing.get_context("spawn")
@@ -152,6 +152,8 @@ class PageProcess:
 class RemoteSession:
     """A `TeleopSession` in another process.
 
+    Its other methods are those named in `COMMANDS`.
+
     Args:
         pipe: Connection to the process with the session.
         info: Constant properties of the session.
@@ -181,33 +183,11 @@ class RemoteSession:
         arrived = time.perf_counter()  # the same clock in all processes
         self.command("drag", name, client, T_world_input, arrived)
 
-    def release(self, name: str, client: int) -> None:
-        """See `TeleopSession`."""
-        self.command("release", name, client)
-
-    def leave(self, client: int) -> None:
-        """See `TeleopSession`."""
-        self.command("leave", client)
-
-    def enable(self, name: str, enabled: bool) -> None:
-        """See `TeleopSession`."""
-        self.command("enable", name, enabled)
-
-    def set_gripper(self, name: str, index: int, value: float) -> None:
-        """See `TeleopSession`."""
-        self.command("set_gripper", name, index, value)
-
-    def pause(self, paused: bool) -> None:
-        """See `TeleopSession`."""
-        self.command("pause", paused)
-
-    def reset(self) -> None:
-        """See `TeleopSession`."""
-        self.command("reset")
-
-    def command_episode(self, command: EpisodeCommand) -> None:
-        """See `TeleopSession`."""
-        self.command("command_episode", command)
+    def __getattr__(self, name: str) -> Callable[..., None]:
+        """Return a method of `TeleopSession` that sends its call."""
+        if name not in COMMANDS:
+            raise AttributeError(f"A session in another process has no '{name}'.")
+        return functools.partial(self.command, name)
 
     def query(self, request: str, *arguments: Any) -> Any:
         """Send a request and return its answer; None after the session was lost."""

@@ -23,6 +23,7 @@ SLIDER_STEP = 0.01  # rad or m
 UNBOUNDED = np.pi  # rad, range of a slider of a joint without limits
 COM_COLOUR, INERTIA_COLOUR = (214, 72, 60), (90, 140, 210)
 FRAME_SIZE = 0.07  # m
+ORIGIN, IDENTITY = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
 LEAST_HALF = 1e-3  # m; thinner boxes of inertia would not be visible
 
 
@@ -43,12 +44,15 @@ class RobotPage:
         self._setting = False
         set_up_scene(site.server, label=f"wbc_suite · {robot.name}")
         self.scene = ModelScene(site.server, self.model)
-        self._add_facts()
+        site.server.gui.add_markdown(
+            f"**{robot.title or robot.name}**  \n"
+            f"{robot.dof} joints, {robot.mass:.1f} kg, {robot.root.kind} root"
+        )
         self._add_postures()
         self._overlays = Overlays(site.server, self.model, self.data, self.scene)
         self._add_joints()
         self.set_keyframe(next(iter(robot.keyframes), None))
-        set_camera(site.server, *robot_box(self.model, self.data.xpos, self.data.xquat))
+        set_camera(site.server, robot_box(self.model, self.data.xpos, self.data.xquat))
 
     def stop(self) -> None:
         """Close the page."""
@@ -87,13 +91,6 @@ class RobotPage:
                 value = joint.mimic.ratio * leader + joint.mimic.offset
                 self.data.qpos[self.model.joint(joint.name).qposadr[0]] = value
 
-    def _add_facts(self) -> None:
-        robot = self.robot
-        self.site.server.gui.add_markdown(
-            f"**{robot.title or robot.name}**  \n"
-            f"{robot.dof} joints, {robot.mass:.1f} kg, {robot.root.kind} root"
-        )
-
     def _add_postures(self) -> None:
         postures = self.site.server.gui.add_button_group(
             "Posture", (*self.robot.keyframes, "zero")
@@ -118,7 +115,9 @@ class RobotPage:
                     self._add_joint(name, group)
 
     def _add_joint(self, name: str, group: str) -> None:
-        low, high = _range(self.model, name)
+        joint, low, high = self.model.joint(name), -UNBOUNDED, UNBOUNDED
+        if joint.limited[0]:
+            low, high = joint.range.tolist()
         side = group.split("_")[0] + "_"
         slider = self.site.server.gui.add_slider(
             plain(name.removeprefix(side)),
@@ -134,13 +133,6 @@ class RobotPage:
         async def _(_: object) -> None:
             if not self._setting:
                 self.set_joints({name: slider.value})
-
-
-def _range(model: mujoco.MjModel, name: str) -> Vector:
-    joint = model.joint(name)
-    if not joint.limited[0]:
-        return np.array([-UNBOUNDED, UNBOUNDED])
-    return np.array(joint.range, dtype=np.float64)
 
 
 class Overlays:
@@ -161,9 +153,15 @@ class Overlays:
         scene: ModelScene,
     ) -> None:
         self._model, self._data = model, data
+        links = [scene.node(body) for body in range(1, model.nbody)]
+        places = [(f"{link}/frame", IDENTITY, ORIGIN) for link in links]
+        for site in range(model.nsite):
+            link, name = scene.node(model.site_bodyid[site]), model.site(site).name
+            place = model.site_quat[site], model.site_pos[site]
+            places.append((f"{link}/frame_{name}", *place))
         self._frames = [
             server.scene.add_frame(
-                f"{scene.node(body)}/{label}",
+                node,
                 axes_length=FRAME_SIZE,
                 axes_radius=0.035 * FRAME_SIZE,
                 origin_radius=0.07 * FRAME_SIZE,
@@ -171,7 +169,7 @@ class Overlays:
                 position=position,
                 visible=False,
             )
-            for body, label, position, wxyz in _places(model)
+            for node, wxyz, position in places
         ]
         self._inertias = [
             _inertia_box(server, model, body, scene.node(body))
@@ -249,16 +247,3 @@ def _inertia_box(
         position=model.body_ipos[body],
         visible=False,
     )
-
-
-def _places(model: mujoco.MjModel) -> list[tuple[int, str, Vector, Vector]]:
-    """Return body, label, position and quaternion of the frames of links and sites."""
-    here: Vector = np.zeros(3)
-    upright: Vector = np.array([1.0, 0.0, 0.0, 0.0])
-    places: list[tuple[int, str, Vector, Vector]] = [
-        (body, "frame", here, upright) for body in range(1, model.nbody)
-    ]
-    for site in range(model.nsite):
-        body, label = int(model.site_bodyid[site]), f"frame_{model.site(site).name}"
-        places.append((body, label, model.site_pos[site], model.site_quat[site]))
-    return places

@@ -48,7 +48,7 @@ class TeleopPage:
         self.markers = TargetMarkers(self.server, model, bodies, snapshot, colours)
         box = robot_box(model, snapshot.body_positions, snapshot.body_quaternions)
         self.panel = TeleopPanel(self.server, session, self.handles, colours, box)
-        set_camera(self.server, *box)
+        set_camera(self.server, box)
         self.server.on_client_connect(self._connect)
         self.server.on_client_disconnect(self._disconnect)
 
