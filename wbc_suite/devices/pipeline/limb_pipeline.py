@@ -34,7 +34,7 @@ class LimbPipeline:
         self.port, self._config, self._dt = port, config, dt
         smooth = config.one_euro
         self._filter = None if smooth is None else OneEuroFilter(smooth, dt)
-        self._limit = MotionLimit(config.linear.rates, config.angular.rates, dt)
+        self._limit = MotionLimit(config.linear, config.angular, dt)
         self.reset()
 
     def reset(self) -> None:

@@ -20,7 +20,7 @@ class GripTarget:
     """
 
     def __init__(self, size: int, config: PipelineConfig, dt: float) -> None:
-        self._motion = LimitedMotion(size, config.grip.rates, dt)
+        self._motion = LimitedMotion(size, config.grip, dt)
         self.reset(np.zeros(size))
 
     def reset(self, values: Vector) -> None:
@@ -47,8 +47,7 @@ class JointTargets:
 
     def __init__(self, port: JointPort, config: PipelineConfig, dt: float) -> None:
         self._port = port
-        rates = config.joint.rates
-        self._motions = [LimitedMotion(1, rates, dt) for _ in port.joints]
+        self._motions = [LimitedMotion(1, config.joint, dt) for _ in port.joints]
         self.reset()
 
     def reset(self) -> None:
@@ -89,7 +88,7 @@ class BaseVelocity:
     def __init__(self, port: SpeedPort, config: PipelineConfig, dt: float) -> None:
         self.robot = robot_of(port.name)
         self._port = port
-        self._change = LimitedMotion(3, config.base_rise.rates, dt)
+        self._change = LimitedMotion(3, config.base_rise, dt)
         self.reset()
 
     def reset(self) -> None:
