@@ -23,13 +23,7 @@ from typing import Any
 from wbc_suite.catalogue import user_cache
 from wbc_suite.errors import DeviceError
 
-__all__ = [
-    "GlBackend",
-    "activate",
-    "context_class",
-    "forget",
-    "missing_environment",
-]
+__all__ = ["GlBackend", "activate", "context_class", "forget", "missing_environment"]
 
 logger = logging.getLogger(__name__)
 

@@ -26,10 +26,8 @@ from wbc_suite.sensing.reading import (
 
 __all__ = ["add_contact_sensors", "proprioception", "sensors_of"]
 
-FOUND, FORCE = (
-    mujoco.mjtConDataField.mjCONDATA_FOUND,
-    mujoco.mjtConDataField.mjCONDATA_FORCE,
-)
+FIELDS = mujoco.mjtConDataField
+FOUND_AND_FORCE = 1 << int(FIELDS.mjCONDATA_FOUND) | 1 << int(FIELDS.mjCONDATA_FORCE)
 NET_FORCE = 3
 """MuJoCo's reduction of contacts to their sum, in world axes."""
 
@@ -123,7 +121,7 @@ def add_contact_sensors(
             type=mujoco.mjtSensor.mjSENS_CONTACT,
             objtype=mujoco.mjtObj.mjOBJ_BODY,
             objname=prefix + link,
-            intprm=[1 << int(FOUND) | 1 << int(FORCE), NET_FORCE, 1],
+            intprm=[FOUND_AND_FORCE, NET_FORCE, 1],
         )
 
 

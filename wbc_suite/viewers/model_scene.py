@@ -47,15 +47,12 @@ class ModelScene:
     Args:
         server: Server whose scene is drawn on.
         model: Model to draw; static geoms are drawn, planes are not.
-        root: Name of the scene node above all bodies.
     """
 
-    def __init__(
-        self, server: "viser.ViserServer", model: mujoco.MjModel, root: str = "/world"
-    ) -> None:
+    def __init__(self, server: "viser.ViserServer", model: mujoco.MjModel) -> None:
         self._server = server
         self._parents = model.body_parentid.copy()
-        self._names = _node_names(model, root)
+        self._names = _node_names(model)
         self._frames = [
             server.scene.add_frame(name, show_axes=False) for name in self._names
         ]
@@ -63,7 +60,18 @@ class ModelScene:
         self.collision_shapes: list[viser.MeshHandle] = []
         self.visual_shapes: list[viser.MeshHandle] = []
         for (body, collision, colour), parts in _parts(model).items():
-            self._add_mesh(body, collision, colour, merge(parts))
+            shapes = self.collision_shapes if collision else self.visual_shapes
+            kind, mesh = "collision" if collision else "visual", merge(parts)
+            handle = server.scene.add_mesh_simple(
+                f"{self._names[body]}/{kind}_{len(shapes)}",
+                mesh.vertices,
+                mesh.faces,
+                color=tuple(round(255 * c) for c in colour[:3]),  # type: ignore[arg-type]
+                opacity=0.35 if collision else (colour[3] if colour[3] < 1 else None),
+                cast_shadow=not collision,
+                visible=not collision,
+            )
+            shapes.append(handle)
 
     def node(self, body: int) -> str:
         """Return the name of a body's scene node."""
@@ -91,26 +99,6 @@ class ModelScene:
         self._shown[moved, :3] = poses[moved, :3]
         self._shown[turned, 3:] = poses[turned, 3:]
         return len(moved) + len(turned)
-
-    def _add_mesh(
-        self,
-        body: int,
-        collision: bool,
-        colour: tuple[float, ...],
-        mesh: TriangleMesh,
-    ) -> None:
-        shapes = self.collision_shapes if collision else self.visual_shapes
-        kind = "collision" if collision else "visual"
-        handle = self._server.scene.add_mesh_simple(
-            f"{self._names[body]}/{kind}_{len(shapes)}",
-            mesh.vertices,
-            mesh.faces,
-            color=tuple(round(255 * c) for c in colour[:3]),  # type: ignore[arg-type]
-            opacity=0.35 if collision else (colour[3] if colour[3] < 1 else None),
-            cast_shadow=not collision,
-            visible=not collision,
-        )
-        shapes.append(handle)
 
 
 def relative_poses(
@@ -157,8 +145,8 @@ def robot_box(
     return (centres - radii).min(axis=0), (centres + radii).max(axis=0)
 
 
-def _node_names(model: mujoco.MjModel, root: str) -> list[str]:
-    names = [root]
+def _node_names(model: mujoco.MjModel) -> list[str]:
+    names = ["/world"]
     for body in range(1, model.nbody):
         own = model.body(body).name.replace("/", "_") or f"body_{body}"
         names.append(f"{names[model.body_parentid[body]]}/{own}")

@@ -11,13 +11,7 @@ from numpy.typing import NDArray
 from wbc_suite.errors import UnknownNameError
 from wbc_suite.sensing.renderer import RenderPreset, make_renderer
 from wbc_suite.typing import Vector
-from wbc_suite.viewers.framing import (
-    VIEWS,
-    View,
-    ViewName,
-    fit_camera,
-    subject_corners,
-)
+from wbc_suite.viewers.framing import VIEWS, View, ViewName, fit_camera, subject_corners
 
 if TYPE_CHECKING:
     from wbc_suite.robot import RobotDescription

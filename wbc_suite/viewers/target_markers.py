@@ -19,6 +19,7 @@ __all__ = ["TargetMarkers"]
 
 NEAR = 0.012  # m; a copy nearer than this to its limb would only tint it
 TURNED = 0.12  # rad
+ABOVE = np.array([0.0, 0.0, 0.12])  # m, from the target to its label
 BALL = 0.04  # m, radius of the marker of a frame without geoms
 
 
@@ -81,15 +82,12 @@ class TargetMarkers:
                     [[status.measured.translation, status.target.translation]],
                     dtype=np.float32,
                 )
-            self._note(name, status, notes.get(name, ""))
-
-    def _note(self, name: str, status: LimbStatus, text: str) -> None:
-        label = self._labels[name]
-        if text != label.text and text:
-            label.text = text
-        label.visible = bool(text)
-        if text:
-            label.position = status.target.translation + np.array([0.0, 0.0, 0.12])
+            label, text = self._labels[name], notes.get(name, "")
+            label.visible = bool(text)
+            if text:
+                if text != label.text:
+                    label.text = text
+                label.position = status.target.translation + ABOVE
 
 
 def _copy(
@@ -102,13 +100,17 @@ def _copy(
     """Return the mesh of a limb in its controlled frame."""
     others = {body for other, body in bodies.items() if other != name}
     chosen = _own_bodies(model, bodies[name], others)
-    parts = [
-        part
-        for geom in range(model.ngeom)
-        if model.geom_bodyid[geom] in chosen
-        and model.geom_group[geom] < COLLISION_GROUP
-        and (part := _in_frame(model, geom, snapshot, status)) is not None
-    ]
+    parts = []
+    for geom in range(model.ngeom):
+        body, mesh = model.geom_bodyid[geom], geom_mesh(model, geom)
+        is_visual = model.geom_group[geom] < COLLISION_GROUP
+        if body in chosen and is_visual and mesh is not None:
+            T_body_geom = _pose(model.geom_pos[geom], model.geom_quat[geom])
+            T_world_body = _pose(
+                snapshot.body_positions[body], snapshot.body_quaternions[body]
+            )
+            T = status.measured.inverse() * T_world_body * T_body_geom
+            parts.append(mesh.moved(T.translation, T.rotation))
     return merge(parts) if parts else ellipsoid_mesh(np.full(3, BALL))
 
 
@@ -121,19 +123,6 @@ def _own_bodies(model: mujoco.MjModel, root: int, others: set[int]) -> set[int]:
         if model.body_parentid[body] in carried:
             carried.add(body)
     return {root} if carried & others else carried
-
-
-def _in_frame(
-    model: mujoco.MjModel, geom: int, snapshot: Snapshot, status: LimbStatus
-) -> TriangleMesh | None:
-    mesh = geom_mesh(model, geom)
-    if mesh is None:
-        return None
-    body = model.geom_bodyid[geom]
-    T_body_geom = _pose(model.geom_pos[geom], model.geom_quat[geom])
-    T_world_body = _pose(snapshot.body_positions[body], snapshot.body_quaternions[body])
-    T = status.measured.inverse() * T_world_body * T_body_geom
-    return mesh.moved(T.translation, T.rotation)
 
 
 def _pose(position: np.ndarray, wxyz: np.ndarray) -> pin.SE3:
