@@ -61,7 +61,6 @@ class PlayerStatus:
         frame: Index of the displayed state.
         position: Time since the start of the episode, s.
         playing: Whether it plays.
-        speed: Playback speed; 1 is as recorded.
         error: Why the chosen episode cannot be displayed; else empty.
     """
 
@@ -69,7 +68,6 @@ class PlayerStatus:
     frame: int
     position: float
     playing: bool
-    speed: float
     error: str = ""
 
 
@@ -111,7 +109,6 @@ class EpisodePlayer:
                 frame=frame,
                 position=position,
                 playing=self._playing,
-                speed=self._speed,
                 error=self._error,
             )
 

@@ -31,6 +31,9 @@ log = logging.getLogger(__name__)
 POLL_PERIOD = 0.05  # s
 EXIT_TIMEOUT = 10.0  # s; a page that has not ended by then is killed
 
+QUERIES = ("snapshot", "grab")
+"""Requests for which the page waits."""
+
 COMMANDS = (
     "release",
     "leave",
@@ -62,16 +65,6 @@ class PageProcess:
         self.url, self.token = "", None
         self._session, self._error = session, ""
         self._opened, self._stopping = threading.Event(), threading.Event()
-        self._queries: dict[str, Callable[..., Any]] = {
-            "snapshot": lambda: session.snapshot,
-            "grab": session.grab,
-        }
-        self._commands: dict[str, Callable[..., Any]] = {
-            "opened": self._set_opened,
-            "failed": self._set_failed,
-            "drag": session.drag,
-            **{name: getattr(session, name) for name in COMMANDS},
-        }
         context = multiprocessing.get_context("spawn")
         self._pipe, remote = context.Pipe()
         self._process = context.Process(
@@ -125,10 +118,21 @@ class PageProcess:
             if self._pipe.poll(POLL_PERIOD):
                 self._session.timer.idle.wait(POLL_PERIOD)  # both need Python's lock
                 request, arguments = self._pipe.recv()
-                if request in self._queries:
-                    self._pipe.send(self._queries[request](*arguments))
-                else:
-                    self._commands[request](*arguments)
+                answer = self._handle(request, *arguments)
+                if request in QUERIES:
+                    self._pipe.send(answer)
+
+    def _handle(self, request: str, *arguments: Any) -> Any:
+        match request:
+            case "opened":
+                self.url, self.token = arguments
+                self._opened.set()
+            case "failed":
+                (self._error,) = arguments
+            case "snapshot":
+                return self._session.snapshot
+            case _:
+                return getattr(self._session, request)(*arguments)
 
     def _end_session(self) -> None:
         """Release what clients held, and end the session, after the page is lost."""
@@ -140,13 +144,6 @@ class PageProcess:
             if status.holder is not None:
                 self._session.leave(status.holder)
         self._session.quit.set()
-
-    def _set_opened(self, url: str, token: str | None) -> None:
-        self.url, self.token = url, token
-        self._opened.set()
-
-    def _set_failed(self, error: str) -> None:
-        self._error = error
 
 
 class RemoteSession:

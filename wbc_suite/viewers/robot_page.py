@@ -41,7 +41,6 @@ class RobotPage:
         self.data = mujoco.MjData(self.model)
         self._lock = threading.Lock()
         self._sliders: dict[str, viser.GuiSliderHandle[float]] = {}
-        self._setting = False
         set_up_scene(site.server, label=f"wbc_suite · {robot.name}")
         self.scene = ModelScene(site.server, self.model)
         site.server.gui.add_markdown(
@@ -63,18 +62,20 @@ class RobotPage:
         values = dict.fromkeys(self.robot.joint_names, 0.0)
         if name is not None:
             values = self.robot.keyframe(name)
-        self._setting = True  # sliders then do not move joints one by one
         for joint, slider in self._sliders.items():
             slider.value = float(np.clip(values[joint], slider.min, slider.max))
-        self._setting = False
         self.set_joints(values)
 
     def set_joints(self, values: dict[str, float]) -> None:
         """Set joint positions, rad or m, and those of joints that mimic them."""
         with self._lock:
             for name, value in values.items():
-                self.data.qpos[self.model.joint(name).qposadr[0]] = value
-            self._couple()
+                self.data.joint(name).qpos[0] = value
+            for joint in self.robot.joints:
+                if joint.mimic is not None:
+                    leader = self.position(joint.mimic.joint)
+                    value = joint.mimic.ratio * leader + joint.mimic.offset
+                    self.data.joint(joint.name).qpos[0] = value
             mujoco.mj_kinematics(self.model, self.data)
             mujoco.mj_comPos(self.model, self.data)
             self.scene.update(self.data.xpos, self.data.xquat)
@@ -82,14 +83,7 @@ class RobotPage:
 
     def position(self, joint: str) -> float:
         """Return the position of a joint, rad or m."""
-        return float(self.data.qpos[self.model.joint(joint).qposadr[0]])
-
-    def _couple(self) -> None:
-        for joint in self.robot.joints:
-            if joint.mimic is not None:
-                leader = self.position(joint.mimic.joint)
-                value = joint.mimic.ratio * leader + joint.mimic.offset
-                self.data.qpos[self.model.joint(joint.name).qposadr[0]] = value
+        return float(self.data.joint(joint).qpos[0])
 
     def _add_postures(self) -> None:
         postures = self.site.server.gui.add_button_group(
@@ -130,8 +124,8 @@ class RobotPage:
         self._sliders[name] = slider
 
         @slider.on_update
-        async def _(_: object) -> None:
-            if not self._setting:
+        async def _(event: "viser.GuiEvent[viser.GuiSliderHandle[float]]") -> None:
+            if event.client is not None:  # moved by the user
                 self.set_joints({name: slider.value})
 
 
