@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import re
 import select
 import sys
 import time
@@ -48,27 +49,18 @@ HELP = """\
   enter  keep the episode    backspace  discard it    z  undo
 """
 
-_ESCAPES = {b"[A": "up", b"[B": "down", b"[C": "right", b"[D": "left"}
 _NAMES = {
-    "\t": "tab",
-    "\r": "enter",
-    "\n": "enter",
-    "\x7f": "backspace",
-    "\b": "backspace",
-}
+    "\x1b[A": "up", "\x1b[B": "down", "\x1b[C": "right", "\x1b[D": "left",
+    "\x1b": "escape", "\t": "tab", "\r": "enter", "\n": "enter",
+    "\x7f": "backspace", "\b": "backspace",
+}  # fmt: skip
 
 
 def parse_keys(data: bytes) -> Iterator[str]:
     """Yield the names of the keys in a terminal's input."""
-    at = 0
-    while at < len(data):
-        if data[at] == 0x1B and data[at + 1 : at + 3] in _ESCAPES:
-            yield _ESCAPES[data[at + 1 : at + 3]]
-            at += 3
-            continue
-        letter = data[at : at + 1].decode("latin-1")
-        yield "escape" if letter == "\x1b" else _NAMES.get(letter, letter.lower())
-        at += 1
+    for found in re.finditer("\x1b\\[[A-D]|.", data.decode("latin-1"), re.DOTALL):
+        key: str = found.group()
+        yield _NAMES.get(key, key.lower())
 
 
 def _velocity(

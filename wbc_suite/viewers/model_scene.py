@@ -11,14 +11,8 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from wbc_suite.robot.triangle_meshes import (
-    TriangleMesh,
-    box_mesh,
-    capsule_mesh,
-    cylinder_mesh,
-    ellipsoid_mesh,
-    merge,
-)
+from wbc_suite.robot import triangle_meshes
+from wbc_suite.robot.triangle_meshes import TriangleMesh
 from wbc_suite.typing import Matrix, Vector
 
 if TYPE_CHECKING:
@@ -61,7 +55,10 @@ class ModelScene:
         self.visual_shapes: list[viser.MeshHandle] = []
         for (body, collision, colour), parts in _parts(model).items():
             shapes = self.collision_shapes if collision else self.visual_shapes
-            kind, mesh = "collision" if collision else "visual", merge(parts)
+            kind, mesh = (
+                "collision" if collision else "visual",
+                triangle_meshes.merge(parts),
+            )
             handle = server.scene.add_mesh_simple(
                 f"{self._names[body]}/{kind}_{len(shapes)}",
                 mesh.vertices,
@@ -175,17 +172,22 @@ def geom_mesh(model: mujoco.MjModel, geom: int) -> TriangleMesh | None:
     size = model.geom_size[geom]
     match model.geom_type[geom]:
         case mujoco.mjtGeom.mjGEOM_BOX:
-            return box_mesh(size)
+            return triangle_meshes.box_mesh(size)
         case mujoco.mjtGeom.mjGEOM_SPHERE:
-            return ellipsoid_mesh(np.full(3, size[0]))
+            return triangle_meshes.ellipsoid_mesh(np.full(3, size[0]))
         case mujoco.mjtGeom.mjGEOM_ELLIPSOID:
-            return ellipsoid_mesh(size)
+            return triangle_meshes.ellipsoid_mesh(size)
         case mujoco.mjtGeom.mjGEOM_CAPSULE:
-            return capsule_mesh(size[0], size[1])
+            return triangle_meshes.capsule_mesh(size[0], size[1])
         case mujoco.mjtGeom.mjGEOM_CYLINDER:
-            return cylinder_mesh(size[0], size[1])
+            return triangle_meshes.cylinder_mesh(size[0], size[1])
         case mujoco.mjtGeom.mjGEOM_MESH:
-            return _asset_mesh(model, int(model.geom_dataid[geom]))
+            asset = model.mesh(model.geom_dataid[geom])
+            vertex, face = asset.vertadr[0], asset.faceadr[0]
+            return TriangleMesh(
+                model.mesh_vert[vertex : vertex + asset.vertnum[0]].astype(np.float64),
+                model.mesh_face[face : face + asset.facenum[0]].astype(np.int64),
+            )
         case _:
             return None
 
@@ -199,7 +201,9 @@ def colored_meshes(model: mujoco.MjModel, geom: int) -> list[tuple[Rgba, Triangl
     mesh, material = geom_mesh(model, geom), int(model.geom_matid[geom])
     if mesh is None:
         return []
-    rgba, pixels = _color_of(model, geom), _pixels_of(model, material)
+    rgba, pixels = model.geom_rgba[geom], _pixels_of(model, material)
+    if material >= 0 and np.array_equal(rgba, DEFAULT_COLOR):
+        rgba = model.mat_rgba[material]
     if pixels is None:
         return [(_rgba(rgba), mesh)]
     if len(pixels) > 1 or model.geom_type[geom] != mujoco.mjtGeom.mjGEOM_MESH:
@@ -213,13 +217,6 @@ def colored_meshes(model: mujoco.MjModel, geom: int) -> list[tuple[Rgba, Triangl
         (_rgba([*palette[k] / 255.0, rgba[3]]), _submesh(mesh, column == k))
         for k in np.unique(column)
     ]
-
-
-def _color_of(model: mujoco.MjModel, geom: int) -> np.ndarray:
-    """Return the colour that MuJoCo draws: the geom's, or else its material's."""
-    own, material = model.geom_rgba[geom], model.geom_matid[geom]
-    is_default = material >= 0 and np.array_equal(own, DEFAULT_COLOR)
-    return model.mat_rgba[material] if is_default else own
 
 
 def _rgba(values: np.ndarray | list[float]) -> Rgba:
@@ -242,11 +239,3 @@ def _submesh(mesh: TriangleMesh, chosen: np.ndarray) -> TriangleMesh:
     """Return some faces of a mesh and the vertices that they use."""
     used, faces = np.unique(mesh.faces[chosen], return_inverse=True)
     return TriangleMesh(mesh.vertices[used], faces.reshape(-1, 3))
-
-
-def _asset_mesh(model: mujoco.MjModel, mesh: int) -> TriangleMesh:
-    vertex, face = model.mesh_vertadr[mesh], model.mesh_faceadr[mesh]
-    return TriangleMesh(
-        model.mesh_vert[vertex : vertex + model.mesh_vertnum[mesh]].astype(np.float64),
-        model.mesh_face[face : face + model.mesh_facenum[mesh]].astype(np.int64),
-    )

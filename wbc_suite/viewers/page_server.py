@@ -16,16 +16,8 @@ from http import HTTPStatus
 from typing import TYPE_CHECKING, TypeAlias
 from urllib.parse import quote
 
-from aiohttp import (
-    ClientError,
-    ClientSession,
-    ClientWebSocketResponse,
-    TCPConnector,
-    WSCloseCode,
-    WSMsgType,
-    hdrs,
-    web,
-)
+import aiohttp
+from aiohttp import WSMsgType, hdrs, web
 
 from wbc_suite.devices.access_rules import token_for
 from wbc_suite.devices.web_server import WebServer, page_url
@@ -44,7 +36,7 @@ MESSAGE_LIMIT = 50 * 1024 * 1024  # bytes, viser's own limit
 HEARTBEAT = 30.0  # s between pings that find clients that are gone
 
 DATA = (WSMsgType.TEXT, WSMsgType.BINARY)
-WebSocket: TypeAlias = web.WebSocketResponse | ClientWebSocketResponse
+WebSocket: TypeAlias = web.WebSocketResponse | aiohttp.ClientWebSocketResponse
 
 
 class PageServer:
@@ -145,7 +137,7 @@ def proxy(port: int) -> list[web.AbstractRouteDef]:
             if request.headers.get(hdrs.UPGRADE, "").lower() == "websocket":
                 return await _relay(request, target)
             return await _fetch(request, target)
-        except (ClientError, TimeoutError):
+        except (aiohttp.ClientError, TimeoutError):
             return web.Response(status=HTTPStatus.BAD_GATEWAY)
 
     return [web.get("/{path:.*}", handle, allow_head=False)]
@@ -157,8 +149,8 @@ async def _fetch(request: web.Request, target: str) -> web.Response:
         hdrs.ACCEPT_ENCODING: request.headers.get(hdrs.ACCEPT_ENCODING, "identity")
     }
     async with (
-        ClientSession(
-            auto_decompress=False, connector=TCPConnector(force_close=True)
+        aiohttp.ClientSession(
+            auto_decompress=False, connector=aiohttp.TCPConnector(force_close=True)
         ) as session,
         session.get(target, headers=accepted, allow_redirects=False) as answer,
     ):
@@ -175,7 +167,7 @@ async def _relay(request: web.Request, target: str) -> web.WebSocketResponse:
     """Relay the messages of a WebSocket both ways until one side closes it."""
     offered = request.headers.get(hdrs.SEC_WEBSOCKET_PROTOCOL, "").split(",")
     async with (
-        ClientSession() as session,
+        aiohttp.ClientSession() as session,
         session.ws_connect(
             target,
             protocols=[name.strip() for name in offered if name.strip()],
@@ -203,8 +195,7 @@ async def _copy(source: WebSocket, sink: WebSocket) -> None:
         else:
             await sink.send_bytes(message.data)
     if message.type is WSMsgType.CLOSE:
-        await sink.close(
-            code=message.data or WSCloseCode.OK, message=(message.extra or "").encode()
-        )
+        code, reason = message.data or aiohttp.WSCloseCode.OK, message.extra or ""
+        await sink.close(code=code, message=reason.encode())
     else:
         await sink.close()

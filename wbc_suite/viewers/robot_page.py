@@ -166,9 +166,18 @@ class Overlays:
             for node, wxyz, position in places
         ]
         self._inertias = [
-            _inertia_box(server, model, body, scene.node(body))
-            for body in range(1, model.nbody)
-            if model.body_mass[body] > 0
+            server.scene.add_box(
+                f"{scene.node(body)}/inertia",
+                dimensions=tuple(2.0 * equivalent_box(mass, model.body_inertia[body])),
+                color=INERTIA_COLOUR,
+                opacity=0.45,
+                cast_shadow=False,
+                wxyz=model.body_iquat[body],
+                position=model.body_ipos[body],
+                visible=False,
+            )
+            for body, mass in enumerate(model.body_mass)
+            if body > 0 and mass > 0
         ]
         self._com = server.scene.add_icosphere(
             "/com", radius=0.03, color=COM_COLOUR, visible=False
@@ -225,19 +234,3 @@ def equivalent_box(mass: float, inertia: Vector) -> Vector:
     """
     squares = 1.5 * (inertia.sum() - 2.0 * inertia) / mass
     return np.maximum(np.sqrt(np.maximum(squares, 0.0)), LEAST_HALF)
-
-
-def _inertia_box(
-    server: "viser.ViserServer", model: mujoco.MjModel, body: int, node: str
-) -> "viser.BoxHandle":
-    half = equivalent_box(model.body_mass[body], model.body_inertia[body])
-    return server.scene.add_box(
-        f"{node}/inertia",
-        dimensions=tuple(2.0 * half),
-        color=INERTIA_COLOUR,
-        opacity=0.45,
-        cast_shadow=False,
-        wxyz=model.body_iquat[body],
-        position=model.body_ipos[body],
-        visible=False,
-    )

@@ -10,7 +10,7 @@ import pinocchio as pin
 from wbc_suite.robot.triangle_meshes import TriangleMesh, ellipsoid_mesh, merge
 from wbc_suite.viewers.model_scene import COLLISION_GROUP, geom_mesh
 from wbc_suite.viewers.scene_setup import Colour, place
-from wbc_suite.viewers.session_state import LimbStatus, Snapshot
+from wbc_suite.viewers.session_state import SessionInfo, Snapshot
 
 if TYPE_CHECKING:
     import viser
@@ -28,8 +28,7 @@ class TargetMarkers:
 
     Args:
         server: Server whose scene is drawn on.
-        model: Model that the limbs belong to.
-        bodies: Body of each limb, by limb name; -1 for a limb without one.
+        info: The limbs, and the model that they belong to.
         snapshot: State at the start; copies are taken in this posture.
         colours: Colour of each limb.
     """
@@ -37,16 +36,15 @@ class TargetMarkers:
     def __init__(
         self,
         server: "viser.ViserServer",
-        model: mujoco.MjModel,
-        bodies: Mapping[str, int],
+        info: SessionInfo,
         snapshot: Snapshot,
         colours: Mapping[str, Colour],
     ) -> None:
         self._nodes: dict[str, viser.SceneNodeHandle] = {}
         self._lines: dict[str, viser.LineSegmentsHandle] = {}
         self._labels: dict[str, viser.LabelHandle] = {}
-        for name, status in snapshot.limbs.items():
-            mesh = _copy(model, name, bodies, snapshot, status)
+        for name in info.limbs:
+            mesh = _copy(info, name, snapshot)
             self._nodes[name] = server.scene.add_mesh_simple(
                 f"/targets/{name}",
                 mesh.vertices,
@@ -90,17 +88,12 @@ class TargetMarkers:
                 label.position = status.target.translation + ABOVE
 
 
-def _copy(
-    model: mujoco.MjModel,
-    name: str,
-    bodies: Mapping[str, int],
-    snapshot: Snapshot,
-    status: LimbStatus,
-) -> TriangleMesh:
+def _copy(info: SessionInfo, name: str, snapshot: Snapshot) -> TriangleMesh:
     """Return the mesh of a limb in its controlled frame."""
-    others = {body for other, body in bodies.items() if other != name}
-    chosen = _own_bodies(model, bodies[name], others)
-    parts = []
+    others = {limb.body for limb in info.limbs.values() if limb.name != name}
+    model, parts = info.model, []
+    chosen = _own_bodies(model, info.limbs[name].body, others)
+    T_limb_world = snapshot.limbs[name].measured.inverse()
     for geom in range(model.ngeom):
         body, mesh = model.geom_bodyid[geom], geom_mesh(model, geom)
         is_visual = model.geom_group[geom] < COLLISION_GROUP
@@ -109,7 +102,7 @@ def _copy(
             T_world_body = _pose(
                 snapshot.body_positions[body], snapshot.body_quaternions[body]
             )
-            T = status.measured.inverse() * T_world_body * T_body_geom
+            T = T_limb_world * T_world_body * T_body_geom
             parts.append(mesh.moved(T.translation, T.rotation))
     return merge(parts) if parts else ellipsoid_mesh(np.full(3, BALL))
 

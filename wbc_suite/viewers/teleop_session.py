@@ -16,7 +16,6 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.control.action import SliceKind
 from wbc_suite.devices import Device, DeviceState, Pipeline, PipelineConfig
 from wbc_suite.devices.pipeline.config import RatesConfig
 from wbc_suite.errors import DatasetError, UnknownNameError
@@ -301,15 +300,10 @@ class TeleopSession:
     # What is displayed.
 
     def _describe(self) -> SessionInfo:
-        layout = self.env.unwrapped.action_layout  # type: ignore[attr-defined]
         return SessionInfo(
             model=self.model,
             limbs={name: limb.info for name, limb in self.limbs.items()},
-            grippers={
-                part.name: tuple(part.labels)
-                for part in layout.slices
-                if part.kind is SliceKind.GRIPPER
-            },
+            grippers={name: grip.labels for name, grip in self._pipeline.grips.items()},
             records=self.episode_control is not None,
         )
 

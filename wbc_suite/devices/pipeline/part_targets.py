@@ -1,6 +1,6 @@
 """Targets of grippers, joints and base velocities, each within its limits."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -16,10 +16,14 @@ class GripTarget:
     """The closing of a gripper, which moves to a goal.
 
     Attributes:
+        labels: Names of the synergies.
         goal: Requested closing of each synergy, -1 open .. 1 closed.
     """
 
-    def __init__(self, size: int, config: PipelineConfig, dt: float) -> None:
+    def __init__(
+        self, labels: Sequence[str], config: PipelineConfig, dt: float
+    ) -> None:
+        self.labels, size = tuple(labels), len(labels)
         self._motion = LimitedMotion(size, config.grip, dt)
         self.reset(np.zeros(size))
 

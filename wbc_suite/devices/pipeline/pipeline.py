@@ -60,7 +60,7 @@ class Pipeline:
         ports = limb_ports(env)
         self.limbs = {n: LimbPipeline(p, settings, dt) for n, p in ports.items()}
         self.grips = {
-            s.name: GripTarget(len(s.labels), settings, dt)
+            s.name: GripTarget(s.labels, settings, dt)
             for s in self._layout.slices
             if s.kind == "gripper"
         }
@@ -160,8 +160,8 @@ class Pipeline:
         if given.grip is not None:
             self.grips[name].aim(given.grip)
         elif given.fingers is not None and method is not None:
-            labels = self._layout[name].labels
-            grip = retarget(given.fingers, labels, by_pinch=method == "pinch")
+            labels, by_pinch = self.grips[name].labels, method == "pinch"
+            grip = retarget(given.fingers, labels, by_pinch=by_pinch)
             self.grips[name].aim(grip)
 
     def _steer(self, velocity: Vector) -> None:
