@@ -32,7 +32,7 @@ POLL_PERIOD = 0.05  # s
 EXIT_TIMEOUT = 10.0  # s; a page that has not ended by then is killed
 
 QUERIES = ("snapshot", "grab")
-"""Requests for which the page waits."""
+"""Requests that have an answer, for which the page waits."""
 
 COMMANDS = (
     "release",
@@ -163,42 +163,35 @@ class RemoteSession:
         self.info = info
         self.lost = threading.Event()
         self._pipe, self._lock = pipe, threading.Lock()
-        self._last: Snapshot = self.query("snapshot")
+        self._last: Snapshot = self.call("snapshot")
 
     @property
     def snapshot(self) -> Snapshot:
         """The newest state, or the last one before the session was lost."""
-        self._last = self.query("snapshot") or self._last
+        self._last = self.call("snapshot") or self._last
         return self._last
 
     def grab(self, name: str, client: int, T_world_input: pin.SE3) -> bool:
         """See `TeleopSession`."""
-        return bool(self.query("grab", name, client, T_world_input))
+        return bool(self.call("grab", name, client, T_world_input))
 
     def drag(self, name: str, client: int, T_world_input: pin.SE3) -> None:
         """See `TeleopSession`; returns before the session has handled it."""
         arrived = time.perf_counter()  # the same clock in all processes
-        self.command("drag", name, client, T_world_input, arrived)
+        self.call("drag", name, client, T_world_input, arrived)
 
     def __getattr__(self, name: str) -> Callable[..., None]:
         """Return a method of `TeleopSession` that sends its call."""
         if name not in COMMANDS:
             raise AttributeError(f"A session in another process has no '{name}'.")
-        return functools.partial(self.command, name)
+        return functools.partial(self.call, name)
 
-    def query(self, request: str, *arguments: Any) -> Any:
-        """Send a request and return its answer; None after the session was lost."""
-        return self._send(request, arguments, answered=True)
-
-    def command(self, request: str, *arguments: Any) -> None:
-        """Send a request that has no answer."""
-        self._send(request, arguments, answered=False)
-
-    def _send(self, request: str, arguments: tuple[Any, ...], *, answered: bool) -> Any:
+    def call(self, request: str, *arguments: Any) -> Any:
+        """Send a request; return the answer of a query, None if the session is lost."""
         with self._lock:
             try:
                 self._pipe.send((request, arguments))
-                return self._pipe.recv() if answered else None
+                return self._pipe.recv() if request in QUERIES else None
             except (EOFError, OSError):
                 self.lost.set()
                 return None
@@ -223,10 +216,10 @@ def _serve(
     try:
         site = PageServer(host, port)
     except DeviceError as error:
-        session.command("failed", str(error))
+        session.call("failed", str(error))
         return
     page = TeleopPage(session, site, label=label)
     page.start()
-    session.command("opened", site.url, site.token)
+    session.call("opened", site.url, site.token)
     session.lost.wait()
     page.stop()

@@ -70,14 +70,13 @@ class ReplayPage:
 
     def start(self) -> None:
         """Start to play."""
-        self.site.start_updates(self._update)
+        self.site.start_updates(
+            lambda n: self._display(self.player.advance(), panel=n % PANEL_EVERY == 0)
+        )
 
     def stop(self) -> None:
         """Stop, and close the server."""
         self.site.stop()
-
-    def _update(self, count: int) -> None:
-        self._display(self.player.advance(), panel=count % PANEL_EVERY == 0)
 
     def _display(self, status: PlayerStatus, *, panel: bool = True) -> None:
         """Display the state of the playback."""

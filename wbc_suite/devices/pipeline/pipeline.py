@@ -84,13 +84,12 @@ class Pipeline:
 
     def reset(self) -> None:
         """Start an episode: every target is at its limb."""
-        for drive in (*self.limbs.values(), *self._joints.values()):
-            drive.reset()
+        parts = *self.limbs.values(), *self._joints.values(), *self._bases.values()
+        for part in parts:
+            part.reset()
         held = self._layout.unpack(self._env.hold_action)
         for name, grip in self.grips.items():
             grip.reset(held[name])
-        for base in self._bases.values():
-            base.reset()
         self._watchdog.reset()
         self._mirror, self._pressed = self._config.mirror, frozenset[str]()
         self._time, self._height = 0.0, 0.0
