@@ -55,7 +55,6 @@ class ReplayPage:
         self._clip: Clip | None = None
         self._shape = np.empty(0)
         self._status = self.server.gui.add_html("")
-        self._shown = ""
         self._add_controls()
         self._plot = add_plot(
             self.server,
@@ -103,15 +102,10 @@ class ReplayPage:
         self._episode.value = clip.name
 
     def _update_panel(self, status: PlayerStatus) -> None:
-        text = _status_html(status, self.player.names)
-        if text != self._shown:
-            self._status.content = self._shown = text
-        wanted = (PREVIOUS, PAUSE if status.playing else PLAY, NEXT)
-        if self._buttons.options != wanted:
-            self._buttons.options = wanted
+        self._status.content = _status_html(status, self.player.names)
+        self._buttons.options = (PREVIOUS, PAUSE if status.playing else PLAY, NEXT)
         if status.clip is not None:
-            if abs(self._time.value - status.position) > 1e-3:
-                self._time.value = status.position
+            self._time.value = status.position
             self._plot.data = _curves(status.clip, status.position)
 
     def _add_controls(self) -> None:

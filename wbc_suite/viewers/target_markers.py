@@ -83,8 +83,7 @@ class TargetMarkers:
             label, text = self._labels[name], notes.get(name, "")
             label.visible = bool(text)
             if text:
-                if text != label.text:
-                    label.text = text
+                label.text = text
                 label.position = status.target.translation + ABOVE
 
 

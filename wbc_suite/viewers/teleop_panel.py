@@ -141,16 +141,12 @@ class TeleopPanel:
 
     def update(self, snapshot: Snapshot) -> None:
         """Display the state of the session."""
-        for element, text in (
-            (self._status, status_html(snapshot, self._info.limbs, self._colours)),
-            (self._limbs, limbs_html(snapshot, self._info.limbs, self._colours)),
-        ):
-            if element.content != text:
-                element.content = text
+        limbs = self._info.limbs  # viser sends only changes
+        self._status.content = status_html(snapshot, limbs, self._colours)
+        self._limbs.content = limbs_html(snapshot, limbs, self._colours)
         for name, sliders in self._grippers.items():
             sliders.update(snapshot.grippers[name])
-        if self._buttons.options != (buttons := _buttons(snapshot)):
-            self._buttons.options = buttons
+        self._buttons.options = _buttons(snapshot)
 
     def record_plots(self, snapshot: Snapshot) -> None:
         """Append the errors and the step time of a tick to the plots."""
