@@ -4,7 +4,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wbc_suite.devices.pipeline.motion_limit import LimitedMotion, MotionLimit, Rates
+from wbc_suite.devices.pipeline.config import RatesConfig
+from wbc_suite.devices.pipeline.motion_limit import LimitedMotion, MotionLimit
+
+
+def limits(speed, acceleration, jerk):
+    return RatesConfig(speed=speed, acceleration=acceleration, jerk=jerk)
 
 
 def follow(goals, rates, dt, size):
@@ -35,7 +40,7 @@ def worst(path, order, dt):
 )
 def test_whatever_the_goals_limits_hold_exactly(goals, speed, acceleration, jerk, dt):
     points = [np.array([x, y]) for x, y, times in goals for _ in range(times)]
-    path = follow([*points, np.zeros(2)], Rates(speed, acceleration, jerk), dt, 2)
+    path = follow([*points, np.zeros(2)], limits(speed, acceleration, jerk), dt, 2)
     # Differences of positions lose digits: eps * size / dt^order.
     lost = 1e-15 * (1.0 + np.abs(path).max())
     assert worst(path, 1, dt) <= speed * (1 + 1e-9) + lost / dt
@@ -46,7 +51,7 @@ def test_whatever_the_goals_limits_hold_exactly(goals, speed, acceleration, jerk
 @pytest.mark.parametrize("dt", [0.005, 0.01, 0.02])
 def test_goal_is_reached_and_hardly_overshot(dt):
     goal = np.array([0.5, 0.1, 0.0])
-    path = follow([goal] * round(2.0 / dt), Rates(1.0, 10.0, 300.0), dt, 3)
+    path = follow([goal] * round(2.0 / dt), limits(1.0, 10.0, 300.0), dt, 3)
     along = path @ goal / np.linalg.norm(goal)
     assert along.max() < np.linalg.norm(goal) + 0.003
     np.testing.assert_allclose(path[-1], goal, atol=1e-6)
@@ -55,12 +60,12 @@ def test_goal_is_reached_and_hardly_overshot(dt):
 def test_slow_motion_is_followed_closely():
     dt, speed = 0.01, 0.2
     goals = [np.array([speed * k * dt]) for k in range(200)]
-    path = follow(goals, Rates(1.0, 10.0, 300.0), dt, 1)
+    path = follow(goals, limits(1.0, 10.0, 300.0), dt, 1)
     assert goals[-1] - path[-1] < 0.06 * speed  # 60 ms behind
 
 
 def test_pose_turns_by_the_shortest_way_within_limits():
-    linear, angular = Rates(1.0, 10.0, 300.0), Rates(2.0, 20.0, 600.0)
+    linear, angular = limits(1.0, 10.0, 300.0), limits(2.0, 20.0, 600.0)
     limit = MotionLimit(linear, angular, 0.01)
     start = pin.SE3(pin.exp3(np.array([0.3, -0.2, 2.9])), np.zeros(3))
     target = pin.SE3(pin.exp3(np.array([-0.4, 0.1, -2.9])), np.ones(3))

@@ -45,9 +45,8 @@ def server():
 
 @pytest.fixture
 def markers(server, session):
-    bodies = {name: limb.body for name, limb in session.info.limbs.items()}
-    colours = limb_colours(bodies)
-    return TargetMarkers(server, session.model, bodies, session.snapshot, colours)
+    colours = limb_colours(session.info.limbs)
+    return TargetMarkers(server, session.info, session.snapshot, colours)
 
 
 def away(session, offset=(0.0, 0.0, 0.1), angle=0.0):

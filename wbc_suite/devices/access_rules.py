@@ -1,4 +1,4 @@
-"""Access rules of the servers of pages and streams, without any sockets.
+"""Access rules of the servers of pages and streams.
 
 - A page of another site in the user's browser must not reach the server: the `Origin`
   of a request must be the host that it asks for. Without a token that host must be a
@@ -12,15 +12,13 @@ import hmac
 import ipaddress
 import logging
 import secrets
-from collections.abc import Mapping
-from dataclasses import dataclass
 from http import HTTPStatus
-from http.cookies import CookieError, SimpleCookie
-from urllib.parse import parse_qs, urlsplit
+from http.cookies import CookieError
+from urllib.parse import urlsplit
 
-from wbc_suite.errors import DeviceError
+from aiohttp import hdrs, web
 
-__all__ = ["AccessRules", "Refusal", "is_loopback", "new_token"]
+__all__ = ["AccessRules", "is_loopback", "token_for"]
 
 logger = logging.getLogger(__name__)
 
@@ -34,81 +32,62 @@ def is_loopback(host: str) -> bool:
     return False
 
 
-def new_token() -> str:
-    """Return a secret of 128 bits that is valid in a URL."""
-    return secrets.token_urlsafe(16)
-
-
-@dataclass(frozen=True, slots=True)
-class Refusal:
-    """The response to a request that is not admitted."""
-
-    status: HTTPStatus
-    text: str
-    headers: tuple[tuple[str, str], ...] = ()
+def token_for(host: str) -> str | None:
+    """Return a new secret of 128 bits, valid in a URL; None for a loopback address."""
+    return None if is_loopback(host) else secrets.token_urlsafe(16)
 
 
 class AccessRules:
     """Decide which requests are admitted.
 
     Args:
-        host: Address that the server listens on.
-        token: Secret that clients need; None if `host` is a loopback address.
+        token: Secret that clients need; None admits those of this machine.
         cookie: Name of the cookie that stands for the token.
-
-    Raises:
-        DeviceError: If the host is not a loopback address and there is no token.
     """
 
-    def __init__(self, host: str, token: str | None, cookie: str = "") -> None:
-        if token is None and not is_loopback(host):
-            raise DeviceError(
-                f"A server on '{host}' can be reached by others and needs a token."
-            )
+    def __init__(self, token: str | None, cookie: str) -> None:
         self._token, self._cookie = token, cookie
 
-    def check(
-        self, method: str, target: str, headers: Mapping[str, str]
-    ) -> Refusal | None:
-        """Return the refusal of a request, or None to admit it.
-
-        Args:
-            method: HTTP method.
-            target: Path and query.
-            headers: Header fields; keys are matched without regard to case.
-        """
-        if method != "GET":
-            return Refusal(HTTPStatus.METHOD_NOT_ALLOWED, "Only GET is supported.")
-        host = headers.get("Host", "")
+    def refusal(self, request: web.Request) -> web.Response | None:
+        """Return the refusal of a request, or None to admit it."""
+        if request.method != hdrs.METH_GET:
+            return _response(HTTPStatus.METHOD_NOT_ALLOWED, "Only GET is supported.")
+        host = request.headers.get(hdrs.HOST, "")
         if self._token is None and not is_loopback(_host_name(host)):
-            return Refusal(
+            return _response(
                 HTTPStatus.FORBIDDEN,
                 "This page is served to this machine only: open it as 127.0.0.1.",
             )
-        origin = headers.get("Origin")
+        origin = request.headers.get(hdrs.ORIGIN)
         if origin is not None and urlsplit(origin).netloc != host:
             logger.warning("Refused a request from a page of %s.", origin)
-            return Refusal(HTTPStatus.FORBIDDEN, "Requests of other sites are refused.")
-        return self._check_token(target, headers)
+            return _response(
+                HTTPStatus.FORBIDDEN, "Requests of other sites are refused."
+            )
+        return None if self._token is None else self._check_token(self._token, request)
 
-    def _check_token(self, target: str, headers: Mapping[str, str]) -> Refusal | None:
-        token = self._token
-        if token is None or _same(token, _cookie(headers, self._cookie)):
-            return None
-        address = urlsplit(target)
-        if not _same(token, parse_qs(address.query).get("token", [""])[0]):
-            return Refusal(
+    def _check_token(self, token: str, request: web.Request) -> web.Response | None:
+        with contextlib.suppress(CookieError):
+            if _same(token, request.cookies.get(self._cookie, "")):
+                return None
+        if not _same(token, request.query.get("token", "")):
+            return _response(
                 HTTPStatus.UNAUTHORIZED,
                 "This page needs its token: open the whole address that the terminal "
                 "shows, with '?token=' and what follows.",
             )
-        if headers.get("Upgrade", "").lower() == "websocket":
+        if request.headers.get(hdrs.UPGRADE, "").lower() == "websocket":
             return None
-        cookie = f"{self._cookie}={token}; HttpOnly; SameSite=Lax; Path=/"
-        path = "/" + address.path.lstrip("/\\")  # a redirect to this host only
-        return Refusal(
-            HTTPStatus.SEE_OTHER, "", (("Location", path), ("Set-Cookie", cookie))
-        )
+        response = _response(HTTPStatus.SEE_OTHER)
+        path = request.rel_url.raw_path.lstrip("/\\")  # a redirect to this host only
+        response.headers[hdrs.LOCATION] = f"/{path}"
+        response.set_cookie(self._cookie, token, httponly=True, samesite="Lax")
+        return response
+
+
+def _response(status: HTTPStatus, text: str = "") -> web.Response:
+    headers = {hdrs.CACHE_CONTROL: "no-store"}
+    return web.Response(status=status, text=text, headers=headers)
 
 
 def _same(token: str, candidate: str) -> bool:
@@ -120,10 +99,3 @@ def _host_name(host: str) -> str:
     with contextlib.suppress(ValueError):
         return urlsplit(f"//{host}").hostname or ""
     return ""
-
-
-def _cookie(headers: Mapping[str, str], name: str) -> str:
-    jar: SimpleCookie = SimpleCookie()
-    with contextlib.suppress(CookieError):
-        jar.load(headers.get("Cookie", ""))
-    return jar[name].value if name in jar else ""

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.control import ActionLayout, FrameKind
+from wbc_suite.control import FrameKind
 from wbc_suite.control.action import ActionSlice, Axis, SliceKind
 from wbc_suite.errors import ConfigError
 from wbc_suite.typing import Vector
@@ -104,7 +104,8 @@ def limb_ports(env: Any) -> dict[str, LimbPort]:
     """
     ports = {}
     for index, controller, slices in _robots(env):
-        make = _whole_body if _is_whole_body(controller) else _parts
+        is_whole_body = hasattr(getattr(controller, "config", None), "frames")
+        make = _whole_body if is_whole_body else _parts
         found = make(env, controller, index, slices)
         ports |= {port.name: port for port in found}
     return ports
@@ -113,7 +114,7 @@ def limb_ports(env: Any) -> dict[str, LimbPort]:
 def speed_ports(env: Any) -> dict[str, SpeedPort]:
     """Return the slices that command velocities of a base, by name."""
     ports = {}
-    for part in _layout(env).slices:
+    for part in env.unwrapped.action_layout.slices:
         if part.kind is SliceKind.BASE and {*part.labels} <= {*_VELOCITY_AXES}:
             axes = tuple(_VELOCITY_AXES.index(Axis(label)) for label in part.labels)
             ports[part.name] = SpeedPort(name=part.name, axes=axes, unit=_unit(part))
@@ -148,7 +149,7 @@ def _joint_port(part: ActionSlice, places: list[Any]) -> JointPort:
         return np.array([place[0] for place in places])
 
     def encode(target: Vector) -> Vector:
-        if _is_step(part):
+        if part.units[0].scale is not None:  # values are steps
             return np.clip((target - measure()) / _unit(part), part.low, part.high)
         return np.clip(target, part.low, part.high)
 
@@ -157,7 +158,7 @@ def _joint_port(part: ActionSlice, places: list[Any]) -> JointPort:
 
 def _robots(env: Any) -> Iterator[tuple[int, Any, dict[str, ActionSlice]]]:
     """Yield each robot's number, controller, and slices by the controller's names."""
-    controllers, layout = env.unwrapped.controllers, _layout(env)
+    controllers, layout = env.unwrapped.controllers, env.unwrapped.action_layout
     for index, controller in enumerate(controllers):
         several = f"robot{index}_" if len(controllers) > 1 else ""
         slices = {
@@ -166,14 +167,6 @@ def _robots(env: Any) -> Iterator[tuple[int, Any, dict[str, ActionSlice]]]:
             if part.name.startswith(several)
         }
         yield index, controller, slices
-
-
-def _layout(env: Any) -> ActionLayout:
-    return env.unwrapped.action_layout
-
-
-def _is_whole_body(controller: Any) -> bool:
-    return hasattr(getattr(controller, "config", None), "frames")
 
 
 def _whole_body(
@@ -244,11 +237,6 @@ def _parts(
 
 def _pose(R: Vector, p: Vector) -> pin.SE3:
     return pin.SE3(R.reshape(3, 3).copy(), p.copy())
-
-
-def _is_step(part: ActionSlice) -> bool:
-    """Return whether values are steps of their quantity."""
-    return part.units[0].scale is not None
 
 
 def _unit(part: ActionSlice) -> Vector:

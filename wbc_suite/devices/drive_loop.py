@@ -40,8 +40,12 @@ def drive(
     period = 1.0 / env.unwrapped.config.control_freq
     info: dict[str, Any] = {}
     pressed, paused, taken = frozenset[str](), False, 0
-    env.reset(seed=seed)
-    pipeline.reset()
+
+    def restart() -> None:
+        env.reset(seed=seed)
+        pipeline.reset()
+
+    restart()
     try:
         device.start()
         due = time.perf_counter()
@@ -52,16 +56,14 @@ def drive(
                 break
             paused ^= "pause" in new
             if "reset" in new:
-                env.reset(seed=seed)
-                pipeline.reset()
+                restart()
             if not paused:
                 *_, done, _, info = env.step(pipeline.update(state))
                 taken += 1
                 if on_step is not None:
                     on_step(state, info)
                 if done:
-                    env.reset(seed=seed)
-                    pipeline.reset()
+                    restart()
             if real_time:
                 due = max(due + period, time.perf_counter() - period)
                 time.sleep(max(0.0, due - time.perf_counter()))

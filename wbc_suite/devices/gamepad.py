@@ -68,11 +68,10 @@ def parse_dualsense(report: bytes) -> Pad | None:
     else:
         return None
     x, y, rx, ry, left, right = body[:6]
-    hat, first, second = body[7] & 15, body[7] >> 4, body[8]
-    names = ("west", "south", "east", "north")
-    down = {name for k, name in enumerate(names) if first >> k & 1}
-    names = ("l1", "r1", "l2", "r2", "select", "start")
-    down |= {name for k, name in enumerate(names) if second >> k & 1}
+    hat, bits = body[7] & 15, int.from_bytes(body[7:9], "little") >> 4
+    above = ("l1", "r1", "l2", "r2", "select", "start")
+    names = ("west", "south", "east", "north", *above)
+    down = {name for k, name in enumerate(names) if bits >> k & 1}
     around = [(0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1)]
     return Pad(
         left=(_byte(x), -_byte(y)),

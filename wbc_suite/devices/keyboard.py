@@ -2,24 +2,25 @@
 
 import contextlib
 import os
+import re
 import select
 import sys
 import time
-from collections.abc import Callable, Iterator, Set
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from typing import Any
 
 import numpy as np
 
 from wbc_suite.devices.state import DeviceState, LimbInput
 from wbc_suite.errors import DeviceError
+from wbc_suite.typing import Vector
 
-__all__ = ["BUTTONS", "HELP", "JOG", "KeyJog", "Keyboard", "parse_keys"]
+__all__ = ["BUTTONS", "HELP", "JOG", "Keyboard", "parse_keys"]
 
 HOLD = 0.12  # s, after a press; a terminal repeats a held key every 0.03 s
-SPEED = 0.25  # m/s, of a held key
-TURN = 0.8  # rad/s
-BASE_SPEED, BASE_TURN = 0.4, 0.6  # m/s and rad/s
-FACTOR = 1.5  # of `+` and `-`
+TWIST = (0.25, 0.25, 0.25, 0.8, 0.8, 0.8)  # m/s and rad/s, of a held key
+BASE = (0.4, 0.4, 0.6)  # m/s and rad/s
+FACTORS = {"+": 1.5, "=": 1.5, "-": 1.0 / 1.5}  # of the speeds, by key
 SLOWEST, FASTEST = 0.1, 4.0
 
 JOG: dict[str, tuple[int, float]] = {
@@ -48,67 +49,29 @@ HELP = """\
   enter  keep the episode    backspace  discard it    z  undo
 """
 
-_ESCAPES = {b"[A": "up", b"[B": "down", b"[C": "right", b"[D": "left"}
 _NAMES = {
-    "\t": "tab",
-    "\r": "enter",
-    "\n": "enter",
-    "\x7f": "backspace",
-    "\b": "backspace",
-}
+    "\x1b[A": "up", "\x1b[B": "down", "\x1b[C": "right", "\x1b[D": "left",
+    "\x1b": "escape", "\t": "tab", "\r": "enter", "\n": "enter",
+    "\x7f": "backspace", "\b": "backspace",
+}  # fmt: skip
 
 
 def parse_keys(data: bytes) -> Iterator[str]:
     """Yield the names of the keys in a terminal's input."""
-    at = 0
-    while at < len(data):
-        if data[at] == 0x1B and data[at + 1 : at + 3] in _ESCAPES:
-            yield _ESCAPES[data[at + 1 : at + 3]]
-            at += 3
-            continue
-        letter = data[at : at + 1].decode("latin-1")
-        yield "escape" if letter == "\x1b" else _NAMES.get(letter, letter.lower())
-        at += 1
+    for found in re.finditer("\x1b\\[[A-D]|.", data.decode("latin-1"), re.DOTALL):
+        key: str = found.group()
+        yield _NAMES.get(key, key.lower())
 
 
-class KeyJog:
-    """Converts keys to velocities of the selected hand.
-
-    Attributes:
-        pace: Factor of all speeds.
-    """
-
-    def __init__(self) -> None:
-        self.pace = 1.0
-
-    def press(self, key: str) -> None:
-        """Handle a key press that changes the pace."""
-        if key in ("+", "=", "-"):
-            pace = self.pace * (1.0 / FACTOR if key == "-" else FACTOR)
-            self.pace = min(max(pace, SLOWEST), FASTEST)
-
-    def state(self, time: float, held: Set[str], pressed: Set[str]) -> DeviceState:
-        """Return the state for some keys.
-
-        Args:
-            time: s.
-            held: Keys that are held.
-            pressed: Keys pressed since the last state.
-        """
-        twist = np.zeros(6)
-        for key in held & JOG.keys():
-            index, sign = JOG[key]
-            twist[index] += sign * self.pace * (SPEED if index < 3 else TURN)
-        base = np.zeros(3)
-        for key in held & BASE_JOG.keys():
-            index, sign = BASE_JOG[key]
-            base[index] += sign * self.pace * (BASE_SPEED if index < 2 else BASE_TURN)
-        return DeviceState(
-            time=time,
-            limbs={"hand": LimbInput(twist=twist)},
-            base=base,
-            buttons=frozenset(BUTTONS[key] for key in pressed & BUTTONS.keys()),
-        )
+def _velocity(
+    held: Set[str], keys: Mapping[str, tuple[int, float]], speeds: Sequence[float]
+) -> Vector:
+    """Return a velocity by held keys; `speeds` is that of each component."""
+    velocity = np.zeros(len(speeds))
+    for key in held & keys.keys():
+        index, sign = keys[key]
+        velocity[index] += sign * speeds[index]
+    return velocity
 
 
 class Keyboard:
@@ -126,13 +89,10 @@ class Keyboard:
     help = HELP
 
     def __init__(
-        self,
-        descriptor: int | None = None,
-        clock: Callable[[], float] = time.monotonic,
+        self, descriptor: int | None = None, clock: Callable[[], float] = time.monotonic
     ) -> None:
         self._asked, self._descriptor = descriptor, -1
-        self._clock = clock
-        self._jog = KeyJog()
+        self._clock, self._pace = clock, 1.0
         self._until: dict[str, float] = {}
         self._before: list[Any] | None = None
 
@@ -158,10 +118,18 @@ class Keyboard:
         self._until = {key: end for key, end in self._until.items() if end >= now}
         fresh = {key for key in pressed if key not in self._until}
         for key in fresh:
-            self._jog.press(key)
+            if key in FACTORS:
+                pace = self._pace * FACTORS[key]
+                self._pace = min(max(pace, SLOWEST), FASTEST)
         self._until |= dict.fromkeys(pressed, now + HOLD)
-        held = set(self._until)
-        return self._jog.state(now, held, fresh)
+        held = self._until.keys()
+        twist = self._pace * _velocity(held, JOG, TWIST)
+        return DeviceState(
+            time=now,
+            limbs={"hand": LimbInput(twist=twist)},
+            base=self._pace * _velocity(held, BASE_JOG, BASE),
+            buttons=frozenset(BUTTONS[key] for key in fresh & BUTTONS.keys()),
+        )
 
     def stop(self) -> None:
         """Restore the terminal."""

@@ -68,25 +68,22 @@ def unflatten(flat: Mapping[str, Any], time: float) -> DeviceState:
     Raises:
         DeviceError: If a value is not a number.
     """
-    numbers = {name: _number(name, value) for name, value in flat.items()}
-    ends = {*POSE, *TWIST, "engaged", "grip"}
-    split = [name.split(".") for name in numbers if not name.startswith("button.")]
-    limbs = {p[0] for p in split if len(p) > 1 and p[1] in ends}
-    base = _taken(numbers, "base", BASE)
+    numbers = {key: _number(key, value) for key, value in flat.items()}
+    groups: dict[str, dict[str, float]] = {}
+    for key, x in numbers.items():
+        name, _, rest = key.partition(".")
+        groups.setdefault(name, {})[rest] = x
+    buttons = groups.pop("button", {})
     return DeviceState(
         time=time,
-        limbs={name: _limb(numbers, name) for name in sorted(limbs)},
+        limbs={n: _limb(groups[n]) for n in sorted(groups) if _is_limb(groups[n])},
         joints={
-            name.removesuffix(".pos"): x
-            for name, x in numbers.items()
-            if name.endswith(".pos")
+            key.removesuffix(".pos"): x
+            for key, x in numbers.items()
+            if key.endswith(".pos")
         },
-        base=base,
-        buttons=frozenset(
-            name.removeprefix("button.")
-            for name, x in numbers.items()
-            if name.startswith("button.") and x > 0.5
-        ),
+        base=_taken(groups.get("base", {}), BASE),
+        buttons=frozenset(name for name, x in buttons.items() if x > 0.5),
     )
 
 
@@ -181,24 +178,26 @@ def _named(name: str, ends: tuple[str, ...], values: Vector) -> dict[str, float]
     return {f"{name}.{end}": float(x) for end, x in zip(ends, values, strict=True)}
 
 
-def _taken(
-    numbers: Mapping[str, float], name: str, ends: tuple[str, ...]
-) -> Vector | None:
+def _taken(group: Mapping[str, float], ends: tuple[str, ...]) -> Vector | None:
     """Return the values of a group, 0 where missing; None when all are missing."""
-    keys = [f"{name}.{end}" for end in ends]
-    if not any(key in numbers for key in keys):
+    if not any(end in group for end in ends):
         return None
-    return np.array([numbers.get(key, 0.0) for key in keys])
+    return np.array([group.get(end, 0.0) for end in ends])
 
 
-def _limb(numbers: Mapping[str, float], name: str) -> LimbInput:
-    place = _taken(numbers, name, POSE)
-    fingers = [x for key, x in numbers.items() if key.startswith(f"{name}.grip.")]
-    whole = numbers.get(f"{name}.grip")
+def _is_limb(group: Mapping[str, float]) -> bool:
+    ends = {*POSE, *TWIST, "engaged", "grip"}
+    return any(key.split(".")[0] in ends for key in group)
+
+
+def _limb(group: Mapping[str, float]) -> LimbInput:
+    place = _taken(group, POSE)
+    fingers = [x for key, x in group.items() if key.startswith("grip.")]
+    whole = group.get("grip")
     return LimbInput(
         pose=None if place is None else pin.SE3(pin.exp3(place[3:]), place[:3]),
-        twist=_taken(numbers, name, TWIST),
-        engaged=numbers.get(f"{name}.engaged", 1.0) > 0.5,
+        twist=_taken(group, TWIST),
+        engaged=group.get("engaged", 1.0) > 0.5,
         grip=None if whole is None and not fingers else np.array(fingers or whole),
     )
 

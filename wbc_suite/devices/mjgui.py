@@ -37,11 +37,8 @@ class MjGui:
         launch: Callable[[mujoco.MjModel, mujoco.MjData], Any] | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._env, self._launch, self._clock = (
-            env.unwrapped,
-            launch or open_window,
-            clock,
-        )
+        self._env, self._clock = env.unwrapped, clock
+        self._launch = launch or open_window
         movable = (LimbKind.POSE, LimbKind.POSITION)
         self._ports = [p for p in limb_ports(env).values() if p.kind in movable]
         self._viewer: Any = None
@@ -65,15 +62,11 @@ class MjGui:
         with self._viewer.lock():
             self._copy()
             mujoco.mj_kinematics(self._model, self._data)
-            places = zip(self._data.mocap_pos, self._data.mocap_quat, strict=True)
-            poses = [
-                pin.XYZQUATToSE3(np.concatenate([p, np.roll(q, -1)])) for p, q in places
-            ]
+            limbs = {
+                port.name: LimbInput(pose=self._pose(k))
+                for k, port in enumerate(self._ports)
+            }
         self._viewer.sync()
-        limbs = {
-            port.name: LimbInput(pose=pose)
-            for port, pose in zip(self._ports, poses, strict=True)
-        }
         return DeviceState(time=self._clock(), limbs=limbs)
 
     def stop(self) -> None:
@@ -81,6 +74,10 @@ class MjGui:
         if self._viewer is not None:
             self._viewer.close()
         self._viewer = None
+
+    def _pose(self, k: int) -> pin.SE3:
+        position, wxyz = self._data.mocap_pos[k], self._data.mocap_quat[k]
+        return pin.XYZQUATToSE3(np.array([*position, *np.roll(wxyz, -1)]))
 
     def _copy(self) -> None:
         self._data.qpos[:] = self._env.simulation.data.qpos

@@ -2,7 +2,6 @@
 
 import contextlib
 import json
-import socket
 import threading
 import time
 from dataclasses import replace
@@ -11,11 +10,11 @@ from importlib import resources
 
 from aiohttp import WSCloseCode, WSMsgType, web
 
-from wbc_suite.devices.access_rules import is_loopback, new_token
+from wbc_suite.devices.access_rules import token_for
 from wbc_suite.devices.pose_frame import MAX_BUTTONS, MAX_BYTES, PoseFrame
 from wbc_suite.devices.state import DeviceState
 from wbc_suite.devices.tls import server_context
-from wbc_suite.devices.web_server import WebServer
+from wbc_suite.devices.web_server import WebServer, page_url
 from wbc_suite.errors import DeviceError
 
 __all__ = ["Stream"]
@@ -50,7 +49,7 @@ class Stream:
         self, host: str = "127.0.0.1", port: int = 8090, *, tls: bool = False
     ) -> None:
         self._host, self._port, self._tls = host, port, tls
-        self.token = None if is_loopback(host) else new_token()
+        self.token = token_for(host)
         self.refused = ""
         self._lock = threading.Lock()
         self._newest: PoseFrame | None = None
@@ -63,10 +62,8 @@ class Stream:
     @property
     def url(self) -> str:
         """The address of the pages; frames go to `/frames` there."""
-        name = socket.gethostname() if self._host in ("0.0.0.0", "::") else self._host
-        name = f"[{name}]" if ":" in name else name
-        query = "" if self.token is None else f"?token={self.token}"
-        return f"http{'s' if self._tls else ''}://{name}:{self._port}/{query}"
+        scheme = "https" if self._tls else "http"
+        return page_url(self._host, self._port, self.token, scheme=scheme)
 
     @property
     def help(self) -> str:

@@ -1,7 +1,6 @@
 """A client of the stream, short enough to copy into any program."""
 
 import json
-from types import TracebackType
 from typing import Any
 
 from wbc_suite.devices.pose_frame import PoseFrame
@@ -33,7 +32,7 @@ class StreamClient:
 
     def send(self, frame: PoseFrame) -> None:
         """Send one frame."""
-        self._socket.send(frame.model_dump_json(exclude_defaults=False))
+        self._socket.send(frame.model_dump_json())
 
     def receive(self, timeout: float) -> dict[str, Any]:
         """Return a reply of the stream, `{"error": ...}`; raises TimeoutError."""
@@ -42,10 +41,5 @@ class StreamClient:
     def __enter__(self) -> "StreamClient":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._socket.close()

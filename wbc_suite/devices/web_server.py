@@ -1,6 +1,7 @@
 """The HTTP server of pages and streams: aiohttp in a thread, behind `AccessRules`."""
 
 import asyncio
+import contextlib
 import logging
 import socket
 import ssl
@@ -10,30 +11,22 @@ from collections.abc import Iterable
 from aiohttp import web
 from aiohttp.typedefs import Handler
 
-from wbc_suite.devices.access_rules import AccessRules
+from wbc_suite.devices.access_rules import AccessRules, is_loopback
 from wbc_suite.errors import DeviceError
 
-__all__ = ["WebServer", "listen"]
+__all__ = ["WebServer", "page_url"]
 
 CONNECTIONS = 256  # at a time; a browser opens one, and a few more while it loads
 HEAD_TIMEOUT = 10.0  # s, from a connection to its first complete request
 SHUTDOWN_TIMEOUT = 0.2  # s; handlers of open WebSockets are cancelled after it
 
 
-def listen(host: str, port: int) -> socket.socket:
-    """Return a listening socket; port 0 takes any free port.
-
-    Raises:
-        DeviceError: If the address or the port is not available.
-    """
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    try:
-        return socket.create_server((host, port), family=family)
-    except OSError as error:
-        raise DeviceError(
-            f"Cannot listen on {host}, port {port}: {error.strerror}. "
-            "Choose another port, or 0 for any free one."
-        ) from error
+def page_url(host: str, port: int, token: str | None, *, scheme: str = "http") -> str:
+    """Return the address that opens the pages of a server, with its token if any."""
+    name = _reachable(host)
+    name = f"[{name}]" if ":" in name else name
+    query = "" if token is None else f"?token={token}"
+    return f"{scheme}://{name}:{port}/{query}"
 
 
 class WebServer:
@@ -65,10 +58,13 @@ class WebServer:
         token: str | None,
         tls: ssl.SSLContext | None = None,
     ) -> None:
-        AccessRules(host, token)  # checked before anything listens
-        self._socket = listen(host, port)
+        if token is None and not is_loopback(host):
+            raise DeviceError(
+                f"A server on '{host}' can be reached by others and needs a token."
+            )
+        self._socket = _listen(host, port)
         self.port: int = self._socket.getsockname()[1]
-        self._rules = AccessRules(host, token, cookie=f"wbc_token_{self.port}")
+        self._rules = AccessRules(token, cookie=f"wbc_token_{self.port}")
         self._routes, self._tls = tuple(routes), tls
         self._no_request_yet: set[web.RequestHandler] = set()
         started = threading.Event()
@@ -125,16 +121,8 @@ class WebServer:
     ) -> web.StreamResponse:
         """Refuse a request that the rules keep out; handle any other."""
         self._no_request_yet.discard(request.protocol)
-        refusal = self._rules.check(
-            request.method, str(request.rel_url), request.headers
-        )
-        if refusal is None:
-            return await handler(request)
-        return web.Response(
-            status=refusal.status,
-            text=refusal.text,
-            headers={"Cache-Control": "no-store", **dict(refusal.headers)},
-        )
+        refusal = self._rules.refusal(request)
+        return await handler(request) if refusal is None else refusal
 
 
 class _Refused(asyncio.Protocol):
@@ -142,3 +130,26 @@ class _Refused(asyncio.Protocol):
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         transport.close()
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    """Return a listening socket; port 0 takes any free port."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    try:
+        return socket.create_server((host, port), family=family)
+    except OSError as error:
+        raise DeviceError(
+            f"Cannot listen on {host}, port {port}: {error.strerror}. "
+            "Choose another port, or 0 for any free one."
+        ) from error
+
+
+def _reachable(host: str) -> str:
+    """Return a name for `host` under which other machines reach it."""
+    if host not in ("0.0.0.0", "::"):
+        return host
+    probe = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    with probe, contextlib.suppress(OSError):
+        probe.connect(("192.0.2.1", 9))  # sends nothing; selects the outgoing address
+        return probe.getsockname()[0]
+    return socket.gethostname()

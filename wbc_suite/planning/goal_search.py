@@ -104,10 +104,7 @@ class GoalSearch:
         self._run = None
 
     def start(
-        self,
-        starts: Sequence[Vector],
-        held: Vector,
-        trail: Sequence[TimedState] = (),
+        self, starts: Sequence[Vector], held: Vector, trail: Sequence[TimedState] = ()
     ) -> None:
         """Begin; the tasks have their targets.
 

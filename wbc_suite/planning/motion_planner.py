@@ -288,10 +288,8 @@ def plan_motion(
             f"Model '{model.name}': motions are planned for joints of one parameter; "
             f"it has nq = {model.nq} and nv = {model.nv}. Lock the others."
         )
-    speeds = np.broadcast_to(
-        np.array(model.velocityLimit if speed is None else speed, float), model.nv
-    ).copy()
-    rates = np.broadcast_to(np.array(acceleration, float), model.nv).copy()
+    speeds = np.full(model.nv, model.velocityLimit if speed is None else speed, float)
+    rates = np.full(model.nv, acceleration, float)
     if not (speeds > 0.0).all() or not (rates > 0.0).all():
         raise ConfigError("Velocity and acceleration limits must be positive.")
     planner = MotionPlanner(

@@ -77,15 +77,12 @@ class Cameras:
         self._model, self._data, self._preset = model, data, preset
         self.labels = Labels(model, robots)
         self._requests = tuple(requests)
-        for request in self._requests:
-            camera_id(model, request.name)
         self._renderers: dict[tuple[int, int], Renderer] = {}
         self._stale: set[tuple[int, int]] = set()
-        self.space = {
-            key: space
-            for request in self._requests
-            for key, space in self._spaces(request).items()
-        }
+        self.space: dict[str, gymnasium.Space[Any]] = {}
+        for request in self._requests:
+            camera_id(model, request.name)  # an error if there is no such camera
+            self.space |= self._spaces(request)
 
     @property
     def far(self) -> float:
@@ -139,10 +136,8 @@ class Cameras:
 
     def projection(self, camera: str, *, width: int, height: int) -> Projection:
         """Return intrinsics and extrinsics of a camera."""
-        camera_index = camera_id(self._model, camera)
-        return Projection.of(
-            self._model, self._data, camera_index, width=width, height=height
-        )
+        index = camera_id(self._model, camera)
+        return Projection.of(self._model, self._data, index, width=width, height=height)
 
     def point_cloud(self, camera: str, *, width: int, height: int) -> Array:
         """Return the point of the world at each pixel, m, shape (height, width, 3)."""

@@ -23,13 +23,7 @@ from typing import Any
 from wbc_suite.catalogue import user_cache
 from wbc_suite.errors import DeviceError
 
-__all__ = [
-    "GlBackend",
-    "activate",
-    "context_class",
-    "forget",
-    "missing_environment",
-]
+__all__ = ["GlBackend", "activate", "context_class", "forget", "missing_environment"]
 
 logger = logging.getLogger(__name__)
 
@@ -230,8 +224,6 @@ def _remember(backend: GlBackend) -> None:
     path = _cache_file()
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        partial = path.with_suffix(f".{os.getpid()}")
-        partial.write_text(json.dumps(asdict(backend)))
-        partial.replace(path)
+        path.write_text(json.dumps(asdict(backend)))  # half a file counts as none
     except OSError as error:
         logger.debug("the GL backend could not be remembered: %s", error)

@@ -27,6 +27,7 @@ class Hand:
 
     Attributes:
         site: The frame's site in the simulation.
+        position: Position of the frame in the world, m. A view.
         gripper_bodies: Bodies of the gripper, with the one it is mounted on.
     """
 
@@ -36,7 +37,7 @@ class Hand:
         model, self._data = state.model, state.data
         self.name, self.frame = name, frame
         self.site: int = model.site(state.prefix + frame).id
-        self._position = state.data.site_xpos[self.site]
+        self.position: Vector = state.data.site_xpos[self.site]
         bodies = {int(model.body(state.prefix + link).id) for link in links}
         self.gripper_bodies = frozenset(bodies)
         self._body_of = {
@@ -44,11 +45,6 @@ class Hand:
             for geom, body in enumerate(model.geom_bodyid)
             if body in bodies
         }
-
-    @property
-    def position(self) -> Vector:
-        """Position of the frame in the world, m. A view."""
-        return self._position
 
     def owns(self, geom: int) -> bool:
         """Whether a geom belongs to the gripper."""

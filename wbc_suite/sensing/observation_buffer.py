@@ -52,9 +52,11 @@ class ObservationBuffer:
         self._low = -self._high
         # A group is a slice of a second copy, so that no two keys share memory.
         self._cuts = [(k, int(k in groups), place) for k, place in self.places.items()]
-        self.space: gymnasium.spaces.Dict = gymnasium.spaces.Dict(
-            {key: _box(key, place) for key, place in self.places.items()}
-        )
+        boxes: dict[str, gymnasium.Space] = {}
+        for key, place in self.places.items():
+            bound, shape = self.bounds[key], (place.stop - place.start,)
+            boxes[key] = gymnasium.spaces.Box(-bound, bound, shape, np.float64)
+        self.space: gymnasium.spaces.Dict = gymnasium.spaces.Dict(boxes)
 
     def update(self) -> None:
         """Read everything from the simulation into `values`, clipped to the bounds."""
@@ -81,11 +83,6 @@ def _places(groups: Mapping[str, Mapping[str, Reading]]) -> dict[str, slice]:
         if readings:
             places[group] = slice(begin, end)
     return places
-
-
-def _box(key: str, place: slice) -> gymnasium.spaces.Box:
-    bound = _bound(key)
-    return gymnasium.spaces.Box(-bound, bound, (place.stop - place.start,), np.float64)
 
 
 def _bound(key: str) -> float:

@@ -64,7 +64,8 @@ class Projection:
             Pixels, shape (..., 2), and depths along the camera's axis, m, shape (...).
             Points with a depth <= 0 are behind the camera; their pixels are invalid.
         """
-        local = self._from_world(np.asarray(points, dtype=np.float64))
+        offset = np.asarray(points, dtype=np.float64) - self.T_wc[:3, 3]
+        local = offset @ self.T_wc[:3, :3]
         depth = local[..., 2]
         with np.errstate(divide="ignore", invalid="ignore"):
             pixels = (local @ self.K.T)[..., :2] / depth[..., None]
@@ -116,9 +117,6 @@ class Projection:
         away = np.sum(normals * (points - self.T_wc[:3, 3]), axis=-1) > 0.0
         normals[away] *= -1.0
         return normals
-
-    def _from_world(self, points: Array) -> Array:
-        return (points - self.T_wc[:3, 3]) @ self.T_wc[:3, :3]
 
 
 def camera_id(model: mujoco.MjModel, name: str) -> int:

@@ -8,28 +8,14 @@ import numpy as np
 
 from wbc_suite.control import RobotState
 from wbc_suite.robot import RobotDescription
+from wbc_suite.sensing import reading
 from wbc_suite.sensing.hands import gripper_links, hands_of
-from wbc_suite.sensing.reading import (
-    Reading,
-    actuator_forces,
-    body_position,
-    body_quat,
-    computed,
-    joint_cosines,
-    joint_positions,
-    joint_sines,
-    joint_velocities,
-    sensor_values,
-    site_position,
-    site_quat,
-)
+from wbc_suite.sensing.reading import Reading
 
 __all__ = ["add_contact_sensors", "proprioception", "sensors_of"]
 
-FOUND, FORCE = (
-    mujoco.mjtConDataField.mjCONDATA_FOUND,
-    mujoco.mjtConDataField.mjCONDATA_FORCE,
-)
+FIELDS = mujoco.mjtConDataField
+FOUND_AND_FORCE = 1 << int(FIELDS.mjCONDATA_FOUND) | 1 << int(FIELDS.mjCONDATA_FORCE)
 NET_FORCE = 3
 """MuJoCo's reduction of contacts to their sum, in world axes."""
 
@@ -45,16 +31,16 @@ def proprioception(state: RobotState) -> dict[str, Reading]:
         state: The robot in the simulation.
     """
     readings = _joints(state) | _base(state) | _hands(state) | _grippers(state)
-    return {state.prefix + key: reading for key, reading in readings.items()}
+    return {state.prefix + key: found for key, found in readings.items()}
 
 
 def _joints(state: RobotState) -> dict[str, Reading]:
     q, v = state.joint_addresses(_body_joints(state.robot))
     return {
-        "joint_pos": joint_positions(q),
-        "joint_pos_cos": joint_cosines(q),
-        "joint_pos_sin": joint_sines(q),
-        "joint_vel": joint_velocities(v),
+        "joint_pos": reading.joint_positions(q),
+        "joint_pos_cos": reading.joint_cosines(q),
+        "joint_pos_sin": reading.joint_sines(q),
+        "joint_vel": reading.joint_velocities(v),
     }
 
 
@@ -65,9 +51,9 @@ def _base(state: RobotState) -> dict[str, Reading]:
     size = 6 if kind == "free" else 3
     body = state.model.body(state.prefix + state.robot.links[0].name).id
     return {
-        "base_pos": body_position(body),
-        "base_quat": body_quat(body),
-        "base_vel": computed(size, lambda: state.v[:size]),
+        "base_pos": reading.body_position(body),
+        "base_quat": reading.body_quat(body),
+        "base_vel": reading.computed(size, lambda: state.v[:size]),
     }
 
 
@@ -76,8 +62,8 @@ def _hands(state: RobotState) -> dict[str, Reading]:
     readings: dict[str, Reading] = {}
     for hand in hands:
         side = f"{hand.name}_" if len(hands) > 1 else ""
-        readings[f"{side}eef_pos"] = site_position(hand.site)
-        readings[f"{side}eef_quat"] = site_quat(hand.site)
+        readings[f"{side}eef_pos"] = reading.site_position(hand.site)
+        readings[f"{side}eef_quat"] = reading.site_quat(hand.site)
     return readings
 
 
@@ -87,8 +73,8 @@ def _grippers(state: RobotState) -> dict[str, Reading]:
     for name, joints in grippers.items():
         key = name if len(grippers) > 1 else "gripper"
         q, v = state.joint_addresses(joints)
-        readings[f"{key}_qpos"] = joint_positions(q)
-        readings[f"{key}_qvel"] = joint_velocities(v)
+        readings[f"{key}_qpos"] = reading.joint_positions(q)
+        readings[f"{key}_qvel"] = reading.joint_velocities(v)
     return readings
 
 
@@ -123,7 +109,7 @@ def add_contact_sensors(
             type=mujoco.mjtSensor.mjSENS_CONTACT,
             objtype=mujoco.mjtObj.mjOBJ_BODY,
             objname=prefix + link,
-            intprm=[1 << int(FOUND) | 1 << int(FORCE), NET_FORCE, 1],
+            intprm=[FOUND_AND_FORCE, NET_FORCE, 1],
         )
 
 
@@ -143,15 +129,15 @@ def sensors_of(state: RobotState) -> dict[str, Reading]:
     """
     robot, model = state.robot, state.model
     _, v = state.joint_addresses(_body_joints(robot))
-    readings = {"joint_torque": actuator_forces(v)}
+    readings = {"joint_torque": reading.actuator_forces(v)}
     for sensor in robot.sensors:
         first, size = _place(model, state.prefix + sensor.name)
-        readings[sensor.name] = sensor_values(range(first, first + size))
+        readings[sensor.name] = reading.sensor_values(range(first, first + size))
     for frame in _feet(robot):
         first, _ = _place(model, f"{state.prefix}{frame}_contact")
         readings[f"{frame}_contact"] = _found(state.data, first)
         # MuJoCo gives the force of the foot on the ground.
-        readings[f"{frame}_contact_force"] = sensor_values(
+        readings[f"{frame}_contact_force"] = reading.sensor_values(
             range(first + 1, first + 4), negated=True
         )
     for side in robot.hands:
@@ -160,7 +146,7 @@ def sensors_of(state: RobotState) -> dict[str, Reading]:
         if names:
             firsts = [_place(model, name)[0] for name in names]
             readings[f"{side}_touch"] = _pressed(state.data, firsts)
-    return {state.prefix + key: reading for key, reading in readings.items()}
+    return {state.prefix + key: found for key, found in readings.items()}
 
 
 def _feet(robot: RobotDescription) -> dict[str, str]:
@@ -177,13 +163,13 @@ def _touching(robot: RobotDescription, side: str) -> list[str]:
 def _found(data: mujoco.MjData, first: int) -> Reading:
     """Read whether a contact sensor has a contact."""
     count = data.sensordata[first : first + 1]
-    return computed(1, lambda: count > 0.0)
+    return reading.computed(1, lambda: count > 0.0)
 
 
 def _pressed(data: mujoco.MjData, firsts: list[int]) -> Reading:
     """Read the norms of the forces of contact sensors, N."""
     places = np.add.outer(firsts, np.arange(1, 4))
-    return computed(
+    return reading.computed(
         len(firsts), lambda: np.linalg.norm(data.sensordata[places], axis=1)
     )
 

@@ -52,27 +52,13 @@ class RenderPreset(StrEnum):
     QUALITY = "quality"
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class _Quality:
-    """Values of MuJoCo's `visual/quality`, and what else a preset sets."""
-
-    visual: dict[str, int]
-    shadows: bool
-    coarse: bool = True
-
-
-def _visual(shadows: int, samples: int, slices: int, stacks: int) -> dict[str, int]:
-    names = ("shadowsize", "offsamples", "numslices", "numstacks")
-    return dict(zip(names, (shadows, samples, slices, stacks), strict=True))
-
-
-_QUALITIES = {
-    RenderPreset.FAST: _Quality(visual=_visual(64, 0, 16, 8), shadows=False),
-    RenderPreset.BALANCED: _Quality(visual=_visual(1024, 0, 28, 16), shadows=True),
-    RenderPreset.QUALITY: _Quality(
-        visual=_visual(4096, 8, 28, 16), shadows=True, coarse=False
-    ),
+QUALITY_FIELDS = ("shadowsize", "offsamples", "numslices", "numstacks")
+QUALITIES = {
+    RenderPreset.FAST: (64, 0, 16, 8),
+    RenderPreset.BALANCED: (1024, 0, 28, 16),
+    RenderPreset.QUALITY: (4096, 8, 28, 16),
 }
+"""Values of these fields of MuJoCo's `visual/quality`."""
 
 
 def make_renderer(
@@ -102,7 +88,7 @@ def make_renderer(
         software = gl_backend.activate().software
         preset = RenderPreset.FAST if software else RenderPreset.QUALITY
     try:
-        return Renderer(model, width, height, _QUALITIES[RenderPreset(preset)])
+        return Renderer(model, width, height, RenderPreset(preset))
     except (mujoco.FatalError, AttributeError, ImportError, RuntimeError) as error:
         raise DeviceError(
             f"This machine cannot draw a picture: {error}. Install OpenGL: "
@@ -122,11 +108,12 @@ class Renderer:
     """
 
     def __init__(
-        self, model: mujoco.MjModel, width: int, height: int, quality: _Quality
+        self, model: mujoco.MjModel, width: int, height: int, preset: RenderPreset
     ) -> None:
         self.model, self.width, self.height = model, width, height
-        self._floors = coarse_floors(model) if quality.coarse else {}
-        self._culls = not quality.shadows  # a shadow may fall into the picture
+        coarse, shadows = preset != RenderPreset.QUALITY, preset != RenderPreset.FAST
+        self._floors = coarse_floors(model) if coarse else {}
+        self._culls = not shadows  # a shadow may fall into the picture
         self._option = mujoco.MjvOption()
         self._area = mujoco.MjrRect(0, 0, width, height)
         self._colors = np.empty((height, width, 3), dtype=np.uint8)
@@ -134,7 +121,7 @@ class Renderer:
         self._gl: Any = None
         self._context: mujoco.MjrContext | None = None
         gl_context = gl_backend.context_class()
-        with _settings_of(model, quality, self._floors, (width, height)):
+        with _settings_of(model, preset, self._floors, (width, height)):
             self.scene = mujoco.MjvScene(model, maxgeom=MAX_GEOMS)
             self._gl = gl_context(width, height)
             self._gl.make_current()
@@ -142,8 +129,8 @@ class Renderer:
             self._context = mujoco.MjrContext(model, scale)
         mujoco.mjr_setBuffer(int(mujoco.mjtFramebuffer.mjFB_OFFSCREEN), self._context)
         self._context.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
-        self.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = quality.shadows
-        self.scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = quality.shadows
+        self.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = shadows
+        self.scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = shadows
 
     def update_scene(
         self, data: mujoco.MjData, camera: int | str | mujoco.MjvCamera = -1
@@ -321,14 +308,14 @@ def _beside(across: Array, z: Array, half_angle: float) -> Array:
 @contextmanager
 def _settings_of(
     model: mujoco.MjModel,
-    quality: _Quality,
+    preset: RenderPreset,
     floors: dict[int, Floor],
     size: tuple[int, int],
 ) -> Iterator[None]:
     """Write settings into the model, where a new context reads them once."""
     wanted = [
         (model.vis.global_, {"offwidth": size[0], "offheight": size[1]}),
-        (model.vis.quality, quality.visual),
+        (model.vis.quality, dict(zip(QUALITY_FIELDS, QUALITIES[preset], strict=True))),
     ]
     kept = [(part, {k: getattr(part, k) for k in values}) for part, values in wanted]
     planes = list(floors)

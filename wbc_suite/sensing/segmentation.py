@@ -48,20 +48,12 @@ class Labels:
         ]
         self.names: dict[SegmentationLevel, dict[int, str]] = {}
         self._numbers: dict[SegmentationLevel, NDArray[np.int32]] = {}
-        for level, found in zip(
-            SegmentationLevel, (elements, instances, classes), strict=True
-        ):
-            distinct = (
-                found if level == SegmentationLevel.ELEMENT else [*dict.fromkeys(found)]
-            )
-            number = {name: i for i, name in enumerate(distinct, 1)}
-            self.names[level] = {i: name for i, name in enumerate(distinct, 1)}
-            numbers = (
-                list(range(1, model.ngeom + 1))
-                if level == SegmentationLevel.ELEMENT
-                else [number[name] for name in found]
-            )
-            self._numbers[level] = np.array([*numbers, 0], dtype=np.int32)
+        found = elements, instances, classes
+        for level, names in zip(SegmentationLevel, found, strict=True):
+            numbers = {name: i for i, name in enumerate(dict.fromkeys(names), 1)}
+            self.names[level] = {i: name for name, i in numbers.items()}
+            of_geoms = [*(numbers[name] for name in names), 0]
+            self._numbers[level] = np.array(of_geoms, dtype=np.int32)
 
     def largest(self, level: SegmentationLevel) -> int:
         """Return the largest number of a level."""

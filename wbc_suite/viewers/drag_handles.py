@@ -4,7 +4,6 @@ Each client has its own set, one handle per limb. A handle shared by all clients
 send one client's drag back to the others, and could not have a mode for each.
 """
 
-import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
@@ -15,11 +14,7 @@ import pinocchio as pin
 
 from wbc_suite.devices.action_ports import LimbKind
 from wbc_suite.viewers.scene_setup import place
-from wbc_suite.viewers.session_state import (
-    LimbInfo,
-    LimbStatus,
-    Snapshot,
-)
+from wbc_suite.viewers.session_state import LimbInfo, LimbStatus, Snapshot
 
 if TYPE_CHECKING:
     import viser
@@ -78,7 +73,6 @@ class DragHandles:
     def __init__(self, session: "Session", scales: Mapping[str, float]) -> None:
         self._session, self._limbs = session, session.info.limbs
         self._scales = scales
-        self._lock = threading.Lock()
         self._clients: dict[int, _Client] = {}
         self._last = session.snapshot
 
@@ -89,52 +83,42 @@ class DragHandles:
             name: self._add(client, limb, limbs[name])
             for name, limb in self._limbs.items()
         }
-        with self._lock:
-            self._clients[client.client_id] = _Client(handles)
+        self._clients[client.client_id] = _Client(handles)
 
     def remove_client(self, client: int) -> None:
         """Forget a client, and release what it held."""
-        with self._lock:
-            self._clients.pop(client, None)
+        self._clients.pop(client, None)
         self._session.leave(client)
 
     def handle(self, client: int, name: str) -> "viser.TransformControlsHandle":
         """Return one client's handle of one limb."""
-        with self._lock:
-            return self._clients[client].handles[name].node
+        return self._clients[client].handles[name].node
 
     def mode(self, client: int) -> HandleMode:
         """Return the mode of one client's handles."""
-        with self._lock:
-            return self._clients[client].mode
+        return self._clients[client].mode
 
     def set_mode(self, client: int, mode: HandleMode) -> None:
         """Show arrows, arcs or both to one client."""
-        with self._lock:
-            self._clients[client].mode = mode
-            handles = dict(self._clients[client].handles)
-        for name, handle in handles.items():
+        self._clients[client].mode = mode
+        for name, handle in self._clients[client].handles.items():
             moves, turns = _controls(self._limbs[name].kind, mode)
             handle.node.disable_axes = handle.node.disable_sliders = not moves
             handle.node.disable_rotations = not turns
 
-    def show(self, client: int, name: str, *, shown: bool) -> None:
+    def show(self, client: int, name: str, shown: bool) -> None:
         """Show or hide one limb's handle to one client."""
-        with self._lock:
-            self._clients[client].handles[name].hidden = not shown
+        self._clients[client].handles[name].hidden = not shown
 
     def recall(self, client: int) -> None:
         """Move a client's handles back to their targets."""
-        with self._lock:
-            for handle in self._clients[client].handles.values():
-                handle.apart = False
+        for handle in self._clients[client].handles.values():
+            handle.apart = False
 
     def update(self, snapshot: Snapshot) -> None:
         """Move every handle that is not dragged to its target."""
         was_reset, self._last = snapshot.epoch != self._last.epoch, snapshot
-        with self._lock:
-            clients = list(self._clients.items())
-        for number, client in clients:
+        for number, client in self._clients.copy().items():  # others may come or leave
             for name, handle in client.handles.items():
                 status = snapshot.limbs[name]
                 if was_reset:

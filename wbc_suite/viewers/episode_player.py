@@ -61,7 +61,6 @@ class PlayerStatus:
         frame: Index of the displayed state.
         position: Time since the start of the episode, s.
         playing: Whether it plays.
-        speed: Playback speed; 1 is as recorded.
         error: Why the chosen episode cannot be displayed; else empty.
     """
 
@@ -69,7 +68,6 @@ class PlayerStatus:
     frame: int
     position: float
     playing: bool
-    speed: float
     error: str = ""
 
 
@@ -91,7 +89,7 @@ class EpisodePlayer:
         if not names:
             raise DatasetError("There are no episodes to play.")
         self.names = tuple(names)
-        self._load, self._clock, self._lock = load, clock, threading.Lock()
+        self._load, self._clock, self._lock = load, clock, threading.RLock()
         self._clip: Clip | None = None
         self._loaded = self._wanted = 0
         self._position, self._speed, self._playing = 0.0, 1.0, True
@@ -101,7 +99,18 @@ class EpisodePlayer:
     def status(self) -> PlayerStatus:
         """State of the playback."""
         with self._lock:
-            return self._status()
+            clip, frame, position = self._clip, 0, 0.0
+            if clip is not None:
+                position = min(self._position, clip.length)
+                after = np.searchsorted(clip.times, position + 1e-9, side="right")
+                frame = int(after) - 1
+            return PlayerStatus(
+                clip=clip,
+                frame=frame,
+                position=position,
+                playing=self._playing,
+                error=self._error,
+            )
 
     def toggle(self) -> None:
         """Pause or resume; at the end, play from the start."""
@@ -122,13 +131,12 @@ class EpisodePlayer:
             self._playing = False
             if self._clip is not None:
                 last = len(self._clip.times) - 1
-                at = int(np.clip(self._status().frame + frames, 0, last))
+                at = int(np.clip(self.status.frame + frames, 0, last))
                 self._position = float(self._clip.times[at])
 
     def choose(self, name: str) -> None:
         """Go to the start of an episode."""
-        with self._lock:
-            self._choose(self.names.index(name))
+        self._choose(self.names.index(name))
 
     def skip(self, episodes: int) -> None:
         """Move by a number of episodes; the first follows the last."""
@@ -159,25 +167,12 @@ class EpisodePlayer:
             if self._clip is not None and self._playing:
                 self._position += self._speed * elapsed
                 if self._position > self._clip.length + PAUSE * self._speed:
-                    self._choose((self._wanted + 1) % len(self.names))
-            return self._status()
+                    self.skip(1)
+            return self.status
 
     def _choose(self, wanted: int) -> None:
-        self._wanted, self._position, self._error = wanted, 0.0, ""
-
-    def _status(self) -> PlayerStatus:
-        clip, frame, position = self._clip, 0, 0.0
-        if clip is not None:
-            position = min(self._position, clip.length)
-            frame = int(np.searchsorted(clip.times, position + 1e-9, side="right")) - 1
-        return PlayerStatus(
-            clip=clip,
-            frame=frame,
-            position=position,
-            playing=self._playing,
-            speed=self._speed,
-            error=self._error,
-        )
+        with self._lock:
+            self._wanted, self._position, self._error = wanted, 0.0, ""
 
 
 def open_player(
@@ -214,12 +209,8 @@ def load_clip(env: RobotEnv, episode: Episode, *, by_states: bool) -> Clip:
         for _, difference, _ in play_actions(env, episode):
             states.append(env.physics_state)
             worst = max(worst, float(np.abs(difference).max()))
-        exact = "bit by bit as recorded"
-        words.append(
-            exact
-            if worst == 0.0
-            else f"replayed actions, largest difference {worst:.1e}"
-        )
+        inexact = f"replayed actions, largest difference {worst:.1e}"
+        words.append("bit by bit as recorded" if worst == 0.0 else inexact)
     count = len(states)
     stacked = np.array(states)
     passed = stacked[:, 0] - stacked[0, 0]

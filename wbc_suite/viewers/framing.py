@@ -6,7 +6,7 @@ from typing import Literal, TypeAlias
 import mujoco
 import numpy as np
 
-from wbc_suite.typing import Matrix, Vector
+from wbc_suite.typing import Matrix
 
 __all__ = ["VIEWS", "View", "ViewName", "fit_camera", "subject_corners"]
 
@@ -51,31 +51,22 @@ def fit_camera(view: View, points: Matrix, *, aspect: float) -> mujoco.MjvCamera
         points: Points of the subject, m, world axes, shape (n, 3).
         aspect: Width over height of the picture.
     """
-    right, up, forward = _camera_axes(view)
-    local = points @ np.column_stack([right, up, forward])
+    azimuth, elevation = np.radians([view.azimuth, view.elevation])
+    level = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+    forward = np.cos(elevation) * level + np.sin(elevation) * np.array([0.0, 0.0, 1.0])
+    right = np.array([np.sin(azimuth), -np.cos(azimuth), 0.0])
+    axes = np.array([right, np.cross(right, forward), forward])
+    local = points @ axes.T
     middle = (local.min(axis=0) + local.max(axis=0)) / 2.0
     offset = local - middle
     tangent = np.tan(np.radians(view.fov) / 2.0) / view.margin
     reach = np.maximum(np.abs(offset[:, 1]), np.abs(offset[:, 0]) / aspect)
     camera = mujoco.MjvCamera()
     camera.type = mujoco.mjtCamera.mjCAMERA_FREE
-    camera.lookat[:] = middle @ np.vstack([right, up, forward])
+    camera.lookat[:] = middle @ axes
     camera.azimuth, camera.elevation = view.azimuth, view.elevation
     camera.distance = float(np.max(reach / tangent - offset[:, 2]))
     return camera
-
-
-def _camera_axes(view: View) -> tuple[Vector, Vector, Vector]:
-    azimuth, elevation = np.radians([view.azimuth, view.elevation])
-    forward = np.array(
-        [
-            np.cos(elevation) * np.cos(azimuth),
-            np.cos(elevation) * np.sin(azimuth),
-            np.sin(elevation),
-        ]
-    )
-    right = np.array([np.sin(azimuth), -np.cos(azimuth), 0.0])
-    return right, np.cross(right, forward), forward
 
 
 def subject_corners(

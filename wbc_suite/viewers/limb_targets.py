@@ -1,7 +1,7 @@
 """Targets of the limbs that clients drag: ownership, clutch, and release."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -10,10 +10,9 @@ import pinocchio as pin
 from wbc_suite.devices.action_ports import LimbKind
 from wbc_suite.devices.pipeline.limb_pipeline import LimbPipeline
 from wbc_suite.devices.state import LimbInput
-from wbc_suite.errors import UnknownNameError
 from wbc_suite.viewers.session_state import LimbInfo, LimbStatus
 
-__all__ = ["LimbTarget", "LimbTargets", "Ownership"]
+__all__ = ["LimbTarget", "Ownership"]
 
 HOLD_TIMEOUT = 20.0  # s; a client that sends nothing for so long loses its limb
 MAX_POSITION_ERROR = 0.03  # m; a released target further than this from its limb ...
@@ -57,7 +56,7 @@ class Ownership:
 
 @dataclass(slots=True)
 class LimbTarget:
-    """A limb of the pipeline that several clients may drag.
+    """A limb of the pipeline that several clients may drag; a session locks the calls.
 
     Attributes:
         stages: Pipeline from the clients' input to the limb's target.
@@ -68,7 +67,7 @@ class LimbTarget:
     """
 
     stages: LimbPipeline
-    ownership: Ownership
+    ownership: Ownership = field(default_factory=Ownership)
     enabled: bool = True
     rest: int | None = None
 
@@ -112,101 +111,65 @@ class LimbTarget:
                 position = np.append(target.translation[:2], measured.translation[2])
                 return pin.SE3(target.rotation, position)
 
-
-class LimbTargets:
-    """All limbs of a session; its methods are called under the session's lock.
-
-    Args:
-        stages: Pipeline of each limb.
-
-    Attributes:
-        limbs: Targets by limb name.
-    """
-
-    def __init__(self, stages: Mapping[str, LimbPipeline]) -> None:
-        self.limbs = {
-            name: LimbTarget(limb, Ownership()) for name, limb in stages.items()
-        }
-
-    def grab(
-        self, name: str, client: int, T_world_input: pin.SE3, *, now: float
-    ) -> bool:
-        """Take a limb and latch the input to it.
-
-        Returns:
-            False if another client holds it, or the pose is invalid.
-        """
-        limb = self._limb(name)
-        if not (_is_valid(T_world_input) and limb.ownership.take(client, now)):
-            return False
-        if limb.enabled:
-            limb.stages.release()
-            limb.stages.follow(LimbInput(pose=T_world_input))
-        return True
-
     def drag(
-        self, name: str, client: int, T_world_input: pin.SE3, *, now: float
+        self, client: int, T_world_input: pin.SE3, *, now: float, grab: bool = False
     ) -> bool:
-        """Move a limb's target with the input; returns as `grab`."""
-        limb = self._limb(name)
-        if not (_is_valid(T_world_input) and limb.ownership.take(client, now)):
-            return False
-        if limb.enabled:
-            limb.stages.follow(LimbInput(pose=T_world_input))
-        return True
-
-    def release(self, name: str, client: int) -> None:
-        """Release a limb; its target stays, and the limb goes on towards it."""
-        limb = self._limb(name)
-        if limb.ownership.release(client):
-            limb.stages.release()
-            limb.rest = 0
-
-    def enable(self, name: str, enabled: bool) -> None:
-        """Engage or disengage a limb's clutch; its target does not move."""
-        limb = self._limb(name)
-        limb.enabled = enabled
-        limb.stages.release()
-
-    def settle(
-        self, status: Mapping[str, LimbStatus], *, period: float, now: float
-    ) -> None:
-        """Move a released target back to its limb once the limb rests short of it.
-
-        Otherwise a target that was dragged far out of reach would have to be dragged
-        all the way back before the limb moves again. Targets of limbs that were not
-        released lately stay.
+        """Take the limb and move its target with the input.
 
         Args:
-            status: Status of all limbs before this tick.
+            client: Who drags.
+            T_world_input: Pose of the input.
+            now: Wall time, s.
+            grab: Whether to latch the input first; the target does not move then.
+
+        Returns:
+            False if another client holds the limb, or the pose is invalid.
+        """
+        if not (_is_valid(T_world_input) and self.ownership.take(client, now)):
+            return False
+        if self.enabled:
+            if grab:
+                self.stages.release()
+            self.stages.follow(LimbInput(pose=T_world_input))
+        return True
+
+    def release(self, client: int) -> None:
+        """Release the limb; its target stays, and the limb goes on towards it."""
+        if self.ownership.release(client):
+            self.stages.release()
+            self.rest = 0
+
+    def enable(self, enabled: bool) -> None:
+        """Engage or disengage the clutch; the target does not move."""
+        self.enabled = enabled
+        self.stages.release()
+
+    def settle(self, before: LimbStatus, *, period: float, now: float) -> None:
+        """Move a released target back to the limb once the limb rests short of it.
+
+        Otherwise a target that was dragged far out of reach would have to be dragged
+        all the way back before the limb moves again. The target of a limb that was not
+        released lately stays.
+
+        Args:
+            before: Status of the limb before this tick.
             period: Time since then, s.
             now: Wall time, s.
         """
-        for name, limb in self.limbs.items():
-            if limb.rest is None:
-                continue
-            before, measured = status[name], limb.stages.port.measure()
-            step = np.linalg.norm(measured.translation - before.measured.translation)
-            limb.rest = limb.rest + 1 if step < REST_SPEED * period else 0
-            if limb.ownership.holder(now) is not None or before.reached:
-                limb.rest = None
-            elif limb.rest * period > REST_TIME:
-                limb.rest = None
-                if (
-                    before.position_error > MAX_POSITION_ERROR
-                    or before.orientation_error > MAX_ORIENTATION_ERROR
-                ):
-                    limb.stages.place(measured)
-
-    def reset(self) -> None:
-        """Forget which limbs were released."""
-        for limb in self.limbs.values():
-            limb.rest = None
-
-    def _limb(self, name: str) -> LimbTarget:
-        if name not in self.limbs:
-            raise UnknownNameError("limb", name, self.limbs)
-        return self.limbs[name]
+        if self.rest is None:
+            return
+        measured = self.stages.port.measure()
+        step = np.linalg.norm(measured.translation - before.measured.translation)
+        self.rest = self.rest + 1 if step < REST_SPEED * period else 0
+        if self.ownership.holder(now) is not None or before.reached:
+            self.rest = None
+        elif self.rest * period > REST_TIME:
+            self.rest = None
+            if (
+                before.position_error > MAX_POSITION_ERROR
+                or before.orientation_error > MAX_ORIENTATION_ERROR
+            ):
+                self.stages.place(measured)
 
 
 def _is_valid(T_world_input: pin.SE3) -> bool:

@@ -9,15 +9,10 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import mujoco
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from wbc_suite.robot.triangle_meshes import (
-    TriangleMesh,
-    box_mesh,
-    capsule_mesh,
-    cylinder_mesh,
-    ellipsoid_mesh,
-    merge,
-)
+from wbc_suite.robot import triangle_meshes
+from wbc_suite.robot.triangle_meshes import TriangleMesh
 from wbc_suite.typing import Matrix, Vector
 
 if TYPE_CHECKING:
@@ -46,15 +41,12 @@ class ModelScene:
     Args:
         server: Server whose scene is drawn on.
         model: Model to draw; static geoms are drawn, planes are not.
-        root: Name of the scene node above all bodies.
     """
 
-    def __init__(
-        self, server: "viser.ViserServer", model: mujoco.MjModel, root: str = "/world"
-    ) -> None:
+    def __init__(self, server: "viser.ViserServer", model: mujoco.MjModel) -> None:
         self._server = server
         self._parents = model.body_parentid.copy()
-        self._names = _node_names(model, root)
+        self._names = _node_names(model)
         self._frames = [
             server.scene.add_frame(name, show_axes=False) for name in self._names
         ]
@@ -62,7 +54,21 @@ class ModelScene:
         self.collision_shapes: list[viser.MeshHandle] = []
         self.visual_shapes: list[viser.MeshHandle] = []
         for (body, collision, colour), parts in _parts(model).items():
-            self._add_mesh(body, collision, colour, merge(parts))
+            shapes = self.collision_shapes if collision else self.visual_shapes
+            kind, mesh = (
+                "collision" if collision else "visual",
+                triangle_meshes.merge(parts),
+            )
+            handle = server.scene.add_mesh_simple(
+                f"{self._names[body]}/{kind}_{len(shapes)}",
+                mesh.vertices,
+                mesh.faces,
+                color=tuple(round(255 * c) for c in colour[:3]),  # type: ignore[arg-type]
+                opacity=0.35 if collision else (colour[3] if colour[3] < 1 else None),
+                cast_shadow=not collision,
+                visible=not collision,
+            )
+            shapes.append(handle)
 
     def node(self, body: int) -> str:
         """Return the name of a body's scene node."""
@@ -91,26 +97,6 @@ class ModelScene:
         self._shown[turned, 3:] = poses[turned, 3:]
         return len(moved) + len(turned)
 
-    def _add_mesh(
-        self,
-        body: int,
-        collision: bool,
-        colour: tuple[float, ...],
-        mesh: TriangleMesh,
-    ) -> None:
-        shapes = self.collision_shapes if collision else self.visual_shapes
-        kind = "collision" if collision else "visual"
-        handle = self._server.scene.add_mesh_simple(
-            f"{self._names[body]}/{kind}_{len(shapes)}",
-            mesh.vertices,
-            mesh.faces,
-            color=tuple(round(255 * c) for c in colour[:3]),  # type: ignore[arg-type]
-            opacity=0.35 if collision else (colour[3] if colour[3] < 1 else None),
-            cast_shadow=not collision,
-            visible=not collision,
-        )
-        shapes.append(handle)
-
 
 def relative_poses(
     positions: Matrix, quaternions: Matrix, parents: np.ndarray
@@ -125,15 +111,11 @@ def relative_poses(
     Returns:
         Position and quaternion (wxyz, w >= 0) side by side, shape (n, 7).
     """
-    w, xyz = quaternions[parents, :1], -quaternions[parents, 1:]  # inverse rotation
-    offset = positions - positions[parents]
-    cross = np.cross(xyz, offset)
-    local = offset + 2.0 * (w * cross + np.cross(xyz, cross))
-    w_b, xyz_b = quaternions[:, :1], quaternions[:, 1:]
-    real = w * w_b - np.sum(xyz * xyz_b, axis=1, keepdims=True)
-    imaginary = w * xyz_b + w_b * xyz + np.cross(xyz, xyz_b)
-    sign = np.where(real < 0.0, -1.0, 1.0)
-    return np.concatenate([local, sign * real, sign * imaginary], axis=1)
+    rotations = Rotation.from_quat(quaternions, scalar_first=True)
+    to_parents = rotations[parents].inv()
+    local = to_parents.apply(positions - positions[parents])
+    wxyz = (to_parents * rotations).as_quat(canonical=True, scalar_first=True)
+    return np.concatenate([local, wxyz], axis=1)
 
 
 def robot_box(
@@ -148,24 +130,20 @@ def robot_box(
         positions: Positions of all bodies in the world, shape (nbody, 3).
         quaternions: Their orientations (wxyz), shape (nbody, 4).
     """
-    bodies = [model.body(body).name for body in range(model.nbody)]
-    prefix = "robot0_" if any(n.startswith("robot0_") for n in bodies) else ""
-    corners = []
-    reach = np.abs(model.geom_aabb[:, :3]) + model.geom_aabb[:, 3:]
-    radii = np.linalg.norm(reach, axis=1)
-    for geom in np.flatnonzero(model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE):
-        body, radius = model.geom_bodyid[geom], radii[geom]
-        if body == 0 or not bodies[body].startswith(prefix):
-            continue
-        place = np.empty(3)
-        mujoco.mju_rotVecQuat(place, model.geom_pos[geom], quaternions[body])
-        corners.append(positions[body] + place + np.array([[-radius], [radius]]))
-    box = np.array(corners)
-    return box[:, 0].min(axis=0), box[:, 1].max(axis=0)
+    names = [model.body(body).name for body in range(model.nbody)]
+    prefix = "robot0_" if any(n.startswith("robot0_") for n in names) else ""
+    own = np.array([body > 0 and n.startswith(prefix) for body, n in enumerate(names)])
+    bodies = model.geom_bodyid
+    drawn = own[bodies] & (model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE)
+    rotations = Rotation.from_quat(quaternions[bodies], scalar_first=True)
+    centres = (positions[bodies] + rotations.apply(model.geom_pos))[drawn]
+    reach = np.abs(model.geom_aabb[drawn, :3]) + model.geom_aabb[drawn, 3:]
+    radii = np.linalg.norm(reach, axis=1, keepdims=True)
+    return (centres - radii).min(axis=0), (centres + radii).max(axis=0)
 
 
-def _node_names(model: mujoco.MjModel, root: str) -> list[str]:
-    names = [root]
+def _node_names(model: mujoco.MjModel) -> list[str]:
+    names = ["/world"]
     for body in range(1, model.nbody):
         own = model.body(body).name.replace("/", "_") or f"body_{body}"
         names.append(f"{names[model.body_parentid[body]]}/{own}")
@@ -194,17 +172,22 @@ def geom_mesh(model: mujoco.MjModel, geom: int) -> TriangleMesh | None:
     size = model.geom_size[geom]
     match model.geom_type[geom]:
         case mujoco.mjtGeom.mjGEOM_BOX:
-            return box_mesh(size)
+            return triangle_meshes.box_mesh(size)
         case mujoco.mjtGeom.mjGEOM_SPHERE:
-            return ellipsoid_mesh(np.full(3, size[0]))
+            return triangle_meshes.ellipsoid_mesh(np.full(3, size[0]))
         case mujoco.mjtGeom.mjGEOM_ELLIPSOID:
-            return ellipsoid_mesh(size)
+            return triangle_meshes.ellipsoid_mesh(size)
         case mujoco.mjtGeom.mjGEOM_CAPSULE:
-            return capsule_mesh(size[0], size[1])
+            return triangle_meshes.capsule_mesh(size[0], size[1])
         case mujoco.mjtGeom.mjGEOM_CYLINDER:
-            return cylinder_mesh(size[0], size[1])
+            return triangle_meshes.cylinder_mesh(size[0], size[1])
         case mujoco.mjtGeom.mjGEOM_MESH:
-            return _asset_mesh(model, int(model.geom_dataid[geom]))
+            asset = model.mesh(model.geom_dataid[geom])
+            vertex, face = asset.vertadr[0], asset.faceadr[0]
+            return TriangleMesh(
+                model.mesh_vert[vertex : vertex + asset.vertnum[0]].astype(np.float64),
+                model.mesh_face[face : face + asset.facenum[0]].astype(np.int64),
+            )
         case _:
             return None
 
@@ -218,7 +201,9 @@ def colored_meshes(model: mujoco.MjModel, geom: int) -> list[tuple[Rgba, Triangl
     mesh, material = geom_mesh(model, geom), int(model.geom_matid[geom])
     if mesh is None:
         return []
-    rgba, pixels = _color_of(model, geom), _pixels_of(model, material)
+    rgba, pixels = model.geom_rgba[geom], _pixels_of(model, material)
+    if material >= 0 and np.array_equal(rgba, DEFAULT_COLOR):
+        rgba = model.mat_rgba[material]
     if pixels is None:
         return [(_rgba(rgba), mesh)]
     if len(pixels) > 1 or model.geom_type[geom] != mujoco.mjtGeom.mjGEOM_MESH:
@@ -232,13 +217,6 @@ def colored_meshes(model: mujoco.MjModel, geom: int) -> list[tuple[Rgba, Triangl
         (_rgba([*palette[k] / 255.0, rgba[3]]), _submesh(mesh, column == k))
         for k in np.unique(column)
     ]
-
-
-def _color_of(model: mujoco.MjModel, geom: int) -> np.ndarray:
-    """Return the colour that MuJoCo draws: the geom's, or else its material's."""
-    own, material = model.geom_rgba[geom], model.geom_matid[geom]
-    is_default = material >= 0 and np.array_equal(own, DEFAULT_COLOR)
-    return model.mat_rgba[material] if is_default else own
 
 
 def _rgba(values: np.ndarray | list[float]) -> Rgba:
@@ -261,11 +239,3 @@ def _submesh(mesh: TriangleMesh, chosen: np.ndarray) -> TriangleMesh:
     """Return some faces of a mesh and the vertices that they use."""
     used, faces = np.unique(mesh.faces[chosen], return_inverse=True)
     return TriangleMesh(mesh.vertices[used], faces.reshape(-1, 3))
-
-
-def _asset_mesh(model: mujoco.MjModel, mesh: int) -> TriangleMesh:
-    vertex, face = model.mesh_vertadr[mesh], model.mesh_faceadr[mesh]
-    return TriangleMesh(
-        model.mesh_vert[vertex : vertex + model.mesh_vertnum[mesh]].astype(np.float64),
-        model.mesh_face[face : face + model.mesh_facenum[mesh]].astype(np.int64),
-    )

@@ -11,13 +11,7 @@ from numpy.typing import NDArray
 from wbc_suite.errors import UnknownNameError
 from wbc_suite.sensing.renderer import RenderPreset, make_renderer
 from wbc_suite.typing import Vector
-from wbc_suite.viewers.framing import (
-    VIEWS,
-    View,
-    ViewName,
-    fit_camera,
-    subject_corners,
-)
+from wbc_suite.viewers.framing import VIEWS, View, ViewName, fit_camera, subject_corners
 
 if TYPE_CHECKING:
     from wbc_suite.robot import RobotDescription
@@ -221,30 +215,21 @@ def add_studio(spec: mujoco.MjSpec, *, ground: float = 0.0) -> None:
         contype=0,
         conaffinity=0,
     )
-    key, fill, rim = 0.50, 0.22, 0.18
-    _add_sun(spec, "studio_key", toward=[-0.55, 0.45, -1.2], diffuse=key, shadow=True)
-    _add_sun(spec, "studio_fill", toward=[-0.9, -0.9, -0.5], diffuse=fill)
-    _add_sun(spec, "studio_rim", toward=[1.0, 0.3, -0.6], diffuse=rim)
-
-
-def _add_sun(
-    spec: mujoco.MjSpec,
-    name: str,
-    *,
-    toward: list[float],
-    diffuse: float,
-    shadow: bool = False,
-) -> None:
-    spec.worldbody.add_light(
-        name=name,
-        type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
-        pos=[-3 * x for x in toward],
-        dir=toward,
-        diffuse=[diffuse] * 3,
-        ambient=[0, 0, 0],
-        specular=[0.25 * diffuse] * 3,
-        castshadow=shadow,
-    )
+    for name, toward, diffuse in (
+        ("key", [-0.55, 0.45, -1.2], 0.50),
+        ("fill", [-0.9, -0.9, -0.5], 0.22),
+        ("rim", [1.0, 0.3, -0.6], 0.18),
+    ):
+        spec.worldbody.add_light(
+            name=f"studio_{name}",
+            type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
+            pos=[-3 * x for x in toward],
+            dir=toward,
+            diffuse=[diffuse] * 3,
+            ambient=[0, 0, 0],
+            specular=[0.25 * diffuse] * 3,
+            castshadow=name == "key",
+        )
 
 
 def _find_view(model: mujoco.MjModel, camera: View | str) -> View | str:

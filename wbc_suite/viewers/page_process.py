@@ -7,6 +7,7 @@ answer only where it needs one: fast drags do not wait for the loop.
 """
 
 import contextlib
+import functools
 import logging
 import multiprocessing
 import signal
@@ -19,7 +20,6 @@ from typing import Any, TypeAlias
 import pinocchio as pin
 
 from wbc_suite.errors import DeviceError
-from wbc_suite.recording.episode_control import EpisodeCommand
 from wbc_suite.viewers.loop_timing import raise_priority
 from wbc_suite.viewers.session_state import SessionInfo, Snapshot
 from wbc_suite.viewers.teleop_session import TeleopSession
@@ -31,8 +31,10 @@ log = logging.getLogger(__name__)
 POLL_PERIOD = 0.05  # s
 EXIT_TIMEOUT = 10.0  # s; a page that has not ended by then is killed
 
+QUERIES = ("snapshot", "grab")
+"""Requests that have an answer, for which the page waits."""
+
 COMMANDS = (
-    "drag",
     "release",
     "leave",
     "enable",
@@ -41,7 +43,7 @@ COMMANDS = (
     "reset",
     "command_episode",
 )
-"""Methods of the session that the page calls without waiting for an answer."""
+"""Methods of the session that the page calls as they are, without an answer."""
 
 
 class PageProcess:
@@ -63,15 +65,6 @@ class PageProcess:
         self.url, self.token = "", None
         self._session, self._error = session, ""
         self._opened, self._stopping = threading.Event(), threading.Event()
-        self._queries: dict[str, Callable[..., Any]] = {
-            "snapshot": lambda: session.snapshot,
-            "grab": session.grab,
-        }
-        self._commands: dict[str, Callable[..., Any]] = {
-            "opened": self._set_opened,
-            "failed": self._set_failed,
-            **{name: getattr(session, name) for name in COMMANDS},
-        }
         context = multiprocessing.get_context("spawn")
         self._pipe, remote = context.Pipe()
         self._process = context.Process(
@@ -125,10 +118,21 @@ class PageProcess:
             if self._pipe.poll(POLL_PERIOD):
                 self._session.timer.idle.wait(POLL_PERIOD)  # both need Python's lock
                 request, arguments = self._pipe.recv()
-                if request in self._queries:
-                    self._pipe.send(self._queries[request](*arguments))
-                else:
-                    self._commands[request](*arguments)
+                answer = self._handle(request, *arguments)
+                if request in QUERIES:
+                    self._pipe.send(answer)
+
+    def _handle(self, request: str, *arguments: Any) -> Any:
+        match request:
+            case "opened":
+                self.url, self.token = arguments
+                self._opened.set()
+            case "failed":
+                (self._error,) = arguments
+            case "snapshot":
+                return self._session.snapshot
+            case _:
+                return getattr(self._session, request)(*arguments)
 
     def _end_session(self) -> None:
         """Release what clients held, and end the session, after the page is lost."""
@@ -141,16 +145,11 @@ class PageProcess:
                 self._session.leave(status.holder)
         self._session.quit.set()
 
-    def _set_opened(self, url: str, token: str | None) -> None:
-        self.url, self.token = url, token
-        self._opened.set()
-
-    def _set_failed(self, error: str) -> None:
-        self._error = error
-
 
 class RemoteSession:
     """A `TeleopSession` in another process.
+
+    Its other methods are those named in `COMMANDS`.
 
     Args:
         pipe: Connection to the process with the session.
@@ -164,64 +163,35 @@ class RemoteSession:
         self.info = info
         self.lost = threading.Event()
         self._pipe, self._lock = pipe, threading.Lock()
-        self._last: Snapshot = self.query("snapshot")
+        self._last: Snapshot = self.call("snapshot")
 
     @property
     def snapshot(self) -> Snapshot:
         """The newest state, or the last one before the session was lost."""
-        self._last = self.query("snapshot") or self._last
+        self._last = self.call("snapshot") or self._last
         return self._last
 
     def grab(self, name: str, client: int, T_world_input: pin.SE3) -> bool:
         """See `TeleopSession`."""
-        return bool(self.query("grab", name, client, T_world_input))
+        return bool(self.call("grab", name, client, T_world_input))
 
     def drag(self, name: str, client: int, T_world_input: pin.SE3) -> None:
         """See `TeleopSession`; returns before the session has handled it."""
         arrived = time.perf_counter()  # the same clock in all processes
-        self.command("drag", name, client, T_world_input, arrived)
+        self.call("drag", name, client, T_world_input, arrived)
 
-    def release(self, name: str, client: int) -> None:
-        """See `TeleopSession`."""
-        self.command("release", name, client)
+    def __getattr__(self, name: str) -> Callable[..., None]:
+        """Return a method of `TeleopSession` that sends its call."""
+        if name not in COMMANDS:
+            raise AttributeError(f"A session in another process has no '{name}'.")
+        return functools.partial(self.call, name)
 
-    def leave(self, client: int) -> None:
-        """See `TeleopSession`."""
-        self.command("leave", client)
-
-    def enable(self, name: str, enabled: bool) -> None:
-        """See `TeleopSession`."""
-        self.command("enable", name, enabled)
-
-    def set_gripper(self, name: str, index: int, value: float) -> None:
-        """See `TeleopSession`."""
-        self.command("set_gripper", name, index, value)
-
-    def pause(self, paused: bool) -> None:
-        """See `TeleopSession`."""
-        self.command("pause", paused)
-
-    def reset(self) -> None:
-        """See `TeleopSession`."""
-        self.command("reset")
-
-    def command_episode(self, command: EpisodeCommand) -> None:
-        """See `TeleopSession`."""
-        self.command("command_episode", command)
-
-    def query(self, request: str, *arguments: Any) -> Any:
-        """Send a request and return its answer; None after the session was lost."""
-        return self._send(request, arguments, answered=True)
-
-    def command(self, request: str, *arguments: Any) -> None:
-        """Send a request that has no answer."""
-        self._send(request, arguments, answered=False)
-
-    def _send(self, request: str, arguments: tuple[Any, ...], *, answered: bool) -> Any:
+    def call(self, request: str, *arguments: Any) -> Any:
+        """Send a request; return the answer of a query, None if the session is lost."""
         with self._lock:
             try:
                 self._pipe.send((request, arguments))
-                return self._pipe.recv() if answered else None
+                return self._pipe.recv() if request in QUERIES else None
             except (EOFError, OSError):
                 self.lost.set()
                 return None
@@ -246,10 +216,10 @@ def _serve(
     try:
         site = PageServer(host, port)
     except DeviceError as error:
-        session.command("failed", str(error))
+        session.call("failed", str(error))
         return
     page = TeleopPage(session, site, label=label)
     page.start()
-    session.command("opened", site.url, site.token)
+    session.call("opened", site.url, site.token)
     session.lost.wait()
     page.stop()

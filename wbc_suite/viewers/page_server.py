@@ -9,27 +9,18 @@ import asyncio
 import contextlib
 import io
 import logging
-import socket
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from http import HTTPStatus
 from typing import TYPE_CHECKING, TypeAlias
 from urllib.parse import quote
 
-from aiohttp import (
-    ClientError,
-    ClientSession,
-    ClientWebSocketResponse,
-    TCPConnector,
-    WSMessage,
-    WSMsgType,
-    hdrs,
-    web,
-)
+import aiohttp
+from aiohttp import WSMsgType, hdrs, web
 
-from wbc_suite.devices.access_rules import is_loopback, new_token
-from wbc_suite.devices.web_server import WebServer
+from wbc_suite.devices.access_rules import token_for
+from wbc_suite.devices.web_server import WebServer, page_url
 from wbc_suite.errors import DeviceError
 
 if TYPE_CHECKING:
@@ -44,7 +35,8 @@ PORTS = range(8080, 8100)  # tried in turn if no port is given
 MESSAGE_LIMIT = 50 * 1024 * 1024  # bytes, viser's own limit
 HEARTBEAT = 30.0  # s between pings that find clients that are gone
 
-WebSocket: TypeAlias = web.WebSocketResponse | ClientWebSocketResponse
+DATA = (WSMsgType.TEXT, WSMsgType.BINARY)
+WebSocket: TypeAlias = web.WebSocketResponse | aiohttp.ClientWebSocketResponse
 
 
 class PageServer:
@@ -65,7 +57,7 @@ class PageServer:
 
     def __init__(self, host: str = "127.0.0.1", port: int | None = None) -> None:
         self.host = host
-        self.token = None if is_loopback(host) else new_token()
+        self.token = token_for(host)
         self.server = _start_viser()
         try:
             self._proxy = self._start_proxy(PORTS if port is None else [port])
@@ -80,10 +72,7 @@ class PageServer:
     @property
     def url(self) -> str:
         """The address that opens the page, with the token if there is one."""
-        name = _reachable(self.host)
-        shown = f"[{name}]" if ":" in name else name
-        query = "" if self.token is None else f"?token={self.token}"
-        return f"http://{shown}:{self.port}/{query}"
+        return page_url(self.host, self.port, self.token)
 
     def start_updates(self, update: Callable[[int], None]) -> None:
         """Call a function with a count at `UPDATE_RATE`, in a thread, until `stop`."""
@@ -114,7 +103,7 @@ class PageServer:
             self.update_times = [*self.update_times[-999:], time.thread_time() - began]
             count += 1
 
-    def _start_proxy(self, ports: "range | list[int]") -> WebServer:
+    def _start_proxy(self, ports: Sequence[int]) -> WebServer:
         routes = proxy(self.server.get_port())
         for port in ports:
             try:
@@ -148,7 +137,7 @@ def proxy(port: int) -> list[web.AbstractRouteDef]:
             if request.headers.get(hdrs.UPGRADE, "").lower() == "websocket":
                 return await _relay(request, target)
             return await _fetch(request, target)
-        except (ClientError, TimeoutError):
+        except (aiohttp.ClientError, TimeoutError):
             return web.Response(status=HTTPStatus.BAD_GATEWAY)
 
     return [web.get("/{path:.*}", handle, allow_head=False)]
@@ -160,8 +149,8 @@ async def _fetch(request: web.Request, target: str) -> web.Response:
         hdrs.ACCEPT_ENCODING: request.headers.get(hdrs.ACCEPT_ENCODING, "identity")
     }
     async with (
-        ClientSession(
-            auto_decompress=False, connector=TCPConnector(force_close=True)
+        aiohttp.ClientSession(
+            auto_decompress=False, connector=aiohttp.TCPConnector(force_close=True)
         ) as session,
         session.get(target, headers=accepted, allow_redirects=False) as answer,
     ):
@@ -178,7 +167,7 @@ async def _relay(request: web.Request, target: str) -> web.WebSocketResponse:
     """Relay the messages of a WebSocket both ways until one side closes it."""
     offered = request.headers.get(hdrs.SEC_WEBSOCKET_PROTOCOL, "").split(",")
     async with (
-        ClientSession() as session,
+        aiohttp.ClientSession() as session,
         session.ws_connect(
             target,
             protocols=[name.strip() for name in offered if name.strip()],
@@ -192,44 +181,21 @@ async def _relay(request: web.Request, target: str) -> web.WebSocketResponse:
             compress=False,
         )
         await client.prepare(request)
-        last = await _first((_copy(client, upstream), _copy(upstream, client)))
-        if last is not None and last.type is WSMsgType.CLOSE:  # with viser's reason
-            await client.close(code=last.data, message=(last.extra or "").encode())
+        await asyncio.gather(
+            _copy(client, upstream), _copy(upstream, client), return_exceptions=True
+        )
         return client
 
 
-async def _copy(source: WebSocket, sink: WebSocket) -> WSMessage:
-    """Copy messages until the source closes; return its last one."""
-    while True:
-        message = await source.receive()
-        if message.type is WSMsgType.BINARY:
-            await sink.send_bytes(message.data)
-        elif message.type is WSMsgType.TEXT:
+async def _copy(source: WebSocket, sink: WebSocket) -> None:
+    """Copy messages until the source closes; close the sink with the same reason."""
+    while (message := await source.receive()).type in DATA:
+        if message.type is WSMsgType.TEXT:
             await sink.send_str(message.data)
         else:
-            return message
-
-
-async def _first(copies: Iterable) -> WSMessage | None:
-    """Run until one of the copies ends; return its last message, None on an error."""
-    tasks = [asyncio.ensure_future(copy) for copy in copies]
-    try:
-        done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-        with contextlib.suppress(ConnectionError):
-            return done.pop().result()
-        return None
-    finally:
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
-
-
-def _reachable(host: str) -> str:
-    """Return a name for `host` under which other machines reach it."""
-    if host not in ("0.0.0.0", "::"):
-        return host
-    probe = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    with probe, contextlib.suppress(OSError):
-        probe.connect(("192.0.2.1", 9))  # sends nothing; selects the outgoing address
-        return probe.getsockname()[0]
-    return socket.gethostname()
+            await sink.send_bytes(message.data)
+    if message.type is WSMsgType.CLOSE:
+        code, reason = message.data or aiohttp.WSCloseCode.OK, message.extra or ""
+        await sink.close(code=code, message=reason.encode())
+    else:
+        await sink.close()

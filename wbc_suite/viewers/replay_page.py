@@ -1,6 +1,7 @@
 """The page of `wbc-suite replay`: recorded episodes with playback controls."""
 
 import html
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -8,15 +9,10 @@ from numpy.typing import NDArray
 
 from wbc_suite.envs import RobotEnv
 from wbc_suite.envs.states import write_physics
-from wbc_suite.viewers.episode_player import (
-    SPEEDS,
-    Clip,
-    EpisodePlayer,
-    PlayerStatus,
-)
+from wbc_suite.viewers.episode_player import SPEEDS, Clip, EpisodePlayer, PlayerStatus
 from wbc_suite.viewers.model_scene import ModelScene, robot_box
 from wbc_suite.viewers.page_server import PageServer
-from wbc_suite.viewers.scene_setup import VIEWS, look_from, set_camera, set_up_scene
+from wbc_suite.viewers.scene_setup import add_plot, add_views, set_camera, set_up_scene
 
 if TYPE_CHECKING:
     import viser
@@ -30,6 +26,14 @@ PLAY, PAUSE, PREVIOUS, NEXT = "Play", "Pause", "Previous", "Next"
 SPEED_LABELS: dict[str, float] = dict(
     zip(("¼", "½", "1", "2", "4"), SPEEDS, strict=True)
 )
+KEYS: dict[str, tuple[str, Callable[[EpisodePlayer], None]]] = {
+    "P": ("Play or pause", EpisodePlayer.toggle),
+    "N": ("Next episode", lambda player: player.skip(1)),
+    "B": ("Previous episode", lambda player: player.skip(-1)),
+    "K": ("Step forward", lambda player: player.step_frames(1)),
+    "J": ("Step back", lambda player: player.step_frames(-1)),
+}
+"""Text and command by key."""
 
 
 class ReplayPage:
@@ -51,25 +55,27 @@ class ReplayPage:
         self._clip: Clip | None = None
         self._shape = np.empty(0)
         self._status = self.server.gui.add_html("")
-        self._shown = ""
         self._add_controls()
-        self._plot = self._add_plot()
+        self._plot = add_plot(
+            self.server,
+            "Norm of the action (blue), reward (green)",
+            {"now": NOW, "action": EFFORT, "reward": REWARD},
+        )
         self._display(player.advance())
         data = env.simulation.data
-        self._box = robot_box(env.simulation.model, data.xpos, data.xquat)
-        set_camera(self.server, *self._box)
-        self.server.on_client_connect(self._connect)
+        box = robot_box(env.simulation.model, data.xpos, data.xquat)
+        set_camera(self.server, box)
+        self.server.on_client_connect(lambda client: add_views(client, box))
 
     def start(self) -> None:
         """Start to play."""
-        self.site.start_updates(self._update)
+        self.site.start_updates(
+            lambda n: self._display(self.player.advance(), panel=n % PANEL_EVERY == 0)
+        )
 
     def stop(self) -> None:
         """Stop, and close the server."""
         self.site.stop()
-
-    def _update(self, count: int) -> None:
-        self._display(self.player.advance(), panel=count % PANEL_EVERY == 0)
 
     def _display(self, status: PlayerStatus, *, panel: bool = True) -> None:
         """Display the state of the playback."""
@@ -96,15 +102,10 @@ class ReplayPage:
         self._episode.value = clip.name
 
     def _update_panel(self, status: PlayerStatus) -> None:
-        text = _status_html(status, self.player.names)
-        if text != self._shown:
-            self._status.content = self._shown = text
-        wanted = (PREVIOUS, PAUSE if status.playing else PLAY, NEXT)
-        if self._buttons.options != wanted:
-            self._buttons.options = wanted
+        self._status.content = _status_html(status, self.player.names)
+        self._buttons.options = (PREVIOUS, PAUSE if status.playing else PLAY, NEXT)
         if status.clip is not None:
-            if abs(self._time.value - status.position) > 1e-3:
-                self._time.value = status.position
+            self._time.value = status.position
             self._plot.data = _curves(status.clip, status.position)
 
     def _add_controls(self) -> None:
@@ -124,16 +125,14 @@ class ReplayPage:
         self._episode = gui.add_dropdown(
             "Episode", player.names, initial_value=player.names[0]
         )
+        clicks = {PREVIOUS: -1, NEXT: 1}
 
         @self._buttons.on_click
         def _(event: "viser.GuiEvent[viser.GuiButtonGroupHandle]") -> None:
-            match event.target.value:
-                case value if value == PREVIOUS:
-                    player.skip(-1)
-                case value if value == NEXT:
-                    player.skip(1)
-                case _:
-                    player.toggle()
+            if event.target.value in clicks:
+                player.skip(clicks[event.target.value])
+            else:
+                player.toggle()
 
         @self._time.on_update
         def _(event: "viser.GuiEvent[viser.GuiSliderHandle[float]]") -> None:
@@ -146,38 +145,9 @@ class ReplayPage:
                 player.choose(event.target.value)
 
         speed.on_click(lambda _: player.set_speed(SPEED_LABELS[speed.value]))
-        gui.add_command("Play or pause", hotkey="P").on_trigger(
-            lambda _: player.toggle()
-        )
-        gui.add_command("Next episode", hotkey="N").on_trigger(lambda _: player.skip(1))
-        gui.add_command("Previous episode", hotkey="B").on_trigger(
-            lambda _: player.skip(-1)
-        )
-        gui.add_command("Step forward", hotkey="K").on_trigger(
-            lambda _: player.step_frames(1)
-        )
-        gui.add_command("Step back", hotkey="J").on_trigger(
-            lambda _: player.step_frames(-1)
-        )
-
-    def _add_plot(self) -> "viser.GuiUplotHandle":
-        return self.server.gui.add_uplot(
-            data=tuple(np.zeros(2) for _ in range(4)),
-            series=(
-                {"label": "s"},
-                {"label": "now", "stroke": NOW, "width": 1},
-                {"label": "action", "stroke": EFFORT, "width": 2},
-                {"label": "reward", "stroke": REWARD, "width": 2},
-            ),
-            title="Norm of the action (blue), reward (green)",
-            scales={"x": {"time": False}},
-            legend={"show": False},
-            height=150,
-        )
-
-    def _connect(self, client: "viser.ClientHandle") -> None:
-        view = client.gui.add_button_group("View from", tuple(VIEWS))
-        view.on_click(lambda _: look_from(client, *self._box, VIEWS[view.value]))
+        for key, (text, run) in KEYS.items():
+            command = gui.add_command(text, hotkey=key)  # type: ignore[arg-type]
+            command.on_trigger(lambda _, run=run: run(player))
 
 
 def _curves(clip: Clip, position: float) -> tuple[NDArray[np.float64], ...]:

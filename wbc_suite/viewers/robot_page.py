@@ -23,6 +23,7 @@ SLIDER_STEP = 0.01  # rad or m
 UNBOUNDED = np.pi  # rad, range of a slider of a joint without limits
 COM_COLOUR, INERTIA_COLOUR = (214, 72, 60), (90, 140, 210)
 FRAME_SIZE = 0.07  # m
+ORIGIN, IDENTITY = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
 LEAST_HALF = 1e-3  # m; thinner boxes of inertia would not be visible
 
 
@@ -40,15 +41,17 @@ class RobotPage:
         self.data = mujoco.MjData(self.model)
         self._lock = threading.Lock()
         self._sliders: dict[str, viser.GuiSliderHandle[float]] = {}
-        self._setting = False
         set_up_scene(site.server, label=f"wbc_suite · {robot.name}")
         self.scene = ModelScene(site.server, self.model)
-        self._add_facts()
+        site.server.gui.add_markdown(
+            f"**{robot.title or robot.name}**  \n"
+            f"{robot.dof} joints, {robot.mass:.1f} kg, {robot.root.kind} root"
+        )
         self._add_postures()
         self._overlays = Overlays(site.server, self.model, self.data, self.scene)
         self._add_joints()
         self.set_keyframe(next(iter(robot.keyframes), None))
-        set_camera(site.server, *robot_box(self.model, self.data.xpos, self.data.xquat))
+        set_camera(site.server, robot_box(self.model, self.data.xpos, self.data.xquat))
 
     def stop(self) -> None:
         """Close the page."""
@@ -59,18 +62,20 @@ class RobotPage:
         values = dict.fromkeys(self.robot.joint_names, 0.0)
         if name is not None:
             values = self.robot.keyframe(name)
-        self._setting = True  # sliders then do not move joints one by one
         for joint, slider in self._sliders.items():
             slider.value = float(np.clip(values[joint], slider.min, slider.max))
-        self._setting = False
         self.set_joints(values)
 
     def set_joints(self, values: dict[str, float]) -> None:
         """Set joint positions, rad or m, and those of joints that mimic them."""
         with self._lock:
             for name, value in values.items():
-                self.data.qpos[self.model.joint(name).qposadr[0]] = value
-            self._couple()
+                self.data.joint(name).qpos[0] = value
+            for joint in self.robot.joints:
+                if joint.mimic is not None:
+                    leader = self.position(joint.mimic.joint)
+                    value = joint.mimic.ratio * leader + joint.mimic.offset
+                    self.data.joint(joint.name).qpos[0] = value
             mujoco.mj_kinematics(self.model, self.data)
             mujoco.mj_comPos(self.model, self.data)
             self.scene.update(self.data.xpos, self.data.xquat)
@@ -78,21 +83,7 @@ class RobotPage:
 
     def position(self, joint: str) -> float:
         """Return the position of a joint, rad or m."""
-        return float(self.data.qpos[self.model.joint(joint).qposadr[0]])
-
-    def _couple(self) -> None:
-        for joint in self.robot.joints:
-            if joint.mimic is not None:
-                leader = self.position(joint.mimic.joint)
-                value = joint.mimic.ratio * leader + joint.mimic.offset
-                self.data.qpos[self.model.joint(joint.name).qposadr[0]] = value
-
-    def _add_facts(self) -> None:
-        robot = self.robot
-        self.site.server.gui.add_markdown(
-            f"**{robot.title or robot.name}**  \n"
-            f"{robot.dof} joints, {robot.mass:.1f} kg, {robot.root.kind} root"
-        )
+        return float(self.data.joint(joint).qpos[0])
 
     def _add_postures(self) -> None:
         postures = self.site.server.gui.add_button_group(
@@ -118,7 +109,9 @@ class RobotPage:
                     self._add_joint(name, group)
 
     def _add_joint(self, name: str, group: str) -> None:
-        low, high = _range(self.model, name)
+        joint, low, high = self.model.joint(name), -UNBOUNDED, UNBOUNDED
+        if joint.limited[0]:
+            low, high = joint.range.tolist()
         side = group.split("_")[0] + "_"
         slider = self.site.server.gui.add_slider(
             plain(name.removeprefix(side)),
@@ -131,16 +124,9 @@ class RobotPage:
         self._sliders[name] = slider
 
         @slider.on_update
-        async def _(_: object) -> None:
-            if not self._setting:
+        async def _(event: "viser.GuiEvent[viser.GuiSliderHandle[float]]") -> None:
+            if event.client is not None:  # moved by the user
                 self.set_joints({name: slider.value})
-
-
-def _range(model: mujoco.MjModel, name: str) -> Vector:
-    joint = model.joint(name)
-    if not joint.limited[0]:
-        return np.array([-UNBOUNDED, UNBOUNDED])
-    return np.array(joint.range, dtype=np.float64)
 
 
 class Overlays:
@@ -161,9 +147,15 @@ class Overlays:
         scene: ModelScene,
     ) -> None:
         self._model, self._data = model, data
+        links = [scene.node(body) for body in range(1, model.nbody)]
+        places = [(f"{link}/frame", IDENTITY, ORIGIN) for link in links]
+        for site in range(model.nsite):
+            link, name = scene.node(model.site_bodyid[site]), model.site(site).name
+            place = model.site_quat[site], model.site_pos[site]
+            places.append((f"{link}/frame_{name}", *place))
         self._frames = [
             server.scene.add_frame(
-                f"{scene.node(body)}/{label}",
+                node,
                 axes_length=FRAME_SIZE,
                 axes_radius=0.035 * FRAME_SIZE,
                 origin_radius=0.07 * FRAME_SIZE,
@@ -171,12 +163,21 @@ class Overlays:
                 position=position,
                 visible=False,
             )
-            for body, label, position, wxyz in _places(model)
+            for node, wxyz, position in places
         ]
         self._inertias = [
-            _inertia_box(server, model, body, scene.node(body))
-            for body in range(1, model.nbody)
-            if model.body_mass[body] > 0
+            server.scene.add_box(
+                f"{scene.node(body)}/inertia",
+                dimensions=tuple(2.0 * equivalent_box(mass, model.body_inertia[body])),
+                color=INERTIA_COLOUR,
+                opacity=0.45,
+                cast_shadow=False,
+                wxyz=model.body_iquat[body],
+                position=model.body_ipos[body],
+                visible=False,
+            )
+            for body, mass in enumerate(model.body_mass)
+            if body > 0 and mass > 0
         ]
         self._com = server.scene.add_icosphere(
             "/com", radius=0.03, color=COM_COLOUR, visible=False
@@ -233,32 +234,3 @@ def equivalent_box(mass: float, inertia: Vector) -> Vector:
     """
     squares = 1.5 * (inertia.sum() - 2.0 * inertia) / mass
     return np.maximum(np.sqrt(np.maximum(squares, 0.0)), LEAST_HALF)
-
-
-def _inertia_box(
-    server: "viser.ViserServer", model: mujoco.MjModel, body: int, node: str
-) -> "viser.BoxHandle":
-    half = equivalent_box(model.body_mass[body], model.body_inertia[body])
-    return server.scene.add_box(
-        f"{node}/inertia",
-        dimensions=tuple(2.0 * half),
-        color=INERTIA_COLOUR,
-        opacity=0.45,
-        cast_shadow=False,
-        wxyz=model.body_iquat[body],
-        position=model.body_ipos[body],
-        visible=False,
-    )
-
-
-def _places(model: mujoco.MjModel) -> list[tuple[int, str, Vector, Vector]]:
-    """Return body, label, position and quaternion of the frames of links and sites."""
-    here: Vector = np.zeros(3)
-    upright: Vector = np.array([1.0, 0.0, 0.0, 0.0])
-    places: list[tuple[int, str, Vector, Vector]] = [
-        (body, "frame", here, upright) for body in range(1, model.nbody)
-    ]
-    for site in range(model.nsite):
-        body, label = int(model.site_bodyid[site]), f"frame_{model.site(site).name}"
-        places.append((body, label, model.site_pos[site], model.site_quat[site]))
-    return places

@@ -1,7 +1,7 @@
 """Floor, light, camera, theme and colours of every page."""
 
 import colorsys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     import viser
 
 __all__ = [
-    "VIEWS",
     "Colour",
+    "add_plot",
+    "add_views",
     "css",
     "limb_colours",
-    "look_from",
     "place",
     "set_camera",
     "set_up_scene",
@@ -82,35 +82,63 @@ def set_up_scene(server: "viser.ViserServer", *, label: str) -> None:
     )
 
 
-def set_camera(server: "viser.ViserServer", low: Vector, high: Vector) -> None:
+def set_camera(server: "viser.ViserServer", box: tuple[Vector, Vector]) -> None:
     """Point the cameras of new clients at a box, from its front right and above.
 
     Args:
         server: Server of the clients.
-        low: Corner of the box with the smallest coordinates, shape (3,), in m.
-        high: The opposite corner.
+        box: Corners with the smallest and the largest coordinates, shape (3,), m.
     """
-    position, look_at = _camera(low, high, VIEWS["Front"])
+    position, look_at = _camera(box, VIEWS["Front"])
     server.initial_camera.position = tuple(position)
     server.initial_camera.look_at = tuple(look_at)
     server.initial_camera.fov = FIELD_OF_VIEW
 
 
-def look_from(
-    client: "viser.ClientHandle", low: Vector, high: Vector, direction: Vector
-) -> None:
-    """Point one client's camera at a box, from a direction."""
-    position, look_at = _camera(low, high, direction)
-    with client.atomic():
-        client.camera.position = position
-        client.camera.look_at = look_at
+def add_views(client: "viser.ClientHandle", box: tuple[Vector, Vector]) -> None:
+    """Add buttons that point one client's camera at a box, each from a direction."""
+    buttons = client.gui.add_button_group("View from", tuple(VIEWS))
+
+    @buttons.on_click
+    def _(_: object) -> None:
+        position, look_at = _camera(box, VIEWS[buttons.value])
+        with client.atomic():
+            client.camera.position = position
+            client.camera.look_at = look_at
 
 
-def _camera(low: Vector, high: Vector, direction: Vector) -> tuple[Vector, Vector]:
+def _camera(box: tuple[Vector, Vector], direction: Vector) -> tuple[Vector, Vector]:
     """Return the position of the camera and the point that it looks at."""
+    low, high = box
     middle = (low + high) / 2.0
     distance = 1.3 * max(float(np.linalg.norm(high - low)), 0.8)
     return middle + distance * direction / np.linalg.norm(direction), middle
+
+
+def add_plot(
+    server: "viser.ViserServer",
+    title: str,
+    curves: Mapping[str, str],
+    *,
+    height: int = 150,
+) -> "viser.GuiUplotHandle":
+    """Add a plot over the time in s, without data.
+
+    Args:
+        server: Server of the page.
+        title: Title of the plot.
+        curves: Colour of each curve in CSS notation, by its label.
+        height: In pixels.
+    """
+    lines = [{"label": k, "stroke": c, "width": 2} for k, c in curves.items()]
+    return server.gui.add_uplot(
+        data=tuple(np.zeros(2) for _ in range(1 + len(lines))),
+        series=({"label": "s"}, *lines),  # type: ignore[arg-type]
+        title=title,
+        scales={"x": {"time": False}},
+        legend={"show": False},
+        height=height,
+    )
 
 
 def place(node: "viser.SceneNodeHandle", T_world_node: pin.SE3) -> None:

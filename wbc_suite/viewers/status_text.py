@@ -74,9 +74,7 @@ def explain(status: LimbStatus, *, at_most: int = 3) -> str:
 
 
 def status_html(
-    snapshot: Snapshot,
-    limbs: Mapping[str, LimbInfo],
-    colours: Mapping[str, Colour],
+    snapshot: Snapshot, limbs: Mapping[str, LimbInfo], colours: Mapping[str, Colour]
 ) -> str:
     """Return the state of the session, with reasons of limbs that miss their target."""
     state, dot = _state(snapshot)
@@ -108,9 +106,7 @@ def status_html(
 
 
 def limbs_html(
-    snapshot: Snapshot,
-    limbs: Mapping[str, LimbInfo],
-    colours: Mapping[str, Colour],
+    snapshot: Snapshot, limbs: Mapping[str, LimbInfo], colours: Mapping[str, Colour]
 ) -> str:
     """Return a table of the limbs: who holds them, and their tracking error."""
     rows = "".join(

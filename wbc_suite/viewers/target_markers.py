@@ -10,7 +10,7 @@ import pinocchio as pin
 from wbc_suite.robot.triangle_meshes import TriangleMesh, ellipsoid_mesh, merge
 from wbc_suite.viewers.model_scene import COLLISION_GROUP, geom_mesh
 from wbc_suite.viewers.scene_setup import Colour, place
-from wbc_suite.viewers.session_state import LimbStatus, Snapshot
+from wbc_suite.viewers.session_state import SessionInfo, Snapshot
 
 if TYPE_CHECKING:
     import viser
@@ -19,6 +19,7 @@ __all__ = ["TargetMarkers"]
 
 NEAR = 0.012  # m; a copy nearer than this to its limb would only tint it
 TURNED = 0.12  # rad
+ABOVE = np.array([0.0, 0.0, 0.12])  # m, from the target to its label
 BALL = 0.04  # m, radius of the marker of a frame without geoms
 
 
@@ -27,8 +28,7 @@ class TargetMarkers:
 
     Args:
         server: Server whose scene is drawn on.
-        model: Model that the limbs belong to.
-        bodies: Body of each limb, by limb name; -1 for a limb without one.
+        info: The limbs, and the model that they belong to.
         snapshot: State at the start; copies are taken in this posture.
         colours: Colour of each limb.
     """
@@ -36,16 +36,15 @@ class TargetMarkers:
     def __init__(
         self,
         server: "viser.ViserServer",
-        model: mujoco.MjModel,
-        bodies: Mapping[str, int],
+        info: SessionInfo,
         snapshot: Snapshot,
         colours: Mapping[str, Colour],
     ) -> None:
         self._nodes: dict[str, viser.SceneNodeHandle] = {}
         self._lines: dict[str, viser.LineSegmentsHandle] = {}
         self._labels: dict[str, viser.LabelHandle] = {}
-        for name, status in snapshot.limbs.items():
-            mesh = _copy(model, name, bodies, snapshot, status)
+        for name in info.limbs:
+            mesh = _copy(info, name, snapshot)
             self._nodes[name] = server.scene.add_mesh_simple(
                 f"/targets/{name}",
                 mesh.vertices,
@@ -81,34 +80,29 @@ class TargetMarkers:
                     [[status.measured.translation, status.target.translation]],
                     dtype=np.float32,
                 )
-            self._note(name, status, notes.get(name, ""))
-
-    def _note(self, name: str, status: LimbStatus, text: str) -> None:
-        label = self._labels[name]
-        if text != label.text and text:
-            label.text = text
-        label.visible = bool(text)
-        if text:
-            label.position = status.target.translation + np.array([0.0, 0.0, 0.12])
+            label, text = self._labels[name], notes.get(name, "")
+            label.visible = bool(text)
+            if text:
+                label.text = text
+                label.position = status.target.translation + ABOVE
 
 
-def _copy(
-    model: mujoco.MjModel,
-    name: str,
-    bodies: Mapping[str, int],
-    snapshot: Snapshot,
-    status: LimbStatus,
-) -> TriangleMesh:
+def _copy(info: SessionInfo, name: str, snapshot: Snapshot) -> TriangleMesh:
     """Return the mesh of a limb in its controlled frame."""
-    others = {body for other, body in bodies.items() if other != name}
-    chosen = _own_bodies(model, bodies[name], others)
-    parts = [
-        part
-        for geom in range(model.ngeom)
-        if model.geom_bodyid[geom] in chosen
-        and model.geom_group[geom] < COLLISION_GROUP
-        and (part := _in_frame(model, geom, snapshot, status)) is not None
-    ]
+    others = {limb.body for limb in info.limbs.values() if limb.name != name}
+    model, parts = info.model, []
+    chosen = _own_bodies(model, info.limbs[name].body, others)
+    T_limb_world = snapshot.limbs[name].measured.inverse()
+    for geom in range(model.ngeom):
+        body, mesh = model.geom_bodyid[geom], geom_mesh(model, geom)
+        is_visual = model.geom_group[geom] < COLLISION_GROUP
+        if body in chosen and is_visual and mesh is not None:
+            T_body_geom = _pose(model.geom_pos[geom], model.geom_quat[geom])
+            T_world_body = _pose(
+                snapshot.body_positions[body], snapshot.body_quaternions[body]
+            )
+            T = T_limb_world * T_world_body * T_body_geom
+            parts.append(mesh.moved(T.translation, T.rotation))
     return merge(parts) if parts else ellipsoid_mesh(np.full(3, BALL))
 
 
@@ -121,19 +115,6 @@ def _own_bodies(model: mujoco.MjModel, root: int, others: set[int]) -> set[int]:
         if model.body_parentid[body] in carried:
             carried.add(body)
     return {root} if carried & others else carried
-
-
-def _in_frame(
-    model: mujoco.MjModel, geom: int, snapshot: Snapshot, status: LimbStatus
-) -> TriangleMesh | None:
-    mesh = geom_mesh(model, geom)
-    if mesh is None:
-        return None
-    body = model.geom_bodyid[geom]
-    T_body_geom = _pose(model.geom_pos[geom], model.geom_quat[geom])
-    T_world_body = _pose(snapshot.body_positions[body], snapshot.body_quaternions[body])
-    T = status.measured.inverse() * T_world_body * T_body_geom
-    return mesh.moved(T.translation, T.rotation)
 
 
 def _pose(position: np.ndarray, wxyz: np.ndarray) -> pin.SE3:

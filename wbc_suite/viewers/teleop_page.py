@@ -44,11 +44,10 @@ class TeleopPage:
         self.handles = DragHandles(
             session, {n: _scale(n, limb.kind) for n, limb in limbs.items()}
         )
-        bodies = {name: limb.body for name, limb in limbs.items()}
-        self.markers = TargetMarkers(self.server, model, bodies, snapshot, colours)
+        self.markers = TargetMarkers(self.server, session.info, snapshot, colours)
         box = robot_box(model, snapshot.body_positions, snapshot.body_quaternions)
         self.panel = TeleopPanel(self.server, session, self.handles, colours, box)
-        set_camera(self.server, *box)
+        set_camera(self.server, box)
         self.server.on_client_connect(self._connect)
         self.server.on_client_disconnect(self._disconnect)
 

@@ -1,9 +1,10 @@
 """The panel of the teleoperation page: status, buttons, limbs, grippers and plots."""
 
+import functools
 import threading
 import time
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +13,7 @@ from wbc_suite.recording.episode_control import EpisodeCommand
 from wbc_suite.typing import Vector
 from wbc_suite.viewers.drag_handles import DragHandles, HandleMode
 from wbc_suite.viewers.gripper_sliders import GripperSliders
-from wbc_suite.viewers.scene_setup import VIEWS, Colour, css, look_from
+from wbc_suite.viewers.scene_setup import Colour, add_plot, add_views, css
 from wbc_suite.viewers.session_state import Snapshot
 from wbc_suite.viewers.status_text import limbs_html, status_html
 
@@ -34,6 +35,9 @@ BUTTON_HINT = (
     "Keys: P pause, R reset, C record or keep, Y keep as a success, X discard, "
     "U delete the last episode"
 )
+CLUTCH_HINT = "Engaged: the limb follows its handle. Else only the handle moves."
+SHADOW_HINT = "Two thirds of the rendering time without a graphics card."
+STEP_COLOUR = "#4a6fa5"
 RECORD_KEYS = {
     "C": (EpisodeCommand.RECORD, "Record or keep the episode"),
     "Y": (EpisodeCommand.SUCCESS, "Keep the episode as a success"),
@@ -78,7 +82,8 @@ class TeleopPanel:
         self._handle_folder = server.gui.add_folder("Handles")
         with server.gui.add_folder("Clutches", expand_by_default=False):
             for name, limb in info.limbs.items():
-                self._add_clutch(name, limb.title)
+                engage = functools.partial(session.enable, name)
+                _add_checkbox(server.gui, limb.title, engage, CLUTCH_HINT)
         self._grippers: dict[str, GripperSliders] = {}
         if info.grippers:
             with server.gui.add_folder("Grippers"):
@@ -87,8 +92,10 @@ class TeleopPanel:
                     for name in info.grippers
                 }
         with server.gui.add_folder("Tracking and timing"):
-            self._error_plot = self._add_error_plot()
-            self._time_plot = self._add_time_plot()
+            errors = {limb.title: css(colours[n]) for n, limb in info.limbs.items()}
+            self._error_plot = add_plot(server, "Distance to target [mm]", errors)
+            times = {"step": STEP_COLOUR}
+            self._time_plot = add_plot(server, "Solve time [ms]", times, height=120)
 
     def add_client(self, client: "viser.ClientHandle") -> None:
         """Add the controls that each client has for itself."""
@@ -107,17 +114,22 @@ class TeleopPanel:
                 color="gray",
                 hint="After a handle was moved with its clutch disengaged. Key: H",
             )
-            view = client.gui.add_button_group("View from", tuple(VIEWS))
+            add_views(client, self._box)
             with client.gui.add_folder("Show", expand_by_default=False):
                 for name, limb in self._info.limbs.items():
-                    self._add_show(client, name, limb.title)
-                _add_shadows(client)
+                    show = functools.partial(self._handles.show, number, name)
+                    _add_checkbox(client.gui, limb.title, show)
+                _add_checkbox(
+                    client.gui,
+                    "Shadows",
+                    lambda on: client.scene.configure_default_lights(cast_shadow=on),
+                    SHADOW_HINT,
+                )
 
         def set_mode(chosen: HandleMode) -> None:
             self._handles.set_mode(number, chosen)
             mode.options = _marked(chosen)
 
-        view.on_click(lambda _: look_from(client, *self._box, VIEWS[view.value]))
         mode.on_click(lambda _: set_mode(_unmarked(mode.value)))
         recall.on_click(lambda _: self._handles.recall(number))
         client.gui.add_command("Move or turn", hotkey="T").on_trigger(
@@ -129,16 +141,12 @@ class TeleopPanel:
 
     def update(self, snapshot: Snapshot) -> None:
         """Display the state of the session."""
-        for element, text in (
-            (self._status, status_html(snapshot, self._info.limbs, self._colours)),
-            (self._limbs, limbs_html(snapshot, self._info.limbs, self._colours)),
-        ):
-            if element.content != text:
-                element.content = text
+        limbs = self._info.limbs  # viser sends only changes
+        self._status.content = status_html(snapshot, limbs, self._colours)
+        self._limbs.content = limbs_html(snapshot, limbs, self._colours)
         for name, sliders in self._grippers.items():
             sliders.update(snapshot.grippers[name])
-        if self._buttons.options != (buttons := _buttons(snapshot)):
-            self._buttons.options = buttons
+        self._buttons.options = _buttons(snapshot)
 
     def record_plots(self, snapshot: Snapshot) -> None:
         """Append the errors and the step time of a tick to the plots."""
@@ -201,60 +209,13 @@ class TeleopPanel:
     def _toggle(self) -> None:
         self._session.pause(not self._session.snapshot.paused)
 
-    def _add_clutch(self, name: str, title: str) -> None:
-        box = self._server.gui.add_checkbox(
-            title,
-            initial_value=True,
-            hint="Engaged: the limb follows its handle. Else only the handle moves.",
-        )
-        box.on_update(lambda _: self._session.enable(name, box.value))
 
-    def _add_show(self, client: "viser.ClientHandle", name: str, title: str) -> None:
-        box = client.gui.add_checkbox(title, initial_value=True)
-        box.on_update(
-            lambda _: self._handles.show(client.client_id, name, shown=box.value)
-        )
-
-    def _add_error_plot(self) -> "viser.GuiUplotHandle":
-        limbs = self._info.limbs
-        return self._server.gui.add_uplot(
-            data=tuple(np.zeros(2) for _ in range(1 + len(limbs))),
-            series=(
-                {"label": "s"},
-                *(
-                    {"label": limb.title, "stroke": css(self._colours[n]), "width": 2}
-                    for n, limb in limbs.items()
-                ),
-            ),
-            title="Distance to target [mm]",
-            scales={"x": {"time": False}},
-            legend={"show": False},
-            height=150,
-        )
-
-    def _add_time_plot(self) -> "viser.GuiUplotHandle":
-        return self._server.gui.add_uplot(
-            data=(np.zeros(2), np.zeros(2)),
-            series=(
-                {"label": "s"},
-                {"label": "step", "stroke": "#4a6fa5", "width": 2},
-            ),
-            title="Solve time [ms]",
-            scales={"x": {"time": False}},
-            legend={"show": False},
-            height=120,
-        )
-
-
-def _add_shadows(client: "viser.ClientHandle") -> None:
-    box = client.gui.add_checkbox(
-        "Shadows",
-        initial_value=True,
-        hint="Two thirds of the rendering time without a graphics card.",
-    )
-    box.on_update(
-        lambda _: client.scene.configure_default_lights(cast_shadow=box.value)
-    )
+def _add_checkbox(
+    gui: "viser.GuiApi", label: str, set_value: Callable[[bool], None], hint: str = ""
+) -> None:
+    """Add a checkbox, checked at first, that calls a function with its value."""
+    box = gui.add_checkbox(label, initial_value=True, hint=hint or None)
+    box.on_update(lambda _: set_value(box.value))
 
 
 def _buttons(snapshot: Snapshot) -> tuple[str, ...]:

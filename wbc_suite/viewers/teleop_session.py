@@ -16,18 +16,14 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.control.action import SliceKind
 from wbc_suite.devices import Device, DeviceState, Pipeline, PipelineConfig
 from wbc_suite.devices.pipeline.config import RatesConfig
 from wbc_suite.errors import DatasetError, UnknownNameError
 from wbc_suite.recording.episode_control import EpisodeCommand, EpisodeControl
 from wbc_suite.typing import Vector
-from wbc_suite.viewers.limb_targets import LimbTargets
+from wbc_suite.viewers.limb_targets import LimbTarget
 from wbc_suite.viewers.loop_timing import LoopTimer, raise_priority
-from wbc_suite.viewers.session_state import (
-    SessionInfo,
-    Snapshot,
-)
+from wbc_suite.viewers.session_state import SessionInfo, Snapshot
 
 __all__ = ["DRAGGED", "TeleopSession"]
 
@@ -95,8 +91,7 @@ class TeleopSession:
         env.reset(seed=seed)
         self._controller = env.unwrapped.controllers[0]  # type: ignore[attr-defined]
         self._pipeline = Pipeline(env, pipeline)
-        self._targets = LimbTargets(self._pipeline.limbs)
-        self.limbs = self._targets.limbs
+        self.limbs = {n: LimbTarget(limb) for n, limb in self._pipeline.limbs.items()}
         self._open_grippers()
         self.info = self._describe()
         self._publish()
@@ -106,7 +101,8 @@ class TeleopSession:
     def grab(self, name: str, client: int, T_world_input: pin.SE3) -> bool:
         """Take a limb and latch the input to it; False if another client holds it."""
         with self._lock:
-            return self._targets.grab(name, client, T_world_input, now=self._clock())
+            now = self._clock()
+            return self._limb(name).drag(client, T_world_input, now=now, grab=True)
 
     def drag(
         self,
@@ -121,15 +117,16 @@ class TeleopSession:
         """
         now = self._clock()
         with self._lock:
-            taken = self._targets.drag(name, client, T_world_input, now=now)
-            if taken and self.limbs[name].enabled:
+            limb = self._limb(name)
+            taken = limb.drag(client, T_world_input, now=now)
+            if taken and limb.enabled:
                 self._inputs.append(now if arrived is None else arrived)
             return taken
 
     def release(self, name: str, client: int) -> None:
         """Release a limb; its target stays, and the limb goes on towards it."""
         with self._lock:
-            self._targets.release(name, client)
+            self._limb(name).release(client)
 
     def leave(self, client: int) -> None:
         """Release everything that a client holds, for instance when its tab closes."""
@@ -139,7 +136,7 @@ class TeleopSession:
     def enable(self, name: str, enabled: bool) -> None:
         """Engage or disengage a limb's clutch; its target does not move."""
         with self._lock:
-            self._targets.enable(name, enabled)
+            self._limb(name).enable(enabled)
 
     def set_gripper(self, name: str, index: int, value: float) -> None:
         """Set one synergy of a gripper, -1 open .. 1 closed; nan is ignored."""
@@ -169,6 +166,11 @@ class TeleopSession:
         """Send a command to the recording; ignored if the session does not record."""
         if self.episode_control is not None:
             self.episode_control.request(command)
+
+    def _limb(self, name: str) -> LimbTarget:
+        if name not in self.limbs:
+            raise UnknownNameError("limb", name, self.limbs)
+        return self.limbs[name]
 
     # The loop.
 
@@ -269,7 +271,8 @@ class TeleopSession:
             self._message = f"The simulation diverged ({info['physics_error']}): reset."
         self._measure_speed(now)
         with self._lock:
-            self._targets.settle(self.snapshot.limbs, period=self.period, now=now)
+            for name, limb in self.limbs.items():
+                limb.settle(self.snapshot.limbs[name], period=self.period, now=now)
         self._tick += 1
 
     def _measure_speed(self, now: float) -> None:
@@ -283,7 +286,8 @@ class TeleopSession:
         self.env.reset(seed=self._seed if seed is None else seed)
         with self._lock:
             self._pipeline.reset()
-            self._targets.reset()
+            for limb in self.limbs.values():
+                limb.rest = None
             self._open_grippers()
         self._message, self._success, self._ik = "", False, {}
         self._last_step = float("nan")
@@ -296,15 +300,10 @@ class TeleopSession:
     # What is displayed.
 
     def _describe(self) -> SessionInfo:
-        layout = self.env.unwrapped.action_layout  # type: ignore[attr-defined]
         return SessionInfo(
             model=self.model,
             limbs={name: limb.info for name, limb in self.limbs.items()},
-            grippers={
-                part.name: tuple(part.labels)
-                for part in layout.slices
-                if part.kind is SliceKind.GRIPPER
-            },
+            grippers={name: grip.labels for name, grip in self._pipeline.grips.items()},
             records=self.episode_control is not None,
         )
 

@@ -26,7 +26,7 @@ class WatchPage:
         set_up_scene(self.site.server, label="wbc_suite")
         self._scene = ModelScene(self.site.server, model)
         middle, reach = model.stat.center, 0.5 * model.stat.extent
-        set_camera(self.site.server, middle - reach, middle + reach)
+        set_camera(self.site.server, (middle - reach, middle + reach))
         log.warning("View the scene at %s", self.site.url)
 
     def show(self, positions: Matrix, quaternions: Matrix) -> None:

@@ -4,7 +4,6 @@ from typing import Literal
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
-from wbc_suite.devices.pipeline.motion_limit import Rates
 from wbc_suite.tomlfile import FrozenModel
 
 __all__ = ["Leash", "OneEuro", "PipelineConfig", "RatesConfig", "WorkspaceBox"]
@@ -18,11 +17,6 @@ class RatesConfig(FrozenModel):
     speed: PositiveFloat
     acceleration: PositiveFloat
     jerk: PositiveFloat
-
-    @property
-    def rates(self) -> Rates:
-        """The limits as a plain value."""
-        return Rates(self.speed, self.acceleration, self.jerk)
 
 
 class WorkspaceBox(FrozenModel):

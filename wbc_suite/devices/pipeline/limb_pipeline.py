@@ -34,7 +34,7 @@ class LimbPipeline:
         self.port, self._config, self._dt = port, config, dt
         smooth = config.one_euro
         self._filter = None if smooth is None else OneEuroFilter(smooth, dt)
-        self._limit = MotionLimit(config.linear.rates, config.angular.rates, dt)
+        self._limit = MotionLimit(config.linear, config.angular, dt)
         self.reset()
 
     def reset(self) -> None:
@@ -96,14 +96,17 @@ class LimbPipeline:
             self._clutch_note = "clutch disengaged"
             return
         if given.twist is not None:
-            self.clutch.place(_moved(self.clutch.target, given.twist * self._dt))
-            self._last_input = None
+            before, step = self.clutch.target, given.twist * self._dt
+            turned = pin.exp3(step[3:]) @ before.rotation
+            self.place(pin.SE3(turned, before.translation + step[:3]))
         if given.pose is None:
             return
         jumped = self._jumps(given.pose)
         self._last_input = given.pose
         if self._config.mode == "absolute":
-            self.clutch.place(self._scaled(given.pose))
+            origin, pose = self.home.translation, given.pose
+            offset = self._config.scale * (pose.translation - origin)
+            self.clutch.place(pin.SE3(pose.rotation, origin + offset))
             return
         if jumped or not self.clutch.engaged:
             self.clutch.engage(given.pose)
@@ -133,11 +136,6 @@ class LimbPipeline:
             return False
         return bool(np.linalg.norm(pose.translation - last.translation) > limit)
 
-    def _scaled(self, pose: pin.SE3) -> pin.SE3:
-        origin = self.home.translation
-        offset = self._config.scale * (pose.translation - origin)
-        return pin.SE3(pose.rotation, origin + offset)
-
 
 def clip_to_box(target: pin.SE3, box: WorkspaceBox) -> tuple[pin.SE3, bool]:
     """Return the nearest target inside a box, and whether it is at its boundary."""
@@ -166,8 +164,3 @@ def clip_to_leash(
     if angle > leash.angle:
         rotation = pin.exp3(leash.angle / angle * turn) @ measured.rotation
     return pin.SE3(rotation, position), tight
-
-
-def _moved(pose: pin.SE3, step: Vector) -> pin.SE3:
-    """Return a pose moved and turned by a step in world axes, shape (6,)."""
-    return pin.SE3(pin.exp3(step[3:]) @ pose.rotation, pose.translation + step[:3])

@@ -1,26 +1,17 @@
 """The input limiter: speed, acceleration and jerk of targets."""
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
 
+from wbc_suite.devices.pipeline.config import RatesConfig
 from wbc_suite.typing import Vector
 
-__all__ = ["LimitedMotion", "MotionLimit", "Rates"]
+__all__ = ["LimitedMotion", "MotionLimit"]
 
 BISECTIONS = 20
 STILL = 1e-12  # units, units / s and / s^2; smaller values count as zero
-
-
-@dataclass(frozen=True, slots=True)
-class Rates:
-    """Greatest magnitudes of a motion's derivatives, in units / s, / s^2 and / s^3."""
-
-    speed: float
-    acceleration: float
-    jerk: float
 
 
 class LimitedMotion:
@@ -42,7 +33,7 @@ class LimitedMotion:
         dt: Time between two ticks, s.
     """
 
-    def __init__(self, size: int, rates: Rates, dt: float) -> None:
+    def __init__(self, size: int, rates: RatesConfig, dt: float) -> None:
         self._rates, self._dt = rates, dt
         self._v, self._a, self._still = np.zeros(size), np.zeros(size), True
 
@@ -120,7 +111,7 @@ class LimitedMotion:
 class MotionLimit:
     """A pose that follows another one within linear and angular limits."""
 
-    def __init__(self, linear: Rates, angular: Rates, dt: float) -> None:
+    def __init__(self, linear: RatesConfig, angular: RatesConfig, dt: float) -> None:
         self._linear = LimitedMotion(3, linear, dt)
         self._angular = LimitedMotion(3, angular, dt)
         self.pose: pin.SE3 = pin.SE3.Identity()

@@ -1,6 +1,6 @@
 """Targets of grippers, joints and base velocities, each within its limits."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -16,11 +16,15 @@ class GripTarget:
     """The closing of a gripper, which moves to a goal.
 
     Attributes:
+        labels: Names of the synergies.
         goal: Requested closing of each synergy, -1 open .. 1 closed.
     """
 
-    def __init__(self, size: int, config: PipelineConfig, dt: float) -> None:
-        self._motion = LimitedMotion(size, config.grip.rates, dt)
+    def __init__(
+        self, labels: Sequence[str], config: PipelineConfig, dt: float
+    ) -> None:
+        self.labels, size = tuple(labels), len(labels)
+        self._motion = LimitedMotion(size, config.grip, dt)
         self.reset(np.zeros(size))
 
     def reset(self, values: Vector) -> None:
@@ -47,8 +51,7 @@ class JointTargets:
 
     def __init__(self, port: JointPort, config: PipelineConfig, dt: float) -> None:
         self._port = port
-        rates = config.joint.rates
-        self._motions = [LimitedMotion(1, rates, dt) for _ in port.joints]
+        self._motions = [LimitedMotion(1, config.joint, dt) for _ in port.joints]
         self.reset()
 
     def reset(self) -> None:
@@ -89,7 +92,7 @@ class BaseVelocity:
     def __init__(self, port: SpeedPort, config: PipelineConfig, dt: float) -> None:
         self.robot = robot_of(port.name)
         self._port = port
-        self._change = LimitedMotion(3, config.base_rise.rates, dt)
+        self._change = LimitedMotion(3, config.base_rise, dt)
         self.reset()
 
     def reset(self) -> None:

@@ -1,6 +1,6 @@
 """The pipeline: from the states of a device to actions."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -60,7 +60,7 @@ class Pipeline:
         ports = limb_ports(env)
         self.limbs = {n: LimbPipeline(p, settings, dt) for n, p in ports.items()}
         self.grips = {
-            s.name: GripTarget(len(s.labels), settings, dt)
+            s.name: GripTarget(s.labels, settings, dt)
             for s in self._layout.slices
             if s.kind == "gripper"
         }
@@ -84,13 +84,12 @@ class Pipeline:
 
     def reset(self) -> None:
         """Start an episode: every target is at its limb."""
-        for drive in (*self.limbs.values(), *self._joints.values()):
-            drive.reset()
+        parts = *self.limbs.values(), *self._joints.values(), *self._bases.values()
+        for part in parts:
+            part.reset()
         held = self._layout.unpack(self._env.hold_action)
         for name, grip in self.grips.items():
             grip.reset(held[name])
-        for base in self._bases.values():
-            base.reset()
         self._watchdog.reset()
         self._mirror, self._pressed = self._config.mirror, frozenset[str]()
         self._time, self._height = 0.0, 0.0
@@ -130,7 +129,8 @@ class Pipeline:
                         self.grips[name].toggle()
                 case "mirror":
                     self._mirror = not self._mirror
-                    self._release(self.limbs)
+                    for limb in self.limbs.values():
+                        limb.release()
                 case "home":
                     for limb in self.limbs.values():
                         limb.go_home()
@@ -148,7 +148,7 @@ class Pipeline:
             joints.aim(state.joints)
         self._height = state.height
         if state.base is not None:
-            self._steer(self._bounded(state.base))
+            self._steer(state.base)
         self._driven |= self._inputs.keys()
 
     def _close(self, limb: str, given: LimbInput) -> None:
@@ -159,32 +159,32 @@ class Pipeline:
         if given.grip is not None:
             self.grips[name].aim(given.grip)
         elif given.fingers is not None and method is not None:
-            labels = self._layout[name].labels
-            grip = retarget(given.fingers, labels, by_pinch=method == "pinch")
+            labels, by_pinch = self.grips[name].labels, method == "pinch"
+            grip = retarget(given.fingers, labels, by_pinch=by_pinch)
             self.grips[name].aim(grip)
-
-    def _bounded(self, velocity: Vector) -> Vector:
-        linear, angular = self._config.base_speed
-        fast = max(1.0, float(np.hypot(*velocity[:2])) / linear)
-        turn = np.clip(velocity[2], -angular, angular)
-        return np.array([velocity[0] / fast, velocity[1] / fast, turn])
 
     def _steer(self, velocity: Vector) -> None:
         """Drive the base of the selected hand's robot: forward, left, turn."""
+        linear, angular = self._config.base_speed
+        forward, left = velocity[:2] / max(1.0, np.hypot(*velocity[:2]) / linear)
+        turn = np.clip(velocity[2], -angular, angular)
         robot = robot_of(self._selector.selected)
         for base in self._bases.values():
-            base.goal = velocity if base.robot == robot else np.zeros(3)
+            goal = [forward, left, turn] if base.robot == robot else np.zeros(3)
+            base.goal = np.array(goal)
         for name, limb in self.limbs.items():
             if limb.port.kind is LimbKind.PLANAR and robot_of(name) == robot:
                 R = limb.clutch.target.rotation
-                along = R @ np.array([velocity[0], velocity[1], 0.0])
-                twist = np.array([*along, 0.0, 0.0, velocity[2]])
+                along = R @ np.array([forward, left, 0.0])
+                twist = np.array([*along, 0.0, 0.0, turn])
                 self._inputs[name] = LimbInput(twist=twist)
 
     def _move(self) -> dict[str, Vector]:
         """Advance all targets by one tick; return the action's values by slice."""
         self._time += self._dt
-        pace = self._pace()
+        ramp = self._config.ramp
+        started = 1.0 if ramp == 0.0 else min(1.0, self._time / ramp)
+        pace = FIRST_PACE + (1.0 - FIRST_PACE) * started
         values: dict[str, Vector] = {}
         planar = [n for n, b in self.limbs.items() if b.port.kind is LimbKind.PLANAR]
         for name in (*planar, *(n for n in self.limbs if n not in planar)):
@@ -206,12 +206,6 @@ class Pipeline:
             if limb.port.kind is LimbKind.POSE and robot_of(name) == robot_of(base):
                 limb.carry(T_step)
 
-    def _pace(self) -> float:
-        """Return the fraction of the speed limits that the start ramp permits."""
-        ramp = self._config.ramp
-        done = 1.0 if ramp == 0.0 else min(1.0, self._time / ramp)
-        return FIRST_PACE + (1.0 - FIRST_PACE) * done
-
     def _hold_or_return(self) -> None:
         """Hold the limbs that the device moved, or move them home."""
         self._inputs, self._height = {}, 0.0
@@ -223,11 +217,8 @@ class Pipeline:
             for name in self._driven:
                 self.limbs[name].go_home()
         else:
-            self._release(self._driven)
-
-    def _release(self, names: Iterable[str]) -> None:
-        for name in names:
-            self.limbs[name].release()
+            for name in self._driven:
+                self.limbs[name].release()
 
 
 class LimbSelector:
