@@ -1,7 +1,6 @@
 """`wbc-suite list | check | schema`: what the catalogue has, and files for it."""
 
 import json
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -17,21 +16,14 @@ if TYPE_CHECKING:
 __all__ = ["check_file", "list_catalogue", "print_schema"]
 
 
-class Kind(StrEnum):
-    """What can be listed."""
+Kind = Literal["robots", "grippers", "bases", "benchmarks", "controllers"]
 
-    ROBOTS = "robots"
-    GRIPPERS = "grippers"
-    BASES = "bases"
-    BENCHMARKS = "benchmarks"
-    CONTROLLERS = "controllers"
-
-
-_FOLDERS = {
-    Kind.GRIPPERS: "robots/gripper",
-    Kind.BASES: "robots/base",
-    Kind.BENCHMARKS: "tasks",
-    Kind.CONTROLLERS: "controllers",
+_FOLDERS: dict[Kind, str] = {
+    "robots": "robots",
+    "grippers": "robots/gripper",
+    "bases": "robots/base",
+    "benchmarks": "tasks",
+    "controllers": "controllers",
 }
 
 
@@ -48,10 +40,10 @@ def list_catalogue(
 
     console = Console(soft_wrap=True)
     known = Catalogue()
-    for chosen in [kind] if kind else Kind:
-        if chosen is Kind.ROBOTS:
+    for chosen in [kind] if kind else _FOLDERS:
+        if chosen == "robots":
             console.print(_robots(known))
-        elif chosen in (Kind.GRIPPERS, Kind.BASES):
+        elif chosen in ("grippers", "bases"):
             console.print(_components(known, chosen))
         else:
             console.print(_files(known, chosen))
@@ -63,13 +55,8 @@ def _robots(catalogue: "Catalogue") -> "Table":
     table = _table("Robots", "name", "", "dof", "kg", "root")
     for name in catalogue.names("robots"):
         robot = load_robot(name, catalogue=catalogue)
-        table.add_row(
-            robot.name,
-            robot.title,
-            str(robot.dof),
-            f"{robot.mass:.1f}",
-            robot.root.kind,
-        )
+        numbers = str(robot.dof), f"{robot.mass:.1f}"
+        table.add_row(robot.name, robot.title, *numbers, robot.root.kind)
     return table
 
 
@@ -77,26 +64,22 @@ def _components(catalogue: "Catalogue", kind: Kind) -> "Table":
     """List grippers with the side they fit, bases with the root they bring."""
     from wbc_suite.robot.robot_file import Component, read_robot_file
 
-    what = "side" if kind is Kind.GRIPPERS else "root"
+    what = "side" if kind == "grippers" else "root"
     table = _table(kind.capitalize(), "name", "", what, "kg")
     for path in catalogue.files(_FOLDERS[kind]):
         component = read_robot_file(path)
         if not isinstance(component, Component):
             continue
         header = component.component
-        side = header.side or "both"
-        table.add_row(
-            header.name,
-            header.title,
-            side if kind is Kind.GRIPPERS else component.root.kind,
-            f"{sum(link.mass for link in component.links):.2f}",
-        )
+        fits = header.side or "both" if what == "side" else component.root.kind
+        mass = sum(link.mass for link in component.links)
+        table.add_row(header.name, header.title, fits, f"{mass:.2f}")
     return table
 
 
 def _files(catalogue: "Catalogue", kind: Kind) -> "Table":
     table = _table(kind.capitalize(), "name", "")
-    if kind is Kind.CONTROLLERS:
+    if kind == "controllers":
         from wbc_suite.control.composite import composite_names
         from wbc_suite.control.part.registry import part_models
 
@@ -115,9 +98,9 @@ def _name_and_title(path: Path, kind: Kind) -> tuple[str, str]:
     from wbc_suite.tomlfile import read_toml
 
     content = read_toml(path)
-    if kind is Kind.CONTROLLERS:
+    if kind == "controllers":
         return path.stem, _controlled(content)
-    if kind is Kind.BENCHMARKS:
+    if kind == "benchmarks":
         return content["name"], content["title"]
     tables = [content, *(t for t in content.values() if isinstance(t, dict))]
     titles = (t.get("title") or t.get("description") for t in tables)

@@ -104,9 +104,8 @@ def _print_episodes(dataset: "Dataset", most: int) -> None:
     for name, length, fact in list(zip(dataset.names, lengths, facts, strict=True))[
         :most
     ]:
-        word = {None: "", True: "success", False: "no success"}[
-            bool(fact["success"]) if "success" in fact else None
-        ]
+        success = bool(fact["success"]) if "success" in fact else None
+        word = {None: "", True: "success", False: "no success"}[success]
         clipped = fact.get("clipped_steps", 0)
         print(
             f"    {name:<10} {length:6d} actions  {word:<10}"
@@ -239,7 +238,7 @@ def convert(
 def extract(
     file: RecordingArgument,
     *,
-    out: Annotated[Path, typer.Option("--out", "-o", help="File to write.")],
+    out: OutOption,
     camera: CamerasOption = None,
     size: PictureSizeOption = 84,
     depth: Annotated[bool, typer.Option("--depth", help="See depth too.")] = False,
