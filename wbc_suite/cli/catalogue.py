@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 import typer
 
@@ -18,8 +18,7 @@ __all__ = ["check_file", "list_catalogue", "print_schema"]
 
 Kind = Literal["robots", "grippers", "bases", "benchmarks", "controllers"]
 
-_FOLDERS: dict[Kind, str] = {
-    "robots": "robots",
+_FOLDERS = {
     "grippers": "robots/gripper",
     "bases": "robots/base",
     "benchmarks": "tasks",
@@ -40,7 +39,8 @@ def list_catalogue(
 
     console = Console(soft_wrap=True)
     known = Catalogue()
-    for chosen in [kind] if kind else _FOLDERS:
+    kinds: tuple[Kind, ...] = (kind,) if kind else get_args(Kind)
+    for chosen in kinds:
         if chosen == "robots":
             console.print(_robots(known))
         elif chosen in ("grippers", "bases"):

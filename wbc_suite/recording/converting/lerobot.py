@@ -17,13 +17,12 @@ Source: the documentation of LeRobotDataset v3.0 (huggingface.co/docs/lerobot).
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wbc_suite.errors import DatasetError
-from wbc_suite.executors.executor import Json
 from wbc_suite.recording.atomic_files import new_folder, write_bytes
 from wbc_suite.recording.converting.layout import Layout, Piece, Progress
 from wbc_suite.recording.dataset import Dataset
@@ -56,7 +55,7 @@ def _import_pyarrow() -> tuple[Any, Any]:
 
 def _write(
     dataset: Dataset, piece: Piece, out: Path, on_progress: Progress
-) -> dict[str, Json]:
+) -> dict[str, Any]:
     """Write frames and videos of some episodes as files of their own.
 
     Returns:
@@ -98,10 +97,10 @@ def _write(
     return {"rows": rows}
 
 
-def _finish(dataset: Dataset, out: Path, pieces: Sequence[Mapping[str, Json]]) -> None:
+def _finish(dataset: Dataset, out: Path, pieces: Sequence[Mapping[str, Any]]) -> None:
     """Write the files about all pieces, in the order of the episodes."""
     arrow, parquet = _import_pyarrow()
-    rows: list[Any] = [row for piece in pieces for row in cast(list, piece["rows"])]
+    rows = [row for piece in pieces for row in piece["rows"]]
     frames = [out / f"data/{_place(number)}.parquet" for number in range(len(pieces))]
     table = arrow.concat_tables([parquet.ParquetFile(path).read() for path in frames])
     episodes = arrow.Table.from_pylist(rows)
