@@ -23,12 +23,7 @@ from wbc_suite.envs.building import (
     simulate,
     use_sampler,
 )
-from wbc_suite.envs.config import (
-    EnvArguments,
-    EnvConfig,
-    checked_seed,
-    parse_env_config,
-)
+from wbc_suite.envs.config import EnvArguments, checked_seed, parse_env_config
 from wbc_suite.envs.states import EnvState, write_physics, write_scene
 from wbc_suite.errors import ConfigError, PhysicsError
 from wbc_suite.sensing.observation_buffer import ObservationBuffer
@@ -76,26 +71,23 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         self._given = benchmark, dict(arguments)
         self.benchmark = load_benchmark(benchmark)
         robots = list(self.benchmark.robots)
-        self.config: EnvConfig = parse_env_config({"robots": robots, **arguments})
+        self.config = parse_env_config({"robots": robots, **arguments})
         use_sampler(self.benchmark, self.config)
         self.render_mode = self.config.render_mode
         self.robots = place_robots(self.benchmark, self.config)
-        self.simulation, self._postures = simulate(
-            self.benchmark, self.robots, self.config
-        )
+        made = simulate(self.benchmark, self.robots, self.config)
+        self.simulation, self._postures = made
         self.controllers = self.simulation.controllers
+        several = len(self.controllers) > 1
         self._driven = [
-            (state.prefix if len(self.controllers) > 1 else "", controller, state)
-            for controller, state in zip(
-                self.controllers, self.simulation.robots, strict=True
-            )
+            (state.prefix if several else "", controller, state)
+            for state, controller in self.simulation.pairs
         ]
         self.action_layout = joint_layout(self.controllers)
         self.action_space = action_space(self.action_layout)
         self._period = 1.0 / self.config.control_freq
-        self.observables = make_observables(
-            self.benchmark, self.simulation, self.config
-        )
+        observed = self.benchmark, self.simulation, self.config
+        self.observables = make_observables(*observed)
         self.cameras, self._display = make_cameras(self.simulation, self.config)
         self._spaces: tuple[ObservationBuffer, gymnasium.spaces.Dict] | None = None
         self._substeps = count_substeps(self.simulation, self.config)
