@@ -12,9 +12,9 @@ __all__ = ["RayCluster"]
 class RayCluster:
     """Runs items as Ray tasks; Ray runs those of dead workers again, elsewhere.
 
+    The cluster is that of `RAY_ADDRESS`, or else one on this machine.
+
     Args:
-        address: Address of the cluster; None for `RAY_ADDRESS`, or for a cluster on
-            this machine.
         workers: Number of items that run at once; None for one per processor.
         attempts: How often an item may lose its worker before it fails.
 
@@ -24,13 +24,7 @@ class RayCluster:
     Source: https://docs.ray.io/en/latest/ray-core/fault_tolerance/tasks.html
     """
 
-    def __init__(
-        self,
-        address: str | None = None,
-        *,
-        workers: int | None = None,
-        attempts: int = 3,
-    ) -> None:
+    def __init__(self, *, workers: int | None = None, attempts: int = 3) -> None:
         try:
             import ray  # pyright: ignore[reportMissingImports]
         except ImportError as error:
@@ -41,7 +35,7 @@ class RayCluster:
         self._ray = ray
         self._attempts = attempts
         if not ray.is_initialized():
-            ray.init(address=address, log_to_driver=False)
+            ray.init(log_to_driver=False)
         self._workers = workers or max(1, int(ray.cluster_resources().get("CPU", 1)))
 
     def run(
