@@ -10,20 +10,14 @@ import numpy as np
 
 from wbc_suite.errors import DatasetError, UnknownNameError
 from wbc_suite.recording import hdf5_reader
-from wbc_suite.recording.episode import (
-    PER_STEP,
-    Column,
-    Episode,
-    Fact,
-    fingerprint,
-    pieces,
-)
+from wbc_suite.recording.episode import Column, Episode, Fact, fingerprint, pieces
 from wbc_suite.recording.hdf5_check import check_files, open_safely
 
 __all__ = ["Dataset", "dataset_files", "free_name", "part_files", "parts_folder"]
 
 _DEMO = re.compile(r"demo_?(\d{1,9})\Z")
 _GROUPS = ("obs", "next_obs")
+_DIMENSIONS = {"states": 2, "actions": 2, "rewards": 1, "dones": 1}
 
 
 def parts_folder(path: Path) -> Path:
@@ -271,11 +265,8 @@ def _check_lengths(name: str, columns: Mapping[str, Column]) -> None:
             raise DatasetError(
                 f"'{name}': '{key}' has {len(column)} rows for {length} actions."
             )
-    for key in ("states", "actions"):
-        if key in columns and columns[key].ndim != 2:
-            raise DatasetError(f"'{name}': '{key}' has the shape {columns[key].shape}.")
-    for key in PER_STEP[2:]:
-        if key in columns and columns[key].ndim != 1:
+    for key, dimensions in _DIMENSIONS.items():
+        if key in columns and columns[key].ndim != dimensions:
             raise DatasetError(f"'{name}': '{key}' has the shape {columns[key].shape}.")
     bad = [k for k in ("states", "actions") if k in columns and not _finite(columns[k])]
     if bad:
