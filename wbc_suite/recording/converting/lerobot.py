@@ -77,7 +77,8 @@ def _write(
             stats = {name: _stats(column) for name, column in columns.items()}
             for key, writer in writers.items():
                 pictures = episode.columns[f"obs/{key}"]
-                writer.add(pictures)
+                for picture in pictures:
+                    writer.add(picture)
                 stats[_feature(key)] = _picture_stats(pictures)
             rows.append(_episode_row(dataset, piece, number, episode, start, writers))
             rows[-1] |= {
