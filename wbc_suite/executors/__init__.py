@@ -1,11 +1,10 @@
 """Work items, run in this process, in worker processes, on Ray or on Slurm."""
 
 from wbc_suite.errors import UnknownNameError
+from wbc_suite.executors.clusters import RayCluster, Slurm
 from wbc_suite.executors.executor import Executor, Outcome, WorkItem
 from wbc_suite.executors.local import Processes, Serial
-from wbc_suite.executors.ray_cluster import RayCluster
 from wbc_suite.executors.results import ResultFolder, run_items
-from wbc_suite.executors.slurm import Slurm
 
 __all__ = [
     "EXECUTORS",
