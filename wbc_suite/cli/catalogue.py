@@ -78,6 +78,8 @@ def _components(catalogue: "Catalogue", kind: Kind) -> "Table":
 
 
 def _files(catalogue: "Catalogue", kind: Kind) -> "Table":
+    from wbc_suite.tomlfile import read_toml
+
     table = _table(kind.capitalize(), "name", "")
     if kind == "controllers":
         from wbc_suite.control.composite import composite_names
@@ -89,22 +91,12 @@ def _files(catalogue: "Catalogue", kind: Kind) -> "Table":
             about = str(model.__doc__).split("\n")[0].partition(";")[0]
             table.add_row(name, f"of one part: {about}")
     for path in catalogue.files(_FOLDERS[kind]):
-        table.add_row(*_name_and_title(path, kind))
+        content = read_toml(path)
+        if kind == "controllers":
+            table.add_row(path.stem, _controlled(content))
+        else:
+            table.add_row(content["name"], content["title"])
     return table
-
-
-def _name_and_title(path: Path, kind: Kind) -> tuple[str, str]:
-    """Return the name and the title of a file."""
-    from wbc_suite.tomlfile import read_toml
-
-    content = read_toml(path)
-    if kind == "controllers":
-        return path.stem, _controlled(content)
-    if kind == "benchmarks":
-        return content["name"], content["title"]
-    tables = [content, *(t for t in content.values() if isinstance(t, dict))]
-    titles = (t.get("title") or t.get("description") for t in tables)
-    return path.stem, next((title for title in titles if isinstance(title, str)), "")
 
 
 def _controlled(content: dict[str, Any]) -> str:

@@ -252,13 +252,7 @@ def tracked(items: Sequence[T], title: str) -> Iterator[T]:
 def serve_until_interrupted(
     site: "PageServer | PageProcess", title: str, until: threading.Event | None = None
 ) -> None:
-    """Print the address of a page, and wait for Ctrl-C or SIGTERM.
-
-    Args:
-        site: The page.
-        title: Title that is printed.
-        until: Another event that ends it.
-    """
+    """Print the address of a page, and wait for Ctrl-C, SIGTERM or `until`."""
     interrupted = until or threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):  # before the address is printed
         signal.signal(number, lambda *_: interrupted.set())

@@ -158,12 +158,7 @@ def describe_action(
 
 
 def _zeros(part: "ActionSlice", held: "Vector") -> str:
-    """Return what zeros mean in a slice.
-
-    Args:
-        part: The slice.
-        held: Its values that keep the present goal.
-    """
+    """Return what zeros mean in a slice; `held` are values that keep its goal."""
     if part.name == "base_mode":
         return "goals of hands ride on the base"
     if part.kind == "base" and len(held) == 3 and held.any():

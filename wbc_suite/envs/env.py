@@ -54,6 +54,8 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         simulation: Model, data and `tick`.
         observables: Observations but pictures; changes, adds and removes them.
         cameras: Pictures of the scene, and projections of points into them.
+        beginning: State of the random generator, and physics state if the episode began
+            with `reset_to`; with the actions they determine the episode.
         latency: Physics steps between a step's begin and its action taking effect; may
             exceed a control period.
     """
@@ -199,8 +201,8 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
     def get_state(self) -> EnvState:
         """Return the episode up to now, to be continued with `set_state`."""
         return EnvState(
-            began_with=self._began_with,
-            placed=self._placed,
+            began_with=self.beginning[0],
+            placed=self.beginning[1],
             taken=tuple(self._taken),
             observables=copy.deepcopy(self.observables.state()),
             rng=copy.deepcopy(self._np_random),
@@ -240,15 +242,6 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         self._start(rng, None if placed is None else np.array(placed, dtype=np.float64))
 
     @property
-    def beginning(self) -> tuple[Mapping[str, Any], Vector | None]:
-        """The generator's state and the physics state that the episode began with.
-
-        Together with the actions they determine the episode. The physics state is None
-        unless the episode began with `reset_to`.
-        """
-        return self._began_with, self._placed
-
-    @property
     def made_of(self) -> tuple[Any, dict[str, Any]]:
         """The benchmark and the arguments of this environment (a copy)."""
         return self._given[0], dict(self._given[1])
@@ -278,7 +271,8 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
 
     def _start(self, rng: np.random.Generator, placed: Vector | None = None) -> None:
         """Bring robots, objects and controllers to the start of an episode."""
-        self._began_with, self._placed = rng.bit_generator.state, placed
+        self.beginning: tuple[Mapping[str, Any], Vector | None]
+        self.beginning = rng.bit_generator.state, placed
         self._taken: list[Vector] = []
         self._waiting: deque[tuple[int, Vector]] = deque()
         simulation = self.simulation

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Container, Iterator, Mapping
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Self, cast
 
@@ -64,7 +65,7 @@ class Dataset:
     ) -> None:
         self.path = Path(path)
         files = [self.path] if alone else dataset_files(self.path)
-        self._open: list[h5py.File] = []
+        self._open = ExitStack()
         self._groups: dict[str, tuple[Path, h5py.Group]] = {}
         self.header: dict[str, Fact] = {}
         self.masks: dict[str, list[str]] = {}
@@ -96,8 +97,7 @@ class Dataset:
 
     def close(self) -> None:
         """Close the files."""
-        while self._open:
-            self._open.pop().close()
+        self._open.close()
 
     def facts(self, name: str) -> Mapping[str, Fact]:
         """Return the facts of an episode, without reading its columns.
@@ -179,8 +179,7 @@ class Dataset:
         return self._groups[name]
 
     def _add(self, path: Path) -> None:
-        file = open_safely(path, checked=True)
-        self._open.append(file)
+        file = self._open.enter_context(open_safely(path, checked=True))
         with hdf5_reader.reading(path):
             data = hdf5_reader.child(file, "data", h5py.Group)
             if data is None:

@@ -119,11 +119,7 @@ class EpisodeControl:
         return self._recorder.kept - self._kept_before
 
     def update(self, reset: Callable[[int], None]) -> None:
-        """Apply the commands, between two steps.
-
-        Args:
-            reset: Resets the environment with a seed.
-        """
+        """Apply the commands between two steps; `reset` is given a seed."""
         with self._lock:
             commands, self._commands = self._commands, []
         if self._was_recording and not self._recorder.recording:

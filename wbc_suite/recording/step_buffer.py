@@ -182,8 +182,7 @@ class StepBuffer:
     def columns(self, *, next_obs: bool = False) -> tuple[dict[str, Column], Column]:
         """Return columns by name, read-only, and the state after the last action.
 
-        Args:
-            next_obs: Whether observations after each action are included.
+        Observations after each action are included with `next_obs`.
 
         Raises:
             DatasetError: If the disk is full.

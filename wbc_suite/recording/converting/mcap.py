@@ -81,12 +81,7 @@ def _write(dataset: Dataset, piece: Piece, out: Path, on_progress: Progress) -> 
 
 
 class _EpisodeWriter:
-    """Writes episodes into a log, one after the other.
-
-    Args:
-        log: An `mcap.writer.Writer`, started.
-        rate: Actions per second where an episode has no times, Hz.
-    """
+    """Writes episodes into a log; `rate`, Hz, is that of episodes without times."""
 
     def __init__(self, log: Any, rate: float) -> None:
         self._log, self._rate = log, rate
