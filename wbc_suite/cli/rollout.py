@@ -1,7 +1,7 @@
 """`wbc-suite rollout`: many episodes, on all processors or a cluster."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -71,20 +71,27 @@ def rollout(
     items = {case: plan_rollouts([case], seeds=seeds, chunk=chunk) for case in cases}
     every = [item for mine in items.values() for item in mine]
     with progress("Rollouts", len(every)) as advance:
-
-        def report(item: "WorkItem", outcome: "Outcome") -> None:
-            if outcome.error is not None:
-                print(f"{item.name}: {outcome.error}")
-            advance(1)
-
         outcomes = run_items(
             run_rollouts,
             every,
             folder=output,
             executor=make_executor(executor, workers=workers),
-            on_outcome=report,
+            on_outcome=_reporter(advance),
         )
     _report(items, outcomes, output)
+
+
+def _reporter(
+    advance: Callable[[int], None],
+) -> "Callable[[WorkItem, Outcome], None]":
+    """Return a function that prints an item's error and advances the bar."""
+
+    def report(item: "WorkItem", outcome: "Outcome") -> None:
+        if outcome.error is not None:
+            print(f"{item.name}: {outcome.error}")
+        advance(1)
+
+    return report
 
 
 def _cases(
