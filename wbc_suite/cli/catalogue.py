@@ -196,11 +196,8 @@ def print_schema(
     ],
 ) -> None:
     """Print the JSON Schema of robot files, or of the frames that a stream takes."""
-    if kind == "frame":
-        from wbc_suite.devices.pose_frame import frame_schema
-
-        print(json.dumps(frame_schema(), indent=2))
-        return
+    from wbc_suite.devices.pose_frame import frame_schema
     from wbc_suite.robot.robot_file import robot_schema
 
-    print(json.dumps(robot_schema(kind), indent=2))
+    schema = frame_schema() if kind == "frame" else robot_schema(kind)
+    print(json.dumps(schema, indent=2))

@@ -78,14 +78,19 @@ def _system() -> Iterator[Finding]:
 
 def _packages() -> Iterator[Finding]:
     """Check that all required packages are installed."""
-    texts: list[str] = []
-    for name in _required():
-        try:
-            texts.append(f"{name} {metadata.version(name)}")
-        except metadata.PackageNotFoundError:
+    versions = {name: _version(name) for name in _required()}
+    for name, version in versions.items():
+        if version is None:
             cure = f"pip install {name}"
             yield Finding(name, "not installed", state="broken", cure=cure)
-    yield Finding("packages", ", ".join(texts))
+    yield Finding("packages", ", ".join(f"{n} {v}" for n, v in versions.items() if v))
+
+
+def _version(package: str) -> str | None:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return None
 
 
 def _required() -> list[str]:
@@ -100,12 +105,7 @@ def _required() -> list[str]:
 
 def _mujoco() -> Iterator[Finding]:
     """Check MuJoCo's distributions; an upgrade from 3 to 4 can lose files."""
-    versions = {}
-    for part in MUJOCO_PARTS:
-        try:
-            versions[part] = metadata.version(part)
-        except metadata.PackageNotFoundError:
-            versions[part] = "missing"
+    versions = {part: _version(part) or "missing" for part in MUJOCO_PARTS}
     text = ""
     if versions["mujoco"] != versions["mujoco-core"]:
         text = f"parts of different versions: {versions}"
