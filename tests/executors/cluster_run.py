@@ -26,11 +26,11 @@ def executor(name) -> Executor:
     if name == "ray":
         import ray  # pyright: ignore[reportMissingImports]
 
-        from wbc_suite.executors.ray_cluster import RayCluster
+        from wbc_suite.executors.clusters import RayCluster
 
         ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False)
         return RayCluster(attempts=2)
-    from wbc_suite.executors.slurm import Slurm
+    from wbc_suite.executors.clusters import Slurm
 
     return Slurm("local", attempts=2)
 

@@ -9,8 +9,7 @@ import types
 import pytest
 
 from wbc_suite.executors import Outcome, WorkItem, make_executor, run_items
-from wbc_suite.executors.ray_cluster import RayCluster
-from wbc_suite.executors.slurm import Slurm
+from wbc_suite.executors.clusters import RayCluster, Slurm
 
 
 def doubled(item, folder):
@@ -167,7 +166,7 @@ class FakeSubmitit(types.ModuleType):
 
 @pytest.fixture
 def submitit(monkeypatch):
-    monkeypatch.setattr("wbc_suite.executors.slurm.POLL_SECONDS", 0.0)
+    monkeypatch.setattr("wbc_suite.executors.clusters.POLL_SECONDS", 0.0)
 
     def install(**failures):
         module = FakeSubmitit(failures)

@@ -10,10 +10,11 @@ from dataclasses import replace
 import h5py
 import numpy as np
 import pytest
+from random_episodes import HEADER, make_episode
 
 from wbc_suite.errors import DatasetError, UnknownNameError
 from wbc_suite.executors import Processes, Serial
-from wbc_suite.recording import Dataset, editing, rebuild
+from wbc_suite.recording import Dataset, Store, editing, rebuild
 from wbc_suite.recording.converting import convert
 from wbc_suite.recording.converting.conversion import convert_piece
 from wbc_suite.recording.extracting import extract
@@ -64,6 +65,25 @@ def test_lerobots_layout_or_what_to_install(small_recording, tmp_path):
     assert table["frame_index"].to_pylist() == 4 * list(range(5))
     with pytest.raises(DatasetError, match="not empty"):
         convert(small_recording, out, "lerobot")
+
+
+def test_lerobots_videos_have_a_frame_for_each_action(tmp_path):
+    pytest.importorskip("pyarrow")
+    av = pytest.importorskip("av")
+    path = tmp_path / "a.hdf5"
+    with Store(path, HEADER) as store:
+        for seed in range(2):
+            episode = make_episode(seed)
+            seen = np.full((episode.length, 32, 48, 3), 100 * seed, dtype=np.uint8)
+            columns = {**episode.columns, "obs/front_image": seen}
+            store.add(replace(episode, columns=columns))
+    out = convert(path, tmp_path / "out", "lerobot")
+    (video,) = (out / "videos/observation.images.front").rglob("*.mp4")
+    with av.open(str(video)) as file:
+        frames = [frame.to_ndarray(format="rgb24") for frame in file.decode(video=0)]
+    assert [frame.shape for frame in frames] == 10 * [(32, 48, 3)]
+    brightness = [frame.mean() for frame in frames]
+    np.testing.assert_allclose(brightness, 5 * [0.0] + 5 * [100.0], atol=8.0)  # lossy
 
 
 def killed_once(item, folder):

@@ -23,9 +23,6 @@ class Notebook:
     def kept(self):
         return len(self.names)
 
-    def open(self):
-        return self
-
     def begin(self):
         self.recording, self.succeeded, self.length = True, False, 0
 

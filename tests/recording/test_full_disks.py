@@ -127,7 +127,7 @@ def test_rows_of_an_episode_that_no_longer_fit_are_said_to_be_lost(disk):
     rows = RowBuffer(disk.folder)
     disk.fill(leave=BLOCK_BYTES + BLOCK_BYTES // 2)  # the second block goes halfway
     with pytest.raises(DatasetError, match=r"No space left.*finished ones are safe"):
-        append_rows(rows, 2 * BLOCK_BYTES)
+        append_rows(rows, 3 * BLOCK_BYTES)
     rows.close()
 
 

@@ -1,9 +1,8 @@
 """`wbc-suite list | check | schema`: what the catalogue has, and files for it."""
 
 import json
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 import typer
 
@@ -17,21 +16,13 @@ if TYPE_CHECKING:
 __all__ = ["check_file", "list_catalogue", "print_schema"]
 
 
-class Kind(StrEnum):
-    """What can be listed."""
-
-    ROBOTS = "robots"
-    GRIPPERS = "grippers"
-    BASES = "bases"
-    BENCHMARKS = "benchmarks"
-    CONTROLLERS = "controllers"
-
+Kind = Literal["robots", "grippers", "bases", "benchmarks", "controllers"]
 
 _FOLDERS = {
-    Kind.GRIPPERS: "robots/gripper",
-    Kind.BASES: "robots/base",
-    Kind.BENCHMARKS: "tasks",
-    Kind.CONTROLLERS: "controllers",
+    "grippers": "robots/gripper",
+    "bases": "robots/base",
+    "benchmarks": "tasks",
+    "controllers": "controllers",
 }
 
 
@@ -48,10 +39,11 @@ def list_catalogue(
 
     console = Console(soft_wrap=True)
     known = Catalogue()
-    for chosen in [kind] if kind else Kind:
-        if chosen is Kind.ROBOTS:
+    kinds: tuple[Kind, ...] = (kind,) if kind else get_args(Kind)
+    for chosen in kinds:
+        if chosen == "robots":
             console.print(_robots(known))
-        elif chosen in (Kind.GRIPPERS, Kind.BASES):
+        elif chosen in ("grippers", "bases"):
             console.print(_components(known, chosen))
         else:
             console.print(_files(known, chosen))
@@ -63,13 +55,8 @@ def _robots(catalogue: "Catalogue") -> "Table":
     table = _table("Robots", "name", "", "dof", "kg", "root")
     for name in catalogue.names("robots"):
         robot = load_robot(name, catalogue=catalogue)
-        table.add_row(
-            robot.name,
-            robot.title,
-            str(robot.dof),
-            f"{robot.mass:.1f}",
-            robot.root.kind,
-        )
+        numbers = str(robot.dof), f"{robot.mass:.1f}"
+        table.add_row(robot.name, robot.title, *numbers, robot.root.kind)
     return table
 
 
@@ -77,26 +64,24 @@ def _components(catalogue: "Catalogue", kind: Kind) -> "Table":
     """List grippers with the side they fit, bases with the root they bring."""
     from wbc_suite.robot.robot_file import Component, read_robot_file
 
-    what = "side" if kind is Kind.GRIPPERS else "root"
+    what = "side" if kind == "grippers" else "root"
     table = _table(kind.capitalize(), "name", "", what, "kg")
     for path in catalogue.files(_FOLDERS[kind]):
         component = read_robot_file(path)
         if not isinstance(component, Component):
             continue
         header = component.component
-        side = header.side or "both"
-        table.add_row(
-            header.name,
-            header.title,
-            side if kind is Kind.GRIPPERS else component.root.kind,
-            f"{sum(link.mass for link in component.links):.2f}",
-        )
+        fits = header.side or "both" if what == "side" else component.root.kind
+        mass = sum(link.mass for link in component.links)
+        table.add_row(header.name, header.title, fits, f"{mass:.2f}")
     return table
 
 
 def _files(catalogue: "Catalogue", kind: Kind) -> "Table":
+    from wbc_suite.tomlfile import read_toml
+
     table = _table(kind.capitalize(), "name", "")
-    if kind is Kind.CONTROLLERS:
+    if kind == "controllers":
         from wbc_suite.control.composite import composite_names
         from wbc_suite.control.part.registry import part_models
 
@@ -106,22 +91,12 @@ def _files(catalogue: "Catalogue", kind: Kind) -> "Table":
             about = str(model.__doc__).split("\n")[0].partition(";")[0]
             table.add_row(name, f"of one part: {about}")
     for path in catalogue.files(_FOLDERS[kind]):
-        table.add_row(*_name_and_title(path, kind))
+        content = read_toml(path)
+        if kind == "controllers":
+            table.add_row(path.stem, _controlled(content))
+        else:
+            table.add_row(content["name"], content["title"])
     return table
-
-
-def _name_and_title(path: Path, kind: Kind) -> tuple[str, str]:
-    """Return the name and the title of a file."""
-    from wbc_suite.tomlfile import read_toml
-
-    content = read_toml(path)
-    if kind is Kind.CONTROLLERS:
-        return path.stem, _controlled(content)
-    if kind is Kind.BENCHMARKS:
-        return content["name"], content["title"]
-    tables = [content, *(t for t in content.values() if isinstance(t, dict))]
-    titles = (t.get("title") or t.get("description") for t in tables)
-    return path.stem, next((title for title in titles if isinstance(title, str)), "")
 
 
 def _controlled(content: dict[str, Any]) -> str:
@@ -221,11 +196,8 @@ def print_schema(
     ],
 ) -> None:
     """Print the JSON Schema of robot files, or of the frames that a stream takes."""
-    if kind == "frame":
-        from wbc_suite.devices.pose_frame import frame_schema
-
-        print(json.dumps(frame_schema(), indent=2))
-        return
+    from wbc_suite.devices.pose_frame import frame_schema
     from wbc_suite.robot.robot_file import robot_schema
 
-    print(json.dumps(robot_schema(kind), indent=2))
+    schema = frame_schema() if kind == "frame" else robot_schema(kind)
+    print(json.dumps(schema, indent=2))

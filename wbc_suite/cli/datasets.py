@@ -101,12 +101,10 @@ def _print_episodes(dataset: "Dataset", most: int) -> None:
         + (f", {sum(successes)} of {len(successes)} succeeded" if successes else "")
         + (f"; lengths {min(lengths)} to {max(lengths)}" if lengths else "")
     )
-    for name, length, fact in list(zip(dataset.names, lengths, facts, strict=True))[
-        :most
-    ]:
-        word = {None: "", True: "success", False: "no success"}[
-            bool(fact["success"]) if "success" in fact else None
-        ]
+    rows = list(zip(dataset.names, lengths, facts, strict=True))
+    for name, length, fact in rows[:most]:
+        success = bool(fact["success"]) if "success" in fact else None
+        word = {None: "", True: "success", False: "no success"}[success]
         clipped = fact.get("clipped_steps", 0)
         print(
             f"    {name:<10} {length:6d} actions  {word:<10}"
@@ -225,21 +223,25 @@ def convert(
     A stopped command continues when it is given again, but for `serial`.
     """
     from wbc_suite.executors import make_executor
-    from wbc_suite.recording import Dataset
     from wbc_suite.recording.converting import convert as write
 
     asked = None if executor == "serial" else make_executor(executor, workers=workers)
-    with Dataset(file) as dataset:
-        total = len(dataset)
-    with progress("Converting", total) as advance:
+    with progress("Converting", _count_episodes(file)) as advance:
         written = write(file, out, to, advance, executor=asked, workers=workers)
     print(f"Wrote {written}.")
+
+
+def _count_episodes(file: Path) -> int:
+    from wbc_suite.recording import Dataset
+
+    with Dataset(file) as dataset:
+        return len(dataset)
 
 
 def extract(
     file: RecordingArgument,
     *,
-    out: Annotated[Path, typer.Option("--out", "-o", help="File to write.")],
+    out: OutOption,
     camera: CamerasOption = None,
     size: PictureSizeOption = 84,
     depth: Annotated[bool, typer.Option("--depth", help="See depth too.")] = False,
@@ -257,7 +259,6 @@ def extract(
     A stopped command continues when it is given again.
     """
     from wbc_suite.executors import make_executor
-    from wbc_suite.recording import Dataset
     from wbc_suite.recording.extracting import extract as extract_observations
 
     changes: dict[str, Any] = {"reward_shaping": shaped, "use_camera_obs": bool(camera)}
@@ -265,9 +266,7 @@ def extract(
     if camera:
         changes["camera_depths"] = depth
     chosen = "serial" if executor == "process" and workers == 1 else executor
-    with Dataset(file) as dataset:
-        total = len(dataset)
-    with progress("Extracting", total) as advance:
+    with progress("Extracting", _count_episodes(file)) as advance:
         count = extract_observations(
             file,
             out,

@@ -6,8 +6,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wbc_suite.cli.options import writing
-
 if TYPE_CHECKING:
     import numpy as np
 
@@ -109,16 +107,10 @@ def _report(controller: str, errors: "Matrix", step_times: "Vector") -> None:
 def _write(folder: Path, pictures: "list[Image]") -> None:
     from PIL import Image
 
-    images = [Image.fromarray(picture) for picture in pictures]
+    from wbc_suite.recording.plots import save_picture
+    from wbc_suite.recording.video import write_video
+
     still, film = folder / "reach.png", folder / "reach.gif"
-    with writing(folder):
-        folder.mkdir(parents=True, exist_ok=True)
-        images[len(images) // 4].save(still)
-        images[0].save(
-            film,
-            save_all=True,
-            append_images=images[1:],
-            duration=1000 // FRAMES_PER_SECOND,
-            loop=0,
-        )
+    save_picture(Image.fromarray(pictures[len(pictures) // 4]), still)
+    write_video(pictures, film, rate=FRAMES_PER_SECOND)
     print(f"Wrote {still} and {film}.")

@@ -5,15 +5,15 @@ import platform
 import sys
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
-from enum import StrEnum
+from dataclasses import KW_ONLY, dataclass
 from importlib import metadata
+from typing import Literal
 
 import typer
 
 from wbc_suite.errors import WbcError
 
-__all__ = ["Finding", "State", "diagnose", "doctor"]
+__all__ = ["Finding", "diagnose", "doctor"]
 
 BASE_SOLVERS = ("daqp", "proxqp", "osqp")
 """QP solvers that come with the package, by the names `qpsolvers` gives them."""
@@ -37,22 +37,14 @@ def doctor() -> None:
         print(f"{_MARKS[finding.state]}  {finding.topic:<11} {finding.text}")
         if finding.cure:
             print(f"      {'':<11} -> {finding.cure}")
-        broken += finding.state is State.BROKEN
+        broken += finding.state == "broken"
     if broken:
         print("Something that is needed is broken: see BAD above.")
         raise typer.Exit(1)
     print("All that is needed is here.")
 
 
-class State(StrEnum):
-    """Severity of a finding."""
-
-    FINE = "fine"
-    OPTIONAL = "optional"
-    BROKEN = "broken"
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class Finding:
     """One property of this machine.
 
@@ -65,7 +57,8 @@ class Finding:
 
     topic: str
     text: str
-    state: State = State.FINE
+    _: KW_ONLY
+    state: Literal["fine", "optional", "broken"] = "fine"
     cure: str = ""
 
 
@@ -78,25 +71,26 @@ def diagnose() -> Iterator[Finding]:
 def _system() -> Iterator[Finding]:
     name = platform.freedesktop_os_release() if sys.platform == "linux" else {}
     system = name.get("PRETTY_NAME", platform.platform())
-    yield Finding(topic="system", text=f"{system}, {platform.machine()}")
+    yield Finding("system", f"{system}, {platform.machine()}")
     version = platform.python_version()
-    yield Finding(topic="python", text=f"{version} at {sys.executable}")
+    yield Finding("python", f"{version} at {sys.executable}")
 
 
 def _packages() -> Iterator[Finding]:
     """Check that all required packages are installed."""
-    texts: list[str] = []
-    for name in _required():
-        try:
-            texts.append(f"{name} {metadata.version(name)}")
-        except metadata.PackageNotFoundError:
-            yield Finding(
-                topic=name,
-                text="not installed",
-                state=State.BROKEN,
-                cure=f"pip install {name}",
-            )
-    yield Finding(topic="packages", text=", ".join(texts))
+    versions = {name: _version(name) for name in _required()}
+    for name, version in versions.items():
+        if version is None:
+            cure = f"pip install {name}"
+            yield Finding(name, "not installed", state="broken", cure=cure)
+    yield Finding("packages", ", ".join(f"{n} {v}" for n, v in versions.items() if v))
+
+
+def _version(package: str) -> str | None:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return None
 
 
 def _required() -> list[str]:
@@ -111,43 +105,30 @@ def _required() -> list[str]:
 
 def _mujoco() -> Iterator[Finding]:
     """Check MuJoCo's distributions; an upgrade from 3 to 4 can lose files."""
-    versions = {}
-    for part in MUJOCO_PARTS:
-        try:
-            versions[part] = metadata.version(part)
-        except metadata.PackageNotFoundError:
-            versions[part] = "missing"
+    versions = {part: _version(part) or "missing" for part in MUJOCO_PARTS}
+    text = ""
+    if versions["mujoco"] != versions["mujoco-core"]:
+        text = f"parts of different versions: {versions}"
     try:
         importlib.import_module("mujoco").mj_versionString()
     except (ImportError, AttributeError) as error:
         first = str(error).splitlines()[0]
         text = f"broken, as after an upgrade from MuJoCo 3: {first}"
-        yield Finding(topic="mujoco", text=text, state=State.BROKEN, cure=REPAIR_MUJOCO)
-        return
-    if versions["mujoco"] != versions["mujoco-core"]:
-        text = f"parts of different versions: {versions}"
-        yield Finding(topic="mujoco", text=text, state=State.BROKEN, cure=REPAIR_MUJOCO)
+    if text:
+        yield Finding("mujoco", text, state="broken", cure=REPAIR_MUJOCO)
 
 
 def _solvers() -> Iterator[Finding]:
     known = importlib.import_module("qpsolvers").available_solvers
-    yield Finding(topic="QP solvers", text=", ".join(sorted(known)))
-    broken = [name for name in BASE_SOLVERS if name not in known]
+    yield Finding("QP solvers", ", ".join(sorted(known)))
+    broken = ", ".join(name for name in BASE_SOLVERS if name not in known)
     if broken:
-        yield Finding(
-            topic="QP solvers",
-            text=f"missing: {', '.join(broken)}",
-            state=State.BROKEN,
-            cure="pip install --force-reinstall daqp proxsuite osqp",
-        )
-    absent = [name for name in EXTRA_SOLVERS if name not in known]
+        cure = "pip install --force-reinstall daqp proxsuite osqp"
+        yield Finding("QP solvers", f"missing: {broken}", state="broken", cure=cure)
+    absent = ", ".join(name for name in EXTRA_SOLVERS if name not in known)
     if absent:
-        yield Finding(
-            topic="QP solvers",
-            text=f"not installed: {', '.join(absent)}",
-            state=State.OPTIONAL,
-            cure='pip install "wbc-suite[solvers]"',
-        )
+        text, cure = f"not installed: {absent}", 'pip install "wbc-suite[solvers]"'
+        yield Finding("QP solvers", text, state="optional", cure=cure)
 
 
 def _catalogue() -> Iterator[Finding]:
@@ -156,12 +137,12 @@ def _catalogue() -> Iterator[Finding]:
     try:
         catalogue = Catalogue()
     except WbcError as error:
-        yield Finding(topic="catalogue", text=str(error), state=State.BROKEN)
+        yield Finding("catalogue", str(error), state="broken")
         return
     folders = ("robots", "tasks", "controllers")
     counts = ", ".join(f"{len(catalogue.names(f))} {f}" for f in folders)
     places = " + ".join(str(p) for p in (catalogue.root, *catalogue.extra))
-    yield Finding(topic="catalogue", text=f"{counts} in {places}")
+    yield Finding("catalogue", f"{counts} in {places}")
 
 
 def _rendering() -> Iterator[Finding]:
@@ -172,17 +153,13 @@ def _rendering() -> Iterator[Finding]:
         backend = gl_backend.activate()
         duration = _frame_seconds()
     except WbcError as error:
-        yield Finding(
-            topic="pictures",
-            text=str(error),
-            state=State.OPTIONAL,
-            cure=gl_backend.APT_COMMAND,
-        )
+        cure = gl_backend.APT_COMMAND
+        yield Finding("pictures", str(error), state="optional", cure=cure)
         return
     artist = "the processor draws" if backend.software else "a graphics card draws"
     speed = f"{1e3 * duration:.1f} ms for a 256x256 frame"
     text = f"{backend.name}, {artist} ({backend.renderer}): {speed}"
-    yield Finding(topic="pictures", text=text)
+    yield Finding("pictures", text)
 
 
 def _frame_seconds() -> float:

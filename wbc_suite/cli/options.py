@@ -7,12 +7,16 @@ import tomllib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
 from wbc_suite.catalogue import ENVIRONMENT_VARIABLE
 from wbc_suite.errors import ConfigError
+
+if TYPE_CHECKING:
+    from wbc_suite.viewers.page_process import PageProcess
+    from wbc_suite.viewers.page_server import PageServer
 
 __all__ = [
     "BaseOption",
@@ -27,7 +31,6 @@ __all__ = [
     "RecordingArgument",
     "RobotArgument",
     "RobotsOption",
-    "Served",
     "SkinOption",
     "TrustFilesOption",
     "camera_arguments",
@@ -246,30 +249,10 @@ def tracked(items: Sequence[T], title: str) -> Iterator[T]:
             advance(1)
 
 
-class Served(Protocol):
-    """A page that is served at an address, with or without a token."""
-
-    @property
-    def url(self) -> str:
-        """The address, with its token."""
-        ...
-
-    @property
-    def token(self) -> str | None:
-        """Token that requests must contain; None if they need none."""
-        ...
-
-
 def serve_until_interrupted(
-    site: Served, title: str, until: threading.Event | None = None
+    site: "PageServer | PageProcess", title: str, until: threading.Event | None = None
 ) -> None:
-    """Print the address of a page, and wait for Ctrl-C or SIGTERM.
-
-    Args:
-        site: The page.
-        title: Title that is printed.
-        until: Another event that ends it.
-    """
+    """Print the address of a page, and wait for Ctrl-C, SIGTERM or `until`."""
     interrupted = until or threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):  # before the address is printed
         signal.signal(number, lambda *_: interrupted.set())

@@ -1,8 +1,7 @@
 """`wbc-suite replay`: recorded episodes, played again."""
 
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -22,18 +21,8 @@ if TYPE_CHECKING:
 __all__ = ["replay"]
 
 
-class Way(StrEnum):
-    """How an episode is played."""
-
-    STATES = "states"
-    ACTIONS = "actions"
-
-
-class Place(StrEnum):
-    """Where episodes are shown."""
-
-    BROWSER = "browser"
-    SCREEN = "screen"
+Way = Literal["states", "actions"]
+Place = Literal["browser", "screen"]
 
 
 def replay(
@@ -41,7 +30,7 @@ def replay(
     *,
     by: Annotated[
         Way, typer.Option(help="States as recorded, or actions, open loop.")
-    ] = Way.ACTIONS,
+    ] = "actions",
     episode: Annotated[
         list[str] | None, typer.Option(help="Episode; all when left out.")
     ] = None,
@@ -80,7 +69,7 @@ def replay(
                 _film(env, dataset, names, by, film)
         finally:
             env.close()
-    if by is Way.ACTIONS:
+    if by == "actions":
         print(f"{sum(exact)} of {len(exact)} episodes replay bit by bit.")
 
 
@@ -95,8 +84,8 @@ def _show(
     """Show episodes until the user ends it."""
     from wbc_suite.viewers.episode_player import open_player
 
-    player = open_player(dataset, names, env, by_states=by is Way.STATES)
-    if place is Place.SCREEN:
+    player = open_player(dataset, names, env, by_states=by == "states")
+    if place == "screen":
         from wbc_suite.viewers.replay_window import show_in_window
 
         show_in_window(player, env)
@@ -115,7 +104,7 @@ def _show(
 def _play(env: "RobotEnv", episode: "Episode", by: Way) -> bool:
     from wbc_suite.recording.replaying import divergence, play_states
 
-    if by is Way.STATES:
+    if by == "states":
         count = sum(1 for _ in play_states(env, episode))
         solved = "solved" if env.benchmark.success() else "not solved"
         print(f"  {episode.name}: {count} states; at the end {solved}")
@@ -147,7 +136,7 @@ def _film(
             picture
             for name in tracked(names, "Drawing")
             for picture in episode_pictures(
-                env, dataset.episode(name), by_states=by is Way.STATES, every=every
+                env, dataset.episode(name), by_states=by == "states", every=every
             )
         ),
         path,

@@ -1,8 +1,7 @@
 """`wbc-suite view | render | export | describe-action`: commands about one robot."""
 
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -46,22 +45,14 @@ def view(
     page.stop()
 
 
-class ViewChoice(StrEnum):
-    """Where the camera stands."""
-
-    THREE_QUARTER = "three_quarter"
-    FRONT = "front"
-    SIDE = "side"
-    BACK = "back"
-
-
 def render(
     robot: RobotArgument,
     *,
     output: Annotated[Path, typer.Option("--output", "-o", help="Picture to write.")],
     view: Annotated[
-        ViewChoice, typer.Option(help="Where the camera stands.")
-    ] = ViewChoice.THREE_QUARTER,
+        Literal["three_quarter", "front", "side", "back"],
+        typer.Option(help="Where the camera stands."),
+    ] = "three_quarter",
     keyframe: Annotated[str, typer.Option(help="Posture of the robot.")] = "ready",
     width: Annotated[int, typer.Option(min=16, max=8192, help="Pixels.")] = 800,
     height: Annotated[int, typer.Option(min=16, max=8192, help="Pixels.")] = 800,
@@ -78,7 +69,7 @@ def render(
 
     picture = render_robot(
         load_robot(robot, gripper=chosen(gripper), base=base, skin=skin),
-        view=view.value,
+        view=view,
         keyframe=keyframe,
         size=(width, height),
     )
@@ -87,18 +78,12 @@ def render(
     print(f"Wrote {output}.")
 
 
-class Format(StrEnum):
-    """Formats that other programs read, and our own for editing an imported robot."""
-
-    MJCF = "mjcf"
-    URDF = "urdf"
-    TOML = "toml"
-
-
 def export_robot(
     robot: RobotArgument,
     *,
-    to: Annotated[Format, typer.Option(help="Format to write.")],
+    to: Annotated[
+        Literal["mjcf", "urdf", "toml"], typer.Option(help="Format to write.")
+    ],
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", help="File to write; otherwise it is printed."),
@@ -120,9 +105,9 @@ def export_robot(
     else:
         description = load_robot(robot, gripper=chosen(gripper), base=base)
     text = {
-        Format.MJCF: description.to_mjcf,
-        Format.URDF: description.to_urdf,
-        Format.TOML: description.to_toml,
+        "mjcf": description.to_mjcf,
+        "urdf": description.to_urdf,
+        "toml": description.to_toml,
     }[to]()
     if output is None:
         print(text)
@@ -173,12 +158,7 @@ def describe_action(
 
 
 def _zeros(part: "ActionSlice", held: "Vector") -> str:
-    """Return what zeros mean in a slice.
-
-    Args:
-        part: The slice.
-        held: Its values that keep the present goal.
-    """
+    """Return what zeros mean in a slice; `held` are values that keep its goal."""
     if part.name == "base_mode":
         return "goals of hands ride on the base"
     if part.kind == "base" and len(held) == 3 and held.any():

@@ -1,15 +1,14 @@
 """`wbc-suite rollout`: many episodes, on all processors or a cluster."""
 
 import json
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from wbc_suite.cli.options import CatalogueOption, ExecutorOption, writing
+from wbc_suite.cli.options import CatalogueOption, ExecutorOption, progress, writing
 
 if TYPE_CHECKING:
     from wbc_suite.evaluation import Case, Summary
@@ -71,15 +70,28 @@ def rollout(
     seeds = range(first_seed, first_seed + episodes)
     items = {case: plan_rollouts([case], seeds=seeds, chunk=chunk) for case in cases}
     every = [item for mine in items.values() for item in mine]
-    with _progress(len(every)) as report:
+    with progress("Rollouts", len(every)) as advance:
         outcomes = run_items(
             run_rollouts,
             every,
             folder=output,
             executor=make_executor(executor, workers=workers),
-            on_outcome=report,
+            on_outcome=_reporter(advance),
         )
     _report(items, outcomes, output)
+
+
+def _reporter(
+    advance: Callable[[int], None],
+) -> "Callable[[WorkItem, Outcome], None]":
+    """Return a function that prints an item's error and advances the bar."""
+
+    def report(item: "WorkItem", outcome: "Outcome") -> None:
+        if outcome.error is not None:
+            print(f"{item.name}: {outcome.error}")
+        advance(1)
+
+    return report
 
 
 def _cases(
@@ -110,29 +122,6 @@ def _cases(
         for together in robots
         for controller in controllers or [None]
     ]
-
-
-@contextmanager
-def _progress(total: int) -> "Iterator[Callable[[WorkItem, Outcome], None]]":
-    """Show a progress bar, and errors above it."""
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TimeRemainingColumn,
-    )
-
-    with Progress(
-        "Rollouts", BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
-    ) as bar:
-        line = bar.add_task("rollouts", total=total)
-
-        def report(item: "WorkItem", outcome: "Outcome") -> None:
-            if outcome.error is not None:
-                bar.console.print(f"{item.name}: {outcome.error}", markup=False)
-            bar.advance(line)
-
-        yield report
 
 
 def _report(

@@ -110,12 +110,7 @@ def teleop(
 
 
 def device_maker(name: str, pairs: list[str] | None) -> DeviceMaker:
-    """Return a function that makes a device for an environment.
-
-    Args:
-        name: See `find_device`.
-        pairs: Its options, `NAME=VALUE`.
-    """
+    """Return a function that makes a device with options `NAME=VALUE`."""
     from wbc_suite.devices import find_device
 
     make, options = find_device(name), device_options(pairs)

@@ -110,18 +110,15 @@ def load_part_controller_config(
         raise ConfigError(f"{custom_fpath}: no controller in it: {error}") from error
 
 
-def make(env_name: str, *args: Any, **kwargs: Any) -> RobosuiteEnv:
+def make(env_name: str, robots: Any = None, **kwargs: Any) -> RobosuiteEnv:
     """Make an environment with robosuite's arguments and defaults.
 
     Raises:
         UnknownNameError: If benchmark, robot, controller or camera is unknown.
         ConfigError: If an argument is neither robosuite's nor ours.
     """
-    if args:
-        kwargs["robots"], *rest = args
-        if rest:
-            raise ConfigError("make: only env_name and robots may come without a name.")
-    return RobosuiteEnv(env_name, **_ours(kwargs))
+    given = kwargs if robots is None else kwargs | {"robots": robots}
+    return RobosuiteEnv(env_name, **_ours(given))
 
 
 def make_from_env_args(env_args: str | dict[str, Any]) -> RobosuiteEnv:
@@ -167,10 +164,7 @@ def _ours(kwargs: dict[str, Any]) -> dict[str, Any]:
     given.setdefault("render_camera", RENDER_CAMERA)
     for key in ("env_name", "type", "env_version"):
         given.pop(key, None)
-    if given.get("robots") is not None and isinstance(given["robots"], list | tuple):
-        robots = list(given["robots"])
-        given["robots"] = robots[0] if len(robots) == 1 else robots
-    for key in ("gripper_types", "base_types", "controller_configs"):
+    for key in ("robots", "gripper_types", "base_types", "controller_configs"):
         value = given.get(key)
         if isinstance(value, list | tuple) and len(value) == 1:
             given[key] = value[0]

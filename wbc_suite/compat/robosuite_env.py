@@ -44,13 +44,7 @@ class RobosuiteEnv:
         self.env = RobotEnv(env_name, **kwargs)
         self.name = env_name
         self.sim, self.viewer = Sim(self.env), Viewer()
-        simulation = self.env.simulation
-        self.robots = tuple(
-            RobotView(state, controller)
-            for state, controller in zip(
-                simulation.robots, simulation.controllers, strict=True
-            )
-        )
+        self.robots = tuple(RobotView(*pair) for pair in self.env.simulation.pairs)
         self.timestep, self.done = 0, False
         self._ep_meta: dict[str, Any] = {}
 
@@ -141,14 +135,13 @@ class RobosuiteEnv:
         self, observable_name: str, attribute: str, modifier: Any
     ) -> None:
         """Change an observation; `corrupter` and `delayer` as in robosuite."""
-        if attribute == "corrupter" and modifier is not None:
-            attribute, inner = "noise", modifier
-            modifier = lambda values, rng: inner(values)  # noqa: E731
-        elif attribute == "delayer" and modifier is not None:
-            attribute, late = "delay", modifier
-            modifier = lambda rng: late()  # noqa: E731
-        attribute = {"corrupter": "noise", "delayer": "delay"}.get(attribute, attribute)
-        self.env.observables.modify(observable_name, **{attribute: modifier})
+        renamed = {
+            "corrupter": ("noise", lambda values, rng: modifier(values)),
+            "delayer": ("delay", lambda rng: modifier()),
+        }
+        name, change = renamed.get(attribute, (attribute, modifier))
+        change = None if modifier is None else change
+        self.env.observables.modify(observable_name, **{name: change})
 
     def get_ep_meta(self) -> dict[str, Any]:
         """Return the value of `set_ep_meta`."""
@@ -192,14 +185,10 @@ class RobosuiteEnv:
 
     def _in_their_form(self, observation: Observation) -> Observation:
         """Flip pictures, and map depths to 0 to 1, as OpenGL has them."""
-        model = self.env.simulation.model
-        near = model.vis.map.znear * model.stat.extent
-        far = model.vis.map.zfar * model.stat.extent
         for key in self.env.cameras.space:
             picture = observation[key][::-1]
             if key.endswith("_depth"):
-                picture = (1.0 - near / np.maximum(picture, near)) / (1.0 - near / far)
-                picture = picture.astype(np.float32)
+                picture = self.sim.opengl_depth(picture).astype(np.float32)
             observation[key] = np.ascontiguousarray(picture)
         return observation
 

@@ -13,7 +13,11 @@ import logging
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from wbc_suite.compat.robosuite_whole_body_json import check_keys, whole_body_config
+from wbc_suite.compat.robosuite_whole_body_json import (
+    check_keys,
+    check_name,
+    whole_body_config,
+)
 from wbc_suite.control.part.registry import is_part_controller, part_models
 from wbc_suite.control.robot_parts import hands_of, parts_of
 from wbc_suite.errors import ConfigError, UnknownNameError
@@ -166,9 +170,7 @@ def _part(
         kind = "BASE_VELOCITY"
     if kind == "OSC_POSE" and given.get("control_ori") is False:
         kind = "OSC_POSITION"
-    if not isinstance(kind, str) or kind not in models:
-        unknown = UnknownNameError("part controller", kind, models)
-        raise ConfigError(f"{source}: key '{where}type': {unknown}")
+    kind = check_name("part controller", kind, models, f"{source}: key '{where}type'")
     fields = set(models[kind].model_fields) - OTHER_UNITS.get(kind, set())
     check_keys(given, fields | {"type"}, IGNORED, source, where)
     ours: dict[str, Any] = {"type": kind}
@@ -191,11 +193,10 @@ def _gripper(
     if given is None:
         return None
     table = _table(given, source, f"{where}gripper")
-    kind = table.get("type", "GRIP")
-    if kind not in ("GRIP", "JOINT_POSITION"):
-        unknown = UnknownNameError("gripper controller", kind, ["GRIP"])
-        raise ConfigError(f"{source}: key '{where}gripper.type': {unknown}")
-    dropped.extend(f"{where}gripper.{key}" for key in table if key != "type")
+    kind, where = table.get("type", "GRIP"), f"{where}gripper."
+    known = ("GRIP", "JOINT_POSITION")
+    check_name("gripper controller", kind, known, f"{source}: key '{where}type'")
+    dropped.extend(where + key for key in table if key != "type")
     return {"type": "GRIP"}
 
 

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 import mujoco
@@ -13,7 +13,7 @@ from wbc_suite.control import CompositeController, RobotState
 from wbc_suite.envs import RobotEnv
 from wbc_suite.envs.states import write_physics
 from wbc_suite.errors import UnknownNameError
-from wbc_suite.typing import Indices, Vector
+from wbc_suite.typing import Array, Indices, Vector
 
 __all__ = ["Model", "RobotView", "Sim"]
 
@@ -146,13 +146,15 @@ class Sim:
         picture = cameras.image(camera_name, **view)[::-1]
         if not depth:
             return picture
+        distance = cameras.depth(camera_name, **view)[::-1, :, 0]
+        return picture, self.opengl_depth(distance)
+
+    def opengl_depth(self, distance: Array) -> Array:
+        """Return distances from a camera, m, as OpenGL's depths, 0 to 1."""
         model = self._env.simulation.model
-        near, far = (
-            getattr(model.vis.map, plane) * model.stat.extent
-            for plane in ("znear", "zfar")
-        )
-        distance = np.maximum(cameras.depth(camera_name, **view)[::-1, :, 0], near)
-        return picture, ((1.0 - near / distance) / (1.0 - near / far))
+        near = model.vis.map.znear * model.stat.extent
+        far = model.vis.map.zfar * model.stat.extent
+        return (1.0 - near / np.maximum(distance, near)) / (1.0 - near / far)
 
 
 def _names(model: mujoco.MjModel, kind: str) -> tuple[str, ...]:
@@ -166,21 +168,6 @@ def _index(kind: str, name: str, names: tuple[str, ...]) -> int:
     return names.index(name)
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class RobotModelView:
-    """Name of a robot, and the prefix of its names in the scene."""
-
-    name: str
-    naming_prefix: str
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class GripperView:
-    """Number of action values of a gripper."""
-
-    dof: int
-
-
 class RobotView:
     """One robot; other attributes are those of its description.
 
@@ -190,21 +177,21 @@ class RobotView:
 
     Attributes:
         name: Name of the robot.
-        robot_model: Its name and prefix.
+        robot_model: Its `name`, and `naming_prefix` of its names in the scene.
         composite_controller: Its controller.
         arms: `right`, `left`, or the names of its hands.
-        gripper: The gripper of each arm.
+        gripper: The gripper of each arm; `dof` is its number of action values.
     """
 
     def __init__(self, state: RobotState, controller: CompositeController) -> None:
         robot, layout = state.robot, controller.layout
         self._state, self._slices = state, {s.name: s for s in layout.slices}
         self.name = robot.name
-        self.robot_model = RobotModelView(name=robot.name, naming_prefix=state.prefix)
+        self.robot_model = SimpleNamespace(name=robot.name, naming_prefix=state.prefix)
         self.composite_controller = controller
         self.arms = tuple(robot.hands)
         self.gripper = {
-            arm: GripperView(dof=self._size(f"{arm}_gripper")) for arm in self.arms
+            arm: SimpleNamespace(dof=self._size(f"{arm}_gripper")) for arm in self.arms
         }
 
     def __getattr__(self, name: str) -> Any:
@@ -235,12 +222,8 @@ class RobotView:
     def _ref_joint_pos_indexes(self) -> Indices:
         """Indices of the robot's joints in qpos, without grippers."""
         robot, model = self._state.robot, self._state.model
-        joints = [
-            joint
-            for group, names in robot.groups.items()
-            if not group.endswith("gripper")
-            for joint in names
-        ]
+        groups = [name for name in robot.groups if not name.endswith("gripper")]
+        joints = [joint for group in groups for joint in robot.groups[group]]
         places = [model.joint(self._state.prefix + j).qposadr[0] for j in joints]
         return np.array(places, dtype=np.int64)
 

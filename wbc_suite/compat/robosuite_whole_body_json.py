@@ -7,7 +7,7 @@ from wbc_suite.control.robot_parts import parts_of
 from wbc_suite.errors import ConfigError, UnknownNameError, did_you_mean
 from wbc_suite.robot import RobotDescription
 
-__all__ = ["check_keys", "whole_body_config"]
+__all__ = ["check_keys", "check_name", "whole_body_config"]
 
 INPUTS = {"absolute": "absolute"} | dict.fromkeys(
     ("delta", "relative", "delta_pose"), "delta"
@@ -84,7 +84,8 @@ def _input(given: Mapping[str, Any], source: str) -> dict[str, Any]:
         ("ik_input_ref_frame", "input_ref_frame", FRAMES),
     ):
         if key in given:
-            ours[own_key] = _meaning(given[key], meanings, f"{source}: key '{key}'")
+            where = f"{source}: key '{key}'"
+            ours[own_key] = meanings[check_name("choice", given[key], meanings, where)]
     if "ik_solve_freq" in given:
         ours["solve_hz"] = given["ik_solve_freq"]
     return ours
@@ -128,9 +129,7 @@ def _locked(moved: list[str], robot: RobotDescription, source: str) -> list[str]
     parts = parts_of(robot)
     known = {*parts, "right", "left", "torso", "head", "base", "legs"}
     for name in moved:
-        if name not in known:
-            unknown = UnknownNameError("part", name, known)
-            raise ConfigError(f"{source}: key 'actuation_part_names': {unknown}")
+        check_name("part", name, known, f"{source}: key 'actuation_part_names'")
     groups = {
         f"{part}_arm" if f"{part}_arm" in robot.groups else part for part in moved
     }
@@ -167,8 +166,8 @@ def _names(value: object, where: str) -> list[str]:
     return list(found)
 
 
-def _meaning(value: object, meanings: Mapping[str, str], where: str) -> str:
-    if not isinstance(value, str) or value not in meanings:
-        unknown = UnknownNameError("choice", value, meanings)
-        raise ConfigError(f"{where}: {unknown}")
-    return meanings[value]
+def check_name(kind: str, name: object, known: Collection[str], where: str) -> str:
+    """Return a name, or raise ConfigError for an unknown one."""
+    if not isinstance(name, str) or name not in known:
+        raise ConfigError(f"{where}: {UnknownNameError(kind, name, known)}")
+    return name

@@ -113,12 +113,8 @@ class StartPosture:
         self._index, self._values = _root(state)
         self._index = np.concatenate([self._index, joints])
         self._values = np.concatenate([self._values, list(posture.values())])
-        arms = [
-            name
-            for group, names in robot.groups.items()
-            if group.endswith("arm")
-            for name in names
-        ]
+        groups = [group for group in robot.groups if group.endswith("arm")]
+        arms = [name for group in groups for name in robot.groups[group]]
         self._arms, _ = state.joint_addresses(tuple(arms))
         ranges = [robot.joint(name).range or (-np.inf, np.inf) for name in arms]
         self._low, self._high = np.array(ranges).reshape(-1, 2).T
@@ -166,14 +162,13 @@ def simulate(
     mujoco.mj_forward(model, data)
     for state in states:
         aim_robot_view(state)
+    configs = [
+        load_composite_controller_config(given, robot)
+        for given, robot in zip(config.controller_list, robots, strict=True)
+    ]
     pairs = [
-        (
-            state,
-            build_composite_controller(
-                load_composite_controller_config(given, state.robot), state
-            ),
-        )
-        for state, given in zip(states, config.controller_list, strict=True)
+        (state, build_composite_controller(config, state))
+        for config, state in zip(configs, states, strict=True)
     ]
     simulation = Simulation(
         model, data, pairs, compiled=config.compiled, lite=config.lite_physics
@@ -213,15 +208,7 @@ def make_cameras(simulation: Simulation, config: EnvConfig) -> tuple[Cameras, Di
     )
     if config.render_mode:
         camera_id(simulation.model, config.render_camera)
-    display = Display(
-        config.render_mode,
-        simulation,
-        cameras,
-        camera=config.render_camera,
-        size=config.render_size,
-        period=1.0 / config.control_freq,
-    )
-    return cameras, display
+    return cameras, Display(simulation, cameras, config)
 
 
 def count_substeps(simulation: Simulation, config: EnvConfig) -> int:

@@ -16,7 +16,6 @@ from pydantic import (
 )
 
 from wbc_suite.control import CompositeControllerName, PartControllerName
-from wbc_suite.envs.display import RenderMode
 from wbc_suite.envs.states import Randomiser
 from wbc_suite.errors import ConfigError
 from wbc_suite.robot import RobotDescription
@@ -62,6 +61,7 @@ Configuration: TypeAlias = Literal["default", "single-robot", "opposed", "parall
 Noise: TypeAlias = NoiseConfig | Mapping[str, Any] | Literal["default"]
 Preset: TypeAlias = RenderPreset | Literal["fast", "balanced", "quality"]
 Level: TypeAlias = SegmentationLevel | Literal["element", "instance", "class"]
+RenderMode: TypeAlias = Literal["human", "rgb_array", "depth_array"]
 
 
 class EnvArguments(TypedDict, total=False):

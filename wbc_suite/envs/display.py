@@ -2,15 +2,14 @@
 
 import importlib
 import time
-from typing import Any, Literal, TypeAlias
+from typing import Any
 
+from wbc_suite.envs.config import EnvConfig
 from wbc_suite.envs.simulation import Simulation
 from wbc_suite.errors import ConfigError
 from wbc_suite.sensing.cameras import Cameras
 
-__all__ = ["Display", "RenderMode"]
-
-RenderMode: TypeAlias = Literal["human", "rgb_array", "depth_array"]
+__all__ = ["Display"]
 
 WATCH_PAGE = "wbc_suite.viewers.watch_page"
 """Imported when needed: `viewers` is a layer above `envs`."""
@@ -20,26 +19,16 @@ class Display:
     """Shows a simulation in one render mode.
 
     Args:
-        mode: `human` serves a page and keeps to real time; the others return arrays.
         simulation: What is shown.
         cameras: Cameras of the scene.
-        camera: Name of the one that pictures come from.
-        size: Width and height of a picture, pixels.
-        period: Time between two frames, s.
+        config: Its `render_mode`: `human` serves a page and keeps to real time, the
+            others return arrays; and camera, size and rate of the pictures.
     """
 
     def __init__(
-        self,
-        mode: RenderMode | None,
-        simulation: Simulation,
-        cameras: Cameras,
-        *,
-        camera: str,
-        size: tuple[int, int],
-        period: float,
+        self, simulation: Simulation, cameras: Cameras, config: EnvConfig
     ) -> None:
-        self.mode, self._simulation, self._cameras = mode, simulation, cameras
-        self._camera, self._size, self._period = camera, size, period
+        self._simulation, self._cameras, self._config = simulation, cameras, config
         self._page: Any = None
         self._due = 0.0
 
@@ -52,14 +41,14 @@ class Display:
         Raises:
             ConfigError: If there is no render mode.
         """
-        width, height = self._size
-        if self.mode == "human":
+        mode, camera = self._config.render_mode, self._config.render_camera
+        width, height = self._config.render_size
+        if mode == "human":
             return self._show()
-        if self.mode == "rgb_array":
-            return self._cameras.image(self._camera, width=width, height=height)
-        if self.mode == "depth_array":
-            depth = self._cameras.depth(self._camera, width=width, height=height)
-            return depth[..., 0]
+        if mode == "rgb_array":
+            return self._cameras.image(camera, width=width, height=height)
+        if mode == "depth_array":
+            return self._cameras.depth(camera, width=width, height=height)[..., 0]
         raise ConfigError("render: make the environment with render_mode.")
 
     def close(self) -> None:
@@ -75,5 +64,6 @@ class Display:
             )
         data = self._simulation.data
         self._page.show(data.xpos, data.xquat)
-        time.sleep(min(max(self._due - time.monotonic(), 0.0), self._period))
-        self._due = time.monotonic() + self._period
+        period = 1.0 / self._config.control_freq
+        time.sleep(min(max(self._due - time.monotonic(), 0.0), period))
+        self._due = time.monotonic() + period

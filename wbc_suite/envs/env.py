@@ -23,12 +23,7 @@ from wbc_suite.envs.building import (
     simulate,
     use_sampler,
 )
-from wbc_suite.envs.config import (
-    EnvArguments,
-    EnvConfig,
-    checked_seed,
-    parse_env_config,
-)
+from wbc_suite.envs.config import EnvArguments, checked_seed, parse_env_config
 from wbc_suite.envs.states import EnvState, write_physics, write_scene
 from wbc_suite.errors import ConfigError, PhysicsError
 from wbc_suite.sensing.observation_buffer import ObservationBuffer
@@ -59,6 +54,8 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         simulation: Model, data and `tick`.
         observables: Observations but pictures; changes, adds and removes them.
         cameras: Pictures of the scene, and projections of points into them.
+        beginning: State of the random generator, and physics state if the episode began
+            with `reset_to`; with the actions they determine the episode.
         latency: Physics steps between a step's begin and its action taking effect; may
             exceed a control period.
     """
@@ -76,26 +73,23 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         self._given = benchmark, dict(arguments)
         self.benchmark = load_benchmark(benchmark)
         robots = list(self.benchmark.robots)
-        self.config: EnvConfig = parse_env_config({"robots": robots, **arguments})
+        self.config = parse_env_config({"robots": robots, **arguments})
         use_sampler(self.benchmark, self.config)
         self.render_mode = self.config.render_mode
         self.robots = place_robots(self.benchmark, self.config)
-        self.simulation, self._postures = simulate(
-            self.benchmark, self.robots, self.config
-        )
+        made = simulate(self.benchmark, self.robots, self.config)
+        self.simulation, self._postures = made
         self.controllers = self.simulation.controllers
+        several = len(self.controllers) > 1
         self._driven = [
-            (state.prefix if len(self.controllers) > 1 else "", controller, state)
-            for controller, state in zip(
-                self.controllers, self.simulation.robots, strict=True
-            )
+            (state.prefix if several else "", controller, state)
+            for state, controller in self.simulation.pairs
         ]
         self.action_layout = joint_layout(self.controllers)
         self.action_space = action_space(self.action_layout)
         self._period = 1.0 / self.config.control_freq
-        self.observables = make_observables(
-            self.benchmark, self.simulation, self.config
-        )
+        observed = self.benchmark, self.simulation, self.config
+        self.observables = make_observables(*observed)
         self.cameras, self._display = make_cameras(self.simulation, self.config)
         self._spaces: tuple[ObservationBuffer, gymnasium.spaces.Dict] | None = None
         self._substeps = count_substeps(self.simulation, self.config)
@@ -207,8 +201,8 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
     def get_state(self) -> EnvState:
         """Return the episode up to now, to be continued with `set_state`."""
         return EnvState(
-            began_with=self._began_with,
-            placed=self._placed,
+            began_with=self.beginning[0],
+            placed=self.beginning[1],
             taken=tuple(self._taken),
             observables=copy.deepcopy(self.observables.state()),
             rng=copy.deepcopy(self._np_random),
@@ -248,15 +242,6 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         self._start(rng, None if placed is None else np.array(placed, dtype=np.float64))
 
     @property
-    def beginning(self) -> tuple[Mapping[str, Any], Vector | None]:
-        """The generator's state and the physics state that the episode began with.
-
-        Together with the actions they determine the episode. The physics state is None
-        unless the episode began with `reset_to`.
-        """
-        return self._began_with, self._placed
-
-    @property
     def made_of(self) -> tuple[Any, dict[str, Any]]:
         """The benchmark and the arguments of this environment (a copy)."""
         return self._given[0], dict(self._given[1])
@@ -286,7 +271,8 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
 
     def _start(self, rng: np.random.Generator, placed: Vector | None = None) -> None:
         """Bring robots, objects and controllers to the start of an episode."""
-        self._began_with, self._placed = rng.bit_generator.state, placed
+        self.beginning: tuple[Mapping[str, Any], Vector | None]
+        self.beginning = rng.bit_generator.state, placed
         self._taken: list[Vector] = []
         self._waiting: deque[tuple[int, Vector]] = deque()
         simulation = self.simulation

@@ -40,8 +40,9 @@ class Simulation:
     Attributes:
         model: The scene.
         data: The state.
-        robots: The robots in the scene.
-        controllers: Their controllers.
+        pairs: The robots in the scene with their controllers.
+        robots: The robots.
+        controllers: The controllers.
         compiled: Whether the whole loop is compiled: not if a controller computes
             commands itself, see `SteppedController`.
         loop_calls: Number of calls of the loop in the last tick. Before each but the
@@ -62,7 +63,7 @@ class Simulation:
         self._watch, self.lite = PhysicsWatch(data), lite
         self.robots = tuple(state for state, _ in pairs)
         self.controllers = tuple(controller for _, controller in pairs)
-        self._pairs = tuple(pairs)
+        self.pairs = tuple(pairs)
         self._left, self._prepared = [0] * len(pairs), False
         self.loop_calls = 1
         self._stepped = [(r, c) for r, c in pairs if isinstance(c, SteppedController)]
@@ -121,9 +122,9 @@ class Simulation:
             PhysicsError: If the state is not finite or MuJoCo warns.
         """
         self.forward()
-        for state, controller in self._pairs:
+        for state, controller in self.pairs:
             controller.reset(state)
-        self._left = [0] * len(self._pairs)
+        self._left = [0] * len(self.pairs)
 
     def tick(self, n: int) -> None:
         """Advance n physics steps with the controllers in the loop.
@@ -146,7 +147,7 @@ class Simulation:
         self.loop_calls = 0
         while n > 0:
             steps = n
-            for k, (state, controller) in enumerate(self._pairs):
+            for k, (state, controller) in enumerate(self.pairs):
                 if k not in self._ticked:
                     if self._left[k] <= 0:
                         with self._watch:

@@ -6,7 +6,7 @@ import re
 import shutil
 import time
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -69,15 +69,7 @@ def plan_rollouts(cases: Iterable[Case], *, seeds: range, chunk: int) -> list[Wo
 
 
 def _item(case: Case, start: int, stop: int) -> WorkItem:
-    payload = {
-        "benchmark": case.benchmark,
-        "robots": list(case.robots),
-        "controller": case.controller,
-        "policy": case.policy,
-        "record": case.record,
-        "arguments": dict(case.arguments),
-        "seeds": [start, stop],
-    }
+    payload = asdict(case) | {"arguments": dict(case.arguments), "seeds": [start, stop]}
     text = json.dumps(payload, sort_keys=True)
     digest = hashlib.sha256(text.encode()).hexdigest()[:8]
     title = re.sub(r"[^A-Za-z0-9]+", "-", case.title).strip("-")[:90]
@@ -98,7 +90,7 @@ def run_rollouts(item: WorkItem, folder: Path) -> dict[str, Any]:
     Returns:
         `episodes`: one dictionary per episode.
     """
-    payload: Any = item.payload
+    payload = item.payload
     env = inner = make(
         payload["benchmark"],
         robots=payload["robots"],

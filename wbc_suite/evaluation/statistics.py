@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -37,8 +37,7 @@ class Summary:
 
 def episodes_of(outcomes: Iterable[Outcome]) -> list[dict[str, Any]]:
     """Return the episodes of `run_rollouts`; failed items have none."""
-    played = (cast("list[Any]", o.result.get("episodes", [])) for o in outcomes)
-    return [episode for episodes in played for episode in episodes]
+    return [e for outcome in outcomes for e in outcome.result.get("episodes", [])]
 
 
 def summarise(episodes: Sequence[dict[str, Any]]) -> Summary:

@@ -5,24 +5,11 @@ import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
-from wbc_suite.errors import ConfigError, UnknownNameError, WbcError
+from wbc_suite.errors import ConfigError, WbcError
 
-__all__ = [
-    "EXECUTORS",
-    "Executor",
-    "Json",
-    "Outcome",
-    "Work",
-    "WorkItem",
-    "make_executor",
-    "run_item",
-]
-
-Json: TypeAlias = "bool | int | float | str | list[Json] | dict[str, Json] | None"
-
-EXECUTORS = ("process", "serial", "ray", "slurm")
+__all__ = ["Executor", "Outcome", "Work", "WorkItem", "run_item"]
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,150}")
 
@@ -37,7 +24,7 @@ class WorkItem:
     """
 
     name: str
-    payload: Mapping[str, Json]
+    payload: Mapping[str, Any]
 
     def __post_init__(self) -> None:
         if not _NAME.fullmatch(self.name):
@@ -53,16 +40,16 @@ class Outcome:
 
     Attributes:
         name: The item's name.
-        result: What the work returned; empty after an error.
+        result: What the work returned, plain JSON data; empty after an error.
         error: Error message, or None.
     """
 
     name: str
-    result: Mapping[str, Json] = field(default_factory=dict)
+    result: Mapping[str, Any] = field(default_factory=dict)
     error: str | None = None
 
 
-Work: TypeAlias = Callable[[WorkItem, Path], Mapping[str, Json]]
+Work: TypeAlias = Callable[[WorkItem, Path], Mapping[str, Any]]
 """A function of an importable module: from an item and a folder to a result."""
 
 
@@ -84,38 +71,6 @@ class Executor(Protocol):
             its own item runs again, and fails if its worker dies every time.
         """
         ...
-
-
-def make_executor(name: str, *, workers: int | None = None) -> Executor:
-    """Make an executor by name.
-
-    Args:
-        name: One of `EXECUTORS`.
-        workers: Number of items that run at once; None for one per processor.
-
-    Raises:
-        UnknownNameError: If there is no such executor.
-        ConfigError: If its package is not installed.
-    """
-    match name:
-        case "serial":
-            from wbc_suite.executors.local import Serial
-
-            return Serial()
-        case "process":
-            from wbc_suite.executors.local import Processes
-
-            return Processes(workers)
-        case "ray":
-            from wbc_suite.executors.ray_cluster import RayCluster
-
-            return RayCluster(workers=workers)
-        case "slurm":
-            from wbc_suite.executors.slurm import Slurm
-
-            return Slurm()
-        case _:
-            raise UnknownNameError("executor", name, EXECUTORS)
 
 
 def run_item(work: Work, item: WorkItem, folder: Path) -> Outcome:

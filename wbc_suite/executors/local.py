@@ -13,6 +13,8 @@ from wbc_suite.executors.executor import Outcome, Work, WorkItem, run_item
 
 __all__ = ["Processes", "Serial"]
 
+SPAWN = multiprocessing.get_context("spawn")
+
 
 class Serial:
     """Runs items in this process, in their order; for debugging."""
@@ -51,24 +53,27 @@ class Processes:
     ) -> Iterator[Outcome]:
         """Run all items; see `Executor`."""
         waiting = deque(items)
-        deaths: dict[str, int] = {}
         while waiting:
-            yield from self._run_until_a_death(work, waiting, deaths, folder)
+            busy: dict[Future[Outcome], WorkItem] = {}
+            yield from self._run_until_a_death(work, waiting, busy, folder)
+            for future, item in busy.items():
+                if future.exception() is None:
+                    yield future.result()
+                else:
+                    yield self._run_alone(work, item, folder)
 
     def _run_until_a_death(
         self,
         work: Work,
         waiting: deque[WorkItem],
-        deaths: dict[str, int],
+        busy: dict[Future[Outcome], WorkItem],
         folder: Path,
     ) -> Iterator[Outcome]:
-        """Run waiting items; items of a dead worker go back to the front."""
-        busy: dict[Future[Outcome], WorkItem] = {}
-        context = multiprocessing.get_context("spawn")
-        pool = ProcessPoolExecutor(min(self.workers, len(waiting)), mp_context=context)
+        """Run waiting items; those without an outcome are left in `busy`."""
+        pool = ProcessPoolExecutor(min(self.workers, len(waiting)), mp_context=SPAWN)
         try:
             while waiting or busy:
-                while waiting and self._may_start(waiting[0], busy, deaths):
+                while waiting and len(busy) < self.workers:
                     future = pool.submit(run_item, work, waiting[0], folder)
                     busy[future] = waiting.popleft()  # not before: `submit` may fail
                 for future in wait(busy, return_when=FIRST_COMPLETED).done:
@@ -76,38 +81,19 @@ class Processes:
                     del busy[future]
                     yield outcome
         except BrokenProcessPool:
-            yield from self._put_back(busy, waiting, deaths)
+            return
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
 
-    def _may_start(
-        self,
-        item: WorkItem,
-        busy: dict[Future[Outcome], WorkItem],
-        deaths: dict[str, int],
-    ) -> bool:
-        """Return whether an item may start now: suspects run alone."""
-        if any(other.name in deaths for other in busy.values()):
-            return False
-        return len(busy) < (1 if item.name in deaths else self.workers)
-
-    def _put_back(
-        self,
-        busy: dict[Future[Outcome], WorkItem],
-        waiting: deque[WorkItem],
-        deaths: dict[str, int],
-    ) -> Iterator[Outcome]:
-        for future, item in busy.items():
-            if future.done() and future.exception() is None:
-                yield future.result()
-                continue
-            # An item that ran beside others may not be the cause; one alone is.
-            deaths[item.name] = deaths.get(item.name, 0) + (len(busy) == 1)
-            if deaths[item.name] < self.attempts:
-                waiting.appendleft(item)
-                continue
-            yield Outcome(
-                name=item.name,
-                error=f"Its worker died {self.attempts} times (killed, out of memory, "
-                "or a crash). Run it alone with the serial executor to see why.",
-            )
+    def _run_alone(self, work: Work, item: WorkItem, folder: Path) -> Outcome:
+        """Run an item beside which a worker died, or which killed it."""
+        for _ in range(self.attempts):
+            with ProcessPoolExecutor(1, mp_context=SPAWN) as pool:
+                future = pool.submit(run_item, work, item, folder)
+            if future.exception() is None:
+                return future.result()
+        return Outcome(
+            name=item.name,
+            error=f"Its worker died {self.attempts} times (killed, out of memory, or a "
+            "crash). Run it alone with the serial executor to see why.",
+        )

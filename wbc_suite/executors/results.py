@@ -4,9 +4,10 @@ import json
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 from wbc_suite.errors import DatasetError
-from wbc_suite.executors.executor import Executor, Json, Outcome, Work, WorkItem
+from wbc_suite.executors.executor import Executor, Outcome, Work, WorkItem
 
 __all__ = ["ResultFolder", "run_items"]
 
@@ -51,7 +52,7 @@ class ResultFolder:
         except OSError as error:
             raise DatasetError(f"'{path}' cannot be written: {error}.") from error
 
-    def read(self, item: WorkItem) -> dict[str, Json] | None:
+    def read(self, item: WorkItem) -> dict[str, Any] | None:
         """Return an item's result; None if it has none, or had another payload."""
         path = self._path(item)
         try:

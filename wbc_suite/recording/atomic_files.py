@@ -15,15 +15,10 @@ RESERVE = 1 << 20
 
 
 def check_folder(folder: Path, needed: int = 0) -> None:
-    """Make a folder if it is missing, and check that files can be written to it.
-
-    Args:
-        folder: The folder.
-        needed: Bytes that will be written, if known.
+    """Make a folder if it is missing, and check that `needed` bytes fit into it.
 
     Raises:
-        DatasetError: If it cannot be made, is read-only, or has less space than
-            needed.
+        DatasetError: If it cannot be made, is read-only, or has less space.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -44,11 +39,7 @@ def check_folder(folder: Path, needed: int = 0) -> None:
 
 
 def new_folder(folder: Path, content: str) -> None:
-    """Make an empty folder.
-
-    Args:
-        folder: The folder.
-        content: What it will hold, for the message.
+    """Make an empty folder for `content`, which the message names.
 
     Raises:
         DatasetError: If it is not empty, or see `check_folder`.

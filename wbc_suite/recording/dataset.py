@@ -1,7 +1,8 @@
 """Reading of datasets: a file, and finished episodes in files beside it."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Self, cast
 
@@ -10,20 +11,14 @@ import numpy as np
 
 from wbc_suite.errors import DatasetError, UnknownNameError
 from wbc_suite.recording import hdf5_reader
-from wbc_suite.recording.episode import (
-    PER_STEP,
-    Column,
-    Episode,
-    Fact,
-    fingerprint,
-    pieces,
-)
+from wbc_suite.recording.episode import Column, Episode, Fact, fingerprint, pieces
 from wbc_suite.recording.hdf5_check import check_files, open_safely
 
-__all__ = ["Dataset", "dataset_files", "part_files", "parts_folder"]
+__all__ = ["Dataset", "dataset_files", "free_name", "part_files", "parts_folder"]
 
 _DEMO = re.compile(r"demo_?(\d{1,9})\Z")
 _GROUPS = ("obs", "next_obs")
+_DIMENSIONS = {"states": 2, "actions": 2, "rewards": 1, "dones": 1}
 
 
 def parts_folder(path: Path) -> Path:
@@ -70,7 +65,7 @@ class Dataset:
     ) -> None:
         self.path = Path(path)
         files = [self.path] if alone else dataset_files(self.path)
-        self._open: list[h5py.File] = []
+        self._open = ExitStack()
         self._groups: dict[str, tuple[Path, h5py.Group]] = {}
         self.header: dict[str, Fact] = {}
         self.masks: dict[str, list[str]] = {}
@@ -102,8 +97,7 @@ class Dataset:
 
     def close(self) -> None:
         """Close the files."""
-        while self._open:
-            self._open.pop().close()
+        self._open.close()
 
     def facts(self, name: str) -> Mapping[str, Fact]:
         """Return the facts of an episode, without reading its columns.
@@ -134,17 +128,7 @@ class Dataset:
             columns = _columns(group)
             if key not in columns:
                 raise UnknownNameError("column", key, tuple(columns))
-            return hdf5_reader.read_column(columns[key])
-
-    def episode(self, name: str) -> Episode:
-        """Read an episode.
-
-        Raises:
-            UnknownNameError: If there is none of that name.
-            DatasetError: If it cannot be read, its columns differ in length, or its
-                numbers are not those that were written.
-        """
-        return self._episode(name)
+            return hdf5_reader.StoredColumn(columns[key], path)[:]
 
     def streamed(self) -> Iterator[Episode]:
         """Read episodes one by one; their columns are read slice by slice when used.
@@ -154,9 +138,20 @@ class Dataset:
         Raises:
             DatasetError: See `episode`.
         """
-        return (self._episode(name, later=True) for name in self.names)
+        return (self.episode(name, later=True) for name in self.names)
 
-    def _episode(self, name: str, *, later: bool = False) -> Episode:
+    def episode(self, name: str, *, later: bool = False) -> Episode:
+        """Read an episode.
+
+        Args:
+            name: Its name.
+            later: Whether columns are read when they are used; see `streamed`.
+
+        Raises:
+            UnknownNameError: If there is none of that name.
+            DatasetError: If it cannot be read, its columns differ in length, or its
+                numbers are not those that were written.
+        """
         path, group = self._find(name)
         with hdf5_reader.reading(path):
             stored = {
@@ -167,7 +162,7 @@ class Dataset:
                 for k, column in stored.items()
             }
             last = hdf5_reader.child(group, "final_state", h5py.Dataset)
-            final = None if last is None else hdf5_reader.read_column(last)
+            final = None if last is None else hdf5_reader.StoredColumn(last, path)[:]
             _check_lengths(name, columns)
             facts = _facts(group)
             written = facts.pop("sha256", None)
@@ -184,8 +179,7 @@ class Dataset:
         return self._groups[name]
 
     def _add(self, path: Path) -> None:
-        file = open_safely(path, checked=True)
-        self._open.append(file)
+        file = self._open.enter_context(open_safely(path, checked=True))
         with hdf5_reader.reading(path):
             data = hdf5_reader.child(file, "data", h5py.Group)
             if data is None:
@@ -201,17 +195,18 @@ class Dataset:
                 group = hdf5_reader.child(data, name, h5py.Group)
                 if group is None or _facts(group).get("uid", name) in known:
                     continue
-                self._groups[self._free(name)] = path, group
+                self._groups[free_name(name, self._groups)] = path, group
             if not self.header:
                 self.header = _facts(data)
                 self.header.pop("total", None)
             self.masks |= _masks(file)
 
-    def _free(self, name: str) -> str:
-        """Return the name, or another one if it is taken."""
-        while name in self._groups:
-            name = f"demo_{_number(name) + 1}"
-        return name
+
+def free_name(name: str, taken: Container[str]) -> str:
+    """Return an episode's name, or the next free one if it is taken."""
+    while name in taken:
+        name = f"demo_{_number(name) + 1}"
+    return name
 
 
 def _number(name: str) -> int:
@@ -257,12 +252,8 @@ def _columns(group: h5py.Group) -> dict[str, h5py.Dataset]:
             assert inner is not None, "its name was listed"
             for key in hdf5_reader.child_names(inner):
                 found[f"{name}/{key}"] = _dataset(inner, key)
-        elif isinstance(group.get(name, getlink=True), h5py.HardLink) and (
-            group.get(name, getclass=True) is h5py.Dataset
-        ):
+        elif isinstance(hdf5_reader.child(group, name, h5py.HLObject), h5py.Dataset):
             found[name] = _dataset(group, name)
-        elif not isinstance(group.get(name, getlink=True), h5py.HardLink):
-            hdf5_reader.child(group, name, h5py.Dataset)
     return found
 
 
@@ -273,11 +264,8 @@ def _check_lengths(name: str, columns: Mapping[str, Column]) -> None:
             raise DatasetError(
                 f"'{name}': '{key}' has {len(column)} rows for {length} actions."
             )
-    for key in ("states", "actions"):
-        if key in columns and columns[key].ndim != 2:
-            raise DatasetError(f"'{name}': '{key}' has the shape {columns[key].shape}.")
-    for key in PER_STEP[2:]:
-        if key in columns and columns[key].ndim != 1:
+    for key, dimensions in _DIMENSIONS.items():
+        if key in columns and columns[key].ndim != dimensions:
             raise DatasetError(f"'{name}': '{key}' has the shape {columns[key].shape}.")
     bad = [k for k in ("states", "actions") if k in columns and not _finite(columns[k])]
     if bad:

@@ -15,10 +15,11 @@ from wbc_suite.errors import DatasetError
 from wbc_suite.recording.dataset import (
     Dataset,
     dataset_files,
+    free_name,
     part_files,
     parts_folder,
 )
-from wbc_suite.recording.episode import Episode
+from wbc_suite.recording.episode import Episode, Fact
 from wbc_suite.recording.episode_store import locked
 from wbc_suite.recording.hdf5_check import check_files
 from wbc_suite.recording.hdf5_writer import write_dataset
@@ -54,23 +55,25 @@ def repair(path: str | Path) -> list[Finding]:
             disk is full; then everything stays as it was.
     """
     path = Path(path)
-    parts = part_files(path)
     with locked(path):
-        findings, episodes = [], {}
+        findings: list[Finding] = []
+        uids: set[Fact] = set()
+        names: dict[str, str] = {}  # by place
         for finding, episode in _read_all(path):
             findings.append(finding)
-            if episode is not None:
-                uid = str(episode.facts.get("uid", finding.place))
-                episodes.setdefault(uid, finding.place)
+            if episode is None:
+                continue
+            uid = episode.facts.get("uid", finding.place)
+            if uid not in uids:
+                uids.add(uid)
+                names[finding.place] = free_name(episode.name, names.values())
         damaged = any(f.problem for f in findings)
-        if not episodes and damaged:
+        if not names and damaged:
             raise DatasetError(f"Nothing of '{path}' can be read: {findings[0]}.")
-        if damaged or parts:
-            _write_repaired(path, set(episodes.values()), keep_old=damaged)
-            if not damaged:
-                rmtree(parts_folder(path), ignore_errors=True)
-    if not part_files(path):
-        rmtree(parts_folder(path), ignore_errors=True)
+        if damaged or part_files(path):
+            _write_repaired(path, names, keep_old=damaged)
+        if not damaged or not part_files(path):
+            rmtree(parts_folder(path), ignore_errors=True)
     return findings
 
 
@@ -189,21 +192,17 @@ def _damage(files: Sequence[Path]) -> dict[Path, str]:
     return {}
 
 
-def _write_repaired(path: Path, wanted: set[str], *, keep_old: bool) -> None:
-    """Write the wanted episodes, given by their places, into one file."""
-    header: dict[str, str | int | float | bool] = {}
-    masks: dict[str, list[str]] = {}
+def _write_repaired(path: Path, names: Mapping[str, str], *, keep_old: bool) -> None:
+    """Write episodes into one file, with their new names by their places."""
+    header: dict[str, Fact] = {}
+    masks: dict[str, list[str]] = {}  # with names of the first file
     for file in [path, *part_files(path)]:
         try:
             with Dataset(file, alone=True) as dataset:
-                header, masks = dict(dataset.header), dict(dataset.masks)
+                header, masks = dataset.header, dataset.masks
             break
         except DatasetError:
             continue
-    names: dict[str, str] = {}  # by place; masks have names of the first file
-    for finding, episode in _read_all(path):
-        if episode is not None and finding.place in wanted:
-            names[finding.place] = _free(episode.name, names.values())
     kept = {
         k: [n for n in masked if n in names.values()] for k, masked in masks.items()
     }
@@ -217,13 +216,6 @@ def _write_repaired(path: Path, wanted: set[str], *, keep_old: bool) -> None:
     if keep_old and path.exists():
         path.replace(path.with_name(path.name + ".damaged"))
     repaired.replace(path)
-
-
-def _free(name: str, taken: Iterable[str]) -> str:
-    number = int(name.split("_")[-1].removeprefix("demo"))
-    while f"demo_{number}" in taken:
-        number += 1
-    return f"demo_{number}"
 
 
 def _distinct(datasets: Iterable[Dataset]) -> list[tuple[Dataset, str]]:

@@ -115,15 +115,15 @@ class EnvSource:
                 f"The dataset does not contain {', '.join(sorted(lost))}: make the "
                 "environment yourself and replay in that."
             )
-        known = {k: v for k, v in self.arguments.items() if k in EnvConfig.model_fields}
-        known = {k: v for k, v in known.items() if k not in _SHOWN}
+        taken = set(EnvConfig.model_fields) - _SHOWN
+        known = {k: v for k, v in self.arguments.items() if k in taken}
         if not trust_files:
             _refuse_paths([self.benchmark, *(known.get(k) for k in _NAMES)])
         try:
             return RobotEnv(self.benchmark, **{**known, **changes})
         except WbcError as error:
             raise DatasetError(
-                f"The environment {self.benchmark} with {dict(known)!s:.200} "
+                f"The environment {self.benchmark} with {known!s:.200} "
                 f"cannot be made here: {error}"
             ) from error
 

@@ -9,15 +9,13 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["PER_STEP", "Column", "Episode", "Fact", "fingerprint", "pieces"]
+__all__ = ["Column", "Episode", "Fact", "fingerprint", "pieces"]
 
 Column: TypeAlias = NDArray[Any]
 """One row per action."""
 Fact: TypeAlias = str | int | float | bool
 """A value about a whole episode."""
 
-PER_STEP = ("states", "actions", "rewards", "dones")
-"""Columns of robomimic's layout, besides `obs/*`."""
 PIECE = 1 << 20
 """Bytes that are read at once while a column is written."""
 

@@ -81,11 +81,8 @@ class EpisodeControl:
         report: Callable[[str], None] | None = None,
     ) -> None:
         self._recorder, self._seed, self._plan = recorder, seed, plan
-        self._report, self._kept_before = report, 0
+        self._report, self._kept_before = report, recorder.kept
         self._length = self._success_steps = 0
-        if plan is not None:
-            recorder.open()
-            self._kept_before = recorder.kept
         self._lock = threading.Lock()
         self._commands: list[EpisodeCommand] = []
         self._message, self._was_recording = "", False
@@ -122,11 +119,7 @@ class EpisodeControl:
         return self._recorder.kept - self._kept_before
 
     def update(self, reset: Callable[[int], None]) -> None:
-        """Apply the commands, between two steps.
-
-        Args:
-            reset: Resets the environment with a seed.
-        """
+        """Apply the commands between two steps; `reset` is given a seed."""
         with self._lock:
             commands, self._commands = self._commands, []
         if self._was_recording and not self._recorder.recording:
@@ -199,7 +192,6 @@ class EpisodeControl:
         return f"{text} ({self._planned_kept} of {self._plan.episodes})."
 
     def _begin(self, reset: Callable[[int], None]) -> str:
-        self._recorder.open()
         seed, self._seed = self._seed, self._seed + 1
         reset(seed)
         self._recorder.begin()

@@ -1,6 +1,5 @@
 """New observations and rewards at the states of recorded episodes."""
 
-import json
 import math
 import shutil
 from collections.abc import Callable, Iterator
@@ -62,17 +61,14 @@ def extract(
             raise DatasetError(f"'{path}' has no episodes.")
         names, masks = dataset.names, dataset.masks
     size = min(PART, math.ceil(len(names) / workers))
-    common = {"trust_files": trust_files, "changes": json.loads(json.dumps(changes))}
+    common = {"trust_files": trust_files, "changes": changes}
     done = run_pieces(
         extract_part,
-        [
-            {**common, "names": list(names[k : k + size])}
-            for k in range(0, len(names), size)
-        ],
+        [common | {"names": names[k : k + size]} for k in range(0, len(names), size)],
         source=path,
         out=out,
         executor=executor,
-        on_piece=lambda item: on_progress(len(_names(item))),
+        on_piece=lambda item: on_progress(len(item.payload["names"])),
     )
     folder = work_folder(out)
     parts = [folder / f"{item.name}.hdf5" for item, _ in done]
@@ -92,7 +88,7 @@ def extract(
 
 def extract_part(item: WorkItem, folder: Path) -> dict[str, Any]:
     """Extract a few episodes into `FOLDER/ITEM.hdf5`."""
-    payload: Any = item.payload
+    payload = item.payload
     with Dataset(payload["source"]) as dataset:
         env = rebuild(dataset, trust_files=payload["trust_files"], **payload["changes"])
         try:
@@ -102,11 +98,6 @@ def extract_part(item: WorkItem, folder: Path) -> dict[str, Any]:
         finally:
             env.close()
     return {"episodes": len(payload["names"])}
-
-
-def _names(item: WorkItem) -> list[Any]:
-    names: Any = item.payload["names"]
-    return names
 
 
 def observe_again(env: RobotEnv, episode: Episode) -> Episode:

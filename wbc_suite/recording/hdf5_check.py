@@ -10,9 +10,10 @@ import resource
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import Any, TypeVar
 
 import h5py
 
@@ -36,6 +37,7 @@ OUT_OF_MEMORY = 3
 """Exit code of the child."""
 TOLERATED = (*hdf5_reader.ERRORS, DatasetError)
 """Errors that the child leaves to the parent, which meets them where they matter."""
+T = TypeVar("T")
 COMMAND = "from wbc_suite.recording.hdf5_check import read_files; read_files()"
 
 
@@ -138,29 +140,22 @@ def _read_structure(path: Path) -> None:
                 continue
             seen.add(group)
             _read_attributes(group)
-            for node in _children(group):
+            for name in _tried(hdf5_reader.child_names, group) or ():
+                node = _tried(hdf5_reader.child, group, name, h5py.HLObject)
                 if isinstance(node, h5py.Group):
                     groups.append(node)
                 elif isinstance(node, h5py.Dataset):
                     _read_attributes(node)
-                    with suppress(*TOLERATED):
-                        hdf5_reader.read_names(node)
-
-
-def _children(group: h5py.Group) -> Iterator[object]:
-    names: list[str] = []
-    with suppress(*TOLERATED):
-        names = hdf5_reader.child_names(group)
-    for name in names:
-        with suppress(*TOLERATED):
-            if isinstance(group.get(name, getlink=True), h5py.HardLink):
-                yield group[name]
+                    _tried(hdf5_reader.read_names, node)
 
 
 def _read_attributes(node: h5py.Group | h5py.Dataset) -> None:
-    names: list[str] = []
+    for name in _tried(hdf5_reader.attribute_names, node) or ():
+        _tried(hdf5_reader.attribute, node, name)
+
+
+def _tried(read: Callable[..., T], *arguments: Any) -> T | None:
+    """Return what a function reads, or None after an error that h5py reports."""
     with suppress(*TOLERATED):
-        names = hdf5_reader.attribute_names(node)
-    for name in names:
-        with suppress(*TOLERATED):
-            hdf5_reader.attribute(node, name)
+        return read(*arguments)
+    return None

@@ -24,7 +24,6 @@ __all__ = [
     "attribute_names",
     "child",
     "child_names",
-    "read_column",
     "read_names",
     "reading",
 ]
@@ -52,7 +51,7 @@ ERRORS = (
 """What h5py raises for damaged files."""
 _PLAIN = re.compile(r"[^/\x00]+\Z")
 
-Node = TypeVar("Node", h5py.Group, h5py.Dataset)
+Node = TypeVar("Node", bound=h5py.HLObject)
 
 
 @contextmanager
@@ -174,7 +173,9 @@ class StoredColumn:
     """
 
     def __init__(self, dataset: h5py.Dataset, path: Path) -> None:
-        _check_numbers(dataset)
+        _check_storage(dataset)
+        if dataset.dtype.kind not in "fiub" or dataset.dtype.itemsize > 8:
+            raise DatasetError(f"'{dataset.name}' holds {dataset.dtype}, not numbers.")
         self._dataset, self._path = dataset, path
         self.shape, self.dtype, self.ndim = dataset.shape, dataset.dtype, dataset.ndim
         self.nbytes = int(np.prod(self.shape, dtype=object)) * self.dtype.itemsize
@@ -190,22 +191,6 @@ class StoredColumn:
         """Read some rows."""
         with reading(self._path):
             return np.asarray(self._dataset[rows])
-
-
-def read_column(dataset: h5py.Dataset) -> NDArray[Any]:
-    """Return numbers, after checking their type, size and storage.
-
-    Raises:
-        DatasetError: If they are no numbers, too many, or not in this file.
-    """
-    _check_numbers(dataset)
-    return np.asarray(dataset[:])
-
-
-def _check_numbers(dataset: h5py.Dataset) -> None:
-    _check_storage(dataset)
-    if dataset.dtype.kind not in "fiub" or dataset.dtype.itemsize > 8:
-        raise DatasetError(f"'{dataset.name}' holds {dataset.dtype}, not numbers.")
 
 
 def read_names(dataset: h5py.Dataset) -> list[str]:

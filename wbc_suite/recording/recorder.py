@@ -27,7 +27,6 @@ class Recorder:
         env: An environment of this package, wrapped or not.
         path: The file; episodes are added to those in it.
         next_obs: Whether observations after each action are stored too.
-        later: Whether the file is opened by `open` or the first episode, not at once.
 
     Raises:
         DatasetError: If it is another environment, or see `Store`.
@@ -36,37 +35,22 @@ class Recorder:
         path: The file.
     """
 
-    def __init__(
-        self, env: Any, path: str | Path, *, next_obs: bool = False, later: bool = False
-    ) -> None:
+    def __init__(self, env: Any, path: str | Path, *, next_obs: bool = False) -> None:
         self._inner, self._next_obs = env.unwrapped, next_obs
         self.path = Path(path)
-        self._header, self._model_file = header_of(env), ""
-        self._store: Store | None = None
+        self._model_file = self._inner.scene_xml
+        digest = hashlib.sha256(self._model_file.encode()).hexdigest()
+        date = datetime.now(UTC).isoformat(timespec="seconds")
+        header = header_of(env) | {"model_hash": digest, "date": date}
+        self._store = Store(self.path, header)
         self._rows = StepBuffer(env, self.path.parent)
         self._facts: dict[str, Fact] | None = None
         self._clipped, self._succeeded = 0, False
-        if not later:
-            self.open()
-
-    def open(self) -> Store:
-        """Open the file, if it is not open yet.
-
-        Raises:
-            DatasetError: See `Store`.
-        """
-        if self._store is None:
-            self._model_file = self._inner.scene_xml
-            digest = hashlib.sha256(self._model_file.encode()).hexdigest()
-            date = datetime.now(UTC).isoformat(timespec="seconds")
-            header = self._header | {"model_hash": digest, "date": date}
-            self._store = Store(self.path, header)
-        return self._store
 
     @property
     def kept(self) -> int:
-        """Episodes in the file, as far as it is open."""
-        return 0 if self._store is None else len(self._store)
+        """Episodes in the file."""
+        return len(self._store)
 
     @property
     def recording(self) -> bool:
@@ -86,7 +70,6 @@ class Recorder:
     def begin(self) -> None:
         """Begin an episode, right after the environment's reset."""
         self.discard()
-        self.open()
         state, placed = self._inner.beginning
         seed = self._inner.np_random_seed
         self._facts = {
@@ -149,13 +132,9 @@ class Recorder:
             "success": self._succeeded if success is None else bool(success),
             "clipped_steps": self._clipped,
         }
-        name = self.open().add(
-            Episode(
-                name="",
-                columns=columns | {"dones": dones},
-                facts=facts,
-                final_state=final_state,
-            )
+        columns |= {"dones": dones}
+        name = self._store.add(
+            Episode(name="", columns=columns, facts=facts, final_state=final_state)
         )
         self.discard()
         return name
@@ -167,10 +146,9 @@ class Recorder:
 
     def undo(self) -> str | None:
         """Delete the last episode that was kept; return its name, or None."""
-        return None if self._store is None else self._store.undo()
+        return self._store.undo()
 
     def close(self) -> None:
         """Discard the episode in progress, and merge all episodes into one file."""
         self.discard()
-        if self._store is not None:
-            self._store.close()
+        self._store.close()

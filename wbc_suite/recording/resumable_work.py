@@ -4,10 +4,11 @@ import hashlib
 import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from wbc_suite.errors import DatasetError
 from wbc_suite.executors import Executor, Outcome, Serial, WorkItem, run_items
-from wbc_suite.executors.executor import Json, Work
+from wbc_suite.executors.executor import Work
 from wbc_suite.recording.atomic_files import check_folder
 
 __all__ = ["run_pieces", "work_folder"]
@@ -20,13 +21,13 @@ def work_folder(out: Path) -> Path:
 
 def run_pieces(
     work: Work,
-    payloads: Sequence[Mapping[str, Json]],
+    payloads: Sequence[Mapping[str, Any]],
     *,
     source: Path,
     out: Path,
     executor: Executor | None,
     on_piece: Callable[[WorkItem], None],
-) -> list[tuple[WorkItem, Mapping[str, Json]]]:
+) -> list[tuple[WorkItem, Mapping[str, Any]]]:
     """Run the pieces that are not finished; return all, in order, with their results.
 
     Args:
@@ -43,7 +44,7 @@ def run_pieces(
     folder = work_folder(out)
     check_folder(folder)
     stat = source.stat() if source.exists() else None
-    common: dict[str, Json] = {
+    common = {
         "source": str(source.resolve()),
         "written": None if stat is None else [stat.st_size, stat.st_mtime_ns],
     }

@@ -1,8 +1,10 @@
-"""Steps of the episode in progress, in rows that go to disk in blocks."""
+"""Steps of the episode in progress, in rows that go to disk."""
 
 import mmap
+import os
 import tempfile
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +18,7 @@ from wbc_suite.recording.episode import Column
 __all__ = ["RowBuffer", "StepBuffer"]
 
 BLOCK_BYTES = 1 << 16
-"""Rows are written to disk in blocks of at most so many bytes."""
-MAX_ROWS = 512
-"""... or so many rows."""
+"""Rows are written to disk in blocks of so many bytes."""
 
 OUTCOME = (
     ("rewards", "f8"),
@@ -31,33 +31,32 @@ OUTCOME = (
 
 
 class RowBuffer:
-    """Rows of one structured type; a full block goes to a file without a name.
+    """Rows of one structured type, in a file without a name.
 
-    The row at `at` is in progress, and so may be the next one: there is always room
-    for both. `advance` completes the first.
+    Two rows are in memory: the one in progress and the next one, which may be begun
+    too. `advance` completes the first, and the places change their roles.
 
     Args:
         folder: Folder of the file. Nothing is left in it, also after a crash.
 
     Attributes:
-        block: Rows in memory, shape (n + 1,); another array after each `begin`.
-        at: Index of the row in progress, less than n.
+        pair: The two rows, shape (2,); another array after each `begin`.
+        at: Index of the row in progress; the next one is at `1 - at`.
     """
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._file: Any = None
-        self.close()
+        self.begin(np.dtype([]))
 
     def __len__(self) -> int:
         """Return the number of complete rows."""
-        return self._written + self.at
+        return self._count
 
     def begin(self, kind: np.dtype[Any]) -> None:
         """Delete all rows, and take rows of a type."""
         self.close()
-        rows = int(np.clip(BLOCK_BYTES // max(kind.itemsize, 1), 1, MAX_ROWS))
-        self.block, self._full = np.zeros(rows + 1, dtype=kind), rows
+        self.pair = np.zeros(2, dtype=kind)
 
     def advance(self) -> None:
         """Complete the row in progress; the next one begins.
@@ -65,51 +64,42 @@ class RowBuffer:
         Raises:
             DatasetError: If the disk is full.
         """
-        self.at += 1
-        if self.at == self._full:
-            self._spill()
+        self._write()
+        self._count += 1
+        self.at = 1 - self.at
 
     def rows(self) -> NDArray[Any]:
         """Return all complete rows and the one in progress, read-only.
 
-        Rows on disk are read when they are used. Later rows do not change them, but
+        They are read from disk when they are used. Later rows do not change them, but
         for the last.
 
         Raises:
             DatasetError: If the disk is full.
         """
-        if self._file is None:
-            rows = self.block[: self.at + 1].copy()
-            rows.flags.writeable = False
-            return rows
-        self._spill()
-        self._write(1)
-        self._file.seek(self._written * self.block.itemsize)
+        self._write(in_progress=True)
         held = mmap.mmap(self._file.fileno(), 0, access=mmap.ACCESS_READ)
-        return np.ndarray((self._written + 1,), self.block.dtype, buffer=held)
+        return np.ndarray((self._count + 1,), self.pair.dtype, buffer=held)
 
     def close(self) -> None:
         """Delete all rows."""
         if self._file is not None:
-            self._file.close()
+            with suppress(OSError):  # of what a full disk did not take
+                self._file.close()
         self._file = None
-        self.block: NDArray[Any] = np.empty(0)
-        self.at = self._written = self._full = 0
+        self.at = self._count = 0
 
-    def _spill(self) -> None:
-        """Move complete rows to the file."""
-        self._write(self.at)
-        self._written += self.at
-        self.block[0] = self.block[self.at]
-        self.at = 0
-
-    def _write(self, count: int) -> None:
-        rest = self.block.view(np.uint8).data[: count * self.block.itemsize]
+    def _write(self, *, in_progress: bool = False) -> None:
+        """Append a row to the file; one in progress is replaced when it is complete."""
+        row = self.pair[self.at : self.at + 1].view(np.uint8)
         try:
             if self._file is None:
-                self._file = tempfile.TemporaryFile(dir=self._folder, buffering=0)  # noqa: SIM115 - closed by close()
-            while rest:  # a disk that fills up takes a part first
-                rest = rest[self._file.write(rest) :]
+                self._file = tempfile.TemporaryFile(  # noqa: SIM115 - closed by close()
+                    dir=self._folder, buffering=BLOCK_BYTES
+                )
+            self._file.write(row)
+            if in_progress:  # `seek` writes all that is buffered
+                self._file.seek(-row.size, os.SEEK_CUR)
         except OSError as error:
             raise DatasetError(
                 f"'{self._folder}' cannot be written: {error.strerror}. The episode in "
@@ -149,11 +139,11 @@ class StepBuffer:
         fields += [("actions", "f8", (env.action_layout.size,))]
         fields += [(name, kind, ()) for name, kind in OUTCOME]
         self._rows.begin(np.dtype(fields, align=True))
-        block = self._rows.block
-        self._states, self._vectors = block["states"], block["vectors"]
-        self._actions = block["actions"]
-        self._outcome = [block[name] for name, _ in OUTCOME]
-        self._apart = [(key, block[f"obs/{key}"]) for key in apart]
+        pair = self._rows.pair
+        self._states, self._vectors = pair["states"], pair["vectors"]
+        self._actions = pair["actions"]
+        self._outcome = [pair[name] for name, _ in OUTCOME]
+        self._apart = [(key, pair[f"obs/{key}"]) for key in apart]
         self._write_state(0, observation)
 
     def add(
@@ -178,7 +168,7 @@ class StepBuffer:
             self._actions[at] = action
             for column, value in zip(self._outcome, outcome, strict=True):
                 column[at] = value
-            self._write_state(at + 1, observation)
+            self._write_state(1 - at, observation)
         except KeyError as error:
             raise DatasetError(
                 f"An observation lacks {error}, which the first one of the episode has."
@@ -192,8 +182,7 @@ class StepBuffer:
     def columns(self, *, next_obs: bool = False) -> tuple[dict[str, Column], Column]:
         """Return columns by name, read-only, and the state after the last action.
 
-        Args:
-            next_obs: Whether observations after each action are included.
+        Observations after each action are included with `next_obs`.
 
         Raises:
             DatasetError: If the disk is full.

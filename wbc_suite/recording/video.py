@@ -1,6 +1,6 @@
 """Episodes as videos (.mp4, .webp, .gif) and as contact sheets."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -55,11 +55,8 @@ def episode_pictures(
         by_states: Whether states are shown as recorded; else actions are taken.
         every: Draw every so many actions.
     """
-    if by_states:
-        played: Iterator[Any] = play_states(env, episode)
-    else:
-        played = play_actions(env, episode)
-    for k, _ in enumerate(played):
+    play: Callable[..., Iterator[Any]] = play_states if by_states else play_actions
+    for k, _ in enumerate(play(env, episode)):
         if k % every == 0:
             yield np.asarray(env.render())
 

@@ -28,7 +28,6 @@ class DataCollection(gymnasium.Wrapper[Any, Any, Any, Any]):
         automatic: Whether each episode is recorded from its reset on, and kept when it
             ends or the next one begins. Otherwise call `recorder.begin` and `keep`.
         next_obs: See `Recorder`.
-        later: See `Recorder`.
 
     Attributes:
         recorder: The recorder of episodes.
@@ -41,10 +40,9 @@ class DataCollection(gymnasium.Wrapper[Any, Any, Any, Any]):
         *,
         automatic: bool = True,
         next_obs: bool = False,
-        later: bool = False,
     ) -> None:
         super().__init__(env)
-        self.recorder = Recorder(env, path, next_obs=next_obs, later=later)
+        self.recorder = Recorder(env, path, next_obs=next_obs)
         self.automatic = automatic
 
     def reset(

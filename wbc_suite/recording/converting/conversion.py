@@ -9,7 +9,6 @@ from typing import Any
 
 from wbc_suite.errors import DatasetError, UnknownNameError
 from wbc_suite.executors import Executor, WorkItem
-from wbc_suite.executors.executor import Json
 from wbc_suite.recording.atomic_files import delete_temporaries
 from wbc_suite.recording.converting.layout import (
     Layout,
@@ -76,18 +75,14 @@ def convert(
         chosen.begin(out)
         if executor is None:
             whole = whole_dataset(dataset)
-            results = [chosen.write(dataset, whole, out, on_progress)]
-            _finish(chosen, dataset, out, results)
+            results = [chosen.write(dataset, whole, out, on_progress) or {}]
+            chosen.finish(dataset, out, results)
             return out
         pieces = [whole_dataset(dataset)]
         if chosen.in_pieces:
             pieces = split_dataset(dataset, workers)
-        payloads: list[dict[str, Json]] = [
-            {
-                "layout": layout,
-                "out": out.name,
-                "piece": {**asdict(piece), "names": list(piece.names)},
-            }
+        payloads = [
+            {"layout": layout, "out": out.name, "piece": asdict(piece)}
             for piece in pieces
         ]
         done = run_pieces(
@@ -96,42 +91,31 @@ def convert(
             source=source,
             out=out,
             executor=executor,
-            on_piece=lambda item: on_progress(len(_piece(item).names)),
+            on_piece=lambda item: on_progress(len(item.payload["piece"]["names"])),
         )
         written = _written(work_folder(out), out.name)
-        _finish(chosen, dataset, written, [result for _, result in done])
+        chosen.finish(dataset, written, [result for _, result in done])
     delete_temporaries(written)
     _move(written, out)
     shutil.rmtree(work_folder(out), ignore_errors=True)
     return out
 
 
-def convert_piece(item: WorkItem, folder: Path) -> Mapping[str, Json]:
+def convert_piece(item: WorkItem, folder: Path) -> Mapping[str, Any]:
     """Write one piece into the work folder, in place of what a dead worker left."""
-    layout = LAYOUTS[str(item.payload["layout"])]
-    written = _written(folder, str(item.payload["out"]))
+    payload = item.payload
+    layout, piece = LAYOUTS[payload["layout"]], Piece(**payload["piece"])
+    written = _written(folder, payload["out"])
     if not layout.in_pieces:
         shutil.rmtree(written, ignore_errors=True)
     written.parent.mkdir(parents=True, exist_ok=True)
-    with Dataset(str(item.payload["source"])) as dataset:
-        return layout.write(dataset, _piece(item), written, lambda _: None)
-
-
-def _finish(
-    layout: Layout, dataset: Dataset, out: Path, results: list[Mapping[str, Json]]
-) -> None:
-    if layout.finish is not None:
-        layout.finish(dataset, out, results)
+    with Dataset(payload["source"]) as dataset:
+        return layout.write(dataset, piece, written, lambda _: None) or {}
 
 
 def _written(folder: Path, name: str) -> Path:
     """Return where pieces are written, under the final name, which layouts may use."""
     return folder / "written" / name
-
-
-def _piece(item: WorkItem) -> Piece:
-    fields: Any = item.payload["piece"]
-    return Piece(**{**fields, "names": tuple(fields["names"])})
 
 
 def _move(written: Path, out: Path) -> None:

@@ -4,9 +4,8 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
-from wbc_suite.executors.executor import Json
 from wbc_suite.recording.dataset import Dataset
 
 __all__ = ["Layout", "Piece", "Progress", "split_dataset", "whole_dataset"]
@@ -16,6 +15,8 @@ MAX_EPISODES = 50
 
 Progress: TypeAlias = Callable[[int], None]
 """Called with the number of episodes that were written since the last call."""
+Finish: TypeAlias = Callable[[Dataset, Path, Sequence[Mapping[str, Any]]], None]
+"""Called with what was written, where, and the results of all pieces in order."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -41,15 +42,15 @@ class Layout:
 
     Attributes:
         begin: Checks that packages are installed and the path can be written.
-        write: Writes the episodes of a piece; returns what `finish` needs of it.
-        finish: Writes files about all pieces, given their results in order; None if
-            there are none.
+        write: Writes the episodes of a piece; returns what `finish` needs of it, if
+            anything.
+        finish: Writes files about all pieces.
         in_pieces: Whether several workers may each write a piece.
     """
 
     begin: Callable[[Path], None]
-    write: Callable[[Dataset, Piece, Path, Progress], Mapping[str, Json]]
-    finish: Callable[[Dataset, Path, Sequence[Mapping[str, Json]]], None] | None = None
+    write: Callable[[Dataset, Piece, Path, Progress], Mapping[str, Any] | None]
+    finish: Finish = lambda *_: None
     in_pieces: bool = False
 
 

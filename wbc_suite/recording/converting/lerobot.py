@@ -17,14 +17,13 @@ Source: the documentation of LeRobotDataset v3.0 (huggingface.co/docs/lerobot).
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wbc_suite.errors import DatasetError
-from wbc_suite.executors.executor import Json
-from wbc_suite.recording.atomic_files import new_folder, write_bytes
+from wbc_suite.recording.atomic_files import new_folder, replace_file, write_bytes
 from wbc_suite.recording.converting.layout import Layout, Piece, Progress
 from wbc_suite.recording.dataset import Dataset
 from wbc_suite.recording.episode import Episode
@@ -56,7 +55,7 @@ def _import_pyarrow() -> tuple[Any, Any]:
 
 def _write(
     dataset: Dataset, piece: Piece, out: Path, on_progress: Progress
-) -> dict[str, Json]:
+) -> dict[str, Any]:
     """Write frames and videos of some episodes as files of their own.
 
     Returns:
@@ -78,7 +77,8 @@ def _write(
             stats = {name: _stats(column) for name, column in columns.items()}
             for key, writer in writers.items():
                 pictures = episode.columns[f"obs/{key}"]
-                writer.add(pictures)
+                for picture in pictures:
+                    writer.add(picture)
                 stats[_feature(key)] = _picture_stats(pictures)
             rows.append(_episode_row(dataset, piece, number, episode, start, writers))
             rows[-1] |= {
@@ -98,21 +98,28 @@ def _write(
     return {"rows": rows}
 
 
-def _finish(dataset: Dataset, out: Path, pieces: Sequence[Mapping[str, Json]]) -> None:
+def _finish(dataset: Dataset, out: Path, pieces: Sequence[Mapping[str, Any]]) -> None:
     """Write the files about all pieces, in the order of the episodes."""
     arrow, parquet = _import_pyarrow()
-    rows: list[Any] = [row for piece in pieces for row in cast(list, piece["rows"])]
+    rows = [row for piece in pieces for row in piece["rows"]]
     frames = [out / f"data/{_place(number)}.parquet" for number in range(len(pieces))]
     table = arrow.concat_tables([parquet.ParquetFile(path).read() for path in frames])
     episodes = arrow.Table.from_pylist(rows)
     _write_table(parquet, episodes, out / f"meta/episodes/{_place(0)}.parquet")
     tasks = arrow.table({"task_index": arrow.array([0]), "task": [_task(dataset)]})
+    kinds = ("task_index", "int64", "int64"), ("task", "unicode", "object")
     pandas = {
         "index_columns": ["task"],
         "column_indexes": [],
         "columns": [
-            _pandas_column("task_index", "int64"),
-            _pandas_column("task", "unicode"),
+            {
+                "name": name,
+                "field_name": name,
+                "pandas_type": kind,
+                "numpy_type": numpy_kind,
+                "metadata": None,
+            }
+            for name, kind, numpy_kind in kinds
         ],
         "creator": {"library": "pyarrow", "version": arrow.__version__},
         "pandas_version": "2.0.0",
@@ -120,8 +127,9 @@ def _finish(dataset: Dataset, out: Path, pieces: Sequence[Mapping[str, Json]]) -
     tasks = tasks.replace_schema_metadata({"pandas": json.dumps(pandas)})
     _write_table(parquet, tasks, out / "meta/tasks.parquet")
     first = dataset.episode(dataset.names[0])
-    _write_json(out / "meta/info.json", _info(dataset, first, len(table)))
-    _write_json(out / "meta/stats.json", _all_stats(table, rows))
+    info, stats = _info(dataset, first, len(table)), _all_stats(table, rows)
+    write_bytes(out / "meta/info.json", json.dumps(info, indent=1).encode())
+    write_bytes(out / "meta/stats.json", json.dumps(stats, indent=1).encode())
 
 
 def _rate(dataset: Dataset) -> int:
@@ -186,9 +194,8 @@ def _stats(column: NDArray[Any]) -> Stats:
         "std": values.std(axis=0).tolist(),
         "count": [len(values)],
     }
-    for name, share in QUANTILES.items():
-        found[name] = np.quantile(values, share, axis=0).tolist()
-    return found
+    quantiles = np.quantile(values, list(QUANTILES.values()), axis=0).tolist()
+    return found | dict(zip(QUANTILES, quantiles, strict=True))
 
 
 def _picture_stats(pictures: NDArray[np.uint8]) -> Stats:
@@ -302,26 +309,9 @@ def _all_stats(table: Any, rows: list[dict[str, Any]]) -> dict[str, Stats]:
     return found
 
 
-def _pandas_column(name: str, kind: str) -> dict[str, Any]:
-    return {
-        "name": name,
-        "field_name": name,
-        "pandas_type": kind,
-        "numpy_type": "int64" if kind == "int64" else "object",
-        "metadata": None,
-    }
-
-
 def _write_table(parquet: Any, table: Any, path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    try:
-        parquet.write_table(table, path)
-    except OSError as error:
-        raise DatasetError(f"'{path}' cannot be written: {error}.") from error
-
-
-def _write_json(path: Path, content: Mapping[str, Any]) -> None:
-    write_bytes(path, json.dumps(content, indent=1).encode())
+    replace_file(path, lambda temporary: parquet.write_table(table, temporary))
 
 
 def _open_video(path: Path, rate: int) -> Mp4Writer:

@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from wbc_suite import __version__
-from wbc_suite.executors.executor import Json
 from wbc_suite.recording.atomic_files import check_folder, replace_file
 from wbc_suite.recording.converting.layout import Layout, Piece, Progress
 from wbc_suite.recording.dataset import Dataset
@@ -61,9 +60,7 @@ def _begin(out: Path) -> None:
     check_folder(out.parent)
 
 
-def _write(
-    dataset: Dataset, piece: Piece, out: Path, on_progress: Progress
-) -> dict[str, Json]:
+def _write(dataset: Dataset, piece: Piece, out: Path, on_progress: Progress) -> None:
     """Write the episodes as one log."""
     writer = import_extra("mcap.writer", "mcap")
 
@@ -81,16 +78,10 @@ def _write(
             log.finish()
 
     replace_file(out, write)
-    return {}
 
 
 class _EpisodeWriter:
-    """Writes episodes into a log, one after the other.
-
-    Args:
-        log: An `mcap.writer.Writer`, started.
-        rate: Actions per second where an episode has no times, Hz.
-    """
+    """Writes episodes into a log; `rate`, Hz, is that of episodes without times."""
 
     def __init__(self, log: Any, rate: float) -> None:
         self._log, self._rate = log, rate

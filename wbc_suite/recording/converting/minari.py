@@ -21,7 +21,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc_suite.errors import DatasetError
-from wbc_suite.executors.executor import Json
 from wbc_suite.recording.atomic_files import new_folder, replace_file, write_bytes
 from wbc_suite.recording.converting.layout import Layout, Piece, Progress
 from wbc_suite.recording.dataset import Dataset
@@ -40,9 +39,7 @@ def _begin(out: Path) -> None:
     new_folder(out, "a Minari dataset")
 
 
-def _write(
-    dataset: Dataset, piece: Piece, out: Path, on_progress: Progress
-) -> dict[str, Json]:
+def _write(dataset: Dataset, piece: Piece, out: Path, on_progress: Progress) -> None:
     """Write the episodes into a folder.
 
     The observation after the last action repeats the one before it where `next_obs`
@@ -84,7 +81,6 @@ def _write(
     }
     content = json.dumps({k: v for k, v in metadata.items() if v != "null"}, indent=1)
     write_bytes(out / "data/metadata.json", content.encode())
-    return {}
 
 
 def _write_episode(group: h5py.Group, number: int, episode: Episode) -> None:

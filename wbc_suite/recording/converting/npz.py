@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from wbc_suite.executors.executor import Json
 from wbc_suite.recording.atomic_files import check_folder, replace_file
 from wbc_suite.recording.converting.layout import Layout, Piece, Progress
 from wbc_suite.recording.dataset import Dataset
@@ -16,15 +15,12 @@ from wbc_suite.recording.episode import Episode
 __all__ = ["NPZ"]
 
 
-def _write(
-    dataset: Dataset, piece: Piece, out: Path, on_progress: Progress
-) -> dict[str, Json]:
+def _write(dataset: Dataset, piece: Piece, out: Path, on_progress: Progress) -> None:
     """Write each episode as `demo_N.npz` into a folder."""
     check_folder(out)
     for episode in map(dataset.episode, piece.names):
         _write_episode(episode, out / f"{episode.name}.npz")
         on_progress(1)
-    return {}
 
 
 def _write_episode(episode: Episode, path: Path) -> None:

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from wbc_suite.executors.executor import Json
 from wbc_suite.recording.atomic_files import check_folder
 from wbc_suite.recording.converting.layout import Layout, Piece, Progress
 from wbc_suite.recording.dataset import Dataset
@@ -19,9 +18,7 @@ _OTHER_COLUMNS = ("clipped", "step_time", "stamp")
 _FACTS = ("model_file", "success", "seed", "uid")
 
 
-def _write(
-    dataset: Dataset, piece: Piece, out: Path, on_progress: Progress
-) -> dict[str, Json]:
+def _write(dataset: Dataset, piece: Piece, out: Path, on_progress: Progress) -> None:
     """Write the episodes as `demo_0`, `demo_1`, ... with `next_obs`.
 
     The last action's `next_obs` repeats its `obs` where it was not recorded.
@@ -38,7 +35,6 @@ def _write(
         for key, masked in dataset.masks.items()
     }
     write_dataset(out, episodes(), dataset.header, masks=masks)
-    return {}
 
 
 def _own_columns(episode: Episode, name: str) -> Episode:
