@@ -8,7 +8,7 @@ import numpy as np
 
 from wbc_suite.compiling import announced, as_argument, is_compiling, plain
 from wbc_suite.control import CompositeController, RobotState, SteppedController
-from wbc_suite.control.composite.registry import TickedController
+from wbc_suite.control.composite.registry import DynamicController, TickedController
 from wbc_suite.control.composite.tick import WholeBodyArrays
 from wbc_suite.control.loop.advance import advance
 from wbc_suite.control.loop.inverse_dynamics import needed_kernels, write_commands
@@ -76,14 +76,17 @@ class Simulation:
             law.adopt(self._laws[k : k + 1], self._drives[first:last], k)
         self._ticked, ticks = self._loop_ticks()
         physics, state = bind_physics(model, data), self._watch.state
-        records = self._laws, self._drives, *needed_kernels(self._laws)
+        bodies = [c.dynamics for c in self.controllers if isinstance(c, DynamicController)]
+        kernels = *needed_kernels(self._laws), tuple(map(as_argument, bodies)) or None
+        records = self._laws, self._drives, *kernels
         views = as_argument(physics), as_argument(state)
         self._loop_arguments = (*addresses(model, data), *views, *records, ticks)
         self._write_commands = write_commands if compiled else plain(write_commands)
         self._law_arguments = views[0], *records
         if not compiled:
             laws, drives = self._laws.view(np.recarray), self._drives.view(np.recarray)
-            self._law_arguments = physics, laws, drives, *records[2:]
+            kernels = *kernels[:-1], tuple(bodies) or None
+            self._law_arguments = physics, laws, drives, *kernels
         with announced("the control loop"):
             self._call_loop(0)
 

@@ -29,6 +29,10 @@ from wbc_suite.control.composite.whole_body_config import (
     check_whole_body,
     default_whole_body_config,
 )
+from wbc_suite.control.composite.whole_body_dynamics_config import (
+    check_dynamics,
+    default_dynamics_config,
+)
 from wbc_suite.control.state import RobotState
 
 __all__ = [
@@ -54,6 +58,12 @@ def _whole_body_ik(config: Mapping[str, Any], state: RobotState) -> CompositeCon
     from wbc_suite.control.composite.whole_body import WholeBodyIK
 
     return WholeBodyIK(config, state, StackBackend)
+
+
+def _whole_body_id(config: Mapping[str, Any], state: RobotState) -> CompositeController:
+    from wbc_suite.control.composite.whole_body_dynamics import WholeBodyID
+
+    return WholeBodyID(config, state)
 
 
 def _whole_body_mink_ik(
@@ -90,3 +100,10 @@ for _name, _build in (
         default=default_whole_body_config,
         check=check_whole_body,
     )
+register_composite(
+    "WHOLE_BODY_ID",
+    _whole_body_id,
+    family="whole_body_id",
+    default=default_dynamics_config,
+    check=check_dynamics,
+)

@@ -171,7 +171,7 @@ class FrameGoals:
         self._arrays = GoalArrays(
             goal=np.zeros((count, 12)),
             home=np.zeros((count, 12)),
-            range=np.array(ranges, dtype=np.float64),
+            range=np.array(ranges, dtype=np.float64).reshape(-1, 2),
             base=np.zeros(12),
             base_joint=int(base.parentJoint),
             base_offset=_row(base.placement),
@@ -180,6 +180,11 @@ class FrameGoals:
             root=root,
         )
         self.argument = as_argument(self._arrays)
+
+    @property
+    def rows(self) -> Matrix:
+        """Goals in the reference frame as rows [R p], shape (n, 12); a view."""
+        return self._arrays.goal
 
     @property
     def base(self) -> pin.SE3:
@@ -195,9 +200,11 @@ class FrameGoals:
             base: Pose of the robot's base.
         """
         arrays, in_base = self._arrays, self._arrays.is_in_base
-        arrays.home[:], arrays.base[:] = [_row(pose) for pose in poses], _row(base)
+        arrays.base[:] = _row(base)
+        for row, pose in zip(arrays.home, poses, strict=True):
+            row[:] = _row(pose)
         self.poses = [base.actInv(p) if in_base else p.copy() for p in poses]
-        arrays.goal[:] = [_row(pose) for pose in self.poses]
+        self._write_rows()
 
     def set(self, action: Vector) -> bool:
         """Read an action; return whether a goal has changed."""
@@ -211,9 +218,13 @@ class FrameGoals:
                 axes = goal.rotation if is_own else np.eye(3)
                 new = frame.behaviour.moved(action[own], goal, axes)
             self.poses.append(new)
-        self._arrays.goal[:] = [_row(pose) for pose in self.poses]
+        self._write_rows()
         pairs = zip(before, self.poses, strict=True)
         return not all(a.isApprox(b, SAME_GOAL) for a, b in pairs)
+
+    def _write_rows(self) -> None:
+        for row, pose in zip(self._arrays.goal, self.poses, strict=True):
+            row[:] = _row(pose)
 
     def hold(self, action: Vector) -> None:
         """Write the slices that keep the goals."""

@@ -9,6 +9,7 @@ from typing import Any, Literal, Protocol, TypeAlias, runtime_checkable
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.control.action import ActionLayout
 from wbc_suite.control.composite.tick import WholeBodyArrays
+from wbc_suite.control.dynamics.arrays import WholeBodyDynamics
 from wbc_suite.control.law.law import Law
 from wbc_suite.control.part.registry import (
     PartControllerName,
@@ -26,6 +27,7 @@ __all__ = [
     "CompositeController",
     "CompositeControllerName",
     "CompositeKind",
+    "DynamicController",
     "SteppedController",
     "TickedController",
     "build_composite_controller",
@@ -39,7 +41,11 @@ __all__ = [
 log = logging.getLogger(__name__)
 
 CompositeControllerName: TypeAlias = Literal[
-    "BASIC", "HYBRID_MOBILE_BASE", "WHOLE_BODY_IK", "WHOLE_BODY_MINK_IK"
+    "BASIC",
+    "HYBRID_MOBILE_BASE",
+    "WHOLE_BODY_ID",
+    "WHOLE_BODY_IK",
+    "WHOLE_BODY_MINK_IK",
 ]
 """Names of the built-in composite controllers."""
 
@@ -117,6 +123,17 @@ class TickedController(CompositeController, Protocol):
     def finish_tick(self) -> None:
         """Finish a tick that the loop has begun, if there is one."""
         ...
+
+
+@runtime_checkable
+class DynamicController(CompositeController, Protocol):
+    """A composite controller whose accelerations are those of one QP for all joints.
+
+    Attributes:
+        dynamics: Arrays of `whole_body_dynamics_law`, which runs in the loop.
+    """
+
+    dynamics: WholeBodyDynamics
 
 
 Builder = Callable[[Mapping[str, Any], RobotState], CompositeController]

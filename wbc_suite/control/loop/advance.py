@@ -4,7 +4,12 @@ from typing import Any
 
 from wbc_suite.compiling import compiled, compiled_nogil
 from wbc_suite.control.composite.tick import Ticks, run_tick
-from wbc_suite.control.loop.inverse_dynamics import CustomLaw, Needed, write_commands
+from wbc_suite.control.loop.inverse_dynamics import (
+    CustomLaw,
+    Needed,
+    WholeBodies,
+    write_commands,
+)
 from wbc_suite.control.loop.mujoco_functions import (
     mj_comPos,
     mj_kinematics,
@@ -33,6 +38,7 @@ def advance(
     hands: Needed,
     feet: Needed,
     custom_law: CustomLaw,
+    bodies: WholeBodies,
     ticks: Ticks,
     steps: int,
 ) -> int:
@@ -51,6 +57,7 @@ def advance(
         hands: Whether there are laws in operational space, see `needed_kernels`.
         feet: Whether there are laws of feet.
         custom_law: Kernel of users' laws.
+        bodies: Robots moved by whole-body inverse dynamics.
         ticks: Whole-body ticks that run here.
         steps: Number of physics steps.
 
@@ -64,7 +71,7 @@ def advance(
     done = 0
     while done < steps and _run_ticks(physics, laws, drives, ticks):
         mj_step1(model, data)
-        write_commands(physics, laws, drives, hands, feet, custom_law)
+        write_commands(physics, laws, drives, hands, feet, custom_law, bodies)
         mj_step2(model, data)
         done += 1
     mj_kinematics(model, data)

@@ -10,6 +10,7 @@ forces that laws of feet plan.
 from typing import Any, TypeAlias
 
 from wbc_suite.compiling import compiled
+from wbc_suite.control.dynamics.law import whole_body_dynamics_law
 from wbc_suite.control.law.balance import balance_law
 from wbc_suite.control.law.custom import custom_kernel
 from wbc_suite.control.law.free_root import is_of_feet, subtract_contact_forces
@@ -23,7 +24,7 @@ from wbc_suite.control.loop.physics import Physics
 from wbc_suite.control.loop.records import CompiledRecords, LawKind, Records
 from wbc_suite.control.loop.rigid_body import multiply_inertia
 
-__all__ = ["CustomLaw", "Needed", "needed_kernels", "write_commands"]
+__all__ = ["CustomLaw", "Needed", "WholeBodies", "needed_kernels", "write_commands"]
 
 _JOINT, _OSC = int(LawKind.JOINT), int(LawKind.OSC)
 _BASE, _VELOCITY = int(LawKind.BASE), int(LawKind.VELOCITY)
@@ -33,6 +34,9 @@ _STANCE, _BALANCE = int(LawKind.STANCE), int(LawKind.BALANCE)
 
 CustomLaw: TypeAlias = Any
 """One kernel for all laws of users, see `control.law.custom`; None without any."""
+
+WholeBodies: TypeAlias = Any
+"""A tuple of `WholeBodyDynamics`, one for each robot that it moves; None without any."""
 
 Needed: TypeAlias = bool | None
 """True, or None to leave a group of laws out of the machine code: numba drops what
@@ -47,6 +51,7 @@ def write_commands(
     hands: Needed,
     feet: Needed,
     custom_law: CustomLaw,
+    bodies: WholeBodies = None,
 ) -> None:
     """Write the commands of all actuators; runs between `mj_step1` and `mj_step2`.
 
@@ -67,8 +72,15 @@ def write_commands(
     if feet is not None:
         for k in range(laws.shape[0]):
             law_of_feet(physics, laws[k], drives)
+    if bodies is not None:
+        for body in bodies:
+            whole_body_dynamics_law(physics, body)
     multiply_inertia(physics, physics.acceleration, physics.force)
     subtract_contact_forces(physics, laws, drives)
+    if bodies is not None:
+        for body in bodies:
+            for j in range(body.torque.shape[0]):
+                physics.force[body.dofs[6 + j]] -= body.torque[j]
     for k in range(laws.shape[0]):
         write_law_commands(physics, laws[k], drives)
 

@@ -36,6 +36,7 @@ class LawKind(IntEnum):
     VELOCITY = 5
     STANCE = 6
     BALANCE = 7
+    DYNAMICS = 8
     CUSTOM = 100
     """Laws of users: this and larger numbers, see `control.law.register_law`."""
 

@@ -1,0 +1,263 @@
+"""Whole-body inverse dynamics for robots on their feet: stand, step, walk, use hands."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from wbc_suite.control.action import ActionLayout, ActionPart, Axis, SliceKind, Unit
+from wbc_suite.control.composite.frame_goals import FrameGoals
+from wbc_suite.control.composite.reduced_robot import lock_groups, moved_joints
+from wbc_suite.control.composite.whole_body_dynamics_config import (
+    FootConfig,
+    WholeBodyIDConfig,
+    read_dynamics,
+)
+from wbc_suite.control.dynamics.arrays import Foot, Limits, make_dynamics
+from wbc_suite.control.law.law import Law
+from wbc_suite.control.loop.records import LawKind
+from wbc_suite.control.part.gripper import GripperController
+from wbc_suite.control.state import RobotState
+from wbc_suite.kinematics import Configuration
+from wbc_suite.locomotion import begin_gait, make_gait
+from wbc_suite.typing import Matrix, Vector
+
+__all__ = ["WholeBodyID"]
+
+UNTIL_NEXT_ACTION = 1_000_000
+"""Physics steps; the loop needs no Python."""
+
+
+class WholeBodyID:
+    """Moves a robot on its feet by one QP for contact forces and joint accelerations.
+
+    At every physics step the gait planner says which feet stand, where the others swing
+    and how the centre of mass accelerates; the QP finds forces and accelerations, and
+    the loop turns them into torques. All of it is compiled.
+
+    Args:
+        config: Plain data of a `WholeBodyIDConfig`.
+        state: The robot in the simulation.
+
+    Attributes:
+        layout: Slices of the action: hands, `walk`, `height`, grippers.
+        dynamics: What the law reads and writes.
+    """
+
+    def __init__(self, config: Mapping[str, Any], state: RobotState) -> None:
+        self.config = read_dynamics(config, state.robot, str(config.get("type")))
+        self._robot = lock_groups(state.robot, ())
+        self._law = Law(
+            LawKind.DYNAMICS, state, moved_joints(self._robot, state)
+        )
+        self._law.keep_limits(state)
+        self._grippers = [
+            GripperController(gripper, synergies, state)
+            for gripper, synergies in state.robot.synergies.items()
+        ]
+        hands = [f.behaviour.action_part(f, self.config) for f in self.config.frames]
+        grippers = [part for gripper in self._grippers for part in gripper.slices]
+        self.layout = ActionLayout([*hands, *_walk_parts(self.config), *grippers])
+        self._goals = FrameGoals(
+            self.config,
+            self.layout,
+            self._robot,
+            Configuration(self._robot.to_pinocchio()),
+            -1,
+        )
+        self.dynamics = self._make_dynamics(state)
+        self.laws: tuple[Law, ...] = (self._law, *(g.law for g in self._grippers))
+        self.reset(state)
+
+    def _make_dynamics(self, state: RobotState) -> Any:
+        config, drives = self.config, self._law.drives
+        root = state.model.joint(f"{state.prefix}root")
+        feet = [_foot(state, foot) for foot in config.feet]
+        soles = np.array([foot.corners for foot in feet])
+        edges = np.stack(
+            [soles[..., 0].min(1), soles[..., 0].max(1)]
+            + [soles[..., 1].min(1), soles[..., 1].max(1)],
+            axis=1,
+        )
+        dof = int(root.dofadr[0])
+        dynamics = make_dynamics(
+            feet=feet,
+            gait=make_gait(config.gait, edges),
+            qpos=drives["qpos"],
+            dofs=np.concatenate([np.arange(dof, dof + 6), drives["dof"]]),
+            nv=state.model.nv,
+            hands=_sites(state, [str(f.frame) for f in config.frames]),
+            hand_weight=np.array(
+                [(f.position_cost, f.orientation_cost) for f in config.frames]
+            ).reshape(-1, 2),
+            goal=self._goals.rows,
+            upright=np.array(
+                [_link(state, u.frame) for u in config.upright], dtype=np.int64
+            ),
+            upright_weight=np.array([u.weight for u in config.upright]),
+            posture_weight=self._posture_weights(),
+            limits=Limits(
+                low=drives["position_min"],
+                high=drives["position_max"],
+                velocity=drives["velocity_max"],
+                torque_low=drives["command_min"],
+                torque_high=drives["command_max"],
+            ),
+        )
+        own = dynamics.state
+        own["root_qpos"], own["root_dof"] = root.qposadr[0], dof
+        own["body"] = root.bodyid[0]
+        own["mass"] = state.model.body_subtreemass[root.bodyid[0]]
+        own["friction"], own["dt"] = config.friction, state.model.opt.timestep
+        own["hand_frame"] = config.input_ref_frame == "base"
+        return dynamics
+
+    def _posture_weights(self) -> Vector:
+        posture, robot = self.config.posture, self._robot
+        weights = {
+            joint: weight
+            for group, weight in posture.weights.items()
+            for joint in robot.groups.get(group, ())
+        }
+        return np.array([weights.get(j, posture.weight) for j in self._law.joints])
+
+    def reset(self, state: RobotState) -> None:
+        """Stand where the robot is."""
+        self._law.reset(state)
+        own, data = self.dynamics, state.data
+        record = own.state[0]
+        record["ticks"] = record["unsolved"] = 0
+        record["fell"] = -1.0
+        root = state.root_pose
+        yaw = float(np.arctan2(root.rotation[1, 0], root.rotation[0, 0]))
+        measured = own.measured
+        measured.com[:] = data.subtree_com[int(record["body"])]
+        for k, site in enumerate(own.site):
+            R = data.site_xmat[site].reshape(3, 3)
+            middle = R @ own.middle[k] if own.is_sole[k] else own.middle[k]
+            measured.foot[k] = data.site_xpos[site] + middle
+            measured.foot_yaw[k] = np.arctan2(R[1, 0], R[0, 0])
+        begin_gait(own.gait, measured, yaw)
+        own.command[:] = 0.0
+        own.load[:] = 0.0
+        own.qp.side[:] = 0
+        heading = pin.utils.rotate("z", yaw)
+        for k, link in enumerate(own.upright):
+            own.upright_pose[k] = (heading.T @ data.xmat[link].reshape(3, 3)).ravel()
+        ready = state.robot.keyframes.get(self.config.posture.keyframe, {})
+        now = data.qpos[own.qpos]
+        own.posture[:] = [
+            ready.get(j, q) for j, q in zip(self._law.joints, now, strict=True)
+        ]
+        origin = np.array([*measured.com[:2], measured.com[2]])
+        poses = [
+            pin.SE3(data.site_xmat[i].reshape(3, 3).copy(), data.site_xpos[i].copy())
+            for i in own.hand
+        ]
+        self._goals.reset(poses, pin.SE3(heading, origin))
+        for gripper in self._grippers:
+            gripper.reset(state)
+
+    def set_goal(self, action: Vector, period: float = 0.05) -> None:
+        """Move hands' goals, and take commands; see `layout`."""
+        self._goals.set(action)
+        for name, first in (("walk", 0), ("height", 3)):
+            part = self.layout[name]
+            values = action[part.start : part.stop]
+            self.dynamics.command[first : first + len(values)] = values
+        for gripper in self._grippers:
+            part = self.layout[gripper.name]
+            gripper.set_goal(action[part.start : part.stop], period)
+
+    def prepare(self, state: RobotState) -> int:
+        """Do nothing: the loop does it all."""
+        return UNTIL_NEXT_ACTION
+
+    @property
+    def hold_action(self) -> Vector:
+        """The action that keeps the hands' goals and stands still."""
+        action = np.zeros(self.layout.size)
+        self._goals.hold(action)
+        action[self.layout["height"].start] = self.dynamics.command[3]
+        for gripper in self._grippers:
+            part = self.layout[gripper.name]
+            action[part.start : part.stop] = gripper.goal
+        return action
+
+    def info(self, state: RobotState) -> dict[str, Any]:
+        """Return `{"balance": ...}`: feet, capture point, loads, next footstep, falls.
+
+        `stance` names the feet that stand, `margin` is the distance of the capture
+        point from the edge of what the robot stands on, m; `loads` are the forces on
+        hands, N; `fell` says when and why the robot fell, or is None.
+        """
+        own = self.dynamics
+        feet = [foot.frame for foot in self.config.feet]
+        names = [frame.name for frame in self.config.frames]
+        return {
+            "balance": {
+                "stance": [f for f, x in zip(feet, own.plan.load, strict=True) if x > 0],
+                "margin": float(own.plan.margin[0]),
+                "loads": {
+                    name: load[:3].copy()
+                    for name, load in zip(names, own.load, strict=True)
+                },
+                "footstep": own.plan.footstep.copy(),
+                "walking": bool(own.gait.state["mode"][0]),
+                "unsolved": int(own.state["unsolved"][0]),
+                "fell": self._fall(state),
+            }
+        }
+
+    def _fall(self, state: RobotState) -> str | None:
+        when = float(self.dynamics.state["fell"][0])
+        if when < 0.0:
+            return None
+        tilt = np.degrees(np.arccos(np.clip(state.root_pose.rotation[2, 2], -1.0, 1.0)))
+        return (
+            f"It fell {when:.2f} s after the reset: its trunk is tilted by {tilt:.0f} "
+            "degrees. The capture point had left what its feet can reach."
+        )
+
+
+def _walk_parts(config: WholeBodyIDConfig) -> list[ActionPart]:
+    low, high = config.height
+    walk = ActionPart(
+        name="walk",
+        kind=SliceKind.VELOCITY,
+        labels=(Axis.FORWARD, Axis.SIDEWAYS, Axis.TURN),
+        units=(Unit("m/s"), Unit("m/s"), Unit("rad/s")),
+        low=tuple(-x for x in config.max_walk),
+        high=config.max_walk,
+    )
+    height = ActionPart(
+        name="height",
+        kind=SliceKind.POSITION,
+        labels=(Axis.Z,),
+        units=(Unit("m"),),
+        low=(low,),
+        high=(high,),
+    )
+    return [walk, height]
+
+
+def _foot(state: RobotState, foot: FootConfig) -> Foot:
+    """Return a foot in the simulation."""
+    site = int(_sites(state, [foot.frame])[0])
+    if foot.sole is None:
+        return Foot(site=site, middle=np.array([0.0, 0.0, -foot.radius]))
+    heel, toes, right, left = foot.sole
+    x, y = 0.5 * (heel + toes), 0.5 * (right + left)
+    sole = (heel - x, toes - x, right - y, left - y)
+    return Foot(site=site, middle=np.array([x, y, 0.0]), sole=sole)
+
+
+def _sites(state: RobotState, names: list[str]) -> Matrix:
+    ids = [state.model.site(state.prefix + name).id for name in names]
+    return np.array(ids, dtype=np.int64)
+
+
+def _link(state: RobotState, name: str) -> int:
+    """Return the body of a frame or link."""
+    return int(state.model.body(state.prefix + state.robot.link_of(name)).id)

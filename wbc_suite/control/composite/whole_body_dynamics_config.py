@@ -1,0 +1,199 @@
+"""Config of WHOLE_BODY_ID: `controllers/{robot}_whole_body_id.toml`."""
+
+from collections.abc import Collection, Iterator, Mapping
+from typing import Any, Literal
+
+from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
+
+from wbc_suite.control.composite.whole_body_config import (
+    ControlledFrame,
+    InputFrame,
+    InputType,
+    default_whole_body_config,
+)
+from wbc_suite.errors import ConfigError, UnknownNameError
+from wbc_suite.locomotion import GaitConfig, TrotConfig
+from wbc_suite.robot import RobotDescription
+from wbc_suite.robot.elements import Name
+from wbc_suite.tomlfile import FrozenModel, parse_model
+
+__all__ = ["FootConfig", "WholeBodyIDConfig", "check_dynamics"]
+__all__ += ["default_dynamics_config", "read_dynamics"]
+
+
+class FootConfig(FrozenModel):
+    """A foot.
+
+    Attributes:
+        frame: Frame or link of the robot.
+        sole: Edges of the sole in the frame's axes, m: heel, toes (along x), right,
+            left (along y); absent for a foot that touches the ground in a point.
+        radius: Of a foot that is a ball about the frame, m.
+    """
+
+    frame: Name
+    sole: tuple[float, float, float, float] | None = None
+    radius: NonNegativeFloat = 0.0
+
+    @model_validator(mode="after")
+    def _sole_is_a_rectangle(self) -> "FootConfig":
+        if self.sole is not None:
+            heel, toes, right, left = self.sole
+            if not (heel < toes and right < left):
+                raise ValueError(
+                    "'sole' is [heel, toes, right, left], with heel < toes and "
+                    "right < left"
+                )
+        return self
+
+
+class UprightConfig(FrozenModel):
+    """Links that keep their orientation while the robot turns and walks.
+
+    Attributes:
+        frame: Frame or link of the robot.
+        weight: Weight of its angular acceleration.
+    """
+
+    frame: Name
+    weight: PositiveFloat = 5.0
+
+
+class StanceConfig(FrozenModel):
+    """Pull of the joints to a posture.
+
+    Attributes:
+        keyframe: The posture.
+        weight: Weight of the accelerations of all joints.
+        weights: Weights of the joints of single groups, in place of `weight`.
+    """
+
+    keyframe: Name = "ready"
+    weight: PositiveFloat = 0.1
+    weights: dict[Name, PositiveFloat] = {}
+
+
+class WholeBodyIDConfig(FrozenModel):
+    """Config of whole-body inverse dynamics.
+
+    Attributes:
+        format: Version of the format, 1.
+        type: Registered name.
+        frames: Hands, in the order of the action; costs are weights of accelerations.
+        feet: Feet; those of a biped from the left.
+        gait: How the robot steps.
+        upright: Links that stay upright.
+        posture: Pull to a posture.
+        friction: Coefficient of friction that contact forces keep to.
+        max_walk: Greatest commands: forward, left (m/s), turn (rad/s).
+        height: Lowest and highest command of height, m.
+        input_type: `absolute` targets of hands, or `delta` steps from the last target.
+        input_ref_frame: Axes of targets and steps: `world`; `base`, which is the
+            heading of the robot at its centre of mass; or the hand's own (`eef`).
+        delta_position: Largest step of a delta action, m.
+        delta_rotation: Largest step of a delta action, rad.
+    """
+
+    format: Literal[1] = 1
+    type: str = "WHOLE_BODY_ID"
+    frames: tuple[ControlledFrame, ...] = Field(default=(), alias="frame")
+    feet: tuple[FootConfig, ...] = Field(alias="foot", min_length=2, max_length=8)
+    gait: GaitConfig
+    upright: tuple[UprightConfig, ...] = ()
+    posture: StanceConfig = StanceConfig()
+    friction: PositiveFloat = 0.6
+    max_walk: tuple[PositiveFloat, PositiveFloat, PositiveFloat] = (1.0, 0.4, 1.0)
+    height: tuple[float, float] = (-0.15, 0.02)
+    input_type: InputType = "absolute"
+    input_ref_frame: InputFrame = "base"
+    delta_position: PositiveFloat = 0.05
+    delta_rotation: PositiveFloat = 0.5
+
+    @model_validator(mode="after")
+    def _gait_fits_feet(self) -> "WholeBodyIDConfig":
+        if self.gait.type == "walk" and (
+            len(self.feet) != 2 or any(foot.sole is None for foot in self.feet)
+        ):
+            raise ValueError(
+                "a gait of type 'walk' needs two feet, left and right, with a 'sole' "
+                "each: heel, toes, right, left, in m"
+            )
+        if self.gait.type == "trot" and len(self.feet) != 4:
+            raise ValueError("a gait of type 'trot' needs four feet")
+        return self
+
+
+def default_dynamics_config(robot: RobotDescription) -> dict[str, Any]:
+    """Return a config for a robot without a file: four feet trot.
+
+    Raises:
+        ConfigError: If the robot has not four feet; soles of a biped are not known.
+    """
+    feet = [frame.name for frame in robot.frames if frame.role == "foot"]
+    if len(feet) == 2:
+        raise ConfigError(
+            f"{robot.name} has two feet, and nobody has told what their soles are: it "
+            "would tip over. Give [[foot]] with 'sole' for the left and the right one; "
+            "see 'On its own feet' in docs/robots.md."
+        )
+    hands = [
+        frame
+        for frame in default_whole_body_config(robot)["frame"]
+        if frame["frame"] in robot.hands.values()
+    ]
+    return {
+        "format": 1,
+        "frame": [{"name": x["name"], "frame": x["frame"]} for x in hands],
+        "foot": [{"frame": name} for name in feet],
+        "gait": TrotConfig().model_dump(),
+        "upright": [{"frame": robot.links[0].name}],
+    }
+
+
+def check_dynamics(
+    config: Mapping[str, Any], robot: RobotDescription | None, source: str
+) -> None:
+    """Raise what `read_dynamics` raises; without a robot only the format's rules."""
+    if robot is None:
+        parse_model(WholeBodyIDConfig, config, source=source)
+    else:
+        read_dynamics(config, robot, source)
+
+
+def read_dynamics(
+    config: Mapping[str, Any], robot: RobotDescription, source: str
+) -> WholeBodyIDConfig:
+    """Return the config as a model.
+
+    Raises:
+        ConfigError: If it breaks a rule of the format, names what the robot does not
+            have, or the robot's root is not free.
+    """
+    if robot.root.kind != "free":
+        raise ConfigError(
+            f"{robot.name} has a {robot.root.kind} root, and WHOLE_BODY_ID moves robots "
+            "on their feet. Use WHOLE_BODY_IK, or give it a free root."
+        )
+    read = parse_model(WholeBodyIDConfig, config, source=source)
+    for key, kind, name, known in _names(read, robot):
+        if name not in known:
+            unknown = UnknownNameError(kind, name, known)
+            raise ConfigError(f"{source}: key '{key}': {robot.name}: {unknown}")
+    return read
+
+
+def _names(
+    config: WholeBodyIDConfig, robot: RobotDescription
+) -> Iterator[tuple[str, str, str, Collection[str]]]:
+    frames = [*(f.name for f in robot.frames), *(x.name for x in robot.links)]
+    groups = (
+        ("frame", [frame.frame for frame in config.frames]),
+        ("foot", [foot.frame for foot in config.feet]),
+        ("upright", [upright.frame for upright in config.upright]),
+    )
+    for key, names in groups:
+        for k, name in enumerate(names):
+            if name is not None:
+                yield f"{key}[{k}].frame", "frame", name, frames
+    for group in config.posture.weights:
+        yield f"posture.weights.{group}", "group", group, robot.groups

@@ -1,0 +1,1 @@
+"""Whole-body inverse dynamics: contact forces and joint accelerations by one QP."""

@@ -1,0 +1,244 @@
+"""What the law of whole-body inverse dynamics reads and writes."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from wbc_suite.compiling import struct
+from wbc_suite.control.loop.records import Records, readable
+from wbc_suite.locomotion.gait import Gait, Measured, Plan, make_measured, make_plan
+from wbc_suite.qp.active_set import QpArrays, make_qp_arrays
+from wbc_suite.typing import Indices, Matrix, Vector
+
+__all__ = ["EDGES", "Foot", "Limits", "Terms", "WholeBodyDynamics"]
+__all__ += ["make_dynamics"]
+
+EDGES = 4
+"""Edges of a friction pyramid."""
+
+STATE = np.dtype(
+    [
+        ("root_qpos", "i8"),  # index of the free root in qpos
+        ("root_dof", "i8"),  # and in qvel
+        ("body", "i8"),  # its link
+        ("mass", "f8"),  # kg
+        ("friction", "f8"),  # coefficient
+        ("dt", "f8"),  # s between two steps of the loop
+        ("ticks", "i8"),
+        ("unsolved", "i8"),  # ticks whose active set was not found
+        ("fell", "f8"),  # time of the fall, s since the reset; negative before
+        ("hand_frame", "i8"),  # 1: goals of hands are given in the heading frame
+    ]
+)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Foot:
+    """A foot: a sole, or a ball.
+
+    Attributes:
+        site: Its site in the simulation.
+        middle: Middle of the sole in the site's axes, m, shape (3,); for a ball the way
+            to its lowest point, world axes.
+        sole: Edges of a sole about its middle: heel, toes, right, left, m; None for a
+            ball.
+    """
+
+    site: int
+    middle: Vector
+    sole: tuple[float, float, float, float] | None = None
+
+    @property
+    def corners(self) -> Matrix:
+        """Points in contact about the middle, m, shape (k, 2)."""
+        if self.sole is None:
+            return np.zeros((1, 2))
+        heel, toes, right, left = self.sole
+        return np.array([(x, y) for x in (heel, toes) for y in (right, left)])
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Limits:
+    """Limits of the joints, shape (n,) each; units rad or m, s, N m or N."""
+
+    low: Vector
+    high: Vector
+    velocity: Vector
+    torque_low: Vector
+    torque_high: Vector
+
+
+@struct
+class Terms(NamedTuple):
+    """Terms of the equations of motion, M a + h = S tau + J^T f.
+
+    Columns are the six of the root in MuJoCo's velocity axes, then n joints.
+
+    Attributes:
+        M: Inertia, shape (6 + n, 6 + n).
+        h: Bias less passive forces, shape (6 + n,).
+        v: Velocity, shape (6 + n,).
+        a: Accelerations of the answer, shape (6 + n,).
+        B: Generalised force of each pyramid edge, shape (edges, 6 + n).
+        root: [X | x] with a_root = X y + x, shape (6, ny + 1).
+        J: Jacobian of a frame, linear then angular, world axes, shape (6, 6 + n).
+        velocity: J v, shape (6,).
+        drift: J' v, shape (6,).
+        spin: Angular momentum about the centre of mass, kg m^2/s, shape (3,).
+    """
+
+    M: Matrix
+    h: Vector
+    v: Vector
+    a: Vector
+    B: Matrix
+    root: Matrix
+    J: Matrix
+    velocity: Vector
+    drift: Vector
+    spin: Vector
+
+
+@struct
+class WholeBodyDynamics(NamedTuple):
+    """Robot, tasks and QP of whole-body inverse dynamics.
+
+    Attributes:
+        state: `STATE` record, shape (1,).
+        dofs: Degrees of freedom of root and joints, shape (6 + n,).
+        qpos: Index of each joint in qpos, shape (n,).
+        place: Column of each degree of freedom of the scene, -1 for others, (nv,).
+        terms: Terms of the equations of motion.
+        site: Site of each foot, shape (f,).
+        middle: See `Foot`, shape (f, 3).
+        is_sole: Whether a foot is a sole, shape (f,).
+        first_edge: First pyramid edge of each foot, and the end, shape (f + 1,).
+        corner: Points in contact about the middle of their foot, m, shape (points, 2).
+        hand: Site of each hand, shape (h,).
+        goal: Goals of hands as they are given, rows [R p], shape (h, 12).
+        hand_weight: Weights of position and orientation, shape (h, 2).
+        load: Observed wrench on each hand, N and N m, world axes, shape (h, 6).
+        upright: Bodies that stay upright, shape (u,).
+        upright_pose: Their rotations in heading axes at the reset, shape (u, 9).
+        upright_weight: Their weights, shape (u,).
+        posture: Positions that joints return to, rad or m, shape (n,).
+        posture_weight: Weight of each joint, shape (n,).
+        limits: Position low and high, velocity, torque low and high, shape (5, n).
+        command: Forward, left (m/s), turn (rad/s), height (m), shape (4,).
+        torque: Torques of the contact forces at the joints, J^T f, shape (n,).
+        last_velocity: Velocity of the last tick, shape (6 + n,).
+        gait: The gait.
+        measured: What its planner reads.
+        plan: What it writes.
+        qp: The QP in y = (edges, accelerations of joints).
+    """
+
+    state: Records
+    dofs: Indices
+    qpos: Indices
+    place: Indices
+    terms: Terms
+    site: Indices
+    middle: Matrix
+    is_sole: Indices
+    first_edge: Indices
+    corner: Matrix
+    hand: Indices
+    goal: Matrix
+    hand_weight: Matrix
+    load: Matrix
+    upright: Indices
+    upright_pose: Matrix
+    upright_weight: Vector
+    posture: Vector
+    posture_weight: Vector
+    limits: Matrix
+    command: Vector
+    torque: Vector
+    last_velocity: Vector
+    gait: Gait
+    measured: Measured
+    plan: Plan
+    qp: QpArrays
+
+
+def make_dynamics(
+    *,
+    feet: Sequence[Foot],
+    gait: Gait,
+    qpos: Indices,
+    dofs: Indices,
+    nv: int,
+    hands: Indices,
+    hand_weight: Matrix,
+    goal: Matrix,
+    upright: Indices,
+    upright_weight: Vector,
+    posture_weight: Vector,
+    limits: Limits,
+) -> WholeBodyDynamics:
+    """Return the arrays of a robot; see `WholeBodyDynamics`."""
+    n, f, h, u = len(qpos), len(feet), len(hands), len(upright)
+    points = [len(foot.corners) for foot in feet]
+    edges = EDGES * sum(points)
+    rows = sum(6 if foot.sole else 3 for foot in feet) + 6 + 3 * u + 6 * h
+    place = np.full(nv, -1, dtype=np.int64)
+    place[dofs] = np.arange(6 + n)
+    qp = make_qp_arrays(
+        np.zeros((rows, edges + n)),
+        np.zeros(rows),
+        np.zeros((2, edges + n)),
+        np.zeros(1),
+        inequalities=2 * n,
+    )
+    terms = Terms(
+        np.zeros((6 + n, 6 + n)),
+        np.zeros(6 + n),
+        np.zeros(6 + n),
+        np.zeros(6 + n),
+        np.zeros((edges, 6 + n)),
+        np.zeros((6, edges + n + 1)),
+        np.zeros((6, 6 + n)),
+        np.zeros(6),
+        np.zeros(6),
+        np.zeros(3),
+    )
+    return WholeBodyDynamics(
+        state=readable(np.zeros(1, STATE)),
+        dofs=np.array(dofs, dtype=np.int64),
+        qpos=np.array(qpos, dtype=np.int64),
+        place=place,
+        terms=terms,
+        site=np.array([foot.site for foot in feet], dtype=np.int64),
+        middle=np.array([foot.middle for foot in feet]),
+        is_sole=np.array([foot.sole is not None for foot in feet], dtype=np.int64),
+        first_edge=EDGES * np.cumsum([0, *points], dtype=np.int64),
+        corner=np.concatenate([foot.corners for foot in feet]),
+        hand=np.array(hands, dtype=np.int64),
+        goal=goal,
+        hand_weight=hand_weight,
+        load=np.zeros((h, 6)),
+        upright=np.array(upright, dtype=np.int64),
+        upright_pose=np.zeros((u, 9)),
+        upright_weight=upright_weight,
+        posture=np.zeros(n),
+        posture_weight=posture_weight,
+        limits=np.array(
+            [
+                limits.low,
+                limits.high,
+                limits.velocity,
+                limits.torque_low,
+                limits.torque_high,
+            ]
+        ),
+        command=np.zeros(4),
+        torque=np.zeros(n),
+        last_velocity=np.zeros(6 + n),
+        gait=gait,
+        measured=make_measured(f),
+        plan=make_plan(f),
+        qp=qp,
+    )

@@ -1,0 +1,126 @@
+"""Torques of a robot on its feet: planner, QP, accelerations and contact forces."""
+
+import numpy as np
+
+from wbc_suite.compiling import compiled
+from wbc_suite.control.dynamics.arrays import WholeBodyDynamics
+from wbc_suite.control.dynamics.qp_rows import edge_forces, state_qp
+from wbc_suite.control.dynamics.terms import (
+    measure,
+    write_frame_terms,
+    write_terms,
+)
+from wbc_suite.control.loop.physics import Physics
+from wbc_suite.control.loop.rigid_body import rotation
+from wbc_suite.linear_algebra import cholesky, dot, solve_lower, solve_upper
+from wbc_suite.locomotion.gait import GaitKind
+from wbc_suite.locomotion.trot import plan_trot
+from wbc_suite.locomotion.walk import plan_walk
+from wbc_suite.qp.active_set import solve_warm
+
+__all__ = ["whole_body_dynamics_law"]
+
+_WALK = int(GaitKind.WALK)
+
+OBSERVER = 6.0
+"""1/s; bandwidth of the observed loads on hands."""
+
+HEAVIEST = 200.0
+"""N or N m; greatest change of a load that one step shows."""
+
+TILTED = 0.6
+"""Cosine of the tilt from which a robot has fallen: 53 degrees."""
+
+DROPPED = 0.2
+"""m; a centre of mass so much lower than commanded has fallen."""
+
+
+@compiled
+def whole_body_dynamics_law(physics: Physics, body: WholeBodyDynamics) -> None:
+    """Write accelerations of root and joints, and the torques of contact forces."""
+    state, qp, terms = body.state[0], body.qp, body.terms
+    write_terms(physics, body)
+    measure(physics, body)
+    _observe_loads(physics, body)
+    if body.gait.settings[0].kind == _WALK:
+        plan_walk(body.gait, body.measured, body.command, state.dt, body.plan)
+    else:
+        plan_trot(body.gait, body.measured, body.command, state.dt, body.plan)
+    _watch_fall(physics, body)
+    state_qp(physics, body)
+    state.ticks += 1
+    if not solve_warm(qp):
+        state.unsolved += 1
+        for i in range(qp.x.shape[0]):
+            qp.x[i] = min(max(qp.x[i], qp.lower[i]), qp.upper[i])
+    edges, size = terms.B.shape[0], qp.x.shape[0]
+    for i in range(6):
+        terms.a[i] = dot(terms.root[i], qp.x, size) + terms.root[i, size]
+    for j in range(body.qpos.shape[0]):
+        terms.a[6 + j] = qp.x[edges + j]
+        body.torque[j] = edge_forces(body, 6 + j)
+    for i in range(body.dofs.shape[0]):
+        physics.acceleration[body.dofs[i]] = terms.a[i]
+        body.last_velocity[i] = terms.v[i]
+
+
+@compiled
+def _observe_loads(physics: Physics, body: WholeBodyDynamics) -> None:
+    """Estimate the wrench on each hand, and count it to the bias and to the weight.
+
+    What the arm did since the last step, less what it was asked to do, is the
+    acceleration of a force that the model does not know:
+
+        M (dv / dt - a) = J^T (f - f_hat)
+
+    solved for the joints of the arm, and averaged over 1/6 s. What hangs on a hand
+    belongs to the centre of mass.
+    """
+    terms, state, measured = body.terms, body.state[0], body.measured
+    size = body.dofs.shape[0]
+    missed, residual = np.empty(size), np.empty(size)
+    for i in range(size):
+        rate = (terms.v[i] - body.last_velocity[i]) / state.dt
+        missed[i] = rate - terms.a[i] if state.ticks > 0 else 0.0
+    for i in range(size):
+        residual[i] = dot(terms.M[i], missed, size)
+    mass, moment, rate = state.mass, np.zeros(2), np.zeros(2)
+    for k in range(body.hand.shape[0]):
+        site = body.hand[k]
+        p, load = physics.site_xpos[site], body.load[k]
+        write_frame_terms(physics, body, int(physics.site_bodyid[site]), p)
+        A, x = np.zeros((6, 6)), np.zeros(6)
+        for r in range(6):
+            for j in range(6, size):
+                x[r] += terms.J[r, j] * residual[j]
+                for s in range(r + 1):
+                    A[r, s] += terms.J[r, j] * terms.J[s, j]
+            A[r, r] += 1e-3
+        cholesky(A, 6, 0.0)
+        solve_lower(A, x, 6)
+        solve_upper(A, x, 6)
+        for r in range(6):
+            part = min(max(x[r], -HEAVIEST), HEAVIEST)
+            load[r] += OBSERVER * state.dt * part
+        for j in range(size):
+            for r in range(6):
+                terms.h[j] -= terms.J[r, j] * load[r]
+        held = max(-load[2] / 9.81, 0.0)
+        mass += held
+        for i in range(2):
+            moment[i] += held * (p[i] - measured.com[i])
+            rate[i] += held * (terms.velocity[i] - measured.com_velocity[i])
+    for i in range(2):
+        measured.com[i] += moment[i] / mass
+        measured.com_velocity[i] += rate[i] / mass
+
+
+@compiled
+def _watch_fall(physics: Physics, body: WholeBodyDynamics) -> None:
+    """Note when the robot falls."""
+    state, gait = body.state[0], body.gait.state[0]
+    tilt = rotation(physics.xmat, state.body)[2, 2]
+    low = body.measured.com[2] < gait.ground + gait.height - DROPPED
+    if state.fell < 0.0 and (tilt < TILTED or low):
+        state.fell = gait.time
+

@@ -1,0 +1,320 @@
+"""Rows, bounds and costs of the QP of whole-body inverse dynamics."""
+
+import numpy as np
+
+from wbc_suite.compiling import compiled
+from wbc_suite.control.dynamics.arrays import EDGES, WholeBodyDynamics
+from wbc_suite.control.dynamics.terms import (
+    eliminate_root,
+    write_edges,
+    write_frame_terms,
+)
+from wbc_suite.control.loop.physics import Physics
+from wbc_suite.control.loop.rigid_body import matrix_product, rotated, rotation
+from wbc_suite.locomotion.gait import GRAVITY
+from wbc_suite.qp.lie import log3, saturate
+from wbc_suite.typing import Matrix, Vector
+
+__all__ = ["edge_forces", "state_qp", "write_heading"]
+
+CONTACT = (100.0, 60.0)
+"""Weight of the rows that keep a foot at rest, and their damping, 1/s."""
+
+SWING = (6.0, 2.0, 500.0)
+"""Weights of position and orientation of a swinging foot, and kp, 1/s^2."""
+
+COM_WEIGHT = 10.0
+SPIN = (0.05, 4.0)
+"""Weight of angular momentum, and its decay, 1/s."""
+
+UPRIGHT = (150.0, 24.0)
+"""kp, 1/s^2, and kd, 1/s, of bodies that stay upright."""
+
+HAND_KP = 100.0
+"""1/s^2."""
+
+FARTHEST = (0.05, 0.25)
+"""m and rad; errors of hands pull no harder than at these."""
+
+POSTURE_KP = 50.0
+"""1/s^2."""
+
+FORCE_COST = 1e-3
+"""1/N; square root of the cost of a force along an edge."""
+
+MOTION_COST = 1e-6
+"""(s^2/rad)^2; least cost of an acceleration."""
+
+LEAST_FORCE = 4.0
+"""N; normal force that a standing foot keeps."""
+
+STRONGEST = 10.0
+"""Weights that a foot may carry."""
+
+WINDOW = (400.0, 40.0, 20.0, 200.0)
+"""kp (1/s^2) and kd (1/s) of positions, kp (1/s) of velocities, and the deceleration
+with which limits are kept that are passed already, rad/s^2."""
+
+FASTEST = 1e4
+"""rad/s^2."""
+
+
+@compiled
+def state_qp(physics: Physics, body: WholeBodyDynamics) -> None:
+    """Write the QP of a tick; terms and plan are those of the tick."""
+    for k in range(body.site.shape[0]):
+        _write_foot_jacobian(physics, body, k)
+        write_edges(physics, body, k)
+    eliminate_root(body)
+    row = 0
+    for k in range(body.site.shape[0]):
+        row = _add_foot(physics, body, k, row)
+    row = _add_momentum(physics, body, row)
+    for k in range(body.upright.shape[0]):
+        row = _add_upright(physics, body, k, row)
+    for k in range(body.hand.shape[0]):
+        row = _add_hand(physics, body, k, row)
+    _write_costs(physics, body)
+    _bound_forces(body)
+    _bound_accelerations(physics, body)
+    _bound_torques(body)
+
+
+@compiled
+def _write_foot_jacobian(physics: Physics, body: WholeBodyDynamics, k: int) -> None:
+    link = int(physics.site_bodyid[body.site[k]])
+    write_frame_terms(physics, body, link, body.measured.foot[k])
+
+
+@compiled
+def _add_row(
+    body: WholeBodyDynamics, row: int, A: Vector, wanted: float, weight: float
+) -> None:
+    """State `weight (A a - wanted)` as a row of the cost, in y."""
+    terms, qp = body.terms, body.qp
+    edges, size = terms.B.shape[0], body.dofs.shape[0]
+    out, last = qp.W[row], terms.root.shape[1] - 1
+    for j in range(last):
+        out[j] = 0.0
+    offset = 0.0
+    for i in range(6):
+        if A[i] != 0.0:
+            part, X = weight * A[i], terms.root[i]
+            for j in range(last):
+                out[j] += part * X[j]
+            offset += A[i] * X[last]
+    for j in range(6, size):
+        out[edges + j - 6] += weight * A[j]
+    qp.e[row] = weight * (wanted - offset)
+
+
+@compiled
+def _add_foot(physics: Physics, body: WholeBodyDynamics, k: int, row: int) -> int:
+    """Add the rows of a foot that rests or swings; return the next row."""
+    plan, terms, measured = body.plan, body.terms, body.measured
+    _write_foot_jacobian(physics, body, k)
+    count = 6 if body.is_sole[k] == 1 else 3
+    stands = plan.load[k] > 0.0
+    turn, R_goal, R_error = np.zeros(3), np.zeros((3, 3)), np.empty((3, 3))
+    if count == 6 and not stands:
+        R = rotation(physics.site_xmat, body.site[k])
+        R_goal[0, 0] = R_goal[1, 1] = np.cos(plan.yaw[k])
+        R_goal[1, 0] = np.sin(plan.yaw[k])
+        R_goal[0, 1], R_goal[2, 2] = -R_goal[1, 0], 1.0
+        matrix_product(R_goal, R.T, R_error)
+        log3(R_error, turn)
+    kd = 2.0 * np.sqrt(SWING[2])
+    for i in range(count):
+        wanted = -terms.drift[i]
+        if stands:
+            wanted -= CONTACT[1] * terms.velocity[i]
+            weight = CONTACT[0]
+        elif i < 3:
+            error = plan.position[k, i] - measured.foot[k, i]
+            rate = plan.velocity[k, i] - terms.velocity[i]
+            wanted += plan.acceleration[k, i] + SWING[2] * error + kd * rate
+            weight = SWING[0]
+        else:
+            wanted += SWING[2] * turn[i - 3] - kd * terms.velocity[i]
+            weight = SWING[1]
+        _add_row(body, row + i, terms.J[i], wanted, weight)
+    return row + count
+
+
+@compiled
+def _add_momentum(physics: Physics, body: WholeBodyDynamics, row: int) -> int:
+    """Add rows of the centre of mass and of angular momentum; return the next row.
+
+    Both follow from the contact forces alone: the sum of all forces is the rate of
+    linear momentum, that of their moments the rate of angular momentum.
+    """
+    state, terms, qp, plan = body.state[0], body.terms, body.qp, body.plan
+    edges = terms.B.shape[0]
+    com, root = body.measured.com, physics.qpos[state.root_qpos :]
+    R = rotation(physics.xmat, state.body)
+    x, y, z = com[0] - root[0], com[1] - root[1], com[2] - root[2]
+    weight = COM_WEIGHT / state.mass
+    for i in range(6):
+        for j in range(qp.W.shape[1]):
+            qp.W[row + i, j] = 0.0
+    for k in range(edges):
+        f, m = terms.B[k, :3], rotated(R, terms.B[k, 3:6])
+        for i in range(3):
+            qp.W[row + i, k] = weight * f[i]
+        qp.W[row + 3, k] = SPIN[0] * (m[0] - (y * f[2] - z * f[1]))
+        qp.W[row + 4, k] = SPIN[0] * (m[1] - (z * f[0] - x * f[2]))
+        qp.W[row + 5, k] = SPIN[0] * (m[2] - (x * f[1] - y * f[0]))
+    for i in range(3):
+        fall = GRAVITY if i == 2 else 0.0
+        qp.e[row + i] = COM_WEIGHT * (plan.com_acceleration[i] + fall)
+        qp.e[row + 3 + i] = -SPIN[0] * SPIN[1] * terms.spin[i]
+    return row + 6
+
+
+@compiled
+def _add_upright(physics: Physics, body: WholeBodyDynamics, k: int, row: int) -> int:
+    """Add the rows of a body that keeps its orientation in heading axes."""
+    terms, gait = body.terms, body.gait.state[0]
+    link = body.upright[k]
+    write_frame_terms(physics, body, link, physics.xpos[link])
+    heading, R_goal, R_error = np.zeros((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    write_heading(gait.yaw, heading)
+    matrix_product(heading, body.upright_pose[k].reshape((3, 3)), R_goal)
+    matrix_product(R_goal, rotation(physics.xmat, link).T, R_error)
+    turn = np.empty(3)
+    log3(R_error, turn)
+    for i in range(3):
+        rate = gait.velocity[2] if i == 2 and gait.mode == 1 else 0.0
+        wanted = UPRIGHT[0] * turn[i] + UPRIGHT[1] * (rate - terms.velocity[3 + i])
+        wanted -= terms.drift[3 + i]
+        _add_row(body, row + i, terms.J[3 + i], wanted, body.upright_weight[k])
+    return row + 3
+
+
+@compiled
+def write_heading(yaw: float, R: Matrix) -> None:
+    """Write a rotation about the vertical, shape (3, 3), into zeros."""
+    R[0, 0] = R[1, 1] = np.cos(yaw)
+    R[1, 0] = np.sin(yaw)
+    R[0, 1], R[2, 2] = -R[1, 0], 1.0
+
+
+@compiled
+def _add_hand(physics: Physics, body: WholeBodyDynamics, k: int, row: int) -> int:
+    """Add the rows of a hand; return the next row."""
+    terms, state, gait = body.terms, body.state[0], body.gait.state[0]
+    site, goal = body.hand[k], body.goal[k].reshape((3, 4))
+    p = physics.site_xpos[site]
+    write_frame_terms(physics, body, int(physics.site_bodyid[site]), p)
+    R_goal, p_goal, lead = goal[:, :3].copy(), goal[:, 3].copy(), np.zeros(6)
+    if state.hand_frame == 1:
+        heading, own = np.zeros((3, 3)), R_goal.copy()
+        write_heading(gait.yaw, heading)
+        matrix_product(heading, own, R_goal)
+        p_goal[:] = rotated(heading, p_goal)
+        for i in range(2):
+            p_goal[i] += body.measured.com[i]
+            lead[i] = body.measured.com_velocity[i]
+        p_goal[2] += gait.ground + gait.height
+        lead[5] = gait.velocity[2] if gait.mode == 1 else 0.0
+    R_error, error = np.empty((3, 3)), np.empty(6)
+    matrix_product(R_goal, rotation(physics.site_xmat, site).T, R_error)
+    log3(R_error, error[3:])
+    for i in range(3):
+        error[i] = p_goal[i] - p[i]
+    saturate(error[:3], FARTHEST[0])
+    saturate(error[3:], FARTHEST[1])
+    kd = 2.0 * np.sqrt(HAND_KP)
+    for i in range(6):
+        wanted = HAND_KP * error[i] + kd * (lead[i] - terms.velocity[i])
+        weight = body.hand_weight[k, i // 3]
+        _add_row(body, row + i, terms.J[i], wanted - terms.drift[i], weight)
+    return row + 6
+
+
+@compiled
+def _write_costs(physics: Physics, body: WholeBodyDynamics) -> None:
+    """Write the cost of forces, and of joints away from their posture."""
+    qp, terms = body.qp, body.terms
+    edges, kd = terms.B.shape[0], 2.0 * np.sqrt(POSTURE_KP)
+    for k in range(edges):
+        qp.diagonal[0, k], qp.diagonal[1, k] = FORCE_COST**2, 0.0
+    for j in range(body.qpos.shape[0]):
+        error = body.posture[j] - physics.qpos[body.qpos[j]]
+        wanted = POSTURE_KP * error - kd * terms.v[6 + j]
+        cost = body.posture_weight[j] ** 2
+        qp.diagonal[0, edges + j] = cost + MOTION_COST
+        qp.diagonal[1, edges + j] = cost * wanted
+
+
+@compiled
+def _bound_forces(body: WholeBodyDynamics) -> None:
+    """Bound the forces along edges by the load that a foot may carry."""
+    qp, state, plan = body.qp, body.state[0], body.plan
+    for k in range(body.site.shape[0]):
+        first, last = body.first_edge[k], body.first_edge[k + 1]
+        weight = state.mass * GRAVITY
+        load = plan.load[k]
+        most = weight * (STRONGEST if load >= 1.0 else 1.3 * load)
+        least = min(LEAST_FORCE, 0.5 * most)
+        for edge in range(first, last):
+            qp.lower[edge], qp.upper[edge] = least / (last - first), most / EDGES
+            if load <= 0.0:
+                qp.side[edge] = 1
+            elif qp.side[edge] > 0 and load >= 1.0:
+                qp.side[edge] = 0
+
+
+@compiled
+def _bound_accelerations(physics: Physics, body: WholeBodyDynamics) -> None:
+    """Bound accelerations so that joints stay within position and velocity limits.
+
+    A window is never empty: where limits disagree the upper bound gives way.
+    """
+    qp, edges = body.qp, body.terms.B.shape[0]
+    kp, kd, kv, most = WINDOW
+    for j in range(body.qpos.shape[0]):
+        q, v = physics.qpos[body.qpos[j]], body.terms.v[6 + j]
+        fastest = body.limits[2, j]
+        high = max(kp * (body.limits[1, j] - q) - kd * v, -most)
+        high = min(high, max(kv * (fastest - v), -most))
+        low = min(kp * (body.limits[0, j] - q) - kd * v, most)
+        low = max(low, min(kv * (-fastest - v), most))
+        low = min(max(low, -FASTEST), FASTEST - 1e-3)
+        qp.lower[edges + j] = low
+        qp.upper[edges + j] = max(min(high, FASTEST), low + 1e-3)
+
+
+@compiled
+def _bound_torques(body: WholeBodyDynamics) -> None:
+    """Write `tau = M_j a + h_j - B_j^T f` as rows of y, within the motors' limits."""
+    terms, qp = body.terms, body.qp
+    n, edges = body.qpos.shape[0], terms.B.shape[0]
+    size = edges + n
+    for j in range(n):
+        row, M = qp.rows[j], terms.M[6 + j]
+        for k in range(edges):
+            row[k] = -terms.B[k, 6 + j]
+        for k in range(n):
+            row[edges + k] = M[6 + k]
+        bias = terms.h[6 + j]
+        for i in range(6):
+            X, part = terms.root[i], M[i]
+            for k in range(size):
+                row[k] += part * X[k]
+            bias += part * X[size]
+        qp.upper[size + j] = body.limits[4, j] - bias
+        qp.upper[size + n + j] = bias - body.limits[3, j]
+        other = qp.rows[n + j]
+        for k in range(size):
+            other[k] = -row[k]
+
+
+@compiled
+def edge_forces(body: WholeBodyDynamics, column: int) -> float:
+    """Return the generalised force of all contacts along one column."""
+    total, B = 0.0, body.terms.B
+    for k in range(B.shape[0]):
+        total += B[k, column] * body.qp.x[k]
+    return total
+

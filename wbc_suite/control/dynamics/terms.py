@@ -1,0 +1,143 @@
+"""Terms of the equations of motion of a robot on its feet, out of MuJoCo's arrays."""
+
+import numpy as np
+
+from wbc_suite.compiling import compiled
+from wbc_suite.control.dynamics.arrays import EDGES, WholeBodyDynamics
+from wbc_suite.control.loop.physics import Physics
+from wbc_suite.control.loop.rigid_body import (
+    point_jacobian_column,
+    point_velocity_and_drift,
+    rotated,
+    rotation,
+    write_inertia,
+)
+from wbc_suite.linear_algebra import dot, solve
+from wbc_suite.typing import Vector
+
+__all__ = ["eliminate_root", "foot_middle", "measure", "write_edges"]
+__all__ += ["write_frame_terms", "write_terms"]
+
+
+@compiled
+def write_terms(physics: Physics, body: WholeBodyDynamics) -> None:
+    """Write inertia, bias, velocity and angular momentum."""
+    terms, dofs = body.terms, body.dofs
+    write_inertia(physics, dofs, dofs.shape[0], terms.M)
+    for i in range(dofs.shape[0]):
+        terms.v[i] = physics.qvel[dofs[i]]
+        terms.h[i] = physics.qfrc_bias[dofs[i]] - physics.qfrc_passive[dofs[i]]
+
+
+@compiled
+def measure(physics: Physics, body: WholeBodyDynamics) -> None:
+    """Write what the planner reads, and the angular momentum."""
+    state, terms, measured = body.state[0], body.terms, body.measured
+    size = body.dofs.shape[0]
+    momentum = np.empty(6)
+    for i in range(6):
+        momentum[i] = dot(terms.M[i], terms.v, size)
+    com = physics.subtree_com[state.body]
+    root = physics.qpos[state.root_qpos : state.root_qpos + 3]
+    spin = rotated(rotation(physics.xmat, state.body), momentum[3:])
+    x, y, z = com[0] - root[0], com[1] - root[1], com[2] - root[2]
+    terms.spin[0] = spin[0] - (y * momentum[2] - z * momentum[1])
+    terms.spin[1] = spin[1] - (z * momentum[0] - x * momentum[2])
+    terms.spin[2] = spin[2] - (x * momentum[1] - y * momentum[0])
+    for i in range(3):
+        measured.com[i] = com[i]
+        measured.com_velocity[i] = momentum[i] / state.mass
+    for k in range(body.site.shape[0]):
+        R = rotation(physics.site_xmat, body.site[k])
+        measured.foot_yaw[k] = np.arctan2(R[1, 0], R[0, 0])
+        measured.foot[k] = foot_middle(physics, body, k)
+        link = int(physics.site_bodyid[body.site[k]])
+        point_velocity_and_drift(
+            physics, link, measured.foot[k], terms.velocity, terms.drift
+        )
+        measured.slip[k] = np.sqrt(terms.velocity[0] ** 2 + terms.velocity[1] ** 2)
+
+
+@compiled
+def foot_middle(physics: Physics, body: WholeBodyDynamics, k: int) -> Vector:
+    """Return the middle of a foot's contact, world axes, m, shape (3,)."""
+    site = body.site[k]
+    if body.is_sole[k] == 1:
+        middle = rotated(rotation(physics.site_xmat, site), body.middle[k])
+    else:
+        middle = body.middle[k]
+    return physics.site_xpos[site] + middle
+
+
+@compiled
+def write_frame_terms(
+    physics: Physics, body: WholeBodyDynamics, link: int, p: Vector
+) -> None:
+    """Write J, J v and J' v of a point of a link, world axes."""
+    terms, column = body.terms, np.empty(6)
+    point_velocity_and_drift(physics, link, p, terms.velocity, terms.drift)
+    terms.J[:] = 0.0
+    dof = int(physics.body_last_dof[link])
+    while dof >= 0:
+        j = body.place[dof]
+        if j >= 0:
+            point_jacobian_column(physics, dof, link, p, column)
+            for i in range(6):
+                terms.J[i, j] = column[i]
+        dof = int(physics.dof_parentid[dof])
+
+
+@compiled
+def write_edges(physics: Physics, body: WholeBodyDynamics, k: int) -> None:
+    """Write the generalised forces of a foot's friction pyramids.
+
+    `terms.J` is the Jacobian of the foot's middle. An edge is a force of which 1 N is
+    normal to the ground; on a sole the normal is the sole's.
+    """
+    terms, state = body.terms, body.state[0]
+    size = body.dofs.shape[0]
+    mu = state.friction / np.sqrt(2.0)
+    R = rotation(physics.site_xmat, body.site[k])
+    d, local, wrench = np.empty(3), np.empty(3), np.empty(6)
+    for edge in range(body.first_edge[k], body.first_edge[k + 1]):
+        point, side = edge // EDGES, edge % EDGES
+        local[0] = mu if side < 2 else -mu
+        local[1] = mu if side % 2 == 0 else -mu
+        local[2] = 1.0
+        r = np.zeros(3)
+        if body.is_sole[k] == 1:
+            d[:] = rotated(R, local)
+            for i in range(3):
+                for j in range(2):
+                    r[i] += R[i, j] * body.corner[point, j]
+        else:
+            d[:] = local
+        wrench[:3] = d
+        wrench[3] = r[1] * d[2] - r[2] * d[1]
+        wrench[4] = r[2] * d[0] - r[0] * d[2]
+        wrench[5] = r[0] * d[1] - r[1] * d[0]
+        row = terms.B[edge]
+        for j in range(size):
+            total = 0.0
+            for i in range(6):
+                total += wrench[i] * terms.J[i, j]
+            row[j] = total
+
+
+@compiled
+def eliminate_root(body: WholeBodyDynamics) -> None:
+    """Write [X | x] with `a_root = X y + x`: the root's six equations of motion.
+
+    Edges of feet that swing count as well; their forces are held at zero.
+    """
+    terms = body.terms
+    edges, n = terms.B.shape[0], body.qpos.shape[0]
+    A = terms.M[:6, :6].copy()
+    for i in range(6):
+        row = terms.root[i]
+        for k in range(edges):
+            row[k] = terms.B[k, i]
+        for j in range(n):
+            row[edges + j] = -terms.M[i, 6 + j]
+        row[edges + n] = -terms.h[i]
+    solve(A, terms.root, 6)
