@@ -11,7 +11,11 @@ from wbc_suite.control import CompositeController, RobotState, SteppedController
 from wbc_suite.control.composite.registry import DynamicController, TickedController
 from wbc_suite.control.composite.tick import WholeBodyArrays
 from wbc_suite.control.loop.advance import advance
-from wbc_suite.control.loop.inverse_dynamics import needed_kernels, write_commands
+from wbc_suite.control.loop.inverse_dynamics import (
+    needed_kernels,
+    solve_bodies,
+    write_commands,
+)
 from wbc_suite.control.loop.mujoco_functions import addresses
 from wbc_suite.control.loop.physics import bind_physics
 from wbc_suite.control.loop.records import gather
@@ -76,12 +80,16 @@ class Simulation:
             law.adopt(self._laws[k : k + 1], self._drives[first:last], k)
         self._ticked, ticks = self._loop_ticks()
         physics, state = bind_physics(model, data), self._watch.state
-        bodies = [c.dynamics for c in self.controllers if isinstance(c, DynamicController)]
+        self._dynamic = [
+            c for c in self.controllers if isinstance(c, DynamicController)
+        ]
+        bodies = [controller.dynamics for controller in self._dynamic]
         kernels = *needed_kernels(self._laws), tuple(map(as_argument, bodies)) or None
         records = self._laws, self._drives, *kernels
         views = as_argument(physics), as_argument(state)
         self._loop_arguments = (*addresses(model, data), *views, *records, ticks)
         self._write_commands = write_commands if compiled else plain(write_commands)
+        self._solve_bodies = solve_bodies if compiled else plain(solve_bodies)
         self._law_arguments = views[0], *records
         if not compiled:
             laws, drives = self._laws.view(np.recarray), self._drives.view(np.recarray)
@@ -164,6 +172,8 @@ class Simulation:
                 with self._watch:
                     for ticked in self._ticked.values():
                         ticked.finish_tick()
+                    for dynamic in self._dynamic:
+                        dynamic.finish_tick()
 
     def _refresh(self) -> None:
         """Compute what follows from the state, without effect on the next step."""
@@ -189,6 +199,9 @@ class Simulation:
         model, data = self.model, self.data
         for _ in range(steps):
             mujoco.mj_step1(model, data)
+            if not self._solve_bodies(self._law_arguments[0], self._law_arguments[-1]):
+                for dynamic in self._dynamic:
+                    dynamic.finish_tick()
             self._write_commands(*self._law_arguments)
             for state, controller in self._stepped:
                 data.ctrl[state.actuator_ids] = controller.compute(state)

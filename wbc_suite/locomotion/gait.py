@@ -20,7 +20,13 @@ from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Indices, Matrix, Vector
 
 __all__ = ["GRAVITY", "Gait", "GaitConfig", "GaitKind", "Measured", "Mode", "Plan"]
-__all__ += ["TrotConfig", "WalkConfig", "approach_command", "begin_gait", "heading_axes"]
+__all__ += [
+    "TrotConfig",
+    "WalkConfig",
+    "approach_command",
+    "begin_gait",
+    "heading_axes",
+]
 __all__ += ["make_gait", "make_measured", "make_plan"]
 
 GRAVITY = 9.81
@@ -239,7 +245,9 @@ def make_gait(config: TrotConfig | WalkConfig, soles: Matrix) -> Gait:
 
 def make_measured(n: int) -> Measured:
     """Return what a planner reads, for n feet, all zero."""
-    return Measured(np.zeros(3), np.zeros(3), np.zeros((n, 3)), np.zeros(n), np.zeros(n))
+    return Measured(
+        np.zeros(3), np.zeros(3), np.zeros((n, 3)), np.zeros(n), np.zeros(n)
+    )
 
 
 def make_plan(n: int) -> Plan:

@@ -196,9 +196,7 @@ def _step(
 
 
 @compiled
-def _swing(
-    gait: Gait, measured: Measured, goal: Vector, dt: float, plan: Plan
-) -> None:
+def _swing(gait: Gait, measured: Measured, goal: Vector, dt: float, plan: Plan) -> None:
     """Write the motion of the swinging foot."""
     state, settings = gait.state[0], gait.settings[0]
     stance, swing = state.stance, 1 - state.stance
@@ -217,7 +215,14 @@ def _swing(
     plan.yaw[swing] = state.yaw + state.velocity[2] * left
     ground = measured.foot[stance, 2]
     write_swing(
-        plan, swing, gait.lift[swing], gait.goal[swing], ground, settings.apex, s, duration
+        plan,
+        swing,
+        gait.lift[swing],
+        gait.goal[swing],
+        ground,
+        settings.apex,
+        s,
+        duration,
     )
 
 
@@ -328,7 +333,9 @@ def _keep_in_soles(
         own = heading_axes(measured.foot_yaw[k])
         for corner in range(4):
             x, y = gait.sole[k, corner % 2], gait.sole[k, 2 + corner // 2]
-            _extend_box(R, own, measured.foot[k] - measured.foot[first], x, y, low, high)
+            _extend_box(
+                R, own, measured.foot[k] - measured.foot[first], x, y, low, high
+            )
     margin, inset = np.inf, gait.settings[0].margin
     for i in range(2):
         out[i] = measured.foot[first, i]

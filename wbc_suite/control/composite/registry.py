@@ -130,10 +130,14 @@ class DynamicController(CompositeController, Protocol):
     """A composite controller whose accelerations are those of one QP for all joints.
 
     Attributes:
-        dynamics: Arrays of `whole_body_dynamics_law`, which runs in the loop.
+        dynamics: What the QP's kernels read and write, see `solve_whole_body`.
     """
 
     dynamics: WholeBodyDynamics
+
+    def finish_tick(self) -> None:
+        """Solve the QP if the loop has stated it and not found its active set."""
+        ...
 
 
 Builder = Callable[[Mapping[str, Any], RobotState], CompositeController]

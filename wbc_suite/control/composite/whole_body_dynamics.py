@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+import mujoco
 import numpy as np
 import pinocchio as pin
 
@@ -14,14 +15,16 @@ from wbc_suite.control.composite.whole_body_dynamics_config import (
     WholeBodyIDConfig,
     read_dynamics,
 )
-from wbc_suite.control.dynamics.arrays import Foot, Limits, make_dynamics
+from wbc_suite.control.dynamics.arrays import Foot, Limits, Stage, make_dynamics
+from wbc_suite.control.dynamics.fallback import QpFallback
 from wbc_suite.control.law.law import Law
 from wbc_suite.control.loop.records import LawKind
 from wbc_suite.control.part.gripper import GripperController
 from wbc_suite.control.state import RobotState
 from wbc_suite.kinematics import Configuration
 from wbc_suite.locomotion import begin_gait, make_gait
-from wbc_suite.typing import Matrix, Vector
+from wbc_suite.qp.solution import Fallback
+from wbc_suite.typing import Indices, Vector
 
 __all__ = ["WholeBodyID"]
 
@@ -43,14 +46,13 @@ class WholeBodyID:
     Attributes:
         layout: Slices of the action: hands, `walk`, `height`, grippers.
         dynamics: What the law reads and writes.
+        fallback: What the last QP took whose active set was not found.
     """
 
     def __init__(self, config: Mapping[str, Any], state: RobotState) -> None:
         self.config = read_dynamics(config, state.robot, str(config.get("type")))
         self._robot = lock_groups(state.robot, ())
-        self._law = Law(
-            LawKind.DYNAMICS, state, moved_joints(self._robot, state)
-        )
+        self._law = Law(LawKind.DYNAMICS, state, moved_joints(self._robot, state))
         self._law.keep_limits(state)
         self._grippers = [
             GripperController(gripper, synergies, state)
@@ -67,6 +69,8 @@ class WholeBodyID:
             -1,
         )
         self.dynamics = self._make_dynamics(state)
+        self._fallback = QpFallback(self.dynamics.qp)
+        self.fallback = Fallback.NONE
         self.laws: tuple[Law, ...] = (self._law, *(g.law for g in self._grippers))
         self.reset(state)
 
@@ -88,6 +92,7 @@ class WholeBodyID:
             dofs=np.concatenate([np.arange(dof, dof + 6), drives["dof"]]),
             nv=state.model.nv,
             hands=_sites(state, [str(f.frame) for f in config.frames]),
+            is_arm=self._arms(state),
             hand_weight=np.array(
                 [(f.position_cost, f.orientation_cost) for f in config.frames]
             ).reshape(-1, 2),
@@ -113,6 +118,22 @@ class WholeBodyID:
         own["hand_frame"] = config.input_ref_frame == "base"
         return dynamics
 
+    def _arms(self, state: RobotState) -> Indices:
+        """Return which joints move each hand, and no other hand or foot, (h, n)."""
+        model, ends = state.model, [*self.config.frames, *self.config.feet]
+        chains = [_chain(model, _link(state, str(end.frame))) for end in ends]
+        hands = len(self.config.frames)
+        return np.array(
+            [
+                [
+                    dof in chains[k] and sum(dof in chain for chain in chains) == 1
+                    for dof in self._law.drives["dof"]
+                ]
+                for k in range(hands)
+            ],
+            dtype=np.int64,
+        ).reshape(hands, len(self._law.joints))
+
     def _posture_weights(self) -> Vector:
         posture, robot = self.config.posture, self._robot
         weights = {
@@ -127,7 +148,7 @@ class WholeBodyID:
         self._law.reset(state)
         own, data = self.dynamics, state.data
         record = own.state[0]
-        record["ticks"] = record["unsolved"] = 0
+        record["ticks"] = record["unsolved"] = record["stage"] = 0
         record["fell"] = -1.0
         root = state.root_pose
         yaw = float(np.arctan2(root.rotation[1, 0], root.rotation[0, 0]))
@@ -174,6 +195,13 @@ class WholeBodyID:
         """Do nothing: the loop does it all."""
         return UNTIL_NEXT_ACTION
 
+    def finish_tick(self) -> None:
+        """Solve the QP if the loop has stated it and not found its active set."""
+        record = self.dynamics.state[0]
+        if record["stage"] == Stage.UNSOLVED:
+            self.fallback = self._fallback.solve(self.dynamics.qp)
+            record["stage"] = Stage.SOLVED
+
     @property
     def hold_action(self) -> Vector:
         """The action that keeps the hands' goals and stands still."""
@@ -197,7 +225,9 @@ class WholeBodyID:
         names = [frame.name for frame in self.config.frames]
         return {
             "balance": {
-                "stance": [f for f, x in zip(feet, own.plan.load, strict=True) if x > 0],
+                "stance": [
+                    f for f, x in zip(feet, own.plan.load, strict=True) if x > 0
+                ],
                 "margin": float(own.plan.margin[0]),
                 "loads": {
                     name: load[:3].copy()
@@ -253,9 +283,19 @@ def _foot(state: RobotState, foot: FootConfig) -> Foot:
     return Foot(site=site, middle=np.array([x, y, 0.0]), sole=sole)
 
 
-def _sites(state: RobotState, names: list[str]) -> Matrix:
+def _sites(state: RobotState, names: list[str]) -> Indices:
     ids = [state.model.site(state.prefix + name).id for name in names]
     return np.array(ids, dtype=np.int64)
+
+
+def _chain(model: mujoco.MjModel, link: int) -> set[int]:
+    """Return the degrees of freedom that move a body."""
+    dofs: set[int] = set()
+    while link > 0:
+        first = int(model.body_dofadr[link])
+        dofs.update(range(first, first + int(model.body_dofnum[link])))
+        link = int(model.body_parentid[link])
+    return dofs
 
 
 def _link(state: RobotState, name: str) -> int:

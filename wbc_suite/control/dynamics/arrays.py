@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
@@ -12,8 +13,19 @@ from wbc_suite.locomotion.gait import Gait, Measured, Plan, make_measured, make_
 from wbc_suite.qp.active_set import QpArrays, make_qp_arrays
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["EDGES", "Foot", "Limits", "Terms", "WholeBodyDynamics"]
+__all__ = ["EDGES", "Foot", "Limits", "Stage", "Terms", "WholeBodyDynamics"]
 __all__ += ["make_dynamics"]
+
+
+class Stage(IntEnum):
+    """Where a tick is."""
+
+    STATED = 0
+    """Not begun: the last answer is written."""
+    SOLVED = 1
+    UNSOLVED = 2
+    """The active set is not found: another solver has to act."""
+
 
 EDGES = 4
 """Edges of a friction pyramid."""
@@ -26,6 +38,7 @@ STATE = np.dtype(
         ("mass", "f8"),  # kg
         ("friction", "f8"),  # coefficient
         ("dt", "f8"),  # s between two steps of the loop
+        ("stage", "i8"),  # `Stage`
         ("ticks", "i8"),
         ("unsolved", "i8"),  # ticks whose active set was not found
         ("fell", "f8"),  # time of the fall, s since the reset; negative before
@@ -118,6 +131,7 @@ class WholeBodyDynamics(NamedTuple):
         corner: Points in contact about the middle of their foot, m, shape (points, 2).
         hand: Site of each hand, shape (h,).
         goal: Goals of hands as they are given, rows [R p], shape (h, 12).
+        is_arm: Whether a joint moves this hand and no other hand or foot, (h, n).
         hand_weight: Weights of position and orientation, shape (h, 2).
         load: Observed wrench on each hand, N and N m, world axes, shape (h, 6).
         upright: Bodies that stay upright, shape (u,).
@@ -147,6 +161,7 @@ class WholeBodyDynamics(NamedTuple):
     corner: Matrix
     hand: Indices
     goal: Matrix
+    is_arm: Indices
     hand_weight: Matrix
     load: Matrix
     upright: Indices
@@ -172,6 +187,7 @@ def make_dynamics(
     dofs: Indices,
     nv: int,
     hands: Indices,
+    is_arm: Indices,
     hand_weight: Matrix,
     goal: Matrix,
     upright: Indices,
@@ -218,6 +234,7 @@ def make_dynamics(
         corner=np.concatenate([foot.corners for foot in feet]),
         hand=np.array(hands, dtype=np.int64),
         goal=goal,
+        is_arm=is_arm,
         hand_weight=hand_weight,
         load=np.zeros((h, 6)),
         upright=np.array(upright, dtype=np.int64),

@@ -3,7 +3,7 @@
 import numpy as np
 
 from wbc_suite.compiling import compiled
-from wbc_suite.control.dynamics.arrays import WholeBodyDynamics
+from wbc_suite.control.dynamics.arrays import Stage, WholeBodyDynamics
 from wbc_suite.control.dynamics.qp_rows import edge_forces, state_qp
 from wbc_suite.control.dynamics.terms import (
     measure,
@@ -18,9 +18,11 @@ from wbc_suite.locomotion.trot import plan_trot
 from wbc_suite.locomotion.walk import plan_walk
 from wbc_suite.qp.active_set import solve_warm
 
-__all__ = ["whole_body_dynamics_law"]
+__all__ = ["solve_whole_body", "write_whole_body"]
 
 _WALK = int(GaitKind.WALK)
+_STATED, _SOLVED = int(Stage.STATED), int(Stage.SOLVED)
+_UNSOLVED = int(Stage.UNSOLVED)
 
 OBSERVER = 6.0
 """1/s; bandwidth of the observed loads on hands."""
@@ -36,9 +38,14 @@ DROPPED = 0.2
 
 
 @compiled
-def whole_body_dynamics_law(physics: Physics, body: WholeBodyDynamics) -> None:
-    """Write accelerations of root and joints, and the torques of contact forces."""
-    state, qp, terms = body.state[0], body.qp, body.terms
+def solve_whole_body(physics: Physics, body: WholeBodyDynamics) -> bool:
+    """Plan, state the QP and solve it; return whether its active set is found.
+
+    Where it is not, another solver writes `qp.x`, and sets the stage to `SOLVED`.
+    """
+    state = body.state[0]
+    if state.stage == _SOLVED:
+        return True
     write_terms(physics, body)
     measure(physics, body)
     _observe_loads(physics, body)
@@ -49,10 +56,19 @@ def whole_body_dynamics_law(physics: Physics, body: WholeBodyDynamics) -> None:
     _watch_fall(physics, body)
     state_qp(physics, body)
     state.ticks += 1
-    if not solve_warm(qp):
-        state.unsolved += 1
-        for i in range(qp.x.shape[0]):
-            qp.x[i] = min(max(qp.x[i], qp.lower[i]), qp.upper[i])
+    if solve_warm(body.qp):
+        state.stage = _SOLVED
+        return True
+    state.stage = _UNSOLVED
+    state.unsolved += 1
+    return False
+
+
+@compiled
+def write_whole_body(physics: Physics, body: WholeBodyDynamics) -> None:
+    """Write accelerations of root and joints, and the torques of contact forces."""
+    qp, terms = body.qp, body.terms
+    body.state[0].stage = _STATED
     edges, size = terms.B.shape[0], qp.x.shape[0]
     for i in range(6):
         terms.a[i] = dot(terms.root[i], qp.x, size) + terms.root[i, size]
@@ -92,9 +108,10 @@ def _observe_loads(physics: Physics, body: WholeBodyDynamics) -> None:
         A, x = np.zeros((6, 6)), np.zeros(6)
         for r in range(6):
             for j in range(6, size):
-                x[r] += terms.J[r, j] * residual[j]
-                for s in range(r + 1):
-                    A[r, s] += terms.J[r, j] * terms.J[s, j]
+                if body.is_arm[k, j - 6] == 1:
+                    x[r] += terms.J[r, j] * residual[j]
+                    for s in range(r + 1):
+                        A[r, s] += terms.J[r, j] * terms.J[s, j]
             A[r, r] += 1e-3
         cholesky(A, 6, 0.0)
         solve_lower(A, x, 6)
@@ -123,4 +140,3 @@ def _watch_fall(physics: Physics, body: WholeBodyDynamics) -> None:
     low = body.measured.com[2] < gait.ground + gait.height - DROPPED
     if state.fell < 0.0 and (tilt < TILTED or low):
         state.fell = gait.time
-

@@ -317,4 +317,3 @@ def edge_forces(body: WholeBodyDynamics, column: int) -> float:
     for k in range(B.shape[0]):
         total += B[k, column] * body.qp.x[k]
     return total
-

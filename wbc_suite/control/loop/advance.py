@@ -8,6 +8,7 @@ from wbc_suite.control.loop.inverse_dynamics import (
     CustomLaw,
     Needed,
     WholeBodies,
+    solve_bodies,
     write_commands,
 )
 from wbc_suite.control.loop.mujoco_functions import (
@@ -62,7 +63,7 @@ def advance(
         steps: Number of physics steps.
 
     Returns:
-        Number of steps that were made, fewer where a tick needs Python to be finished.
+        Number of steps that were made, fewer where a tick or a QP needs Python to be finished.
         -1 if numbers were or are not usable, or MuJoCo warned. Where they are not to
         begin with, there is no step.
     """
@@ -71,8 +72,11 @@ def advance(
     done = 0
     while done < steps and _run_ticks(physics, laws, drives, ticks):
         mj_step1(model, data)
+        if not solve_bodies(physics, bodies):
+            break
         write_commands(physics, laws, drives, hands, feet, custom_law, bodies)
         mj_step2(model, data)
+        _count_down(ticks)
         done += 1
     mj_kinematics(model, data)
     mj_comPos(model, data)
@@ -89,6 +93,12 @@ def _run_ticks(
             is_due = tick.state[0].countdown <= 0
             if is_due and not run_tick(tick, physics.qpos, laws, drives):
                 return False
+    return True
+
+
+@compiled
+def _count_down(ticks: Ticks) -> None:
+    """Count the physics steps until the next ticks."""
+    if ticks is not None:
         for tick in ticks:
             tick.state[0].countdown -= 1
-    return True

@@ -10,7 +10,7 @@ forces that laws of feet plan.
 from typing import Any, TypeAlias
 
 from wbc_suite.compiling import compiled
-from wbc_suite.control.dynamics.law import whole_body_dynamics_law
+from wbc_suite.control.dynamics.law import solve_whole_body, write_whole_body
 from wbc_suite.control.law.balance import balance_law
 from wbc_suite.control.law.custom import custom_kernel
 from wbc_suite.control.law.free_root import is_of_feet, subtract_contact_forces
@@ -24,7 +24,8 @@ from wbc_suite.control.loop.physics import Physics
 from wbc_suite.control.loop.records import CompiledRecords, LawKind, Records
 from wbc_suite.control.loop.rigid_body import multiply_inertia
 
-__all__ = ["CustomLaw", "Needed", "WholeBodies", "needed_kernels", "write_commands"]
+__all__ = ["CustomLaw", "Needed", "WholeBodies", "needed_kernels", "solve_bodies"]
+__all__ += ["write_commands"]
 
 _JOINT, _OSC = int(LawKind.JOINT), int(LawKind.OSC)
 _BASE, _VELOCITY = int(LawKind.BASE), int(LawKind.VELOCITY)
@@ -41,6 +42,20 @@ WholeBodies: TypeAlias = Any
 Needed: TypeAlias = bool | None
 """True, or None to leave a group of laws out of the machine code: numba drops what
 depends on an argument that is None, which halves the time to compile."""
+
+
+@compiled
+def solve_bodies(physics: Physics, bodies: WholeBodies) -> bool:
+    """Solve the QPs of whole-body inverse dynamics; runs after `mj_step1`.
+
+    Returns:
+        Whether all are solved. Others need Python; then this is called again.
+    """
+    done = True
+    if bodies is not None:
+        for body in bodies:
+            done = solve_whole_body(physics, body) and done
+    return done
 
 
 @compiled
@@ -74,7 +89,7 @@ def write_commands(
             law_of_feet(physics, laws[k], drives)
     if bodies is not None:
         for body in bodies:
-            whole_body_dynamics_law(physics, body)
+            write_whole_body(physics, body)
     multiply_inertia(physics, physics.acceleration, physics.force)
     subtract_contact_forces(physics, laws, drives)
     if bodies is not None:
