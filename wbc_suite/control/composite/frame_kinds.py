@@ -18,7 +18,7 @@ from wbc_suite.typing import Matrix, Vector
 if TYPE_CHECKING:
     from wbc_suite.control.composite.whole_body_config import (
         ControlledFrame,
-        WholeBodyIKConfig,
+        GoalsConfig,
     )
 
 __all__ = [
@@ -70,7 +70,7 @@ class FrameKind:
         return tuple(axis in labels for axis in AXES)
 
     def action_part(
-        self, frame: "ControlledFrame", config: "WholeBodyIKConfig"
+        self, frame: "ControlledFrame", config: "GoalsConfig"
     ) -> ActionPart:
         """Return the slice of a frame of this kind."""
         absolute = config.input_type == "absolute"

@@ -23,6 +23,7 @@ from wbc_suite.tomlfile import FrozenModel, parse_model
 
 __all__ = [
     "ControlledFrame",
+    "GoalsConfig",
     "HeldFrame",
     "InputFrame",
     "InputType",
@@ -150,7 +151,38 @@ class LimitsConfig(FrozenModel):
     balance_margin: NonNegativeFloat = 0.03
 
 
-class WholeBodyIKConfig(FrozenModel):
+class GoalsConfig(FrozenModel):
+    """Controlled frames, and how an action moves their goals.
+
+    Attributes:
+        frames: Controlled frames, in the order of the action.
+        input_type: `absolute` targets, or `delta` steps from the last target.
+        input_ref_frame: Axes of targets and steps: `world`, the robot's `base`, or the
+            controlled frame's own (`eef`, deltas only).
+        delta_position: Largest step of a delta action, m.
+        delta_rotation: Largest step of a delta action, rad.
+    """
+
+    frames: tuple[ControlledFrame, ...] = Field(default=(), alias="frame")
+    input_type: InputType = "absolute"
+    input_ref_frame: InputFrame = "world"
+    delta_position: PositiveFloat = 0.05
+    delta_rotation: PositiveFloat = 0.5
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "GoalsConfig":
+        names = [frame.name for frame in self.frames]
+        if len(set(names)) != len(names):
+            raise ValueError(f"controlled frames share a name: {names}")
+        if self.input_type == "absolute" and self.input_ref_frame == "eef":
+            raise ValueError(
+                "input_ref_frame 'eef' needs input_type 'delta': a frame is always at "
+                "the origin of its own axes"
+            )
+        return self
+
+
+class WholeBodyIKConfig(GoalsConfig):
     """Config of a whole-body IK controller.
 
     Attributes:
@@ -161,11 +193,6 @@ class WholeBodyIKConfig(FrozenModel):
         locked: Groups of joints that are kept at the posture.
         posture: Pull to a posture.
         limits: Limits of the command.
-        input_type: `absolute` targets, or `delta` steps from the last target.
-        input_ref_frame: Axes of targets and steps: `world`, the robot's `base`, or the
-            controlled frame's own (`eef`, deltas only).
-        delta_position: Largest step of a delta action, m.
-        delta_rotation: Largest step of a delta action, rad.
         solve_hz: Solves per second.
         joint_law: Gains of the joint-position law.
         planning: Whether to plan motions around obstacles and local minima; else all
@@ -184,28 +211,12 @@ class WholeBodyIKConfig(FrozenModel):
     locked: tuple[Name, ...] = ()
     posture: PostureConfig = PostureConfig()
     limits: LimitsConfig = LimitsConfig()
-    input_type: InputType = "absolute"
-    input_ref_frame: InputFrame = "world"
-    delta_position: PositiveFloat = 0.05
-    delta_rotation: PositiveFloat = 0.5
     solve_hz: Annotated[float, Field(ge=10.0, le=1000.0)] = 100.0
     joint_law: JointLawConfig = JointLawConfig()
     planning: bool = True
     far: tuple[PositiveFloat, PositiveFloat] = (0.15, 0.6)
     search_iterations: int = Field(default=25, ge=0)
     tolerance: tuple[PositiveFloat, PositiveFloat] = (1e-3, 3.5e-3)
-
-    @model_validator(mode="after")
-    def _consistent(self) -> "WholeBodyIKConfig":
-        names = [frame.name for frame in self.frames]
-        if len(set(names)) != len(names):
-            raise ValueError(f"controlled frames share a name: {names}")
-        if self.input_type == "absolute" and self.input_ref_frame == "eef":
-            raise ValueError(
-                "input_ref_frame 'eef' needs input_type 'delta': a frame is always at "
-                "the origin of its own axes"
-            )
-        return self
 
 
 def default_whole_body_config(robot: RobotDescription) -> dict[str, Any]:

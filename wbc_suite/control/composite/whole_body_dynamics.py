@@ -1,4 +1,4 @@
-"""Whole-body inverse dynamics for robots on their feet: stand, step, walk, use hands."""
+"""Whole-body inverse dynamics for robots on their feet: stand, walk, use hands."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -78,12 +78,7 @@ class WholeBodyID:
         config, drives = self.config, self._law.drives
         root = state.model.joint(f"{state.prefix}root")
         feet = [_foot(state, foot) for foot in config.feet]
-        soles = np.array([foot.corners for foot in feet])
-        edges = np.stack(
-            [soles[..., 0].min(1), soles[..., 0].max(1)]
-            + [soles[..., 1].min(1), soles[..., 1].max(1)],
-            axis=1,
-        )
+        edges = np.array([foot.sole or (0.0,) * 4 for foot in feet])
         dof = int(root.dofadr[0])
         dynamics = make_dynamics(
             feet=feet,

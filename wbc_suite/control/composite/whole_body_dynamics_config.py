@@ -6,9 +6,8 @@ from typing import Any, Literal
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from wbc_suite.control.composite.whole_body_config import (
-    ControlledFrame,
+    GoalsConfig,
     InputFrame,
-    InputType,
     default_whole_body_config,
 )
 from wbc_suite.errors import ConfigError, UnknownNameError
@@ -73,13 +72,13 @@ class StanceConfig(FrozenModel):
     weights: dict[Name, PositiveFloat] = {}
 
 
-class WholeBodyIDConfig(FrozenModel):
+class WholeBodyIDConfig(GoalsConfig):
     """Config of whole-body inverse dynamics.
 
     Attributes:
         format: Version of the format, 1.
         type: Registered name.
-        frames: Hands, in the order of the action; costs are weights of accelerations.
+        frames: Hands; costs are weights of accelerations.
         feet: Feet; those of a biped from the left.
         gait: How the robot steps.
         upright: Links that stay upright.
@@ -87,16 +86,12 @@ class WholeBodyIDConfig(FrozenModel):
         friction: Coefficient of friction that contact forces keep to.
         max_walk: Greatest commands: forward, left (m/s), turn (rad/s).
         height: Lowest and highest command of height, m.
-        input_type: `absolute` targets of hands, or `delta` steps from the last target.
-        input_ref_frame: Axes of targets and steps: `world`; `base`, which is the
+        input_ref_frame: Axes of hands' targets and steps: `world`; `base`, which is the
             heading of the robot at its centre of mass; or the hand's own (`eef`).
-        delta_position: Largest step of a delta action, m.
-        delta_rotation: Largest step of a delta action, rad.
     """
 
     format: Literal[1] = 1
     type: str = "WHOLE_BODY_ID"
-    frames: tuple[ControlledFrame, ...] = Field(default=(), alias="frame")
     feet: tuple[FootConfig, ...] = Field(alias="foot", min_length=2, max_length=8)
     gait: GaitConfig
     upright: tuple[UprightConfig, ...] = ()
@@ -104,10 +99,7 @@ class WholeBodyIDConfig(FrozenModel):
     friction: PositiveFloat = 0.6
     max_walk: tuple[PositiveFloat, PositiveFloat, PositiveFloat] = (1.0, 0.4, 1.0)
     height: tuple[float, float] = (-0.15, 0.02)
-    input_type: InputType = "absolute"
     input_ref_frame: InputFrame = "base"
-    delta_position: PositiveFloat = 0.05
-    delta_rotation: PositiveFloat = 0.5
 
     @model_validator(mode="after")
     def _gait_fits_feet(self) -> "WholeBodyIDConfig":
@@ -171,8 +163,8 @@ def read_dynamics(
     """
     if robot.root.kind != "free":
         raise ConfigError(
-            f"{robot.name} has a {robot.root.kind} root, and WHOLE_BODY_ID moves robots "
-            "on their feet. Use WHOLE_BODY_IK, or give it a free root."
+            f"{robot.name} has a {robot.root.kind} root, and WHOLE_BODY_ID moves "
+            "robots on their feet. Use WHOLE_BODY_IK, or give it a free root."
         )
     read = parse_model(WholeBodyIDConfig, config, source=source)
     for key, kind, name, known in _names(read, robot):

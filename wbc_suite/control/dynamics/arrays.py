@@ -99,7 +99,9 @@ class Terms(NamedTuple):
         J: Jacobian of a frame, linear then angular, world axes, shape (6, 6 + n).
         velocity: J v, shape (6,).
         drift: J' v, shape (6,).
-        spin: Angular momentum about the centre of mass, kg m^2/s, shape (3,).
+        com: Centre of mass of the robot without what it holds, m, shape (3,).
+        spin: Angular momentum about it, kg m^2/s, shape (3,).
+        held: Force and moment about it of what hands hold, N and N m, shape (6,).
     """
 
     M: Matrix
@@ -111,7 +113,9 @@ class Terms(NamedTuple):
     J: Matrix
     velocity: Vector
     drift: Vector
+    com: Vector
     spin: Vector
+    held: Vector
 
 
 @struct
@@ -141,7 +145,7 @@ class WholeBodyDynamics(NamedTuple):
         posture_weight: Weight of each joint, shape (n,).
         limits: Position low and high, velocity, torque low and high, shape (5, n).
         command: Forward, left (m/s), turn (rad/s), height (m), shape (4,).
-        torque: Torques of the contact forces at the joints, J^T f, shape (n,).
+        torque: Torques of contact forces and loads at the joints, J^T f, shape (n,).
         last_velocity: Velocity of the last tick, shape (6 + n,).
         gait: The gait.
         measured: What its planner reads.
@@ -220,6 +224,8 @@ def make_dynamics(
         np.zeros(6),
         np.zeros(6),
         np.zeros(3),
+        np.zeros(3),
+        np.zeros(6),
     )
     return WholeBodyDynamics(
         state=readable(np.zeros(1, STATE)),

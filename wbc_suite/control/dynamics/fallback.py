@@ -26,7 +26,7 @@ class QpFallback:
         self._solver = make_solver("daqp")
 
     def solve(self, qp: QpArrays) -> Fallback:
-        """Write the optimum, or what comes nearest, into `qp.x`; return what it took."""
+        """Write the optimum, or the nearest to it, to `qp.x`; return what it took."""
         problem, n = self._problem, len(qp.x)
         problem.H[:] = qp.W.T @ qp.W + np.diag(qp.diagonal[0] + qp.mu[0])
         problem.c[:] = -(qp.W.T @ qp.e) - qp.diagonal[1]

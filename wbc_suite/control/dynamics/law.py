@@ -13,10 +13,11 @@ from wbc_suite.control.dynamics.terms import (
 from wbc_suite.control.loop.physics import Physics
 from wbc_suite.control.loop.rigid_body import rotation
 from wbc_suite.linear_algebra import cholesky, dot, solve_lower, solve_upper
-from wbc_suite.locomotion.gait import GaitKind
+from wbc_suite.locomotion.gait import GRAVITY, GaitKind
 from wbc_suite.locomotion.trot import plan_trot
 from wbc_suite.locomotion.walk import plan_walk
 from wbc_suite.qp.active_set import solve_warm
+from wbc_suite.typing import Vector
 
 __all__ = ["solve_whole_body", "write_whole_body"]
 
@@ -29,6 +30,9 @@ OBSERVER = 6.0
 
 HEAVIEST = 200.0
 """N or N m; greatest change of a load that one step shows."""
+
+DAMPING = 1e-3
+"""m^2; damps the wrench in directions that the arm does not feel."""
 
 TILTED = 0.6
 """Cosine of the tilt from which a robot has fallen: 53 degrees."""
@@ -66,7 +70,7 @@ def solve_whole_body(physics: Physics, body: WholeBodyDynamics) -> bool:
 
 @compiled
 def write_whole_body(physics: Physics, body: WholeBodyDynamics) -> None:
-    """Write accelerations of root and joints, and the torques of contact forces."""
+    """Write accelerations of root and joints, and torques of contacts and loads."""
     qp, terms = body.qp, body.terms
     body.state[0].stage = _STATED
     edges, size = terms.B.shape[0], qp.x.shape[0]
@@ -74,7 +78,9 @@ def write_whole_body(physics: Physics, body: WholeBodyDynamics) -> None:
         terms.a[i] = dot(terms.root[i], qp.x, size) + terms.root[i, size]
     for j in range(body.qpos.shape[0]):
         terms.a[6 + j] = qp.x[edges + j]
-        body.torque[j] = edge_forces(body, 6 + j)
+        dof = body.dofs[6 + j]
+        held = physics.qfrc_bias[dof] - physics.qfrc_passive[dof] - terms.h[6 + j]
+        body.torque[j] = edge_forces(body, 6 + j) + held
     for i in range(body.dofs.shape[0]):
         physics.acceleration[body.dofs[i]] = terms.a[i]
         body.last_velocity[i] = terms.v[i]
@@ -94,42 +100,59 @@ def _observe_loads(physics: Physics, body: WholeBodyDynamics) -> None:
     """
     terms, state, measured = body.terms, body.state[0], body.measured
     size = body.dofs.shape[0]
-    missed, residual = np.empty(size), np.empty(size)
-    for i in range(size):
-        rate = (terms.v[i] - body.last_velocity[i]) / state.dt
-        missed[i] = rate - terms.a[i] if state.ticks > 0 else 0.0
+    missed, residual = np.zeros(size), np.empty(size)
+    if state.ticks > 0:
+        for i in range(size):
+            missed[i] = (terms.v[i] - body.last_velocity[i]) / state.dt - terms.a[i]
     for i in range(size):
         residual[i] = dot(terms.M[i], missed, size)
     mass, moment, rate = state.mass, np.zeros(2), np.zeros(2)
+    terms.held[:] = 0.0
     for k in range(body.hand.shape[0]):
-        site = body.hand[k]
-        p, load = physics.site_xpos[site], body.load[k]
-        write_frame_terms(physics, body, int(physics.site_bodyid[site]), p)
-        A, x = np.zeros((6, 6)), np.zeros(6)
+        p, load = physics.site_xpos[body.hand[k]], body.load[k]
+        write_frame_terms(physics, body, int(physics.site_bodyid[body.hand[k]]), p)
+        change = _missing_wrench(body, k, residual)
         for r in range(6):
-            for j in range(6, size):
-                if body.is_arm[k, j - 6] == 1:
-                    x[r] += terms.J[r, j] * residual[j]
-                    for s in range(r + 1):
-                        A[r, s] += terms.J[r, j] * terms.J[s, j]
-            A[r, r] += 1e-3
-        cholesky(A, 6, 0.0)
-        solve_lower(A, x, 6)
-        solve_upper(A, x, 6)
-        for r in range(6):
-            part = min(max(x[r], -HEAVIEST), HEAVIEST)
+            part = min(max(change[r], -HEAVIEST), HEAVIEST)
             load[r] += OBSERVER * state.dt * part
-        for j in range(size):
-            for r in range(6):
+            terms.held[r] += load[r]
+            for j in range(size):
                 terms.h[j] -= terms.J[r, j] * load[r]
-        held = max(-load[2] / 9.81, 0.0)
+        x, y, z = p[0] - terms.com[0], p[1] - terms.com[1], p[2] - terms.com[2]
+        terms.held[3] += y * load[2] - z * load[1]
+        terms.held[4] += z * load[0] - x * load[2]
+        terms.held[5] += x * load[1] - y * load[0]
+        held = max(-load[2] / GRAVITY, 0.0)
         mass += held
         for i in range(2):
-            moment[i] += held * (p[i] - measured.com[i])
+            moment[i] += held * (p[i] - terms.com[i])
             rate[i] += held * (terms.velocity[i] - measured.com_velocity[i])
     for i in range(2):
         measured.com[i] += moment[i] / mass
         measured.com_velocity[i] += rate[i] / mass
+
+
+@compiled
+def _missing_wrench(body: WholeBodyDynamics, k: int, residual: Vector) -> Vector:
+    """Return the wrench at a hand that explains the residual of its arm, (6,).
+
+    Args:
+        body: The robot; `terms.J` is the Jacobian of the hand.
+        k: The hand.
+        residual: Generalised forces that the model does not know, shape (6 + n,).
+    """
+    J, A, x = body.terms.J, np.zeros((6, 6)), np.zeros(6)
+    for r in range(6):
+        A[r, r] = DAMPING
+        for j in range(6, J.shape[1]):
+            if body.is_arm[k, j - 6] == 1:
+                x[r] += J[r, j] * residual[j]
+                for s in range(r + 1):
+                    A[r, s] += J[r, j] * J[s, j]
+    cholesky(A, 6, 0.0)
+    solve_lower(A, x, 6)
+    solve_upper(A, x, 6)
+    return x
 
 
 @compiled

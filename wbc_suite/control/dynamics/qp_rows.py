@@ -146,11 +146,12 @@ def _add_momentum(physics: Physics, body: WholeBodyDynamics, row: int) -> int:
     """Add rows of the centre of mass and of angular momentum; return the next row.
 
     Both follow from the contact forces alone: the sum of all forces is the rate of
-    linear momentum, that of their moments the rate of angular momentum.
+    linear momentum, that of their moments the rate of angular momentum. What hands
+    hold adds to both.
     """
     state, terms, qp, plan = body.state[0], body.terms, body.qp, body.plan
     edges = terms.B.shape[0]
-    com, root = body.measured.com, physics.qpos[state.root_qpos :]
+    com, root = terms.com, physics.qpos[state.root_qpos :]
     R = rotation(physics.xmat, state.body)
     x, y, z = com[0] - root[0], com[1] - root[1], com[2] - root[2]
     weight = COM_WEIGHT / state.mass
@@ -166,8 +167,9 @@ def _add_momentum(physics: Physics, body: WholeBodyDynamics, row: int) -> int:
         qp.W[row + 5, k] = SPIN[0] * (m[2] - (x * f[1] - y * f[0]))
     for i in range(3):
         fall = GRAVITY if i == 2 else 0.0
-        qp.e[row + i] = COM_WEIGHT * (plan.com_acceleration[i] + fall)
-        qp.e[row + 3 + i] = -SPIN[0] * SPIN[1] * terms.spin[i]
+        wanted = plan.com_acceleration[i] + fall - terms.held[i] / state.mass
+        qp.e[row + i] = COM_WEIGHT * wanted
+        qp.e[row + 3 + i] = -SPIN[0] * (SPIN[1] * terms.spin[i] + terms.held[3 + i])
     return row + 6
 
 

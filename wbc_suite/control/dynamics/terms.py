@@ -45,7 +45,7 @@ def measure(physics: Physics, body: WholeBodyDynamics) -> None:
     terms.spin[1] = spin[1] - (z * momentum[0] - x * momentum[2])
     terms.spin[2] = spin[2] - (x * momentum[1] - y * momentum[0])
     for i in range(3):
-        measured.com[i] = com[i]
+        measured.com[i] = terms.com[i] = com[i]
         measured.com_velocity[i] = momentum[i] / state.mass
     for k in range(body.site.shape[0]):
         R = rotation(physics.site_xmat, body.site[k])

@@ -5,7 +5,7 @@ world's, angular in its own), then the joints of a law of feet.
 """
 
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import pinocchio as pin
@@ -243,9 +243,13 @@ def is_of_feet(law: CompiledRecords) -> bool:
 
 @compiled
 def subtract_contact_forces(
-    physics: Physics, laws: CompiledRecords, drives: CompiledRecords
+    physics: Physics, laws: CompiledRecords, drives: CompiledRecords, bodies: Any
 ) -> None:
-    """Subtract `J^T f` of laws of feet from the forces that the joints need."""
+    """Subtract `J^T f` of all feet from the forces that the joints need."""
+    if bodies is not None:
+        for body in bodies:
+            for j in range(body.torque.shape[0]):
+                physics.force[body.dofs[6 + j]] -= body.torque[j]
     for k in range(laws.shape[0]):
         if is_of_feet(laws[k]):
             for j in range(laws[k].first, laws[k].last):

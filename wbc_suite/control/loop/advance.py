@@ -63,7 +63,7 @@ def advance(
         steps: Number of physics steps.
 
     Returns:
-        Number of steps that were made, fewer where a tick or a QP needs Python to be finished.
+        Number of steps that were made, fewer where a tick or a QP needs Python.
         -1 if numbers were or are not usable, or MuJoCo warned. Where they are not to
         begin with, there is no step.
     """

@@ -37,7 +37,7 @@ CustomLaw: TypeAlias = Any
 """One kernel for all laws of users, see `control.law.custom`; None without any."""
 
 WholeBodies: TypeAlias = Any
-"""A tuple of `WholeBodyDynamics`, one for each robot that it moves; None without any."""
+"""A tuple of `WholeBodyDynamics`, one for each robot on its feet; None without any."""
 
 Needed: TypeAlias = bool | None
 """True, or None to leave a group of laws out of the machine code: numba drops what
@@ -56,6 +56,14 @@ def solve_bodies(physics: Physics, bodies: WholeBodies) -> bool:
         for body in bodies:
             done = solve_whole_body(physics, body) and done
     return done
+
+
+@compiled
+def write_bodies(physics: Physics, bodies: WholeBodies) -> None:
+    """Write the accelerations of whole-body inverse dynamics."""
+    if bodies is not None:
+        for body in bodies:
+            write_whole_body(physics, body)
 
 
 @compiled
@@ -87,15 +95,9 @@ def write_commands(
     if feet is not None:
         for k in range(laws.shape[0]):
             law_of_feet(physics, laws[k], drives)
-    if bodies is not None:
-        for body in bodies:
-            write_whole_body(physics, body)
+    write_bodies(physics, bodies)
     multiply_inertia(physics, physics.acceleration, physics.force)
-    subtract_contact_forces(physics, laws, drives)
-    if bodies is not None:
-        for body in bodies:
-            for j in range(body.torque.shape[0]):
-                physics.force[body.dofs[6 + j]] -= body.torque[j]
+    subtract_contact_forces(physics, laws, drives, bodies)
     for k in range(laws.shape[0]):
         write_law_commands(physics, laws[k], drives)
 
