@@ -1,6 +1,6 @@
 """One robot alone on a floor, under one controller."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import mujoco
@@ -24,6 +24,7 @@ class Stand:
     Args:
         name: The robot.
         controller: Composite controller: a name or a config.
+        edit: Changes the scene before it is compiled.
 
     Attributes:
         robot: Its description.
@@ -34,10 +35,17 @@ class Stand:
         simulation: Both together.
     """
 
-    def __init__(self, name: str, controller: str | Mapping[str, Any]) -> None:
+    def __init__(
+        self,
+        name: str,
+        controller: str | Mapping[str, Any],
+        edit: Callable[[mujoco.MjSpec], None] | None = None,
+    ) -> None:
         self.robot: RobotDescription = load_robot(name)
         spec = empty_arena()
         attach_robot(spec, self.robot, robot_prefix(0))
+        if edit is not None:
+            edit(spec)
         self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
         self.state = RobotState(

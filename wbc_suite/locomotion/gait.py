@@ -59,6 +59,7 @@ class TrotConfig(FrozenModel):
         margin: Distance of the capture point from the edge of the feet at which the
             robot steps by itself, m.
         speed: Speed of the centre of mass at which it does, m/s.
+        recover: Whether it does.
     """
 
     type: Literal["trot"] = "trot"
@@ -69,6 +70,7 @@ class TrotConfig(FrozenModel):
     acceleration: PositiveFloat = 1.0
     margin: NonNegativeFloat = 0.03
     speed: PositiveFloat = 0.25
+    recover: bool = True
 
 
 class WalkConfig(FrozenModel):
@@ -87,6 +89,8 @@ class WalkConfig(FrozenModel):
         lower: How much lower than at `ready` the centre of mass is carried, m.
         margin: Distance of the centre of pressure from the edges of soles, m.
         gain: Feedback on the divergent component of motion, 1/s.
+        recover: Whether the robot steps by itself when the capture point leaves its
+            soles.
     """
 
     type: Literal["walk"] = "walk"
@@ -102,6 +106,7 @@ class WalkConfig(FrozenModel):
     lower: NonNegativeFloat = 0.02
     margin: NonNegativeFloat = 0.006
     gain: PositiveFloat = 4.0
+    recover: bool = True
 
 
 GaitConfig: TypeAlias = Annotated[TrotConfig | WalkConfig, Field(discriminator="type")]

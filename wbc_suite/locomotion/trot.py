@@ -124,7 +124,7 @@ def _switch_mode(gait: Gait, measured: Measured, moving: bool, margin: float) ->
         pushed = margin < settings.margin or speed > settings.speed
         for k in range(measured.slip.shape[0]):
             pushed = pushed or measured.slip[k] > SLIPPING
-        if pushed and state.time > SETTLING:
+        if pushed and state.time > SETTLING and settings.recover > 0.0:
             state.until = state.time + RECOVERY
         if moving or state.time < state.until:
             state.mode, state.phase = _STEP, 0.0

@@ -127,7 +127,8 @@ def _stand(
     else:
         state.shift = max(0.0, state.shift - dt / SHIFTING)
     plan.margin[0] = _keep_in_soles(gait, measured, dcm, -1, inside)
-    if plan.margin[0] < -OUTSIDE and state.time > SETTLING:
+    pushed = plan.margin[0] < -OUTSIDE and settings.recover > 0.0
+    if pushed and state.time > SETTLING:
         R = heading_axes(state.yaw)
         side = 0.0
         for i in range(2):

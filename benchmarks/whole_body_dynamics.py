@@ -1,0 +1,382 @@
+"""Robustness of whole-body inverse dynamics: standing, pushes, walking, hands.
+
+Each trial is a simulation of one robot on a floor under WHOLE_BODY_ID. A robot has
+fallen when its trunk is tilted over 53 degrees or 25 cm lower. A push is a force on the
+trunk for 0.1 s. Trials of a case differ by their seed: the phase of the push, and small
+changes of the posture at the start.
+
+Usage:
+    python benchmarks/whole_body_dynamics.py --quick
+    python benchmarks/whole_body_dynamics.py --only GR1FreeBody/push --trials 20
+"""
+
+import time
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import mujoco
+import numpy as np
+from harness.report import Report, options
+from harness.stand import Stand
+
+from wbc_suite.control import load_composite_controller_config
+
+GR1, SPOT, ARM = "GR1FreeBody", "Spot", "SpotWithArm"
+TILTED, DROPPED = 0.6, 0.25  # cosine; m
+PUSH = 0.1  # s
+ACTION = 0.02  # s between two actions
+SETTLED = 1.0  # s after which errors count
+COLUMNS = ("trials", "survived", "travelled_m", "drift_m", "turned_deg", "slip_mm")
+COLUMNS += ("hand_median_mm", "hand_worst_mm", "unsolved_per_s")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """What a robot does, and what happens to it."""
+
+    robot: str
+    name: str
+    seconds: float = 8.0
+    walk: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    height: float = 0.0
+    start: float = 0.5  # s; when it begins to walk
+    stop: float = np.inf
+    push: tuple[float, float, float] | None = None  # N
+    at: float = 3.0  # s; trials spread it over a second
+    pushes: tuple[float, float] | None = None  # N; every 3 s, from any side
+    random_commands: bool = False
+    lissajous: float = 0.0  # m
+    load: float = 0.0  # kg in each hand
+    far_goals: bool = False
+    in_world: bool = False
+    recover: bool = True
+    friction: float | None = None
+    slope: float = 0.0  # degrees
+    boxes: float = 0.0  # m
+    mass: float = 1.0
+    damping: float = 0.0  # N m s
+    jitter: float = 0.01  # rad; of the posture at the start
+    most: dict[str, float] = field(default_factory=dict)  # what is asked for
+
+    @property
+    def case(self) -> str:
+        """Its name as a path."""
+        return f"{self.robot}/{self.name}"
+
+
+def cases() -> list[Case]:
+    """Return all cases."""
+    found: list[Case] = []
+
+    def add(robot: str, name: str, **more: Any) -> None:
+        found.append(Case(robot=robot, name=name, **more))
+
+    directions = {"front": (1, 0), "back": (-1, 0), "left": (0, 1), "right": (0, -1)}
+    fixed = {GR1: (250, 150, 250, 300), SPOT: (500, 300, 200, 200)}
+    fixed[ARM] = fixed[SPOT]
+    stepping = {GR1: (500, 500, 300, 300), SPOT: (500,) * 4, ARM: (500,) * 4}
+    walking = {GR1: (500, 500, 200, 200), SPOT: (500,) * 4, ARM: (500,) * 4}
+    for robot in (GR1, SPOT, ARM):
+        hands = robot != SPOT
+        add(
+            robot, "stand", seconds=60.0, lissajous=0.1 if hands else 0.0, in_world=True
+        )
+        for kind, forces in (("fixed", fixed), ("step", stepping), ("walk", walking)):
+            for (side, (x, y)), force in zip(
+                directions.items(), forces[robot], strict=True
+            ):
+                add(
+                    robot,
+                    f"push/{kind}/{side}/{force}",
+                    push=(x * force, y * force, 0.0),
+                    recover=kind != "fixed",
+                    walk=(0.2, 0.0, 0.0) if kind == "walk" else (0.0, 0.0, 0.0),
+                )
+        fast = robot != GR1
+        v = 1.0 if fast else 0.5
+        go = {"walk": (v, 0.0, 0.0), "seconds": (20.0 if fast else 10.0) / v + 4.0}
+        add(robot, "walk/forward", **go)
+        add(robot, "walk/back", walk=(-v if fast else -0.2, 0.0, 0.0), seconds=10.0)
+        side = 0.4 if fast else 0.2
+        add(robot, "walk/sideways", walk=(0.0, side, 0.0), seconds=10.0)
+        add(robot, "walk/turn", walk=(0.0, 0.0, 1.0 if fast else 0.4), seconds=10.0)
+        add(robot, "walk/stop", walk=(v, 0.0, 0.0), stop=5.0, seconds=9.0)
+        add(robot, "walk/crouch", walk=(0.2, 0.0, 0.0), height=-0.15, start=3.0)
+        add(robot, "walk/friction", walk=(0.5 * v, 0.0, 0.0), friction=0.3)
+        slope = 10.0 if fast else 5.0
+        add(robot, "walk/slope", walk=(0.5 * v, 0.0, 0.0), slope=slope, seconds=10.0)
+        boxes = 0.06 if fast else 0.04
+        add(robot, "walk/boxes", walk=(0.5 * v, 0.0, 0.0), boxes=boxes, seconds=14.0)
+        add(robot, "walk/light", walk=(0.5 * v, 0.0, 0.0), mass=0.9)
+        add(robot, "walk/heavy", walk=(0.5 * v, 0.0, 0.0), mass=1.1)
+        add(robot, "walk/damped", walk=(0.5 * v, 0.0, 0.0), damping=1.0)
+        add(robot, "commands", seconds=60.0, random_commands=True)
+        pushes = (200.0, 400.0) if fast else (100.0, 200.0)
+        add(robot, "commands/pushed", seconds=60.0, random_commands=True, pushes=pushes)
+        if hands:
+            add(robot, "hand/load", load=2.0, in_world=True)
+            add(robot, "hand/march", walk=(0.0, 0.0, 0.0011), in_world=True)
+            add(robot, "hand/far", far_goals=True, seconds=5.0)
+    add(GR1, "hand/walk_loaded", walk=(0.3, 0.0, 0.0), load=5.0, seconds=10.0)
+    return found
+
+
+class Trial:
+    """One simulation of a case."""
+
+    def __init__(self, case: Case, seed: int) -> None:
+        self.case, self.seed, self.rng = case, seed, np.random.default_rng(seed)
+        config = load_composite_controller_config("WHOLE_BODY_ID", case.robot)
+        config["input_ref_frame"] = "world" if case.in_world else "base"
+        config["gait"] = {**config["gait"], "recover": case.recover}
+        self.stand = Stand(case.robot, config, self._edit)
+        self._change_model()
+        self.at = case.at + seed % 8 / 8.0
+        self.stand.start()
+        self._jitter()
+        self.stand.simulation.start()
+        self.arrays = self.stand.controller.dynamics
+        self.body = int(self.arrays.state["body"][0])
+        data = self.stand.data
+        self.hands = data.site_xpos[self.arrays.hand].copy()
+        self.first, self.feet = data.xpos[self.body].copy(), self._feet()
+        self.command, self.force = np.zeros(3), np.zeros(2)
+        self.goals = self.stand.controller.hold_action
+        self.errors: list[float] = []
+        self.yaw, self.slip = 0.0, 0.0
+
+    def _edit(self, spec: mujoco.MjSpec) -> None:
+        if self.case.boxes:
+            rng = np.random.default_rng(0)
+            for x in np.arange(0.8, 16.0, 0.25):
+                for y in np.arange(-1.0, 1.1, 0.25):
+                    height = 0.5 * self.case.boxes * rng.uniform(0.0, 1.0)
+                    spec.worldbody.add_geom(
+                        type=mujoco.mjtGeom.mjGEOM_BOX,
+                        size=[0.12, 0.12, max(height, 1e-3)],
+                        pos=[x, y, height],
+                        condim=3,
+                    )
+
+    def _change_model(self) -> None:
+        model, case = self.stand.model, self.case
+        if case.friction is not None:
+            model.geom_friction[:, 0] = case.friction
+        angle = np.deg2rad(case.slope)
+        model.opt.gravity[:] = 9.81 * np.array([-np.sin(angle), 0.0, -np.cos(angle)])
+        model.body_mass[:] *= case.mass
+        model.body_inertia[:] *= case.mass
+        drives = self.stand.controller.laws[0].drives
+        model.dof_damping[drives["dof"]] += case.damping
+        if case.damping:
+            self.unknown_damping = drives["dof"]
+
+    def _jitter(self) -> None:
+        drives, data = self.stand.controller.laws[0].drives, self.stand.data
+        arms = self.stand.controller.dynamics.is_arm.any(axis=0)
+        noise = self.rng.normal(0.0, self.case.jitter, len(drives))
+        data.qpos[drives["qpos"]] += np.where(arms, noise, 0.0)
+
+    def _feet(self) -> np.ndarray:
+        return self.stand.data.site_xpos[self.arrays.site].copy()
+
+    def _act(self, t: float) -> None:
+        case, controller = self.case, self.stand.controller
+        layout, action = controller.layout, self.goals.copy()
+        if case.random_commands and round(t / ACTION) % 100 == 0:
+            most = np.array([0.3, 0.15, 0.4] if case.robot == GR1 else [0.8, 0.3, 0.8])
+            self.command = self.rng.uniform(-most, most)
+        walk = layout["walk"]
+        if case.start <= t < case.stop:
+            command = self.command if case.random_commands else case.walk
+            action[walk.start : walk.stop] = command
+        action[layout["height"].start] = case.height
+        for k, frame in enumerate(controller.config.frames):
+            part = layout[frame.name]
+            if case.lissajous:
+                s = 2.0 * np.pi * 0.2 * t
+                path = [np.sin(s), np.sin(2.0 * s), np.sin(3.0 * s)]
+                fade = case.lissajous * min(1.0, t / 2.0)
+                action[part.start : part.start + 3] += fade * np.array(path)
+            elif case.far_goals and t > 1.0:
+                side = np.random.default_rng([k, self.seed])
+                direction = side.normal(size=3)
+                action[part.start : part.start + 3] += (
+                    2.0 * direction / np.linalg.norm(direction)
+                )
+        controller.set_goal(layout.clip(layout.check(action))[0])
+        self.action = action
+
+    def _disturb(self, t: float) -> None:
+        case, data = self.case, self.stand.data
+        data.xfrc_applied[:] = 0.0
+        links = self.stand.model.site_bodyid[self.arrays.hand]
+        for link in links:
+            data.xfrc_applied[link, 2] -= 9.81 * case.load * min(1.0, t)
+        if case.push is not None and self.at <= t < self.at + PUSH:
+            data.xfrc_applied[self.body, :3] = case.push
+        if case.pushes is not None and t > 2.0:
+            if t % 3.0 < ACTION:
+                angle = self.rng.uniform(0.0, 2.0 * np.pi)
+                self.force = self.rng.uniform(*case.pushes) * np.array(
+                    [np.cos(angle), np.sin(angle)]
+                )
+            if t % 3.0 < PUSH:
+                data.xfrc_applied[self.body, :2] = self.force
+
+    def _observe(self, t: float) -> None:
+        case, data = self.case, self.stand.data
+        R = data.xmat[self.body].reshape(3, 3)
+        yaw = np.arctan2(R[1, 0], R[0, 0])
+        self.yaw += (yaw - self.yaw + np.pi) % (2.0 * np.pi) - np.pi
+        if t < SETTLED or not len(self.hands):
+            return
+        goal = self.hands.copy()
+        if case.in_world:
+            for k, frame in enumerate(self.stand.controller.config.frames):
+                start = self.stand.controller.layout[frame.name].start
+                goal[k] = self.action[start : start + 3]
+        elif case.load:
+            state, com = self.arrays.gait.state[0], self.arrays.measured.com
+            c, s = np.cos(state["yaw"]), np.sin(state["yaw"])
+            for k in range(len(goal)):
+                p = self.arrays.goal[k].reshape(3, 4)[:, 3]
+                goal[k] = com + [c * p[0] - s * p[1], s * p[0] + c * p[1], 0.0]
+                goal[k, 2] = p[2] + state["ground"] + state["height"]
+        else:
+            return
+        found = data.site_xpos[self.arrays.hand]
+        self.errors.extend(np.linalg.norm(found - goal, axis=1))
+
+    def run(self) -> dict[str, Any]:
+        """Return what happened."""
+        stand, case = self.stand, self.case
+        steps = round(ACTION / stand.model.opt.timestep)
+        for i in range(round(case.seconds / ACTION)):
+            t = i * ACTION
+            self._act(t)
+            self._disturb(t)
+            stand.simulation.tick(steps)
+            self._observe(t)
+            trunk = stand.data.xpos[self.body]
+            low = trunk[2] < self.first[2] + min(case.height, 0.0) - DROPPED
+            if case.slope == 0.0 and case.boxes == 0.0 and low:
+                break
+            if stand.data.xmat[self.body][8] < TILTED:
+                break
+        else:
+            i += 1
+        return self._found(i * ACTION)
+
+    def _found(self, seconds: float) -> dict[str, Any]:
+        data, case = self.stand.data, self.case
+        way = data.xpos[self.body][:2] - self.first[:2]
+        direction = np.array(case.walk[:2])
+        length = np.linalg.norm(direction)
+        unit = direction / length if length > 1e-6 else np.array([1.0, 0.0])
+        along = float(way @ unit)
+        across = float(np.linalg.norm(way - along * unit))
+        errors = 1e3 * np.array(self.errors or [np.nan])
+        slip = np.linalg.norm((self._feet() - self.feet)[:, :2], axis=1).max()
+        steps = int(self.arrays.gait.state["steps"][0])
+        return {
+            "survived": seconds >= case.seconds - 1e-9,
+            "seconds": seconds,
+            "along": along,
+            "across": across,
+            "turned": float(np.degrees(self.yaw)),
+            "slip": 1e3 * float(slip) if steps == 0 else np.nan,
+            "hand": errors,
+            "unsolved": int(self.arrays.state["unsolved"][0]) / max(seconds, 1e-9),
+        }
+
+
+def run_trial(case: Case, seed: int) -> dict[str, Any]:
+    """Run one trial, in any process."""
+    return Trial(case, seed).run()
+
+
+def summary(case: Case, trials: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return a row of the table."""
+    survived = [trial for trial in trials if trial["survived"]]
+    hands = np.concatenate([trial["hand"] for trial in survived or trials])
+
+    def worst(key: str) -> float | None:
+        values = [abs(trial[key]) for trial in survived]
+        return float(np.max(values)) if values and np.isfinite(values).all() else None
+
+    return {
+        "case": case.case,
+        "side": "WHOLE_BODY_ID",
+        "trials": len(trials),
+        "survived": len(survived),
+        "travelled_m": worst("along"),
+        "drift_m": worst("across"),
+        "turned_deg": worst("turned"),
+        "slip_mm": worst("slip"),
+        "hand_median_mm": float(np.median(hands)) if np.isfinite(hands).all() else None,
+        "hand_worst_mm": float(hands.max()) if np.isfinite(hands).all() else None,
+        "unsolved_per_s": float(np.median([trial["unsolved"] for trial in trials])),
+    }
+
+
+def tick_cost(report: Report, robot: str, walk: float, seconds: float) -> None:
+    """Measure a tick: the loop with the law, less the physics with its torques."""
+    stand = Stand(robot, "WHOLE_BODY_ID")
+    stand.reset()
+    controller, layout = stand.controller, stand.controller.layout
+    action = controller.hold_action
+    action[layout["walk"].start] = walk
+    controller.set_goal(action)
+    stand.simulation.tick(500)
+    ticks, steps = [], 20
+    other = mujoco.MjData(stand.model)
+    for _ in range(round(seconds / (steps * stand.model.opt.timestep))):
+        mujoco.mj_copyData(other, stand.model, stand.data)
+        first = time.thread_time_ns()
+        for _ in range(steps):
+            mujoco.mj_step(stand.model, other)
+        second = time.thread_time_ns()
+        stand.simulation.tick(steps)
+        third = time.thread_time_ns()
+        ticks.append((third - second - (second - first)) / steps / 1e3)
+    name = "walking" if walk else "standing"
+    report.add(f"{robot}/tick", name, ticks)
+
+
+def main(make: Callable[[], list[Case]] = cases) -> None:
+    """Run the cases, and show a table."""
+    parser = options(__doc__, "2 trials of a few cases")
+    parser.add_argument("--only", default="", help="cases whose name contains this")
+    parser.add_argument("--trials", type=int, default=8)
+    parser.add_argument("--processes", type=int, default=2)
+    arguments = parser.parse_args()
+    chosen = [case for case in make() if arguments.only in case.case]
+    if arguments.quick:
+        few = ("push/step", "walk/forward", "hand/load")
+        chosen = [case for case in chosen if any(name in case.name for name in few)]
+        chosen = [replace(case, seconds=min(case.seconds, 6.0)) for case in chosen]
+    trials = 1 if arguments.quick else arguments.trials
+    report = Report()
+    if "tick" in arguments.only or not arguments.only:
+        for robot in (GR1, SPOT, ARM):
+            for walk in (0.0, 0.2):
+                tick_cost(report, robot, walk, 2.0)
+        report.show("A tick of the QP", ("median_us", "p99_us", "n"))
+    with ProcessPoolExecutor(arguments.processes) as pool:
+        waiting = [
+            (case, [pool.submit(run_trial, case, seed) for seed in range(trials)])
+            for case in chosen
+        ]
+        for case, futures in waiting:
+            row = summary(case, [future.result() for future in futures])
+            report.rows.append(row)
+            print(case.case, {k: v for k, v in row.items() if k in COLUMNS}, flush=True)
+    report.show("Robustness", COLUMNS)
+    report.write(arguments.json)
+
+
+if __name__ == "__main__":
+    main()
