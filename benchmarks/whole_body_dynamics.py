@@ -166,12 +166,8 @@ class Trial:
             model.geom_friction[:, 0] = case.friction
         angle = np.deg2rad(case.slope)
         model.opt.gravity[:] = 9.81 * np.array([-np.sin(angle), 0.0, -np.cos(angle)])
-        model.body_mass[:] *= case.mass
-        model.body_inertia[:] *= case.mass
         drives = self.stand.controller.laws[0].drives
         model.dof_damping[drives["dof"]] += case.damping
-        if case.damping:
-            self.unknown_damping = drives["dof"]
 
     def _jitter(self) -> None:
         drives, data = self.stand.controller.laws[0].drives, self.stand.data
@@ -206,12 +202,15 @@ class Trial:
                 action[part.start : part.start + 3] += (
                     2.0 * direction / np.linalg.norm(direction)
                 )
-        controller.set_goal(layout.clip(layout.check(action))[0])
-        self.action = action
+        self.action = action  # references arrive a period later: errors are of those
+        controller.set_goal(layout.clip(layout.check(action))[0], ACTION)
 
     def _disturb(self, t: float) -> None:
         case, data = self.case, self.stand.data
         data.xfrc_applied[:] = 0.0
+        if case.mass != 1.0:
+            weight = self.stand.model.body_mass * (case.mass - 1.0) * -9.81
+            data.xfrc_applied[:, 2] += weight
         links = self.stand.model.site_bodyid[self.arrays.hand]
         for link in links:
             data.xfrc_applied[link, 2] -= 9.81 * case.load * min(1.0, t)
@@ -243,7 +242,7 @@ class Trial:
             c, s = np.cos(state["yaw"]), np.sin(state["yaw"])
             for k in range(len(goal)):
                 p = self.arrays.goal[k].reshape(3, 4)[:, 3]
-                goal[k] = com + [c * p[0] - s * p[1], s * p[0] + c * p[1], 0.0]
+                goal[k] = com + np.array([c * p[0] - s * p[1], s * p[0] + c * p[1], 0])
                 goal[k, 2] = p[2] + state["ground"] + state["height"]
         else:
             return

@@ -66,7 +66,7 @@ class TrotConfig(FrozenModel):
     period: PositiveFloat = 0.5
     duty: float = Field(default=0.5, gt=0.0, lt=1.0)
     apex: PositiveFloat = 0.07
-    reach: PositiveFloat = 0.28
+    reach: PositiveFloat = 0.38
     acceleration: PositiveFloat = 1.0
     margin: NonNegativeFloat = 0.03
     speed: PositiveFloat = 0.25

@@ -43,7 +43,7 @@ STEPPING_GAINS = (10.0, 8.0)
 HEIGHT_GAINS = (150.0, 24.0)
 """1/s^2 and 1/s."""
 
-GREATEST = 5.0
+GREATEST = 8.0
 """m/s^2; acceleration of the centre of mass."""
 
 

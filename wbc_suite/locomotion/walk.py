@@ -108,7 +108,7 @@ def _stand(
 ) -> None:
     """Keep the DCM between the feet; shift it, and step, for a command or a push."""
     state, settings = gait.state[0], gait.settings[0]
-    wanted, inside = np.empty(2), np.empty(2)
+    wanted, inside, R = np.empty(2), np.empty(2), heading_axes(state.yaw)
     for i in range(2):
         wanted[i] = 0.5 * (measured.foot[0, i] + measured.foot[1, i])
     middle = wanted.copy()
@@ -129,15 +129,15 @@ def _stand(
     plan.margin[0] = _keep_in_soles(gait, measured, dcm, -1, inside)
     pushed = plan.margin[0] < -OUTSIDE and settings.recover > 0.0
     if pushed and state.time > SETTLING:
-        R = heading_axes(state.yaw)
         side = 0.0
         for i in range(2):
             side += R[i, 1] * (dcm[i] - middle[i])
         state.until = state.time + RECOVERY
         _begin_step(gait, 1 if side > 0.0 else 0, settings.double_support)
     for i in range(2):
-        inside[i] = dcm[i] + settings.gain / omega * (dcm[i] - wanted[i])
-    _keep_in_soles(gait, measured, inside, -1, zmp)
+        zmp[i] = dcm[i] + settings.gain / omega * (dcm[i] - wanted[i])
+    if settings.recover > 0.0:
+        _keep_in_soles(gait, measured, zmp.copy(), -1, zmp)
 
 
 @compiled

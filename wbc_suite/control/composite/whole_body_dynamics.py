@@ -108,7 +108,6 @@ class WholeBodyID:
         own = dynamics.state
         own["root_qpos"], own["root_dof"] = root.qposadr[0], dof
         own["body"] = root.bodyid[0]
-        own["mass"] = state.model.body_subtreemass[root.bodyid[0]]
         own["friction"], own["dt"] = config.friction, state.model.opt.timestep
         own["hand_frame"] = config.input_ref_frame == "base"
         return dynamics
@@ -172,12 +171,14 @@ class WholeBodyID:
             for i in own.hand
         ]
         self._goals.reset(poses, pin.SE3(heading, origin))
+        own.start[:] = own.reference[:] = own.goal
         for gripper in self._grippers:
             gripper.reset(state)
 
     def set_goal(self, action: Vector, period: float = 0.05) -> None:
         """Move hands' goals, and take commands; see `layout`."""
         self._goals.set(action)
+        self._time_references(period)
         for name, first in (("walk", 0), ("height", 3)):
             part = self.layout[name]
             values = action[part.start : part.stop]
@@ -185,6 +186,17 @@ class WholeBodyID:
         for gripper in self._grippers:
             part = self.layout[gripper.name]
             gripper.set_goal(action[part.start : part.stop], period)
+
+    def _time_references(self, period: float) -> None:
+        """Let references of hands move to the goals, no faster than they may."""
+        own = self.dynamics
+        own.start[:] = own.reference
+        for k, frame in enumerate(self.config.frames):
+            start, goal = own.start[k].reshape(3, 4), own.goal[k].reshape(3, 4)
+            way = float(np.linalg.norm(goal[:, 3] - start[:, 3]))
+            turn = float(np.linalg.norm(pin.log3(goal[:, :3] @ start[:, :3].T)))
+            slowest = max(way / frame.max_linear_speed, turn / frame.max_angular_speed)
+            own.travel[k] = 0.0, max(period, slowest)
 
     def prepare(self, state: RobotState) -> int:
         """Do nothing: the loop does it all."""

@@ -35,7 +35,7 @@ STATE = np.dtype(
         ("root_qpos", "i8"),  # index of the free root in qpos
         ("root_dof", "i8"),  # and in qvel
         ("body", "i8"),  # its link
-        ("mass", "f8"),  # kg
+        ("mass", "f8"),  # kg; as of the last tick
         ("friction", "f8"),  # coefficient
         ("dt", "f8"),  # s between two steps of the loop
         ("stage", "i8"),  # `Stage`
@@ -135,6 +135,9 @@ class WholeBodyDynamics(NamedTuple):
         corner: Points in contact about the middle of their foot, m, shape (points, 2).
         hand: Site of each hand, shape (h,).
         goal: Goals of hands as they are given, rows [R p], shape (h, 12).
+        start: Where their references start, shape (h, 12).
+        reference: Where their references are, shape (h, 12).
+        travel: Time since the start, and of the way to the goal, s, shape (h, 2).
         is_arm: Whether a joint moves this hand and no other hand or foot, (h, n).
         hand_weight: Weights of position and orientation, shape (h, 2).
         load: Observed wrench on each hand, N and N m, world axes, shape (h, 6).
@@ -165,6 +168,9 @@ class WholeBodyDynamics(NamedTuple):
     corner: Matrix
     hand: Indices
     goal: Matrix
+    start: Matrix
+    reference: Matrix
+    travel: Matrix
     is_arm: Indices
     hand_weight: Matrix
     load: Matrix
@@ -240,6 +246,9 @@ def make_dynamics(
         corner=np.concatenate([foot.corners for foot in feet]),
         hand=np.array(hands, dtype=np.int64),
         goal=goal,
+        start=np.zeros((h, 12)),
+        reference=np.zeros((h, 12)),
+        travel=np.ones((h, 2)),
         is_arm=is_arm,
         hand_weight=hand_weight,
         load=np.zeros((h, 6)),

@@ -12,7 +12,7 @@ from wbc_suite.control.dynamics.terms import (
 from wbc_suite.control.loop.physics import Physics
 from wbc_suite.control.loop.rigid_body import matrix_product, rotated, rotation
 from wbc_suite.locomotion.gait import GRAVITY
-from wbc_suite.qp.lie import log3, saturate
+from wbc_suite.qp.lie import exp3, log3, saturate
 from wbc_suite.typing import Matrix, Vector
 
 __all__ = ["edge_forces", "state_qp", "write_heading"]
@@ -30,10 +30,10 @@ SPIN = (0.05, 4.0)
 UPRIGHT = (150.0, 24.0)
 """kp, 1/s^2, and kd, 1/s, of bodies that stay upright."""
 
-HAND_KP = 100.0
+HAND_KP = 400.0
 """1/s^2."""
 
-FARTHEST = (0.05, 0.25)
+FARTHEST = (0.02, 0.1)
 """m and rad; errors of hands pull no harder than at these."""
 
 POSTURE_KP = 50.0
@@ -205,20 +205,22 @@ def write_heading(yaw: float, R: Matrix) -> None:
 def _add_hand(physics: Physics, body: WholeBodyDynamics, k: int, row: int) -> int:
     """Add the rows of a hand; return the next row."""
     terms, state, gait = body.terms, body.state[0], body.gait.state[0]
-    site, goal = body.hand[k], body.goal[k].reshape((3, 4))
+    site = body.hand[k]
     p = physics.site_xpos[site]
     write_frame_terms(physics, body, int(physics.site_bodyid[site]), p)
-    R_goal, p_goal, lead = goal[:, :3].copy(), goal[:, 3].copy(), np.zeros(6)
+    R_goal, p_goal, lead = np.empty((3, 3)), np.empty(3), np.zeros(6)
+    advance_reference(body, k, R_goal, p_goal, lead)
     if state.hand_frame == 1:
         heading, own = np.zeros((3, 3)), R_goal.copy()
         write_heading(gait.yaw, heading)
         matrix_product(heading, own, R_goal)
         p_goal[:] = rotated(heading, p_goal)
+        lead[:3], lead[3:] = rotated(heading, lead[:3]), rotated(heading, lead[3:])
         for i in range(2):
             p_goal[i] += body.measured.com[i]
-            lead[i] = body.measured.com_velocity[i]
+            lead[i] += body.measured.com_velocity[i]
         p_goal[2] += gait.ground + gait.height
-        lead[5] = gait.velocity[2] if gait.mode == 1 else 0.0
+        lead[5] += gait.velocity[2] if gait.mode == 1 else 0.0
     R_error, error = np.empty((3, 3)), np.empty(6)
     matrix_product(R_goal, rotation(physics.site_xmat, site).T, R_error)
     log3(R_error, error[3:])
@@ -232,6 +234,38 @@ def _add_hand(physics: Physics, body: WholeBodyDynamics, k: int, row: int) -> in
         weight = body.hand_weight[k, i // 3]
         _add_row(body, row + i, terms.J[i], wanted - terms.drift[i], weight)
     return row + 6
+
+
+@compiled
+def advance_reference(
+    body: WholeBodyDynamics, k: int, R: Matrix, p: Vector, twist: Vector
+) -> None:
+    """Move the reference of a hand towards its goal; write its pose and velocity.
+
+    Args:
+        body: The robot.
+        k: The hand.
+        R: Output: orientation, shape (3, 3).
+        p: Output: position, m, shape (3,).
+        twist: Output: velocity, linear then angular, in the axes of goals.
+    """
+    start, goal = body.start[k].reshape((3, 4)), body.goal[k].reshape((3, 4))
+    out, travel = body.reference[k].reshape((3, 4)), body.travel[k]
+    travel[0] = min(travel[0] + body.state[0].dt, travel[1])
+    s, moves = travel[0] / travel[1], travel[0] < travel[1]
+    R_way, R_part, turn = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
+    R_start, R_goal = start[:, :3].copy(), goal[:, :3].copy()
+    matrix_product(R_goal, R_start.T, R_way)
+    log3(R_way, turn)
+    exp3(s * turn[0], s * turn[1], s * turn[2], R_part)
+    matrix_product(R_part, R_start, R)
+    for i in range(3):
+        way = goal[i, 3] - start[i, 3]
+        p[i] = out[i, 3] = start[i, 3] + s * way
+        if moves:
+            twist[i], twist[3 + i] = way / travel[1], turn[i] / travel[1]
+        for j in range(3):
+            out[i, j] = R[i, j]
 
 
 @compiled

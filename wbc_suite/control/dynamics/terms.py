@@ -34,7 +34,7 @@ def measure(physics: Physics, body: WholeBodyDynamics) -> None:
     """Write what the planner reads, and the angular momentum."""
     state, terms, measured = body.state[0], body.terms, body.measured
     size = body.dofs.shape[0]
-    momentum = np.empty(6)
+    state.mass, momentum = terms.M[0, 0], np.empty(6)
     for i in range(6):
         momentum[i] = dot(terms.M[i], terms.v, size)
     com = physics.subtree_com[state.body]
