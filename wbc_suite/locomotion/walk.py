@@ -44,6 +44,9 @@ CLOSE = 0.015
 OUTSIDE = 0.01
 """m; how far the DCM leaves the soles before the robot steps by itself."""
 
+DISTURBED = 0.06
+"""m; distance of the DCM from its reference at which a walk counts as pushed."""
+
 COMMITTED = 0.06
 """s before the landing at which place and time of a step are fixed."""
 
@@ -176,11 +179,14 @@ def _step(
     stance, swing = state.stance, 1 - state.stance
     both = state.since < settings.double_support
     _, own, landing = _periodic_step(gait, omega, stance)
-    wanted, growth = np.empty(2), np.exp(omega * state.since)
+    wanted, growth, far = np.empty(2), np.exp(omega * state.since), 0.0
     for i in range(2):
         foot = measured.foot[stance, i]
         error = dcm[i] - foot - own[i] * growth
+        far += error**2
         wanted[i] = foot + (1.0 + settings.gain / omega) * error
+    if np.sqrt(far) > DISTURBED:
+        state.until = max(state.until, state.time + 0.5)
     _keep_in_soles(gait, measured, wanted, -1 if both else stance, zmp)
     plan.margin[0] = _keep_in_soles(gait, measured, dcm, -1 if both else stance, wanted)
     if state.since < state.duration - COMMITTED:

@@ -28,8 +28,14 @@ _UNSOLVED = int(Stage.UNSOLVED)
 OBSERVER = 6.0
 """1/s; bandwidth of the observed loads on hands."""
 
-HEAVIEST = 200.0
+FORGETTING = 0.05
+"""1/s; rate at which a load is forgotten."""
+
+STRONGEST_CHANGE = 200.0
 """N or N m; greatest change of a load that one step shows."""
+
+HEAVIEST, HEAVIEST_MOMENT = 120.0, 8.0
+"""N and N m; greatest load."""
 
 DAMPING = 1e-3
 """m^2; damps the wrench in directions that the arm does not feel."""
@@ -113,8 +119,10 @@ def _observe_loads(physics: Physics, body: WholeBodyDynamics) -> None:
         write_frame_terms(physics, body, int(physics.site_bodyid[body.hand[k]]), p)
         change = _missing_wrench(body, k, residual)
         for r in range(6):
-            part = min(max(change[r], -HEAVIEST), HEAVIEST)
-            load[r] += OBSERVER * state.dt * part
+            part = min(max(change[r], -STRONGEST_CHANGE), STRONGEST_CHANGE)
+            most = HEAVIEST if r < 3 else HEAVIEST_MOMENT
+            load[r] += state.dt * (OBSERVER * part - FORGETTING * load[r])
+            load[r] = min(max(load[r], -most), most)
             terms.held[r] += load[r]
             for j in range(size):
                 terms.h[j] -= terms.J[r, j] * load[r]

@@ -36,6 +36,9 @@ HAND_KP = 400.0
 FARTHEST = (0.02, 0.1)
 """m and rad; errors of hands pull no harder than at these."""
 
+RECOVERING = 0.3
+"""Part of the hands' weights while a robot recovers from a push."""
+
 POSTURE_KP = 50.0
 """1/s^2."""
 
@@ -208,30 +211,36 @@ def _add_hand(physics: Physics, body: WholeBodyDynamics, k: int, row: int) -> in
     site = body.hand[k]
     p = physics.site_xpos[site]
     write_frame_terms(physics, body, int(physics.site_bodyid[site]), p)
-    R_goal, p_goal, lead = np.empty((3, 3)), np.empty(3), np.zeros(6)
-    advance_reference(body, k, R_goal, p_goal, lead)
+    R_goal, p_goal = np.empty((3, 3)), np.empty(3)
+    lead, twist = np.zeros(6), np.zeros(6)
+    advance_reference(body, k, R_goal, p_goal, twist)
     if state.hand_frame == 1:
         heading, own = np.zeros((3, 3)), R_goal.copy()
         write_heading(gait.yaw, heading)
         matrix_product(heading, own, R_goal)
         p_goal[:] = rotated(heading, p_goal)
-        lead[:3], lead[3:] = rotated(heading, lead[:3]), rotated(heading, lead[3:])
+        twist[:3], twist[3:] = rotated(heading, twist[:3]), rotated(heading, twist[3:])
         for i in range(2):
             p_goal[i] += body.measured.com[i]
-            lead[i] += body.measured.com_velocity[i]
+            lead[i] = body.measured.com_velocity[i]
         p_goal[2] += gait.ground + gait.height
-        lead[5] += gait.velocity[2] if gait.mode == 1 else 0.0
+        lead[5] = gait.velocity[2] if gait.mode == 1 else 0.0
     R_error, error = np.empty((3, 3)), np.empty(6)
     matrix_product(R_goal, rotation(physics.site_xmat, site).T, R_error)
     log3(R_error, error[3:])
     for i in range(3):
         error[i] = p_goal[i] - p[i]
-    saturate(error[:3], FARTHEST[0])
-    saturate(error[3:], FARTHEST[1])
+    for i in range(2):
+        part, far = error[3 * i : 3 * i + 3], FARTHEST[i]
+        length = np.sqrt(part[0] ** 2 + part[1] ** 2 + part[2] ** 2)
+        saturate(part, far)
+        for j in range(3):  # a hand that is held back is not led either
+            lead[3 * i + j] += twist[3 * i + j] * min(1.0, far / max(length, far))
     kd = 2.0 * np.sqrt(HAND_KP)
+    share = RECOVERING if gait.time < gait.until else 1.0
     for i in range(6):
         wanted = HAND_KP * error[i] + kd * (lead[i] - terms.velocity[i])
-        weight = body.hand_weight[k, i // 3]
+        weight = share * body.hand_weight[k, i // 3]
         _add_row(body, row + i, terms.J[i], wanted - terms.drift[i], weight)
     return row + 6
 
