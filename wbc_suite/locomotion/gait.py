@@ -100,7 +100,7 @@ class WalkConfig(FrozenModel):
     apex: PositiveFloat = 0.05
     narrowest: PositiveFloat = 0.13
     widest: PositiveFloat = 0.55
-    forward: PositiveFloat = 0.45
+    forward: PositiveFloat = 0.6
     backward: PositiveFloat = 0.4
     acceleration: PositiveFloat = 0.4
     lower: NonNegativeFloat = 0.02

@@ -56,7 +56,7 @@ FIXED = 0.85
 CANDIDATES = 9
 """Step times that are tried."""
 
-FASTEST = 2.0
+FASTEST = 3.0
 """m/s; mean speed of a swinging foot that costs nothing."""
 
 HEIGHT_GAINS = (100.0, 20.0)
@@ -171,7 +171,8 @@ def _step(
         at_rest = not moving and state.steps > 2 and state.time > state.until
         for i in range(3):
             at_rest = at_rest and abs(state.velocity[i]) < 0.02
-        _begin_step(gait, 1 - state.stance, 0.0)
+        hurry = settings.double_support if state.time < state.until else 0.0
+        _begin_step(gait, 1 - state.stance, hurry)
         if at_rest:
             state.mode, state.steps = _STAND, 0
             _keep_in_soles(gait, measured, dcm, -1, zmp)

@@ -30,11 +30,14 @@ SPIN = (0.05, 4.0)
 UPRIGHT = (150.0, 24.0)
 """kp, 1/s^2, and kd, 1/s, of bodies that stay upright."""
 
-HAND_KP = 400.0
+HAND_KP = 600.0
 """1/s^2."""
 
-FARTHEST = (0.02, 0.1)
+FARTHEST = (0.015, 0.08)
 """m and rad; errors of hands pull no harder than at these."""
+
+HELD_BACK = (0.06, 0.3)
+"""m and rad; a reference that is farther ahead leads the hand less."""
 
 RECOVERING = 0.3
 """Part of the hands' weights while a robot recovers from a push."""
@@ -235,7 +238,9 @@ def _add_hand(physics: Physics, body: WholeBodyDynamics, k: int, row: int) -> in
         length = np.sqrt(part[0] ** 2 + part[1] ** 2 + part[2] ** 2)
         saturate(part, far)
         for j in range(3):  # a hand that is held back is not led either
-            lead[3 * i + j] += twist[3 * i + j] * min(1.0, far / max(length, far))
+            lead[3 * i + j] += twist[3 * i + j] * min(
+                1.0, HELD_BACK[i] / max(length, 1e-9)
+            )
     kd = 2.0 * np.sqrt(HAND_KP)
     share = RECOVERING if gait.time < gait.until else 1.0
     for i in range(6):
