@@ -27,6 +27,7 @@ ORDER = (
     "kinematics",
     "qp",
     "planning",
+    "locomotion",
     "control",
     "scene",
     "sensing",

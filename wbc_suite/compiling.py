@@ -17,13 +17,15 @@ from types import FunctionType
 from typing import Any, TypeVar, cast
 
 import numba
+import numpy as np
 from numba import types
 from numba.experimental import structref
 
 from wbc_suite.catalogue import user_cache
+from wbc_suite.typing import Records
 
 __all__ = ["announced", "as_argument", "cache_folder", "compiled"]
-__all__ += ["compiled_nogil", "is_compiling", "plain", "struct"]
+__all__ += ["compiled_nogil", "is_compiling", "plain", "readable", "struct"]
 
 log = logging.getLogger(__name__)
 
@@ -82,6 +84,11 @@ def _compile(function: Function, **options: bool) -> Function:
 def is_compiling() -> bool:
     """Return whether numba compiles kernels: not under `NUMBA_DISABLE_JIT=1`."""
     return not _numba.DISABLE_JIT
+
+
+def readable(records: Records) -> Records:
+    """Return records whose fields plain Python reads as kernels do, if it has to."""
+    return records if is_compiling() else records.view(np.recarray)
 
 
 def plain(kernel: Any) -> Any:

@@ -21,6 +21,12 @@ Matrix: TypeAlias = NDArray[np.floating[Any]]
 Indices: TypeAlias = NDArray[np.int64]
 """Integer array of indices."""
 
+Records: TypeAlias = NDArray[np.void]
+"""Structured array, such as of `LAW` or `DRIVE` records."""
+
+CompiledRecords: TypeAlias = Any
+"""Such an array, or one of its records, in a kernel: fields are attributes."""
+
 RobotName: TypeAlias = Literal[
     "Baxter",
     "GR1",

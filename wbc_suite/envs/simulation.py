@@ -8,7 +8,7 @@ import numpy as np
 
 from wbc_suite.compiling import announced, as_argument, is_compiling, plain
 from wbc_suite.control import CompositeController, RobotState, SteppedController
-from wbc_suite.control.composite.registry import DynamicController, TickedController
+from wbc_suite.control.composite.protocols import DynamicController, TickedController
 from wbc_suite.control.composite.tick import WholeBodyArrays
 from wbc_suite.control.loop.advance import advance
 from wbc_suite.control.loop.inverse_dynamics import (

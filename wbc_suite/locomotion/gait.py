@@ -14,10 +14,9 @@ from typing import Annotated, Literal, NamedTuple, TypeAlias
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
-from wbc_suite.compiling import compiled, struct
-from wbc_suite.control.loop.records import CompiledRecords, Records, readable
+from wbc_suite.compiling import compiled, readable, struct
 from wbc_suite.tomlfile import FrozenModel
-from wbc_suite.typing import Indices, Matrix, Vector
+from wbc_suite.typing import CompiledRecords, Indices, Matrix, Records, Vector
 
 __all__ = ["GRAVITY", "Gait", "GaitConfig", "GaitKind", "Measured", "Mode", "Plan"]
 __all__ += [

@@ -22,8 +22,9 @@ from wbc_suite.locomotion.gait import (
     approach_command,
     heading_axes,
 )
+from wbc_suite.locomotion.soles import keep_in_soles
 from wbc_suite.locomotion.swing import write_swing
-from wbc_suite.typing import Matrix, Vector
+from wbc_suite.typing import Vector
 
 __all__ = ["plan_walk"]
 
@@ -129,7 +130,7 @@ def _stand(
                 _begin_step(gait, state.stance, 0.0)
     else:
         state.shift = max(0.0, state.shift - dt / SHIFTING)
-    plan.margin[0] = _keep_in_soles(gait, measured, dcm, -1, inside)
+    plan.margin[0] = keep_in_soles(gait, measured, dcm, -1, inside)
     pushed = plan.margin[0] < -OUTSIDE and settings.recover > 0.0
     if pushed and state.time > SETTLING:
         side = 0.0
@@ -140,7 +141,7 @@ def _stand(
     for i in range(2):
         zmp[i] = dcm[i] + settings.gain / omega * (dcm[i] - wanted[i])
     if settings.recover > 0.0:
-        _keep_in_soles(gait, measured, zmp.copy(), -1, zmp)
+        keep_in_soles(gait, measured, zmp.copy(), -1, zmp)
 
 
 @compiled
@@ -175,7 +176,7 @@ def _step(
         _begin_step(gait, 1 - state.stance, hurry)
         if at_rest:
             state.mode, state.steps = _STAND, 0
-            _keep_in_soles(gait, measured, dcm, -1, zmp)
+            keep_in_soles(gait, measured, dcm, -1, zmp)
             return
     stance, swing = state.stance, 1 - state.stance
     both = state.since < settings.double_support
@@ -188,8 +189,8 @@ def _step(
         wanted[i] = foot + (1.0 + settings.gain / omega) * error
     if np.sqrt(far) > DISTURBED:
         state.until = max(state.until, state.time + 0.5)
-    _keep_in_soles(gait, measured, wanted, -1 if both else stance, zmp)
-    plan.margin[0] = _keep_in_soles(gait, measured, dcm, -1 if both else stance, wanted)
+    keep_in_soles(gait, measured, wanted, -1 if both else stance, zmp)
+    plan.margin[0] = keep_in_soles(gait, measured, dcm, -1 if both else stance, wanted)
     if state.since < state.duration - COMMITTED:
         _choose_duration(gait, measured, dcm, zmp, landing, omega, both)
     if both:
@@ -322,49 +323,3 @@ def _choose_duration(
             cost += 4.0 * max(0.0, way - reach)
         if cost < best - 1e-9:
             best, state.duration = cost, duration
-
-
-@compiled
-def _keep_in_soles(
-    gait: Gait, measured: Measured, point: Vector, foot: int, out: Vector
-) -> float:
-    """Write the nearest point within the box about a sole, or both with foot -1.
-
-    Returns:
-        How far the point is inside, m; negative outside.
-    """
-    first = 0 if foot < 0 else foot
-    last = 1 if foot < 0 else foot
-    R = heading_axes(measured.foot_yaw[first])
-    low, high = np.full(2, np.inf), np.full(2, -np.inf)
-    for k in range(first, last + 1):
-        own = heading_axes(measured.foot_yaw[k])
-        for corner in range(4):
-            x, y = gait.sole[k, corner % 2], gait.sole[k, 2 + corner // 2]
-            _extend_box(
-                R, own, measured.foot[k] - measured.foot[first], x, y, low, high
-            )
-    margin, inset = np.inf, gait.settings[0].margin
-    for i in range(2):
-        out[i] = measured.foot[first, i]
-    for i in range(2):
-        at = 0.0
-        for j in range(2):
-            at += R[j, i] * (point[j] - measured.foot[first, j])
-        margin = min(margin, at - low[i] - inset, high[i] - inset - at)
-        kept = min(max(at, low[i] + inset), high[i] - inset)
-        for j in range(2):
-            out[j] += R[j, i] * kept
-    return margin
-
-
-@compiled
-def _extend_box(
-    R: Matrix, own: Matrix, place: Vector, x: float, y: float, low: Vector, high: Vector
-) -> None:
-    """Extend a box in axes R by a point (x, y) of a foot."""
-    for i in range(2):
-        at = 0.0
-        for j in range(2):
-            at += R[j, i] * (place[j] + own[j, 0] * x + own[j, 1] * y)
-        low[i], high[i] = min(low[i], at), max(high[i], at)

@@ -14,10 +14,12 @@ from wbc_suite.control.composite.frame_kinds import (
     register_frame_kind,
 )
 from wbc_suite.control.composite.hybrid import HybridMobileBase, check_hybrid
-from wbc_suite.control.composite.registry import (
+from wbc_suite.control.composite.protocols import (
     CompositeController,
-    CompositeControllerName,
     SteppedController,
+)
+from wbc_suite.control.composite.registry import (
+    CompositeControllerName,
     build_composite_controller,
     composite_names,
     default_composite,

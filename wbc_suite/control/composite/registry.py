@@ -4,13 +4,10 @@ import importlib
 import logging
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Literal, Protocol, TypeAlias, runtime_checkable
+from typing import Any, Literal, TypeAlias
 
 from wbc_suite.catalogue import Catalogue
-from wbc_suite.control.action import ActionLayout
-from wbc_suite.control.composite.tick import WholeBodyArrays
-from wbc_suite.control.dynamics.arrays import WholeBodyDynamics
-from wbc_suite.control.law.law import Law
+from wbc_suite.control.composite.protocols import CompositeController
 from wbc_suite.control.part.registry import (
     PartControllerName,
     is_part_controller,
@@ -21,15 +18,11 @@ from wbc_suite.control.state import RobotState
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.robot import RobotDescription, load_robot
 from wbc_suite.tomlfile import read_json, read_toml
-from wbc_suite.typing import RobotName, Vector
+from wbc_suite.typing import RobotName
 
 __all__ = [
-    "CompositeController",
     "CompositeControllerName",
     "CompositeKind",
-    "DynamicController",
-    "SteppedController",
-    "TickedController",
     "build_composite_controller",
     "composite_names",
     "default_composite",
@@ -48,96 +41,6 @@ CompositeControllerName: TypeAlias = Literal[
     "WHOLE_BODY_MINK_IK",
 ]
 """Names of the built-in composite controllers."""
-
-
-class CompositeController(Protocol):
-    """Drives all actuators of one robot.
-
-    The order of calls is `reset`, then `set_goal` once per action, then `prepare`
-    before the first physics step and whenever its answer has expired. The laws act
-    between `mj_step1` and `mj_step2` of every step, in the compiled loop.
-
-    Attributes:
-        layout: Slices of the action.
-        laws: Laws of the control loop.
-    """
-
-    layout: ActionLayout
-    laws: tuple[Law, ...]
-
-    @property
-    def hold_action(self) -> Vector:
-        """The action that keeps the present goals."""
-        ...
-
-    def info(self, state: RobotState) -> dict[str, Any]:
-        """Return entries of the environment's `info`, by key."""
-        ...
-
-    def reset(self, state: RobotState) -> None:
-        """Start from the robot's state; goals hold it there."""
-        ...
-
-    def set_goal(self, action: Vector, period: float = 0.05) -> None:
-        """Take an action that `layout` has checked and clipped.
-
-        Args:
-            action: Shape (layout.size,).
-            period: Time until the next one, s.
-        """
-        ...
-
-    def prepare(self, state: RobotState) -> int:
-        """Update the laws; return for how many physics steps that is enough."""
-        ...
-
-
-@runtime_checkable
-class SteppedController(CompositeController, Protocol):
-    """A composite controller that computes commands in Python at every physics step.
-
-    Its laws act first; `compute` overrides their commands.
-    """
-
-    def compute(self, state: RobotState) -> Vector:
-        """Return one command per actuator, in the order of `state.actuators`.
-
-        Called after `mj_step1`. A command is a torque, or a setpoint where the actuator
-        is a servo.
-        """
-        ...
-
-
-@runtime_checkable
-class TickedController(CompositeController, Protocol):
-    """A composite controller whose ticks the control loop can run."""
-
-    def loop_tick(self) -> WholeBodyArrays | None:
-        """Return the tick, or None where Python computes each.
-
-        Called once the laws are in the loop's table. Without a tick `prepare` is
-        called as for other controllers.
-        """
-        ...
-
-    def finish_tick(self) -> None:
-        """Finish a tick that the loop has begun, if there is one."""
-        ...
-
-
-@runtime_checkable
-class DynamicController(CompositeController, Protocol):
-    """A composite controller whose accelerations are those of one QP for all joints.
-
-    Attributes:
-        dynamics: What the QP's kernels read and write, see `solve_whole_body`.
-    """
-
-    dynamics: WholeBodyDynamics
-
-    def finish_tick(self) -> None:
-        """Solve the QP if the loop has stated it and not found its active set."""
-        ...
 
 
 Builder = Callable[[Mapping[str, Any], RobotState], CompositeController]
@@ -259,9 +162,14 @@ def _read(
         return _of_arms({"type": name.upper()}, name, robot, catalogue), name
     if name.endswith(".toml"):
         config = read_toml(Path(name))
-        kind = "BASIC" if "body_parts" in config else "WHOLE_BODY_IK"
-        return {"type": kind} | config, name
+        return {"type": _kind_in(config)} | config, name
     return _named(name, robot, catalogue)
+
+
+def _kind_in(config: Mapping[str, Any]) -> str:
+    """Return the kind of a file that does not name it."""
+    kinds = {"body_parts": "BASIC", "gait": "WHOLE_BODY_ID"}
+    return next((kinds[key] for key in kinds if key in config), "WHOLE_BODY_IK")
 
 
 def _converted(

@@ -1,7 +1,7 @@
 """Config of the whole-body composites: `controllers/{robot}_whole_body_ik.toml`."""
 
 from collections.abc import Collection, Iterator, Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Protocol
 
 from pydantic import (
     AfterValidator,
@@ -30,6 +30,7 @@ __all__ = [
     "LimitsConfig",
     "PostureConfig",
     "WholeBodyIKConfig",
+    "check_goals",
     "check_whole_body",
     "default_whole_body_config",
     "read_whole_body",
@@ -151,7 +152,7 @@ class LimitsConfig(FrozenModel):
     balance_margin: NonNegativeFloat = 0.03
 
 
-class GoalsConfig(FrozenModel):
+class GoalsConfig(Protocol):
     """Controlled frames, and how an action moves their goals.
 
     Attributes:
@@ -163,26 +164,45 @@ class GoalsConfig(FrozenModel):
         delta_rotation: Largest step of a delta action, rad.
     """
 
-    frames: tuple[ControlledFrame, ...] = Field(default=(), alias="frame")
-    input_type: InputType = "absolute"
-    input_ref_frame: InputFrame = "world"
-    delta_position: PositiveFloat = 0.05
-    delta_rotation: PositiveFloat = 0.5
+    @property
+    def frames(self) -> tuple[ControlledFrame, ...]:
+        """Controlled frames."""
+        ...
 
-    @model_validator(mode="after")
-    def _consistent(self) -> "GoalsConfig":
-        names = [frame.name for frame in self.frames]
-        if len(set(names)) != len(names):
-            raise ValueError(f"controlled frames share a name: {names}")
-        if self.input_type == "absolute" and self.input_ref_frame == "eef":
-            raise ValueError(
-                "input_ref_frame 'eef' needs input_type 'delta': a frame is always at "
-                "the origin of its own axes"
-            )
-        return self
+    @property
+    def input_type(self) -> InputType:
+        """What an action is."""
+        ...
+
+    @property
+    def input_ref_frame(self) -> InputFrame:
+        """Axes of actions."""
+        ...
+
+    @property
+    def delta_position(self) -> float:
+        """Largest step, m."""
+        ...
+
+    @property
+    def delta_rotation(self) -> float:
+        """Largest step, rad."""
+        ...
 
 
-class WholeBodyIKConfig(GoalsConfig):
+def check_goals(config: GoalsConfig) -> None:
+    """Raise ValueError where frames share a name, or axes do not fit the input."""
+    names = [frame.name for frame in config.frames]
+    if len(set(names)) != len(names):
+        raise ValueError(f"controlled frames share a name: {names}")
+    if config.input_type == "absolute" and config.input_ref_frame == "eef":
+        raise ValueError(
+            "input_ref_frame 'eef' needs input_type 'delta': a frame is always at the "
+            "origin of its own axes"
+        )
+
+
+class WholeBodyIKConfig(FrozenModel):
     """Config of a whole-body IK controller.
 
     Attributes:
@@ -193,6 +213,10 @@ class WholeBodyIKConfig(GoalsConfig):
         locked: Groups of joints that are kept at the posture.
         posture: Pull to a posture.
         limits: Limits of the command.
+        input_type: See `GoalsConfig`.
+        input_ref_frame: See `GoalsConfig`.
+        delta_position: See `GoalsConfig`.
+        delta_rotation: See `GoalsConfig`.
         solve_hz: Solves per second.
         joint_law: Gains of the joint-position law.
         planning: Whether to plan motions around obstacles and local minima; else all
@@ -211,12 +235,21 @@ class WholeBodyIKConfig(GoalsConfig):
     locked: tuple[Name, ...] = ()
     posture: PostureConfig = PostureConfig()
     limits: LimitsConfig = LimitsConfig()
+    input_type: InputType = "absolute"
+    input_ref_frame: InputFrame = "world"
+    delta_position: PositiveFloat = 0.05
+    delta_rotation: PositiveFloat = 0.5
     solve_hz: Annotated[float, Field(ge=10.0, le=1000.0)] = 100.0
     joint_law: JointLawConfig = JointLawConfig()
     planning: bool = True
     far: tuple[PositiveFloat, PositiveFloat] = (0.15, 0.6)
     search_iterations: int = Field(default=25, ge=0)
     tolerance: tuple[PositiveFloat, PositiveFloat] = (1e-3, 3.5e-3)
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "WholeBodyIKConfig":
+        check_goals(self)
+        return self
 
 
 def default_whole_body_config(robot: RobotDescription) -> dict[str, Any]:

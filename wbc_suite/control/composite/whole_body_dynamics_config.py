@@ -6,8 +6,10 @@ from typing import Any, Literal
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from wbc_suite.control.composite.whole_body_config import (
-    GoalsConfig,
+    ControlledFrame,
     InputFrame,
+    InputType,
+    check_goals,
     default_whole_body_config,
 )
 from wbc_suite.errors import ConfigError, UnknownNameError
@@ -72,7 +74,7 @@ class StanceConfig(FrozenModel):
     weights: dict[Name, PositiveFloat] = {}
 
 
-class WholeBodyIDConfig(GoalsConfig):
+class WholeBodyIDConfig(FrozenModel):
     """Config of whole-body inverse dynamics.
 
     Attributes:
@@ -86,12 +88,16 @@ class WholeBodyIDConfig(GoalsConfig):
         friction: Coefficient of friction that contact forces keep to.
         max_walk: Greatest commands: forward, left (m/s), turn (rad/s).
         height: Lowest and highest command of height, m.
+        input_type: `absolute` targets of hands, or `delta` steps from the last target.
         input_ref_frame: Axes of hands' targets and steps: `world`; `base`, which is the
             heading of the robot at its centre of mass; or the hand's own (`eef`).
+        delta_position: Largest step of a delta action, m.
+        delta_rotation: Largest step of a delta action, rad.
     """
 
     format: Literal[1] = 1
     type: str = "WHOLE_BODY_ID"
+    frames: tuple[ControlledFrame, ...] = Field(default=(), alias="frame")
     feet: tuple[FootConfig, ...] = Field(alias="foot", min_length=2, max_length=8)
     gait: GaitConfig
     upright: tuple[UprightConfig, ...] = ()
@@ -99,10 +105,14 @@ class WholeBodyIDConfig(GoalsConfig):
     friction: PositiveFloat = 0.6
     max_walk: tuple[PositiveFloat, PositiveFloat, PositiveFloat] = (1.0, 0.4, 1.0)
     height: tuple[float, float] = (-0.15, 0.02)
+    input_type: InputType = "absolute"
     input_ref_frame: InputFrame = "base"
+    delta_position: PositiveFloat = 0.05
+    delta_rotation: PositiveFloat = 0.5
 
     @model_validator(mode="after")
     def _gait_fits_feet(self) -> "WholeBodyIDConfig":
+        check_goals(self)
         if self.gait.type == "walk" and (
             len(self.feet) != 2 or any(foot.sole is None for foot in self.feet)
         ):

@@ -7,11 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wbc_suite.compiling import struct
-from wbc_suite.control.loop.records import Records, readable
+from wbc_suite.compiling import readable, struct
 from wbc_suite.locomotion.gait import Gait, Measured, Plan, make_measured, make_plan
 from wbc_suite.qp.active_set import QpArrays, make_qp_arrays
-from wbc_suite.typing import Indices, Matrix, Vector
+from wbc_suite.typing import Indices, Matrix, Records, Vector
 
 __all__ = ["EDGES", "Foot", "Limits", "Stage", "Terms", "WholeBodyDynamics"]
 __all__ += ["make_dynamics"]
@@ -212,33 +211,14 @@ def make_dynamics(
     rows = sum(6 if foot.sole else 3 for foot in feet) + 6 + 3 * u + 6 * h
     place = np.full(nv, -1, dtype=np.int64)
     place[dofs] = np.arange(6 + n)
-    qp = make_qp_arrays(
-        np.zeros((rows, edges + n)),
-        np.zeros(rows),
-        np.zeros((2, edges + n)),
-        np.zeros(1),
-        inequalities=2 * n,
-    )
-    terms = Terms(
-        np.zeros((6 + n, 6 + n)),
-        np.zeros(6 + n),
-        np.zeros(6 + n),
-        np.zeros(6 + n),
-        np.zeros((edges, 6 + n)),
-        np.zeros((6, edges + n + 1)),
-        np.zeros((6, 6 + n)),
-        np.zeros(6),
-        np.zeros(6),
-        np.zeros(3),
-        np.zeros(3),
-        np.zeros(6),
-    )
+    W, diagonal = np.zeros((rows, edges + n)), np.zeros((2, edges + n))
+    rest = np.zeros(rows), diagonal, np.zeros(1)
     return WholeBodyDynamics(
         state=readable(np.zeros(1, STATE)),
         dofs=np.array(dofs, dtype=np.int64),
         qpos=np.array(qpos, dtype=np.int64),
         place=place,
-        terms=terms,
+        terms=_make_terms(n, edges),
         site=np.array([foot.site for foot in feet], dtype=np.int64),
         middle=np.array([foot.middle for foot in feet]),
         is_sole=np.array([foot.sole is not None for foot in feet], dtype=np.int64),
@@ -257,20 +237,30 @@ def make_dynamics(
         upright_weight=upright_weight,
         posture=np.zeros(n),
         posture_weight=posture_weight,
-        limits=np.array(
-            [
-                limits.low,
-                limits.high,
-                limits.velocity,
-                limits.torque_low,
-                limits.torque_high,
-            ]
-        ),
+        limits=np.array([getattr(limits, name) for name in Limits.__slots__]),
         command=np.zeros(4),
         torque=np.zeros(n),
         last_velocity=np.zeros(6 + n),
         gait=gait,
         measured=make_measured(f),
         plan=make_plan(f),
-        qp=qp,
+        qp=make_qp_arrays(W, *rest, inequalities=2 * n),
+    )
+
+
+def _make_terms(n: int, edges: int) -> Terms:
+    size = 6 + n
+    return Terms(
+        M=np.zeros((size, size)),
+        h=np.zeros(size),
+        v=np.zeros(size),
+        a=np.zeros(size),
+        B=np.zeros((edges, size)),
+        root=np.zeros((6, edges + n + 1)),
+        J=np.zeros((6, size)),
+        velocity=np.zeros(6),
+        drift=np.zeros(6),
+        com=np.zeros(3),
+        spin=np.zeros(3),
+        held=np.zeros(6),
     )

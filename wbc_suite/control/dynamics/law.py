@@ -4,7 +4,7 @@ import numpy as np
 
 from wbc_suite.compiling import compiled
 from wbc_suite.control.dynamics.arrays import Stage, WholeBodyDynamics
-from wbc_suite.control.dynamics.qp_rows import edge_forces, state_qp
+from wbc_suite.control.dynamics.qp_rows import state_qp
 from wbc_suite.control.dynamics.terms import (
     measure,
     write_frame_terms,
@@ -86,7 +86,9 @@ def write_whole_body(physics: Physics, body: WholeBodyDynamics) -> None:
         terms.a[6 + j] = qp.x[edges + j]
         dof = body.dofs[6 + j]
         held = physics.qfrc_bias[dof] - physics.qfrc_passive[dof] - terms.h[6 + j]
-        body.torque[j] = edge_forces(body, 6 + j) + held
+        for k in range(edges):
+            held += terms.B[k, 6 + j] * qp.x[k]
+        body.torque[j] = held
     for i in range(body.dofs.shape[0]):
         physics.acceleration[body.dofs[i]] = terms.a[i]
         body.last_velocity[i] = terms.v[i]

@@ -3,7 +3,8 @@
 import numpy as np
 
 from wbc_suite.compiling import compiled
-from wbc_suite.control.dynamics.arrays import EDGES, WholeBodyDynamics
+from wbc_suite.control.dynamics.arrays import WholeBodyDynamics
+from wbc_suite.control.dynamics.qp_bounds import write_bounds
 from wbc_suite.control.dynamics.terms import (
     eliminate_root,
     write_edges,
@@ -15,7 +16,7 @@ from wbc_suite.locomotion.gait import GRAVITY
 from wbc_suite.qp.lie import exp3, log3, saturate
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["edge_forces", "state_qp", "write_heading"]
+__all__ = ["state_qp"]
 
 CONTACT = (100.0, 60.0)
 """Weight of the rows that keep a foot at rest, and their damping, 1/s."""
@@ -42,28 +43,6 @@ HELD_BACK = (0.06, 0.3)
 RECOVERING = 0.3
 """Part of the hands' weights while a robot recovers from a push."""
 
-POSTURE_KP = 50.0
-"""1/s^2."""
-
-FORCE_COST = 1e-3
-"""1/N; square root of the cost of a force along an edge."""
-
-MOTION_COST = 1e-6
-"""(s^2/rad)^2; least cost of an acceleration."""
-
-LEAST_FORCE = 4.0
-"""N; normal force that a standing foot keeps."""
-
-STRONGEST = 10.0
-"""Weights that a foot may carry."""
-
-WINDOW = (400.0, 40.0, 20.0, 200.0)
-"""kp (1/s^2) and kd (1/s) of positions, kp (1/s) of velocities, and the deceleration
-with which limits are kept that are passed already, rad/s^2."""
-
-FASTEST = 1e4
-"""rad/s^2."""
-
 
 @compiled
 def state_qp(physics: Physics, body: WholeBodyDynamics) -> None:
@@ -80,10 +59,7 @@ def state_qp(physics: Physics, body: WholeBodyDynamics) -> None:
         row = _add_upright(physics, body, k, row)
     for k in range(body.hand.shape[0]):
         row = _add_hand(physics, body, k, row)
-    _write_costs(physics, body)
-    _bound_forces(body)
-    _bound_accelerations(physics, body)
-    _bound_torques(body)
+    write_bounds(physics, body)
 
 
 @compiled
@@ -186,7 +162,7 @@ def _add_upright(physics: Physics, body: WholeBodyDynamics, k: int, row: int) ->
     link = body.upright[k]
     write_frame_terms(physics, body, link, physics.xpos[link])
     heading, R_goal, R_error = np.zeros((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    write_heading(gait.yaw, heading)
+    _write_heading(gait.yaw, heading)
     matrix_product(heading, body.upright_pose[k].reshape((3, 3)), R_goal)
     matrix_product(R_goal, rotation(physics.xmat, link).T, R_error)
     turn = np.empty(3)
@@ -200,7 +176,7 @@ def _add_upright(physics: Physics, body: WholeBodyDynamics, k: int, row: int) ->
 
 
 @compiled
-def write_heading(yaw: float, R: Matrix) -> None:
+def _write_heading(yaw: float, R: Matrix) -> None:
     """Write a rotation about the vertical, shape (3, 3), into zeros."""
     R[0, 0] = R[1, 1] = np.cos(yaw)
     R[1, 0] = np.sin(yaw)
@@ -216,10 +192,10 @@ def _add_hand(physics: Physics, body: WholeBodyDynamics, k: int, row: int) -> in
     write_frame_terms(physics, body, int(physics.site_bodyid[site]), p)
     R_goal, p_goal = np.empty((3, 3)), np.empty(3)
     lead, twist = np.zeros(6), np.zeros(6)
-    advance_reference(body, k, R_goal, p_goal, twist)
+    _advance_reference(body, k, R_goal, p_goal, twist)
     if state.hand_frame == 1:
         heading, own = np.zeros((3, 3)), R_goal.copy()
-        write_heading(gait.yaw, heading)
+        _write_heading(gait.yaw, heading)
         matrix_product(heading, own, R_goal)
         p_goal[:] = rotated(heading, p_goal)
         twist[:3], twist[3:] = rotated(heading, twist[:3]), rotated(heading, twist[3:])
@@ -251,7 +227,7 @@ def _add_hand(physics: Physics, body: WholeBodyDynamics, k: int, row: int) -> in
 
 
 @compiled
-def advance_reference(
+def _advance_reference(
     body: WholeBodyDynamics, k: int, R: Matrix, p: Vector, twist: Vector
 ) -> None:
     """Move the reference of a hand towards its goal; write its pose and velocity.
@@ -280,90 +256,3 @@ def advance_reference(
             twist[i], twist[3 + i] = way / travel[1], turn[i] / travel[1]
         for j in range(3):
             out[i, j] = R[i, j]
-
-
-@compiled
-def _write_costs(physics: Physics, body: WholeBodyDynamics) -> None:
-    """Write the cost of forces, and of joints away from their posture."""
-    qp, terms = body.qp, body.terms
-    edges, kd = terms.B.shape[0], 2.0 * np.sqrt(POSTURE_KP)
-    for k in range(edges):
-        qp.diagonal[0, k], qp.diagonal[1, k] = FORCE_COST**2, 0.0
-    for j in range(body.qpos.shape[0]):
-        error = body.posture[j] - physics.qpos[body.qpos[j]]
-        wanted = POSTURE_KP * error - kd * terms.v[6 + j]
-        cost = body.posture_weight[j] ** 2
-        qp.diagonal[0, edges + j] = cost + MOTION_COST
-        qp.diagonal[1, edges + j] = cost * wanted
-
-
-@compiled
-def _bound_forces(body: WholeBodyDynamics) -> None:
-    """Bound the forces along edges by the load that a foot may carry."""
-    qp, state, plan = body.qp, body.state[0], body.plan
-    for k in range(body.site.shape[0]):
-        first, last = body.first_edge[k], body.first_edge[k + 1]
-        weight = state.mass * GRAVITY
-        load = plan.load[k]
-        most = weight * (STRONGEST if load >= 1.0 else 1.3 * load)
-        least = min(LEAST_FORCE, 0.5 * most)
-        for edge in range(first, last):
-            qp.lower[edge], qp.upper[edge] = least / (last - first), most / EDGES
-            if load <= 0.0:
-                qp.side[edge] = 1
-            elif qp.side[edge] > 0 and load >= 1.0:
-                qp.side[edge] = 0
-
-
-@compiled
-def _bound_accelerations(physics: Physics, body: WholeBodyDynamics) -> None:
-    """Bound accelerations so that joints stay within position and velocity limits.
-
-    A window is never empty: where limits disagree the upper bound gives way.
-    """
-    qp, edges = body.qp, body.terms.B.shape[0]
-    kp, kd, kv, most = WINDOW
-    for j in range(body.qpos.shape[0]):
-        q, v = physics.qpos[body.qpos[j]], body.terms.v[6 + j]
-        fastest = body.limits[2, j]
-        high = max(kp * (body.limits[1, j] - q) - kd * v, -most)
-        high = min(high, max(kv * (fastest - v), -most))
-        low = min(kp * (body.limits[0, j] - q) - kd * v, most)
-        low = max(low, min(kv * (-fastest - v), most))
-        low = min(max(low, -FASTEST), FASTEST - 1e-3)
-        qp.lower[edges + j] = low
-        qp.upper[edges + j] = max(min(high, FASTEST), low + 1e-3)
-
-
-@compiled
-def _bound_torques(body: WholeBodyDynamics) -> None:
-    """Write `tau = M_j a + h_j - B_j^T f` as rows of y, within the motors' limits."""
-    terms, qp = body.terms, body.qp
-    n, edges = body.qpos.shape[0], terms.B.shape[0]
-    size = edges + n
-    for j in range(n):
-        row, M = qp.rows[j], terms.M[6 + j]
-        for k in range(edges):
-            row[k] = -terms.B[k, 6 + j]
-        for k in range(n):
-            row[edges + k] = M[6 + k]
-        bias = terms.h[6 + j]
-        for i in range(6):
-            X, part = terms.root[i], M[i]
-            for k in range(size):
-                row[k] += part * X[k]
-            bias += part * X[size]
-        qp.upper[size + j] = body.limits[4, j] - bias
-        qp.upper[size + n + j] = bias - body.limits[3, j]
-        other = qp.rows[n + j]
-        for k in range(size):
-            other[k] = -row[k]
-
-
-@compiled
-def edge_forces(body: WholeBodyDynamics, column: int) -> float:
-    """Return the generalised force of all contacts along one column."""
-    total, B = 0.0, body.terms.B
-    for k in range(B.shape[0]):
-        total += B[k, column] * body.qp.x[k]
-    return total

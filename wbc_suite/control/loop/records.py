@@ -5,24 +5,17 @@ A law owns its records until a simulation gathers the laws of all robots in one 
 
 from collections.abc import Sequence
 from enum import IntEnum
-from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wbc_suite.compiling import is_compiling
+from wbc_suite.compiling import readable
+from wbc_suite.typing import CompiledRecords, Records
 
 __all__ = ["DRIVE", "LAW", "MOST_FEET", "STANCE", "CompiledRecords", "LawKind"]
-__all__ += ["Records", "gather", "new_records"]
+__all__ += ["Records", "gather", "new_records", "readable"]
 
 MOST_FEET = 8
 """Greatest number of feet of one robot."""
-
-Records: TypeAlias = NDArray[np.void]
-"""Structured array of `LAW` or `DRIVE` records."""
-
-CompiledRecords: TypeAlias = Any
-"""Such an array, or one of its records, in a kernel: fields are attributes."""
 
 
 class LawKind(IntEnum):
@@ -129,11 +122,6 @@ velocity and acceleration are those of the commanded velocity, which changes unt
 def new_records(count: int, kind: np.dtype[np.void]) -> Records:
     """Return records of `LAW` or `DRIVE` kind, all zero."""
     return readable(np.zeros(count, kind))
-
-
-def readable(records: Records) -> Records:
-    """Return records whose fields plain Python reads as kernels do, if it has to."""
-    return records if is_compiling() else records.view(np.recarray)
 
 
 def gather(pieces: Sequence[tuple[Records, Records]]) -> tuple[Records, Records]:

@@ -1,0 +1,107 @@
+"""What the simulation asks of composite controllers."""
+
+from typing import Any, Protocol, runtime_checkable
+
+from wbc_suite.control.action import ActionLayout
+from wbc_suite.control.composite.tick import WholeBodyArrays
+from wbc_suite.control.dynamics.arrays import WholeBodyDynamics
+from wbc_suite.control.law.law import Law
+from wbc_suite.control.state import RobotState
+from wbc_suite.typing import Vector
+
+__all__ = [
+    "CompositeController",
+    "DynamicController",
+    "SteppedController",
+    "TickedController",
+]
+
+
+class CompositeController(Protocol):
+    """Drives all actuators of one robot.
+
+    The order of calls is `reset`, then `set_goal` once per action, then `prepare`
+    before the first physics step and whenever its answer has expired. The laws act
+    between `mj_step1` and `mj_step2` of every step, in the compiled loop.
+
+    Attributes:
+        layout: Slices of the action.
+        laws: Laws of the control loop.
+    """
+
+    layout: ActionLayout
+    laws: tuple[Law, ...]
+
+    @property
+    def hold_action(self) -> Vector:
+        """The action that keeps the present goals."""
+        ...
+
+    def info(self, state: RobotState) -> dict[str, Any]:
+        """Return entries of the environment's `info`, by key."""
+        ...
+
+    def reset(self, state: RobotState) -> None:
+        """Start from the robot's state; goals hold it there."""
+        ...
+
+    def set_goal(self, action: Vector, period: float = 0.05) -> None:
+        """Take an action that `layout` has checked and clipped.
+
+        Args:
+            action: Shape (layout.size,).
+            period: Time until the next one, s.
+        """
+        ...
+
+    def prepare(self, state: RobotState) -> int:
+        """Update the laws; return for how many physics steps that is enough."""
+        ...
+
+
+@runtime_checkable
+class SteppedController(CompositeController, Protocol):
+    """A composite controller that computes commands in Python at every physics step.
+
+    Its laws act first; `compute` overrides their commands.
+    """
+
+    def compute(self, state: RobotState) -> Vector:
+        """Return one command per actuator, in the order of `state.actuators`.
+
+        Called after `mj_step1`. A command is a torque, or a setpoint where the actuator
+        is a servo.
+        """
+        ...
+
+
+@runtime_checkable
+class TickedController(CompositeController, Protocol):
+    """A composite controller whose ticks the control loop can run."""
+
+    def loop_tick(self) -> WholeBodyArrays | None:
+        """Return the tick, or None where Python computes each.
+
+        Called once the laws are in the loop's table. Without a tick `prepare` is
+        called as for other controllers.
+        """
+        ...
+
+    def finish_tick(self) -> None:
+        """Finish a tick that the loop has begun, if there is one."""
+        ...
+
+
+@runtime_checkable
+class DynamicController(CompositeController, Protocol):
+    """A composite controller whose accelerations are those of one QP for all joints.
+
+    Attributes:
+        dynamics: What the QP's kernels read and write, see `solve_whole_body`.
+    """
+
+    dynamics: WholeBodyDynamics
+
+    def finish_tick(self) -> None:
+        """Solve the QP if the loop has stated it and not found its active set."""
+        ...
