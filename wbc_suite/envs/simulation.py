@@ -10,6 +10,7 @@ from wbc_suite.compiling import announced, as_argument, is_compiling, plain
 from wbc_suite.control import CompositeController, RobotState, SteppedController
 from wbc_suite.control.composite.protocols import DynamicController, TickedController
 from wbc_suite.control.composite.tick import WholeBodyArrays
+from wbc_suite.control.dynamics.arrays import for_plain_python
 from wbc_suite.control.loop.advance import advance
 from wbc_suite.control.loop.inverse_dynamics import (
     needed_kernels,
@@ -93,7 +94,7 @@ class Simulation:
         self._law_arguments = views[0], *records
         if not compiled:
             laws, drives = self._laws.view(np.recarray), self._drives.view(np.recarray)
-            kernels = *kernels[:-1], tuple(bodies) or None
+            kernels = *kernels[:-1], tuple(map(for_plain_python, bodies)) or None
             self._law_arguments = physics, laws, drives, *kernels
         with announced("the control loop"):
             self._call_loop(0)

@@ -134,7 +134,7 @@ STATE = np.dtype(
         ("reference", "f8", (2,)),  # of the centre of mass, m
         ("phase", "f8"),  # trot: part of the cycle
         ("stance", "i8"),  # walk: the foot that stands, 0 left, 1 right
-        ("since", "f8"),  # walk: time since the step began, s
+        ("since", "f8"),  # walk: time since the step began; trot: when it last stood, s
         ("duration", "f8"),  # walk: of this step, s
         ("shift", "f8"),  # walk: part of the way from standing to the first step
         ("waiting", "f8"),  # walk: time since then, s

@@ -33,7 +33,7 @@ LOADING = 0.03
 """s in which a foot takes over its load, and leaves it."""
 
 SETTLING = 0.3
-"""s after the reset in which the robot does not step by itself."""
+"""s after the reset, and after the last step, in which feet may slip."""
 
 LEASH = 0.1
 """m; the reference is not farther from the centre of mass."""
@@ -122,8 +122,9 @@ def _switch_mode(gait: Gait, measured: Measured, moving: bool, margin: float) ->
     speed = np.sqrt(v[0] ** 2 + v[1] ** 2)
     if state.mode == _STAND:
         pushed = margin < settings.margin or speed > settings.speed
+        settled = state.time > state.since + SETTLING
         for k in range(measured.slip.shape[0]):
-            pushed = pushed or measured.slip[k] > SLIPPING
+            pushed = pushed or (settled and measured.slip[k] > SLIPPING)
         if pushed and state.time > SETTLING and settings.recover > 0.0:
             state.until = state.time + RECOVERY
         if moving or state.time < state.until:
@@ -133,7 +134,7 @@ def _switch_mode(gait: Gait, measured: Measured, moving: bool, margin: float) ->
     for i in range(3):
         at_rest = at_rest and abs(state.velocity[i]) < 0.02
     if at_rest and state.phase % 0.5 < 0.02:
-        state.mode = _STAND
+        state.mode, state.since = _STAND, state.time
         state.reference[0], state.reference[1] = measured.com[0], measured.com[1]
 
 

@@ -13,7 +13,7 @@ from wbc_suite.qp.active_set import QpArrays, make_qp_arrays
 from wbc_suite.typing import Indices, Matrix, Records, Vector
 
 __all__ = ["EDGES", "Foot", "Limits", "Stage", "Terms", "WholeBodyDynamics"]
-__all__ += ["make_dynamics"]
+__all__ += ["for_plain_python", "make_dynamics"]
 
 
 class Stage(IntEnum):
@@ -246,6 +246,15 @@ def make_dynamics(
         plan=make_plan(f),
         qp=make_qp_arrays(W, *rest, inequalities=2 * n),
     )
+
+
+def for_plain_python(body: WholeBodyDynamics) -> WholeBodyDynamics:
+    """Return the same arrays, with records whose fields plain Python reads."""
+    gait = body.gait._replace(
+        settings=body.gait.settings.view(np.recarray),
+        state=body.gait.state.view(np.recarray),
+    )
+    return body._replace(state=body.state.view(np.recarray), gait=gait)
 
 
 def _make_terms(n: int, edges: int) -> Terms:

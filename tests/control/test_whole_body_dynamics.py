@@ -1,0 +1,308 @@
+"""WHOLE_BODY_ID: its terms, its QP, and robots that stand, walk and are pushed."""
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wbc_suite
+from wbc_suite.control import load_composite_controller_config
+from wbc_suite.control.dynamics.arrays import EDGES
+from wbc_suite.control.dynamics.fallback import QpFallback
+from wbc_suite.control.dynamics.terms import write_frame_terms
+from wbc_suite.control.loop.physics import bind_physics
+from wbc_suite.errors import ConfigError
+from wbc_suite.qp.solution import Fallback
+
+ROBOTS = ("GR1FreeBody", "SpotWithArm")
+
+
+class Walker:
+    """A robot under WHOLE_BODY_ID."""
+
+    def __init__(self, alone, name, **changes):
+        found = alone(name, "WHOLE_BODY_ID", **changes)
+        self.state, self.controller = found.state, found.controller
+        self.simulation, self.robot = found.simulation, found.robot
+        self.model, self.data = self.state.model, self.state.data
+        self.body = self.controller.dynamics
+        self.simulation.start()
+        self.link = int(self.body.state["body"][0])
+
+    def act(self, seconds, walk=(0.0, 0.0, 0.0), push=(0.0, 0.0, 0.0), each=None):
+        layout = self.controller.layout
+        action = layout.pack({"walk": walk}, base=self.controller.hold_action)
+        for _ in range(round(seconds / 0.02)):
+            self.controller.set_goal(action, 0.02)
+            self.data.xfrc_applied[self.link, :3] = push
+            self.simulation.tick(10)
+            if each is not None:
+                each()
+        return self
+
+    @property
+    def balance(self):
+        return self.controller.info(self.state)["balance"]
+
+    def forces(self):
+        """Return the contact forces that MuJoCo applies to the robot, upwards, N."""
+        total, force = 0.0, np.zeros(6)
+        for k in range(self.data.ncon):
+            mujoco.mj_contactForce(self.model, self.data, k, force)
+            frame = self.data.contact[k].frame.reshape(3, 3)
+            total += abs((frame.T @ force[:3])[2])
+        return total
+
+
+@pytest.fixture(scope="module", params=ROBOTS)
+def walking(request, alone):
+    """A robot in the middle of a step."""
+    return Walker(alone, request.param).act(1.9, (0.2, 0.1, 0.2))
+
+
+@pytest.fixture(scope="module", params=ROBOTS)
+def standing(request, alone):
+    return Walker(alone, request.param).act(1.0)
+
+
+def stepped(walker):
+    """Bring MuJoCo's arrays to the state of the last tick's end."""
+    mujoco.mj_step1(walker.model, walker.data)
+
+
+def test_terms_are_those_of_mujoco(walking):
+    body, data, model = walking.body, walking.data, walking.model
+    stepped(walking)
+    solve_once(walking)
+    dofs, full = body.dofs, np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, full)
+    np.testing.assert_allclose(body.terms.M, full[np.ix_(dofs, dofs)], atol=1e-12)
+    np.testing.assert_allclose(body.terms.v, data.qvel[dofs])
+    robot, q, v = walking.robot.to_pinocchio(), walking.state.q, walking.state.v
+    free = robot.createData()
+    pin.computeCentroidalMomentum(robot, free, q, v)
+    np.testing.assert_allclose(body.terms.com, free.com[0], atol=1e-9)
+    fingers = 2e-3 * np.abs(free.hg.linear).max()  # they are not in the law
+    measured = body.terms.M[:3] @ body.terms.v
+    np.testing.assert_allclose(measured, free.hg.linear, atol=fingers + 1e-6)
+    np.testing.assert_allclose(body.terms.spin, free.hg.angular, atol=5e-3)
+
+
+def test_frames_have_mujocos_jacobians_and_drifts(walking):
+    body, data, model = walking.body, walking.data, walking.model
+    stepped(walking)
+    physics = bind_physics(model, data)
+    for site in [*body.site, *body.hand]:
+        link, p = int(model.site_bodyid[site]), data.site_xpos[site].copy()
+        write_frame_terms(physics, body, link, p)
+        linear, angular = np.zeros((2, 3, model.nv))
+        mujoco.mj_jac(model, data, linear, angular, p, link)
+        J = np.vstack([linear, angular])
+        np.testing.assert_allclose(body.terms.J, J[:, body.dofs], atol=1e-12)
+        np.testing.assert_allclose(body.terms.velocity, J @ data.qvel, atol=1e-10)
+        mujoco.mj_jacDot(model, data, linear, angular, p, link)
+        drift = np.vstack([linear, angular]) @ data.qvel
+        np.testing.assert_allclose(body.terms.drift, drift, atol=1e-9)
+
+
+def solve_once(walker):
+    """Run the law's tick once more in the present state, without physics."""
+    arguments = walker.simulation._law_arguments
+    walker.body.state["stage"] = 0
+    if not walker.simulation._solve_bodies(arguments[0], arguments[-1]):
+        walker.controller.finish_tick()
+    walker.simulation._write_commands(*arguments)
+
+
+def test_the_answer_keeps_the_equations_of_motion_and_its_limits(walking):
+    body, data = walking.body, walking.data
+    stepped(walking)
+    solve_once(walking)
+    terms, n = body.terms, len(body.qpos)
+    f, edges = body.qp.x[: len(terms.B)], len(terms.B)
+    total = terms.M @ terms.a + terms.h - terms.B.T @ f
+    np.testing.assert_allclose(total[:6], 0.0, atol=1e-9 * np.abs(terms.h).max())
+    tau = data.ctrl[walking.controller.laws[0].drives["ctrl"]]
+    np.testing.assert_allclose(total[6:], tau, atol=1e-8)
+    _, _, _, low, high = body.limits
+    assert (tau >= low - 1e-9).all()
+    assert (tau <= high + 1e-9).all()
+    assert (f >= body.qp.lower[:edges] - 1e-9).all()
+    assert (terms.a[6:] >= body.qp.lower[edges : edges + n] - 1e-9).all()
+    assert (terms.a[6:] <= body.qp.upper[edges : edges + n] + 1e-9).all()
+    for k in range(len(body.site)):
+        if body.plan.load[k] == 0.0:
+            first, last = body.first_edge[k], body.first_edge[k + 1]
+            np.testing.assert_array_equal(f[first:last], 0.0)
+
+
+def test_daqp_finds_the_same_optimum(walking):
+    qp, checked = walking.body.qp, 0
+    for _ in range(20):
+        walking.act(0.02, (0.2, 0.1, 0.2))
+        stepped(walking)
+        solve_once(walking)
+        x = qp.x.copy()
+        assert QpFallback(qp).solve(qp) is Fallback.NONE
+        scale = np.maximum(1.0, np.abs(x))
+        checked += 1
+        found, best = cost(qp, x), cost(qp, qp.x)
+        assert found <= best + 1e-6 * abs(best) + 1e-6
+        np.testing.assert_allclose(
+            (x / scale)[len(walking.body.terms.B) :],
+            (qp.x / scale)[len(walking.body.terms.B) :],
+            atol=2e-3,
+        )
+        qp.x[:] = x
+    assert checked == 20
+
+
+def cost(qp, x):
+    square = 0.5 * np.sum((qp.W @ x - qp.e) ** 2)
+    return square + 0.5 * qp.diagonal[0] @ x**2 - qp.diagonal[1] @ x
+
+
+def test_the_root_is_eliminated_by_its_equations_of_motion(standing):
+    body, rng = standing.body, np.random.default_rng(0)
+    stepped(standing)
+    solve_once(standing)
+    terms, edges = body.terms, len(body.terms.B)
+    for _ in range(5):
+        y = rng.normal(size=len(body.qp.x))
+        root = terms.root[:, :-1] @ y + terms.root[:, -1]
+        left = terms.M[:6] @ np.concatenate([root, y[edges:]]) + terms.h[:6]
+        right = terms.B[:, :6].T @ y[:edges]
+        np.testing.assert_allclose(left, right, atol=1e-9 * np.abs(terms.h).max())
+
+
+def test_planned_forces_are_those_of_the_simulation(standing):
+    planned = standing.body.qp.x[: len(standing.body.terms.B)].sum()
+    weight = 9.81 * standing.model.body_subtreemass[standing.link]
+    assert planned == pytest.approx(weight, rel=0.01)
+    mujoco.mj_forward(standing.model, standing.data)
+    assert standing.forces() == pytest.approx(weight, rel=0.01)
+
+
+def test_standing_feet_do_not_slip(standing):
+    feet = standing.data.site_xpos[standing.body.site].copy()
+    standing.act(1.0)
+    moved = standing.data.site_xpos[standing.body.site] - feet
+    np.testing.assert_allclose(moved, 0.0, atol=1e-3)
+    assert len(standing.balance["stance"]) == len(feet)
+    assert standing.balance["margin"] > 0.02
+    assert standing.balance["unsolved"] == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "speed"), [("GR1FreeBody", 0.3), ("Spot", 0.8), ("SpotWithArm", 0.8)]
+)
+def test_a_robot_walks_as_commanded_and_stands_again(alone, name, speed):
+    walker = Walker(alone, name).act(2.5, (speed, 0.0, 0.0))
+    start = walker.data.qpos[:3].copy()
+    walker.act(2.0, (speed, 0.0, 0.0))
+    way = walker.data.qpos[:3] - start
+    np.testing.assert_allclose(way[:2], [2.0 * speed, 0.0], atol=0.06)
+    walker.act(3.0)
+    assert not walker.balance["walking"]
+    assert walker.balance["fell"] is None
+    np.testing.assert_allclose(walker.data.qvel[:3], 0.0, atol=0.02)
+
+
+@pytest.mark.parametrize("push", [(400, 0, 0), (-400, 0, 0), (0, 300, 0), (0, -300, 0)])
+def test_gr1_steps_when_it_is_pushed(alone, push):
+    walker = Walker(alone, "GR1FreeBody").act(1.0)
+    walker.act(0.1, push=push).act(0.2)
+    assert walker.balance["walking"]
+    walker.act(3.5)
+    assert walker.balance["fell"] is None
+    assert walker.data.xmat[walker.link][8] > 0.98
+
+
+def test_a_fall_is_told_and_torques_stay_finite(alone):
+    walker, torques = Walker(alone, "GR1FreeBody").act(0.7), []
+    walker.act(0.1, push=(1500, 900, 0))
+    walker.act(1.5, each=lambda: torques.append(walker.data.ctrl.copy()))
+    assert np.isfinite(torques).all()
+    assert "fell" in walker.balance["fell"]
+
+
+def test_a_load_in_the_hands_is_observed_and_held(alone):
+    walker = Walker(alone, "GR1FreeBody", input_ref_frame="world").act(0.6)
+    hands = walker.model.site_bodyid[walker.body.hand]
+    walker.data.xfrc_applied[hands, 2] = -2.0 * 9.81
+    before = walker.data.site_xpos[walker.body.hand].copy()
+    walker.act(2.5)
+    for load in walker.balance["loads"].values():
+        np.testing.assert_allclose(load, [0.0, 0.0, -2.0 * 9.81], atol=2.0)
+    moved = walker.data.site_xpos[walker.body.hand] - before
+    np.testing.assert_allclose(moved, 0.0, atol=2e-3)
+
+
+def test_spot_holds_its_hand_in_the_world_while_it_marches(alone):
+    walker = Walker(alone, "SpotWithArm", input_ref_frame="world").act(0.5)
+    start = walker.data.site_xpos[walker.body.hand].copy()
+    errors = []
+
+    def note():
+        errors.append(np.abs(walker.data.site_xpos[walker.body.hand] - start).max())
+
+    walker.act(2.0, (0.0, 0.0, 0.0011), each=note)
+    assert walker.body.gait.state["steps"][0] > 8
+    assert max(errors) < 3e-3
+
+
+def test_a_hand_follows_a_goal_in_the_heading_of_the_robot(alone):
+    walker = Walker(alone, "SpotWithArm")
+    layout, hold = walker.controller.layout, walker.controller.hold_action
+    part = layout["right_hand"]
+    hold[part.start] += 0.05
+    walker.controller.set_goal(hold)
+    before = walker.data.site_xpos[walker.body.hand[0]].copy()
+    walker.simulation.tick(500)
+    moved = walker.data.site_xpos[walker.body.hand[0]] - before
+    np.testing.assert_allclose(moved, [0.05, 0.0, 0.0], atol=3e-3)
+
+
+def test_plain_python_computes_the_same_torques(alone):
+    found = []
+    for compiled in (True, False):
+        walker = Walker(alone, "Spot")
+        pairs = walker.simulation.pairs
+        simulation = type(walker.simulation)(
+            walker.model, walker.data, pairs, compiled=compiled
+        )
+        simulation.start()
+        simulation.tick(2)
+        found.append(walker.data.ctrl.copy())
+    np.testing.assert_allclose(*found, atol=1e-8)
+
+
+def test_configs_are_refused_in_words():
+    def load(robot, **changes):
+        config = load_composite_controller_config("WHOLE_BODY_ID", "GR1FreeBody")
+        return load_composite_controller_config(config | changes, robot)
+
+    with pytest.raises(ConfigError, match="fixed root"):
+        load("GR1")
+    with pytest.raises(ConfigError, match="two feet"):
+        load("GR1FreeBody", foot=[{"frame": "left_foot"}, {"frame": "right_foot"}])
+    with pytest.raises(ConfigError, match="four feet"):
+        load("GR1FreeBody", gait={"type": "trot"})
+    feet = load_composite_controller_config("WHOLE_BODY_ID", "GR1FreeBody")["foot"]
+    with pytest.raises(ConfigError, match="Did you mean 'left_foot'"):
+        load("GR1FreeBody", foot=[feet[0] | {"frame": "left_fot"}, feet[1]])
+    with pytest.raises(ConfigError, match="heel < toes"):
+        load("GR1FreeBody", foot=[{"frame": "left_foot", "sole": [1, 0, 0, 1]}] * 2)
+
+
+def test_an_environment_walks(alone):
+    env = wbc_suite.make("Lift", robots="Spot", controller_configs="WHOLE_BODY_ID")
+    env.reset(seed=0)
+    layout = env.action_layout
+    action = layout.pack({"walk": [-0.5, 0.0, 0.0]}, base=env.hold_action)
+    for _ in range(30):
+        *_, info = env.step(action)
+    assert info["balance"]["walking"]
+    assert info["balance"]["fell"] is None
+    assert EDGES == 4
+    env.close()
