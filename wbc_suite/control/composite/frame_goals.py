@@ -9,7 +9,7 @@ import pinocchio as pin
 from wbc_suite.compiling import as_argument, compiled, struct
 from wbc_suite.control.action import ActionLayout
 from wbc_suite.control.composite.frame_targets import FrameArrays, write_frame_pose
-from wbc_suite.control.composite.whole_body_config import GoalsConfig
+from wbc_suite.control.composite.goals_config import GoalsConfig
 from wbc_suite.kinematics import Configuration
 from wbc_suite.kinematics.forward import RobotArrays, compute_joint_poses
 from wbc_suite.qp.lie import exp3, log3

@@ -16,9 +16,9 @@ from wbc_suite.qp import ComTask, FrameTask
 from wbc_suite.typing import Matrix, Vector
 
 if TYPE_CHECKING:
+    from wbc_suite.control.composite.goals_config import GoalsConfig
     from wbc_suite.control.composite.whole_body_config import (
         ControlledFrame,
-        GoalsConfig,
     )
 
 __all__ = [

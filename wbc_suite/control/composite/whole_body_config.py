@@ -1,7 +1,7 @@
 """Config of the whole-body composites: `controllers/{robot}_whole_body_ik.toml`."""
 
 from collections.abc import Collection, Iterator, Mapping
-from typing import Annotated, Any, Literal, Protocol
+from typing import Annotated, Any, Literal
 
 from pydantic import (
     AfterValidator,
@@ -12,6 +12,7 @@ from pydantic import (
 )
 
 from wbc_suite.control.composite.frame_kinds import FrameKind, find_frame_kind
+from wbc_suite.control.composite.goals_config import check_goals
 from wbc_suite.control.composite.reduced_robot import gripper_groups
 from wbc_suite.control.law.joint_laws import JointLawConfig
 from wbc_suite.control.part.stance_controller import HeldFrame
@@ -23,14 +24,12 @@ from wbc_suite.tomlfile import FrozenModel, parse_model
 
 __all__ = [
     "ControlledFrame",
-    "GoalsConfig",
     "HeldFrame",
     "InputFrame",
     "InputType",
     "LimitsConfig",
     "PostureConfig",
     "WholeBodyIKConfig",
-    "check_goals",
     "check_whole_body",
     "default_whole_body_config",
     "read_whole_body",
@@ -150,56 +149,6 @@ class LimitsConfig(FrozenModel):
     floor: float = 0.0
     weight_shares: dict[Name, PositiveFloat] = {}
     balance_margin: NonNegativeFloat = 0.03
-
-
-class GoalsConfig(Protocol):
-    """Controlled frames, and how an action moves their goals.
-
-    Attributes:
-        frames: Controlled frames, in the order of the action.
-        input_type: `absolute` targets, or `delta` steps from the last target.
-        input_ref_frame: Axes of targets and steps: `world`, the robot's `base`, or the
-            controlled frame's own (`eef`, deltas only).
-        delta_position: Largest step of a delta action, m.
-        delta_rotation: Largest step of a delta action, rad.
-    """
-
-    @property
-    def frames(self) -> tuple[ControlledFrame, ...]:
-        """Controlled frames."""
-        ...
-
-    @property
-    def input_type(self) -> InputType:
-        """What an action is."""
-        ...
-
-    @property
-    def input_ref_frame(self) -> InputFrame:
-        """Axes of actions."""
-        ...
-
-    @property
-    def delta_position(self) -> float:
-        """Largest step, m."""
-        ...
-
-    @property
-    def delta_rotation(self) -> float:
-        """Largest step, rad."""
-        ...
-
-
-def check_goals(config: GoalsConfig) -> None:
-    """Raise ValueError where frames share a name, or axes do not fit the input."""
-    names = [frame.name for frame in config.frames]
-    if len(set(names)) != len(names):
-        raise ValueError(f"controlled frames share a name: {names}")
-    if config.input_type == "absolute" and config.input_ref_frame == "eef":
-        raise ValueError(
-            "input_ref_frame 'eef' needs input_type 'delta': a frame is always at the "
-            "origin of its own axes"
-        )
 
 
 class WholeBodyIKConfig(FrozenModel):
