@@ -101,10 +101,11 @@ def _files(catalogue: "Catalogue", kind: Kind) -> "Table":
 
 def _controlled(content: dict[str, Any]) -> str:
     """Return what a controller's file controls."""
-    if "frame" in content:
-        return ", ".join(frame["name"] for frame in content["frame"])
-    parts = content["body_parts"].items()
-    return ", ".join(f"{name}: {part['type']}" for name, part in parts)
+    if "body_parts" in content:
+        parts = content["body_parts"].items()
+        return ", ".join(f"{name}: {part['type']}" for name, part in parts)
+    walk = ["walk", "height"] if "gait" in content else []
+    return ", ".join([*(frame["name"] for frame in content.get("frame", ())), *walk])
 
 
 def _table(title: str, *columns: str) -> "Table":
