@@ -51,7 +51,7 @@ def control_only(
 ) -> None:
     """Compute the control of one instant again and again."""
     for _ in range(steps):
-        write_commands(physics, laws, drives, hands, feet, custom_law)
+        write_commands(physics, laws, drives, hands, feet, custom_law, None)
 
 
 class Law:
@@ -72,7 +72,7 @@ class Law:
         write, (laws, drives, *kernels) = plain(write_commands), self.records
         laws, drives = laws.view(np.recarray), drives.view(np.recarray)
         for _ in range(steps):
-            write(self.physics, laws, drives, *kernels)
+            write(self.physics, laws, drives, *kernels, None)
 
     def run(self, blocks: int) -> dict[str, list[float]]:
         """Return times of one step by side, us."""

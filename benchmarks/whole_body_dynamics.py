@@ -253,7 +253,8 @@ class Trial:
         """Return what happened."""
         stand, case = self.stand, self.case
         steps = round(ACTION / stand.model.opt.timestep)
-        for i in range(round(case.seconds / ACTION)):
+        i, planned = 0, round(case.seconds / ACTION)
+        while i < planned:
             t = i * ACTION
             self._act(t)
             self._disturb(t)
@@ -265,7 +266,6 @@ class Trial:
                 break
             if stand.data.xmat[self.body][8] < TILTED:
                 break
-        else:
             i += 1
         return self._found(i * ACTION)
 

@@ -11,12 +11,12 @@ layout = env.action_layout
 stand = env.hold_action
 walk = layout.pack({"walk": [-0.3, 0.0, 0.2]}, base=stand)
 
-trunk = env.unwrapped.simulation.data.body("robot0_base_link")
+trunk = env.simulation.data.body("robot0_base_link")
 start = trunk.xpos.copy()
 for i in range(160):
     action = walk if 20 <= i < 100 else stand
     trunk_force = [0.0, 250.0, 0.0] if 110 <= i < 112 else [0.0, 0.0, 0.0]
-    env.unwrapped.simulation.data.xfrc_applied[trunk.id, :3] = trunk_force
+    env.simulation.data.xfrc_applied[trunk.id, :3] = trunk_force
     *_, info = env.step(action)
     if i % 20 == 19:
         balance = info["balance"]

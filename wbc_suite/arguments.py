@@ -11,8 +11,6 @@ import numpy as np
 from wbc_suite.errors import ConfigError, shortened
 from wbc_suite.typing import Array
 
-__all__ = ["check_array", "check_count", "check_number"]
-
 _REAL = "fiu"  # NumPy's kinds of real numbers
 
 

@@ -14,8 +14,6 @@ from pathlib import Path
 
 from wbc_suite.errors import ConfigError, UnknownNameError
 
-__all__ = ["Catalogue", "user_cache", "user_cache_root"]
-
 ENVIRONMENT_VARIABLE = "WBC_SUITE_CATALOGUE"
 
 

@@ -24,9 +24,6 @@ from numba.experimental import structref
 from wbc_suite.catalogue import user_cache
 from wbc_suite.typing import Records
 
-__all__ = ["announced", "as_argument", "cache_folder", "compiled"]
-__all__ += ["compiled_nogil", "is_compiling", "plain", "readable", "struct"]
-
 log = logging.getLogger(__name__)
 
 _untyped: Any = numba

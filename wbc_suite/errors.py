@@ -8,22 +8,6 @@ what is allowed, and what to do.
 import difflib
 from collections.abc import Collection, Sequence
 
-__all__ = [
-    "ActionError",
-    "ConfigError",
-    "DatasetError",
-    "DescriptionError",
-    "DeviceError",
-    "PhysicsError",
-    "PlacementError",
-    "SolverError",
-    "UnknownNameError",
-    "WbcError",
-    "did_you_mean",
-    "join_first",
-    "shortened",
-]
-
 MAX_NAMES = 25
 """Largest number of names in a message."""
 

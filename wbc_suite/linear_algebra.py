@@ -10,20 +10,6 @@ import numpy as np
 from wbc_suite.compiling import compiled
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = [
-    "cholesky",
-    "dot",
-    "inverse_trace",
-    "lq_factor",
-    "lq_solve",
-    "pseudo_inverse",
-    "row_space",
-    "solve",
-    "solve_lower",
-    "solve_upper",
-    "subtract_projection",
-]
-
 _SMALLEST = 1e-30
 """Square of a length that counts as zero."""
 

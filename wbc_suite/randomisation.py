@@ -19,8 +19,6 @@ from wbc_suite.typing import Array
 if TYPE_CHECKING:
     from wbc_suite.envs import RobotEnv
 
-__all__ = ["BoundRandomisation", "Randomisation", "draw_pattern"]
-
 Share: TypeAlias = Annotated[float, Field(ge=0.0, lt=1.0)]
 
 

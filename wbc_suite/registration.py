@@ -13,8 +13,6 @@ from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec
 from types import ModuleType
 
-__all__ = ["BENCHMARKS", "register_environments"]
-
 BENCHMARKS = (
     "Door",
     "Lift",

@@ -10,8 +10,6 @@ from dataclasses import dataclass, field
 import mujoco
 import numpy as np
 
-__all__ = ["Block", "Frames", "time_block", "time_frames", "times"]
-
 clock = time.process_time_ns
 _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 

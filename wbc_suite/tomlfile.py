@@ -15,17 +15,6 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from wbc_suite.errors import ConfigError, did_you_mean, join_first, shortened
 
-__all__ = [
-    "FROZEN",
-    "FrozenModel",
-    "load_model",
-    "parse_model",
-    "parse_toml",
-    "read_json",
-    "read_text",
-    "read_toml",
-]
-
 MAX_BYTES = 4_000_000
 """Largest file that is read; the largest in the catalogue has about 60 kB."""
 

@@ -134,7 +134,7 @@ def test_sensors_that_are_switched_off_stay_off():
 def machine_code(monkeypatch, tmp_path):
     """Machine code is kept in an empty folder."""
     monkeypatch.setattr(compiling, "user_cache", lambda: tmp_path)
-    monkeypatch.setattr(compiling.numba.config, "CACHE_DIR", "")
+    monkeypatch.setattr("numba.config.CACHE_DIR", "")
     compiling.cache_folder.cache_clear()
     yield tmp_path / "compiled"
     compiling.cache_folder.cache_clear()
@@ -176,7 +176,7 @@ def test_machine_code_that_is_long_unused_is_deleted(machine_code):
 def test_a_folder_that_cannot_be_written_is_replaced(monkeypatch, tmp_path):
     blocked = tmp_path / "file"
     blocked.write_text("not a folder")
-    monkeypatch.setattr(compiling.numba.config, "CACHE_DIR", str(blocked))
+    monkeypatch.setattr("numba.config.CACHE_DIR", str(blocked))
     compiling.cache_folder.cache_clear()
     try:
         folder = compiling.cache_folder()

@@ -29,6 +29,7 @@ from wbc_suite.control.law.osc_saturation import POSTURE_COST, SHORTENING_COST
 from wbc_suite.control.law.stance import LEAST_PRESSURE, RANK, TORQUE_ARM
 from wbc_suite.control.loop.acceleration_limits import RATE
 from wbc_suite.control.loop.records import LawKind
+from wbc_suite.typing import Matrix, Vector
 
 UNBOUNDED = 1e30
 
@@ -539,14 +540,14 @@ def _carrying(state, joints, sites):
 
 
 class Dynamics(NamedTuple):
-    M: object
-    h: object
-    J: object
-    S: object
-    s: object
-    A: object
-    b: object
-    lift: object
+    M: Matrix
+    h: Vector
+    J: Matrix
+    S: Matrix
+    s: Vector
+    A: Matrix
+    b: Vector
+    lift: Matrix
 
 
 class Balance(Stance):

@@ -112,7 +112,7 @@ def write_all_commands(controller, state):
     kernels = needed_kernels(laws)
     laws, drives = laws.view(np.recarray), drives.view(np.recarray)
     physics = bind_physics(state.model, state.data)
-    plain(write_commands)(physics, laws, drives, *kernels)
+    plain(write_commands)(physics, laws, drives, *kernels, None)
 
 
 @pytest.mark.slow

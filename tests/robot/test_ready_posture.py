@@ -82,7 +82,7 @@ class Lone:
         physics = as_argument(bind_physics(self.model, self.data))
         records = gather([(law.record, law.drives)])
         law.adopt(*records)
-        arguments = physics, *records, *needed_kernels(records[0])
+        arguments = physics, *records, *needed_kernels(records[0]), None
         for _ in range(round(seconds / self.model.opt.timestep)):
             mujoco.mj_step1(self.model, self.data)
             write_commands(*arguments)

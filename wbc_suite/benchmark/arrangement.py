@@ -8,8 +8,6 @@ from wbc_suite.errors import ConfigError
 from wbc_suite.robot import RobotDescription
 from wbc_suite.scene import place_robot
 
-__all__ = ["TwoArmPlaces", "arrange_one", "arrange_two_arms"]
-
 
 class TwoArmPlaces(Protocol):
     """Places of robots in the file of a two-arm benchmark; distances in m.

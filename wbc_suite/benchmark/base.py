@@ -15,14 +15,6 @@ from wbc_suite.robot import RobotDescription
 from wbc_suite.sensing.reading import Reading
 from wbc_suite.tomlfile import parse_model, read_toml
 
-__all__ = [
-    "Benchmark",
-    "benchmark_names",
-    "load_benchmark",
-    "load_config",
-    "register_benchmark",
-]
-
 C = TypeVar("C", bound=BaseModel)
 
 

@@ -24,8 +24,6 @@ from wbc_suite.sensing.reading import (
 from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Vector
 
-__all__ = ["Door", "DoorConfig"]
-
 DOOR = "door"
 HINGE, LEVER, GRIP = "door_panel_joint", "door_handle_joint", "door_handle_grip"
 

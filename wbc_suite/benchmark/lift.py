@@ -20,8 +20,6 @@ from wbc_suite.sensing.reading import Reading
 from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Vector
 
-__all__ = ["Lift", "LiftConfig"]
-
 CUBE = "cube"
 
 

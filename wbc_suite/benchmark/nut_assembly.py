@@ -21,8 +21,6 @@ from wbc_suite.scene.placement import Region, SequentialSampler, UniformSampler
 from wbc_suite.sensing.reading import Reading
 from wbc_suite.tomlfile import FrozenModel
 
-__all__ = ["NutAssembly", "NutAssemblyConfig"]
-
 MAKERS = {"SquareNut": objects.square_nut, "RoundNut": objects.round_nut}
 
 Nut = Literal["SquareNut", "RoundNut"]

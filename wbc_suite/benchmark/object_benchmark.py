@@ -30,8 +30,6 @@ from wbc_suite.sensing.reading import (
 from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Vector
 
-__all__ = ["ObjectBenchmark", "ObjectBenchmarkConfig", "Opposed"]
-
 log = logging.getLogger(__name__)
 
 TRIES = 50

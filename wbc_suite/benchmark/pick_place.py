@@ -18,8 +18,6 @@ from wbc_suite.scene.objects import SceneObject
 from wbc_suite.scene.placement import Region, UniformSampler
 from wbc_suite.sensing.reading import Reading
 
-__all__ = ["PickPlace", "PickPlaceConfig"]
-
 MAKERS = {
     "Milk": objects.milk,
     "Bread": objects.bread,

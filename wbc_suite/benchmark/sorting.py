@@ -10,8 +10,6 @@ from wbc_suite.benchmark.staged_reward import StagedReward
 from wbc_suite.scene.objects import ObjectState
 from wbc_suite.sensing.reading import Reading, constant, selected
 
-__all__ = ["Sorting"]
-
 
 class SortingBenchmark(Protocol):
     """What the rules need of a benchmark; most of it is in `ObjectBenchmark`."""

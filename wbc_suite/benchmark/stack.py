@@ -17,8 +17,6 @@ from wbc_suite.scene.placement import Region, UniformSampler
 from wbc_suite.sensing.reading import Reading, body_position, offset
 from wbc_suite.tomlfile import FrozenModel
 
-__all__ = ["Stack", "StackConfig"]
-
 A, B = "cubeA", "cubeB"
 
 

@@ -6,8 +6,6 @@ from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
 from wbc_suite.tomlfile import FrozenModel
 
-__all__ = ["StagedReward"]
-
 
 class StagedReward(FrozenModel):
     """Rewards of the stages, all below 1, and their scales.

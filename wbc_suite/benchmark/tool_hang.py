@@ -24,8 +24,6 @@ from wbc_suite.scene.placement import Region, SequentialSampler, UniformSampler
 from wbc_suite.sensing.reading import Reading, computed
 from wbc_suite.tomlfile import FrozenModel
 
-__all__ = ["ToolHang", "ToolHangConfig"]
-
 STAND, FRAME, TOOL = "base", "frame", "tool"
 FLAT = (0.5, 0.5, 0.5, 0.5)
 """The frame's rod along x and its arm along y, flat on the table."""

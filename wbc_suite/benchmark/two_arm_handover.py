@@ -35,8 +35,6 @@ from wbc_suite.sensing.reading import (
 )
 from wbc_suite.tomlfile import FrozenModel
 
-__all__ = ["TwoArmHandover", "TwoArmHandoverConfig"]
-
 HAMMER, HANDLE = "hammer", "hammer_handle"
 
 

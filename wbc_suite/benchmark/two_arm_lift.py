@@ -28,8 +28,6 @@ from wbc_suite.sensing.reading import (
 )
 from wbc_suite.tomlfile import FrozenModel
 
-__all__ = ["TwoArmLift", "TwoArmLiftConfig"]
-
 POT, HANDLES = "pot", ("pot_handle0", "pot_handle1")
 WALL = 0.006
 """Thickness of the pot's walls, m."""

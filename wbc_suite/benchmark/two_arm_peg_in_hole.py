@@ -32,8 +32,6 @@ from wbc_suite.sensing.reading import (
 )
 from wbc_suite.tomlfile import FrozenModel
 
-__all__ = ["TwoArmPegInHole", "TwoArmPegInHoleConfig"]
-
 PEG, PLATE = "peg", "plate"
 ACROSS = (math.sqrt(0.5), -math.sqrt(0.5), 0.0, 0.0)
 """Turns a plate's normal to the hand's y axis."""

@@ -32,8 +32,6 @@ from wbc_suite.sensing.reading import (
 )
 from wbc_suite.tomlfile import FrozenModel
 
-__all__ = ["TwoArmTransport", "TwoArmTransportConfig"]
-
 LID, PAYLOAD, TRASH = "lid", "payload", "trash"
 START_BIN, TARGET_BIN, TRASH_BIN = "start_bin", "target_bin", "trash_bin"
 GOALS = {PAYLOAD: TARGET_BIN, TRASH: TRASH_BIN}

@@ -20,8 +20,6 @@ from wbc_suite.sensing.reading import Reading, offset, site_position, user_value
 from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["Wipe", "WipeConfig"]
-
 MARK = "mark"
 CENTROID, PORTION, RADIUS, PRESSES, MEASURES = 0, 3, 4, 5, 6
 """Places of the measured values in user data, after the marks; their number."""

@@ -25,8 +25,6 @@ from wbc_suite.cli import (
 from wbc_suite.errors import WbcError
 from wbc_suite.sensing import gl_backend
 
-__all__ = ["app", "run"]
-
 app = typer.Typer(
     name="wbc-suite",
     help="Whole-body control of robots: describe, view, teleoperate, benchmark.",

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from wbc_suite.envs import RobotEnv
     from wbc_suite.typing import Vector
 
-__all__ = ["bench"]
-
 BLOCKS = 5
 RESETS, PICTURES = 20, 50
 SHARE = 0.05  # of the way from what holds the robot to a random action

@@ -13,9 +13,6 @@ if TYPE_CHECKING:
 
     from wbc_suite.catalogue import Catalogue
 
-__all__ = ["check_file", "list_catalogue", "print_schema"]
-
-
 Kind = Literal["robots", "grippers", "bases", "benchmarks", "controllers"]
 
 _FOLDERS = {
@@ -139,7 +136,7 @@ def check_file(
     from wbc_suite.tomlfile import read_toml
 
     content = read_toml(file) if file.suffix == ".toml" else {"component": None}
-    controls = "body_parts" in content or "frame" in content
+    controls = not content.keys().isdisjoint(("body_parts", "frame", "gait"))
     if "name" in content:
         print(f"{file}: fine. {_benchmark(file)}")
     elif file.suffix == ".json" or (controls and "component" not in content):
@@ -182,12 +179,7 @@ def _controller(file: Path, robot: str | None) -> str:
     from wbc_suite.control import load_composite_controller_config
 
     config = load_composite_controller_config(file, robot)
-    given = config.get("body_parts")
-    if given is None:
-        frames = ", ".join(frame["name"] for frame in config["frame"])
-        return f"{config['type']} of {frames}."
-    parts = ", ".join(f"{name} ({part['type']})" for name, part in given.items())
-    return f"{config['type']} of {parts}."
+    return f"{config['type']} of {_controlled(config)}."
 
 
 def print_schema(

@@ -20,17 +20,6 @@ if TYPE_CHECKING:
     from wbc_suite.recording import Dataset
     from wbc_suite.recording.editing import Finding
 
-__all__ = [
-    "convert",
-    "extract",
-    "filter_episodes",
-    "inspect",
-    "merge",
-    "repair",
-    "split",
-    "verify",
-]
-
 OutOption = Annotated[Path, typer.Option("--out", "-o", help="File to write.")]
 
 

@@ -12,8 +12,6 @@ if TYPE_CHECKING:
     from wbc_suite.typing import Matrix, Vector
     from wbc_suite.viewers.offscreen import Image
 
-__all__ = ["demo"]
-
 HANDS = ("right_hand", "left_hand")
 RATE = 50  # Hz, of actions
 PERIOD = 4.0  # s, of one figure

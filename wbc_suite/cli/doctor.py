@@ -13,8 +13,6 @@ import typer
 
 from wbc_suite.errors import WbcError
 
-__all__ = ["Finding", "diagnose", "doctor"]
-
 BASE_SOLVERS = ("daqp", "proxqp", "osqp")
 """QP solvers that come with the package, by the names `qpsolvers` gives them."""
 EXTRA_SOLVERS = ("piqp", "clarabel", "quadprog")

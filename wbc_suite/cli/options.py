@@ -18,31 +18,6 @@ if TYPE_CHECKING:
     from wbc_suite.viewers.page_process import PageProcess
     from wbc_suite.viewers.page_server import PageServer
 
-__all__ = [
-    "BaseOption",
-    "CamerasOption",
-    "CatalogueOption",
-    "ControllerOption",
-    "ExecutorOption",
-    "GripperOption",
-    "HostOption",
-    "PictureSizeOption",
-    "PortOption",
-    "RecordingArgument",
-    "RobotArgument",
-    "RobotsOption",
-    "SkinOption",
-    "TrustFilesOption",
-    "camera_arguments",
-    "chosen",
-    "device_options",
-    "environment_arguments",
-    "progress",
-    "serve_until_interrupted",
-    "tracked",
-    "writing",
-]
-
 RobotArgument = Annotated[
     str,
     typer.Argument(

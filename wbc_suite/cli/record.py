@@ -28,8 +28,6 @@ from wbc_suite.cli.teleop import ONE_DAY, device_maker, drive, stages_of
 if TYPE_CHECKING:
     from wbc_suite.wrappers import DataCollection
 
-__all__ = ["record"]
-
 BY_POLICY, BY_HAND = 20.0, 100.0
 """Hz; at 20 Hz an operator notices the latency of 50 ms."""
 

@@ -18,9 +18,6 @@ if TYPE_CHECKING:
     from wbc_suite.envs import RobotEnv
     from wbc_suite.recording import Dataset, Episode
 
-__all__ = ["replay"]
-
-
 Way = Literal["states", "actions"]
 Place = Literal["browser", "screen"]
 

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from wbc_suite.control import ActionSlice
     from wbc_suite.typing import Vector
 
-__all__ = ["describe_action", "export_robot", "render", "view"]
-
 
 def view(
     robot: RobotArgument,

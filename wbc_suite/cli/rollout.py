@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from wbc_suite.evaluation import Case, Summary
     from wbc_suite.executors import Outcome, WorkItem
 
-__all__ = ["rollout"]
-
 
 def rollout(
     benchmarks: Annotated[list[str], typer.Argument(help="Benchmarks, one or more.")],

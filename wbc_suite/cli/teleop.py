@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from wbc_suite.devices import Device, PipelineConfig
     from wbc_suite.recording.episode_control import EpisodeControl
 
-__all__ = ["DeviceMaker", "device_maker", "drive", "stages_of", "teleop"]
-
 ONE_DAY = 86_400  # s; horizon of a session, in place of the benchmark's
 POLL_PERIOD = 0.2  # s; of a session without a page
 DeviceMaker = Callable[["gymnasium.Env[Any, Any]"], "Device"]

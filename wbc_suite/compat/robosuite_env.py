@@ -10,8 +10,6 @@ from wbc_suite.compat.robosuite_sim import Model, RobotView, Sim
 from wbc_suite.envs import RobotEnv
 from wbc_suite.errors import ConfigError, DatasetError
 
-__all__ = ["GymWrapper", "RobosuiteEnv"]
-
 Observation = dict[str, Any]
 
 

@@ -23,8 +23,6 @@ from wbc_suite.control.robot_parts import hands_of, parts_of
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.robot import RobotDescription
 
-__all__ = ["convert"]
-
 log = logging.getLogger(__name__)
 
 SPECIFIC = "composite_controller_specific_configs"

@@ -15,8 +15,6 @@ from wbc_suite.envs.states import write_physics
 from wbc_suite.errors import UnknownNameError
 from wbc_suite.typing import Array, Indices, Vector
 
-__all__ = ["Model", "RobotView", "Sim"]
-
 KINDS = "body|joint|geom|site|light|camera|actuator|sensor|tendon|mesh"
 _OF_MODEL = re.compile(rf"({KINDS})_(name2id|id2name|names)")
 _COUNTS = {"joint": "jnt", "camera": "cam", "actuator": "u"}

@@ -7,8 +7,6 @@ from wbc_suite.control.robot_parts import parts_of
 from wbc_suite.errors import ConfigError, UnknownNameError, did_you_mean
 from wbc_suite.robot import RobotDescription
 
-__all__ = ["check_keys", "check_name", "whole_body_config"]
-
 INPUTS = {"absolute": "absolute"} | dict.fromkeys(
     ("delta", "relative", "delta_pose"), "delta"
 )

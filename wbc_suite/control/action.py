@@ -14,8 +14,6 @@ from wbc_suite.compiling import compiled
 from wbc_suite.errors import ActionError, ConfigError, UnknownNameError
 from wbc_suite.typing import Vector
 
-__all__ = ["ActionLayout", "ActionPart", "ActionSlice", "Axis", "SliceKind", "Unit"]
-
 
 class SliceKind(StrEnum):
     """What the values of a slice set."""

@@ -11,17 +11,6 @@ from typing import TypeAlias, overload
 from wbc_suite.qp import ActiveLimit, LimitKind
 from wbc_suite.qp.report import Reason as SolverReason
 
-__all__ = [
-    "Contact",
-    "InMotion",
-    "LazyReasons",
-    "NoSolution",
-    "Reason",
-    "TorqueLimit",
-    "TrackingError",
-    "is_transient",
-]
-
 
 @dataclass(frozen=True, slots=True)
 class Contact:

@@ -8,8 +8,6 @@ from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.elements import Joint
 
-__all__ = ["RobotPart", "hands_of", "motors", "parts_of", "robot_part"]
-
 _ORDER = (
     "right_arm",
     "left_arm",

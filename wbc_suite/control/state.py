@@ -9,8 +9,6 @@ from wbc_suite.kinematics import Conversion
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["RobotState"]
-
 
 class RobotState:
     """One robot among everything a MuJoCo simulation holds.

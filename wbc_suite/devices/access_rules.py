@@ -18,8 +18,6 @@ from urllib.parse import urlsplit
 
 from aiohttp import hdrs, web
 
-__all__ = ["AccessRules", "is_loopback", "token_for"]
-
 logger = logging.getLogger(__name__)
 
 

@@ -14,18 +14,6 @@ from wbc_suite.control.action import ActionSlice, Axis, SliceKind
 from wbc_suite.errors import ConfigError
 from wbc_suite.typing import Vector
 
-__all__ = [
-    "JointPort",
-    "LimbKind",
-    "LimbPort",
-    "SpeedPort",
-    "joint_ports",
-    "limb_ports",
-    "robot_of",
-    "side_of",
-    "speed_ports",
-]
-
 _VELOCITY_AXES = (Axis.FORWARD, Axis.SIDEWAYS, Axis.TURN)
 
 

@@ -7,16 +7,6 @@ from typing import Any, Protocol
 from wbc_suite.devices.state import DeviceState
 from wbc_suite.errors import ConfigError, DeviceError, UnknownNameError
 
-__all__ = [
-    "Device",
-    "Scripted",
-    "device_names",
-    "find_device",
-    "is_device",
-    "make_device",
-    "register_device",
-]
-
 
 class Device(Protocol):
     """An input device; classes need no base, only these three methods."""

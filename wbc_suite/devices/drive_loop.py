@@ -8,8 +8,6 @@ from wbc_suite.devices.device import Device
 from wbc_suite.devices.pipeline import Pipeline
 from wbc_suite.devices.state import DeviceState
 
-__all__ = ["drive"]
-
 StepCallback = Callable[[DeviceState, dict[str, Any]], None]
 
 

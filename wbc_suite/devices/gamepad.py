@@ -16,15 +16,6 @@ from wbc_suite.devices.state import DeviceState, LimbInput
 from wbc_suite.errors import DeviceError
 from wbc_suite.typing import Vector
 
-__all__ = [
-    "DualSense",
-    "Gamepad",
-    "Pad",
-    "pad_state",
-    "parse_dualsense",
-    "parse_joystick",
-]
-
 DEAD = 0.1  # dead zone, as a fraction of a stick's range
 SPEED, TURN = 0.3, 1.0  # m/s and rad/s at full deflection
 DRIVE, SPIN = 0.4, 0.6  # of the base

@@ -6,8 +6,6 @@ from typing import Any
 
 from wbc_suite.errors import DeviceError
 
-__all__ = ["UDEV_RULE", "open_hid", "waiting_reports"]
-
 UDEV_RULE = 'KERNEL=="hidraw*", ATTRS{idVendor}=="%04x", MODE="0660", TAG+="uaccess"'
 """udev rule with which users on Linux may open a vendor's devices."""
 

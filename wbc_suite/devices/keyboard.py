@@ -15,8 +15,6 @@ from wbc_suite.devices.state import DeviceState, LimbInput
 from wbc_suite.errors import DeviceError
 from wbc_suite.typing import Vector
 
-__all__ = ["BUTTONS", "HELP", "JOG", "Keyboard", "parse_keys"]
-
 HOLD = 0.12  # s, after a press; a terminal repeats a held key every 0.03 s
 TWIST = (0.25, 0.25, 0.25, 0.8, 0.8, 0.8)  # m/s and rad/s, of a held key
 BASE = (0.4, 0.4, 0.6)  # m/s and rad/s

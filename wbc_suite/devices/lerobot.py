@@ -19,8 +19,6 @@ from wbc_suite.devices.state import DeviceState, LimbInput
 from wbc_suite.errors import DeviceError
 from wbc_suite.typing import Vector
 
-__all__ = ["FromLeRobot", "Teleoperator", "ToLeRobot", "flatten", "unflatten"]
-
 POSE = ("x", "y", "z", "rx", "ry", "rz")
 TWIST = ("vx", "vy", "vz", "wx", "wy", "wz")
 BASE = ("forward", "left", "turn")

@@ -12,8 +12,6 @@ from wbc_suite.devices.action_ports import LimbKind, LimbPort, limb_ports
 from wbc_suite.devices.state import DeviceState, LimbInput
 from wbc_suite.errors import DeviceError
 
-__all__ = ["MjGui", "open_window"]
-
 SIZE = 0.03  # m, half size of a target
 COLOURS = ((0.9, 0.3, 0.2, 0.5), (0.2, 0.5, 0.9, 0.5), (0.3, 0.7, 0.3, 0.5))
 

@@ -9,16 +9,6 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 from wbc_suite.devices.state import DeviceState, LimbInput
 from wbc_suite.errors import DeviceError
 
-__all__ = [
-    "FORMAT",
-    "MAX_BUTTONS",
-    "MAX_BYTES",
-    "Pose",
-    "PoseFrame",
-    "PoseLimb",
-    "frame_schema",
-]
-
 FORMAT = "wbc-pose-frame/1"
 MAX_BYTES = 32_768
 """Maximum size of a frame; two hands with all their joints take 4 kB."""

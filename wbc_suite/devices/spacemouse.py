@@ -11,8 +11,6 @@ from wbc_suite.devices.hid import open_hid, waiting_reports
 from wbc_suite.devices.state import DeviceState, LimbInput
 from wbc_suite.typing import Vector
 
-__all__ = ["SpaceMouse", "parse_axes", "parse_buttons", "shaped"]
-
 VENDORS = (0x256F, 0x046D)  # 3Dconnexion, and Logitech for models before 2013
 PRODUCTS = (
     0xC62E, 0xC62F, 0xC631, 0xC632, 0xC633, 0xC635, 0xC652, 0xC63A,  # 3Dconnexion

@@ -10,8 +10,6 @@ from numpy.typing import ArrayLike
 
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["DeviceState", "LimbInput", "mirrored"]
-
 _FLIP = np.diag([1.0, -1.0, 1.0])  # left and right change places
 _TWIST = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])  # a rotation is a pseudovector
 

@@ -17,8 +17,6 @@ from wbc_suite.devices.tls import server_context
 from wbc_suite.devices.web_server import WebServer, page_url
 from wbc_suite.errors import DeviceError
 
-__all__ = ["Stream"]
-
 SOCKET = "/frames"
 PAGES = {"/": "controls.html", "/xr": "xr.html"}
 SENDERS = 8  # connected at a time; only one of them moves the robot

@@ -6,8 +6,6 @@ from typing import Any
 from wbc_suite.devices.pose_frame import PoseFrame
 from wbc_suite.errors import DeviceError
 
-__all__ = ["StreamClient"]
-
 
 class StreamClient:
     """Send pose frames to a stream.

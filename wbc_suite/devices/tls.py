@@ -11,8 +11,6 @@ from pathlib import Path
 from wbc_suite.catalogue import user_cache
 from wbc_suite.errors import DeviceError
 
-__all__ = ["make_key", "server_context"]
-
 DAYS = 825  # of validity; the most that browsers accept
 
 

@@ -14,8 +14,6 @@ from aiohttp.typedefs import Handler
 from wbc_suite.devices.access_rules import AccessRules, is_loopback
 from wbc_suite.errors import DeviceError
 
-__all__ = ["WebServer", "page_url"]
-
 CONNECTIONS = 256  # at a time; a browser opens one, and a few more while it loads
 HEAD_TIMEOUT = 10.0  # s, from a connection to its first complete request
 SHUTDOWN_TIMEOUT = 0.2  # s; handlers of open WebSockets are cancelled after it

@@ -37,19 +37,6 @@ from wbc_suite.sensing.proprioception import (
 )
 from wbc_suite.typing import Indices, Vector
 
-__all__ = [
-    "StartPosture",
-    "action_space",
-    "compose",
-    "count_substeps",
-    "joint_layout",
-    "make_cameras",
-    "make_observables",
-    "place_robots",
-    "simulate",
-    "use_sampler",
-]
-
 
 def use_sampler(benchmark: Benchmark, config: EnvConfig) -> None:
     """Replace the benchmark's sampler by that of the arguments, if there is one."""

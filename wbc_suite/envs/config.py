@@ -26,15 +26,6 @@ from wbc_suite.sensing.segmentation import SegmentationLevel
 from wbc_suite.tomlfile import FrozenModel, parse_model
 from wbc_suite.typing import RobotName
 
-__all__ = [
-    "EnvArguments",
-    "EnvConfig",
-    "NoiseConfig",
-    "checked_seed",
-    "parse_env_config",
-]
-
-
 Pixels: TypeAlias = Annotated[int, Field(gt=0, le=8192)]
 Segmentations: TypeAlias = SegmentationLevel | tuple[SegmentationLevel, ...] | None
 

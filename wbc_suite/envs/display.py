@@ -9,8 +9,6 @@ from wbc_suite.envs.simulation import Simulation
 from wbc_suite.errors import ConfigError
 from wbc_suite.sensing.cameras import Cameras
 
-__all__ = ["Display"]
-
 WATCH_PAGE = "wbc_suite.viewers.watch_page"
 """Imported when needed: `viewers` is a layer above `envs`."""
 

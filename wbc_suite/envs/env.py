@@ -29,8 +29,6 @@ from wbc_suite.errors import ConfigError, PhysicsError
 from wbc_suite.sensing.observation_buffer import ObservationBuffer
 from wbc_suite.typing import Vector
 
-__all__ = ["RobotEnv"]
-
 Observation = dict[str, Any]
 
 

@@ -22,8 +22,6 @@ from wbc_suite.control.loop.physics import bind_physics
 from wbc_suite.control.loop.records import gather
 from wbc_suite.envs.watch import PhysicsWatch
 
-__all__ = ["Simulation"]
-
 
 class Simulation:
     """A MuJoCo model and its state, driven by one controller per robot.

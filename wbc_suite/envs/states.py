@@ -12,8 +12,6 @@ from wbc_suite.arguments import check_array
 from wbc_suite.errors import ConfigError
 from wbc_suite.typing import Vector
 
-__all__ = ["EnvState", "Randomiser", "write_physics", "write_scene"]
-
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class EnvState:

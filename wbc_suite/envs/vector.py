@@ -18,8 +18,6 @@ from wbc_suite.envs.vector_infos import gather_infos
 from wbc_suite.errors import ActionError, ConfigError
 from wbc_suite.typing import Array, Matrix
 
-__all__ = ["VectorRobotEnv"]
-
 Observations = dict[str, Array]
 Info = dict[str, Any]
 Flags = NDArray[np.bool_]

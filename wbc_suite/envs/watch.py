@@ -16,8 +16,6 @@ from wbc_suite.control.loop.state_checks import (
 )
 from wbc_suite.errors import PhysicsError
 
-__all__ = ["PhysicsWatch"]
-
 log = logging.getLogger(__name__)
 
 _NAMES = [

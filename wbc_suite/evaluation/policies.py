@@ -10,8 +10,6 @@ from wbc_suite.envs import RobotEnv
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.typing import Vector
 
-__all__ = ["POLICIES", "Policy", "hold", "make_policy", "random", "scripted"]
-
 Policy: TypeAlias = Callable[[Mapping[str, Any]], Vector]
 """From an observation to an action of `env.action_space`; made for each episode."""
 

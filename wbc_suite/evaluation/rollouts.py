@@ -19,8 +19,6 @@ from wbc_suite.executors import WorkItem
 from wbc_suite.recording.dataset import parts_folder
 from wbc_suite.wrappers import DataCollection
 
-__all__ = ["Case", "plan_rollouts", "run_rollouts"]
-
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Case:

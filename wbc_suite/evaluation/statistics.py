@@ -9,8 +9,6 @@ import numpy as np
 
 from wbc_suite.executors import Outcome
 
-__all__ = ["Summary", "episodes_of", "summarise", "wilson"]
-
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Summary:

@@ -9,8 +9,6 @@ from typing import Any
 from wbc_suite.errors import ConfigError
 from wbc_suite.executors.executor import Outcome, Work, WorkItem, run_item
 
-__all__ = ["RayCluster", "Slurm"]
-
 POLL_SECONDS = 0.5
 
 

@@ -9,8 +9,6 @@ from typing import Any, Protocol, TypeAlias
 
 from wbc_suite.errors import ConfigError, WbcError
 
-__all__ = ["Executor", "Outcome", "Work", "WorkItem", "run_item"]
-
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,150}")
 
 

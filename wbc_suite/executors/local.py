@@ -11,8 +11,6 @@ from pathlib import Path
 from wbc_suite.errors import ConfigError
 from wbc_suite.executors.executor import Outcome, Work, WorkItem, run_item
 
-__all__ = ["Processes", "Serial"]
-
 SPAWN = multiprocessing.get_context("spawn")
 
 

@@ -9,8 +9,6 @@ from typing import Any
 from wbc_suite.errors import DatasetError
 from wbc_suite.executors.executor import Executor, Outcome, Work, WorkItem
 
-__all__ = ["ResultFolder", "run_items"]
-
 MAX_BYTES = 64 << 20
 """Larger result files are not read."""
 

@@ -19,8 +19,6 @@ from wbc_suite.kinematics.forward import (
 from wbc_suite.kinematics.tangent_space import TangentSpace
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["Axes", "Configuration", "named_joints", "random_configuration"]
-
 Axes = Literal["local", "aligned", "world"]
 """Axes of a Jacobian: the frame's own, world axes at the frame, world at its origin."""
 

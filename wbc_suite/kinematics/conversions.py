@@ -31,8 +31,6 @@ from wbc_suite.errors import DescriptionError, UnknownNameError
 from wbc_suite.kinematics.configuration import named_joints
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["Conversion"]
-
 _FREE_Q = [0, 1, 2, 4, 5, 6, 3]  # where x y z qx qy qz qw stand in MuJoCo's qpos
 _BALL_Q = [1, 2, 3, 0]
 

@@ -13,16 +13,6 @@ import pinocchio as pin
 from wbc_suite.compiling import compiled, struct
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = [
-    "JointKind",
-    "RobotArrays",
-    "compute_com",
-    "compute_joint_poses",
-    "multiply_poses",
-    "pack_pose",
-    "robot_arrays",
-]
-
 
 @struct
 class RobotArrays(NamedTuple):

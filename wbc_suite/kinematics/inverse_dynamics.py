@@ -9,8 +9,6 @@ from wbc_suite.compiling import compiled, struct
 from wbc_suite.kinematics.forward import RobotArrays, compute_joint_poses
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["InertiaArrays", "compute_torques", "inertia_arrays"]
-
 
 @struct
 class InertiaArrays(NamedTuple):

@@ -10,8 +10,6 @@ from wbc_suite.compiling import compiled
 from wbc_suite.kinematics.forward import JointKind, RobotArrays
 from wbc_suite.typing import Vector
 
-__all__ = ["TangentSpace", "difference", "integrate", "integrate_joints"]
-
 
 @compiled
 def integrate_joints(robot: RobotArrays, dq: Vector) -> None:

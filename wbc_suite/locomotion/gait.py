@@ -18,16 +18,6 @@ from wbc_suite.compiling import compiled, readable, struct
 from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import CompiledRecords, Indices, Matrix, Records, Vector
 
-__all__ = ["GRAVITY", "Gait", "GaitConfig", "GaitKind", "Measured", "Mode", "Plan"]
-__all__ += [
-    "TrotConfig",
-    "WalkConfig",
-    "approach_command",
-    "begin_gait",
-    "heading_axes",
-]
-__all__ += ["make_gait", "make_measured", "make_plan"]
-
 GRAVITY = 9.81
 """m/s^2."""
 

@@ -6,8 +6,6 @@ from wbc_suite.compiling import compiled
 from wbc_suite.locomotion.gait import Gait, Measured, heading_axes
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["keep_in_soles"]
-
 
 @compiled
 def keep_in_soles(

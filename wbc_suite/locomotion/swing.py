@@ -4,8 +4,6 @@ from wbc_suite.compiling import compiled
 from wbc_suite.locomotion.gait import Plan
 from wbc_suite.typing import Vector
 
-__all__ = ["minimum_jerk", "write_swing"]
-
 BEYOND = 0.004
 """m; feet swing to so far under the ground, so that they touch it in time."""
 

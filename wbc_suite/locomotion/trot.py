@@ -19,8 +19,6 @@ from wbc_suite.locomotion.gait import (
 from wbc_suite.locomotion.swing import write_swing
 from wbc_suite.typing import Vector
 
-__all__ = ["plan_trot"]
-
 _STAND, _STEP = int(Mode.STAND), int(Mode.STEP)
 
 RECOVERY = 2.0

@@ -26,8 +26,6 @@ from wbc_suite.locomotion.soles import keep_in_soles
 from wbc_suite.locomotion.swing import write_swing
 from wbc_suite.typing import Vector
 
-__all__ = ["plan_walk"]
-
 _STAND, _STEP = int(Mode.STAND), int(Mode.STEP)
 
 RECOVERY = 1.6

@@ -15,8 +15,6 @@ from wbc_suite.kinematics import Configuration, Conversion
 from wbc_suite.qp import FloorLimit, SelfCollisionLimit
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["Clearance", "LinkDistanceChecker", "SceneCollisionChecker"]
-
 Clearance: TypeAlias = Callable[[Vector], float]
 """Maps a configuration, shape (nq,), to a clearance, m."""
 

@@ -17,8 +17,6 @@ from wbc_suite.planning.trajectory import Motion, TimedState
 from wbc_suite.qp import FrameEquality, Limit, PostureTask, Task, TaskStack
 from wbc_suite.typing import Vector
 
-__all__ = ["GoalProblem", "GoalSearch"]
-
 STEP = 0.1  # s; one iteration goes as far as joints can in this time
 MAX_ITERATIONS = 40  # from one initial configuration
 STARTS = 16

@@ -15,8 +15,6 @@ from wbc_suite.planning.time_parameterisation import ProfileGenerator, retrace_s
 from wbc_suite.planning.trajectory import Motion, Segment, TimedState, Trajectory
 from wbc_suite.typing import Vector
 
-__all__ = ["CATCH_UP_LIMIT", "MotionPlanner", "plan_motion"]
-
 MAX_PATH_TIME = 90.0  # s at full speed; of all lines that RRT-Connect checks
 SHORTCUTS = 600
 MIN_CLEARANCE = 0.015  # m; closer links are slowed down, so a short path takes long

@@ -10,8 +10,6 @@ from wbc_suite.planning.collision_checker import Clearance
 from wbc_suite.planning.shortcutting import shorten_path
 from wbc_suite.typing import Vector
 
-__all__ = ["RRTConnect"]
-
 STRIDE = 0.25  # s; how far a tree grows at once
 SHORTCUTS = 80
 LOCAL_SHARE = 0.7  # share of the samples that are drawn near the two ends

@@ -10,8 +10,6 @@ from wbc_suite.planning.time_parameterisation import ProfileGenerator
 from wbc_suite.planning.trajectory import Segment, Trajectory
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["shorten_path", "shorten_trajectory"]
-
 MIN_GAIN = 0.01  # s; a shortcut that gains less is not taken
 CLEARANCE_TOLERANCE = 0.1  # of the clearance asked for
 CHECKS = 2  # configurations checked at once

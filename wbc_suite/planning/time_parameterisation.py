@@ -5,8 +5,6 @@ import ruckig
 
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["ProfileGenerator", "State", "retrace_scales"]
-
 State = tuple[Vector, Vector]
 """Positions and velocities, shape (nv,) each."""
 

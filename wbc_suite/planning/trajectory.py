@@ -11,8 +11,6 @@ import ruckig
 from wbc_suite.planning.time_parameterisation import State
 from wbc_suite.typing import Vector
 
-__all__ = ["Motion", "Segment", "TimedState", "Trajectory"]
-
 
 @dataclass(frozen=True, slots=True)
 class Segment:

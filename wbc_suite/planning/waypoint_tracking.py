@@ -5,8 +5,6 @@ import numpy as np
 from wbc_suite.compiling import compiled
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["HORIZONS", "cruise_speed", "track_waypoints"]
-
 HORIZONS = (0.03, 0.06, 0.1, 0.15, 0.22, 0.32, 0.45, 0.6)
 """Times at which to meet the motion, s."""
 

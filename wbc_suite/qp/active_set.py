@@ -31,8 +31,6 @@ from wbc_suite.linear_algebra import cholesky, dot, solve_lower, solve_upper
 from wbc_suite.qp.problem import UNBOUNDED
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["QpArrays", "make_qp_arrays", "solve_warm"]
-
 _QUICK = 8  # rounds in which all violated bounds and rows become active at once
 _CAREFUL = 32  # rounds after those, in which the worst one does
 _DEPENDENT = 1e-12  # part of a row's square that the rows above must leave

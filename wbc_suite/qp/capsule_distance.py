@@ -8,8 +8,6 @@ from wbc_suite.compiling import compiled, struct
 from wbc_suite.kinematics.forward import RobotArrays
 from wbc_suite.typing import Array, Indices, Matrix, Vector
 
-__all__ = ["CapsuleArrays", "nearest_pairs", "segment_parameters"]
-
 SKIN = 0.1
 """m; a list holds pairs within the influence and this distance, and is made again when
 a capsule has moved by half of it: the neighbour lists of Verlet (1967)."""

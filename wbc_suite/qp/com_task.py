@@ -10,8 +10,6 @@ from wbc_suite.qp.task import RowTask, SharedRow
 from wbc_suite.qp.task_kernels import com_error
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["ComTask"]
-
 
 class ComTask(RowTask):
     """Bring the centre of mass to a point: `e = p* - p_com`, `J = J_com`, world axes.

@@ -20,8 +20,6 @@ from wbc_suite.qp.strict_level import MAX_LEVELS
 from wbc_suite.qp.task import RowTask, Task
 from wbc_suite.typing import Indices, Vector
 
-__all__ = ["Constraints", "check_parts"]
-
 
 class Constraints:
     """Inequality rows, then equality rows, in the order in which a problem has them.

@@ -23,8 +23,6 @@ from wbc_suite.qp.lie import FAR, log3, saturate
 from wbc_suite.qp.task import SharedRow
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["Equality", "FrameEquality", "HeldFrames", "LinearEquality", "hold_frames"]
-
 Direction = Literal["x", "y", "z", "roll", "pitch", "yaw"]
 _DIRECTIONS = ("x", "y", "z", "roll", "pitch", "yaw")
 _RETURN_SPEED = 0.5  # m/s, of a frame that has drifted

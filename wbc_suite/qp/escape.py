@@ -20,8 +20,6 @@ from wbc_suite.qp.lie import is_usable
 from wbc_suite.qp.limit import JointBounds
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["Escape", "StackCopy"]
-
 _STILL = 0.02  # rad/s or m/s; a slower robot stands
 _STANDING_TIME = 0.25  # s of standing before a simulation
 _FAR = 5e-3  # m (and rad / _ARM); a smaller error is accepted

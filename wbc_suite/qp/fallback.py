@@ -22,8 +22,6 @@ from wbc_suite.qp.solver import QpSolver
 from wbc_suite.qp.tick import RETURN_WEIGHT, TOLERANCE, TickArrays, stiffness
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["Ladder", "box_least_squares", "checked_solve", "retreat"]
-
 _SLACK_WEIGHT = 1e2  # of a relaxed row against one that is led back
 _SWEEPS = 100
 _NO_ROWS: Indices = np.zeros(0, dtype=np.int64)

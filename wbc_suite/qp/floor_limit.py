@@ -15,8 +15,6 @@ from wbc_suite.qp.limit import LimitKind, RowLimit
 from wbc_suite.qp.problem import UNBOUNDED
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["FloorLimit", "SphereArrays", "floor_rows"]
-
 _SEPARATION = 0.2
 """m/s, greatest speed upwards of what is too low."""
 

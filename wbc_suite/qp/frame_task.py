@@ -14,8 +14,6 @@ from wbc_suite.qp.task import RowTask, SharedRow, cost_vector
 from wbc_suite.qp.task_kernels import frame_error
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["FrameTask", "homogeneous"]
-
 
 class FrameTask(RowTask):
     """Bring a frame to a target pose T_wt.

@@ -8,8 +8,6 @@ from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.task import RowTask
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["JointCouplingTask"]
-
 
 class JointCouplingTask(RowTask):
     """Let a joint follow another: `e = ratio q_leader + offset - q_follower`.

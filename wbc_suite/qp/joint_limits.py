@@ -9,8 +9,6 @@ from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.limit import BoxLimit, JointBounds
 from wbc_suite.typing import Vector
 
-__all__ = ["AccelerationLimit", "PositionLimit", "VelocityLimit"]
-
 _NO_LIMIT = 1e10
 """Limits of a model beyond it are none: some files write 1e20."""
 

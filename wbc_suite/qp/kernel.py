@@ -2,8 +2,6 @@
 
 from enum import IntEnum
 
-__all__ = ["Kernel", "kernel_of"]
-
 
 class Kernel(IntEnum):
     """What computes a task, a limit or an equality in each tick."""

@@ -6,8 +6,6 @@ from wbc_suite.compiling import compiled
 from wbc_suite.linear_algebra import cholesky, dot, solve_lower, solve_upper
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["least_change"]
-
 _MAX_STEPS = 100
 _FEASIBLE = 1e-12
 """Accepted violation of rows of length 1, per 1 + |x|."""

@@ -20,8 +20,6 @@ from wbc_suite.qp.task import JointTask, RowTask, Task
 from wbc_suite.qp.task_kernels import TaskArrays
 from wbc_suite.typing import Array, Indices, Matrix, Vector
 
-__all__ = ["Level", "LevelLayout", "TickLayout", "make_levels", "tick_layout"]
-
 
 @dataclass(frozen=True, slots=True)
 class LevelLayout:

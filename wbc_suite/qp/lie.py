@@ -5,8 +5,6 @@ import numpy as np
 from wbc_suite.compiling import compiled
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["FAR", "exp3", "inverse_left_jacobian", "is_usable", "log3", "saturate"]
-
 FAR = 1e9
 """m or rad; a target beyond it counts as not finite, since squares of errors may
 overflow."""

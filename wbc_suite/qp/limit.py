@@ -13,8 +13,6 @@ from wbc_suite.kinematics.configuration import named_joints
 from wbc_suite.qp.kernel import Kernel
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["BoxLimit", "JointBounds", "Limit", "LimitKind", "RowLimit", "merge_bounds"]
-
 
 class LimitKind(IntEnum):
     """What set a bound or a row."""

@@ -10,8 +10,6 @@ from wbc_suite.qp.lie import is_usable
 from wbc_suite.qp.task import RowTask, cost_vector
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["LookAtTask"]
-
 _LEAST_DISTANCE = 0.02  # m; nearer points have no direction
 
 

@@ -10,8 +10,6 @@ from wbc_suite.qp.kernel import Kernel
 from wbc_suite.qp.task import JointTask, SharedRow
 from wbc_suite.typing import Vector
 
-__all__ = ["DampingTask", "PostureTask"]
-
 
 class PostureTask(JointTask):
     """Pull joints to a posture q*: `e = q* (-) q`, `J = I`.

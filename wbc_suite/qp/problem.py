@@ -5,8 +5,6 @@ import numpy as np
 from wbc_suite.compiling import compiled
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["Problem", "clip_step"]
-
 UNBOUNDED = 1e30
 """A bound at or beyond it binds nothing (the convention of most solvers)."""
 

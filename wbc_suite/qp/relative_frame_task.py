@@ -9,8 +9,6 @@ from wbc_suite.qp.lie import is_usable
 from wbc_suite.qp.task import RowTask, cost_vector
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["RelativeFrameTask"]
-
 
 class RelativeFrameTask(RowTask):
     """Bring a frame f to a target pose T_rt in another frame r.

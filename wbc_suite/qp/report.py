@@ -10,17 +10,6 @@ from wbc_suite.qp.level import TickLayout
 from wbc_suite.qp.limit import LimitKind
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = [
-    "ActiveLimit",
-    "Conflict",
-    "LevelRecord",
-    "OutOfReach",
-    "Reason",
-    "TargetNotFinite",
-    "TaskReport",
-    "TickRecord",
-]
-
 _SHARE = 0.1  # part of a task's pull that something must oppose to be named
 _NOTHING = 1e-12  # pull that is rounding: no joint moves the task at all
 _STRETCHED = 0.05  # pull over its greatest possible value; below, no joint can help

@@ -22,8 +22,6 @@ from wbc_suite.typing import Indices, Matrix, Vector
 if TYPE_CHECKING:
     from wbc_suite.robot import RobotDescription
 
-__all__ = ["LinkPair", "SelfCollisionLimit", "self_collision_rows"]
-
 _SEPARATION = 0.2
 """m/s, greatest speed of separation of links that are too near."""
 

@@ -8,8 +8,6 @@ import numpy as np
 from wbc_suite.qp.report import ActiveLimit, TaskReport, TickRecord
 from wbc_suite.typing import Vector
 
-__all__ = ["Fallback", "Solution"]
-
 
 class Fallback(IntEnum):
     """How far a tick had to retreat from the problem as stated, mildest first."""

@@ -10,8 +10,6 @@ from wbc_suite.errors import SolverError, UnknownNameError
 from wbc_suite.qp.problem import UNBOUNDED, Problem
 from wbc_suite.typing import Vector
 
-__all__ = ["DaqpSolver", "QpSolver", "QpsolversSolver", "make_solver"]
-
 _TOLERANCE = 1e-10
 _ITERATIONS = 1000  # of one solve, some 10 ms; a humanoid's takes up to 100
 _EQUALITY = 5  # how daqp marks an equality row

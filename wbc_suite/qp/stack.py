@@ -31,8 +31,6 @@ from wbc_suite.qp.tick import (
 )
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["TaskStack"]
-
 _SOLVED = TickStatus.SOLVED.value
 _NO_NAMES: tuple[tuple[str, ...], ...] = ((),)
 

@@ -9,8 +9,6 @@ from wbc_suite.qp.problem import UNBOUNDED
 from wbc_suite.qp.task_kernels import TaskArrays
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["MAX_LEVELS", "LevelArrays", "restrict_level"]
-
 MAX_LEVELS = 6
 """Greatest number of strict levels of a stack."""
 

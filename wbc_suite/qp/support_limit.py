@@ -13,8 +13,6 @@ from wbc_suite.qp.limit import LimitKind, RowLimit
 from wbc_suite.qp.problem import UNBOUNDED
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["Sole", "SupportLimit", "convex_hull"]
-
 GRAVITY = 9.81  # m/s^2
 RETURN_SPEED = 0.05  # m/s, from outside the limit
 JUMP = 2.0  # m/s; a root that moved faster was put elsewhere

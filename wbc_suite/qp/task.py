@@ -13,16 +13,6 @@ from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.kernel import Kernel
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = [
-    "JointTask",
-    "RowTask",
-    "SharedRow",
-    "Task",
-    "check_speed",
-    "cost_vector",
-    "joint_costs",
-]
-
 
 class SharedRow:
     """A target or costs, with a copy in every stack that holds the task.

@@ -20,8 +20,6 @@ from wbc_suite.qp.kernel import Kernel
 from wbc_suite.qp.lie import FAR, inverse_left_jacobian, log3
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["TaskArrays", "com_error", "frame_error", "write_tasks"]
-
 
 @struct
 class TaskArrays(NamedTuple):

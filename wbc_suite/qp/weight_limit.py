@@ -10,8 +10,6 @@ from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.limit import LimitKind, RowLimit
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["WeightLimit"]
-
 RATE = 5.0  # 1/s; how fast what is left of the effort may be used up
 RETURN = 0.1  # of the effort per second, from beyond the limit
 

@@ -7,9 +7,6 @@ from pathlib import Path
 
 from wbc_suite.errors import DatasetError
 
-__all__ = ["check_folder", "delete_temporaries", "new_folder", "replace_file"]
-__all__ += ["write_bytes"]
-
 RESERVE = 1 << 20
 """Bytes that must be left on the disk after a file is written."""
 

@@ -14,8 +14,6 @@ from wbc_suite.recording import hdf5_reader
 from wbc_suite.recording.episode import Column, Episode, Fact, fingerprint, pieces
 from wbc_suite.recording.hdf5_check import check_files, open_safely
 
-__all__ = ["Dataset", "dataset_files", "free_name", "part_files", "parts_folder"]
-
 _DEMO = re.compile(r"demo_?(\d{1,9})\Z")
 _GROUPS = ("obs", "next_obs")
 _DIMENSIONS = {"states": 2, "actions": 2, "rewards": 1, "dones": 1}

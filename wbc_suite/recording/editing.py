@@ -24,8 +24,6 @@ from wbc_suite.recording.episode_store import locked
 from wbc_suite.recording.hdf5_check import check_files
 from wbc_suite.recording.hdf5_writer import write_dataset
 
-__all__ = ["Finding", "filter_dataset", "merge", "repair", "split", "verify"]
-
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Finding:

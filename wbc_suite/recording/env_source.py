@@ -15,8 +15,6 @@ from wbc_suite.errors import DatasetError, WbcError
 from wbc_suite.recording.dataset import Dataset
 from wbc_suite.recording.episode import Fact
 
-__all__ = ["EnvSource", "header_of", "rebuild"]
-
 GYM_TYPE = 2
 """Type of Gymnasium environments in robomimic's `env_args`."""
 PACKAGES = ("mujoco", "pin", "numpy", "gymnasium", "h5py", "daqp")

@@ -9,8 +9,6 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Column", "Episode", "Fact", "fingerprint", "pieces"]
-
 Column: TypeAlias = NDArray[Any]
 """One row per action."""
 Fact: TypeAlias = str | int | float | bool

@@ -8,8 +8,6 @@ from enum import StrEnum
 from wbc_suite.errors import DatasetError
 from wbc_suite.recording.recorder import Recorder
 
-__all__ = ["EpisodeCommand", "EpisodeControl", "EpisodeStatus", "RecordingPlan"]
-
 SUCCESS_STEPS = 10
 """Successive steps with success after which an episode of a plan is kept."""
 

@@ -19,8 +19,6 @@ from wbc_suite.recording.hdf5_writer import write_dataset
 from wbc_suite.recording.replaying import play_states
 from wbc_suite.recording.resumable_work import run_pieces, work_folder
 
-__all__ = ["extract", "extract_part", "observe_again"]
-
 PART = 10
 """Maximum number of episodes of a work item; each item makes an environment."""
 

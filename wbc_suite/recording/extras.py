@@ -5,8 +5,6 @@ from typing import Any
 
 from wbc_suite.errors import DatasetError
 
-__all__ = ["import_extra"]
-
 
 def import_extra(module: str, extra: str) -> Any:
     """Import a module of an optional package.

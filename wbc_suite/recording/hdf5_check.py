@@ -21,8 +21,6 @@ import wbc_suite
 from wbc_suite.errors import DatasetError
 from wbc_suite.recording import hdf5_reader
 
-__all__ = ["check_files", "open_safely"]
-
 CPU_SECONDS = 10
 """Processor time for the start and for small files, s."""
 BYTES_PER_SECOND = 10_000_000

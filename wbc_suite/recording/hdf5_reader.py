@@ -17,17 +17,6 @@ from numpy.typing import NDArray
 
 from wbc_suite.errors import DatasetError, UnknownNameError
 
-__all__ = [
-    "ERRORS",
-    "StoredColumn",
-    "attribute",
-    "attribute_names",
-    "child",
-    "child_names",
-    "read_names",
-    "reading",
-]
-
 MAX_CHILDREN = 200_000
 MAX_ATTRIBUTES = 1000  # of a group or dataset
 MAX_NAME = 200  # characters

@@ -17,8 +17,6 @@ from wbc_suite.errors import DatasetError
 from wbc_suite.recording.atomic_files import check_folder, replace_file
 from wbc_suite.recording.episode import Column, Episode, Fact, fingerprint, pieces
 
-__all__ = ["SCHEMA_VERSION", "open_late_errors", "uncompressed_bytes", "write_dataset"]
-
 SCHEMA_VERSION = 1
 PICTURE_BYTES = 10_000
 """Rows of bytes of at least this size are pictures, and are compressed."""

@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 
 from wbc_suite.recording.extras import import_extra
 
-__all__ = ["Mp4Writer"]
-
 
 class Mp4Writer:
     """Writes an H.264 video picture by picture; needs the package `av`.

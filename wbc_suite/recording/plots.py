@@ -9,8 +9,6 @@ from wbc_suite.errors import DatasetError
 from wbc_suite.recording.dataset import Dataset
 from wbc_suite.typing import Vector
 
-__all__ = ["save_picture", "write_plots"]
-
 WIDTH, HEIGHT, MARGIN = 720, 150, 28  # pixels of one plot
 INK, CURVE, GOOD, BAD = "#333333", "#4a6fa5", "#3f8f5b", "#c8553d"
 MOST = 400

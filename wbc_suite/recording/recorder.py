@@ -17,8 +17,6 @@ from wbc_suite.recording.episode import Episode, Fact, pieces
 from wbc_suite.recording.episode_store import Store
 from wbc_suite.recording.step_buffer import StepBuffer
 
-__all__ = ["Recorder"]
-
 
 class Recorder:
     """Records one environment's episodes into a file.

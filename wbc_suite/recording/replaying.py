@@ -16,8 +16,6 @@ from wbc_suite.errors import DatasetError, WbcError
 from wbc_suite.recording.episode import Episode
 from wbc_suite.typing import Vector
 
-__all__ = ["Divergence", "divergence", "play_actions", "play_states", "start_as"]
-
 log = logging.getLogger(__name__)
 
 _JOINT = re.compile(r'<(?:free)?joint\b[^<>]*?\bname="([^"<>]{1,200})"')

@@ -11,8 +11,6 @@ from wbc_suite.executors import Executor, Outcome, Serial, WorkItem, run_items
 from wbc_suite.executors.executor import Work
 from wbc_suite.recording.atomic_files import check_folder
 
-__all__ = ["run_pieces", "work_folder"]
-
 
 def work_folder(out: Path) -> Path:
     """Return the folder of finished pieces until all are finished; `OUT.work`."""

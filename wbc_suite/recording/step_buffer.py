@@ -15,8 +15,6 @@ from wbc_suite.envs import RobotEnv
 from wbc_suite.errors import DatasetError
 from wbc_suite.recording.episode import Column
 
-__all__ = ["RowBuffer", "StepBuffer"]
-
 BLOCK_BYTES = 1 << 16
 """Rows are written to disk in blocks of so many bytes."""
 

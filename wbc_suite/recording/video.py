@@ -19,8 +19,6 @@ from wbc_suite.recording.mp4_writer import Mp4Writer
 from wbc_suite.recording.plots import save_picture
 from wbc_suite.recording.replaying import play_actions, play_states
 
-__all__ = ["check_video", "episode_pictures", "write_sheet", "write_video"]
-
 Picture = NDArray[np.uint8]
 
 RATE = 20.0  # pictures per second, at most

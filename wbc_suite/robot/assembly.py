@@ -29,8 +29,6 @@ from wbc_suite.robot.shapes import SkinMesh
 from wbc_suite.robot.skins import SkinFinder
 from wbc_suite.tomlfile import parse_model
 
-__all__ = ["assemble", "describe_component", "read_assembly"]
-
 LISTS = ("frames", "cameras", "actuators", "sensors", "connects")
 """Lists of a component that are joined in an assembly."""
 SOURCES = ("name", "title", "source", "license", "deviations")

@@ -13,8 +13,6 @@ from wbc_suite.robot.shapes import Shape, SkinMesh
 if TYPE_CHECKING:
     from wbc_suite.robot.robot_file import Component
 
-__all__ = ["depth_first", "locked", "prefixed", "recolored", "with_colors"]
-
 S = TypeVar("S", bound=Shape | SkinMesh)
 
 

@@ -17,13 +17,6 @@ from wbc_suite.robot.shape_geometry import hull_spheres, support_points
 from wbc_suite.robot.shapes import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = [
-    "EnclosingCapsule",
-    "collision_pairs",
-    "collision_spheres",
-    "enclosing_capsules",
-]
-
 MAX_STRIPS = 4
 """Largest number of parallel capsules for a flat box."""
 

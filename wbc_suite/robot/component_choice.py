@@ -10,8 +10,6 @@ from wbc_suite.catalogue import Catalogue
 from wbc_suite.errors import ConfigError, DescriptionError, UnknownNameError
 from wbc_suite.robot.robot_file import Assembly, Component, Part
 
-__all__ = ["Choice", "Reader", "choose", "is_bare", "is_path"]
-
 Choice = str | Mapping[str, str] | None
 """A component for every side, or one per side; None keeps those of the assembly."""
 

@@ -15,8 +15,6 @@ from wbc_suite.tomlfile import parse_model
 if TYPE_CHECKING:
     import mujoco
 
-__all__ = ["RobotDescription"]
-
 T = TypeVar("T")
 _SIDES = {"right", "left"}
 

@@ -21,26 +21,6 @@ from pydantic import (
 from wbc_suite.robot.shapes import ROUNDING, Posed, Real, Shape, Vector3
 from wbc_suite.tomlfile import FROZEN, FrozenModel
 
-__all__ = [
-    "Actuator",
-    "Camera",
-    "Channel",
-    "Connect",
-    "Contacts",
-    "Elements",
-    "Frame",
-    "Joint",
-    "Link",
-    "Mimic",
-    "Mount",
-    "Name",
-    "Rgba",
-    "Root",
-    "Sensor",
-    "Synergy",
-    "rigid_bodies",
-]
-
 Name: TypeAlias = Annotated[
     str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=80)
 ]

@@ -14,8 +14,6 @@ from wbc_suite.robot.elements import Frame, Joint, Link, rigid_bodies
 if TYPE_CHECKING:
     from wbc_suite.robot.importing import NameTable
 
-__all__ = ["Limb", "infer_frames", "infer_limbs", "infer_ready", "infer_role"]
-
 KINDS = {
     "gripper": "finger fingers thumb gripper index middle ring pinky jaw knuckle",
     "head": "head neck",

@@ -22,8 +22,6 @@ from wbc_suite.robot.standing_posture import standing_legs
 from wbc_suite.robot.validation import RESERVED
 from wbc_suite.tomlfile import parse_model
 
-__all__ = ["LinkFields", "NameTable", "describe_import", "overlapping_links"]
-
 LOG = logging.getLogger(__name__)
 
 LinkFields: TypeAlias = dict[str, Any]

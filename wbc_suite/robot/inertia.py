@@ -11,14 +11,6 @@ from wbc_suite.typing import Matrix, Vector
 if TYPE_CHECKING:
     from wbc_suite.robot.elements import Link
 
-__all__ = [
-    "implausible",
-    "inertia_fields",
-    "inertia_matrix",
-    "nearest_physical",
-    "unphysical",
-]
-
 INERTIA_SLACK = 1e-6
 """Relative slack of the triangle inequality; vendors round their tensors."""
 GYRATION_RANGE = (0.08, 1.1)

@@ -14,8 +14,6 @@ from wbc_suite.robot.robot_file import Component, read_robot_file
 from wbc_suite.robot.skins import SkinFinder
 from wbc_suite.typing import RobotName
 
-__all__ = ["load_robot"]
-
 FOLDERS = ("gripper", "base", "arm", "body")
 
 

@@ -13,8 +13,6 @@ from wbc_suite.errors import ConfigError, DescriptionError
 from wbc_suite.robot.shapes import SkinMesh, Vector3, cached_by_shape
 from wbc_suite.typing import Indices, Matrix
 
-__all__ = ["READABLE", "read_points", "skin_triangles", "write_stl"]
-
 READABLE = (".stl", ".obj")
 """Suffixes of the files that `read_points` can read."""
 MAX_BYTES = 100_000_000

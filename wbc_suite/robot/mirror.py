@@ -25,9 +25,6 @@ from wbc_suite.typing import Matrix, Vector
 if TYPE_CHECKING:
     from wbc_suite.robot.robot_file import Component
 
-__all__ = ["Mirror", "reflect_component"]
-
-
 POSED = ("frames", "mounts", "cameras")
 NAMED = ("sensors", "actuators", "connects")
 

@@ -13,8 +13,6 @@ import mujoco
 from wbc_suite.errors import ConfigError, DescriptionError
 from wbc_suite.robot.xml_files import Element, inside, read_xml
 
-__all__ = ["compile_mjcf", "read_mjcf_spec"]
-
 MAX_FILES = 50
 """Largest number of XML files that include one another."""
 MAX_ELEMENTS = 20_000

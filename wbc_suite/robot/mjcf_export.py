@@ -12,8 +12,6 @@ from wbc_suite.robot.inertia import inertia_matrix
 from wbc_suite.robot.mjcf_export_geoms import VisualGeoms, add_collision_geoms
 from wbc_suite.robot.poses import se3_of
 
-__all__ = ["SENSOR_TYPES", "STOP_MARGIN", "build_mjspec", "write_mjcf"]
-
 STOP_SOLREF = (0.004, 1.0)
 """Time constant in s and damping ratio of joint limits, the stiffest that is stable
 with a step of 2 ms. With MuJoCo's default of 20 ms a joint overshoots its limit by

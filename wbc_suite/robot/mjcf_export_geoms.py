@@ -36,8 +36,6 @@ from wbc_suite.robot.triangle_meshes import (
 )
 from wbc_suite.typing import Indices, Matrix
 
-__all__ = ["COLLISION_GROUP", "VISUAL_GROUP", "VisualGeoms", "add_collision_geoms"]
-
 VISUAL_GROUP = 2
 """Geom group of shapes that are only drawn."""
 COLLISION_GROUP = 3

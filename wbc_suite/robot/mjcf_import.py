@@ -19,8 +19,6 @@ from wbc_suite.robot.mjcf_import_elements import pose_at, read_actuators, read_s
 from wbc_suite.robot.poses import joint_motion, pose_fields
 from wbc_suite.typing import Vector
 
-__all__ = ["read_mjcf"]
-
 LOG = logging.getLogger(__name__)
 
 DUMMY = {"mass": 1e-9, "inertia": (1e-13, 1e-13, 1e-13, 0.0, 0.0, 0.0)}

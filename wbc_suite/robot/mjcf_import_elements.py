@@ -11,8 +11,6 @@ from wbc_suite.robot.poses import pose_fields
 from wbc_suite.robot.shape_geometry import fit_hull
 from wbc_suite.typing import Vector
 
-__all__ = ["pose_at", "read_actuators", "read_shapes"]
-
 LOG = logging.getLogger(__name__)
 
 VISUAL_GROUPS = 3

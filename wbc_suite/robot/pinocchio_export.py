@@ -11,8 +11,6 @@ from wbc_suite.robot.inertia import inertia_matrix
 from wbc_suite.robot.poses import se3_of
 from wbc_suite.typing import Vector
 
-__all__ = ["build_pinocchio"]
-
 GRAVITY = np.array([0.0, 0.0, -9.81])
 """m/s^2; the default of MuJoCo."""
 

@@ -9,15 +9,6 @@ from scipy.spatial.transform import Rotation
 from wbc_suite.robot.shapes import Vector3
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = [
-    "HasPose",
-    "compose",
-    "joint_motion",
-    "pose_fields",
-    "rotation_matrix",
-    "se3_of",
-]
-
 
 class HasPose(Protocol):
     """An item of a description with a pose: a link, a frame, a shape, ..."""

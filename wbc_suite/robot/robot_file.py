@@ -22,15 +22,6 @@ from wbc_suite.robot.mirror import Mirror, reflect_component
 from wbc_suite.robot.shapes import Posed, as_table
 from wbc_suite.tomlfile import FrozenModel, parse_model, parse_toml, read_text
 
-__all__ = [
-    "Assembly",
-    "Component",
-    "Header",
-    "Part",
-    "read_robot_file",
-    "robot_schema",
-]
-
 
 class Header(FrozenModel):
     """Name, kind and sources of a component.

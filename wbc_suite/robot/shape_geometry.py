@@ -29,15 +29,6 @@ from wbc_suite.robot.shapes import (
 )
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = [
-    "along_z",
-    "fit_hull",
-    "hull_spheres",
-    "mesh_of",
-    "shape_bounds",
-    "support_points",
-]
-
 RING_POINTS = 24
 """Points on one ring of a loft or a cone; half as many on a small one."""
 SMALL = 0.02

@@ -14,28 +14,6 @@ from pydantic import AfterValidator, BaseModel, Field, model_validator
 
 from wbc_suite.tomlfile import FROZEN
 
-__all__ = [
-    "Box",
-    "Capsule",
-    "Color",
-    "Cylinder",
-    "Ellipsoid",
-    "Hull",
-    "Interval",
-    "Loft",
-    "Posed",
-    "Quaternion",
-    "Real",
-    "Shape",
-    "Size",
-    "SizeInterval",
-    "SkinMesh",
-    "Sphere",
-    "Vector3",
-    "as_table",
-    "cached_by_shape",
-]
-
 S = TypeVar("S")
 T = TypeVar("T")
 

@@ -24,8 +24,6 @@ from wbc_suite.robot.elements import Name
 from wbc_suite.robot.shapes import Color, Posed, SkinMesh, Vector3
 from wbc_suite.tomlfile import FrozenModel, load_model
 
-__all__ = ["MESHES", "SkinFinder", "SkinTable", "read_skin"]
-
 log = logging.getLogger(__name__)
 
 MESHES = "meshes"

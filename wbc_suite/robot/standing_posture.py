@@ -8,8 +8,6 @@ from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.elements import Frame
 from wbc_suite.typing import Vector
 
-__all__ = ["standing_legs"]
-
 TOLERANCE = 0.02
 """Largest residual in m of a posture that is accepted."""
 

@@ -8,8 +8,6 @@ from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.elements import Elements
 from wbc_suite.robot.robot_file import Component, Header
 
-__all__ = ["write_toml"]
-
 ONE_A_LINE = ("visual", "collision", "spheres", "sections", "exclude")
 """Lists that are written with one entry per line."""
 

@@ -12,16 +12,6 @@ import numpy as np
 
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = [
-    "TriangleMesh",
-    "box_mesh",
-    "capsule_mesh",
-    "creased",
-    "cylinder_mesh",
-    "ellipsoid_mesh",
-    "merge",
-]
-
 RESOLUTION = ((0.006, 10, 4), (0.02, 16, 8), (math.inf, 28, 16))
 """Largest radius in m; segments around the axis; stacks from pole to pole, all even.
 

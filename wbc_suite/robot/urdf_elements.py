@@ -11,8 +11,6 @@ from wbc_suite.errors import ConfigError, DescriptionError, did_you_mean, join_f
 from wbc_suite.robot.xml_files import Element, read_xml
 from wbc_suite.typing import Vector
 
-__all__ = ["Branch", "UrdfTree", "number", "numbers", "pose_of", "read_tree"]
-
 MAX_LINKS = 500
 """Largest number of links, as in robot files."""
 

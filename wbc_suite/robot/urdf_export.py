@@ -20,8 +20,6 @@ from wbc_suite.robot.shape_geometry import along_z, mesh_of, shape_bounds
 from wbc_suite.robot.shapes import Box, Capsule, Cylinder, Posed, Shape, Sphere
 from wbc_suite.typing import Matrix
 
-__all__ = ["ROOT_TYPES", "UNLIMITED", "write_urdf"]
-
 UNLIMITED = 1e6
 """Written for limits that URDF requires and the robot lacks; read as no limit."""
 ROOT_TYPES = {"fixed": "fixed", "free": "floating", "planar": "planar"}

@@ -30,8 +30,6 @@ from wbc_suite.robot.urdf_export import ROOT_TYPES, UNLIMITED
 from wbc_suite.robot.urdf_import_shapes import MeshFolder, UrdfShapes
 from wbc_suite.robot.xml_files import Element
 
-__all__ = ["read_urdf"]
-
 LOG = logging.getLogger(__name__)
 
 UNLIMITED_RANGE = 1e4

@@ -17,8 +17,6 @@ from wbc_suite.robot.urdf_elements import number, numbers, pose_of
 from wbc_suite.robot.xml_files import Element, inside
 from wbc_suite.typing import Vector
 
-__all__ = ["MeshFolder", "UrdfShapes"]
-
 LOG = logging.getLogger(__name__)
 
 

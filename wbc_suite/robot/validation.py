@@ -12,8 +12,6 @@ if TYPE_CHECKING:
     from wbc_suite.robot.description import RobotDescription
     from wbc_suite.robot.elements import Link
 
-__all__ = ["RESERVED", "check_description"]
-
 RESERVED = ("root", "root_x", "root_y", "root_yaw", "world")
 """Names of the root's joints and of the world; links, joints and frames differ."""
 

@@ -7,8 +7,6 @@ from xml.parsers import expat
 
 from wbc_suite.errors import ConfigError
 
-__all__ = ["Element", "inside", "read_xml"]
-
 MAX_BYTES = 8_000_000
 """Largest XML file that is read; large humanoids have about 200 kB."""
 MAX_DEPTH = 400

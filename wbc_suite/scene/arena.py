@@ -11,14 +11,6 @@ from wbc_suite.scene.compose import add_camera
 from wbc_suite.scene.materials import FRICTION, wood_pixels
 from wbc_suite.tomlfile import FrozenModel
 
-__all__ = [
-    "TableConfig",
-    "add_table",
-    "add_table_cameras",
-    "add_tables",
-    "empty_arena",
-]
-
 WOOD_SIZE = 512
 """Pixels along each side of the table's texture."""
 

@@ -12,18 +12,6 @@ from wbc_suite.robot.poses import pose_fields, se3_of
 from wbc_suite.robot.shapes import Vector3
 from wbc_suite.scene.objects.scene_object import TORSION, SceneObject
 
-__all__ = [
-    "add_camera",
-    "add_robot_view",
-    "aim_robot_view",
-    "attach_robot",
-    "compile_scene",
-    "fix_to_frame",
-    "place_robot",
-    "robot_prefix",
-]
-
-
 log = logging.getLogger(__name__)
 
 SMALL = 24

@@ -11,8 +11,6 @@ from wbc_suite.scene.objects.scene_object import Color, Part, SceneObject
 from wbc_suite.scene.objects.vessels import open_bin
 from wbc_suite.tomlfile import FrozenModel
 
-__all__ = ["BinConfig", "ghost", "peg", "standing_bin"]
-
 LEG: Color = (0.32, 0.33, 0.35, 1.0)
 LEG_RADIUS, INSET = 0.012, 0.03
 GHOST = 0.3

@@ -15,15 +15,6 @@ from numpy.typing import NDArray
 from wbc_suite.errors import UnknownNameError
 from wbc_suite.robot.shapes import Vector3
 
-__all__ = [
-    "FRICTION",
-    "MATERIALS",
-    "Material",
-    "material_named",
-    "use_material",
-    "wood_pixels",
-]
-
 FRICTION = (1.0, 0.005, 0.0001)
 """Sliding, torsional, rolling; the default of this field's table-top benchmarks."""
 

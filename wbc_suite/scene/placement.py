@@ -17,18 +17,6 @@ from wbc_suite.scene.objects.object_state import Extent
 from wbc_suite.scene.objects.scene_object import STANDING, Quat
 from wbc_suite.tomlfile import FrozenModel
 
-__all__ = [
-    "Measured",
-    "OnTopSampler",
-    "Placed",
-    "Placements",
-    "Region",
-    "RejectionSampler",
-    "Sampler",
-    "SequentialSampler",
-    "UniformSampler",
-]
-
 TRIES = 300
 """Poses drawn for one object before all objects are placed again."""
 LAYOUTS = 20

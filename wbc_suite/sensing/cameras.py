@@ -15,8 +15,6 @@ from wbc_suite.sensing.renderer import Renderer, RenderPreset, make_renderer
 from wbc_suite.sensing.segmentation import Labels, SegmentationLevel
 from wbc_suite.typing import Array
 
-__all__ = ["CameraRequest", "Cameras"]
-
 Picture = NDArray[Any]
 
 

@@ -23,8 +23,6 @@ from typing import Any
 from wbc_suite.catalogue import user_cache
 from wbc_suite.errors import DeviceError
 
-__all__ = ["GlBackend", "activate", "context_class", "forget", "missing_environment"]
-
 logger = logging.getLogger(__name__)
 
 APT_COMMAND = "sudo apt-get install libegl1 libegl-mesa0 libgl1-mesa-dri libgles2"

@@ -8,8 +8,6 @@ from wbc_suite.control import RobotState
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Vector
 
-__all__ = ["Hand", "gripper_links", "hands_of", "pairs_in_contact"]
-
 
 def pairs_in_contact(data: mujoco.MjData) -> list[list[int]]:
     """Return the two geoms of each contact."""

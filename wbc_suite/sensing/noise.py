@@ -11,8 +11,6 @@ import numpy as np
 from wbc_suite.arguments import check_count, check_number
 from wbc_suite.typing import Vector
 
-__all__ = ["GaussianNoise", "LowPass", "MovingAverage", "UniformDelay", "UniformNoise"]
-
 
 @dataclass(frozen=True, slots=True)
 class GaussianNoise:

@@ -19,8 +19,6 @@ from wbc_suite.sensing.observation_buffer import ObservationBuffer
 from wbc_suite.sensing.reading import Reading
 from wbc_suite.typing import Vector
 
-__all__ = ["Change", "Observables"]
-
 Noise: TypeAlias = Callable[[Vector, np.random.Generator], Vector]
 Delay: TypeAlias = float | Callable[[np.random.Generator], float]
 Filter: TypeAlias = Callable[[Vector], Vector]

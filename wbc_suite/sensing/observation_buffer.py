@@ -9,8 +9,6 @@ import numpy as np
 from wbc_suite.sensing.reading import Reading
 from wbc_suite.typing import Vector
 
-__all__ = ["LARGEST", "ObservationBuffer"]
-
 LARGEST = 1e4
 """Bound of observations, SI units; larger values, as of impacts, are clipped."""
 

@@ -9,8 +9,6 @@ from numpy.typing import ArrayLike
 from wbc_suite.errors import UnknownNameError
 from wbc_suite.typing import Array, Matrix, Vector
 
-__all__ = ["Projection", "camera_id"]
-
 FLIP = np.diag([1.0, -1.0, -1.0])
 """From the camera axes of OpenGL and MuJoCo (y up, z back) to those of OpenCV."""
 

@@ -12,8 +12,6 @@ from wbc_suite.sensing import reading
 from wbc_suite.sensing.hands import gripper_links, hands_of
 from wbc_suite.sensing.reading import Reading
 
-__all__ = ["add_contact_sensors", "proprioception", "sensors_of"]
-
 FIELDS = mujoco.mjtConDataField
 FOUND_AND_FORCE = 1 << int(FIELDS.mjCONDATA_FOUND) | 1 << int(FIELDS.mjCONDATA_FORCE)
 NET_FORCE = 3

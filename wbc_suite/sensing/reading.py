@@ -14,27 +14,6 @@ from numpy.typing import ArrayLike
 
 from wbc_suite.typing import Vector
 
-__all__ = [
-    "Reading",
-    "actuator_forces",
-    "body_position",
-    "body_quat",
-    "computed",
-    "constant",
-    "joint_cosines",
-    "joint_positions",
-    "joint_sines",
-    "joint_velocities",
-    "offset",
-    "relative_position",
-    "relative_quat",
-    "selected",
-    "sensor_values",
-    "site_position",
-    "site_quat",
-    "user_values",
-]
-
 Read: TypeAlias = Callable[[], Any]
 """Returns the present values, shape (size,); may be a view."""
 

@@ -19,8 +19,6 @@ from wbc_suite.errors import DeviceError
 from wbc_suite.sensing import gl_backend
 from wbc_suite.typing import Array, Indices
 
-__all__ = ["RenderPreset", "Renderer", "make_renderer"]
-
 GEOM = int(mujoco.mjtObj.mjOBJ_GEOM)
 PLANE = int(mujoco.mjtGeom.mjGEOM_PLANE)
 PIECES = 20

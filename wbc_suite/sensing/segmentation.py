@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from wbc_suite.control import RobotState
 from wbc_suite.sensing.hands import hands_of
 
-__all__ = ["Labels", "SegmentationLevel"]
-
 
 class SegmentationLevel(StrEnum):
     """Granularity of a segmentation."""

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
     from wbc_suite.viewers.page_process import Session
 
-__all__ = ["DragHandles", "HandleMode"]
-
 
 class HandleMode(StrEnum):
     """Which controls the handles have; arrows and arcs overlap near the middle."""

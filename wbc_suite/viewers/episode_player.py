@@ -13,15 +13,6 @@ from wbc_suite.recording import Dataset, Episode
 from wbc_suite.recording.replaying import play_actions, start_as
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = [
-    "SPEEDS",
-    "Clip",
-    "EpisodePlayer",
-    "PlayerStatus",
-    "load_clip",
-    "open_player",
-]
-
 SPEEDS = (0.25, 0.5, 1.0, 2.0, 4.0)
 PAUSE = 1.0  # s, between the end of an episode and the next one
 

@@ -8,8 +8,6 @@ import numpy as np
 
 from wbc_suite.typing import Matrix
 
-__all__ = ["VIEWS", "View", "ViewName", "fit_camera", "subject_corners"]
-
 ViewName: TypeAlias = Literal["three_quarter", "front", "side", "back"]
 
 

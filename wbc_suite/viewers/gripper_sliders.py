@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     Slider = viser.GuiSliderHandle[float]
     Event = viser.GuiEvent[Slider]
 
-__all__ = ["GripperSliders"]
-
 STEP = 0.02
 USER_TIME = 1.0  # s; after the user moved a slider, it is not updated for so long
 

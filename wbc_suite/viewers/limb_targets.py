@@ -12,8 +12,6 @@ from wbc_suite.devices.pipeline.limb_pipeline import LimbPipeline
 from wbc_suite.devices.state import LimbInput
 from wbc_suite.viewers.session_state import LimbInfo, LimbStatus
 
-__all__ = ["LimbTarget", "Ownership"]
-
 HOLD_TIMEOUT = 20.0  # s; a client that sends nothing for so long loses its limb
 MAX_POSITION_ERROR = 0.03  # m; a released target further than this from its limb ...
 MAX_ORIENTATION_ERROR = 0.2  # rad; ... or turned by more, moves back to the limb ...

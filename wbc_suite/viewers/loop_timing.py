@@ -8,8 +8,6 @@ import threading
 import time
 from collections.abc import Callable
 
-__all__ = ["SWITCH_INTERVAL", "LoopTimer", "prepare_interpreter", "raise_priority"]
-
 LEAD = 3e-3  # s; for GR1 1 ms is enough, 2 ms on a shared processor
 MAX_BACKLOG = 5  # periods; a loop that is further behind does not catch up
 SWITCH_INTERVAL = 1e-4  # s; at 1 ms, or Python's own 5, other threads delay the loop

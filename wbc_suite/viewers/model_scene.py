@@ -18,15 +18,6 @@ from wbc_suite.typing import Matrix, Vector
 if TYPE_CHECKING:
     import viser
 
-__all__ = [
-    "COLLISION_GROUP",
-    "ModelScene",
-    "colored_meshes",
-    "geom_mesh",
-    "relative_poses",
-    "robot_box",
-]
-
 Rgba: TypeAlias = tuple[float, float, float, float]
 
 COLLISION_GROUP = 3  # geoms of this group and above are collision geoms

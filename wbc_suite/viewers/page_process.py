@@ -24,8 +24,6 @@ from wbc_suite.viewers.loop_timing import raise_priority
 from wbc_suite.viewers.session_state import SessionInfo, Snapshot
 from wbc_suite.viewers.teleop_session import TeleopSession
 
-__all__ = ["PageProcess", "RemoteSession", "Session"]
-
 log = logging.getLogger(__name__)
 
 POLL_PERIOD = 0.05  # s

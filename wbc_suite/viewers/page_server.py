@@ -26,8 +26,6 @@ from wbc_suite.errors import DeviceError
 if TYPE_CHECKING:
     import viser
 
-__all__ = ["PageServer", "proxy"]
-
 log = logging.getLogger(__name__)
 
 UPDATE_RATE = 25.0  # Hz

@@ -17,8 +17,6 @@ from wbc_suite.viewers.scene_setup import add_plot, add_views, set_camera, set_u
 if TYPE_CHECKING:
     import viser
 
-__all__ = ["ReplayPage"]
-
 PANEL_EVERY = 3  # updates
 PLOT_POINTS = 200
 EFFORT, REWARD, NOW = "#4a6fa5", "#3f8f5b", "#c8553d"

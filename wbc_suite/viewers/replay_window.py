@@ -11,8 +11,6 @@ from wbc_suite.envs import RobotEnv
 from wbc_suite.envs.states import write_physics
 from wbc_suite.viewers.episode_player import EpisodePlayer
 
-__all__ = ["KEYS", "show_in_window"]
-
 PERIOD = 1.0 / 60.0  # s, between frames
 KEYS: dict[int, Callable[[EpisodePlayer], None]] = {
     32: EpisodePlayer.toggle,  # space

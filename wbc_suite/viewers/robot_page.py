@@ -17,8 +17,6 @@ from wbc_suite.viewers.status_text import plain
 if TYPE_CHECKING:
     import viser
 
-__all__ = ["Overlays", "RobotPage", "equivalent_box"]
-
 SLIDER_STEP = 0.01  # rad or m
 UNBOUNDED = np.pi  # rad, range of a slider of a joint without limits
 COM_COLOUR, INERTIA_COLOUR = (214, 72, 60), (90, 140, 210)

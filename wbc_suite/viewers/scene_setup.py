@@ -13,17 +13,6 @@ from wbc_suite.typing import Vector
 if TYPE_CHECKING:
     import viser
 
-__all__ = [
-    "Colour",
-    "add_plot",
-    "add_views",
-    "css",
-    "limb_colours",
-    "place",
-    "set_camera",
-    "set_up_scene",
-]
-
 Colour: TypeAlias = tuple[int, int, int]
 """Red, green and blue, 0 to 255."""
 

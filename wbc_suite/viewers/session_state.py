@@ -11,8 +11,6 @@ from wbc_suite.devices.action_ports import LimbKind
 from wbc_suite.recording.episode_control import EpisodeStatus
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["LimbInfo", "LimbStatus", "SessionInfo", "Snapshot"]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LimbInfo:

@@ -17,8 +17,6 @@ from wbc_suite.qp import ActiveLimit, Conflict, LimitKind, LinkPair, OutOfReach
 from wbc_suite.viewers.scene_setup import Colour, css
 from wbc_suite.viewers.session_state import LimbInfo, LimbStatus, Snapshot
 
-__all__ = ["describe_reason", "explain", "limbs_html", "plain", "status_html"]
-
 GREEN, YELLOW, RED = "#3f8f5b", "#b08a2e", "#c8553d"
 
 

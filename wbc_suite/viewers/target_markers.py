@@ -15,8 +15,6 @@ from wbc_suite.viewers.session_state import SessionInfo, Snapshot
 if TYPE_CHECKING:
     import viser
 
-__all__ = ["TargetMarkers"]
-
 NEAR = 0.012  # m; a copy nearer than this to its limb would only tint it
 TURNED = 0.12  # rad
 ABOVE = np.array([0.0, 0.0, 0.12])  # m, from the target to its label

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
     from wbc_suite.viewers.page_process import Session
 
-__all__ = ["TeleopPage"]
-
 PANEL_EVERY = 5  # updates
 PLOT_EVERY = 7  # updates; not a multiple, so that both seldom coincide
 HAND_SCALE, OTHER_SCALE, BASE_SCALE = 0.22, 0.16, 0.4  # m

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
     from wbc_suite.viewers.page_process import Session
 
-__all__ = ["TeleopPanel"]
-
 PLOT_SECONDS = 10.0
 PLOT_POINTS = 150
 PLOT_ROWS = 300  # more than PLOT_SECONDS at the rate of the page's updates

@@ -25,8 +25,6 @@ from wbc_suite.viewers.limb_targets import LimbTarget
 from wbc_suite.viewers.loop_timing import LoopTimer, raise_priority
 from wbc_suite.viewers.session_state import SessionInfo, Snapshot
 
-__all__ = ["DRAGGED", "TeleopSession"]
-
 DRAGGED = PipelineConfig(
     jump=None,  # a page that draws slowly sends a drag in few, long steps
     leash=None,  # a target out of reach is reported instead; see `LimbTargets.settle`

@@ -9,8 +9,6 @@ from wbc_suite.viewers.model_scene import ModelScene
 from wbc_suite.viewers.page_server import PageServer
 from wbc_suite.viewers.scene_setup import set_camera, set_up_scene
 
-__all__ = ["WatchPage"]
-
 log = logging.getLogger(__name__)
 
 

@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from wbc_suite.errors import UnknownNameError
 
-__all__ = ["Flat"]
-
 Flattened = NDArray[np.float32]
 
 

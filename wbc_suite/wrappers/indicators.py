@@ -10,8 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 from wbc_suite.envs import RobotEnv
 from wbc_suite.errors import ConfigError
 
-__all__ = ["Indicators"]
-
 
 class Indicators(gymnasium.Wrapper[Any, Any, Any, Any]):
     """Draws a disc into `render`'s pictures at each hand and at chosen places.

@@ -16,8 +16,6 @@ from wbc_suite.recording.recorder import Recorder
 from wbc_suite.recording.replaying import start_as
 from wbc_suite.typing import Matrix
 
-__all__ = ["DataCollection", "DemoStart", "Playback"]
-
 
 class DataCollection(gymnasium.Wrapper[Any, Any, Any, Any]):
     """Records every episode, or chosen ones.

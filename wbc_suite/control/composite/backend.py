@@ -6,8 +6,6 @@ from typing import NamedTuple, Protocol, TypeAlias
 from wbc_suite.control.reasons import Reason
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["Explanation", "IkBackend", "IkStep"]
-
 Explanation: TypeAlias = Callable[[], Mapping[str, Sequence[Reason]]]
 
 

@@ -30,8 +30,6 @@ from wbc_suite.robot.elements import Name
 from wbc_suite.tomlfile import FrozenModel, parse_model
 from wbc_suite.typing import Vector
 
-__all__ = ["BasicConfig", "BasicController", "check_basic", "default_basic_config"]
-
 
 class BasicConfig(FrozenModel):
     """Config of BASIC.

@@ -16,8 +16,6 @@ from wbc_suite.control.composite.whole_body_config import WholeBodyIKConfig
 from wbc_suite.kinematics import Configuration
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["ControlledFrames"]
-
 
 class ControlledFrames:
     """Owner of the arrays of controlled frames on one configuration.

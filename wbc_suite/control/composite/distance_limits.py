@@ -13,8 +13,6 @@ from wbc_suite.robot.collision_capsules import (
     enclosing_capsules,
 )
 
-__all__ = ["distance_limits"]
-
 MAX_NEIGHBOUR_JOINTS = 1
 """Links with at most this many joints between them are kept apart by joint limits."""
 

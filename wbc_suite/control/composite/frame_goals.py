@@ -16,8 +16,6 @@ from wbc_suite.qp.lie import exp3, log3
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["FrameGoals", "GoalArrays", "place_goals"]
-
 SAME_GOAL = 1e-9
 """m and rad; changes below are rounding."""
 

@@ -21,14 +21,6 @@ if TYPE_CHECKING:
         ControlledFrame,
     )
 
-__all__ = [
-    "FrameKind",
-    "GoalTask",
-    "find_frame_kind",
-    "frame_kind_names",
-    "register_frame_kind",
-]
-
 MAX_POSITION = 10.0
 """Bound of absolute positions, m: no robot here reaches farther."""
 

@@ -20,17 +20,6 @@ from wbc_suite.kinematics.forward import (
 from wbc_suite.qp.lie import exp3, log3
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = [
-    "CENTRE_OF_MASS",
-    "FrameArrays",
-    "PostureArrays",
-    "lower_level_rate",
-    "measure_frames",
-    "posture_step",
-    "write_frame_pose",
-    "write_targets",
-]
-
 CENTRE_OF_MASS = -1
 """Stands for the joint of the centre of mass, which has none."""
 

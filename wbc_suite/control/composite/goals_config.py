@@ -9,8 +9,6 @@ if TYPE_CHECKING:
         InputType,
     )
 
-__all__ = ["GoalsConfig", "check_goals"]
-
 
 class GoalsConfig(Protocol):
     """Controlled frames, and how an action moves their goals.

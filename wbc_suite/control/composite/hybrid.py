@@ -14,8 +14,6 @@ from wbc_suite.errors import ConfigError
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Vector
 
-__all__ = ["HybridMobileBase", "check_hybrid"]
-
 WORLD = 0
 """MuJoCo's body of that name."""
 

@@ -29,8 +29,6 @@ from wbc_suite.kinematics import Configuration
 from wbc_suite.qp import ActiveLimit, Conflict, OutOfReach
 from wbc_suite.typing import Vector
 
-__all__ = ["Body", "IkReport", "contacts_of", "lagging_joint"]
-
 COMMAND_STANDSTILL = 1e-3
 """rad/s or m/s; a command slower than that stands."""
 

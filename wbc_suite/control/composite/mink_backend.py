@@ -18,8 +18,6 @@ from wbc_suite.qp import ActiveLimit, LimitKind
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["MinkBackend"]
-
 LEVEL_FACTOR = 0.03
 """mink has weights only: each level counts this much of the one above."""
 

@@ -23,9 +23,6 @@ from wbc_suite.kinematics.forward import RobotArrays
 from wbc_suite.planning import TimedState
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["PROGRESS", "STUCK_AFTER", "Event", "ProgressArrays", "Trail"]
-__all__ += ["approach_goals", "progress_arrays", "record_state", "watch_progress"]
-
 STANDSTILL = 0.02  # rad/s or m/s
 STUCK_AFTER = 0.1  # s at a standstill
 PROGRESS_WINDOW = 0.2  # s; over which progress is measured

@@ -9,13 +9,6 @@ from wbc_suite.control.law.law import Law
 from wbc_suite.control.state import RobotState
 from wbc_suite.typing import Vector
 
-__all__ = [
-    "CompositeController",
-    "DynamicController",
-    "SteppedController",
-    "TickedController",
-]
-
 
 class CompositeController(Protocol):
     """Drives all actuators of one robot.

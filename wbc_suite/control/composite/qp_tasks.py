@@ -28,17 +28,6 @@ from wbc_suite.qp import (
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Vector
 
-__all__ = [
-    "TRACKING_COST",
-    "accelerations",
-    "held_equality",
-    "joint_accelerations",
-    "joint_speeds",
-    "make_limits",
-    "planar_joints",
-    "travel_costs",
-]
-
 TRACKING_COST = 10.0
 """[cost]/s of tracking a joint-space motion; far above the solver's damping."""
 

@@ -12,8 +12,6 @@ from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.assembly_steps import locked
 from wbc_suite.typing import Indices, Vector
 
-__all__ = ["gripper_groups", "joint_indices", "lock_groups", "moved_joints"]
-
 
 def lock_groups(robot: RobotDescription, groups: Sequence[str]) -> RobotDescription:
     """Return the robot with some groups, and all its grippers, fixed at `ready`.

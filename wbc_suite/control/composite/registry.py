@@ -20,17 +20,6 @@ from wbc_suite.robot import RobotDescription, load_robot
 from wbc_suite.tomlfile import read_json, read_toml
 from wbc_suite.typing import RobotName
 
-__all__ = [
-    "CompositeControllerName",
-    "CompositeKind",
-    "build_composite_controller",
-    "composite_names",
-    "default_composite",
-    "load_composite_controller_config",
-    "register_composite",
-    "register_config_converter",
-]
-
 log = logging.getLogger(__name__)
 
 CompositeControllerName: TypeAlias = Literal[

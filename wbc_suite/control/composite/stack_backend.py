@@ -31,8 +31,6 @@ from wbc_suite.qp import (
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["StackBackend"]
-
 
 class StackBackend:
     """`IkBackend` over a `TaskStack`.

@@ -38,9 +38,6 @@ from wbc_suite.control.part.spline_reference import (
 from wbc_suite.qp.tick import TickArrays, TickStatus, solve_tick
 from wbc_suite.typing import Indices, Vector
 
-__all__ = ["TICK", "Stage", "Ticks", "WholeBodyArrays", "run_tick"]
-
-
 _FIRST_LEVEL: int = np.int64(0)  # pyright: ignore[reportAssignmentType]
 """Typed, since a literal would be compiled once more."""
 

@@ -17,8 +17,6 @@ from wbc_suite.kinematics.inverse_dynamics import (
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Vector
 
-__all__ = ["TorqueArrays", "TorqueLimiter", "motors_suffice"]
-
 SHARE = 0.95  # of the effort; the rest is for tracking errors
 MIN_SHARE = 0.2  # of a change of velocity; so much is commanded in any case
 ROUNDS = 3  # in which further motors may saturate

@@ -46,8 +46,6 @@ from wbc_suite.qp import (
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["Waypoint", "WaypointPlanner"]
-
 PLAN_SHARE = 0.95  # of the acceleration limits, in a planned motion
 TRACKING_SHARE = 0.98  # of them, for removing a tracking error
 MAX_DELAY = 0.15  # s; at which the clock of a motion is slowest

@@ -51,8 +51,6 @@ from wbc_suite.planning import LinkDistanceChecker, SceneCollisionChecker
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Vector
 
-__all__ = ["WholeBodyIK"]
-
 LOG = logging.getLogger(__name__)
 
 MIN_POINT_CONTACTS = 3

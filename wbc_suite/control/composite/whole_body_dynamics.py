@@ -26,8 +26,6 @@ from wbc_suite.locomotion import begin_gait, make_gait
 from wbc_suite.qp.solution import Fallback
 from wbc_suite.typing import Indices, Vector
 
-__all__ = ["WholeBodyID"]
-
 UNTIL_NEXT_ACTION = 1_000_000
 """Physics steps; the loop needs no Python."""
 

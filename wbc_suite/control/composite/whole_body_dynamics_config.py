@@ -18,9 +18,6 @@ from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.elements import Name
 from wbc_suite.tomlfile import FrozenModel, parse_model
 
-__all__ = ["FootConfig", "WholeBodyIDConfig", "check_dynamics"]
-__all__ += ["default_dynamics_config", "read_dynamics"]
-
 
 class FootConfig(FrozenModel):
     """A foot.

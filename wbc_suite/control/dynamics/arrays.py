@@ -12,9 +12,6 @@ from wbc_suite.locomotion.gait import Gait, Measured, Plan, make_measured, make_
 from wbc_suite.qp.active_set import QpArrays, make_qp_arrays
 from wbc_suite.typing import Indices, Matrix, Records, Vector
 
-__all__ = ["EDGES", "Foot", "Limits", "Stage", "Terms", "WholeBodyDynamics"]
-__all__ += ["for_plain_python", "make_dynamics"]
-
 
 class Stage(IntEnum):
     """Where a tick is."""

@@ -8,8 +8,6 @@ from wbc_suite.qp.problem import Problem
 from wbc_suite.qp.solution import Fallback
 from wbc_suite.qp.solver import make_solver
 
-__all__ = ["QpFallback"]
-
 SOFT = 1e4
 """Cost of what is missing from a limit that cannot be kept, 1/N^2 m^2."""
 

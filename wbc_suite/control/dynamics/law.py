@@ -19,8 +19,6 @@ from wbc_suite.locomotion.walk import plan_walk
 from wbc_suite.qp.active_set import solve_warm
 from wbc_suite.typing import Vector
 
-__all__ = ["solve_whole_body", "write_whole_body"]
-
 _WALK = int(GaitKind.WALK)
 _STATED, _SOLVED = int(Stage.STATED), int(Stage.SOLVED)
 _UNSOLVED = int(Stage.UNSOLVED)

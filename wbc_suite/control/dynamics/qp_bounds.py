@@ -7,8 +7,6 @@ from wbc_suite.control.dynamics.arrays import EDGES, WholeBodyDynamics
 from wbc_suite.control.loop.physics import Physics
 from wbc_suite.locomotion.gait import GRAVITY
 
-__all__ = ["write_bounds"]
-
 POSTURE_KP = 50.0
 """1/s^2."""
 

@@ -16,8 +16,6 @@ from wbc_suite.locomotion.gait import GRAVITY
 from wbc_suite.qp.lie import exp3, log3, saturate
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["state_qp"]
-
 CONTACT = (100.0, 60.0)
 """Weight of the rows that keep a foot at rest, and their damping, 1/s."""
 

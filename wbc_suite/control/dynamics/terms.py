@@ -15,9 +15,6 @@ from wbc_suite.control.loop.rigid_body import (
 from wbc_suite.linear_algebra import dot, solve
 from wbc_suite.typing import Vector
 
-__all__ = ["eliminate_root", "foot_middle", "measure", "write_edges"]
-__all__ += ["write_frame_terms", "write_terms"]
-
 
 @compiled
 def write_terms(physics: Physics, body: WholeBodyDynamics) -> None:

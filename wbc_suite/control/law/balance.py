@@ -26,8 +26,6 @@ from wbc_suite.linear_algebra import cholesky, solve, solve_lower, solve_upper
 from wbc_suite.qp.least_change import least_change
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["balance_law", "sole_rows"]
-
 COM_STIFFNESS = 60.0  # 1/s^2; well above g / h = 12 of the inverted pendulum
 TRUNK_STIFFNESS = 150.0  # 1/s^2
 TRUNK_COST = 0.05  # [cost] s^2/rad against 1 [cost] s^2/m of the centre of mass

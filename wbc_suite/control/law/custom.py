@@ -9,8 +9,6 @@ from wbc_suite.control.loop.acceleration_limits import limit_accelerations
 from wbc_suite.control.loop.records import CompiledRecords, LawKind
 from wbc_suite.typing import Indices
 
-__all__ = ["custom_kernel", "register_law"]
-
 _KERNELS: list[Any] = []
 """Registered kernels; the kind of a law is `LawKind.CUSTOM` plus its place here."""
 

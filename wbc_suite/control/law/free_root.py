@@ -25,16 +25,6 @@ from wbc_suite.control.loop.rigid_body import (
 from wbc_suite.qp.lie import exp3, log3
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["CONTACT_DAMPING", "SINGULAR", "Flags", "RootMotion"]
-__all__ += ["contact_jacobian", "contact_rows", "equations_of_motion", "is_of_feet"]
-__all__ += [
-    "law_dofs",
-    "leg_gram",
-    "root_reference",
-    "subtract_contact_forces",
-    "write_motion",
-]
-
 Flags: TypeAlias = NDArray[np.bool_]
 """Which columns belong to joints that carry feet."""
 

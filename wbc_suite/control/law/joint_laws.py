@@ -14,9 +14,6 @@ from wbc_suite.control.state import RobotState
 from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Vector
 
-__all__ = ["JointLaw", "JointLawConfig", "VelocityLaw"]
-__all__ += ["base_law", "joint_law", "velocity_law"]
-
 
 @compiled
 def joint_law(physics: Physics, law: CompiledRecords, drives: CompiledRecords) -> None:

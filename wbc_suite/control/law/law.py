@@ -10,8 +10,6 @@ from wbc_suite.control.state import RobotState
 from wbc_suite.errors import ConfigError
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["Law", "ServoLaw", "TorqueLaw"]
-
 DECELERATION = 10.0
 """rad/s^2 or m/s^2; joints stop at their limits with it unless the robot's description
 gives another. Arms of the catalogue can do so carrying themselves."""

@@ -31,8 +31,6 @@ from wbc_suite.linear_algebra import (
 from wbc_suite.qp.lie import exp3, log3, saturate
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["LEAST_DAMPING", "SINGULAR", "OscLaw", "osc_law"]
-
 SINGULAR = 1e-4
 """1/kg or 1/(kg m^2); directions in which the hand is less mobile are damped."""
 

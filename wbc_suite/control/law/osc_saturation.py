@@ -11,8 +11,6 @@ from wbc_suite.linear_algebra import cholesky, dot, lq_factor, solve_lower, solv
 from wbc_suite.qp.least_change import least_change
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["POSTURE_COST", "SHORTENING_COST", "keep_direction"]
-
 SHORTENING_COST = 1e-2
 """[cost] of less velocity towards the goal, beside an equal error of acceleration."""
 

@@ -6,8 +6,6 @@ from wbc_suite.compiling import compiled
 from wbc_suite.control.loop.records import CompiledRecords
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["hold_reference", "reference_at", "set_reference"]
-
 
 @compiled
 def reference_at(

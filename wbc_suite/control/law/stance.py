@@ -42,9 +42,6 @@ from wbc_suite.linear_algebra import (
 from wbc_suite.qp import Sole
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["LEAST_PRESSURE", "RANK", "TORQUE_ARM", "StanceContact", "StanceLaw"]
-__all__ += ["stance_law"]
-
 TORQUE_ARM = 0.05
 """m; a contact torque of 0.05 N m costs as much as a force of 1 N: soles are small."""
 

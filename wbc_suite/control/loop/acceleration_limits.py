@@ -6,8 +6,6 @@ from wbc_suite.compiling import compiled
 from wbc_suite.control.loop.physics import Physics
 from wbc_suite.control.loop.records import CompiledRecords
 
-__all__ = ["RATE", "acceleration_limits", "limit_accelerations"]
-
 RATE = 50.0
 """1/s; fastest exponential approach to a limit, and return from beyond it."""
 

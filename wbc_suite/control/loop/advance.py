@@ -25,8 +25,6 @@ from wbc_suite.control.loop.state_checks import (
     check_before,
 )
 
-__all__ = ["advance"]
-
 
 @compiled_nogil
 def advance(

@@ -7,8 +7,6 @@ from wbc_suite.control.loop.physics import Physics
 from wbc_suite.control.loop.records import CompiledRecords, LawKind
 from wbc_suite.control.loop.rigid_body import multiply_inertia
 
-__all__ = ["observe_disturbances"]
-
 _TORQUE, _SERVO = int(LawKind.TORQUE), int(LawKind.SERVO)
 _STANCE, _BALANCE = int(LawKind.STANCE), int(LawKind.BALANCE)
 

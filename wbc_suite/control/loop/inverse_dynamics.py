@@ -24,9 +24,6 @@ from wbc_suite.control.loop.physics import Physics
 from wbc_suite.control.loop.records import CompiledRecords, LawKind, Records
 from wbc_suite.control.loop.rigid_body import multiply_inertia
 
-__all__ = ["CustomLaw", "Needed", "WholeBodies", "needed_kernels", "solve_bodies"]
-__all__ += ["write_commands"]
-
 _JOINT, _OSC = int(LawKind.JOINT), int(LawKind.OSC)
 _BASE, _VELOCITY = int(LawKind.BASE), int(LawKind.VELOCITY)
 _TORQUE, _SERVO = int(LawKind.TORQUE), int(LawKind.SERVO)
@@ -74,7 +71,7 @@ def write_commands(
     hands: Needed,
     feet: Needed,
     custom_law: CustomLaw,
-    bodies: WholeBodies = None,
+    bodies: WholeBodies,
 ) -> None:
     """Write the commands of all actuators; runs between `mj_step1` and `mj_step2`.
 
@@ -159,7 +156,7 @@ def write_law_commands(
 
 
 def needed_kernels(laws: Records) -> tuple[Needed, Needed, CustomLaw]:
-    """Return the last three arguments of `write_commands` for a table of laws."""
+    """Return `hands`, `feet`, `custom_law` of `write_commands` for a table of laws."""
     kinds = laws["kind"]
     hands = kinds == LawKind.OSC
     feet = (kinds == LawKind.STANCE) | (kinds == LawKind.BALANCE)

@@ -11,8 +11,6 @@ import llvmlite.binding
 import mujoco
 from numba import types
 
-__all__ = ["addresses", "mj_comPos", "mj_kinematics", "mj_step1", "mj_step2"]
-
 _MODEL_AND_DATA = types.void(types.intp, types.intp)
 
 _LIBRARY = next(Path(mujoco.__file__).parent.glob("libmujoco*"))

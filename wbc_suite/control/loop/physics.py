@@ -8,8 +8,6 @@ import numpy as np
 from wbc_suite.compiling import struct
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["OscWork", "Physics", "bind_physics"]
-
 
 @struct
 class OscWork(NamedTuple):

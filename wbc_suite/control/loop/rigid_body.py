@@ -6,17 +6,6 @@ from wbc_suite.compiling import compiled
 from wbc_suite.control.loop.physics import Physics
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = [
-    "matrix_product",
-    "moves_body",
-    "multiply_inertia",
-    "point_jacobian_column",
-    "point_velocity_and_drift",
-    "rotated",
-    "rotation",
-    "write_inertia",
-]
-
 
 @compiled
 def rotation(rotations: Matrix, k: int) -> Matrix:

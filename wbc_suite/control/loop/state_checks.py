@@ -8,8 +8,6 @@ import numpy as np
 from wbc_suite.compiling import compiled, struct
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["LARGEST", "CheckedState", "check_after", "check_before", "checked_state"]
-
 LARGEST = float(mujoco.mjMAXVAL)
 """MuJoCo calls larger numbers bad, as it does NaN."""
 

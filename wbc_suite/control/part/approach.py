@@ -11,8 +11,6 @@ import pinocchio as pin
 from wbc_suite.compiling import compiled
 from wbc_suite.typing import Vector
 
-__all__ = ["approach_pose", "approach_speed", "step_share"]
-
 
 @compiled
 def approach_speed(distance: float, settling: float, braking: float) -> float:

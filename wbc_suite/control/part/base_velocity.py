@@ -21,8 +21,6 @@ from wbc_suite.control.state import RobotState
 from wbc_suite.errors import ConfigError
 from wbc_suite.typing import Indices, Vector
 
-__all__ = ["BaseVelocityConfig", "BaseVelocityController"]
-
 AXES = (Axis.FORWARD, Axis.SIDEWAYS, Axis.TURN)
 UNITS = (Unit("m/s"), Unit("m/s"), Unit("rad/s"))
 

@@ -14,8 +14,6 @@ from wbc_suite.control.state import RobotState
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Vector
 
-__all__ = ["UNTIL_NEXT_ACTION", "PartController", "PoseInput"]
-
 UNTIL_NEXT_ACTION = 1 << 30
 """Physics steps; more than an action takes."""
 

@@ -7,8 +7,6 @@ from wbc_suite.kinematics.configuration import random_configuration
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Vector
 
-__all__ = ["feasible_accelerations", "greatest_loads"]
-
 LOAD_SAMPLES = 50
 LEAST_ACCELERATION = 2.0
 """rad/s^2 or m/s^2; where holding the load takes nearly the whole effort."""

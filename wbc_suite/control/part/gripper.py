@@ -14,8 +14,6 @@ from wbc_suite.errors import ConfigError
 from wbc_suite.robot.elements import Synergy
 from wbc_suite.typing import Indices, Vector
 
-__all__ = ["GripperController", "OpeningTable"]
-
 SAMPLES = 41
 
 

@@ -11,20 +11,29 @@ from wbc_suite.control.part.part_settings import ROUNDING, InputFrame, Range, li
 from wbc_suite.qp.lie import exp3, log3
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["HandGoal", "move_goal"]
-
 
 class GoalSettings(Protocol):
     """Settings of a controller that moves the goal of a hand."""
 
     @property
-    def input_ref_frame(self) -> InputFrame: ...
+    def input_ref_frame(self) -> InputFrame:
+        """Axes of the goal's steps."""
+        ...
+
     @property
-    def goal_update_mode(self) -> Literal["achieved", "desired"]: ...
+    def goal_update_mode(self) -> Literal["achieved", "desired"]:
+        """What a step is added to."""
+        ...
+
     @property
-    def position_limits(self) -> Range | None: ...
+    def position_limits(self) -> Range | None:
+        """Range of the goal's position, m."""
+        ...
+
     @property
-    def orientation_limits(self) -> Range | None: ...
+    def orientation_limits(self) -> Range | None:
+        """Range of the goal's orientation, rad."""
+        ...
 
 
 class HandGoal:

@@ -27,8 +27,6 @@ from wbc_suite.control.robot_parts import RobotPart
 from wbc_suite.control.state import RobotState
 from wbc_suite.typing import Vector
 
-__all__ = ["IkPoseConfig", "IkPoseController"]
-
 AXES = (Axis.X, Axis.Y, Axis.Z, Axis.QX, Axis.QY, Axis.QZ, Axis.QW)
 
 

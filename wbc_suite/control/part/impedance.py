@@ -14,8 +14,6 @@ from wbc_suite.control.part.part_settings import (
 from wbc_suite.tomlfile import FROZEN
 from wbc_suite.typing import Vector
 
-__all__ = ["Gains", "Impedance", "ImpedanceSettings"]
-
 Gains: TypeAlias = NonNegativeFloat | tuple[NonNegativeFloat, ...]
 """One gain for all axes or joints, or one for each."""
 

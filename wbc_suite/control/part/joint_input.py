@@ -17,8 +17,6 @@ from wbc_suite.control.robot_parts import RobotPart
 from wbc_suite.control.state import RobotState
 from wbc_suite.typing import Vector
 
-__all__ = ["JointInput", "narrow_limits", "position_limits", "velocity_limits"]
-
 _UNITS: dict[SliceKind, tuple[Unit, Unit]] = {
     SliceKind.POSTURE: (Unit("rad"), Unit("m")),
     SliceKind.VELOCITY: (Unit("rad/s"), Unit("m/s")),

@@ -26,8 +26,6 @@ from wbc_suite.control.robot_parts import RobotPart
 from wbc_suite.control.state import RobotState
 from wbc_suite.typing import Vector
 
-__all__ = ["JointPositionConfig", "JointPositionController"]
-
 
 class JointPositionConfig(ImpedanceSettings, PartSettings):
     """Joints follow positions; see `JointLaw`.

@@ -18,8 +18,6 @@ from wbc_suite.control.robot_parts import RobotPart
 from wbc_suite.control.state import RobotState
 from wbc_suite.typing import Vector
 
-__all__ = ["JointTorqueConfig", "JointTorqueController"]
-
 SHARE = 0.1
 """Part of the greatest torque at full input: 8.7 N m at Panda's shoulder, 1.2 N m at
 its wrist. robosuite's 0.1 N m for all joints moves nothing visibly."""

@@ -25,8 +25,6 @@ from wbc_suite.control.robot_parts import RobotPart
 from wbc_suite.control.state import RobotState
 from wbc_suite.typing import Vector
 
-__all__ = ["JointVelocityConfig", "JointVelocityController"]
-
 
 class JointVelocityConfig(PartSettings):
     """Joints follow velocities; see `VelocityLaw`.

@@ -27,8 +27,6 @@ from wbc_suite.control.state import RobotState
 from wbc_suite.errors import UnknownNameError
 from wbc_suite.typing import Vector
 
-__all__ = ["OscConfig", "OscController"]
-
 AXES = (Axis.X, Axis.Y, Axis.Z, Axis.RX, Axis.RY, Axis.RZ)
 UNITS = (*(Unit("m"),) * 3, *(Unit("rad"),) * 3)
 

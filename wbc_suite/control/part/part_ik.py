@@ -24,8 +24,6 @@ from wbc_suite.qp import (
 from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Matrix
 
-__all__ = ["IkMotion", "PartIk"]
-
 UNLIMITED = 1e3
 """m/s and rad/s; velocities are limited by `approach_pose`."""
 

@@ -12,22 +12,6 @@ from wbc_suite.errors import ConfigError
 from wbc_suite.tomlfile import FROZEN, FrozenModel
 from wbc_suite.typing import Vector
 
-__all__ = [
-    "REACH",
-    "ROUNDING",
-    "GripConfig",
-    "InputFrame",
-    "InputScaling",
-    "InputType",
-    "Numbers",
-    "PartSettings",
-    "Range",
-    "apply_torque_settings",
-    "damping_of",
-    "limits_of",
-    "spread",
-]
-
 InputType = Literal["delta", "absolute"]
 InputFrame = Literal["world", "base", "eef"]
 Numbers: TypeAlias = float | tuple[float, ...]

@@ -13,18 +13,6 @@ from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.robot import RobotDescription
 from wbc_suite.tomlfile import parse_model
 
-__all__ = [
-    "PartControllerName",
-    "check_part",
-    "is_part_controller",
-    "load_part_controller_config",
-    "make_part",
-    "parse_part",
-    "part_controller",
-    "part_models",
-    "register_part_controller",
-]
-
 PartControllerName: TypeAlias = Literal[
     "OSC_POSE",
     "OSC_POSITION",

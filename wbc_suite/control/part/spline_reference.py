@@ -16,9 +16,6 @@ from wbc_suite.kinematics.tangent_space import (
 )
 from wbc_suite.typing import Indices, Matrix, Vector
 
-__all__ = ["SplineArrays", "SplineReference", "extend_spline", "lead_root"]
-__all__ += ["window_length"]
-
 ROUNDING = 1e-9
 
 

@@ -21,15 +21,6 @@ from wbc_suite.robot.elements import Name
 from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Vector
 
-__all__ = [
-    "HeldFrame",
-    "StanceConfig",
-    "StanceController",
-    "held_frames",
-    "soles_of",
-    "stance_law",
-]
-
 
 class HeldFrame(FrozenModel):
     """A frame in contact that must not move, such as a foot.

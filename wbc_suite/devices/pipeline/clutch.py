@@ -2,8 +2,6 @@
 
 import pinocchio as pin
 
-__all__ = ["Clutch"]
-
 
 class Clutch:
     """Repeat the motion of an input with a target.

@@ -6,8 +6,6 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from wbc_suite.tomlfile import FrozenModel
 
-__all__ = ["Leash", "OneEuro", "PipelineConfig", "RatesConfig", "WorkspaceBox"]
-
 Point = tuple[float, float, float]
 
 

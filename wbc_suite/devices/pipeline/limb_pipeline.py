@@ -11,8 +11,6 @@ from wbc_suite.devices.pipeline.one_euro import OneEuroFilter
 from wbc_suite.devices.state import LimbInput
 from wbc_suite.typing import Vector
 
-__all__ = ["LimbPipeline", "clip_to_box", "clip_to_leash"]
-
 NEAR = 1e-9  # m or rad
 
 

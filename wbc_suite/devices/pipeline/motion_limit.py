@@ -8,8 +8,6 @@ import pinocchio as pin
 from wbc_suite.devices.pipeline.config import RatesConfig
 from wbc_suite.typing import Vector
 
-__all__ = ["LimitedMotion", "MotionLimit"]
-
 BISECTIONS = 20
 STILL = 1e-12  # units, units / s and / s^2; smaller values count as zero
 

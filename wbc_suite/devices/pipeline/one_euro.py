@@ -7,8 +7,6 @@ import pinocchio as pin
 
 from wbc_suite.devices.pipeline.config import OneEuro
 
-__all__ = ["OneEuroFilter"]
-
 SPEED_CUTOFF = 1.0  # Hz, of the speed's own filter, as in the source
 
 

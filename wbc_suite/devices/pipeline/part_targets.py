@@ -9,8 +9,6 @@ from wbc_suite.devices.pipeline.config import PipelineConfig
 from wbc_suite.devices.pipeline.motion_limit import LimitedMotion
 from wbc_suite.typing import Vector
 
-__all__ = ["BaseVelocity", "GripTarget", "JointTargets"]
-
 
 class GripTarget:
     """The closing of a gripper, which moves to a goal.

@@ -28,8 +28,6 @@ from wbc_suite.devices.state import DeviceState, LimbInput, mirrored
 from wbc_suite.errors import ConfigError
 from wbc_suite.typing import Vector
 
-__all__ = ["Pipeline"]
-
 FIRST_PACE = 0.1  # of the speed limits, at the start of the ramp
 
 

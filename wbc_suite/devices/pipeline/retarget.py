@@ -6,8 +6,6 @@ import numpy as np
 
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["curls", "opposition", "pinch", "retarget"]
-
 FINGERS = {
     "thumb": (1, 2, 3, 4),
     "index": (5, 6, 7, 8, 9),

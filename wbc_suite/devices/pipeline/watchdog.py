@@ -5,8 +5,6 @@ from enum import StrEnum
 
 from wbc_suite.devices.state import DeviceState
 
-__all__ = ["Phase", "Watchdog"]
-
 
 class Phase(StrEnum):
     """What the pipeline does, by the time without new data."""

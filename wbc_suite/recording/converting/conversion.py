@@ -25,8 +25,6 @@ from wbc_suite.recording.converting.robomimic import ROBOMIMIC
 from wbc_suite.recording.dataset import Dataset
 from wbc_suite.recording.resumable_work import run_pieces, work_folder
 
-__all__ = ["LAYOUTS", "convert", "convert_piece"]
-
 LAYOUTS: Mapping[str, Layout] = MappingProxyType(
     {
         "robomimic": ROBOMIMIC,

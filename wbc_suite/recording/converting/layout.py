@@ -8,8 +8,6 @@ from typing import Any, TypeAlias
 
 from wbc_suite.recording.dataset import Dataset
 
-__all__ = ["Layout", "Piece", "Progress", "split_dataset", "whole_dataset"]
-
 MAX_EPISODES = 50
 """Episodes of a piece, which are lost with a killed worker."""
 

@@ -30,8 +30,6 @@ from wbc_suite.recording.episode import Episode
 from wbc_suite.recording.extras import import_extra
 from wbc_suite.recording.mp4_writer import Mp4Writer
 
-__all__ = ["LEROBOT"]
-
 CHUNK = 1000  # files in a folder
 QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
 PICTURE = "_image"

@@ -29,8 +29,6 @@ from wbc_suite.recording.dataset import Dataset
 from wbc_suite.recording.episode import Episode
 from wbc_suite.recording.extras import import_extra
 
-__all__ = ["MCAP"]
-
 SECOND = 1_000_000_000  # ns
 YEAR = 3e7  # s; no episode is as long
 _TIME = {

@@ -27,8 +27,6 @@ from wbc_suite.recording.dataset import Dataset
 from wbc_suite.recording.episode import Episode
 from wbc_suite.registration import BENCHMARKS
 
-__all__ = ["MINARI"]
-
 VERSION = "0.5.4"
 _NAME = re.compile(r"[-\w]+?-v\d+\Z")
 _INFOS = ("states", "clipped", "step_time", "stamp")

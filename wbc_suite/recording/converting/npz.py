@@ -12,8 +12,6 @@ from wbc_suite.recording.converting.layout import Layout, Piece, Progress
 from wbc_suite.recording.dataset import Dataset
 from wbc_suite.recording.episode import Episode
 
-__all__ = ["NPZ"]
-
 
 def _write(dataset: Dataset, piece: Piece, out: Path, on_progress: Progress) -> None:
     """Write each episode as `demo_N.npz` into a folder."""

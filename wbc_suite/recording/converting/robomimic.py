@@ -12,8 +12,6 @@ from wbc_suite.recording.dataset import Dataset
 from wbc_suite.recording.episode import Episode
 from wbc_suite.recording.hdf5_writer import write_dataset
 
-__all__ = ["ROBOMIMIC"]
-
 _OTHER_COLUMNS = ("clipped", "step_time", "stamp")
 _FACTS = ("model_file", "success", "seed", "uid")
 

@@ -4,8 +4,6 @@ from functools import partial
 
 from wbc_suite.scene.objects.scene_object import Color, Hinge, Part, SceneObject
 
-__all__ = ["door"]
-
 FRAME: Color = (0.62, 0.64, 0.67, 1.0)
 PANEL: Color = (0.42, 0.27, 0.16, 1.0)
 INLAY: Color = (0.50, 0.33, 0.20, 1.0)

@@ -6,8 +6,6 @@ from typing import Literal
 from wbc_suite.robot.shapes import Box, Hull, Loft
 from wbc_suite.scene.objects.scene_object import Color, Part, SceneObject
 
-__all__ = ["bottle", "bread", "can", "cereal", "lemon", "milk"]
-
 RED: Color = (0.80, 0.10, 0.12, 1.0)
 WHITE: Color = (0.95, 0.95, 0.93, 1.0)
 BLUE: Color = (0.16, 0.36, 0.68, 1.0)

@@ -10,8 +10,6 @@ from wbc_suite.robot.shapes import Vector3
 from wbc_suite.scene.objects.scene_object import STANDING, Quat, SceneObject
 from wbc_suite.typing import Matrix, Vector
 
-__all__ = ["Extent", "ObjectState"]
-
 DIRECTIONS = 64
 """Horizontal directions along which an object is measured; 0.1 % below the circle."""
 

@@ -5,8 +5,6 @@ from collections.abc import Sequence
 from wbc_suite.robot.shapes import Hull, Vector3
 from wbc_suite.scene.objects.scene_object import Color, Part, SceneObject
 
-__all__ = ["ball", "box", "capsule", "cylinder", "hull"]
-
 GREY = (0.7, 0.7, 0.7, 1.0)
 
 

@@ -14,16 +14,6 @@ from wbc_suite.robot.shape_geometry import mesh_of
 from wbc_suite.robot.shapes import Box, Cylinder, Hull, Loft, Vector3
 from wbc_suite.scene.materials import material_named, use_material
 
-__all__ = [
-    "TORSION",
-    "Color",
-    "Hinge",
-    "MjcfObject",
-    "Part",
-    "Quat",
-    "SceneObject",
-]
-
 Color: TypeAlias = tuple[float, float, float, float]
 Quat: TypeAlias = tuple[float, float, float, float]
 

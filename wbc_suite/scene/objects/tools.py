@@ -8,16 +8,6 @@ from wbc_suite.robot.shapes import Vector3
 from wbc_suite.scene.objects.scene_object import Color, Part, SceneObject
 from wbc_suite.scene.objects.vessels import ring_of_boxes
 
-__all__ = [
-    "hammer",
-    "hanging_frame",
-    "plate_with_hole",
-    "round_nut",
-    "square_nut",
-    "stand",
-    "wrench",
-]
-
 WOOD: Color = (0.72, 0.50, 0.28, 1.0)
 STEEL: Color = (0.62, 0.64, 0.67, 1.0)
 BLACK: Color = (0.13, 0.13, 0.14, 1.0)

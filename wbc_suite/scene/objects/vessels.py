@@ -7,8 +7,6 @@ from functools import partial
 from wbc_suite.robot.shapes import Vector3
 from wbc_suite.scene.objects.scene_object import Color, Part, SceneObject
 
-__all__ = ["hollow_cylinder", "lid", "open_bin", "pot", "ring_of_boxes"]
-
 WOOD: Color = (0.80, 0.62, 0.42, 1.0)
 ENAMEL: Color = (0.78, 0.22, 0.16, 1.0)
 GREEN: Color = (0.25, 0.55, 0.30, 1.0)
