@@ -11,6 +11,13 @@ from wbc_suite.control import CompositeController, RobotState, SteppedController
 from wbc_suite.control.composite.protocols import DynamicController, TickedController
 from wbc_suite.control.composite.tick import WholeBodyArrays
 from wbc_suite.control.dynamics.arrays import for_plain_python
+from wbc_suite.control.dynamics.state_source import (
+    begin_source,
+    make_state_source,
+    read_all_sensors,
+    source_for_plain_python,
+    use_all_feet,
+)
 from wbc_suite.control.loop.advance import advance
 from wbc_suite.control.loop.inverse_dynamics import (
     needed_kernels,
@@ -78,15 +85,26 @@ class Simulation:
             first, last = self._laws["first"][k], self._laws["last"][k]
             law.adopt(self._laws[k : k + 1], self._drives[first:last], k)
         self._ticked, ticks = self._loop_ticks()
-        physics, state = bind_physics(model, data), self._watch.state
         self._dynamic = [
             c for c in self.controllers if isinstance(c, DynamicController)
         ]
+        exact = all(controller.sensors.is_exact for controller in self._dynamic)
+        believed = data if exact else mujoco.MjData(model)
+        self._sources = [
+            make_state_source(
+                c.sensors, c.dynamics, model=model, data=data, believed=believed
+            )
+            for c in ([] if exact else self._dynamic)
+        ]
+        self._believed = believed
+        physics, state = bind_physics(model, believed), self._watch.state
         bodies = [controller.dynamics for controller in self._dynamic]
         kernels = *needed_kernels(self._laws), tuple(map(as_argument, bodies)) or None
         records = self._laws, self._drives, *kernels
         views = as_argument(physics), as_argument(state)
-        self._loop_arguments = (*addresses(model, data), *views, *records, ticks)
+        states = *addresses(model, data), addresses(model, believed)[1]
+        sources = tuple(map(as_argument, self._sources)) or None
+        self._loop_arguments = (*states, *views, *records, ticks, sources)
         self._write_commands = write_commands if compiled else plain(write_commands)
         self._solve_bodies = solve_bodies if compiled else plain(solve_bodies)
         self._law_arguments = views[0], *records
@@ -134,6 +152,8 @@ class Simulation:
         self.forward()
         for state, controller in self.pairs:
             controller.reset(state)
+        for source in self._sources:
+            begin_source(source, self.data)
         self._left = [0] * len(self.pairs)
 
     def tick(self, n: int) -> None:
@@ -193,15 +213,26 @@ class Simulation:
             self._watch.check()
         return done
 
+    def _sense(self) -> None:
+        """Write the believed state, in plain Python."""
+        sources = tuple(map(source_for_plain_python, self._sources))
+        plain(read_all_sensors)(sources)
+        mujoco.mj_kinematics(self.model, self._believed)
+        plain(use_all_feet)(sources)
+        mujoco.mj_step1(self.model, self._believed)
+
     def _step_in_python(self, steps: int) -> bool:
         """Do what `advance` does, with controllers that compute commands."""
         model, data = self.model, self.data
         for _ in range(steps):
             mujoco.mj_step1(model, data)
+            if self._sources:
+                self._sense()
             if not self._solve_bodies(self._law_arguments[0], self._law_arguments[-1]):
                 for dynamic in self._dynamic:
                     dynamic.finish_tick()
             self._write_commands(*self._law_arguments)
+            data.ctrl[:] = self._believed.ctrl
             for state, controller in self._stepped:
                 data.ctrl[state.actuator_ids] = controller.compute(state)
             mujoco.mj_step2(model, data)

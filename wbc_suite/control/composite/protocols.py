@@ -5,6 +5,7 @@ from typing import Any, Protocol, runtime_checkable
 from wbc_suite.control.action import ActionLayout
 from wbc_suite.control.composite.tick import WholeBodyArrays
 from wbc_suite.control.dynamics.arrays import WholeBodyDynamics
+from wbc_suite.control.dynamics.state_source import StateSourceConfig
 from wbc_suite.control.law.law import Law
 from wbc_suite.control.state import RobotState
 from wbc_suite.typing import Vector
@@ -91,9 +92,11 @@ class DynamicController(CompositeController, Protocol):
 
     Attributes:
         dynamics: What the QP's kernels read and write, see `solve_whole_body`.
+        sensors: Where the state of the robot comes from.
     """
 
     dynamics: WholeBodyDynamics
+    sensors: StateSourceConfig
 
     def finish_tick(self) -> None:
         """Solve the QP if the loop has stated it and not found its active set."""

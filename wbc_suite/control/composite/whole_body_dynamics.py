@@ -44,11 +44,13 @@ class WholeBodyID:
     Attributes:
         layout: Slices of the action: hands, `walk`, `height`, grippers.
         dynamics: What the law reads and writes.
+        sensors: Where the state of the robot comes from.
         fallback: What the last QP took whose active set was not found.
     """
 
     def __init__(self, config: Mapping[str, Any], state: RobotState) -> None:
         self.config = read_dynamics(config, state.robot, str(config.get("type")))
+        self.sensors = self.config.sensors
         self._robot = lock_groups(state.robot, ())
         self._law = Law(LawKind.DYNAMICS, state, moved_joints(self._robot, state))
         self._law.keep_limits(state)

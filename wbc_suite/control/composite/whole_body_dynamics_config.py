@@ -12,6 +12,7 @@ from wbc_suite.control.composite.whole_body_config import (
     InputType,
     default_whole_body_config,
 )
+from wbc_suite.control.dynamics.state_source import StateSourceConfig
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.locomotion import GaitConfig, TrotConfig
 from wbc_suite.robot import RobotDescription
@@ -82,6 +83,8 @@ class WholeBodyIDConfig(FrozenModel):
         gait: How the robot steps.
         upright: Links that stay upright.
         posture: Pull to a posture.
+        sensors: Where the state of the robot comes from: the simulation, or an IMU and
+            encoders, with noise and delay.
         friction: Coefficient of friction that contact forces keep to.
         max_walk: Greatest commands: forward, left (m/s), turn (rad/s).
         height: Lowest and highest command of height, m.
@@ -99,6 +102,7 @@ class WholeBodyIDConfig(FrozenModel):
     gait: GaitConfig
     upright: tuple[UprightConfig, ...] = ()
     posture: StanceConfig = StanceConfig()
+    sensors: StateSourceConfig = StateSourceConfig()
     friction: PositiveFloat = 0.6
     max_walk: tuple[PositiveFloat, PositiveFloat, PositiveFloat] = (1.0, 0.4, 1.0)
     height: tuple[float, float] = (-0.15, 0.02)

@@ -4,6 +4,12 @@ from typing import Any
 
 from wbc_suite.compiling import compiled, compiled_nogil
 from wbc_suite.control.composite.tick import Ticks, run_tick
+from wbc_suite.control.dynamics.state_source import (
+    Sources,
+    pass_commands,
+    read_all_sensors,
+    use_all_feet,
+)
 from wbc_suite.control.loop.inverse_dynamics import (
     CustomLaw,
     Needed,
@@ -30,6 +36,7 @@ from wbc_suite.control.loop.state_checks import (
 def advance(
     model: Any,
     data: Any,
+    believed: Any,
     physics: Physics,
     state: CheckedState,
     laws: CompiledRecords,
@@ -39,6 +46,7 @@ def advance(
     custom_law: CustomLaw,
     bodies: WholeBodies,
     ticks: Ticks,
+    sources: Sources,
     steps: int,
 ) -> int:
     """Advance physics under all laws, without the interpreter's lock.
@@ -49,7 +57,8 @@ def advance(
     Args:
         model: Address of the model; the model itself in plain Python.
         data: Address of its data; the data in plain Python.
-        physics: Views of their arrays.
+        believed: Address of the state that laws read; see `state_source`.
+        physics: Views of its arrays; of `data` where there are no sensors.
         state: What is checked before the first and after the last step.
         laws: `LAW` records.
         drives: `DRIVE` records.
@@ -58,6 +67,7 @@ def advance(
         custom_law: Kernel of users' laws.
         bodies: Robots moved by whole-body inverse dynamics.
         ticks: Whole-body ticks that run here.
+        sources: Sensors of robots.
         steps: Number of physics steps.
 
     Returns:
@@ -70,9 +80,15 @@ def advance(
     done = 0
     while done < steps and _run_ticks(physics, laws, drives, ticks):
         mj_step1(model, data)
+        if sources is not None:
+            read_all_sensors(sources)
+            mj_kinematics(model, believed)
+            use_all_feet(sources)
+            mj_step1(model, believed)
         if not solve_bodies(physics, bodies):
             break
         write_commands(physics, laws, drives, hands, feet, custom_law, bodies)
+        pass_commands(physics, sources)
         mj_step2(model, data)
         _count_down(ticks)
         done += 1
