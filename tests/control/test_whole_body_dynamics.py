@@ -1,5 +1,7 @@
 """WHOLE_BODY_ID: its terms, its QP, and robots that stand, walk and are pushed."""
 
+import tomllib
+
 import mujoco
 import numpy as np
 import pinocchio as pin
@@ -7,12 +9,16 @@ import pytest
 
 import wbc_suite
 from wbc_suite.control import load_composite_controller_config
+from wbc_suite.control.composite.whole_body_dynamics_config import (
+    default_dynamics_config,
+)
 from wbc_suite.control.dynamics.arrays import EDGES
 from wbc_suite.control.dynamics.fallback import QpFallback
 from wbc_suite.control.dynamics.terms import write_frame_terms
 from wbc_suite.control.loop.physics import bind_physics
 from wbc_suite.errors import ConfigError
 from wbc_suite.qp.solution import Fallback
+from wbc_suite.robot import load_robot
 
 ROBOTS = ("GR1FreeBody", "SpotWithArm")
 
@@ -293,6 +299,19 @@ def test_configs_are_refused_in_words():
         load("GR1FreeBody", foot=[feet[0] | {"frame": "left_fot"}, feet[1]])
     with pytest.raises(ConfigError, match="heel < toes"):
         load("GR1FreeBody", foot=[{"frame": "left_foot", "sole": [1, 0, 0, 1]}] * 2)
+
+
+def test_a_biped_without_soles_is_refused_with_those_that_its_shapes_suggest():
+    robot = load_robot("GR1FreeBody")
+    with pytest.raises(ConfigError, match="soles are not given") as raised:
+        default_dynamics_config(robot)
+    text = str(raised.value)
+    config = tomllib.loads(text[text.index("format = 1") :])
+    read = load_composite_controller_config(config, robot)
+    assert [foot["frame"] for foot in read["foot"]] == ["left_foot", "right_foot"]
+    without = robot.model_copy(update={"frames": ()})
+    with pytest.raises(ConfigError, match="0 frames with the role 'foot'"):
+        default_dynamics_config(without)
 
 
 def test_an_environment_walks(alone):

@@ -287,7 +287,7 @@ def _foot(state: RobotState, foot: FootConfig) -> Foot:
     heel, toes, right, left = foot.sole
     x, y = 0.5 * (heel + toes), 0.5 * (right + left)
     sole = (heel - x, toes - x, right - y, left - y)
-    return Foot(site=site, middle=np.array([x, y, 0.0]), sole=sole)
+    return Foot(site=site, middle=np.array([x, y, -foot.height]), sole=sole)
 
 
 def _sites(state: RobotState, names: list[str]) -> Indices:

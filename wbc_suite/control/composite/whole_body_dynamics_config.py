@@ -17,6 +17,7 @@ from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.locomotion import GaitConfig, TrotConfig
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.elements import Name
+from wbc_suite.robot.soles import ball_radius, guess_sole
 from wbc_suite.tomlfile import FrozenModel, parse_model
 
 
@@ -27,11 +28,13 @@ class FootConfig(FrozenModel):
         frame: Frame or link of the robot.
         sole: Edges of the sole in the frame's axes, m: heel, toes (along x), right,
             left (along y); absent for a foot that touches the ground in a point.
+        height: Of the frame over the sole, m, as in a file whose foot is the ankle.
         radius: Of a foot that is a ball about the frame, m.
     """
 
     frame: Name
     sole: tuple[float, float, float, float] | None = None
+    height: float = 0.0
     radius: NonNegativeFloat = 0.0
 
     @model_validator(mode="after")
@@ -130,14 +133,19 @@ def default_dynamics_config(robot: RobotDescription) -> dict[str, Any]:
     """Return a config for a robot without a file: four feet trot.
 
     Raises:
-        ConfigError: If the robot has not four feet; soles of a biped are not known.
+        ConfigError: If the robot has no four feet; soles of a biped are not known.
     """
     feet = [frame.name for frame in robot.frames if frame.role == "foot"]
+    if len(feet) < 2:
+        raise ConfigError(
+            f"{robot.name} has {len(feet)} frames with the role 'foot'. Name its feet "
+            "in a controller file with [[foot]]; see docs/locomotion.md."
+        )
     if len(feet) == 2:
         raise ConfigError(
-            f"{robot.name} has two feet, and nobody has told what their soles are: it "
-            "would tip over. Give [[foot]] with 'sole' for the left and the right one; "
-            "see 'On its own feet' in docs/robots.md."
+            f"{robot.name} has two feet, and their soles are not given: it would tip "
+            "over. Write a controller file with [[foot]] for the left and right one. "
+            f"See docs/locomotion.md.{_suggested(robot, feet)}"
         )
     hands = [
         frame
@@ -147,10 +155,27 @@ def default_dynamics_config(robot: RobotDescription) -> dict[str, Any]:
     return {
         "format": 1,
         "frame": [{"name": x["name"], "frame": x["frame"]} for x in hands],
-        "foot": [{"frame": name} for name in feet],
+        "foot": [{"frame": x, "radius": ball_radius(robot, x)} for x in feet],
         "gait": TrotConfig().model_dump(),
         "upright": [{"frame": robot.links[0].name}],
     }
+
+
+def _suggested(robot: RobotDescription, feet: list[str]) -> str:
+    """Return a file with the soles that the collision shapes have; empty if none."""
+    tables = []
+    for name in sorted(feet, key=lambda name: "left" not in name.lower()):
+        sole = guess_sole(robot, name)
+        if sole is None:
+            return ""
+        edges = ", ".join(f"{edge:.3f}" for edge in sole.edges)
+        tables.append(
+            f'[[foot]]\nframe = "{name}"\nsole = [{edges}]\nheight = {sole.height:.3f}'
+        )
+    trunk = f'[gait]\ntype = "walk"\n\n[[upright]]\nframe = "{robot.links[0].name}"'
+    head = 'format = 1\ntype = "WHOLE_BODY_ID"'
+    file = "\n\n".join([head, *tables, trunk])
+    return f" Its collision shapes suggest:\n\n{file}\n"
 
 
 def check_dynamics(
