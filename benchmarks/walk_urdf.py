@@ -1,12 +1,14 @@
 """Robots from URDF files on their own feet: stand, then walk forward.
 
 A robot stands for two seconds on the floor of Lift and walks for ten. Its collision
-shapes are those of the file; meshes are used where they are found.
+shapes are those of the file; meshes are used where they are found. Without a file it is
+Spot, exported to URDF.
 
-Usage: python benchmarks/walk_urdf.py FILE ... [--controller FILE] [--speed 0.5]
+Usage: python benchmarks/walk_urdf.py [FILE ...] [--controller FILE] [--speed 0.5]
 """
 
 import logging
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +37,7 @@ def walk(
     # The table of Lift is in front.
     go = env.action_layout.pack({"walk": [-speed, 0.0, 0.0]}, base=stand)
     data, trunk = env.simulation.data, f"robot0_{robot.links[0].name}"
+    info: dict[str, Any] = {}
     ways = [data.body(trunk).xpos.copy()]
     for action, duration in ((stand, STAND), (go, seconds)):
         for _ in range(round(duration / PERIOD)):
@@ -55,21 +58,24 @@ def walk(
 
 def main() -> None:
     parser = options(__doc__, "2 s of walking")
-    parser.add_argument("files", nargs="+", type=Path)
+    parser.add_argument("files", nargs="*", type=Path)
     parser.add_argument("--controller", default="WHOLE_BODY_ID")
     parser.add_argument("--speed", type=float, default=0.5)
     arguments = parser.parse_args()
     logging.getLogger("wbc_suite").setLevel(logging.ERROR)
     seconds, report = 2.0 if arguments.quick else WALK, Report()
-    for file in arguments.files:
-        try:
-            row = walk(
-                file, arguments.controller, speed=arguments.speed, seconds=seconds
-            )
-        except WbcError as error:
-            print(f"{file}: {error}")
-            continue
-        report.rows.append(row)
+    with tempfile.TemporaryDirectory() as folder:
+        spot = Path(folder) / "spot.urdf"
+        spot.write_text(load_robot("Spot").to_urdf(), encoding="utf-8")
+        for file in arguments.files or [spot]:
+            try:
+                row = walk(
+                    file, arguments.controller, speed=arguments.speed, seconds=seconds
+                )
+            except WbcError as error:
+                print(f"{file}: {error}")
+                continue
+            report.rows.append(row)
     report.show("On their own feet", COLUMNS)
     report.write(arguments.json)
 
