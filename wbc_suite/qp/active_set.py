@@ -45,52 +45,31 @@ _SOFT, _HARD = 1, 2
 class QpArrays(NamedTuple):
     """The QP of one level: m cost rows, p inequality rows, up to k equality rows.
 
-    Bounds stand in the order x, inequality rows, equality rows.
-
-    Attributes:
-        W: Weighted cost rows, shape (m, n).
-        e: Weighted steps, shape (m,).
-        diagonal: D without mu, and r, shape (2, n).
-        mu: Added to D, positive, shape (1,).
-        rows: Inequality rows, then equality rows, shape (p + k, n).
-        lower: Lower bounds, shape (n + p + k,).
-        upper: Upper bounds, shape (n + p + k,).
-        wanted: Upper bounds that rows keep softly, where they are below `upper`, (p,).
-        weight: Cost w of soft rows, shape (1,).
-        counts: p, and how many equality rows there are, shape (2,).
-        side: In and out, the active set: -1 or 1 where x is at its lower or upper
-            bound; 1 for soft, 2 for hard inequality rows; else 0; shape (n + p,).
-        x: Output, the optimum, shape (n,).
-        multipliers: Output, of bounds and rows, positive at upper ones.
-        active: Scratch, the rows of the small system, shape (m + p + k,).
-        last: Scratch, end of the entries of each row that are not zero.
-        scaled: Scratch, rows times D^-1/2, shape (m + p + k, n).
-        system: Scratch, the small system.
-        y: Scratch, its solution.
-        root: Scratch, D^-1/2, shape (n,).
-        kept: Scratch, x at bounds, else 0, shape (n,).
+    Bounds stand in the order x, inequality rows, equality rows. `side` is the active
+    set, in and out: -1 or 1 where x is at its lower or upper bound; 1 for soft, 2 for
+    hard inequality rows; else 0. What follows `multipliers` is scratch.
     """
 
-    W: Matrix
-    e: Vector
-    diagonal: Matrix
-    mu: Vector
-    rows: Matrix
-    lower: Vector
-    upper: Vector
-    wanted: Vector
-    weight: Vector
-    counts: Indices
-    side: Indices
-    x: Vector
-    multipliers: Vector
-    active: Indices
-    last: Indices
-    scaled: Matrix
-    system: Matrix
-    y: Vector
-    root: Vector
-    kept: Vector
+    W: Matrix  # (m, n), weighted cost rows
+    e: Vector  # (m,), weighted steps
+    diagonal: Matrix  # (2, n), D without mu, and r
+    mu: Vector  # (1,), added to D, positive
+    rows: Matrix  # (p + k, n), inequality rows, then equality rows
+    lower: Vector  # (n + p + k,)
+    upper: Vector  # (n + p + k,)
+    wanted: Vector  # (p,), bounds that rows keep softly, where they are below `upper`
+    weight: Vector  # (1,), cost w of soft rows
+    counts: Indices  # (2,), p, and how many equality rows there are
+    side: Indices  # (n + p,)
+    x: Vector  # (n,), output: the optimum
+    multipliers: Vector  # (n + p + k,), output: positive at upper bounds
+    active: Indices  # (m + p + k,), rows of the small system
+    last: Indices  # (m + p + k,), end of the entries of each row that are not zero
+    scaled: Matrix  # (m + p + k, n), rows times D^-1/2
+    system: Matrix  # the small system
+    y: Vector  # its solution
+    root: Vector  # (n,), D^-1/2
+    kept: Vector  # (n,), x at bounds, else 0
 
 
 def make_qp_arrays(
@@ -106,15 +85,7 @@ def make_qp_arrays(
 ) -> QpArrays:
     """Return the arrays of a QP without bounds, over the cost that is given.
 
-    Args:
-        W: See `QpArrays`.
-        e: See `QpArrays`.
-        diagonal: See `QpArrays`.
-        mu: See `QpArrays`.
-        inequalities: Number of inequality rows.
-        equalities: Greatest number of equality rows.
-        x: Buffer of the optimum, if there is one.
-        multipliers: Buffer of the multipliers, if there is one.
+    It has room for so many rows. Optimum and multipliers may have buffers already.
     """
     m, n = W.shape
     rows, size = inequalities + equalities, m + inequalities + equalities

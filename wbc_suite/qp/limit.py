@@ -145,6 +145,14 @@ def joint_values(
     return found
 
 
+def joint_movers(configuration: Configuration) -> Matrix:
+    """Return 1 where a velocity moves a joint, else 0, shape (njoints, nv)."""
+    moves = np.zeros((len(configuration.model.joints), configuration.nv))
+    for joint, row in enumerate(moves):
+        row[configuration.joint_support(joint)] = 1.0
+    return moves
+
+
 @compiled
 def merge_bounds(
     bounds: JointBounds,

@@ -87,10 +87,8 @@ class TaskReport:
     """How one task stands after a tick.
 
     Attributes:
-        name: The task's name.
         position_error: Length of the error before saturation, in `unit`.
         orientation_error: Angle to the target, rad; 0 for tasks without one.
-        unit: Unit of `position_error`.
         reached: Whether both are within the tolerances asked for.
         reasons: What keeps the task from its target, weightiest first; empty when it
             is reached or simply on its way. `str` turns each into text.
@@ -132,33 +130,27 @@ class LevelRecord:
     def reasons(
         self, task: int, opponents: Sequence[tuple[Reason, Vector]]
     ) -> tuple[Reason, ...]:
-        """Return what opposes the pull of a task, weightiest first.
+        """Return what opposes the pull of a row task, weightiest first.
 
         At the optimum the forces on the joints balance: the pulls
         `g_i = W_i^T (e_i - W_i dq)` of all tasks against the multipliers of limits and
         equality rows. The share of an opponent with force f in stopping task i is
         `f . g_i / (g_i . g_i)`. A task that is not met though it hardly pulls has its
         limb stretched: no joint moves it nearer.
-
-        Args:
-            task: Its number among the level's row tasks.
-            opponents: Force on the joints of each active limit and equality.
         """
         slices, rest = self.layout.slices, self.e - self.W @ self.x
         pulls = [self.W[rows].T @ rest[rows] for rows in slices]
         pull, rows = pulls[task], slices[task]
         greatest = float(np.linalg.norm(self.W[rows]) * np.linalg.norm(rest[rows]))
         square = float(pull @ pull)
-        found: list[tuple[Reason, float]] = [
-            (reason, float(force @ pull)) for reason, force in opponents
-        ]
-        found += [
-            (Conflict(other), float(-force @ pull))
+        others: list[tuple[Reason, Vector]] = [
+            (Conflict(other), -force)
             for other, force in zip(self.layout.names, pulls, strict=True)
             if other != self.layout.names[task]
         ]
-        joints = self.diagonal[1] - self.diagonal[0] * self.x
-        found.append((Conflict("posture"), float(-joints @ pull)))
+        joints = self.diagonal[0] * self.x - self.diagonal[1]
+        forces = [*opponents, *others, (Conflict("posture"), joints)]
+        found = [(reason, float(force @ pull)) for reason, force in forces]
         named = [(reason, part) for reason, part in found if part > _SHARE * square]
         reasons = tuple(reason for reason, _ in sorted(named, key=lambda r: -r[1]))
         if np.sqrt(square) <= max(_STRETCHED * greatest, _NOTHING):
@@ -208,12 +200,7 @@ class TickRecord(NamedTuple):
     def explain(
         self, *, position_tolerance: float = 1e-3, orientation_tolerance: float = 5e-3
     ) -> dict[str, TaskReport]:
-        """Report every row task by name.
-
-        Args:
-            position_tolerance: Length of an error that counts as reached, m.
-            orientation_tolerance: Angle that counts as reached, rad.
-        """
+        """Report every row task by name; errors within m and rad count as reached."""
         found: dict[str, TaskReport] = {}
         for k, level in enumerate(self.levels):
             opponents = list(self._opponents(level, is_first=k == 0))
@@ -232,19 +219,13 @@ class TickRecord(NamedTuple):
     def _limit(self, i: int, multiplier: float) -> ActiveLimit:
         """Describe one limit by its place among the multipliers."""
         nv, is_upper = len(self.layout.joints), multiplier > 0.0
-        if i < nv:
+        side, is_joint = "upper" if is_upper else "lower", i < nv
+        if is_joint:
             kind = LimitKind(int(self.kinds[nv * is_upper + i]))
             subject, unit = self.layout.joints[i], self.layout.units[i]
         else:
             kind, subject, unit = self.subjects[i - nv]
-        return ActiveLimit(
-            kind=kind,
-            subject=subject,
-            side="upper" if is_upper else "lower",
-            is_joint=i < nv,
-            unit=unit,
-            multiplier=abs(multiplier),
-        )
+        return ActiveLimit(kind, subject, side, is_joint, unit, abs(multiplier))
 
     def _opponents(
         self, level: LevelRecord, *, is_first: bool

@@ -151,7 +151,6 @@ class TaskStack:
             held=rows.held,
             rate=rows.rate,
             capsules=rows.collision.argument,
-            collision=rows.collision.rates,
             collision_rows=rows.collision_rows,
             spheres=rows.floor.argument,
             floor_rows=rows.floor_rows,

@@ -15,12 +15,11 @@ import numpy as np
 from wbc_suite.compiling import compiled, struct
 from wbc_suite.kinematics.forward import RobotArrays, compute_joint_poses
 from wbc_suite.qp.active_set import QpArrays, solve_warm
-from wbc_suite.qp.capsule_distance import CapsuleArrays
+from wbc_suite.qp.capsule_distance import CapsuleArrays, self_collision_rows
 from wbc_suite.qp.equality import HeldFrames, hold_frames
 from wbc_suite.qp.floor_limit import SphereArrays, floor_rows
 from wbc_suite.qp.limit import JointBounds, merge_bounds
 from wbc_suite.qp.problem import UNBOUNDED, worst_violation
-from wbc_suite.qp.self_collision_limit import self_collision_rows
 from wbc_suite.qp.strict_level import LevelArrays, restrict_level
 from wbc_suite.qp.task_kernels import TaskArrays, write_tasks
 from wbc_suite.typing import Indices, Vector
@@ -72,7 +71,6 @@ class TickArrays(NamedTuple):
     held: HeldFrames  # frames of equality rows
     rate: Vector  # (k,), right-hand side of constant equality rows per second, else NaN
     capsules: CapsuleArrays  # of the self-collision limit
-    collision: Vector  # (2,), its distance and rate, see `self_collision_rows`
     collision_rows: Indices  # (2,), its first inequality row and the end
     spheres: SphereArrays  # of the floor limit
     floor_rows: Indices  # (2,), its first inequality row and the end
@@ -170,7 +168,7 @@ def _write_rows(tick: TickArrays, qp: QpArrays, dt: float) -> None:
     first, last = tick.collision_rows[0], tick.collision_rows[1]
     if last > first:
         G, near = qp.rows[first:last], h[first:last]
-        self_collision_rows(robot, tick.capsules, tick.collision, dt, G, near)
+        self_collision_rows(robot, tick.capsules, dt, G, near)
     first, last = tick.floor_rows[0], tick.floor_rows[1]
     if last > first:
         floor_rows(robot, tick.spheres, dt, qp.rows[first:last], h[first:last])
