@@ -37,8 +37,7 @@ _DEPENDENT = 1e-12  # part of a row's square that the rows above must leave
 _TOLERANCE = 1e-13  # m, rad: violation of a bound by rounding
 _ROW_TOLERANCE = 1e-11  # m: violation of a row by rounding
 
-_SOFT, _HARD = 1, 2
-"""States of an active inequality row: at `wanted` with slack, or at its bound."""
+_SOFT, _HARD = 1, 2  # states of active rows: at `wanted` with slack, or at the bound
 
 
 @struct
@@ -117,8 +116,7 @@ def make_qp_arrays(
 def solve_warm(qp: QpArrays) -> bool:
     """Minimise `0.5 |W x - e|^2 + 0.5 x^T (D + mu) x - r^T x` within bounds and rows.
 
-    Returns:
-        Whether x is the optimum, provided that it keeps the rows.
+    Return whether x is the optimum, provided that it keeps the rows.
     """
     n, m = qp.x.shape[0], qp.e.shape[0]
     p, k = qp.counts[0], qp.counts[1]
@@ -131,8 +129,7 @@ def solve_warm(qp: QpArrays) -> bool:
             qp.side[n + row] = 0
     for count in range(_QUICK + _CAREFUL):
         if count == _QUICK:
-            for i in range(n + p):
-                qp.side[i] = 0
+            qp.side[:] = 0
         size = _state_system(qp)
         cholesky(qp.system, size, _DEPENDENT)
         solve_lower(qp.system, qp.y, size)
@@ -141,17 +138,13 @@ def solve_warm(qp: QpArrays) -> bool:
         changed = _deactivate(qp)
         if not _activate(qp, count >= _QUICK) and not changed:
             return True
-    for i in range(n + p):
-        qp.side[i] = 0
+    qp.side[:] = 0
     return False
 
 
 @compiled
 def _end(row: Vector) -> int:
-    """Return where a row's last entry other than zero is, and one more.
-
-    Joints count from the root outwards, so that many rows end early.
-    """
+    """Return the end of a row's entries: many end early, as joints count outwards."""
     end = row.shape[0]
     while end > 0 and row[end - 1] == 0.0:
         end -= 1
@@ -203,8 +196,7 @@ def _recover(qp: QpArrays, size: int) -> None:
     n, m = qp.x.shape[0], qp.e.shape[0]
     x, multipliers, side, last = qp.x, qp.multipliers, qp.side, qp.last
     W, rows, all_scaled = qp.W, qp.rows, qp.scaled
-    for i in range(multipliers.shape[0]):
-        multipliers[i] = 0.0
+    multipliers[:] = 0.0
     for k in range(size):
         row, y, scaled = qp.active[k], qp.y[k], all_scaled[k]
         if row >= m:

@@ -13,9 +13,7 @@ SKIN = 0.1
 """m; a list holds pairs within the influence and this distance, and is made again when
 a capsule has moved by half of it: the neighbour lists of Verlet (1967)."""
 
-SEPARATION = 0.2
-"""m/s, greatest speed of separation of what is too near."""
-
+SEPARATION = 0.2  # m/s, greatest speed of separation of what is too near
 _POINT = 1e-12  # m^2; a shorter segment is a point
 _PARALLEL = 1e-12  # squared sine of the angle between parallel segments
 _TOUCHING = 1e-9  # m; nearer segments have no direction between them
@@ -49,12 +47,8 @@ def self_collision_rows(
 ) -> None:
     """Write the velocity dampers of the nearest pairs; joint poses are current.
 
-    Args:
-        robot: The robot.
-        capsules: The capsules.
-        dt: Step, s.
-        G: Output, `-d(distance)/dq` of each row, shape (k, nv); 0 where there is none.
-        h: Output, how far each pair may approach, m, shape (k,).
+    G, shape (k, nv), gets `-d(distance)/dq` of each row, 0 where there is none; h gets
+    how far each pair may approach in dt seconds, m.
     """
     _find_nearest(robot, capsules)
     for row in range(h.shape[0]):

@@ -31,12 +31,9 @@ _RETURN_ANGULAR_SPEED = 1.0  # rad/s
 
 
 class Equality(ABC):
-    """Rows `A dq = b`, prior to every task.
+    """Rows `A dq = b`, prior to every task: `dim` of them, which reports call `name`.
 
-    Attributes:
-        kernel: What writes the rows, see `kernel_of`.
-        name: How reports call the rows.
-        dim: Number of rows.
+    A class says in its own body what writes them, see `kernel_of`.
     """
 
     kernel: ClassVar[Kernel] = Kernel.PYTHON
@@ -217,12 +214,7 @@ def hold_frames(
 ) -> None:
     """Write the kept rows of `J_local dq = gain e`, see `FrameEquality`.
 
-    Args:
-        robot: The robot; joint poses are current.
-        held: The frames.
-        dt: Step, s.
-        A: Output, equality rows of the problem, shape (m, nv) or more.
-        b: Output, their right-hand side.
+    Joint poses are current; A and b are all equality rows of the problem.
     """
     T, error = np.empty(12), np.empty(6)
     for t in range(held.joint.shape[0]):

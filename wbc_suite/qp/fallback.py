@@ -23,20 +23,14 @@ from wbc_suite.typing import Matrix, Vector
 
 _SLACK_WEIGHT = 1e2  # of a relaxed row against one that is led back
 _SWEEPS = 100
-_ROOM = 1e-11
-"""m or rad; bounds are so much wider where the only steps that levels above allow lie
-on them, and rounding decides whether there is any."""
+_ROOM = 1e-11  # m or rad; so much wider are bounds that rounding may make infeasible
 
 
 class Ladder:
     """Solves the levels of a stack one by one, by a solver or a fallback.
 
-    Args:
-        q: Positions of the robot; read.
-        levels: The levels, as `solve_tick` has stated them.
-        tick: The tick.
-        solver: Solver of the first level; a fresh one of its kind is made for each
-            size of problem below.
+    The levels are as `solve_tick` has stated them at the positions q. The solver is for
+    the first level; a fresh one of its kind is made for each size of problem below.
     """
 
     def __init__(
@@ -87,7 +81,7 @@ class Ladder:
         problem, solver = self.problem(k)
         level.state(problem)
         result = checked_solve(solver, problem)
-        if result is None:  # only just feasible: rounding may leave nothing
+        if result is None:  # the only steps that are left may lie on the bounds
             bounds = slice(problem.nv + len(problem.G))
             problem.lower[bounds] -= _ROOM
             problem.upper[bounds] += _ROOM
@@ -134,16 +128,9 @@ def checked_solve(solver: QpSolver, problem: Problem) -> tuple[Vector, Vector] |
 def retreat(
     solver: QpSolver, problem: Problem, *, lb: Vector, ub: Vector
 ) -> tuple[Vector, Vector, Fallback]:
-    """Find a step for a problem that has no solution.
+    """Return step, multipliers and rung for a problem that has no solution.
 
-    Args:
-        solver: Fresh ones of its kind are used.
-        problem: The problem; its bounds may be replaced.
-        lb: Lower bounds of position and velocity alone.
-        ub: Upper bounds of the same.
-
-    Returns:
-        The step, multipliers, and the rung that was reached.
+    Its bounds may be replaced by lb and ub, those of position and velocity alone.
     """
     if result := _solve_with_loose_limits(solver, problem):
         return *result, Fallback.LIMITS

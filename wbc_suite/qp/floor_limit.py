@@ -137,12 +137,8 @@ def floor_rows(
 ) -> None:
     """Write the rows of the lowest spheres; joint poses are current.
 
-    Args:
-        robot: The robot.
-        spheres: The spheres.
-        dt: Step, s.
-        G: Output, negative derivative of the height of each, shape (k, nv).
-        h: Output, how far each may come down, m, shape (k,).
+    G, shape (k, nv), gets the negative derivative of the height of each; h gets how far
+    it may come down in dt seconds, m.
     """
     _find_lowest(robot, spheres)
     G[:] = 0.0

@@ -171,15 +171,8 @@ def merge_bounds(
     wins over position, position over acceleration. A joint outside a limit therefore
     returns at its greatest speed.
 
-    Args:
-        bounds: Limits of the joints.
-        q: Joint positions, shape (nq,).
-        v_previous: Velocity of the previous step, shape (nv,).
-        dt: Step, s.
-        lower: Output, least step, shape (nv,).
-        upper: Output, greatest step, shape (nv,).
-        kinds: Output, the `LimitKind` that set each lower, then each upper bound,
-            shape (2 nv,).
+    `kinds`, shape (2 nv,), gets the `LimitKind` that set each lower, then each upper
+    bound.
     """
     nv, q_index, gain = lower.shape[0], bounds.q_index, bounds.position_gain
     q_lower, q_upper = bounds.q_lower, bounds.q_upper

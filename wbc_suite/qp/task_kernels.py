@@ -1,8 +1,7 @@
 """Compiled errors, Jacobians and weighted rows of QP tasks.
 
 `write_tasks` turns the errors and Jacobians of all tasks of a level into weighted rows.
-Those of the built-in kinds are computed here; those of other tasks stand in the buffers
-before.
+Those of built-in kinds are computed here; those of others are in the buffers before.
 """
 
 from typing import NamedTuple
@@ -92,9 +91,8 @@ def write_tasks(
         mu += curvature * bending
         total += size
     _write_joint_tasks(robot, tasks, dt)
-    diagonal = tasks.diagonal
-    for i in range(diagonal.shape[1]):
-        total += abs(diagonal[0, i]) + abs(diagonal[1, i])
+    for value in tasks.diagonal.flat:
+        total += abs(value)
     tasks.mu[0] = mu
     return bool(np.isfinite(mu + total))
 
@@ -171,11 +169,9 @@ def com_error(
     Joint poses are current; the target may be longer than 3.
     """
     compute_com(robot)
-    columns = robot.com_jacobian
+    jacobian[:] = robot.com_jacobian.T
     for i in range(3):
         error[i] = target[i] - robot.com[i]
-        for col in range(jacobian.shape[1]):
-            jacobian[i, col] = columns[col, i]
 
 
 @compiled
@@ -184,8 +180,7 @@ def _weigh_rows(
 ) -> tuple[float, float]:
     """Write the weighted rows of a task, `W = cost J` and `e = cost saturated step`.
 
-    Returns:
-        `sum |e| max|W|` over the rows, and the sum of all sizes.
+    Return `sum |e| max|W|` over the rows, and the sum of all sizes.
     """
     first, last = tasks.row_start[t], tasks.row_start[t + 1]
     middle, finite, gain = tasks.angular_start[t], True, tasks.gain[t]
@@ -224,10 +219,9 @@ def _weigh_rows(
 @compiled
 def _write_joint_tasks(robot: RobotArrays, tasks: TaskArrays, dt: float) -> None:
     """Write the diagonal: squared costs, and squared costs times saturated steps."""
-    nv, diagonal, bias = tasks.q_index.shape[0], tasks.diagonal, tasks.bias
-    q, q_index = robot.q, tasks.q_index
-    for i in range(nv):
-        diagonal[0, i], diagonal[1, i] = bias[0, i], bias[1, i]
+    q, q_index, diagonal = robot.q, tasks.q_index, tasks.diagonal
+    nv = q_index.shape[0]
+    diagonal[:] = tasks.bias
     for t in range(tasks.joint_kernel.shape[0]):
         error, weight, total = tasks.joint_error[t], tasks.squared_cost[t], 0.0
         target, is_posture = tasks.joint_target[t], tasks.joint_kernel[t]

@@ -1,10 +1,9 @@
 """One tick of a stack in one compiled call.
 
 `solve_tick` computes forward kinematics, task rows, bounds and limit rows, and solves
-all levels by the active set of the last tick. Compiled loops may call it as well as
-Python. Where a level is not solved it returns: the caller solves that level by other
-means, writes the result into the level's `qp`, calls `finish_level`, and calls
-`solve_tick` again for the levels below.
+all levels by the active set of the last tick. Where a level is not solved it returns:
+the caller solves that level by other means, writes the result into the level's `qp`,
+calls `finish_level`, and calls `solve_tick` again for the levels below.
 """
 
 from enum import IntEnum
@@ -24,9 +23,7 @@ from wbc_suite.qp.strict_level import LevelArrays, restrict_level
 from wbc_suite.qp.task_kernels import TaskArrays, write_tasks
 from wbc_suite.typing import Indices, Vector
 
-TOLERANCE = 1e-7
-"""A step that violates a row or bound by more is not taken, m or rad."""
-
+TOLERANCE = 1e-7  # m or rad; a step that violates a row or bound by more is not taken
 RETURN_WEIGHT = 1e2  # of a soft row, against the stiffest joint's cost
 _PRESSURE_MEMORY = 0.2  # s, in which the damping by rows falls to 1 / e
 _PRESSURE_MAX = 1e6  # times what tasks pull with
@@ -36,14 +33,10 @@ class TickStatus(IntEnum):
     """How `solve_tick` ended."""
 
     SOLVED = 0
-    UNSOLVED = 1
-    """A level is stated, and its active set was not found."""
-    BAD_ROWS = 2
-    """Rows of a level are not finite."""
-    BAD_POSITION = 3
-    """The configuration is not finite."""
-    NEEDS_PYTHON = 4
-    """Tasks or limits without a kernel must be evaluated before each tick."""
+    UNSOLVED = 1  # a level is stated, and its active set was not found
+    BAD_ROWS = 2  # rows of a level are not finite
+    BAD_POSITION = 3  # the configuration is not finite
+    NEEDS_PYTHON = 4  # tasks or limits without a kernel must be evaluated before
 
 
 @struct
@@ -82,15 +75,10 @@ class TickArrays(NamedTuple):
 
 @compiled
 def solve_tick(tick: TickArrays, dt: float, start: int) -> tuple[int, int]:
-    """Solve the levels from `start` on; the step is then in `tick.x` and `tick.v`.
+    """Solve the levels from `start` on; 0 begins a tick, of dt seconds.
 
-    Args:
-        tick: What the tick reads and writes.
-        dt: Step, s.
-        start: First level; 0 begins a tick.
-
-    Returns:
-        A `TickStatus`, and the level at which it ended.
+    Return a `TickStatus`, and the level at which it ended. The step is then in `tick.x`
+    and `tick.v`.
     """
     if start == 0 and not tick.prepared[0]:
         return TickStatus.NEEDS_PYTHON.value, 0
@@ -127,8 +115,7 @@ def finish_level(tick: TickArrays, k: int, dt: float, kept: bool) -> None:
     """
     qp = tick.levels[k].qp
     tick.solved[0] = k + 1
-    for i in range(tick.x.shape[0]):
-        tick.x[i] = qp.x[i]
+    tick.x[:] = qp.x
     if k == 0 and qp.rows.shape[0] > 0:
         tick.pressure_damping[0] *= np.exp(-dt / _PRESSURE_MEMORY)
         if kept:
