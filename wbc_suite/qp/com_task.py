@@ -42,11 +42,7 @@ class ComTask(RowTask):
             self.set_target(target)
 
     def set_target(self, target: Vector) -> None:
-        """Set the point p*, m, shape (3,).
-
-        Raises:
-            ConfigError: If the shape is wrong.
-        """
+        """Set the point p*, m; ConfigError if its shape is not (3,)."""
         what = f"Task '{self.name}': the target"
         self.target_row.set(check_array(what, target, (3,)))
 

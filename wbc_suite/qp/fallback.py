@@ -173,11 +173,15 @@ def _solve_with_loose_limits(
     solver: QpSolver, problem: Problem
 ) -> tuple[Vector, Vector] | None:
     """Solve with slack s >= 0 on `G dq <= h + s`, within the acceleration window."""
-    loose = problem.copy()
-    loose.wanted[:] = np.minimum(problem.wanted, problem.h)
-    loose.h[:] = UNBOUNDED
-    loose.weight = _SLACK_WEIGHT * problem.weight
-    return checked_solve(solver.fresh(), loose)
+    return checked_solve(solver.fresh(), _loosened(problem.copy()))
+
+
+def _loosened(problem: Problem) -> Problem:
+    """Make all inequality rows of a problem soft; return it."""
+    np.minimum(problem.wanted, problem.h, out=problem.wanted)
+    problem.h[:] = UNBOUNDED
+    problem.weight *= _SLACK_WEIGHT
+    return problem
 
 
 def _solve_with_slack(
@@ -189,16 +193,13 @@ def _solve_with_slack(
     here too, see `task_kernels.write_tasks`: without it a robot whose feet and links
     contradict each other was measured to swing at full speed, 9.6 rad/s between ticks.
     """
-    relaxed = problem.copy(equalities=False)
-    A, b, weight = problem.A, problem.b, _SLACK_WEIGHT * problem.weight
+    relaxed = _loosened(problem.copy(equalities=False))
+    A, b, weight = problem.A, problem.b, relaxed.weight
     mu = np.abs(A).max(axis=1, initial=0.0) @ np.abs(b)
     broken = np.maximum(0.0, -problem.wanted)
     mu += np.abs(problem.G).max(axis=1, initial=0.0) @ broken
     relaxed.H += weight * (A.T @ A + mu * np.eye(problem.nv))
     relaxed.c -= weight * (A.T @ b)
-    relaxed.wanted[:] = np.minimum(problem.wanted, problem.h)
-    relaxed.h[:] = UNBOUNDED
-    relaxed.weight = weight
     result = checked_solve(solver.fresh(), relaxed)
     if result is None:
         return None

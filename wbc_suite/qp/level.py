@@ -52,10 +52,9 @@ class Level:
     Args:
         configuration: The robot.
         tasks: Tasks of this level; they are bound here.
-        layout: Where their rows are.
-        results: Results of the level.
-        all_finite: See `TaskArrays`.
-        inequalities: Number of inequality rows of the stack.
+        layout: Layout of the stack.
+        results: Results of the stack.
+        k: Number of the level.
         above: Number of rows of all levels above, and of the stack's equalities.
 
     Attributes:
@@ -69,29 +68,29 @@ class Level:
         self,
         configuration: Configuration,
         tasks: Sequence[Task],
-        layout: LevelLayout,
+        layout: TickLayout,
         results: Records,
         *,
-        all_finite: Vector,
-        inequalities: int,
+        k: int,
         above: int,
     ) -> None:
         for task in tasks:
             task.bind(configuration)
-        nv, multipliers = configuration.nv, results["multipliers"]
+        own, p, nv = results[f"level {k}"], layout.inequalities, configuration.nv
+        multipliers = own["multipliers"]
         self._row_tasks = [t for t in tasks if isinstance(t, RowTask)]
         self._joint_tasks = [t for t in tasks if isinstance(t, JointTask)]
-        self._slices = layout.slices
-        rows, joints = self._row_tasks, self._joint_tasks
-        self.tasks = _task_arrays(configuration, rows, joints, results, all_finite)
+        self._slices = layout.levels[k].slices
+        rows, joints, finite = self._row_tasks, self._joint_tasks, results["all_finite"]
+        self.tasks = _task_arrays(configuration, rows, joints, own, finite)
         self.qp: QpArrays = make_qp_arrays(
             self.tasks.W,
             self.tasks.e,
             self.tasks.diagonal,
             self.tasks.mu,
-            inequalities=inequalities,
-            equalities=len(multipliers) - nv - inequalities,
-            x=results["x"],
+            inequalities=p,
+            equalities=len(multipliers) - nv - p,
+            x=own["x"],
             multipliers=multipliers,
         )
         self._kept_counts: Indices = np.zeros(2, dtype=np.int64)
@@ -215,18 +214,10 @@ def make_levels(
     levels: list[Level] = []
     above = sum(size for _, size in layout.equalities)
     for k, own in enumerate(_by_level(tasks)):
-        levels.append(
-            Level(
-                configuration,
-                own,
-                layout.levels[k],
-                results[f"level {k}"],
-                all_finite=results["all_finite"],
-                inequalities=layout.inequalities,
-                above=above if k else 0,
-            )
-        )
-        above += len(levels[-1].tasks.e)
+        rows = above if k else 0
+        level = Level(configuration, own, layout, results, k=k, above=rows)
+        above += len(level.tasks.e)
+        levels.append(level)
     return levels
 
 

@@ -45,16 +45,8 @@ class BoxLimit(ABC):
 class RowLimit(ABC):
     """A limit `G dq <= h` of a fixed number of rows.
 
-    A solution never violates it as long as one exists.
-
-    A subclass sets `dim` and writes `rows`; `subject` and `kind` are for reports:
-
-        class Ceiling(RowLimit):
-            dim = 1
-
-            def rows(self, configuration, dt, G, h):
-                G[0] = configuration.frame_jacobian("head", "aligned")[2]
-                h[0] = 1.8 - configuration.frame_pose("head").translation[2]
+    A solution never violates it as long as one exists. A subclass sets `dim` and writes
+    `rows`, as the guide of QP stacks shows; `subject` and `kind` are for reports.
 
     A row with h < 0 is outside its limit. It leads back softly and may go no further
     out, so that other rows can still be kept.

@@ -76,11 +76,7 @@ class LookAtTask(RowTask):
             self.set_target(target)
 
     def set_target(self, target: Vector) -> None:
-        """Set the point p, m, shape (3,).
-
-        Raises:
-            ConfigError: If the shape is wrong.
-        """
+        """Set the point p, m; ConfigError if its shape is not (3,)."""
         what = f"Task '{self.name}': the target"
         self.target = check_array(what, target, (3,)).copy()
 

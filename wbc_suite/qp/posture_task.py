@@ -42,11 +42,7 @@ class PostureTask(JointTask):
             self.set_target(target)
 
     def set_target(self, target: Vector) -> None:
-        """Set the posture q*, shape (nq,).
-
-        Raises:
-            ConfigError: If the shape is wrong.
-        """
+        """Set the posture q*; ConfigError if its shape is not (nq,)."""
         what = f"Task '{self.name}': the posture"
         is_set = self.target_row.is_set
         shape = self.target_row.values.shape if is_set else None

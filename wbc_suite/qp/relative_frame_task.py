@@ -64,11 +64,7 @@ class RelativeFrameTask(RowTask):
             self.set_target(target)
 
     def set_target(self, target: pin.SE3 | Matrix) -> None:
-        """Set the pose T_rt: an SE3 or a homogeneous matrix, shape (4, 4).
-
-        Raises:
-            ConfigError: If the shape is wrong or the rotation is no rotation.
-        """
+        """Set the pose T_rt, see `FrameTask.set_target`."""
         T = homogeneous(self.name, target)
         self.target = pin.SE3(T[:3, :3].copy(), T[:3, 3].copy())
 

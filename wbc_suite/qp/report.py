@@ -57,7 +57,6 @@ class Conflict:
     other: str
 
     def __str__(self) -> str:
-        """Return "conflict: other"."""
         return f"conflict: {self.other}"
 
 
@@ -66,7 +65,6 @@ class OutOfReach:
     """No joint moves the task nearer to its target: its limb is stretched."""
 
     def __str__(self) -> str:
-        """Return the reason as text."""
         return "out of reach: no joint moves it nearer"
 
 
@@ -75,7 +73,6 @@ class TargetNotFinite:
     """The target is not finite, so that the task holds what it controls."""
 
     def __str__(self) -> str:
-        """Return the reason as text."""
         return "target not finite: held"
 
 

@@ -34,7 +34,6 @@ class LinkPair:
     second: str
 
     def __str__(self) -> str:
-        """Return both names: "forearm - torso"."""
         return f"{self.first} - {self.second}"
 
 

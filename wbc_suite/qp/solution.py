@@ -28,7 +28,6 @@ class Fallback(IntEnum):
     """Inputs or results are not finite: the robot stands still."""
 
     def __str__(self) -> str:
-        """Return what was done as a sentence."""
         return _SENTENCES[self]
 
 

@@ -48,13 +48,13 @@ class TaskStack:
     they control, rows that contradict each other are relaxed, and the `Solution`
     reports it.
 
-    A tick is one compiled call: see `tick.solve_tick`, which compiled loops may call
-    with `arrays` themselves. The solver runs where it does not converge.
+    A tick is one compiled call of `tick.solve_tick`, which compiled loops may call with
+    `arrays` themselves. The solver runs where it does not converge.
 
     Args:
         configuration: The robot; `solve` reads it, the caller moves it.
-        tasks: Tasks, see `RowTask` for priorities. The stack binds them: frames are
-            resolved, and targets that were not set hold the present pose.
+        tasks: They are bound: frames are resolved, targets that were not set hold the
+            present pose.
         limits: Limits; position, velocity and acceleration limits with their defaults
             when absent.
         equalities: Rows that are kept exactly, before all tasks.
@@ -72,8 +72,7 @@ class TaskStack:
 
     Attributes:
         v_previous: Velocity of the last tick, shape (nv,); write to set it.
-        arrays: The argument of `solve_tick`; targets of tasks are copied into it by
-            `prepare`.
+        arrays: The argument of `solve_tick`.
         is_compiled: Whether a tick needs no Python: all parts have a kernel.
 
     Raises:
@@ -123,11 +122,9 @@ class TaskStack:
         self._ladder = Ladder(configuration.q, self.levels, self._tick, qp)
         self.arrays = as_argument(self._tick)
         frames = [t for t in tasks if isinstance(t, FrameTask)]
-        self._escape = (
-            Escape(configuration, frames, self.bounds, self._copy)
-            if escape and frames
-            else None
-        )
+        self._escape: Escape | None = None
+        if escape and frames:
+            self._escape = Escape(configuration, frames, self.bounds, self._copy)
         self._is_alone = self._escape is None and self.is_compiled
         self._last: Solution | None = None
 
@@ -165,13 +162,8 @@ class TaskStack:
 
         After it the same inputs give bit-equal solutions.
         """
-        shape = self.v_previous.shape
-        v = (
-            np.zeros(shape)
-            if v is None
-            else check_array("TaskStack.reset: v", v, shape)
-        )
-        self.v_previous[:] = v
+        what, shape = "TaskStack.reset: v", self.v_previous.shape
+        self.v_previous[:] = 0.0 if v is None else check_array(what, v, shape)
         for part in (self._ladder, *self.levels, self._constraints, self._escape):
             if part is not None:
                 part.reset()

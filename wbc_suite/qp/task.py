@@ -51,15 +51,8 @@ class RowTask(ABC):
     `gain e` is shortened to the task's greatest speed, because errors without bound
     are what makes joints flip at limits. `W` is the diagonal of costs.
 
-    A subclass writes `evaluate`; weights, saturation, damping and reports are the
-    stack's work:
-
-        class HeightTask(RowTask):
-            def evaluate(self, configuration, error, jacobian):
-                error[0] = 1.2 - configuration.frame_pose("head").translation[2]
-                jacobian[0] = configuration.frame_jacobian("head", "aligned")[2]
-
-        task = HeightTask("height", dim=1, cost=10.0)
+    A subclass writes `evaluate`, as the guide of QP stacks shows; weights, saturation,
+    damping and reports are the stack's work.
 
     Args:
         name: How reports call the task.
