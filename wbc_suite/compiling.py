@@ -11,7 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from types import FunctionType
 from typing import Any, TypeVar, cast
@@ -33,20 +33,15 @@ _structref: Any = structref
 Function = TypeVar("Function", bound=Callable[..., Any])
 Fields = TypeVar("Fields", bound=tuple[Any, ...])
 
-PATIENCE = 1.5
-"""s; compiling that takes longer is announced. Reading machine code takes 0.2."""
-
-INTERVAL = 5.0
-"""s between two messages about the progress of compiling."""
-
-KEPT = 7 * 24 * 3600.0
-"""s; machine code that no process has asked for in this time is deleted."""
+PATIENCE = 1.5  # s; what compiles for longer is announced; reading the code takes 0.2
+INTERVAL = 5.0  # s between two messages about the progress of compiling
+KEPT = 7 * 24 * 3600.0  # s; code that no process asks for in this time is deleted
 
 _KERNELS: list[Any] = []
 """All kernels of imported modules, to report how many are compiled."""
 
 
-def compiled(function: Function) -> Function:
+def compiled(function: Function, *, nogil: bool = False) -> Function:
     """Compile a function on its first call, and keep its machine code on disk.
 
     The function also runs as plain Python: see `plain`, or everything under
@@ -54,28 +49,21 @@ def compiled(function: Function) -> Function:
 
     Args:
         function: Takes numbers, arrays, tuples, and what `as_argument` returns.
+        nogil: Whether it releases the interpreter's lock while it runs. For long calls
+            only: a thread needs up to 50 us to get the lock back.
     """
-    return _compile(function)
-
-
-def compiled_nogil(function: Function) -> Function:
-    """Compile a function that releases the interpreter's lock while it runs.
-
-    For long calls only: a thread needs up to 50 us to get the lock back.
-    """
-    return _compile(function, nogil=True)
-
-
-def _compile(function: Function, **options: bool) -> Function:
     previous = _numba.CACHE_DIR
     _numba.CACHE_DIR = str(cache_folder())
     try:
-        kernel = _njit(cache=True, error_model="numpy", **options)(function)
+        kernel = _njit(cache=True, error_model="numpy", nogil=nogil)(function)
     finally:
         _numba.CACHE_DIR = previous
     if not _numba.DISABLE_JIT:
         _KERNELS.append(kernel)
     return cast("Function", kernel)
+
+
+compiled_nogil = partial(compiled, nogil=True)
 
 
 def is_compiling() -> bool:
@@ -108,31 +96,24 @@ def struct(fields: type[Fields]) -> type[Fields]:
     Args:
         fields: A `NamedTuple` class at the top level of a module.
     """
-    place = {"__module__": fields.__module__}
-    numba_type = type(
-        f"{fields.__name__}Type",
-        (_StructType,),
-        place | {"__qualname__": f"{fields.__qualname__}.numba_type"},
-    )
-    proxy = type(
-        f"{fields.__name__}Proxy",
-        (_structref.StructRefProxy,),
-        place | {"__qualname__": f"{fields.__qualname__}.proxy"},
-    )
-    _structref.register(numba_type)
     names: Any = fields
-    _structref.define_proxy(proxy, numba_type, list(names._fields))
-    names.numba_type, names.proxy = numba_type, proxy
+    module, qualname = fields.__module__, fields.__qualname__
+    for name, base in (
+        ("numba_type", _StructType),
+        ("proxy", _structref.StructRefProxy),
+    ):
+        place = {"__module__": module, "__qualname__": f"{qualname}.{name}"}
+        setattr(names, name, type(f"{fields.__name__}_{name}", (base,), place))
+    proxy = names.proxy
+    _structref.register(names.numba_type)
+    _structref.define_proxy(proxy, names.numba_type, list(names._fields))
 
     def pack(values: Any) -> Any:
         return proxy(*values)
 
     # Numba names cache files by these: one for each class, for reading an index fails
     # where the module of one of its types cannot be imported.
-    pack.__module__, pack.__qualname__ = (
-        fields.__module__,
-        f"{fields.__qualname__}.pack",
-    )
+    pack.__module__, pack.__qualname__ = module, f"{qualname}.pack"
     names.pack = staticmethod(pack if _numba.DISABLE_JIT else compiled(pack))
     return fields
 
@@ -160,7 +141,7 @@ class _StructType(types.StructRef):
 
 @cache
 def cache_folder() -> Path:
-    """Return where machine code is kept.
+    """Return where machine code is kept, which depends on the state of the kernels.
 
     In `NUMBA_CACHE_DIR` when that is set, else in the user's cache folder, else, when
     nothing there can be written, in one that lasts as long as the process.
@@ -175,7 +156,9 @@ def cache_folder() -> Path:
     except OSError:
         return Path(tempfile.mkdtemp(prefix="wbc_suite_"))
     with suppress(OSError):
-        _delete_old(parent)
+        for other in parent.iterdir():
+            if time.time() - other.stat().st_mtime > KEPT:
+                shutil.rmtree(other, ignore_errors=True)
     return folder
 
 
@@ -191,13 +174,6 @@ def _kernels_digest() -> str:
         if b"wbc_suite.compiling import" in source or file.name == "compiling.py":
             digest.update(source)
     return digest.hexdigest()[:16]
-
-
-def _delete_old(parent: Path) -> None:
-    """Delete folders that no process has used for long."""
-    for folder in parent.iterdir():
-        if time.time() - folder.stat().st_mtime > KEPT:
-            shutil.rmtree(folder, ignore_errors=True)
 
 
 @contextmanager

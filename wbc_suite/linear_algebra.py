@@ -10,11 +10,8 @@ import numpy as np
 from wbc_suite.compiling import compiled
 from wbc_suite.typing import Matrix, Vector
 
-_SMALLEST = 1e-30
-"""Square of a length that counts as zero."""
-
-_JACOBI_SWEEPS = 12
-"""Greatest number of sweeps; 6 make a matrix of 6 rows diagonal."""
+_SMALLEST = 1e-30  # square of a length that counts as zero
+_JACOBI_SWEEPS = 12  # at most; 6 make a matrix of 6 rows diagonal
 
 
 # Sums may be reassociated, which makes them vector instructions. NaN stays NaN.
@@ -29,19 +26,17 @@ def dot(a: Vector, b: Vector, n: int) -> float:
 
 @compiled
 def cholesky(A: Matrix, n: int, tolerance: float) -> int:
-    """Factorise `A = L L^T` in place; L has an inverted diagonal.
+    """Factorise `A = L L^T` in place; return the number of independent rows.
 
-    A row that depends on the rows above it gets a zero in place of its inverted
-    diagonal entry: `solve_lower` and `solve_upper` then leave it out, with x = 0.
+    L has an inverted diagonal. A row that depends on the rows above it gets a zero in
+    place of its inverted diagonal entry: `solve_lower` and `solve_upper` then leave it
+    out, with x = 0. That happens where A is singular or not finite.
 
     Args:
         A: Symmetric positive semidefinite, shape (n, n) or larger; only the lower
             triangle is read and written.
         n: Size of the system.
         tolerance: Part of a diagonal entry that the rows above must leave.
-
-    Returns:
-        The number of independent rows; less than n where A is singular or not finite.
     """
     rank = 0
     for i in range(n):
@@ -78,10 +73,7 @@ def solve_upper(L: Matrix, x: Vector, n: int) -> None:
 def solve(A: Matrix, B: Matrix, n: int) -> None:  # noqa: C901, one elimination
     """Solve `A X = B` in place by Gaussian elimination with partial pivoting.
 
-    Args:
-        A: Square, not singular, shape (n, n); destroyed.
-        B: Right-hand sides, shape (n, k); becomes X.
-        n: Size of the system.
+    A, shape (n, n), must not be singular and is destroyed; B has shape (n, k).
     """
     for i in range(n):
         pivot = i
@@ -109,10 +101,8 @@ def solve(A: Matrix, B: Matrix, n: int) -> None:  # noqa: C901, one elimination
 def lq_factor(Q: Matrix, n: int, L: Matrix) -> None:
     """Factorise `A = L Q` by modified Gram-Schmidt; Q overwrites A.
 
-    Args:
-        Q: A, shape (m, n) or wider, m <= n; becomes orthonormal rows.
-        n: Number of columns.
-        L: Output, lower triangular with an inverted diagonal, shape (m, m).
+    Q has shape (m, n) or wider, m <= n. L, shape (m, m), is lower triangular with an
+    inverted diagonal.
     """
     for i in range(Q.shape[0]):
         row = Q[i]
@@ -133,19 +123,12 @@ def lq_solve(Q: Matrix, n: int, y: Vector, x: Vector) -> None:
 
     With `A = L Q` from `lq_factor`, y solves `L y = b`. Where rows of A are nearly
     dependent, Q is not quite orthonormal, and `Q^T y` loses digits. Row by row from
-    the last, x is as exact as A.
-
-    Args:
-        Q: Orthonormal rows, shape (m, n) or wider.
-        n: Number of columns.
-        y: Right-hand side, shape (m,).
-        x: Output, shape (n,) or longer.
+    the last, x is as exact as A. Q, shape (m, n), may be wider and x longer.
 
     Source: Björck, Paige (1992), "Loss and recapture of orthogonality in the modified
     Gram-Schmidt algorithm", SIAM J. Matrix Anal. Appl. 13(1).
     """
-    for j in range(n):
-        x[j] = 0.0
+    x[:n] = 0.0
     for i in range(Q.shape[0] - 1, -1, -1):
         row = Q[i]
         missing = y[i] - dot(row, x, n)
@@ -157,9 +140,8 @@ def lq_solve(Q: Matrix, n: int, y: Vector, x: Vector) -> None:
 def inverse_trace(L: Matrix, column: Vector) -> float:
     """Return `1 / trace((L L^T)^-1)`, a lower bound of the least eigenvalue.
 
-    Args:
-        L: Lower triangular with an inverted diagonal, shape (m, m).
-        column: Scratch, shape (m,).
+    L, shape (m, m), is lower triangular with an inverted diagonal; `column`, shape
+    (m,), is scratch.
     """
     total, m = 0.0, L.shape[0]
     for j in range(m):
@@ -227,10 +209,8 @@ def subtract_projection(V: Matrix, count: int, v: Vector) -> None:
 def pseudo_inverse(A: Matrix, tolerance: float, out: Matrix) -> None:
     """Write the pseudo-inverse of a symmetric matrix, by Jacobi's method.
 
-    Args:
-        A: Positive semidefinite, shape (n, n); destroyed.
-        tolerance: Part of the largest eigenvalue below which others count as zero.
-        out: Output, shape (n, n).
+    A, shape (n, n), is positive semidefinite, and destroyed. Eigenvalues below the
+    tolerance times the largest count as zero.
 
     Source: Golub and Van Loan (2013), "Matrix Computations", section 8.5.
     """

@@ -75,12 +75,8 @@ def time_block(
 ) -> Block:
     """Time steps, then `mj_step` from their initial states with constant controls.
 
-    Args:
-        step: Takes one environment step.
-        actions: One per step.
-        model: The environment's compiled model.
-        data: Its state.
-        substeps: Physics steps of one environment step.
+    Model and data are those of the environment; each of its steps takes an action and
+    makes so many substeps.
     """
     size = mujoco.mj_stateSize(model, _STATE)
     starts, controls = np.zeros((len(actions), size)), []

@@ -18,20 +18,15 @@ from wbc_suite.typing import Matrix, Vector
 Clearance: TypeAlias = Callable[[Vector], float]
 """Maps a configuration, shape (nq,), to a clearance, m."""
 
-DEPTH = 1e-3
-"""m; shallower contacts are no collision."""
+DEPTH = 1e-3  # m; shallower contacts are no collision
 
 
 class SceneCollisionChecker:
     """Checks a robot against all geoms of a MuJoCo scene, and against itself.
 
     Works on a copy of the scene's state. Contacts that the scene has already are
-    ignored, such as those of feet on the floor.
-
-    Args:
-        model: The scene with the robot.
-        data: Its state; read.
-        conversion: Conversion of the configurations that will be checked.
+    ignored, such as those of feet on the floor. The conversion is that of the
+    configurations that will be checked.
     """
 
     def __init__(
@@ -63,12 +58,7 @@ class SceneCollisionChecker:
 class LinkDistanceChecker:
     """Checks the distances that the distance limits of a QP keep.
 
-    Args:
-        model: The robot.
-        limits: Distance limits. They are bound to a configuration of the checker's own.
-
-    Attributes:
-        limits: The limits.
+    The limits are bound to a configuration of the checker's own.
     """
 
     def __init__(
@@ -88,11 +78,9 @@ class LinkDistanceChecker:
         It is infinite where all links are beyond the limits' influence.
         """
         self._configuration.update(q)
-        return min(
-            (self._beyond_margin(limit) for limit in self.limits), default=np.inf
-        )
-
-    def _beyond_margin(self, limit: SelfCollisionLimit | FloorLimit) -> float:
-        rows = slice(limit.dim)
-        limit.rows(self._configuration, 1.0, self._G[rows], self._h[rows])
-        return float(limit.distances.min()) - limit.margin
+        least = np.inf
+        for limit in self.limits:
+            G, h = self._G[: limit.dim], self._h[: limit.dim]
+            limit.rows(self._configuration, 1.0, G, h)
+            least = min(least, float(limit.distances.min()) - limit.margin)
+        return least

@@ -72,11 +72,6 @@ class GoalSearch:
     """Searches for a configuration that meets a problem, and the motion to it.
 
     Starts from the configurations given, then from random ones, the same in each call.
-
-    Args:
-        problem: What to meet.
-        clearance: Clearance of a configuration, m.
-        planner: Plans the motions.
     """
 
     def __init__(
@@ -125,11 +120,8 @@ class GoalSearch:
     def advance(self, iterations: int, now: TimedState) -> Motion | None:
         """Run some iterations; return a motion once one is known, or a shorter one.
 
-        It may still change ahead of the robot while the search is running.
-
-        Args:
-            iterations: How many.
-            now: Present state of the robot.
+        It may still change ahead of the robot, which is at `now`, while the search is
+        running.
         """
         self._now = now
         for _ in range(iterations):

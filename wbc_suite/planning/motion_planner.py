@@ -28,13 +28,13 @@ RETRACE_SCALE = 8.0  # of the accelerations: recorded velocities have steps
 
 
 class MotionPlanner:
-    """Plans motions under velocity and acceleration limits.
+    """Plans motions under velocity and acceleration limits, shape (nv,) each.
 
     Args:
         model: The robot.
         clearance: Clearance of a configuration, m; free where it is positive.
-        speed: Velocity limits, shape (nv,).
-        acceleration: Acceleration limits, shape (nv,).
+        speed: Velocity limits.
+        acceleration: Acceleration limits.
         spacing: Time between two collision checks along a motion, s.
         path_spacing: The same on the path of RRT-Connect, s at full speed.
     """
@@ -77,16 +77,10 @@ class MotionPlanner:
         return self._motion(now, self._generator.stop((np.zeros_like(now.v), now.v)))
 
     def around(self, motion: Motion, goal: Vector) -> Iterator[None]:
-        """Extend a motion that stops by a path of RRT-Connect, or else straight.
-
-        Args:
-            motion: Changed in place.
-            goal: Configuration to rest at.
-        """
-        rest = motion.goal
-        path = [rest, goal]
+        """Extend a motion that stops by a path of RRT-Connect, or else straight."""
+        path = [motion.goal, goal]
         if self._is_euclidean:
-            for found in self._rrt.search(rest, goal, max_checks=self._max_checks):
+            for found in self._rrt.search(*path, max_checks=self._max_checks):
                 path = found or path
                 yield None
         motion.trajectory.extend(self._lines(motion, path))
@@ -108,12 +102,8 @@ class MotionPlanner:
     ) -> Generator[None, None, Motion | None]:
         """Return a motion that stops and goes back until it can turn to the goal.
 
-        Where the robot was is free, so this needs no search.
-
-        Args:
-            now: Present state.
-            goal: Configuration to rest at.
-            trail: Earlier states, the latest first.
+        Where the robot was is free, so this needs no search. The trail has its earlier
+        states, the latest first.
         """
         if not self._is_euclidean:
             return None
@@ -148,12 +138,7 @@ class MotionPlanner:
         )
 
     def rejoin(self, motion: Motion, now: TimedState) -> None:
-        """Lead a robot that was delayed directly to a later part of its motion.
-
-        Args:
-            motion: Changed in place.
-            now: Present state.
-        """
+        """Lead a robot that was delayed directly to a later part of its motion."""
         self._skip(motion, now)
         delay = self.catch_up_time(motion, now)
         if delay < CATCH_UP_LIMIT:
@@ -205,9 +190,8 @@ class MotionPlanner:
         x = [motion.position_of(state.q) for state in trail]
         steps = -np.diff([state.time for state in trail])
         v = -np.array([state.v for state in trail])
-        scales = retrace_scales(
-            v, steps, speed=self._speed, acceleration=self._acceleration
-        )
+        limits = {"speed": self._speed, "acceleration": self._acceleration}
+        scales = retrace_scales(v, steps, **limits)
         states = list(zip(x, scales[:, None] * v, strict=True))
         durations = 2.0 * steps / (scales[1:] + scales[:-1])
         for (a, b), time in zip(itertools.pairwise(states), durations, strict=True):
@@ -290,13 +274,9 @@ def plan_motion(
     rates = np.full(model.nv, acceleration, float)
     if not (speeds > 0.0).all() or not (rates > 0.0).all():
         raise ConfigError("Velocity and acceleration limits must be positive.")
+    spacings = {"spacing": spacing, "path_spacing": spacing}
     planner = MotionPlanner(
-        model,
-        clearance,
-        speed=speeds,
-        acceleration=rates,
-        spacing=spacing,
-        path_spacing=spacing,
+        model, clearance, speed=speeds, acceleration=rates, **spacings
     )
     now = TimedState(0.0, np.array(start, float), np.zeros(model.nv))
     goal = np.array(goal, float)

@@ -59,17 +59,10 @@ class RRTConnect:
     def search(
         self, start: Vector, end: Vector, *, max_checks: int
     ) -> Iterator[list[Vector] | None]:
-        """Search for configurations to pass through on straight lines.
+        """Yield None now and then, and at last a path with both ends, if one was found.
 
-        The random numbers are the same in every call.
-
-        Args:
-            start: First configuration; need not be free.
-            end: Last configuration.
-            max_checks: Number of collision checks after which to give up.
-
-        Yields:
-            None now and then, and at last the path with both ends, if one was found.
+        It is passed through on straight lines. The start need not be free. The random
+        numbers are the same in every call.
         """
         rng = np.random.default_rng(0)
         trees, self.checks = (_Tree(start), _Tree(end)), 0

@@ -25,15 +25,14 @@ def shorten_path(
 ) -> Iterator[list[Vector] | None]:
     """Shorten a path of straight lines, all joints at once and one joint alone in turn.
 
+    Yields None after each attempt, and at last the path.
+
     Args:
         path: Configurations.
         attempts: How many shortcuts to try.
         speed: Velocity limits, shape (nv,); lengths are measured in time.
         is_free: Returns whether the straight line between two configurations is free.
         rng: Random numbers.
-
-    Yields:
-        None after each attempt, and at last the path.
 
     Source: Geraerts and Overmars (2007), "Creating High-quality Paths for Motion
     Planning", IJRR 26(8).

@@ -16,9 +16,7 @@ MAX_SCALE = 50.0
 class ProfileGenerator:
     """Generates synchronised profiles: all joints arrive at the same time.
 
-    Args:
-        speed: Velocity limits, shape (nv,).
-        acceleration: Acceleration limits, shape (nv,).
+    Velocity and acceleration limits have shape (nv,).
 
     Source: Berscheid and Kröger (2021), "Jerk-limited Real-time Trajectory Generation
     with Arbitrary Target States", RSS. Jerk is not limited here.
@@ -38,16 +36,10 @@ class ProfileGenerator:
     ) -> ruckig.Trajectory | None:
         """Return the fastest profile between two states, or None if there is none.
 
-        Velocity limits grow to the velocity of the end where that is greater.
-
-        Args:
-            start: Positions and velocities.
-            end: The same at the end.
-            min_duration: Duration that the profile must have at least, s.
-            acceleration_scale: Factor on the acceleration limits.
+        Velocity limits grow to the velocity of the end where that is greater;
+        acceleration limits are scaled.
         """
-        given = self._input(start)
-        given.target_position, given.target_velocity = end
+        given = self._input(start, end)
         given.max_velocity = np.maximum(self.speed, np.abs(end[1]))
         given.max_acceleration = acceleration_scale * self.acceleration
         given.minimum_duration = min_duration
@@ -55,11 +47,8 @@ class ProfileGenerator:
 
     def line(self, start: Vector, end: Vector) -> ruckig.Trajectory:
         """Return the fastest profile from rest to rest on a straight line."""
-        step = np.abs(end - start)
-        moved = np.maximum(step, NO_MOTION)
-        still = np.zeros_like(start)
-        given = self._input((start, still))
-        given.target_position, given.target_velocity = end, still
+        moved, still = np.maximum(np.abs(end - start), NO_MOTION), np.zeros_like(start)
+        given = self._input((start, still), (end, still))
         given.max_velocity = float((self.speed / moved).min()) * moved
         given.max_acceleration = float((self.acceleration / moved).min()) * moved
         found = self._calculate(given)
@@ -68,19 +57,18 @@ class ProfileGenerator:
 
     def stop(self, start: State) -> ruckig.Trajectory:
         """Return the profile that stops each joint as soon as it can."""
-        given = self._input(start)
+        given = self._input(start, (start[0], np.zeros_like(start[1])))
         given.control_interface = ruckig.ControlInterface.Velocity
         given.synchronization = ruckig.Synchronization.No
-        given.target_velocity = np.zeros_like(start[1])
-        given.max_velocity = self.speed
-        given.max_acceleration = self.acceleration
         found = self._calculate(given)
         assert found is not None, "every joint can brake"
         return found
 
-    def _input(self, start: State) -> ruckig.InputParameter:
+    def _input(self, start: State, end: State) -> ruckig.InputParameter:
         given = ruckig.InputParameter(len(self.speed))
         given.current_position, given.current_velocity = start
+        given.target_position, given.target_velocity = end
+        given.max_velocity, given.max_acceleration = self.speed, self.acceleration
         return given
 
     def _calculate(self, given: ruckig.InputParameter) -> ruckig.Trajectory | None:
@@ -105,11 +93,8 @@ def retrace_scales(
     found forwards and then backwards along the trail; none is below 1, because what the
     robot did before it can do again. The first is 1.
 
-    Args:
-        v: Velocities at the recorded states, shape (n, nv).
-        steps: Times between them, s, shape (n - 1,).
-        speed: Velocity limits, shape (nv,).
-        acceleration: Acceleration limits, shape (nv,).
+    The recorded states have velocities v, shape (n, nv), and are steps (s), shape
+    (n - 1,), apart. Limits have shape (nv,).
 
     Source: Bobrow, Dubowsky and Gibson (1985), "Time-Optimal Control of Robotic
     Manipulators Along Specified Paths", IJRR 4(3); here on a grid of states.

@@ -14,17 +14,11 @@ from wbc_suite.typing import Vector
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """A part of a profile, from `begin` to `end`; backwards where `end` is earlier.
-
-    Attributes:
-        profile: The profile.
-        begin: Its time at the segment's start, s.
-        end: Its time at the segment's end, s.
-    """
+    """A part of a profile, from `begin` to `end`; backwards where `end` is earlier."""
 
     profile: ruckig.Trajectory
-    begin: float
-    end: float
+    begin: float  # s, time of the profile
+    end: float  # s, time of the profile
 
     @classmethod
     def whole(cls, profile: ruckig.Trajectory) -> "Segment":
@@ -43,18 +37,18 @@ class Segment:
 
     def state(self, time: float) -> State:
         """Return positions and velocities after a time, bounded to the segment."""
-        time = min(max(time, 0.0), self.duration)
         sign = 1.0 if self.end >= self.begin else -1.0
-        x, v, _ = self.profile.at_time(self.begin + sign * time)
+        x, v, _ = self.profile.at_time(self._time(time))
         return np.array(x), sign * np.array(v)
 
     def between(self, first: float, last: float) -> "Segment":
         """Return the part between two times of the segment, bounded to it."""
-        sign = 1.0 if self.end >= self.begin else -1.0
-        first, last = max(0.0, first), min(last, self.duration)
-        return Segment(
-            self.profile, self.begin + sign * first, self.begin + sign * last
-        )
+        return Segment(self.profile, self._time(first), self._time(last))
+
+    def _time(self, time: float) -> float:
+        """Return the profile's time after a time of the segment, bounded to it."""
+        time = min(max(time, 0.0), self.duration)
+        return self.begin + (time if self.end >= self.begin else -time)
 
     def check_times(self, spacing: float) -> list[float]:
         """Return times inside the segment, at most a spacing apart, s."""
@@ -64,11 +58,9 @@ class Segment:
     def check_positions(
         self, spacing: float, *, begin: float = 0.0
     ) -> Iterator[Vector]:
-        """Yield positions to check, coarse steps first: collisions are found early.
+        """Yield positions to check from a time on, at most a spacing (s) apart.
 
-        Args:
-            spacing: Greatest time between them, s.
-            begin: Time from which on to check, s.
+        Coarse steps are first: collisions are found early.
         """
         times = self.check_times(spacing)
         stride = 1 << len(times).bit_length()
@@ -79,11 +71,7 @@ class Segment:
 
 
 class Trajectory:
-    """Segments one after the other.
-
-    Args:
-        segments: At least one; each begins where the one before ends.
-    """
+    """Segments one after the other, at least one; each begins where the last ends."""
 
     def __init__(self, segments: Iterable[Segment]) -> None:
         self._set(segments)
@@ -147,13 +135,8 @@ class TimedState:
 class Motion:
     """A trajectory in the tangent space of a configuration, and how far it is followed.
 
-    Args:
-        model: The robot.
-        origin: Configuration that positions of the trajectory are counted from.
-        trajectory: What to follow.
-
-    Attributes:
-        clock: Time on the trajectory, s.
+    Positions of the trajectory are counted from the origin, a configuration. The clock
+    is the time on the trajectory, s.
     """
 
     def __init__(

@@ -5,9 +5,7 @@ import numpy as np
 from wbc_suite.compiling import compiled
 from wbc_suite.typing import Matrix, Vector
 
-HORIZONS = (0.03, 0.06, 0.1, 0.15, 0.22, 0.32, 0.45, 0.6)
-"""Times at which to meet the motion, s."""
-
+HORIZONS = (0.03, 0.06, 0.1, 0.15, 0.22, 0.32, 0.45, 0.6)  # s, to meet the motion at
 HALVINGS = 60
 SLACK = 1e-9  # rad or m; distances that count as none
 
@@ -64,13 +62,6 @@ def cruise_speed(
     """Return the cruising speed that covers d just in time; nan where none does.
 
     The profile accelerates from v0, cruises, and accelerates to v1.
-
-    Args:
-        d: Distance.
-        v0: Velocity at the start.
-        v1: Velocity at the end.
-        acceleration: Magnitude of both accelerations.
-        time: Duration, s.
     """
     low = 0.5 * (v0 + v1 - acceleration * time)
     high = 0.5 * (v0 + v1 + acceleration * time)

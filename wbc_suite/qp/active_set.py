@@ -37,60 +37,38 @@ _DEPENDENT = 1e-12  # part of a row's square that the rows above must leave
 _TOLERANCE = 1e-13  # m, rad: violation of a bound by rounding
 _ROW_TOLERANCE = 1e-11  # m: violation of a row by rounding
 
-_SOFT, _HARD = 1, 2
-"""States of an active inequality row: at `wanted` with slack, or at its bound."""
+_SOFT, _HARD = 1, 2  # states of active rows: at `wanted` with slack, or at the bound
 
 
 @struct
 class QpArrays(NamedTuple):
     """The QP of one level: m cost rows, p inequality rows, up to k equality rows.
 
-    Bounds stand in the order x, inequality rows, equality rows.
-
-    Attributes:
-        W: Weighted cost rows, shape (m, n).
-        e: Weighted steps, shape (m,).
-        diagonal: D without mu, and r, shape (2, n).
-        mu: Added to D, positive, shape (1,).
-        rows: Inequality rows, then equality rows, shape (p + k, n).
-        lower: Lower bounds, shape (n + p + k,).
-        upper: Upper bounds, shape (n + p + k,).
-        wanted: Upper bounds that rows keep softly, where they are below `upper`, (p,).
-        weight: Cost w of soft rows, shape (1,).
-        counts: p, and how many equality rows there are, shape (2,).
-        side: In and out, the active set: -1 or 1 where x is at its lower or upper
-            bound; 1 for soft, 2 for hard inequality rows; else 0; shape (n + p,).
-        x: Output, the optimum, shape (n,).
-        multipliers: Output, of bounds and rows, positive at upper ones.
-        active: Scratch, the rows of the small system, shape (m + p + k,).
-        last: Scratch, end of the entries of each row that are not zero.
-        scaled: Scratch, rows times D^-1/2, shape (m + p + k, n).
-        system: Scratch, the small system.
-        y: Scratch, its solution.
-        root: Scratch, D^-1/2, shape (n,).
-        kept: Scratch, x at bounds, else 0, shape (n,).
+    Bounds stand in the order x, inequality rows, equality rows. `side` is the active
+    set, in and out: -1 or 1 where x is at its lower or upper bound; 1 for soft, 2 for
+    hard inequality rows; else 0. What follows `multipliers` is scratch.
     """
 
-    W: Matrix
-    e: Vector
-    diagonal: Matrix
-    mu: Vector
-    rows: Matrix
-    lower: Vector
-    upper: Vector
-    wanted: Vector
-    weight: Vector
-    counts: Indices
-    side: Indices
-    x: Vector
-    multipliers: Vector
-    active: Indices
-    last: Indices
-    scaled: Matrix
-    system: Matrix
-    y: Vector
-    root: Vector
-    kept: Vector
+    W: Matrix  # (m, n), weighted cost rows
+    e: Vector  # (m,), weighted steps
+    diagonal: Matrix  # (2, n), D without mu, and r
+    mu: Vector  # (1,), added to D, positive
+    rows: Matrix  # (p + k, n), inequality rows, then equality rows
+    lower: Vector  # (n + p + k,)
+    upper: Vector  # (n + p + k,)
+    wanted: Vector  # (p,), bounds that rows keep softly, where they are below `upper`
+    weight: Vector  # (1,), cost w of soft rows
+    counts: Indices  # (2,), p, and how many equality rows there are
+    side: Indices  # (n + p,)
+    x: Vector  # (n,), output: the optimum
+    multipliers: Vector  # (n + p + k,), output: positive at upper bounds
+    active: Indices  # (m + p + k,), rows of the small system
+    last: Indices  # (m + p + k,), end of the entries of each row that are not zero
+    scaled: Matrix  # (m + p + k, n), rows times D^-1/2
+    system: Matrix  # the small system
+    y: Vector  # its solution
+    root: Vector  # (n,), D^-1/2
+    kept: Vector  # (n,), x at bounds, else 0
 
 
 def make_qp_arrays(
@@ -106,15 +84,7 @@ def make_qp_arrays(
 ) -> QpArrays:
     """Return the arrays of a QP without bounds, over the cost that is given.
 
-    Args:
-        W: See `QpArrays`.
-        e: See `QpArrays`.
-        diagonal: See `QpArrays`.
-        mu: See `QpArrays`.
-        inequalities: Number of inequality rows.
-        equalities: Greatest number of equality rows.
-        x: Buffer of the optimum, if there is one.
-        multipliers: Buffer of the multipliers, if there is one.
+    It has room for so many rows. Optimum and multipliers may have buffers already.
     """
     m, n = W.shape
     rows, size = inequalities + equalities, m + inequalities + equalities
@@ -146,8 +116,7 @@ def make_qp_arrays(
 def solve_warm(qp: QpArrays) -> bool:
     """Minimise `0.5 |W x - e|^2 + 0.5 x^T (D + mu) x - r^T x` within bounds and rows.
 
-    Returns:
-        Whether x is the optimum, provided that it keeps the rows.
+    Return whether x is the optimum, provided that it keeps the rows.
     """
     n, m = qp.x.shape[0], qp.e.shape[0]
     p, k = qp.counts[0], qp.counts[1]
@@ -160,8 +129,7 @@ def solve_warm(qp: QpArrays) -> bool:
             qp.side[n + row] = 0
     for count in range(_QUICK + _CAREFUL):
         if count == _QUICK:
-            for i in range(n + p):
-                qp.side[i] = 0
+            qp.side[:] = 0
         size = _state_system(qp)
         cholesky(qp.system, size, _DEPENDENT)
         solve_lower(qp.system, qp.y, size)
@@ -170,17 +138,13 @@ def solve_warm(qp: QpArrays) -> bool:
         changed = _deactivate(qp)
         if not _activate(qp, count >= _QUICK) and not changed:
             return True
-    for i in range(n + p):
-        qp.side[i] = 0
+    qp.side[:] = 0
     return False
 
 
 @compiled
 def _end(row: Vector) -> int:
-    """Return where a row's last entry other than zero is, and one more.
-
-    Joints count from the root outwards, so that many rows end early.
-    """
+    """Return the end of a row's entries: many end early, as joints count outwards."""
     end = row.shape[0]
     while end > 0 and row[end - 1] == 0.0:
         end -= 1
@@ -232,8 +196,7 @@ def _recover(qp: QpArrays, size: int) -> None:
     n, m = qp.x.shape[0], qp.e.shape[0]
     x, multipliers, side, last = qp.x, qp.multipliers, qp.side, qp.last
     W, rows, all_scaled = qp.W, qp.rows, qp.scaled
-    for i in range(multipliers.shape[0]):
-        multipliers[i] = 0.0
+    multipliers[:] = 0.0
     for k in range(size):
         row, y, scaled = qp.active[k], qp.y[k], all_scaled[k]
         if row >= m:

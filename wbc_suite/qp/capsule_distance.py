@@ -1,4 +1,4 @@
-"""Compiled search for the nearest pairs of capsules, and their distance's Jacobian."""
+"""Compiled search for the nearest pairs of capsules, and rows that keep them apart."""
 
 from typing import NamedTuple
 
@@ -6,12 +6,14 @@ import numpy as np
 
 from wbc_suite.compiling import compiled, struct
 from wbc_suite.kinematics.forward import RobotArrays
+from wbc_suite.qp.problem import UNBOUNDED
 from wbc_suite.typing import Array, Indices, Matrix, Vector
 
 SKIN = 0.1
 """m; a list holds pairs within the influence and this distance, and is made again when
 a capsule has moved by half of it: the neighbour lists of Verlet (1967)."""
 
+SEPARATION = 0.2  # m/s, greatest speed of separation of what is too near
 _POINT = 1e-12  # m^2; a shorter segment is a point
 _PARALLEL = 1e-12  # squared sine of the angle between parallel segments
 _TOUCHING = 1e-9  # m; nearer segments have no direction between them
@@ -19,59 +21,50 @@ _TOUCHING = 1e-9  # m; nearer segments have no direction between them
 
 @struct
 class CapsuleArrays(NamedTuple):
-    """n capsules of which p pairs are kept apart by k rows.
+    """n capsules of which p pairs are kept apart by k rows, in m."""
 
-    Attributes:
-        joint: Joint of each capsule, shape (n,).
-        ends: Both ends of its segment in the joint, m, shape (n, 6).
-        radius: Radii, m, shape (n,).
-        pairs: Capsules of each pair, one after another, shape (2 p,).
-        moves: 1 where a velocity moves a joint, else 0, shape (njoints, nv).
-        influence: Pairs further apart are left out, m.
-        world: Scratch, ends in the world, shape (n, 2, 3).
-        middle: Scratch, middles of the segments, shape (n, 3).
-        reach: Scratch, radii of balls around the capsules, m, shape (n,).
-        listed: Pairs near enough to be measured, shape (p,).
-        listed_count: How many they are, shape (1,); -1 before the first search.
-        listed_middle: Where the middles were when the list was made, shape (n, 3).
-        found: Output, pair of each row, nearest first, -1 where there is none, (k,).
-        distance: Output, distance of each row's pair, m; inf where there is none, (k,).
-    """
-
-    joint: Indices
-    ends: Matrix
-    radius: Vector
-    pairs: Indices
-    moves: Matrix
-    influence: float
-    world: Array
-    middle: Matrix
-    reach: Vector
-    listed: Indices
-    listed_count: Indices
-    listed_middle: Matrix
-    found: Indices
-    distance: Vector
+    joint: Indices  # (n,), joint of each capsule
+    ends: Matrix  # (n, 6), both ends of its segment in the joint
+    radius: Vector  # (n,)
+    pairs: Indices  # (2 p,), capsules of each pair, one after another
+    moves: Matrix  # (njoints, nv), 1 where a velocity moves a joint, else 0
+    margin: float  # distance that is kept
+    influence: float  # pairs further apart are left out
+    rate: float  # approach speed per distance left, 1/s
+    world: Array  # (n, 2, 3), scratch: ends in the world
+    middle: Matrix  # (n, 3), scratch: middles of the segments
+    reach: Vector  # (n,), scratch: radii of balls around the capsules
+    listed: Indices  # (p,), pairs near enough to be measured
+    listed_count: Indices  # (1,), how many they are; -1 before the first search
+    listed_middle: Matrix  # (n, 3), where the middles were when the list was made
+    found: Indices  # (k,), output: pair of each row, nearest first, -1 for none
+    distance: Vector  # (k,), output: distance of each row's pair, inf for none
 
 
 @compiled
-def nearest_pairs(robot: RobotArrays, capsules: CapsuleArrays, G: Matrix) -> int:
-    """Find the nearest pairs and write the negative derivative of their distance.
+def self_collision_rows(
+    robot: RobotArrays, capsules: CapsuleArrays, dt: float, G: Matrix, h: Vector
+) -> None:
+    """Write the velocity dampers of the nearest pairs; joint poses are current.
 
-    Args:
-        robot: The robot; joint poses are current.
-        capsules: The capsules.
-        G: Output, `-d(distance)/dq` of each row, shape (k, nv); 0 where there is none.
-
-    Returns:
-        The number of rows with a pair within the influence.
+    G, shape (k, nv), gets `-d(distance)/dq` of each row, 0 where there is none; h gets
+    how far each pair may approach in dt seconds, m.
     """
+    _find_nearest(robot, capsules)
+    for row in range(h.shape[0]):
+        _write_row(robot, capsules, row, G[row])
+        speed = capsules.rate * (capsules.distance[row] - capsules.margin)
+        h[row] = min(max(speed, -SEPARATION) * dt, UNBOUNDED)
+
+
+@compiled
+def _find_nearest(robot: RobotArrays, capsules: CapsuleArrays) -> None:
+    """Find the nearest pairs within the influence, and their distances."""
     _place_capsules(robot, capsules)
     _update_list(capsules)
     found, distance, world = capsules.found, capsules.distance, capsules.world
+    found[:], distance[:] = -1, np.inf
     rows, total = found.shape[0], 0
-    for row in range(rows):
-        found[row], distance[row] = -1, np.inf
     for k in range(capsules.listed_count[0]):
         pair = capsules.listed[k]
         a, b = capsules.pairs[2 * pair], capsules.pairs[2 * pair + 1]
@@ -87,15 +80,20 @@ def nearest_pairs(robot: RobotArrays, capsules: CapsuleArrays, G: Matrix) -> int
             square += x * x
         d = np.sqrt(square) - capsules.radius[a] - capsules.radius[b]
         if d < limit:
-            row = min(total, rows - 1)
-            while row > 0 and distance[row - 1] > d:
-                distance[row], found[row] = distance[row - 1], found[row - 1]
-                row -= 1
-            distance[row], found[row] = d, pair
-            total = min(total + 1, rows)
-    for row in range(rows):
-        _write_row(robot, capsules, row, G[row])
-    return total
+            insert_nearest(found, distance, total, pair, d)
+            total += 1
+
+
+@compiled
+def insert_nearest(
+    found: Indices, distance: Vector, count: int, item: int, d: float
+) -> None:
+    """Insert an item, nearest first; where all rows are taken, the last drops out."""
+    row = min(count, found.shape[0] - 1)
+    while row > 0 and distance[row - 1] > d:
+        distance[row], found[row] = distance[row - 1], found[row - 1]
+        row -= 1
+    distance[row], found[row] = d, item
 
 
 @compiled
@@ -124,9 +122,7 @@ def _update_list(capsules: CapsuleArrays) -> None:
         is_current = is_current and moved < (0.49 * SKIN) ** 2
     if is_current:
         return
-    for c in range(middle.shape[0]):
-        for i in range(3):
-            known[c, i] = middle[c, i]
+    known[:] = middle
     count = 0
     for pair in range(capsules.listed.shape[0]):
         a, b = capsules.pairs[2 * pair], capsules.pairs[2 * pair + 1]
@@ -153,9 +149,8 @@ def _write_row(
     is, so only those that move one of them count.
     """
     pair = capsules.found[row]
+    out[:] = 0.0
     if pair < 0:
-        for col in range(out.shape[0]):
-            out[col] = 0.0
         return
     a, b = capsules.pairs[2 * pair], capsules.pairs[2 * pair + 1]
     A, B = capsules.world[a], capsules.world[b]
@@ -176,7 +171,6 @@ def _write_row(
     moves_b = capsules.moves[capsules.joint[b]]
     for col in range(out.shape[0]):
         side = moves_a[col] - moves_b[col]
-        out[col] = 0.0
         if side != 0.0:
             J, z = robot.jacobian[col], x if side > 0.0 else y
             speed = n[0] * (J[0] + J[4] * z[2] - J[5] * z[1])

@@ -17,10 +17,9 @@ class ComTask(RowTask):
     Args:
         cost: [cost]/m, one number or one per world axis.
         target: Point p*, m, shape (3,); without one the point at binding time.
-        gain: See `RowTask`.
-        level: See `RowTask`.
         max_speed: Greatest speed asked for, m/s.
-        name: How reports call the task.
+
+    Other arguments are those of `RowTask`.
     """
 
     kernel: ClassVar[Kernel] = Kernel.COM
@@ -39,19 +38,13 @@ class ComTask(RowTask):
             name, dim=3, cost=cost, gain=gain, level=level, max_speed=max_speed
         )
         self.target_row = SharedRow(3)
-        self.has_target = False
         if target is not None:
             self.set_target(target)
 
     def set_target(self, target: Vector) -> None:
-        """Set the point p*, m, shape (3,).
-
-        Raises:
-            ConfigError: If the shape is wrong.
-        """
+        """Set the point p*, m; ConfigError if its shape is not (3,)."""
         what = f"Task '{self.name}': the target"
         self.target_row.set(check_array(what, target, (3,)))
-        self.has_target = True
 
     @property
     def target(self) -> Vector:
@@ -60,7 +53,7 @@ class ComTask(RowTask):
 
     def bind(self, configuration: Configuration) -> None:
         """Without a target, hold the present point."""
-        if not self.has_target:
+        if not self.target_row.is_set:
             self.set_target(configuration.com)
 
     def evaluate(

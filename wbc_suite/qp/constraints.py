@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from itertools import pairwise
 from types import UnionType
-from typing import cast
+from typing import TypeVar, cast
 
 import numpy as np
 
@@ -52,18 +52,16 @@ class Constraints:
         limits: Sequence[Limit],
         equalities: Sequence[Equality],
     ) -> None:
-        self._limits = [x for x in limits if isinstance(x, RowLimit)]
-        self._equalities = tuple(equalities)
-        for part in (*self._limits, *self._equalities):
+        row_limits = [x for x in limits if isinstance(x, RowLimit)]
+        for part in (*row_limits, *equalities):
             part.bind(configuration)
-        dims = [x.dim for x in self._limits]
-        self._rows = _slices(dims)
-        self._equality_rows = _slices([x.dim for x in equalities])
-        self.inequalities = sum(dims)
-        self.equalities = sum(x.dim for x in equalities)
+        self._limits, self.inequalities = _with_rows(row_limits)
+        self._equalities, self.equalities = _with_rows(equalities)
         self.names = tuple((x.name, x.dim) for x in equalities)
-        speeds = [x.relax_speed for x in self._limits]
-        self.relax_speed: Vector = np.repeat(np.array(speeds, dtype=np.float64), dims)
+        speeds = [limit.relax_speed for limit in row_limits for _ in range(limit.dim)]
+        self.relax_speed: Vector = np.array(speeds, dtype=np.float64)
+        self._python_limits: list[tuple[RowLimit, slice]] = []
+        self._python_equalities: list[tuple[Equality, slice]] = []
         self._bind_limits(configuration)
         self._bind_equalities(configuration)
         self.is_compiled = not self._python_limits and not self._python_equalities
@@ -73,8 +71,7 @@ class Constraints:
         self.collision, self.floor = SelfCollisionLimit((), ()), FloorLimit({})
         self.collision_rows: Indices = np.zeros(2, dtype=np.int64)
         self.floor_rows: Indices = np.zeros(2, dtype=np.int64)
-        self._python_limits: list[tuple[RowLimit, slice]] = []
-        for limit, rows in zip(self._limits, self._rows, strict=True):
+        for limit, rows in self._limits:
             kernel, end = kernel_of(limit), (rows.start, rows.stop)
             is_first = not self.collision_rows.any()
             if isinstance(limit, SelfCollisionLimit) and kernel and is_first:
@@ -88,29 +85,27 @@ class Constraints:
 
     def _bind_equalities(self, configuration: Configuration) -> None:
         self.rate: Vector = np.full(self.equalities, np.nan)
-        self._frames: list[tuple[FrameEquality, int]] = []
         self._constant: list[tuple[LinearEquality, slice]] = []
-        self._python_equalities: list[tuple[Equality, slice]] = []
-        for equality, rows in zip(self._equalities, self._equality_rows, strict=True):
+        frames: list[tuple[FrameEquality, int]] = []
+        for equality, rows in self._equalities:
             kernel = kernel_of(equality)
             if isinstance(equality, FrameEquality) and kernel is Kernel.FRAME:
-                self._frames.append((equality, rows.start))
+                frames.append((equality, rows.start))
             elif isinstance(equality, LinearEquality) and kernel is Kernel.CONSTANT:
                 self._constant.append((equality, rows))
                 self.rate[rows] = equality.rate
             else:
                 self._python_equalities.append((equality, rows))
-        self._held = HeldFrames.of(configuration, self._frames)
-        self.held = as_argument(self._held)
-        self._targets = list(self._held.target)  # copies live as long as these views
-        for (equality, _), target in zip(self._frames, self._targets, strict=True):
+        held = HeldFrames.of(configuration, frames)
+        self.held = as_argument(held)
+        self._targets = list(held.target)  # copies live as long as these views
+        for (equality, _), target in zip(frames, self._targets, strict=True):
             equality.target_row.attach(target)
 
     def fill_constants(self, qp: QpArrays) -> None:
         """Write the rows that never change."""
-        A = qp.rows[self.inequalities :]
         for equality, rows in self._constant:
-            A[rows] = equality.matrix
+            qp.rows[self.inequalities :][rows] = equality.matrix
 
     def prepare(self, configuration: Configuration, dt: float, qp: QpArrays) -> None:
         """Write the rows that have no kernel."""
@@ -124,35 +119,31 @@ class Constraints:
 
     def reset(self) -> None:
         """Let limits discard their memory of earlier ticks."""
-        for limit in self._limits:
+        for limit, _ in self._limits:
             limit.reset()
 
     def subject(self, row: int) -> tuple[LimitKind, object, str]:
         """Return kind, subject and unit of an inequality row of the last tick."""
-        for limit, rows in zip(self._limits, self._rows, strict=True):
-            if row < rows.stop:
-                return limit.kind, limit.subject(row - rows.start), limit.unit
-        raise IndexError(row)
+        limit, rows = next(pair for pair in self._limits if row < pair[1].stop)
+        return limit.kind, limit.subject(row - rows.start), limit.unit
 
     def violated(self, qp: QpArrays, x: Vector, tolerance: float) -> tuple[str, ...]:
         """Return the names of the rows that a step does not keep."""
-        over = qp.rows @ x - qp.upper[len(x) :]
-        p = self.inequalities
+        over, p = qp.rows @ x - qp.upper[len(x) :], self.inequalities
         missed = np.abs(over[p:]) > tolerance
-        names = [
-            equality.name
-            for equality, rows in zip(
-                self._equalities, self._equality_rows, strict=True
-            )
-            if missed[rows].any()
-        ]
+        names = [part.name for part, rows in self._equalities if missed[rows].any()]
         rows = np.flatnonzero(over[:p] > tolerance)
         return (*names, *(str(self.subject(int(i))[1]) for i in rows))
 
 
-def _slices(sizes: Sequence[int]) -> list[slice]:
-    """Return where each block of rows is, one after another."""
-    return [slice(a, b) for a, b in pairwise(np.cumsum([0, *sizes]).tolist())]
+Part = TypeVar("Part", RowLimit, Equality)
+
+
+def _with_rows(parts: Sequence[Part]) -> tuple[list[tuple[Part, slice]], int]:
+    """Return each part with its rows, one after another, and their number."""
+    ends = np.cumsum([0, *(part.dim for part in parts)]).tolist()
+    slices = [slice(a, b) for a, b in pairwise(ends)]
+    return list(zip(parts, slices, strict=True)), ends[-1]
 
 
 def check_parts(
@@ -186,9 +177,7 @@ def _check_list(
     if not isinstance(given, Sequence) or isinstance(given, str):
         raise ConfigError(f"TaskStack: {what} are a list, not {given!r:.60}.")
     items = cast("Sequence[object]", given)
-    for item in items:
-        if not isinstance(item, kind):
-            raise ConfigError(
-                f"TaskStack: {what} hold {name} objects, not {item!r:.60}."
-            )
+    for x in items:
+        if not isinstance(x, kind):
+            raise ConfigError(f"TaskStack: {what} hold {name} objects, not {x!r:.60}.")
     return items

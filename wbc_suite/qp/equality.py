@@ -19,8 +19,9 @@ from wbc_suite.kinematics.forward import (
 )
 from wbc_suite.qp.frame_task import homogeneous
 from wbc_suite.qp.kernel import Kernel
-from wbc_suite.qp.lie import FAR, log3, saturate
+from wbc_suite.qp.lie import log3, saturate
 from wbc_suite.qp.task import SharedRow
+from wbc_suite.qp.task_kernels import relative_rotation
 from wbc_suite.typing import Indices, Matrix, Vector
 
 Direction = Literal["x", "y", "z", "roll", "pitch", "yaw"]
@@ -30,12 +31,9 @@ _RETURN_ANGULAR_SPEED = 1.0  # rad/s
 
 
 class Equality(ABC):
-    """Rows `A dq = b`, prior to every task.
+    """Rows `A dq = b`, prior to every task: `dim` of them, which reports call `name`.
 
-    Attributes:
-        kernel: What writes the rows, see `kernel_of`.
-        name: How reports call the rows.
-        dim: Number of rows.
+    A class says in its own body what writes them, see `kernel_of`.
     """
 
     kernel: ClassVar[Kernel] = Kernel.PYTHON
@@ -97,20 +95,18 @@ class FrameEquality(Equality):
         kept = [_DIRECTIONS.index(direction) for direction in directions]
         self.directions: Indices = np.array(kept, dtype=np.int64)
         self.dim = len(kept)
-        self.target_row, self.has_target = SharedRow(12), False
+        self.target_row = SharedRow(12)
         if target is not None:
             self.set_target(target)
 
     def set_target(self, target: pin.SE3 | Matrix) -> None:
         """Set the pose T_wt to hold."""
         self.target_row.set(homogeneous(self.name, target).ravel()[:12])
-        self.has_target = True
 
     def bind(self, configuration: Configuration) -> None:
         """Resolve the frame; without a target, hold its present pose."""
-        self.frame_index = configuration.frame_id(self.frame)
-        if not self.has_target:
-            self.set_target(configuration.frame_pose(self.frame_index))
+        if not self.target_row.is_set:
+            self.set_target(configuration.frame_pose(self.frame))
 
     def rows(
         self, configuration: Configuration, dt: float, A: Matrix, b: Vector
@@ -148,9 +144,8 @@ class LinearEquality(Equality):
     ) -> None:
         self.name = name
         owner = f"LinearEquality '{name}'"
-        self.matrix: Matrix = np.atleast_2d(
-            check_array(f"{owner}: the matrix", matrix, None).copy()
-        )
+        rows = check_array(f"{owner}: the matrix", matrix, None)
+        self.matrix: Matrix = np.atleast_2d(rows.copy())
         if self.matrix.ndim != 2:
             raise ConfigError(f"{owner}: a matrix, not shape {self.matrix.shape}.")
         self.dim = len(self.matrix)
@@ -158,14 +153,10 @@ class LinearEquality(Equality):
         if rate is not None:
             self.rate[:] = check_array(f"{owner}: the rate", rate, (self.dim,))
         if not (np.isfinite(self.matrix).all() and np.isfinite(self.rate).all()):
-            raise ConfigError(f"LinearEquality '{name}': a value is not finite.")
+            raise ConfigError(f"{owner}: a value is not finite.")
 
     def bind(self, configuration: Configuration) -> None:
-        """Check the number of columns.
-
-        Raises:
-            ConfigError: If it differs from nv.
-        """
+        """Raise ConfigError if the number of columns is not nv."""
         if self.matrix.shape[1] != configuration.nv:
             raise ConfigError(
                 f"LinearEquality '{self.name}': {self.matrix.shape[1]} columns; "
@@ -182,36 +173,24 @@ class LinearEquality(Equality):
 
 @struct
 class HeldFrames(NamedTuple):
-    """Frames that `hold_frames` holds, n of them.
+    """Frames that `hold_frames` holds: n of them, with m rows."""
 
-    Attributes:
-        joint: Parent joint of each frame, shape (n,).
-        offset: Pose of the frame in its joint, by columns, shape (n, 12).
-        moves: 1 where a velocity moves the frame, else 0, shape (n, nv).
-        target: Pose to hold, [R p] row by row, shape (n, 12).
-        gain: Fraction of the drift that one step removes; 0 leads nothing back.
-        directions: Local direction of each row, shape (m,).
-        row_start: First entry of each frame in `directions`, and m, shape (n + 1,).
-        row: Row of the problem of each entry of `directions`, shape (m,).
-    """
-
-    joint: Indices
-    offset: Matrix
-    moves: Matrix
-    target: Matrix
-    gain: Vector
-    directions: Indices
-    row_start: Indices
-    row: Indices
+    joint: Indices  # (n,), parent joint of each frame
+    offset: Matrix  # (n, 12), pose of the frame in its joint, by columns
+    moves: Matrix  # (n, nv), 1 where a velocity moves the frame, else 0
+    target: Matrix  # (n, 12), pose to hold, [R p] row by row
+    gain: Vector  # (n,), fraction of the drift that one step removes; 0 removes none
+    directions: Indices  # (m,), local direction of each row
+    row_start: Indices  # (n + 1,), first entry of each frame in `directions`, and m
+    row: Indices  # (m,), row of the problem of each entry of `directions`
 
     @classmethod
     def of(
         cls, configuration: Configuration, held: Sequence[tuple[FrameEquality, int]]
     ) -> "HeldFrames":
         """Return the arrays of some equalities, each with its first row."""
-        ids = [configuration.frame_id(x.frame) for x, _ in held]
-        frames = [configuration.model.frames[k] for k in ids]
-        count = len(held)
+        model, count = configuration.model, len(held)
+        frames = [model.frames[configuration.frame_id(x.frame)] for x, _ in held]
         moves = np.zeros((count, configuration.nv))
         for k, frame in enumerate(frames):
             moves[k, configuration.joint_support(frame.parentJoint)] = 1.0
@@ -219,11 +198,9 @@ class HeldFrames(NamedTuple):
         rows = [row + np.arange(x.dim, dtype=np.int64) for x, row in held]
         return cls(
             joint=np.array([f.parentJoint for f in frames], dtype=np.int64),
-            offset=np.array([pack_pose(f.placement) for f in frames]).reshape(
-                count, 12
-            ),
+            offset=np.reshape([pack_pose(f.placement) for f in frames], (count, 12)),
             moves=moves,
-            target=np.array([x.target_row.values for x, _ in held]).reshape(count, 12),
+            target=np.reshape([x.target_row.values for x, _ in held], (count, 12)),
             gain=np.array([x.gain if x.hold_pose else 0.0 for x, _ in held]),
             directions=np.concatenate([*none, *(x.directions for x, _ in held)]),
             row_start=np.cumsum([0, *(x.dim for x, _ in held)], dtype=np.int64),
@@ -235,14 +212,9 @@ class HeldFrames(NamedTuple):
 def hold_frames(
     robot: RobotArrays, held: HeldFrames, dt: float, A: Matrix, b: Vector
 ) -> None:
-    """Write the rows of `FrameEquality`: the kept rows of `J_local dq = gain e`.
+    """Write the kept rows of `J_local dq = gain e`, see `FrameEquality`.
 
-    Args:
-        robot: The robot; joint poses are current.
-        held: The frames.
-        dt: Step, s.
-        A: Output, rows of the problem.
-        b: Output, their right-hand side.
+    Joint poses are current; A and b are all equality rows of the problem.
     """
     T, error = np.empty(12), np.empty(6)
     for t in range(held.joint.shape[0]):
@@ -279,17 +251,12 @@ def _drift(
 ) -> None:
     """Write the pose of a frame, and its drift in the frame's axes, shape (6,)."""
     multiply_poses(robot.pose[joint], offset, T)
-    E, finite = np.empty((3, 3)), True
-    for i in range(12):
-        finite &= abs(target[i]) < FAR
+    E = np.empty((3, 3))
+    finite = relative_rotation(T, target, E)
+    log3(E, error[3:])
     for i in range(3):
         error[i] = 0.0
         for j in range(3):
             error[i] += T[3 * i + j] * (target[4 * j + 3] - T[9 + j])
-            E[i, j] = T[3 * i] * target[j]
-            E[i, j] += T[3 * i + 1] * target[4 + j] + T[3 * i + 2] * target[8 + j]
-    if finite:
-        log3(E, error[3:])
-    else:
-        for i in range(6):
-            error[i] = np.nan
+    if not finite:
+        error[:] = np.nan

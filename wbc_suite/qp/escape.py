@@ -10,7 +10,7 @@ so that a robot whose target is out of reach stands still.
 
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from wbc_suite.qp.frame_task import FrameTask
 from wbc_suite.qp.lie import is_usable
 from wbc_suite.qp.limit import JointBounds
 from wbc_suite.typing import Indices, Matrix, Vector
+
+if TYPE_CHECKING:
+    from wbc_suite.qp.stack import TaskStack
 
 _STILL = 0.02  # rad/s or m/s; a slower robot stands
 _STANDING_TIME = 0.25  # s of standing before a simulation
@@ -32,16 +35,6 @@ _ARRIVED = 0.1  # of the range; this near to the middle the drive ends
 _BETTER = 0.5  # of the error; what a drive must come under to be worth it
 _DRIVE_COST = 3.0  # against the greatest cost of a watched task
 _DRIVE_SPEED = 0.5  # of the velocity limit
-
-
-class StackCopy(Protocol):
-    """A copy of a stack on a copy of its robot, for simulation."""
-
-    configuration: Configuration
-
-    def step(self, dt: float, bias: Matrix | None) -> None:
-        """Solve and move one step, with a bias on single joints."""
-        ...
 
 
 @dataclass(slots=True)
@@ -67,16 +60,13 @@ class Escape:
         configuration: Configuration,
         tasks: Sequence[FrameTask],
         bounds: JointBounds,
-        make_copy: Callable[[], StackCopy],
+        make_copy: Callable[[], "TaskStack"],
     ) -> None:
         self._configuration, self._tasks = configuration, tuple(tasks)
         self._bounds, self._make_copy = bounds, make_copy
         self._range = bounds.q_upper - bounds.q_lower
         limited = np.isfinite(self._range) & (bounds.q_index >= 0)
         self._limited = np.flatnonzero(limited)
-        self._middle: Vector = np.zeros(configuration.nv)
-        at = self._limited
-        self._middle[at] = 0.5 * (bounds.q_upper[at] + bounds.q_lower[at])
         self._supports = [t.support(configuration) for t in self._tasks]
         self._bias: Matrix = np.zeros((2, configuration.nv))
         self.reset()
@@ -97,8 +87,7 @@ class Escape:
         Args:
             dt: Step, s.
             v: Velocity of the previous tick, shape (nv,).
-            pressed: Returns the velocity indices of the joints that are pressed against
-                position limits.
+            pressed: Returns velocity indices of joints pressed against position limits.
         """
         self._still = self._still + dt if max(v.max(), -v.min()) < _STILL else 0.0
         if self._drive is None and self._search is None:
@@ -153,7 +142,7 @@ class Escape:
 
     def _is_over(self, drive: _Drive, q: Vector) -> bool:
         joints = drive.joints
-        left = np.abs(self._middle[joints] - q[self._bounds.q_index[joints]])
+        left = np.abs(self._to_middle(joints, q))
         arrived = bool((left < _ARRIVED * self._range[joints]).all())
         return arrived or drive.time > _DRIVE_TIME
 
@@ -161,11 +150,16 @@ class Escape:
         joints = drive.joints
         cost = _DRIVE_COST * max(float(t.cost.max()) for t in self._tasks)
         speed = np.minimum(self._bounds.v_max[joints], 3.0) * _DRIVE_SPEED * dt
-        step = self._middle[joints] - q[self._bounds.q_index[joints]]
+        step = self._to_middle(joints, q)
         self._bias[:] = 0.0
         self._bias[0, joints] = cost**2
         self._bias[1, joints] = cost**2 * np.clip(step, -speed, speed)
         return self._bias
+
+    def _to_middle(self, joints: Indices, q: Vector) -> Vector:
+        bounds = self._bounds
+        middle = 0.5 * (bounds.q_upper[joints] + bounds.q_lower[joints])
+        return middle - q[bounds.q_index[joints]]
 
     def _is_stuck(self) -> bool:
         if self._simulated is not None and not self._targets_moved(

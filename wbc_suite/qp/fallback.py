@@ -12,46 +12,31 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wbc_suite.compiling import compiled
-from wbc_suite.kinematics import Configuration
+from wbc_suite.compiling import as_argument, compiled
 from wbc_suite.qp.level import Level
-from wbc_suite.qp.limit import JointBounds
+from wbc_suite.qp.limit import merge_bounds
 from wbc_suite.qp.problem import UNBOUNDED, Problem, clip_step
 from wbc_suite.qp.solution import Fallback
 from wbc_suite.qp.solver import QpSolver
 from wbc_suite.qp.tick import RETURN_WEIGHT, TOLERANCE, TickArrays, stiffness
-from wbc_suite.typing import Indices, Matrix, Vector
+from wbc_suite.typing import Matrix, Vector
 
 _SLACK_WEIGHT = 1e2  # of a relaxed row against one that is led back
 _SWEEPS = 100
-_NO_ROWS: Indices = np.zeros(0, dtype=np.int64)
-_ROOM = 1e-11
-"""m or rad; bounds are so much wider where the only steps that levels above allow lie
-on them, and rounding decides whether there is any."""
+_ROOM = 1e-11  # m or rad; so much wider are bounds that rounding may make infeasible
 
 
 class Ladder:
     """Solves the levels of a stack one by one, by a solver or a fallback.
 
-    Args:
-        configuration: The robot.
-        levels: The levels, as `solve_tick` has stated them.
-        bounds: Bounds of the joints.
-        tick: The tick.
-        solver: Solver of the first level; a fresh one of its kind is made for each
-            size of problem below.
+    The levels are as `solve_tick` has stated them at the positions q. The solver is for
+    the first level; a fresh one of its kind is made for each size of problem below.
     """
 
     def __init__(
-        self,
-        configuration: Configuration,
-        levels: Sequence[Level],
-        bounds: JointBounds,
-        tick: TickArrays,
-        solver: QpSolver,
+        self, q: Vector, levels: Sequence[Level], tick: TickArrays, solver: QpSolver
     ) -> None:
-        self._configuration, self._levels = configuration, levels
-        self._bounds, self._tick, self.solver = bounds, tick, solver
+        self._q, self._levels, self._tick, self.solver = q, levels, tick, solver
         self._problems: dict[tuple[int, int], tuple[Problem, QpSolver]] = {}
 
     def reset(self) -> None:
@@ -60,15 +45,9 @@ class Ladder:
         self._problems.clear()
 
     def solve_level(self, k: int, dt: float, *, is_finite: bool) -> Fallback:
-        """Write step and multipliers of a level into its arrays.
+        """Write step and multipliers of level k into its arrays; return what it took.
 
-        Args:
-            k: The level.
-            dt: Step, s.
-            is_finite: Whether its rows are.
-
-        Returns:
-            What it took; `Fallback.LEVEL` if nothing is written.
+        `Fallback.LEVEL` writes nothing. `is_finite` is whether the level's rows are.
         """
         if k > 0:
             return self._solve_lower(k) if is_finite else Fallback.LEVEL
@@ -79,8 +58,7 @@ class Ladder:
             result = checked_solve(solver, problem)
         if result is None:
             problem.weight = RETURN_WEIGHT * stiffness(level.arrays.tasks)
-            q, v, kinds = self._configuration.q, self._tick.v, self._tick.kinds
-            lb, ub = self._bounds.without_acceleration(q, v, dt, kinds)
+            lb, ub = self._bounds_without_acceleration(dt)
             if is_finite:
                 *result, fallback = retreat(solver, problem, lb=lb, ub=ub)
                 level.qp.lower[:], level.qp.upper[:] = problem.lower, problem.upper
@@ -90,13 +68,20 @@ class Ladder:
         level.qp.x[:], level.qp.multipliers[:] = result
         return fallback
 
+    def _bounds_without_acceleration(self, dt: float) -> tuple[Vector, Vector]:
+        """Return the bounds of a step that may change speeds at once, shape (nv,)."""
+        tick, lower, upper = self._tick, *np.empty((2, len(self._tick.v)))
+        bounds = tick.bounds._replace(a_max=np.full(len(lower), np.inf))
+        merge_bounds(as_argument(bounds), self._q, tick.v, dt, lower, upper, tick.kinds)
+        return lower, upper
+
     def _solve_lower(self, k: int) -> Fallback:
         """Solve a level below the first."""
         level, first = self._levels[k], self._levels[0].qp
         problem, solver = self.problem(k)
         level.state(problem)
         result = checked_solve(solver, problem)
-        if result is None:  # only just feasible: rounding may leave nothing
+        if result is None:  # the only steps that are left may lie on the bounds
             bounds = slice(problem.nv + len(problem.G))
             problem.lower[bounds] -= _ROOM
             problem.upper[bounds] += _ROOM
@@ -117,7 +102,7 @@ class Ladder:
         p, rank = (int(count) for count in self._levels[k].qp.counts)
         if (k, rank) not in self._problems:
             solver = self.solver if k == 0 else self.solver.fresh()
-            problem = Problem(self._configuration.nv, p, rank)
+            problem = Problem(len(self._tick.v), p, rank)
             self._problems[k, rank] = problem, solver
         return self._problems[k, rank]
 
@@ -127,7 +112,7 @@ def checked_solve(solver: QpSolver, problem: Problem) -> tuple[Vector, Vector] |
 
     The step is clipped to the bounds, which it may have missed by rounding.
     """
-    soft = problem.soft() if len(problem.G) else _NO_ROWS
+    soft = problem.soft()
     result = solver.solve(problem.with_slack(soft) if len(soft) else problem)
     if result is None:
         return None
@@ -143,25 +128,15 @@ def checked_solve(solver: QpSolver, problem: Problem) -> tuple[Vector, Vector] |
 def retreat(
     solver: QpSolver, problem: Problem, *, lb: Vector, ub: Vector
 ) -> tuple[Vector, Vector, Fallback]:
-    """Find a step for a problem that has no solution.
+    """Return step, multipliers and rung for a problem that has no solution.
 
-    Args:
-        solver: Tried first, without acceleration limits.
-        problem: The problem; its bounds may be replaced.
-        lb: Lower bounds of position and velocity alone.
-        ub: Upper bounds of the same.
-
-    Returns:
-        The step, multipliers, and the rung that was reached.
+    Its bounds may be replaced by lb and ub, those of position and velocity alone.
     """
-    result = _solve_with_loose_limits(solver, problem)
-    if result is not None:
+    if result := _solve_with_loose_limits(solver, problem):
         return *result, Fallback.LIMITS
-    result = _solve_without_window(solver, problem, lb, ub)
-    if result is not None:
+    if result := _solve_without_window(solver, problem, lb, ub):
         return *result, Fallback.ACCELERATION
-    result = _solve_with_slack(solver, problem)
-    if result is not None:
+    if result := _solve_with_slack(solver, problem):
         return *result, Fallback.SLACK
     nothing = np.zeros(len(problem.upper))
     x = box_least_squares(problem.H, problem.c, problem.lb, problem.ub, _SWEEPS)
@@ -198,11 +173,15 @@ def _solve_with_loose_limits(
     solver: QpSolver, problem: Problem
 ) -> tuple[Vector, Vector] | None:
     """Solve with slack s >= 0 on `G dq <= h + s`, within the acceleration window."""
-    loose = problem.copy()
-    loose.wanted[:] = np.minimum(problem.wanted, problem.h)
-    loose.h[:] = UNBOUNDED
-    loose.weight = _SLACK_WEIGHT * problem.weight
-    return checked_solve(solver.fresh(), loose)
+    return checked_solve(solver.fresh(), _loosened(problem.copy()))
+
+
+def _loosened(problem: Problem) -> Problem:
+    """Make all inequality rows of a problem soft; return it."""
+    np.minimum(problem.wanted, problem.h, out=problem.wanted)
+    problem.h[:] = UNBOUNDED
+    problem.weight *= _SLACK_WEIGHT
+    return problem
 
 
 def _solve_with_slack(
@@ -214,16 +193,13 @@ def _solve_with_slack(
     here too, see `task_kernels.write_tasks`: without it a robot whose feet and links
     contradict each other was measured to swing at full speed, 9.6 rad/s between ticks.
     """
-    relaxed = problem.copy(equalities=False)
-    A, b, weight = problem.A, problem.b, _SLACK_WEIGHT * problem.weight
+    relaxed = _loosened(problem.copy(equalities=False))
+    A, b, weight = problem.A, problem.b, relaxed.weight
     mu = np.abs(A).max(axis=1, initial=0.0) @ np.abs(b)
     broken = np.maximum(0.0, -problem.wanted)
     mu += np.abs(problem.G).max(axis=1, initial=0.0) @ broken
     relaxed.H += weight * (A.T @ A + mu * np.eye(problem.nv))
     relaxed.c -= weight * (A.T @ b)
-    relaxed.wanted[:] = np.minimum(problem.wanted, problem.h)
-    relaxed.h[:] = UNBOUNDED
-    relaxed.weight = weight
     result = checked_solve(solver.fresh(), relaxed)
     if result is None:
         return None

@@ -10,35 +10,27 @@ from wbc_suite.arguments import check_count, check_number
 from wbc_suite.compiling import as_argument, compiled, struct
 from wbc_suite.kinematics import Configuration
 from wbc_suite.kinematics.forward import RobotArrays, compute_joint_poses
+from wbc_suite.qp.capsule_distance import SEPARATION, insert_nearest
 from wbc_suite.qp.kernel import Kernel
-from wbc_suite.qp.limit import LimitKind, RowLimit
+from wbc_suite.qp.limit import LimitKind, RowLimit, joint_movers
 from wbc_suite.qp.problem import UNBOUNDED
 from wbc_suite.typing import Indices, Matrix, Vector
-
-_SEPARATION = 0.2
-"""m/s, greatest speed upwards of what is too low."""
 
 
 @struct
 class SphereArrays(NamedTuple):
-    """n spheres, of which the k lowest have a row.
+    """n spheres, of which the k lowest have a row, in m; see `FloorLimit`."""
 
-    Attributes:
-        joint: Joint of each sphere, shape (n,).
-        sphere: Centre in its joint and radius of each, m, shape (n, 4).
-        moves: 1 where a velocity moves a joint, else 0, shape (njoints, nv).
-        options: Height of the floor, influence, margin (m), rate (1/s) and braking
-            (m/s^2), shape (5,).
-        found: Output, sphere of each row, lowest first, -1 where there is none, (k,).
-        distance: Output, distance from the floor, m; inf where there is none, (k,).
-    """
-
-    joint: Indices
-    sphere: Matrix
-    moves: Matrix
-    options: Vector
-    found: Indices
-    distance: Vector
+    joint: Indices  # (n,), joint of each sphere
+    sphere: Matrix  # (n, 4), centre in its joint and radius of each
+    moves: Matrix  # (njoints, nv), 1 where a velocity moves a joint, else 0
+    height: float
+    margin: float
+    influence: float
+    rate: float
+    braking: float
+    found: Indices  # (k,), output: sphere of each row, lowest first, -1 for none
+    distance: Vector  # (k,), output: distance from the floor, inf for none
 
 
 class FloorLimit(RowLimit):
@@ -96,23 +88,21 @@ class FloorLimit(RowLimit):
         Raises:
             UnknownNameError: If a link is no frame of the model.
         """
-        model = configuration.model
+        model, sphere = configuration.model, self._spheres.copy()
         if self._model is model:
             return
-        joint, sphere = np.zeros(len(self._links), dtype=np.int64), self._spheres.copy()
-        for k, link in enumerate(self._links):
-            frame = model.frames[configuration.frame_id(link)]
-            joint[k] = frame.parentJoint
-            sphere[k, :3] = frame.placement.act(self._spheres[k, :3])
-        moves: Matrix = np.zeros((len(model.joints), configuration.nv))
-        for j in set(joint.tolist()):
-            moves[j, configuration.joint_support(j)] = 1.0
-        options = self.height, self.influence, self.margin, self.rate, self.braking
+        links = [model.frames[configuration.frame_id(link)] for link in self._links]
+        for row, frame in zip(sphere, links, strict=True):
+            row[:3] = frame.placement.act(row[:3])
         self.arrays = SphereArrays(
-            joint=joint,
+            joint=np.array([frame.parentJoint for frame in links], dtype=np.int64),
             sphere=sphere,
-            moves=moves,
-            options=np.array(options),
+            moves=joint_movers(configuration),
+            height=self.height,
+            margin=self.margin,
+            influence=self.influence,
+            rate=self.rate,
+            braking=self.braking,
             found=np.full(self.dim, -1, dtype=np.int64),
             distance=np.full(self.dim, np.inf),
         )
@@ -145,24 +135,18 @@ class FloorLimit(RowLimit):
 def floor_rows(
     robot: RobotArrays, spheres: SphereArrays, dt: float, G: Matrix, h: Vector
 ) -> None:
-    """Write the rows of the lowest spheres.
+    """Write the rows of the lowest spheres; joint poses are current.
 
-    Args:
-        robot: The robot; joint poses are current.
-        spheres: The spheres.
-        dt: Step, s.
-        G: Output, negative derivative of the height of each, shape (k, nv).
-        h: Output, how far each may come down, m, shape (k,).
+    G, shape (k, nv), gets the negative derivative of the height of each; h gets how far
+    it may come down in dt seconds, m.
     """
     _find_lowest(robot, spheres)
-    margin, rate, braking = spheres.options[2], spheres.options[3], spheres.options[4]
+    G[:] = 0.0
     for row in range(h.shape[0]):
-        left = spheres.distance[row] - margin
-        speed = min(rate * left, np.sqrt(2.0 * braking * max(left, 0.0)))
-        h[row] = min(max(speed, -_SEPARATION) * dt, UNBOUNDED)
-        k = spheres.found[row]
-        for col in range(G.shape[1]):
-            G[row, col] = 0.0
+        left, k = spheres.distance[row] - spheres.margin, spheres.found[row]
+        braked = np.sqrt(2.0 * spheres.braking * max(left, 0.0))
+        speed = min(spheres.rate * left, braked)
+        h[row] = min(max(speed, -SEPARATION) * dt, UNBOUNDED)
         if k < 0:
             continue
         T, s = robot.pose[spheres.joint[k]], spheres.sphere[k]
@@ -177,17 +161,12 @@ def floor_rows(
 @compiled
 def _find_lowest(robot: RobotArrays, spheres: SphereArrays) -> None:
     """Find the lowest spheres and their distances from the floor."""
-    found, distance, rows = spheres.found, spheres.distance, spheres.found.shape[0]
-    height, influence = spheres.options[0], spheres.options[1]
-    for row in range(rows):
-        found[row], distance[row] = -1, np.inf
+    found, distance, count = spheres.found, spheres.distance, 0
+    found[:], distance[:] = -1, np.inf
     for k in range(spheres.joint.shape[0]):
         T, s = robot.pose[spheres.joint[k]], spheres.sphere[k]
         z = T[11] + T[2] * s[0] + T[5] * s[1] + T[8] * s[2]
-        d = z - s[3] - height
-        if d < min(influence, distance[rows - 1]):
-            row = rows - 1
-            while row > 0 and distance[row - 1] > d:
-                distance[row], found[row] = distance[row - 1], found[row - 1]
-                row -= 1
-            distance[row], found[row] = d, k
+        d = z - s[3] - spheres.height
+        if d < min(spheres.influence, distance[-1]):
+            insert_nearest(found, distance, count, k, d)
+            count += 1

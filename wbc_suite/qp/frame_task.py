@@ -34,11 +34,10 @@ class FrameTask(RowTask):
         position_cost: [cost]/m, one number or one per world axis.
         orientation_cost: [cost]/rad, one number or one per axis of the frame.
         target: Target pose; without one the pose at binding time is held.
-        gain: See `RowTask`.
-        level: See `RowTask`.
         max_linear_speed: Greatest speed asked for, m/s.
         max_angular_speed: Greatest angular speed asked for, rad/s.
-        name: How reports call the task; the frame's name when absent.
+
+    Gain and level are those of `RowTask`. Reports call the task by its frame.
 
     Source: Lynch and Park (2017), "Modern Robotics", section 6.3; SO(3) Jacobian from
     Chirikjian (2012), "Stochastic Models, Information Theory, and Lie Groups", 10.86.
@@ -62,19 +61,14 @@ class FrameTask(RowTask):
         super().__init__(
             name or frame,
             dim=6,
+            cost=pose_costs(name or frame, position_cost, orientation_cost),
             gain=gain,
             level=level,
             max_speed=max_linear_speed,
             max_angular_speed=max_angular_speed,
             angular_start=3,
         )
-        self.frame = frame
-        position = cost_vector(self.name, position_cost, 3)
-        orientation = cost_vector(self.name, orientation_cost, 3)
-        self.cost_row.set(np.concatenate([position, orientation]))
-        self.target_row = SharedRow(12)
-        self._pose: Matrix = self.target_row.values.reshape(3, 4)
-        self.has_target = False
+        self.frame, self.target_row = frame, SharedRow(12)
         if target is not None:
             self.set_target(target)
 
@@ -85,12 +79,9 @@ class FrameTask(RowTask):
         orientation: float | Vector | None = None,
     ) -> None:
         """Change the costs, [cost]/m and [cost]/rad."""
-        costs = self.cost.copy()
-        if position is not None:
-            costs[:3] = cost_vector(self.name, position, 3)
-        if orientation is not None:
-            costs[3:] = cost_vector(self.name, orientation, 3)
-        self.cost_row.set(costs)
+        position = self.cost[:3] if position is None else position
+        orientation = self.cost[3:] if orientation is None else orientation
+        self.cost_row.set(pose_costs(self.name, position, orientation))
 
     def set_target(self, target: pin.SE3 | Matrix) -> None:
         """Set the target pose T_wt: an SE3 or a homogeneous matrix, shape (4, 4).
@@ -102,21 +93,20 @@ class FrameTask(RowTask):
             ConfigError: If the shape is wrong or the rotation is no rotation.
         """
         self.target_row.set(homogeneous(self.name, target).ravel()[:12])
-        self.has_target = True
 
     @property
     def target(self) -> pin.SE3:
         """Target pose T_wt, a copy."""
-        return pin.SE3(self._pose[:, :3].copy(), self._pose[:, 3].copy())
+        pose = self.target_row.values.reshape(3, 4)
+        return pin.SE3(pose[:, :3].copy(), pose[:, 3].copy())
 
     def bind(self, configuration: Configuration) -> None:
         """Resolve the frame; without a target, hold its present pose."""
-        self.frame_index = configuration.frame_id(self.frame)
-        frame = configuration.model.frames[self.frame_index]
+        frame = configuration.model.frames[configuration.frame_id(self.frame)]
         self.joint, self.offset = int(frame.parentJoint), pack_pose(frame.placement)
         self._support = configuration.support(self.frame)
-        if not self.has_target:
-            self.set_target(configuration.frame_pose(self.frame_index))
+        if not self.target_row.is_set:
+            self.set_target(configuration.frame_pose(self.frame))
 
     def support(self, configuration: Configuration) -> Indices:
         """Return the velocity indices between the root and the frame."""
@@ -130,6 +120,14 @@ class FrameTask(RowTask):
         compute_joint_poses(robot)
         joint, offset, target = self.joint, self.offset, self.target_row.values
         frame_error(robot, joint, offset, target, self._support, error, jacobian)
+
+
+def pose_costs(
+    owner: str, position: float | Vector, orientation: float | Vector
+) -> Vector:
+    """Return the costs of position, then of orientation, shape (6,)."""
+    parts = cost_vector(owner, position, 3), cost_vector(owner, orientation, 3)
+    return np.concatenate(parts)
 
 
 def homogeneous(owner: str, pose: pin.SE3 | Matrix) -> Matrix:

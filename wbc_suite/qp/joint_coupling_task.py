@@ -21,10 +21,9 @@ class JointCouplingTask(RowTask):
         ratio: Radians (or metres) of the follower per radian (or metre) of the leader.
         offset: The follower's position when the leader is at zero, rad or m.
         cost: [cost]/rad or [cost]/m.
-        gain: See `RowTask`.
-        level: See `RowTask`.
         max_speed: Greatest speed asked for, rad/s or m/s.
-        name: How reports call the task; "follower - leader" when absent.
+
+    Gain and level are those of `RowTask`. Reports call it "follower - leader".
     """
 
     unit = "rad"

@@ -6,8 +6,7 @@ import numpy as np
 
 from wbc_suite.arguments import check_number
 from wbc_suite.kinematics import Configuration
-from wbc_suite.qp.limit import BoxLimit, JointBounds
-from wbc_suite.typing import Vector
+from wbc_suite.qp.limit import BoxLimit, JointBounds, joint_values
 
 _NO_LIMIT = 1e10
 """Limits of a model beyond it are none: some files write 1e20."""
@@ -52,12 +51,12 @@ class PositionLimit(BoxLimit):
             bounds.q_lower[i] = max(bounds.q_lower[i], lower + margin)
             bounds.q_upper[i] = min(bounds.q_upper[i], upper - margin)
         for name, (lower, upper) in self.joints.items():
-            i = configuration.model.joints[configuration.joint_id(name)].idx_v
+            i = model.joints[configuration.joint_id(name)].idx_v
             bounds.q_lower[i] = max(bounds.q_lower[i], lower)
             bounds.q_upper[i] = min(bounds.q_upper[i], upper)
         bounds.q_lower[bounds.q_lower < -_NO_LIMIT] = -np.inf
         bounds.q_upper[bounds.q_upper > _NO_LIMIT] = np.inf
-        bounds.position_gain = min(bounds.position_gain, self.gain)
+        np.minimum(bounds.position_gain, self.gain, out=bounds.position_gain)
 
 
 class VelocityLimit(BoxLimit):
@@ -69,7 +68,7 @@ class VelocityLimit(BoxLimit):
     Args:
         joints: Limits of single joints by name, rad/s or m/s, in place of the model's.
         base_linear: Limit of each linear axis of a free or planar root, m/s.
-        base_angular: Limit of each angular axis of a free or planar root, rad/s.
+        base_angular: Limit of each angular axis of such a root, rad/s.
         scale: Factor on all of the model's limits, (0, 1].
 
     Raises:
@@ -86,20 +85,20 @@ class VelocityLimit(BoxLimit):
     ) -> None:
         self.joints = dict(joints or {})
         self.base_linear, self.base_angular = base_linear, base_angular
-        self.scale = scale
         for value in (*self.joints.values(), base_linear, base_angular):
             check_number("VelocityLimit: a limit", value, above=0.0, allow_inf=True)
-        check_number("VelocityLimit: scale", scale, above=0.0, most=1.0)
+        self.scale = check_number("VelocityLimit: scale", scale, above=0.0, most=1.0)
 
     def apply(self, configuration: Configuration, bounds: JointBounds) -> None:
         """Take the limits from the model, the root's from the options."""
-        known = np.array(configuration.model.velocityLimit, dtype=np.float64)
-        limits = np.where(
-            (known > 0.0) & (known < _NO_LIMIT), known * self.scale, np.inf
+        known = configuration.model.velocityLimit
+        limits = joint_values(
+            configuration,
+            np.where((known > 0.0) & (known < _NO_LIMIT), known * self.scale, np.inf),
+            self.joints,
+            root_linear=self.base_linear,
+            root_angular=self.base_angular,
         )
-        limits[configuration.root_linear] = self.base_linear
-        limits[configuration.root_angular] = self.base_angular
-        _set_joints(limits, configuration, self.joints)
         np.minimum(bounds.v_max, limits, out=bounds.v_max)
 
 
@@ -135,17 +134,11 @@ class AccelerationLimit(BoxLimit):
 
     def apply(self, configuration: Configuration, bounds: JointBounds) -> None:
         """Set the window of every velocity."""
-        limits = np.full(configuration.nv, self.default)
-        limits[configuration.root_linear] = self.base_linear
-        limits[configuration.root_angular] = self.base_angular
-        _set_joints(limits, configuration, self.joints)
+        limits = joint_values(
+            configuration,
+            self.default,
+            self.joints,
+            root_linear=self.base_linear,
+            root_angular=self.base_angular,
+        )
         np.minimum(bounds.a_max, limits, out=bounds.a_max)
-
-
-def _set_joints(
-    limits: Vector, configuration: Configuration, joints: Mapping[str, float]
-) -> None:
-    """Set the limits of single joints by name."""
-    for name, value in joints.items():
-        joint = configuration.model.joints[configuration.joint_id(name)]
-        limits[joint.idx_v : joint.idx_v + joint.nv] = value

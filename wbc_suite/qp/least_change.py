@@ -7,11 +7,8 @@ from wbc_suite.linear_algebra import cholesky, dot, solve_lower, solve_upper
 from wbc_suite.typing import Matrix, Vector
 
 _MAX_STEPS = 100
-_FEASIBLE = 1e-12
-"""Accepted violation of rows of length 1, per 1 + |x|."""
-
-_INDEPENDENT = 1e-12
-"""Square of what the active rows must leave of a row of length 1."""
+_FEASIBLE = 1e-12  # accepted violation of rows of length 1, per 1 + |x|
+_INDEPENDENT = 1e-12  # square of what the active rows must leave of a row of length 1
 
 
 @compiled
@@ -37,9 +34,7 @@ def least_change(
     Source: Goldfarb, Idnani (1983), "A numerically stable dual method for solving
     strictly convex quadratic programs", Mathematical Programming 27.
     """
-    n, count = x.shape[0], 0
-    for i in range(n):
-        x[i] = 0.0
+    x[:], count = 0.0, 0
     for _ in range(_MAX_STEPS):
         row, sign = _most_violated(rows, low, high, x)
         if row < 0:

@@ -1,9 +1,9 @@
 """The tasks that share one strict level, and their buffers."""
 
-import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -13,76 +13,48 @@ from wbc_suite.qp.active_set import QpArrays, make_qp_arrays
 from wbc_suite.qp.constraints import Constraints
 from wbc_suite.qp.frame_task import FrameTask
 from wbc_suite.qp.kernel import Kernel, kernel_of
-from wbc_suite.qp.limit import JointBounds
+from wbc_suite.qp.limit import unlimited_bounds
 from wbc_suite.qp.problem import Problem
 from wbc_suite.qp.strict_level import LevelArrays
 from wbc_suite.qp.task import JointTask, RowTask, Task
 from wbc_suite.qp.task_kernels import TaskArrays
-from wbc_suite.typing import Array, Indices, Matrix, Vector
+from wbc_suite.typing import Indices, Matrix, Records, Vector
 
 
 @dataclass(frozen=True, slots=True)
 class LevelLayout:
-    """Names of a level's row tasks, and where its results are in the stack's buffer.
-
-    Attributes:
-        names: The row tasks.
-        units: Unit of each one's error.
-        slices: Where each one's rows are.
-        shapes: Shape of each array of results, in the order of the buffer.
-        start: Where the first one begins.
-    """
+    """Names of a level's row tasks, units of their errors, and where their rows are."""
 
     names: tuple[str, ...]
     units: tuple[str, ...]
     slices: tuple[slice, ...]
-    shapes: Mapping[str, tuple[int, ...]]
-    start: int
-
-    @property
-    def end(self) -> int:
-        """Where the results end."""
-        return self.start + sum(math.prod(shape) for shape in self.shapes.values())
-
-    def views(self, buffer: Vector) -> dict[str, Array]:
-        """Return the arrays of results in the stack's buffer, by name."""
-        found: dict[str, Array] = {}
-        start = self.start
-        for name, shape in self.shapes.items():
-            end = start + math.prod(shape)
-            found[name] = buffer[start:end].reshape(shape)
-            start = end
-        return found
 
 
 @dataclass(frozen=True, slots=True)
 class TickLayout:
-    """Names of a stack's joints and rows, and where its results are in one buffer.
+    """Names of a stack's joints and rows, and where its results are in one buffer."""
 
-    Attributes:
-        joints: Names of the velocities.
-        units: Their units.
-        equalities: Name and number of rows of each equality.
-        inequalities: Number of inequality rows.
-        levels: Layouts of the levels.
-    """
-
-    joints: tuple[str, ...]
-    units: tuple[str, ...]
-    equalities: Sequence[tuple[str, int]]
-    inequalities: int
+    joints: tuple[str, ...]  # names of the velocities
+    units: tuple[str, ...]  # of their positions
+    equalities: Sequence[tuple[str, int]]  # name and number of rows of each
+    inequalities: int  # number of rows
     levels: tuple[LevelLayout, ...]
+    dtype: np.dtype[np.void]  # of all results; begins with "x" and "v"
+
+    def results(self, buffer: Vector) -> Records:
+        """Return a view of a buffer as a record, with one field for each level."""
+        return buffer.view(self.dtype).reshape(())
 
 
 class Level:
-    """Tasks of one level with their arrays, and the arrays of their problem.
+    """Tasks of one strict level with their arrays, and the arrays of their problem.
 
     Args:
         configuration: The robot.
         tasks: Tasks of this level; they are bound here.
-        layout: Where the results are, see `tick_layout`.
-        buffer: The results of the stack.
-        inequalities: Number of inequality rows of the stack.
+        layout: Layout of the stack.
+        results: Results of the stack.
+        k: Number of the level.
         above: Number of rows of all levels above, and of the stack's equalities.
 
     Attributes:
@@ -96,31 +68,30 @@ class Level:
         self,
         configuration: Configuration,
         tasks: Sequence[Task],
-        layout: LevelLayout,
-        buffer: Vector,
+        layout: TickLayout,
+        results: Records,
         *,
-        inequalities: int,
+        k: int,
         above: int,
     ) -> None:
         for task in tasks:
             task.bind(configuration)
+        own, p, nv = results[f"level {k}"], layout.inequalities, configuration.nv
+        multipliers = own["multipliers"]
         self._row_tasks = [t for t in tasks if isinstance(t, RowTask)]
         self._joint_tasks = [t for t in tasks if isinstance(t, JointTask)]
-        self._slices, views = layout.slices, layout.views(buffer)
-        nv = configuration.nv
-        views["all_finite"] = buffer[2 * nv + 1 : 2 * nv + 2]
-        self.tasks = _task_arrays(
-            configuration, self._row_tasks, self._joint_tasks, views
-        )
+        self._slices = layout.levels[k].slices
+        rows, joints, finite = self._row_tasks, self._joint_tasks, results["all_finite"]
+        self.tasks = _task_arrays(configuration, rows, joints, own, finite)
         self.qp: QpArrays = make_qp_arrays(
             self.tasks.W,
             self.tasks.e,
             self.tasks.diagonal,
             self.tasks.mu,
-            inequalities=inequalities,
-            equalities=len(views["multipliers"]) - nv - inequalities,
-            x=views["x"],
-            multipliers=views["multipliers"],
+            inequalities=p,
+            equalities=len(multipliers) - nv - p,
+            x=own["x"],
+            multipliers=multipliers,
         )
         self._kept_counts: Indices = np.zeros(2, dtype=np.int64)
         self.arrays = LevelArrays(
@@ -132,10 +103,8 @@ class Level:
             kept_counts=self._kept_counts,
         )
         self._copies = self._attach_rows()
-        self.is_compiled = not any(
-            kernel == Kernel.PYTHON
-            for kernel in (*self.tasks.kernel, *self.tasks.joint_kernel)
-        )
+        kernels = *self.tasks.kernel, *self.tasks.joint_kernel
+        self.is_compiled = Kernel.PYTHON not in kernels
         self._evaluate(configuration, Kernel.CONSTANT)
 
     def prepare(self, configuration: Configuration) -> None:
@@ -166,27 +135,20 @@ class Level:
 
     def held(self) -> tuple[str, ...]:
         """Return the names of the tasks whose target was not finite."""
-        distances, finite = self.tasks.distance, self.tasks.joint_finite
-        rows = np.isnan(distances[:, 0])
-        held = [t.name for t, bad in zip(self._row_tasks, rows, strict=True) if bad]
-        held += [
-            t.name for t, ok in zip(self._joint_tasks, finite, strict=True) if not ok
-        ]
-        return tuple(held)
+        tasks = *self._row_tasks, *self._joint_tasks
+        held = *np.isnan(self.tasks.distances[:, 0]), *(self.tasks.joint_finite == 0)
+        return tuple(t.name for t, is_held in zip(tasks, held, strict=True) if is_held)
 
     def _attach_rows(self) -> list[Vector]:
         """Let targets and costs follow those of the tasks; return the copies."""
-        copies: list[Vector] = []
-        for k, task in enumerate(self._row_tasks):
-            cost = self.tasks.cost[self._slices[k]]
-            target = self.tasks.target[k, : task.target_row.values.size]
-            task.cost_row.attach(cost)
-            task.target_row.attach(target)
-            copies += [cost, target]
-        for k, task in enumerate(self._joint_tasks):
-            target = self.tasks.joint_target[k, : task.target_row.values.size]
-            task.target_row.attach(target)
-            copies.append(target)
+        tasks, rows = self.tasks, self._row_tasks
+        shared = [task.cost_row for task in rows]
+        copies = [tasks.cost[own] for own in self._slices]
+        shared += [task.target_row for task in (*rows, *self._joint_tasks)]
+        copies += [*tasks.target, *tasks.joint_target]
+        copies = [x[: y.values.size] for x, y in zip(copies, shared, strict=True)]
+        for row, copy in zip(shared, copies, strict=True):
+            row.attach(copy)
         return copies
 
     def _evaluate(self, configuration: Configuration, kernel: Kernel) -> None:
@@ -204,38 +166,41 @@ class Level:
 def tick_layout(
     configuration: Configuration, tasks: Sequence[Task], rows: Constraints
 ) -> TickLayout:
-    """Return where the results of a stack are in one buffer.
-
-    First are the step, the velocity, the residual, and whether all targets are finite.
-    """
-    nv, layouts = configuration.nv, list[LevelLayout]()
-    start = 2 * nv + 2
-    for own in _by_level(tasks):
+    """Return the names of a stack, and where its results are in one buffer."""
+    nv, levels = configuration.nv, list[LevelLayout]()
+    fields: list[Any] = [
+        ("x", float, (nv,)),
+        ("v", float, (nv,)),
+        ("residual", float, (1,)),
+        ("all_finite", float, (1,)),
+    ]
+    for k, own in enumerate(_by_level(tasks)):
         row_tasks = [task for task in own if isinstance(task, RowTask)]
         ends = np.cumsum([0, *(task.dim for task in row_tasks)]).tolist()
-        size = rows.inequalities + (nv if layouts else rows.equalities)
-        layout = LevelLayout(
-            names=tuple(task.name for task in row_tasks),
-            units=tuple(task.unit for task in row_tasks),
-            slices=tuple(slice(a, b) for a, b in pairwise(ends)),
-            shapes={
-                "distances": (len(row_tasks), 2),
-                "W": (ends[-1], nv),
-                "e": (ends[-1],),
-                "diagonal": (2, nv),
-                "x": (nv,),
-                "multipliers": (nv + size,),
-            },
-            start=start,
+        levels.append(
+            LevelLayout(
+                names=tuple(task.name for task in row_tasks),
+                units=tuple(task.unit for task in row_tasks),
+                slices=tuple(slice(a, b) for a, b in pairwise(ends)),
+            )
         )
-        start = layout.end
-        layouts.append(layout)
+        size = nv + rows.inequalities + (nv if k else rows.equalities)
+        results = [
+            ("distances", float, (len(row_tasks), 2)),
+            ("W", float, (ends[-1], nv)),
+            ("e", float, (ends[-1],)),
+            ("diagonal", float, (2, nv)),
+            ("x", float, (nv,)),
+            ("multipliers", float, (size,)),
+        ]
+        fields.append((f"level {k}", results))
     return TickLayout(
         joints=configuration.velocity_names(),
         units=configuration.velocity_units(),
         equalities=rows.names,
         inequalities=rows.inequalities,
-        levels=tuple(layouts),
+        levels=tuple(levels),
+        dtype=np.dtype(fields),
     )
 
 
@@ -243,23 +208,16 @@ def make_levels(
     configuration: Configuration,
     tasks: Sequence[Task],
     layout: TickLayout,
-    buffer: Vector,
+    results: Records,
 ) -> list[Level]:
     """Return the strict levels, the first first; tasks are bound."""
     levels: list[Level] = []
     above = sum(size for _, size in layout.equalities)
-    for own, place in zip(_by_level(tasks), layout.levels, strict=True):
-        levels.append(
-            Level(
-                configuration,
-                own,
-                place,
-                buffer,
-                inequalities=layout.inequalities,
-                above=above if levels else 0,
-            )
-        )
-        above += len(levels[-1].tasks.e)
+    for k, own in enumerate(_by_level(tasks)):
+        rows = above if k else 0
+        level = Level(configuration, own, layout, results, k=k, above=rows)
+        above += len(level.tasks.e)
+        levels.append(level)
     return levels
 
 
@@ -273,55 +231,53 @@ def _task_arrays(
     configuration: Configuration,
     rows: Sequence[RowTask],
     joints: Sequence[JointTask],
-    views: Mapping[str, Array],
+    results: Records,
+    all_finite: Vector,
 ) -> TaskArrays:
-    """Return the arrays of bound tasks; results are views of one buffer."""
+    """Return the arrays of bound tasks."""
     nv, nq, n, k = configuration.nv, configuration.nq, len(rows), len(joints)
     row_start = np.cumsum([0, *(task.dim for task in rows)], dtype=np.int64)
+    angular = np.array([task.angular_start for task in rows], dtype=np.int64)
     m, supports = int(row_start[-1]), [task.support(configuration) for task in rows]
-    q_index = JointBounds.unlimited(configuration).q_index
-    frames = [task if isinstance(task, FrameTask) else None for task in rows]
-    angular = [
-        start + task.angular_start
-        for start, task in zip(row_start.tolist(), rows, strict=False)
-    ]
+    q_index = unlimited_bounds(configuration).q_index
+    joint, offset = np.zeros(n, dtype=np.int64), np.zeros((n, 12))
+    for row, task in enumerate(rows):
+        if isinstance(task, FrameTask):
+            joint[row], offset[row] = task.joint, task.offset
+    joint_kernel = [_joint_kernel(task, q_index) for task in joints]
     return TaskArrays(
         kernel=np.array([kernel_of(task) for task in rows], dtype=np.int64),
-        joint=np.array([f.joint if f else 0 for f in frames], dtype=np.int64),
-        offset=np.array([f.offset if f else np.zeros(12) for f in frames]).reshape(
-            n, 12
-        ),
+        joint=joint,
+        offset=offset,
         target=np.zeros((n, 12)),
         row_start=row_start,
-        angular_start=np.array(angular, dtype=np.int64),
+        angular_start=row_start[:-1] + angular,
         support_start=np.cumsum([0, *(len(s) for s in supports)], dtype=np.int64),
         support=np.concatenate([np.zeros(0), *supports]).astype(np.int64),
         error=np.zeros(m),
         jacobian=np.zeros((m, nv)),
         cost=np.zeros(m),
         gain=np.array([task.gain for task in rows], dtype=np.float64),
-        max_speed=np.array([task.max_speeds for task in rows]).reshape(n, 2),
-        distance=views["distances"],
-        joint_kernel=np.array(list(_joint_kernels(q_index, joints)), dtype=np.int64),
+        max_speed=np.reshape([task.max_speeds for task in rows], (n, 2)),
+        distances=results["distances"],
+        joint_kernel=np.array(joint_kernel, dtype=np.int64),
         joint_target=np.zeros((k, nq)),
         joint_error=np.zeros((k, nv)),
-        squared_cost=np.array([task.squared_costs for task in joints]).reshape(k, nv),
+        squared_cost=np.reshape([task.squared_costs for task in joints], (k, nv)),
         joint_gain=np.array([task.gain for task in joints], dtype=np.float64),
         joint_speed=np.array([task.max_speed for task in joints], dtype=np.float64),
         joint_finite=np.ones(k, dtype=np.int64),
         q_index=q_index,
         bias=np.zeros((2, nv)),
-        W=views["W"],
-        e=views["e"],
-        diagonal=views["diagonal"],
+        W=results["W"],
+        e=results["e"],
+        diagonal=results["diagonal"],
         mu=np.zeros(1),
-        all_finite=views["all_finite"],
+        all_finite=all_finite,
     )
 
 
-def _joint_kernels(q_index: Indices, tasks: Sequence[JointTask]) -> Iterator[Kernel]:
-    """Yield the kernel of each; joints with several parameters are Pinocchio's."""
-    for task in tasks:
-        kernel, several = kernel_of(task), task.squared_costs[q_index < 0].any()
-        is_posture = kernel is Kernel.POSTURE
-        yield Kernel.PYTHON if is_posture and several else kernel
+def _joint_kernel(task: JointTask, q_index: Indices) -> Kernel:
+    """Return the kernel of a task; joints with several parameters are Pinocchio's."""
+    kernel, several = kernel_of(task), task.squared_costs[q_index < 0].any()
+    return Kernel.PYTHON if kernel is Kernel.POSTURE and several else kernel

@@ -5,10 +5,7 @@ import numpy as np
 from wbc_suite.compiling import compiled
 from wbc_suite.typing import Matrix, Vector
 
-FAR = 1e9
-"""m or rad; a target beyond it counts as not finite, since squares of errors may
-overflow."""
-
+FAR = 1e9  # m or rad; a target beyond it counts as not finite: squares may overflow
 _SMALL_ANGLE = 1e-4  # below it series are exact to 1e-16
 
 
@@ -62,6 +59,14 @@ def exp3(x: float, y: float, z: float, out: Matrix) -> None:
     else:
         half = np.sin(0.5 * angle) / angle
         a, b = np.sin(angle) / angle, 2.0 * half * half
+    _write_series(x, y, z, a, b, out)
+
+
+@compiled
+def _write_series(
+    x: float, y: float, z: float, a: float, b: float, out: Matrix
+) -> None:
+    """Write `I + a [r] + b [r]^2`, shape (3, 3)."""
     out[0, 0] = 1.0 - b * (y * y + z * z)
     out[1, 1] = 1.0 - b * (x * x + z * z)
     out[2, 2] = 1.0 - b * (x * x + y * y)
@@ -90,15 +95,9 @@ def saturate(step: Vector, limit: float) -> None:
 
 @compiled
 def inverse_left_jacobian(r: Vector, angle: float, out: Matrix) -> None:
-    """Write `Jl^-1(r)`, the inverse left Jacobian of SO(3) at rotation vector r."""
+    """Write `Jl^-1(r) = I - [r] / 2 + b [r]^2`, the inverse left Jacobian of SO(3)."""
     if angle < _SMALL_ANGLE:
         b = 1.0 / 12.0
     else:
         b = 1.0 / angle**2 - 0.5 / (angle * np.tan(0.5 * angle))
-    x, y, z = r[0], r[1], r[2]
-    out[0, 0] = 1.0 - b * (y * y + z * z)
-    out[1, 1] = 1.0 - b * (x * x + z * z)
-    out[2, 2] = 1.0 - b * (x * x + y * y)
-    out[0, 1], out[1, 0] = 0.5 * z + b * x * y, -0.5 * z + b * x * y
-    out[0, 2], out[2, 0] = -0.5 * y + b * x * z, 0.5 * y + b * x * z
-    out[1, 2], out[2, 1] = 0.5 * x + b * y * z, -0.5 * x + b * y * z
+    _write_series(r[0], r[1], r[2], -0.5, b, out)

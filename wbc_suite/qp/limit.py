@@ -1,13 +1,13 @@
 """What limits have in common: bounds of joints, or inequality rows."""
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from collections.abc import Mapping
 from enum import IntEnum
-from typing import ClassVar, TypeAlias
+from typing import ClassVar, NamedTuple, TypeAlias
 
 import numpy as np
 
-from wbc_suite.compiling import compiled
+from wbc_suite.compiling import compiled, struct
 from wbc_suite.kinematics import Configuration
 from wbc_suite.kinematics.configuration import named_joints
 from wbc_suite.qp.kernel import Kernel
@@ -39,22 +39,14 @@ class BoxLimit(ABC):
 
     @abstractmethod
     def apply(self, configuration: Configuration, bounds: "JointBounds") -> None:
-        """Tighten the bounds; called once, when a stack is built."""
+        """Tighten the bounds in place; called once, when a stack is built."""
 
 
 class RowLimit(ABC):
     """A limit `G dq <= h` of a fixed number of rows.
 
-    A solution never violates it as long as one exists.
-
-    A subclass sets `dim` and writes `rows`; `subject` and `kind` are for reports:
-
-        class Ceiling(RowLimit):
-            dim = 1
-
-            def rows(self, configuration, dt, G, h):
-                G[0] = configuration.frame_jacobian("head", "aligned")[2]
-                h[0] = 1.8 - configuration.frame_pose("head").translation[2]
+    A solution never violates it as long as one exists. A subclass sets `dim` and writes
+    `rows`, as the guide of QP stacks shows; `subject` and `kind` are for reports.
 
     A row with h < 0 is outside its limit. It leads back softly and may go no further
     out, so that other rows can still be kept.
@@ -81,13 +73,9 @@ class RowLimit(ABC):
     def rows(
         self, configuration: Configuration, dt: float, G: Matrix, h: Vector
     ) -> None:
-        """Write G, shape (dim, nv), and h, shape (dim,); unused rows are 0 <= inf.
+        """Write G, shape (dim, nv), and h, shape (dim,), for a step of dt seconds.
 
-        Args:
-            configuration: Where the robot is.
-            dt: Step, s.
-            G: Output, zero before the first call.
-            h: Output.
+        G is zero before the first call. Unused rows are 0 <= inf.
         """
 
     def reset(self) -> None:  # noqa: B027, may be empty
@@ -102,83 +90,66 @@ Limit: TypeAlias = BoxLimit | RowLimit
 """What a stack takes as a limit."""
 
 
-@dataclass(slots=True)
-class JointBounds:
-    """The box that limits fill in when a stack is built, one entry per velocity.
+@struct
+class JointBounds(NamedTuple):
+    """Limits of joints, one entry per velocity, which a stack's limits fill in."""
 
-    Attributes:
-        q_index: Position index of each velocity, -1 where positions are no vector.
-        q_lower: Lower position limits, -inf where there is none.
-        q_upper: Upper position limits.
-        position_gain: Fraction of the distance to a limit that one step may cover.
-        v_max: Speed limits, inf where there is none.
-        a_max: Acceleration limits, inf where there is none.
+    q_index: Indices  # position index of each velocity, -1 where it has none
+    q_lower: Vector  # lower position limits, -inf where there is none
+    q_upper: Vector  # upper position limits
+    position_gain: Vector  # fraction of the distance to a limit that a step may cover
+    v_max: Vector  # speed limits, inf where there is none
+    a_max: Vector  # acceleration limits, inf where there is none
+
+
+def unlimited_bounds(configuration: Configuration) -> JointBounds:
+    """Return infinite bounds."""
+    nv = configuration.nv
+    q_index = np.full(nv, -1, dtype=np.int64)
+    for _, joint in named_joints(configuration.model):
+        if joint.nq == 1 and joint.nv == 1:
+            q_index[joint.idx_v] = joint.idx_q
+    infinite = np.full(nv, np.inf)
+    return JointBounds(
+        q_index, -infinite, infinite, np.ones(nv), infinite.copy(), infinite.copy()
+    )
+
+
+def joint_values(
+    configuration: Configuration,
+    values: float | Vector,
+    joints: Mapping[str, float],
+    *,
+    root_linear: float = 0.0,
+    root_angular: float = 0.0,
+) -> Vector:
+    """Return one value per velocity, those of the root and of named joints their own.
+
+    Raises:
+        UnknownNameError: If a named joint is not in the model.
     """
+    found = np.full(configuration.nv, values, dtype=np.float64)
+    found[configuration.root_linear] = root_linear
+    found[configuration.root_angular] = root_angular
+    for name, value in joints.items():
+        joint = configuration.model.joints[configuration.joint_id(name)]
+        found[joint.idx_v : joint.idx_v + joint.nv] = value
+    return found
 
-    q_index: Indices
-    q_lower: Vector
-    q_upper: Vector
-    position_gain: float
-    v_max: Vector
-    a_max: Vector
 
-    @classmethod
-    def unlimited(cls, configuration: Configuration) -> "JointBounds":
-        """Return infinite bounds."""
-        nv = configuration.nv
-        q_index = np.full(nv, -1, dtype=np.int64)
-        for _, joint in named_joints(configuration.model):
-            if joint.nq == 1 and joint.nv == 1:
-                q_index[joint.idx_v] = joint.idx_q
-        return cls(
-            q_index=q_index,
-            q_lower=np.full(nv, -np.inf),
-            q_upper=np.full(nv, np.inf),
-            position_gain=1.0,
-            v_max=np.full(nv, np.inf),
-            a_max=np.full(nv, np.inf),
-        )
-
-    def without_acceleration(
-        self, q: Vector, v_previous: Vector, dt: float, kinds: Indices
-    ) -> tuple[Vector, Vector]:
-        """Return the bounds of a step dq that may change speeds at once, shape (nv,).
-
-        Args:
-            q: Joint positions, shape (nq,).
-            v_previous: Velocity of the last step, shape (nv,).
-            dt: Duration of the step, s.
-            kinds: Output, which limit set each bound, see `merge_bounds`.
-        """
-        nv = len(self.v_max)
-        lower, upper = np.empty(nv), np.empty(nv)
-        merge_bounds(
-            q,
-            self.q_index,
-            self.q_lower,
-            self.q_upper,
-            self.position_gain,
-            self.v_max,
-            v_previous,
-            np.full(nv, np.inf),
-            dt,
-            lower,
-            upper,
-            kinds,
-        )
-        return lower, upper
+def joint_movers(configuration: Configuration) -> Matrix:
+    """Return 1 where a velocity moves a joint, else 0, shape (njoints, nv)."""
+    moves = np.zeros((len(configuration.model.joints), configuration.nv))
+    for joint, row in enumerate(moves):
+        row[configuration.joint_support(joint)] = 1.0
+    return moves
 
 
 @compiled
 def merge_bounds(
+    bounds: JointBounds,
     q: Vector,
-    q_index: Indices,
-    q_lower: Vector,
-    q_upper: Vector,
-    position_gain: float,
-    v_max: Vector,
     v_previous: Vector,
-    a_max: Vector,
     dt: float,
     lower: Vector,
     upper: Vector,
@@ -192,30 +163,20 @@ def merge_bounds(
     wins over position, position over acceleration. A joint outside a limit therefore
     returns at its greatest speed.
 
-    Args:
-        q: Joint positions, shape (nq,).
-        q_index: Position index of each velocity, -1 where it has none, shape (nv,).
-        q_lower: Lower position limits, -inf where there is none, shape (nv,).
-        q_upper: Upper position limits.
-        position_gain: Fraction of the distance that one step may cover, 0 to 1.
-        v_max: Speed limits, inf where there is none, shape (nv,).
-        v_previous: Velocity of the previous step, shape (nv,).
-        a_max: Acceleration limits, inf where there is none, shape (nv,).
-        dt: Step, s.
-        lower: Output, least step, shape (nv,).
-        upper: Output, greatest step, shape (nv,).
-        kinds: Output, the `LimitKind` that set each lower, then each upper bound,
-            shape (2 nv,).
+    `kinds`, shape (2 nv,), gets the `LimitKind` that set each lower, then each upper
+    bound.
     """
-    nv = lower.shape[0]
+    nv, q_index, gain = lower.shape[0], bounds.q_index, bounds.position_gain
+    q_lower, q_upper = bounds.q_lower, bounds.q_upper
+    v_max, a_max = bounds.v_max, bounds.a_max
     for i in range(nv):
         window = a_max[i] * dt * dt
         lo, hi = v_previous[i] * dt - window, v_previous[i] * dt + window
         lo_kind = hi_kind = LimitKind.ACCELERATION.value
         k = q_index[i]
         if k >= 0:
-            top = _reach(q_upper[i] - q[k], position_gain, a_max[i], dt)
-            bottom = -_reach(q[k] - q_lower[i], position_gain, a_max[i], dt)
+            top = _reach(q_upper[i] - q[k], gain[i], a_max[i], dt)
+            bottom = -_reach(q[k] - q_lower[i], gain[i], a_max[i], dt)
             if lo < bottom or lo > top:
                 lo, lo_kind = min(max(lo, bottom), top), LimitKind.POSITION.value
             if hi < bottom or hi > top:

@@ -7,7 +7,7 @@ from wbc_suite.arguments import check_array
 from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.lie import is_usable
-from wbc_suite.qp.task import RowTask, cost_vector
+from wbc_suite.qp.task import RowTask
 from wbc_suite.typing import Matrix, Vector
 
 _LEAST_DISTANCE = 0.02  # m; nearer points have no direction
@@ -35,10 +35,9 @@ class LookAtTask(RowTask):
         target: Point p, m, world axes, shape (3,); without one, 1 m along the axis at
             binding time.
         cost: [cost]/rad.
-        gain: See `RowTask`.
-        level: See `RowTask`.
         max_angular_speed: Greatest speed asked for, rad/s.
-        name: How reports call the task; "frame looks" when absent.
+
+    Gain and level are those of `RowTask`. Reports call the task "frame looks".
 
     Raises:
         ConfigError: If the axis has no length.
@@ -61,7 +60,7 @@ class LookAtTask(RowTask):
         super().__init__(
             name or f"{frame} looks",
             dim=3,
-            cost=float(cost_vector(f"{frame} looks", cost, 1)[0]),
+            cost=cost,
             gain=gain,
             level=level,
             max_speed=max_angular_speed,
@@ -77,11 +76,7 @@ class LookAtTask(RowTask):
             self.set_target(target)
 
     def set_target(self, target: Vector) -> None:
-        """Set the point p, m, shape (3,).
-
-        Raises:
-            ConfigError: If the shape is wrong.
-        """
+        """Set the point p, m; ConfigError if its shape is not (3,)."""
         what = f"Task '{self.name}': the target"
         self.target = check_array(what, target, (3,)).copy()
 

@@ -17,14 +17,9 @@ class PostureTask(JointTask):
     Each joint's wanted step is shortened to `max_speed dt`.
 
     Args:
-        cost: [cost]/rad or [cost]/m for all joints; free and planar roots have cost
-            zero unless named.
-        costs: Costs of single joints by name, in place of `cost`.
         target: Posture q*, shape (nq,); without one the posture at binding time.
-        gain: See `RowTask`.
-        level: See `RowTask`.
-        max_speed: Greatest speed asked for, rad/s or m/s.
-        name: How reports call the task.
+
+    Other arguments are those of `JointTask`.
     """
 
     kernel: ClassVar[Kernel] = Kernel.POSTURE
@@ -43,25 +38,20 @@ class PostureTask(JointTask):
         super().__init__(
             name, cost=cost, costs=costs, gain=gain, level=level, max_speed=max_speed
         )
-        self.has_target = False
         if target is not None:
             self.set_target(target)
 
     def set_target(self, target: Vector) -> None:
-        """Set the posture q*, shape (nq,).
-
-        Raises:
-            ConfigError: If the shape is wrong.
-        """
+        """Set the posture q*; ConfigError if its shape is not (nq,)."""
         what = f"Task '{self.name}': the posture"
-        shape = self.target_row.values.shape if self.has_target else None
+        is_set = self.target_row.is_set
+        shape = self.target_row.values.shape if is_set else None
         posture = check_array(what, target, shape)
         if posture.ndim != 1:
             raise ConfigError(f"{what} is a vector, not shape {posture.shape}.")
-        if not self.has_target:
+        if not is_set:
             self.target_row = SharedRow(posture.size)
         self.target_row.set(posture)
-        self.has_target = True
 
     @property
     def target(self) -> Vector:
@@ -71,7 +61,7 @@ class PostureTask(JointTask):
     def bind(self, configuration: Configuration) -> None:
         """Resolve joint names; without a target, take the present posture."""
         super().bind(configuration)
-        if not self.has_target:
+        if not self.target_row.is_set:
             self.set_target(configuration.q)
         if self.target.shape != (configuration.nq,):
             raise ConfigError(
@@ -85,15 +75,7 @@ class PostureTask(JointTask):
 
 
 class DampingTask(JointTask):
-    """Prefer small steps: `e = 0`, `J = I`.
-
-    Args:
-        cost: [cost]/rad or [cost]/m for all joints; free and planar roots have cost
-            zero unless named.
-        costs: Costs of single joints by name, in place of `cost`.
-        level: See `RowTask`.
-        name: How reports call the task.
-    """
+    """Prefer small steps: `e = 0`, `J = I`; arguments are those of `JointTask`."""
 
     kernel: ClassVar[Kernel] = Kernel.CONSTANT
 

@@ -15,8 +15,8 @@ class Problem:
     Rows of G may be soft: where `wanted < h`, the cost has the term `0.5 weight s^2`,
     s >= 0 being the violation of `G x <= wanted`.
 
-    Owns its arrays, and keeps all bounds in two vectors in the order x, G, A. The
-    attributes below are views: write into them.
+    Owns its arrays, and keeps all bounds in two vectors. All others are views: write
+    into them.
 
     Args:
         nv: Number of variables.
@@ -24,15 +24,8 @@ class Problem:
         equalities: Rows of A.
 
     Attributes:
-        H: Cost matrix, shape (nv, nv).
-        c: Cost vector, shape (nv,).
-        G: Inequality rows, shape (inequalities, nv).
-        h: Their upper bounds.
-        wanted: Their soft upper bounds; not below h, rows are hard.
+        wanted: Soft upper bounds of G x; not below h, rows are hard.
         weight: Cost of what is missing from that, [cost]^2/m^2.
-        A: Equality rows, shape (equalities, nv).
-        lb: Lower bounds of x.
-        ub: Upper bounds of x.
         rows: G above A.
         lower: Lower bounds of x, G x, A x in this order.
         upper: Upper bounds of the same.

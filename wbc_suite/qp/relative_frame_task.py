@@ -4,9 +4,9 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.kinematics import Configuration
-from wbc_suite.qp.frame_task import homogeneous
+from wbc_suite.qp.frame_task import homogeneous, pose_costs
 from wbc_suite.qp.lie import is_usable
-from wbc_suite.qp.task import RowTask, cost_vector
+from wbc_suite.qp.task import RowTask
 from wbc_suite.typing import Matrix, Vector
 
 
@@ -27,11 +27,10 @@ class RelativeFrameTask(RowTask):
         position_cost: [cost]/m, one number or one per axis of r.
         orientation_cost: [cost]/rad, one number or one per axis of f.
         target: Pose T_rt; without one the pose at binding time is held.
-        gain: See `RowTask`.
-        level: See `RowTask`.
         max_linear_speed: Greatest relative speed asked for, m/s.
         max_angular_speed: Greatest relative angular speed asked for, rad/s.
-        name: How reports call the task; "frame in root" when absent.
+
+    Gain and level are those of `RowTask`. Reports call the task "frame in root".
     """
 
     def __init__(
@@ -48,9 +47,11 @@ class RelativeFrameTask(RowTask):
         max_angular_speed: float = 3.0,
         name: str | None = None,
     ) -> None:
+        name = name or f"{frame} in {root}"
         super().__init__(
-            name or f"{frame} in {root}",
+            name,
             dim=6,
+            cost=pose_costs(name, position_cost, orientation_cost),
             gain=gain,
             level=level,
             max_speed=max_linear_speed,
@@ -58,19 +59,12 @@ class RelativeFrameTask(RowTask):
             angular_start=3,
         )
         self.frame, self.root = frame, root
-        position = cost_vector(self.name, position_cost, 3)
-        orientation = cost_vector(self.name, orientation_cost, 3)
-        self.cost_row.set(np.concatenate([position, orientation]))
         self.target: pin.SE3 | None = None
         if target is not None:
             self.set_target(target)
 
     def set_target(self, target: pin.SE3 | Matrix) -> None:
-        """Set the pose T_rt: an SE3 or a homogeneous matrix, shape (4, 4).
-
-        Raises:
-            ConfigError: If the shape is wrong or the rotation is no rotation.
-        """
+        """Set the pose T_rt, see `FrameTask.set_target`."""
         T = homogeneous(self.name, target)
         self.target = pin.SE3(T[:3, :3].copy(), T[:3, 3].copy())
 

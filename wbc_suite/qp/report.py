@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from wbc_suite.qp.level import TickLayout
+from wbc_suite.qp.level import LevelLayout, TickLayout
 from wbc_suite.qp.limit import LimitKind
 from wbc_suite.typing import Indices, Matrix, Vector
 
@@ -52,16 +52,11 @@ class ActiveLimit:
 
 @dataclass(frozen=True, slots=True)
 class Conflict:
-    """Another task, equality rows or upper levels that oppose a task.
-
-    Attributes:
-        other: What opposes it.
-    """
+    """Another task, equality rows or upper levels that oppose a task."""
 
     other: str
 
     def __str__(self) -> str:
-        """Return "conflict: other"."""
         return f"conflict: {self.other}"
 
 
@@ -70,7 +65,6 @@ class OutOfReach:
     """No joint moves the task nearer to its target: its limb is stretched."""
 
     def __str__(self) -> str:
-        """Return the reason as text."""
         return "out of reach: no joint moves it nearer"
 
 
@@ -79,7 +73,6 @@ class TargetNotFinite:
     """The target is not finite, so that the task holds what it controls."""
 
     def __str__(self) -> str:
-        """Return the reason as text."""
         return "target not finite: held"
 
 
@@ -91,10 +84,8 @@ class TaskReport:
     """How one task stands after a tick.
 
     Attributes:
-        name: The task's name.
         position_error: Length of the error before saturation, in `unit`.
         orientation_error: Angle to the target, rad; 0 for tasks without one.
-        unit: Unit of `position_error`.
         reached: Whether both are within the tolerances asked for.
         reasons: What keeps the task from its target, weightiest first; empty when it
             is reached or simply on its way. `str` turns each into text.
@@ -120,73 +111,43 @@ class TaskReport:
 
 @dataclass(frozen=True, slots=True)
 class LevelRecord:
-    """What a tick left of one level.
+    """What a tick left of one level; see `TaskArrays` for what has no comment."""
 
-    Attributes:
-        names: Its row tasks.
-        units: Unit of each one's error.
-        slices: Where each one's rows are.
-        held: Names of the tasks whose target was not finite.
-        distances: Length (in its unit) and angle (rad) of each error, shape (n, 2).
-        W: Weighted rows, shape (m, nv).
-        e: Weighted steps, shape (m,).
-        diagonal: Squared weights and weighted steps of joints, shape (2, nv).
-        x: The step that was found, shape (nv,).
-        multipliers: Of bounds, inequality rows and equality rows.
-        pressed: Rows with a multiplier other than zero, shape (k,).
-        rows: These rows, shape (k, nv).
-    """
-
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    slices: tuple[slice, ...]
-    held: tuple[str, ...]
+    layout: LevelLayout
+    held: tuple[str, ...]  # names of the tasks whose target was not finite
+    pressed: Indices  # (k,), rows with a multiplier other than zero
+    rows: Matrix  # (k, nv), these rows
     distances: Matrix
     W: Matrix
     e: Vector
     diagonal: Matrix
-    x: Vector
-    multipliers: Vector
-    pressed: Indices
-    rows: Matrix
-
-    def pulls(self) -> list[Vector]:
-        """Return the force of each row task on the joints, `W^T (e - W x)`."""
-        return [
-            self.W[rows].T @ (self.e[rows] - self.W[rows] @ self.x)
-            for rows in self.slices
-        ]
+    x: Vector  # (nv,), the step that was found
+    multipliers: Vector  # of bounds, inequality rows and equality rows
 
     def reasons(
         self, task: int, opponents: Sequence[tuple[Reason, Vector]]
     ) -> tuple[Reason, ...]:
-        """Return what opposes the pull of a task, weightiest first.
+        """Return what opposes the pull of a row task, weightiest first.
 
         At the optimum the forces on the joints balance: the pulls
         `g_i = W_i^T (e_i - W_i dq)` of all tasks against the multipliers of limits and
         equality rows. The share of an opponent with force f in stopping task i is
         `f . g_i / (g_i . g_i)`. A task that is not met though it hardly pulls has its
         limb stretched: no joint moves it nearer.
-
-        Args:
-            task: Its number among the level's row tasks.
-            opponents: Force on the joints of each active limit and equality.
         """
-        pulls, rows = self.pulls(), self.slices[task]
-        pull = pulls[task]
-        rest = self.e[rows] - self.W[rows] @ self.x
-        greatest = float(np.linalg.norm(self.W[rows]) * np.linalg.norm(rest))
+        slices, rest = self.layout.slices, self.e - self.W @ self.x
+        pulls = [self.W[rows].T @ rest[rows] for rows in slices]
+        pull, rows = pulls[task], slices[task]
+        greatest = float(np.linalg.norm(self.W[rows]) * np.linalg.norm(rest[rows]))
         square = float(pull @ pull)
-        found: list[tuple[Reason, float]] = [
-            (reason, float(force @ pull)) for reason, force in opponents
+        others: list[tuple[Reason, Vector]] = [
+            (Conflict(other), -force)
+            for other, force in zip(self.layout.names, pulls, strict=True)
+            if other != self.layout.names[task]
         ]
-        found += [
-            (Conflict(other), float(-force @ pull))
-            for k, (other, force) in enumerate(zip(self.names, pulls, strict=True))
-            if k != task
-        ]
-        joints = self.diagonal[1] - self.diagonal[0] * self.x
-        found.append((Conflict("posture"), float(-joints @ pull)))
+        joints = self.diagonal[0] * self.x - self.diagonal[1]
+        forces = [*opponents, *others, (Conflict("posture"), joints)]
+        found = [(reason, float(force @ pull)) for reason, force in forces]
         named = [(reason, part) for reason, part in found if part > _SHARE * square]
         reasons = tuple(reason for reason, _ in sorted(named, key=lambda r: -r[1]))
         if np.sqrt(square) <= max(_STRETCHED * greatest, _NOTHING):
@@ -198,24 +159,18 @@ class TickRecord(NamedTuple):
     """What explains a tick, also after the next ones.
 
     It is made in each tick, and only copies; names and arrays are resolved when it is
-    read.
-
-    Attributes:
-        layout: Names, and where the results are.
-        buffer: The results of all levels, a copy.
-        kinds: The `LimitKind` of each lower, then each upper bound, shape (2 nv,).
-        held: Names of the tasks whose target was not finite, of each solved level.
-        pressed: Rows with a multiplier other than zero and these rows, of each solved
-            level; empty for stacks without rows.
-        subjects: Kind, subject and unit of the pressed inequality rows, by row.
+    read. `held` and `pressed` have an entry for each solved level, see `LevelRecord`;
+    `pressed` is empty for stacks without rows.
     """
 
     layout: TickLayout
-    buffer: Vector
-    kinds: Indices
+    buffer: Vector  # results of all levels, a copy
+    kinds: Indices  # (2 nv,), `LimitKind` of each lower, then each upper bound
     held: tuple[tuple[str, ...], ...]
     pressed: tuple[tuple[Indices, Matrix], ...]
-    subjects: Mapping[int, tuple[LimitKind, object, str]]
+    subjects: Mapping[
+        int, tuple[LimitKind, object, str]
+    ]  # by inequality row, with unit
 
     @property
     def levels(self) -> list[LevelRecord]:
@@ -223,19 +178,10 @@ class TickRecord(NamedTuple):
         none = np.zeros(0, dtype=np.int64), np.zeros((0, len(self.layout.joints)))
         records: list[LevelRecord] = []
         for k, held in enumerate(self.held):
-            layout = self.layout.levels[k]
-            pressed, rows = self.pressed[k] if self.pressed else none
-            records.append(
-                LevelRecord(
-                    names=layout.names,
-                    units=layout.units,
-                    slices=layout.slices,
-                    held=held,
-                    pressed=pressed,
-                    rows=rows,
-                    **layout.views(self.buffer),
-                )
-            )
+            results = self.layout.results(self.buffer)[f"level {k}"]
+            values = {name: results[name] for name in results.dtype.names or ()}
+            pressed = self.pressed[k] if self.pressed else none
+            records.append(LevelRecord(self.layout.levels[k], held, *pressed, **values))
         return records
 
     def active(self) -> tuple[ActiveLimit, ...]:
@@ -251,16 +197,11 @@ class TickRecord(NamedTuple):
     def explain(
         self, *, position_tolerance: float = 1e-3, orientation_tolerance: float = 5e-3
     ) -> dict[str, TaskReport]:
-        """Report every row task by name.
-
-        Args:
-            position_tolerance: Length of an error that counts as reached, m.
-            orientation_tolerance: Angle that counts as reached, rad.
-        """
+        """Report every row task by name; errors within m and rad count as reached."""
         found: dict[str, TaskReport] = {}
         for k, level in enumerate(self.levels):
             opponents = list(self._opponents(level, is_first=k == 0))
-            for n, name in enumerate(level.names):
+            for n, name in enumerate(level.layout.names):
                 distance, angle = (float(x) for x in level.distances[n])
                 near = distance <= position_tolerance and angle <= orientation_tolerance
                 reasons: tuple[Reason, ...] = ()
@@ -268,26 +209,20 @@ class TickRecord(NamedTuple):
                     reasons = (TargetNotFinite(),)
                 elif not near:
                     reasons = level.reasons(n, opponents)
-                unit = level.units[n]
+                unit = level.layout.units[n]
                 found[name] = TaskReport(name, distance, angle, unit, near, reasons)
         return found
 
     def _limit(self, i: int, multiplier: float) -> ActiveLimit:
         """Describe one limit by its place among the multipliers."""
         nv, is_upper = len(self.layout.joints), multiplier > 0.0
-        if i < nv:
+        side, is_joint = "upper" if is_upper else "lower", i < nv
+        if is_joint:
             kind = LimitKind(int(self.kinds[nv * is_upper + i]))
             subject, unit = self.layout.joints[i], self.layout.units[i]
         else:
             kind, subject, unit = self.subjects[i - nv]
-        return ActiveLimit(
-            kind=kind,
-            subject=subject,
-            side="upper" if is_upper else "lower",
-            is_joint=i < nv,
-            unit=unit,
-            multiplier=abs(multiplier),
-        )
+        return ActiveLimit(kind, subject, side, is_joint, unit, abs(multiplier))
 
     def _opponents(
         self, level: LevelRecord, *, is_first: bool

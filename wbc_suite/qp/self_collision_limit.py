@@ -9,37 +9,31 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.arguments import check_count, check_number
-from wbc_suite.compiling import as_argument, compiled
+from wbc_suite.compiling import as_argument
 from wbc_suite.kinematics import Configuration
-from wbc_suite.kinematics.forward import RobotArrays, compute_joint_poses
-from wbc_suite.qp.capsule_distance import CapsuleArrays, nearest_pairs
+from wbc_suite.kinematics.forward import compute_joint_poses
+from wbc_suite.qp.capsule_distance import CapsuleArrays, self_collision_rows
 from wbc_suite.qp.kernel import Kernel
-from wbc_suite.qp.limit import LimitKind, RowLimit
-from wbc_suite.qp.problem import UNBOUNDED
-from wbc_suite.robot.collision_capsules import EnclosingCapsule
+from wbc_suite.qp.limit import LimitKind, RowLimit, joint_movers
+from wbc_suite.robot.collision_capsules import (
+    EnclosingCapsule,
+    collision_pairs,
+    enclosing_capsules,
+)
 from wbc_suite.typing import Indices, Matrix, Vector
 
 if TYPE_CHECKING:
     from wbc_suite.robot import RobotDescription
 
-_SEPARATION = 0.2
-"""m/s, greatest speed of separation of links that are too near."""
-
 
 @dataclass(frozen=True, slots=True)
 class LinkPair:
-    """Two links of a robot.
-
-    Attributes:
-        first: Name of the first link.
-        second: Name of the second link.
-    """
+    """The names of two links of a robot."""
 
     first: str
     second: str
 
     def __str__(self) -> str:
-        """Return both names: "forearm - torso"."""
         return f"{self.first} - {self.second}"
 
 
@@ -93,7 +87,6 @@ class SelfCollisionLimit(RowLimit):
         self._capsules = tuple(capsules)
         self._pairs = _capsule_pairs(self._capsules, pairs)
         self._model: pin.Model | None = None  # that the arrays belong to
-        self.rates: Vector = np.array([self.margin, self.rate])
 
     @classmethod
     def of_robot(
@@ -105,38 +98,25 @@ class SelfCollisionLimit(RowLimit):
         keyframes (without any, in its neutral posture) do not indicate contact, and
         are not kept apart.
         """
-        from wbc_suite.robot.collision_capsules import (
-            collision_pairs,
-            enclosing_capsules,
-        )
-
-        limit = cls(
-            enclosing_capsules(robot),
-            collision_pairs(robot),
-            nearest=nearest,
-            margin=margin,
-        )
-        configuration = Configuration(robot.to_pinocchio())
-        limit.bind(configuration)
-        rest = configuration.q.copy()
+        capsules, pairs = enclosing_capsules(robot), collision_pairs(robot)
+        limit = cls(capsules, pairs, nearest=nearest, margin=margin)
+        model = robot.to_pinocchio()
         for keyframe in robot.keyframes.values() or ({},):
-            q = rest.copy()
+            q = pin.neutral(model)
             for joint, value in keyframe.items():
-                q[configuration.model.joints[configuration.joint_id(joint)].idx_q] = (
-                    value
-                )
-            configuration.update(q)
-            limit.drop_touching(configuration)
+                q[model.joints[model.getJointId(joint)].idx_q] = value
+            limit.drop_touching(Configuration(model, q))
         return limit
 
     def drop_touching(self, configuration: Configuration) -> None:
         """Leave out the capsule pairs that are nearer than the margin right now."""
-        count = len(self._pairs)
+        count, robot = len(self._pairs), configuration.robot
         arrays = self._make_arrays(configuration, rows=count, influence=self.margin)
-        compute_joint_poses(configuration.robot)
-        G = np.zeros((count, configuration.nv))
-        touching = nearest_pairs(configuration.robot, as_argument(arrays), G)
-        self._pairs = np.delete(self._pairs, arrays.found[:touching], axis=0)
+        compute_joint_poses(robot)
+        G, h = np.zeros((count, configuration.nv)), np.zeros(count)
+        self_collision_rows(robot, as_argument(arrays), 1.0, G, h)
+        touching = arrays.found[arrays.found >= 0]
+        self._pairs = np.delete(self._pairs, touching, axis=0)
         self._model = None
         self.bind(configuration)
 
@@ -147,33 +127,30 @@ class SelfCollisionLimit(RowLimit):
             UnknownNameError: If a link is no frame of the model.
         """
         if self._model is not configuration.model:
-            rows, influence = self.dim, self.influence
-            self.arrays = self._make_arrays(
-                configuration, rows=rows, influence=influence
-            )
+            options = {"rows": self.dim, "influence": self.influence}
+            self.arrays = self._make_arrays(configuration, **options)
             self.argument = as_argument(self.arrays)
             self._model = configuration.model
 
     def _make_arrays(
         self, configuration: Configuration, *, rows: int, influence: float
     ) -> CapsuleArrays:
-        model, count = configuration.model, len(self._capsules)
-        joint, ends = np.zeros(count, dtype=np.int64), np.empty((count, 6))
-        for k, capsule in enumerate(self._capsules):
-            frame = model.frames[configuration.frame_id(capsule.link)]
-            joint[k] = frame.parentJoint
-            ends[k, :3] = frame.placement.act(np.asarray(capsule.start))
-            ends[k, 3:] = frame.placement.act(np.asarray(capsule.end))
-        moves = np.zeros((len(model.joints), configuration.nv))
-        for j in set(joint.tolist()):
-            moves[j, configuration.joint_support(j)] = 1.0
+        count, frames = len(self._capsules), configuration.model.frames
+        links = [frames[configuration.frame_id(c.link)] for c in self._capsules]
+        ends = [
+            frame.placement.act(np.array(end))
+            for frame, capsule in zip(links, self._capsules, strict=True)
+            for end in (capsule.start, capsule.end)
+        ]
         return CapsuleArrays(
-            joint=joint,
-            ends=ends,
+            joint=np.array([frame.parentJoint for frame in links], dtype=np.int64),
+            ends=np.reshape(ends, (count, 6)),
             radius=np.array([c.radius for c in self._capsules], dtype=np.float64),
             pairs=self._pairs.ravel().copy(),
-            moves=moves,
+            moves=joint_movers(configuration),
+            margin=self.margin,
             influence=influence,
+            rate=self.rate,
             world=np.zeros((count, 2, 3)),
             middle=np.zeros((count, 3)),
             reach=np.zeros(count),
@@ -188,9 +165,8 @@ class SelfCollisionLimit(RowLimit):
         self, configuration: Configuration, dt: float, G: Matrix, h: Vector
     ) -> None:
         """Write the dampers of the nearest pairs, `-n . (J_a - J_b) dq <= ...`."""
-        robot = configuration.robot
-        compute_joint_poses(robot)
-        self_collision_rows(robot, self.argument, self.rates, dt, G, h)
+        compute_joint_poses(configuration.robot)
+        self_collision_rows(configuration.robot, self.argument, dt, G, h)
 
     def reset(self) -> None:
         """Discard the list of near pairs."""
@@ -220,31 +196,6 @@ class SelfCollisionLimit(RowLimit):
         """Return the two links of a row of the last tick."""
         a, b = (int(k) for k in self._pairs[self.found[row]])
         return LinkPair(self._capsules[a].link, self._capsules[b].link)
-
-
-@compiled
-def self_collision_rows(
-    robot: RobotArrays,
-    capsules: CapsuleArrays,
-    rates: Vector,
-    dt: float,
-    G: Matrix,
-    h: Vector,
-) -> None:
-    """Write the velocity dampers of the nearest pairs.
-
-    Args:
-        robot: The robot; joint poses are current.
-        capsules: The capsules, whose k nearest pairs have a row.
-        rates: Distance that is kept, m, and approach speed per distance left, 1/s.
-        dt: Step, s.
-        G: Output, shape (k, nv).
-        h: Output, how far each pair may approach, m, shape (k,).
-    """
-    nearest_pairs(robot, capsules, G)
-    for row in range(h.shape[0]):
-        speed = rates[1] * (capsules.distance[row] - rates[0])
-        h[row] = min(max(speed, -_SEPARATION) * dt, UNBOUNDED)
 
 
 def _capsule_pairs(

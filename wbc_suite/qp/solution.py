@@ -28,19 +28,18 @@ class Fallback(IntEnum):
     """Inputs or results are not finite: the robot stands still."""
 
     def __str__(self) -> str:
-        """Return what was done as a sentence."""
         return _SENTENCES[self]
 
 
-_SENTENCES = {
-    Fallback.NONE: "solved as stated",
-    Fallback.LEVEL: "a lower level could not be solved and was left out",
-    Fallback.LIMITS: "limit rows were relaxed",
-    Fallback.ACCELERATION: "acceleration limits were dropped",
-    Fallback.SLACK: "equality and limit rows were relaxed",
-    Fallback.BOX: "rows were left out, bounds of joints are kept",
-    Fallback.HOLD: "the robot holds still",
-}
+_SENTENCES = (
+    "solved as stated",
+    "a lower level could not be solved and was left out",
+    "limit rows were relaxed",
+    "acceleration limits were dropped",
+    "equality and limit rows were relaxed",
+    "rows were left out, bounds of joints are kept",
+    "the robot holds still",
+)
 
 
 class Solution(NamedTuple):
@@ -89,11 +88,11 @@ class Solution(NamedTuple):
     def __str__(self) -> str:
         """Return the fallback, the fastest joint, every task and every active limit."""
         lines = [f"Solution: {self.fallback} (residual {self.residual:.1g})"]
-        names, units = self.record.layout.joints, self.record.layout.units
+        layout = self.record.layout
         if len(self.v):
-            fastest = int(np.argmax(np.abs(self.v)))
-            speed = f"{abs(self.v[fastest]):.3g} {units[fastest]}/s"
-            lines.append(f"  fastest joint: {names[fastest]}, {speed}")
+            k = int(np.argmax(np.abs(self.v)))
+            speed = f"{abs(self.v[k]):.3g} {layout.units[k]}/s"
+            lines.append(f"  fastest joint: {layout.joints[k]}, {speed}")
         lines += [f"  {report}" for report in self.explain().values()]
         lines += [f"  active: {limit}" for limit in self.active]
         lines += [f"  not kept: {name}" for name in self.conflicts]

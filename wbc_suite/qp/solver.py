@@ -13,6 +13,7 @@ from wbc_suite.typing import Vector
 _TOLERANCE = 1e-10
 _ITERATIONS = 1000  # of one solve, some 10 ms; a humanoid's takes up to 100
 _EQUALITY = 5  # how daqp marks an equality row
+_EXACT = {"eps_abs": 1e-9, "eps_rel": 0.0}
 
 
 class QpSolver(Protocol):
@@ -86,19 +87,9 @@ class QpsolversSolver:
     _SPARSE = ("proxqp", "osqp", "clarabel")
 
     _OPTIONS: ClassVar[dict[str, dict[str, Any]]] = {
-        "proxqp": {
-            "eps_abs": 1e-9,
-            "eps_rel": 0.0,
-            "backend": "sparse",
-            "max_iter": 100,
-        },
-        "osqp": {
-            "eps_abs": 1e-8,
-            "eps_rel": 0.0,
-            "max_iter": 20000,
-            "time_limit": 1.0,  # s
-        },
-        "piqp": {"eps_abs": 1e-9, "eps_rel": 0.0},
+        "proxqp": {**_EXACT, "backend": "sparse", "max_iter": 100},
+        "osqp": {**_EXACT, "eps_abs": 1e-8, "max_iter": 20000, "time_limit": 1.0},  # s
+        "piqp": _EXACT,
     }
 
     def __init__(self, name: str) -> None:
@@ -116,15 +107,12 @@ class QpsolversSolver:
         used = problem.h < UNBOUNDED
         matrix = csc_matrix if self.name in self._SPARSE else np.array
         qp = qpsolvers.Problem(
-            matrix(problem.H),
-            problem.c,
-            matrix(problem.G[used]) if used.any() else None,
-            problem.h[used] if used.any() else None,
-            matrix(problem.A) if problem.equalities else None,
-            problem.b if problem.equalities else None,
-            problem.lb,
-            problem.ub,
+            matrix(problem.H), problem.c, lb=problem.lb, ub=problem.ub
         )
+        if used.any():
+            qp.G, qp.h = matrix(problem.G[used]), problem.h[used]
+        if problem.equalities:
+            qp.A, qp.b = matrix(problem.A), problem.b
         try:
             with warnings.catch_warnings():
                 # How a solver ended is in what it returns; a tick prints nothing.
@@ -136,13 +124,11 @@ class QpsolversSolver:
             return None
         if not solution.found or solution.x is None or solution.z_box is None:
             return None
-        multipliers = np.zeros(len(problem.upper))
-        nv, rows = problem.nv, len(problem.G)
-        multipliers[:nv] = solution.z_box
+        rows = np.zeros(len(problem.G))
         if used.any():
-            multipliers[nv : nv + rows][used] = solution.z
-        if problem.equalities:
-            multipliers[nv + rows :] = solution.y
+            rows[used] = solution.z
+        of_equalities = solution.y if problem.equalities else ()
+        multipliers = np.concatenate([solution.z_box, rows, of_equalities])
         return np.array(solution.x), multipliers
 
 

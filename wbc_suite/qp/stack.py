@@ -15,7 +15,7 @@ from wbc_suite.qp.fallback import Ladder
 from wbc_suite.qp.frame_task import FrameTask
 from wbc_suite.qp.joint_limits import AccelerationLimit, PositionLimit, VelocityLimit
 from wbc_suite.qp.level import make_levels, tick_layout
-from wbc_suite.qp.limit import BoxLimit, JointBounds, Limit, LimitKind
+from wbc_suite.qp.limit import BoxLimit, Limit, LimitKind, unlimited_bounds
 from wbc_suite.qp.problem import Problem
 from wbc_suite.qp.report import TaskReport, TickRecord
 from wbc_suite.qp.solution import Fallback, Solution
@@ -29,7 +29,7 @@ from wbc_suite.qp.tick import (
     finish_level,
     solve_tick,
 )
-from wbc_suite.typing import Indices, Matrix, Vector
+from wbc_suite.typing import Indices, Matrix, Records, Vector
 
 _SOLVED = TickStatus.SOLVED.value
 _NO_NAMES: tuple[tuple[str, ...], ...] = ((),)
@@ -48,13 +48,13 @@ class TaskStack:
     they control, rows that contradict each other are relaxed, and the `Solution`
     reports it.
 
-    A tick is one compiled call: see `tick.solve_tick`, which compiled loops may call
-    with `arrays` themselves. The solver runs where it does not converge.
+    A tick is one compiled call of `tick.solve_tick`, which compiled loops may call with
+    `arrays` themselves. The solver runs where it does not converge.
 
     Args:
         configuration: The robot; `solve` reads it, the caller moves it.
-        tasks: Tasks, see `RowTask` for priorities. The stack binds them: frames are
-            resolved, and targets that were not set hold the present pose.
+        tasks: They are bound: frames are resolved, targets that were not set hold the
+            present pose.
         limits: Limits; position, velocity and acceleration limits with their defaults
             when absent.
         equalities: Rows that are kept exactly, before all tasks.
@@ -72,8 +72,7 @@ class TaskStack:
 
     Attributes:
         v_previous: Velocity of the last tick, shape (nv,); write to set it.
-        arrays: The argument of `solve_tick`; targets of tasks are copied into it by
-            `prepare`.
+        arrays: The argument of `solve_tick`.
         is_compiled: Whether a tick needs no Python: all parts have a kernel.
 
     Raises:
@@ -105,67 +104,57 @@ class TaskStack:
         self.curvature_damping = check_number(
             "TaskStack: curvature_damping", curvature_damping, least=0.0
         )
-        self.bounds = JointBounds.unlimited(configuration)
+        self.bounds = unlimited_bounds(configuration)
         for limit in limits:
             if isinstance(limit, BoxLimit):
                 limit.apply(configuration, self.bounds)
         qp = make_solver(solver)
-        self._constraints = Constraints(configuration, limits, self.equalities)
-        rows = self._constraints
+        rows = self._constraints = Constraints(configuration, limits, self.equalities)
         self._layout = tick_layout(configuration, tasks, rows)
-        self._buffer: Vector = np.zeros(self._layout.levels[-1].end)
-        self.levels = make_levels(configuration, tasks, self._layout, self._buffer)
+        self._buffer: Vector = np.zeros(self._layout.dtype.itemsize // 8)
+        results = self._layout.results(self._buffer)
+        self.levels = make_levels(configuration, tasks, self._layout, results)
         rows.fill_constants(self.levels[0].qp)
         self._warm = solver == "daqp" if warm is None else warm
-        self.is_compiled = self._constraints.is_compiled and all(
-            level.is_compiled for level in self.levels
-        )
-        self._tick = self._make_arrays()
+        self.is_compiled = all(x.is_compiled for x in (rows, *self.levels))
+        self._tick = self._make_arrays(results)
         self.v_previous: Vector = self._tick.v
-        self._ladder = Ladder(configuration, self.levels, self.bounds, self._tick, qp)
+        self._ladder = Ladder(configuration.q, self.levels, self._tick, qp)
         self.arrays = as_argument(self._tick)
         frames = [t for t in tasks if isinstance(t, FrameTask)]
-        self._escape = (
-            Escape(configuration, frames, self.bounds, self._copy)
-            if escape and frames
-            else None
-        )
+        self._escape: Escape | None = None
+        if escape and frames:
+            self._escape = Escape(configuration, frames, self.bounds, self._copy)
         self._is_alone = self._escape is None and self.is_compiled
         self._last: Solution | None = None
 
-    def _make_arrays(self) -> TickArrays:
+    def _make_arrays(self, results: Records) -> TickArrays:
         """Gather what the kernel reads and writes."""
-        bounds, rows, nv = self.bounds, self._constraints, self.configuration.nv
+        rows, nv = self._constraints, self.configuration.nv
         levels = tuple(as_argument(level.arrays) for level in self.levels)
-        step = self._buffer[: 2 * nv + 2]
         return TickArrays(
             robot=self.configuration.robot,
             levels=(*levels, *levels[-1:] * (MAX_LEVELS - len(levels))),
             level_count=len(levels),
-            q_lower=bounds.q_lower,
-            q_upper=bounds.q_upper,
-            v_max=bounds.v_max,
-            a_max=bounds.a_max,
+            bounds=self.bounds,
             kinds=np.zeros(2 * nv, dtype=np.int64),
-            v=step[nv : 2 * nv],
-            x=step[:nv],
-            residual=step[2 * nv : 2 * nv + 1],
+            v=results["v"],
+            x=results["x"],
+            residual=results["residual"],
+            all_finite=results["all_finite"],
             solved=np.zeros(1, dtype=np.int64),
             relax_speed=rows.relax_speed,
             pressure_damping=np.zeros(1),
             held=rows.held,
             rate=rows.rate,
             capsules=rows.collision.argument,
-            collision=rows.collision.rates,
             collision_rows=rows.collision_rows,
             spheres=rows.floor.argument,
             floor_rows=rows.floor_rows,
             prepared=np.full(2, int(self.is_compiled), dtype=np.int64),
-            position_gain=float(bounds.position_gain),
             damping=float(self.damping),
             curvature=float(self.curvature_damping),
             warm=bool(self._warm),
-            all_finite=step[2 * nv + 1 :],
         )
 
     def reset(self, v: Vector | None = None) -> None:
@@ -173,19 +162,13 @@ class TaskStack:
 
         After it the same inputs give bit-equal solutions.
         """
-        if v is None:
-            self.v_previous[:] = 0.0
-        else:
-            shape = (self.configuration.nv,)
-            self.v_previous[:] = check_array("TaskStack.reset: v", v, shape)
-        self._ladder.reset()
-        for level in self.levels:
-            level.reset()
+        what, shape = "TaskStack.reset: v", self.v_previous.shape
+        self.v_previous[:] = 0.0 if v is None else check_array(what, v, shape)
+        for part in (self._ladder, *self.levels, self._constraints, self._escape):
+            if part is not None:
+                part.reset()
         self._tick.pressure_damping[:] = 0.0
-        self._constraints.reset()
         self._last = None
-        if self._escape is not None:
-            self._escape.reset()
 
     def prepare(self, dt: float) -> None:
         """Evaluate tasks, limits and equalities that have no kernel."""
@@ -196,10 +179,7 @@ class TaskStack:
         self._tick.prepared[0] = 1
 
     def solve(self, dt: float) -> Solution:
-        """Return the step from the present configuration.
-
-        Args:
-            dt: Duration of the step, s.
+        """Return the step from the present configuration, which takes dt seconds.
 
         Raises:
             ConfigError: If dt is not positive and finite.
@@ -223,10 +203,7 @@ class TaskStack:
     def complete(self, dt: float, status: int, k: int) -> Solution:
         """Return the solution of a tick, after doing what the kernel could not do.
 
-        Args:
-            dt: Duration of the step, s.
-            status: Status that `solve_tick` returned.
-            k: Level that it returned.
+        Status and level k are those that `solve_tick` returned.
         """
         fallback = Fallback.NONE
         if status == TickStatus.NEEDS_PYTHON:
@@ -279,9 +256,8 @@ class TaskStack:
             subjects = {row: rows.subject(row) for row in active}
             if fallback >= Fallback.LIMITS and solved:
                 conflicts = rows.violated(self.levels[0].qp, tick.x, TOLERANCE)
-        record = TickRecord(
-            self._layout, values, tick.kinds.copy(), held, pressed, subjects
-        )
+        kinds = tick.kinds.copy()
+        record = TickRecord(self._layout, values, kinds, held, pressed, subjects)
         return Solution(
             values[:nv],
             values[nv : 2 * nv],
@@ -333,11 +309,7 @@ class TaskStack:
         """Report how each task with rows stood at the last tick, and why.
 
         Costs some 50 us a task: meant for reports, not for every tick of a fast loop,
-        which can keep a `record` and explain it later.
-
-        Args:
-            position_tolerance: Length of an error that counts as reached, m.
-            orientation_tolerance: Angle that counts as reached, rad.
+        which can keep a `record` and explain it later. See `TickRecord.explain`.
         """
         return self.record().explain(
             position_tolerance=position_tolerance,

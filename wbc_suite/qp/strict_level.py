@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from wbc_suite.compiling import compiled, struct
-from wbc_suite.linear_algebra import row_space, subtract_projection
+from wbc_suite.linear_algebra import dot, row_space, subtract_projection
 from wbc_suite.qp.active_set import QpArrays
 from wbc_suite.qp.problem import UNBOUNDED
 from wbc_suite.qp.task_kernels import TaskArrays
@@ -21,22 +21,16 @@ _RANK_TOLERANCE = 1e-6  # rows of an upper level shorter than this bind nothing
 class LevelArrays(NamedTuple):
     """One strict level.
 
-    Attributes:
-        tasks: Its tasks.
-        qp: Its problem. Below level 0, equality rows are an orthonormal basis of what
-            the levels above decide.
-        above: Scratch, rows of all levels above and of the equalities, shape (m, nv).
-        lengths: Scratch of `row_space`, shape (nv,).
-        kept: The basis of the last tick, shape (nv, nv).
-        kept_counts: Its size, and the greatest rank so far, shape (2,).
+    Below level 0, equality rows of the problem are an orthonormal basis of what the
+    levels above decide.
     """
 
     tasks: TaskArrays
     qp: QpArrays
-    above: Matrix
-    lengths: Vector
-    kept: Matrix
-    kept_counts: Indices
+    above: Matrix  # (m, nv), scratch: rows of all levels above and of the equalities
+    lengths: Vector  # (nv,), scratch of `row_space`
+    kept: Matrix  # (nv, nv), the basis of the last tick
+    kept_counts: Indices  # (2,), its size, and the greatest rank so far
 
 
 @compiled
@@ -44,35 +38,23 @@ def restrict_level(levels: tuple[LevelArrays, ...], k: int, x: Vector) -> None:
     """State that level k may move in ways that all levels above rate like their step.
 
     Those are `V dq = V x`, where V is an orthonormal basis of the equality rows and of
-    all rows above. x itself is one of them, so the problem has a solution.
-
-    Args:
-        levels: All levels.
-        k: The level.
-        x: The step of the level above, shape (nv,).
+    all rows above. x, the step of the level above, is one of them, so the problem has a
+    solution.
     """
     level, first, nv = levels[k], levels[0].qp, x.shape[0]
     qp, p, count = level.qp, first.counts[0], first.counts[1]
-    above, rows, upper_rows = level.above, qp.rows, first.rows
-    for row in range(count):
-        for i in range(nv):
-            above[row, i] = upper_rows[p + row, i]
+    above, rows = level.above, qp.rows
+    above[:count] = first.rows[p : p + count]
     for j in range(k):
         W = levels[j].qp.W
-        for row in range(W.shape[0]):
-            for i in range(nv):
-                above[count + row, i] = W[row, i]
+        above[count : count + W.shape[0]] = W
         count += W.shape[0]
     rank = _decided_directions(above, rows[p:], level)
     qp.counts[1] = rank
-    for i in range(nv):
-        qp.lower[i], qp.upper[i] = first.lower[i], first.upper[i]
+    qp.lower[:nv], qp.upper[:nv] = first.lower[:nv], first.upper[:nv]
+    rows[:p] = first.rows[:p]
     for row in range(p + rank):
-        y = 0.0
-        for i in range(nv):
-            if row < p:
-                rows[row, i] = upper_rows[row, i]
-            y += rows[row, i] * x[i]
+        y = dot(rows[row], x, nv)
         qp.upper[nv + row] = max(first.wanted[row], y) if row < p else y
         qp.lower[nv + row] = -UNBOUNDED if row < p else y
 
@@ -101,8 +83,6 @@ def _decided_directions(rows: Matrix, V: Matrix, level: LevelArrays) -> int:
         for i in range(counts[0]):
             subtract_projection(V, rank, kept[i])
         rank += row_space(kept[: counts[0]], _LOST_DIRECTION, V[rank:], lengths)
-    for i in range(rank):
-        for j in range(V.shape[1]):
-            kept[i, j] = V[i, j]
+    kept[:rank] = V[:rank]
     counts[0] = rank
     return rank

@@ -120,11 +120,11 @@ class SupportLimit(RowLimit):
 
     def subject(self, row: int) -> str:
         """Return over which side the robot would fall."""
-        row %= self._edges
-        ahead, left = self._forward @ self._normals[row], self._left(row)
-        sides = ("toes", "heels") if abs(ahead) > abs(left) else ("left", "right")
-        side = sides[0] if (ahead if abs(ahead) > abs(left) else left) > 0 else sides[1]
-        return f"centre of mass at the {side}"
+        (x, y), (forward, sideways) = self._normals[row % self._edges], self._forward
+        ahead, left = forward * x + sideways * y, forward * y - sideways * x
+        if abs(ahead) > abs(left):
+            return f"centre of mass at the {'toes' if ahead > 0 else 'heels'}"
+        return f"centre of mass at the {'left' if left > 0 else 'right'}"
 
     def _last_step(self, configuration: Configuration, dt: float) -> Vector:
         """Return how the robot came here from the last tick, shape (nv,)."""
@@ -134,10 +134,6 @@ class SupportLimit(RowLimit):
         step = pin.difference(configuration.model, before, self._before)
         fast = float(np.abs(step[configuration.root_linear]).max(initial=0.0))
         return step if fast < JUMP * dt else np.zeros(configuration.nv)
-
-    def _left(self, row: int) -> float:
-        x, y = self._forward
-        return float(np.array([-y, x]) @ self._normals[row])
 
     def _update(self, configuration: Configuration) -> None:
         """Recompute the hull if the soles have moved."""

@@ -11,26 +11,27 @@ from wbc_suite.arguments import check_array, check_count, check_number
 from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.kernel import Kernel
+from wbc_suite.qp.limit import joint_values
 from wbc_suite.typing import Indices, Matrix, Vector
 
 
 class SharedRow:
     """A target or costs, with a copy in every stack that holds the task.
 
-    Args:
-        size: Number of values.
-
     Attributes:
-        values: The values; write them with `set`.
+        values: The values, zero until they are `set`.
+        is_set: Whether they are.
     """
 
     def __init__(self, size: int) -> None:
         self.values: Vector = np.zeros(size)
+        self.is_set = False
         self._copies: list[ref[Vector]] = []
 
     def set(self, values: Vector) -> None:
         """Set the values, and those of all copies."""
         self.values[:] = values
+        self.is_set = True
         for copy in self._copies:
             row = copy()
             if row is not None:
@@ -50,15 +51,8 @@ class RowTask(ABC):
     `gain e` is shortened to the task's greatest speed, because errors without bound
     are what makes joints flip at limits. `W` is the diagonal of costs.
 
-    A subclass writes `evaluate`; weights, saturation, damping and reports are the
-    stack's work:
-
-        class HeightTask(RowTask):
-            def evaluate(self, configuration, error, jacobian):
-                error[0] = 1.2 - configuration.frame_pose("head").translation[2]
-                jacobian[0] = configuration.frame_jacobian("head", "aligned")[2]
-
-        task = HeightTask("height", dim=1, cost=10.0)
+    A subclass writes `evaluate`, as the guide of QP stacks shows; weights, saturation,
+    damping and reports are the stack's work.
 
     Args:
         name: How reports call the task.
@@ -101,10 +95,7 @@ class RowTask(ABC):
         self.dim = check_count(f"Task '{name}': dim", dim, least=1)
         self.cost_row = SharedRow(self.dim)
         self.cost_row.set(cost_vector(self.name, cost, self.dim))
-        self.max_speeds = (
-            check_speed(self.name, max_speed),
-            check_speed(self.name, max_angular_speed),
-        )
+        self.max_speeds = _speed(name, max_speed), _speed(name, max_angular_speed)
         self.angular_start = dim if angular_start is None else angular_start
 
     @property
@@ -123,14 +114,11 @@ class RowTask(ABC):
     def evaluate(
         self, configuration: Configuration, error: Vector, jacobian: Matrix
     ) -> None:
-        """Write the error and its Jacobian at the present configuration.
+        """Write the error, shape (dim,), and J, `d(error) = -J dq`, shape (dim, nv).
 
-        Args:
-            configuration: Where the robot is.
-            error: Output, shape (dim,). An error that is not finite, or beyond 1e9,
-                holds what the task controls, and is reported.
-            jacobian: Output J, finite in any case, `d(error) = -J dq`, shape (dim, nv).
-                It is zero before the first call, and keeps columns outside the support.
+        An error that is not finite, or beyond 1e9, holds what the task controls, and is
+        reported. J is finite in any case; it is zero before the first call, and keeps
+        columns outside the support.
         """
 
     def support(self, configuration: Configuration) -> Indices:
@@ -154,18 +142,15 @@ class RowTask(ABC):
 class JointTask(ABC):
     """A term of a stack's cost whose Jacobian is the identity: one row per velocity.
 
+    Other arguments and attributes are those of `RowTask`.
+
     Args:
-        name: How reports call the task.
         cost: [cost]/rad or [cost]/m for all joints; free and planar roots have cost
             zero unless named.
         costs: Costs of single joints by name, in place of `cost`.
-        gain: See `RowTask`.
-        level: See `RowTask`.
         max_speed: Greatest speed of each joint, rad/s or m/s.
 
     Attributes:
-        kernel: See `RowTask`.
-        target_row: See `RowTask`.
         squared_costs: Squared cost of each velocity once bound, shape (nv,).
     """
 
@@ -186,11 +171,11 @@ class JointTask(ABC):
         self.cost, self.costs = cost, dict(costs or {})
         for value in (cost, *self.costs.values()):
             cost_vector(name, value, 1)
-        self.max_speed = check_speed(name, max_speed)
+        self.max_speed = _speed(name, max_speed)
 
     def bind(self, configuration: Configuration) -> None:
         """Resolve joint names."""
-        self.squared_costs = joint_costs(configuration, self.cost, self.costs) ** 2
+        self.squared_costs = joint_values(configuration, self.cost, self.costs) ** 2
 
     @abstractmethod
     def evaluate(self, configuration: Configuration, error: Vector) -> None:
@@ -234,29 +219,7 @@ def cost_vector(owner: str, cost: float | Vector, size: int) -> Vector:
     return np.broadcast_to(vector, (size,)).copy()
 
 
-def check_speed(owner: str, speed: object) -> float:
-    """Return the greatest speed a task asks for; infinity is no limit.
-
-    Raises:
-        ConfigError: If it is not positive.
-    """
-    return check_number(
-        f"Task '{owner}': the greatest speed", speed, above=0.0, allow_inf=True
-    )
-
-
-def joint_costs(
-    configuration: Configuration, cost: float, by_joint: Mapping[str, float]
-) -> Vector:
-    """Return one cost per velocity, zero for the root unless named.
-
-    Raises:
-        UnknownNameError: If a named joint is not in the model.
-    """
-    costs = np.full(configuration.nv, cost)
-    costs[configuration.root_linear] = 0.0
-    costs[configuration.root_angular] = 0.0
-    for name, value in by_joint.items():
-        joint = configuration.model.joints[configuration.joint_id(name)]
-        costs[joint.idx_v : joint.idx_v + joint.nv] = value
-    return costs
+def _speed(name: str, speed: object) -> float:
+    """Return the greatest speed a task asks for, checked; infinity is no limit."""
+    what = f"Task '{name}': the greatest speed"
+    return check_number(what, speed, above=0.0, allow_inf=True)

@@ -1,8 +1,7 @@
 """Compiled errors, Jacobians and weighted rows of QP tasks.
 
 `write_tasks` turns the errors and Jacobians of all tasks of a level into weighted rows.
-Those of the built-in kinds are computed here; those of other tasks stand in the buffers
-before.
+Those of built-in kinds are computed here; those of others are in the buffers before.
 """
 
 from typing import NamedTuple
@@ -23,68 +22,36 @@ from wbc_suite.typing import Indices, Matrix, Vector
 
 @struct
 class TaskArrays(NamedTuple):
-    """The tasks of one level; n tasks with m rows in all, and k tasks on joints.
+    """The tasks of one level: n tasks with m rows in all, and k tasks on joints."""
 
-    Attributes:
-        kernel: `Kernel` of each task with rows, shape (n,).
-        joint: Parent joint of the frame of each, shape (n,).
-        offset: Pose of the frame in its joint, by columns, shape (n, 12).
-        target: Target pose [R p] row by row, or position, shape (n, 12).
-        row_start: First row of each task, and m, shape (n + 1,).
-        angular_start: First row of each task that is an angle, shape (n,).
-        support_start: First entry of `support` of each task, shape (n + 1,).
-        support: Velocity indices whose columns may differ from zero.
-        error: Errors, shape (m,).
-        jacobian: Their derivatives, `d(error) = -J dq`, shape (m, nv).
-        cost: Cost of each row, shape (m,).
-        gain: Gain of each task, shape (n,).
-        max_speed: Greatest speed and angular speed of each task, shape (n, 2).
-        distance: Output, length of the error and its angle, shape (n, 2); NaN for a
-            target that is not finite.
-        joint_kernel: `Kernel` of each task on joints, shape (k,).
-        joint_target: Posture of each, shape (k, nq).
-        joint_error: Errors, shape (k, nv).
-        squared_cost: Squared costs, shape (k, nv).
-        joint_gain: Gains, shape (k,).
-        joint_speed: Greatest speeds, shape (k,).
-        joint_finite: Output, whether the target of each is finite, shape (k,).
-        q_index: Position index of each velocity, -1 where it has none, shape (nv,).
-        bias: Squared costs and weighted steps that are added, shape (2, nv).
-        W: Output, weighted Jacobians, shape (m, nv).
-        e: Output, weighted steps, shape (m,).
-        diagonal: Output, squared costs and weighted steps of joints, shape (2, nv).
-        mu: Output, damping of all joints, shape (1,).
-        all_finite: Output, set to 0 if a target is not finite, shape (1,).
-    """
-
-    kernel: Indices
-    joint: Indices
-    offset: Matrix
-    target: Matrix
-    row_start: Indices
-    angular_start: Indices
-    support_start: Indices
-    support: Indices
-    error: Vector
-    jacobian: Matrix
-    cost: Vector
-    gain: Vector
-    max_speed: Matrix
-    distance: Matrix
-    joint_kernel: Indices
-    joint_target: Matrix
-    joint_error: Matrix
-    squared_cost: Matrix
-    joint_gain: Vector
-    joint_speed: Vector
-    joint_finite: Indices
-    q_index: Indices
-    bias: Matrix
-    W: Matrix
-    e: Vector
-    diagonal: Matrix
-    mu: Vector
-    all_finite: Vector
+    kernel: Indices  # (n,), `Kernel` of each task with rows
+    joint: Indices  # (n,), parent joint of the frame of each
+    offset: Matrix  # (n, 12), pose of the frame in its joint, by columns
+    target: Matrix  # (n, 12), target pose [R p] row by row, or position
+    row_start: Indices  # (n + 1,), first row of each task, and m
+    angular_start: Indices  # (n,), first row of each task that is an angle
+    support_start: Indices  # (n + 1,), first entry of `support` of each task
+    support: Indices  # velocity indices whose columns may differ from zero
+    error: Vector  # (m,)
+    jacobian: Matrix  # (m, nv), `d(error) = -J dq`
+    cost: Vector  # (m,)
+    gain: Vector  # (n,)
+    max_speed: Matrix  # (n, 2), greatest speed and angular speed of each task
+    distances: Matrix  # (n, 2), output: lengths of error and angle, NaN if not finite
+    joint_kernel: Indices  # (k,), `Kernel` of each task on joints
+    joint_target: Matrix  # (k, nq), posture of each
+    joint_error: Matrix  # (k, nv)
+    squared_cost: Matrix  # (k, nv)
+    joint_gain: Vector  # (k,)
+    joint_speed: Vector  # (k,), greatest speeds
+    joint_finite: Indices  # (k,), output: whether the target of each is finite
+    q_index: Indices  # (nv,), position index of each velocity, -1 where it has none
+    bias: Matrix  # (2, nv), squared costs and weighted steps that are added
+    W: Matrix  # (m, nv), output: weighted Jacobians
+    e: Vector  # (m,), output: weighted steps
+    diagonal: Matrix  # (2, nv), output: squared costs and weighted steps of joints
+    mu: Vector  # (1,), output: damping of all joints
+    all_finite: Vector  # (1,), output: set to 0 if a target is not finite
 
 
 @compiled
@@ -124,15 +91,14 @@ def write_tasks(
         mu += curvature * bending
         total += size
     _write_joint_tasks(robot, tasks, dt)
-    diagonal = tasks.diagonal
-    for i in range(diagonal.shape[1]):
-        total += abs(diagonal[0, i]) + abs(diagonal[1, i])
+    for value in tasks.diagonal.flat:
+        total += abs(value)
     tasks.mu[0] = mu
     return bool(np.isfinite(mu + total))
 
 
 @compiled
-def frame_error(  # noqa: C901, one frame
+def frame_error(
     robot: RobotArrays,
     joint: int,
     offset: Vector,
@@ -154,20 +120,12 @@ def frame_error(  # noqa: C901, one frame
     """
     T, E, A = np.empty(12), np.empty((3, 3)), np.empty((3, 3))
     multiply_poses(robot.pose[joint], offset, T)
-    finite = True
-    for i in range(12):
-        finite &= abs(target[i]) < FAR
+    finite = relative_rotation(T, target, E)
     rotation = error[3:]
-    for i in range(3):
-        error[i] = target[4 * i + 3] - T[9 + i]
-        for j in range(3):
-            E[i, j] = 1.0 if i == j else 0.0
-            if finite:
-                E[i, j] = T[3 * i] * target[j]
-                E[i, j] += T[3 * i + 1] * target[4 + j] + T[3 * i + 2] * target[8 + j]
     angle = log3(E, rotation)
     inverse_left_jacobian(rotation, angle, E)
     for i in range(3):
+        error[i] = target[4 * i + 3] - T[9 + i]
         for j in range(3):  # A = Jl^-1 R^T maps world rates
             A[i, j] = E[i, 0] * T[j] + E[i, 1] * T[3 + j] + E[i, 2] * T[6 + j]
     columns = robot.jacobian
@@ -181,28 +139,39 @@ def frame_error(  # noqa: C901, one frame
         for i in range(3):
             jacobian[3 + i, col] = A[i, 0] * x + A[i, 1] * y + A[i, 2] * z
     if not finite:
-        for i in range(6):
-            error[i] = np.nan
+        error[:] = np.nan
+
+
+@compiled
+def relative_rotation(T: Vector, target: Vector, out: Matrix) -> bool:
+    """Write `R_wf^T R_wt`, or I for a target that is not finite; return if it is.
+
+    T is packed by columns, the target row by row.
+    """
+    finite = True
+    for i in range(12):
+        finite &= abs(target[i]) < FAR
+    for i in range(3):
+        for j in range(3):
+            out[i, j] = 1.0 if i == j else 0.0
+            if finite:
+                out[i, j] = T[3 * i] * target[j]
+                out[i, j] += T[3 * i + 1] * target[4 + j] + T[3 * i + 2] * target[8 + j]
+    return finite
 
 
 @compiled
 def com_error(
     robot: RobotArrays, target: Vector, error: Vector, jacobian: Matrix
 ) -> None:
-    """Write the error of the centre of mass and its Jacobian; see `ComTask`.
+    """Write the error of the centre of mass, (3,), and its Jacobian; see `ComTask`.
 
-    Args:
-        robot: The robot; joint poses are current.
-        target: Target position, shape (3,) or longer.
-        error: Output, shape (3,).
-        jacobian: Output, shape (3, nv).
+    Joint poses are current; the target may be longer than 3.
     """
     compute_com(robot)
-    columns = robot.com_jacobian
+    jacobian[:] = robot.com_jacobian.T
     for i in range(3):
         error[i] = target[i] - robot.com[i]
-        for col in range(jacobian.shape[1]):
-            jacobian[i, col] = columns[col, i]
 
 
 @compiled
@@ -211,26 +180,21 @@ def _weigh_rows(
 ) -> tuple[float, float]:
     """Write the weighted rows of a task, `W = cost J` and `e = cost saturated step`.
 
-    Returns:
-        `sum |e| max|W|` over the rows, and the sum of all sizes.
+    Return `sum |e| max|W|` over the rows, and the sum of all sizes.
     """
-    first, middle, last = (
-        tasks.row_start[t],
-        tasks.angular_start[t],
-        tasks.row_start[t + 1],
-    )
-    finite, gain = True, tasks.gain[t]
+    first, last = tasks.row_start[t], tasks.row_start[t + 1]
+    middle, finite, gain = tasks.angular_start[t], True, tasks.gain[t]
     scale = np.empty(2)
     for part in range(2):
         square = 0.0
         for row in range(middle if part else first, last if part else middle):
             square += tasks.error[row] ** 2
         length, limit = np.sqrt(square), tasks.max_speed[t, part] * dt
-        tasks.distance[t, part] = length
+        tasks.distances[t, part] = length
         finite &= length < FAR
         scale[part] = gain if gain * length <= limit else limit / length
     if not finite:
-        tasks.distance[t, 0] = tasks.distance[t, 1] = np.nan
+        tasks.distances[t, 0] = tasks.distances[t, 1] = np.nan
         tasks.all_finite[0] = 0.0
     bending, total = 0.0, 0.0
     all_W, jacobian = tasks.W, tasks.jacobian
@@ -255,10 +219,9 @@ def _weigh_rows(
 @compiled
 def _write_joint_tasks(robot: RobotArrays, tasks: TaskArrays, dt: float) -> None:
     """Write the diagonal: squared costs, and squared costs times saturated steps."""
-    nv, diagonal, bias = tasks.q_index.shape[0], tasks.diagonal, tasks.bias
-    q, q_index = robot.q, tasks.q_index
-    for i in range(nv):
-        diagonal[0, i], diagonal[1, i] = bias[0, i], bias[1, i]
+    q, q_index, diagonal = robot.q, tasks.q_index, tasks.diagonal
+    nv = q_index.shape[0]
+    diagonal[:] = tasks.bias
     for t in range(tasks.joint_kernel.shape[0]):
         error, weight, total = tasks.joint_error[t], tasks.squared_cost[t], 0.0
         target, is_posture = tasks.joint_target[t], tasks.joint_kernel[t]

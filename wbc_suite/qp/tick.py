@@ -1,10 +1,9 @@
 """One tick of a stack in one compiled call.
 
 `solve_tick` computes forward kinematics, task rows, bounds and limit rows, and solves
-all levels by the active set of the last tick. Compiled loops may call it as well as
-Python. Where a level is not solved it returns: the caller solves that level by other
-means, writes the result into the level's `qp`, calls `finish_level`, and calls
-`solve_tick` again for the levels below.
+all levels by the active set of the last tick. Where a level is not solved it returns:
+the caller solves that level by other means, writes the result into the level's `qp`,
+calls `finish_level`, and calls `solve_tick` again for the levels below.
 """
 
 from enum import IntEnum
@@ -15,30 +14,16 @@ import numpy as np
 from wbc_suite.compiling import compiled, struct
 from wbc_suite.kinematics.forward import RobotArrays, compute_joint_poses
 from wbc_suite.qp.active_set import QpArrays, solve_warm
-from wbc_suite.qp.capsule_distance import CapsuleArrays
+from wbc_suite.qp.capsule_distance import CapsuleArrays, self_collision_rows
 from wbc_suite.qp.equality import HeldFrames, hold_frames
 from wbc_suite.qp.floor_limit import SphereArrays, floor_rows
-from wbc_suite.qp.limit import merge_bounds
+from wbc_suite.qp.limit import JointBounds, merge_bounds
 from wbc_suite.qp.problem import UNBOUNDED, worst_violation
-from wbc_suite.qp.self_collision_limit import self_collision_rows
 from wbc_suite.qp.strict_level import LevelArrays, restrict_level
 from wbc_suite.qp.task_kernels import TaskArrays, write_tasks
 from wbc_suite.typing import Indices, Vector
 
-__all__ = [
-    "RETURN_WEIGHT",
-    "TOLERANCE",
-    "LevelArrays",
-    "TickArrays",
-    "TickStatus",
-    "finish_level",
-    "solve_tick",
-    "stiffness",
-]
-
-TOLERANCE = 1e-7
-"""A step that violates a row or bound by more is not taken, m or rad."""
-
+TOLERANCE = 1e-7  # m or rad; a step that violates a row or bound by more is not taken
 RETURN_WEIGHT = 1e2  # of a soft row, against the stiffest joint's cost
 _PRESSURE_MEMORY = 0.2  # s, in which the damping by rows falls to 1 / e
 _PRESSURE_MAX = 1e6  # times what tasks pull with
@@ -48,92 +33,52 @@ class TickStatus(IntEnum):
     """How `solve_tick` ended."""
 
     SOLVED = 0
-    UNSOLVED = 1
-    """A level is stated, and its active set was not found."""
-    BAD_ROWS = 2
-    """Rows of a level are not finite."""
-    BAD_POSITION = 3
-    """The configuration is not finite."""
-    NEEDS_PYTHON = 4
-    """Tasks or limits without a kernel must be evaluated before each tick."""
+    UNSOLVED = 1  # a level is stated, and its active set was not found
+    BAD_ROWS = 2  # rows of a level are not finite
+    BAD_POSITION = 3  # the configuration is not finite
+    NEEDS_PYTHON = 4  # tasks or limits without a kernel must be evaluated before
 
 
 @struct
 class TickArrays(NamedTuple):
-    """What a tick reads and writes.
+    """What a tick reads and writes: p inequality rows, k equality rows.
 
-    Attributes:
-        robot: The robot; its q is where the tick begins.
-        levels: Strict levels, the first first; the last is repeated up to
-            `MAX_LEVELS`, so that machine code does not depend on their number.
-        level_count: How many there are.
-        q_lower: Lower position limits, shape (nv,).
-        q_upper: Upper position limits, shape (nv,).
-        v_max: Speed limits, shape (nv,).
-        a_max: Acceleration limits, shape (nv,).
-        kinds: Output, the `LimitKind` of each lower, then each upper bound, (2 nv,).
-        v: In and out, velocity of the last step, shape (nv,).
-        x: Output, the step, shape (nv,).
-        residual: Output, greatest violation of the first level's rows, shape (1,).
-        all_finite: Output, whether the targets of all tasks are finite, shape (1,).
-        solved: Output, number of solved levels, shape (1,).
-        relax_speed: `RowLimit.relax_speed` of each inequality row, shape (p,).
-        pressure_damping: Damping by the rows that tasks press against, shape (1,).
-        held: Frames of equality rows.
-        rate: Right-hand side of equality rows per second, shape (k,).
-        capsules: Capsules of the self-collision limit.
-        collision: Its distance and rate, see `self_collision_rows`, shape (2,).
-        collision_rows: Its first inequality row and the end, shape (2,).
-        spheres: Spheres of the floor limit.
-        floor_rows: Its first inequality row and the end, shape (2,).
-        prepared: 1 where Python has evaluated what has no kernel, or nothing has none;
-            a tick sets it back to the second entry, shape (2,).
-        position_gain: Fraction of the distance to a limit that one step may cover.
-        damping: Tikhonov term, [cost]^2/rad^2.
-        curvature: See `write_tasks`.
-        warm: Whether the active set of the last tick is tried.
+    `levels` holds the strict levels, the first first; the last is repeated up to
+    `MAX_LEVELS`, so that machine code does not depend on their number. `prepared` is 1
+    where Python has evaluated what has no kernel, or nothing has none; a tick sets it
+    back to the second entry.
     """
 
-    robot: RobotArrays
+    robot: RobotArrays  # its q is where the tick begins
     levels: tuple[LevelArrays, ...]
     level_count: int
-    q_lower: Vector
-    q_upper: Vector
-    v_max: Vector
-    a_max: Vector
-    kinds: Indices
-    v: Vector
-    x: Vector
-    residual: Vector
-    all_finite: Vector
-    solved: Indices
-    relax_speed: Vector
-    pressure_damping: Vector
-    held: HeldFrames
-    rate: Vector
-    capsules: CapsuleArrays
-    collision: Vector
-    collision_rows: Indices
-    spheres: SphereArrays
-    floor_rows: Indices
-    prepared: Indices
-    position_gain: float
-    damping: float
-    curvature: float
-    warm: bool
+    bounds: JointBounds
+    kinds: Indices  # (2 nv,), output: `LimitKind` of each lower, then each upper bound
+    v: Vector  # (nv,), in and out: velocity of the last step
+    x: Vector  # (nv,), output: the step
+    residual: Vector  # (1,), output: greatest violation of the first level's rows
+    all_finite: Vector  # (1,), output: whether the targets of all tasks are finite
+    solved: Indices  # (1,), output: number of solved levels
+    relax_speed: Vector  # (p,), `RowLimit.relax_speed` of each inequality row
+    pressure_damping: Vector  # (1,), damping by the rows that tasks press against
+    held: HeldFrames  # frames of equality rows
+    rate: Vector  # (k,), right-hand side of constant equality rows per second, else NaN
+    capsules: CapsuleArrays  # of the self-collision limit
+    collision_rows: Indices  # (2,), its first inequality row and the end
+    spheres: SphereArrays  # of the floor limit
+    floor_rows: Indices  # (2,), its first inequality row and the end
+    prepared: Indices  # (2,)
+    damping: float  # Tikhonov term, [cost]^2/rad^2
+    curvature: float  # see `write_tasks`
+    warm: bool  # whether the active set of the last tick is tried
 
 
 @compiled
 def solve_tick(tick: TickArrays, dt: float, start: int) -> tuple[int, int]:
-    """Solve the levels from `start` on; the step is then in `tick.x` and `tick.v`.
+    """Solve the levels from `start` on; 0 begins a tick, of dt seconds.
 
-    Args:
-        tick: What the tick reads and writes.
-        dt: Step, s.
-        start: First level; 0 begins a tick.
-
-    Returns:
-        A `TickStatus`, and the level at which it ended.
+    Return a `TickStatus`, and the level at which it ended. The step is then in `tick.x`
+    and `tick.v`.
     """
     if start == 0 and not tick.prepared[0]:
         return TickStatus.NEEDS_PYTHON.value, 0
@@ -148,8 +93,7 @@ def solve_tick(tick: TickArrays, dt: float, start: int) -> tuple[int, int]:
         else:
             restrict_level(levels, k, tick.x)
             damping = levels[k - 1].tasks.mu[0]
-        finite = write_tasks(tick.robot, level.tasks, dt, damping, tick.curvature)
-        if not finite:
+        if not write_tasks(tick.robot, level.tasks, dt, damping, tick.curvature):
             return TickStatus.BAD_ROWS.value, k
         if k == 0 and _is_soft(level.qp):
             level.qp.weight[0] = RETURN_WEIGHT * stiffness(level.tasks)
@@ -165,18 +109,13 @@ def solve_tick(tick: TickArrays, dt: float, start: int) -> tuple[int, int]:
 
 @compiled
 def finish_level(tick: TickArrays, k: int, dt: float, kept: bool) -> None:
-    """Take the solution of a level, in `qp.x` and `qp.multipliers`, as the step.
+    """Take the solution of level k, in `qp.x` and `qp.multipliers`, as the step.
 
-    Args:
-        tick: The tick.
-        k: The level.
-        dt: Step, s.
-        kept: Whether its rows were; those that are relaxed do not damp the next tick.
+    `kept` is whether its rows were; those that are relaxed do not damp the next tick.
     """
     qp = tick.levels[k].qp
     tick.solved[0] = k + 1
-    for i in range(tick.x.shape[0]):
-        tick.x[i] = qp.x[i]
+    tick.x[:] = qp.x
     if k == 0 and qp.rows.shape[0] > 0:
         tick.pressure_damping[0] *= np.exp(-dt / _PRESSURE_MEMORY)
         if kept:
@@ -194,20 +133,8 @@ def _begin_tick(tick: TickArrays, dt: float) -> bool:
     if not np.isfinite(total):
         return False
     nv = tick.x.shape[0]
-    merge_bounds(
-        robot.q,
-        tick.levels[0].tasks.q_index,
-        tick.q_lower,
-        tick.q_upper,
-        tick.position_gain,
-        tick.v_max,
-        tick.v,
-        tick.a_max,
-        dt,
-        qp.lower[:nv],
-        qp.upper[:nv],
-        tick.kinds,
-    )
+    lower, upper = qp.lower[:nv], qp.upper[:nv]
+    merge_bounds(tick.bounds, robot.q, tick.v, dt, lower, upper, tick.kinds)
     if qp.rows.shape[0] > 0:
         compute_joint_poses(robot)
         _write_rows(tick, qp, dt)
@@ -224,14 +151,14 @@ def _write_rows(tick: TickArrays, qp: QpArrays, dt: float) -> None:
     see `RowLimit.relax_speed`.
     """
     p, k, nv = qp.counts[0], qp.counts[1], tick.x.shape[0]
+    robot, h = tick.robot, qp.upper[nv : nv + p]
     first, last = tick.collision_rows[0], tick.collision_rows[1]
-    h = qp.upper[nv : nv + p]
     if last > first:
         G, near = qp.rows[first:last], h[first:last]
-        self_collision_rows(tick.robot, tick.capsules, tick.collision, dt, G, near)
+        self_collision_rows(robot, tick.capsules, dt, G, near)
     first, last = tick.floor_rows[0], tick.floor_rows[1]
     if last > first:
-        floor_rows(tick.robot, tick.spheres, dt, qp.rows[first:last], h[first:last])
+        floor_rows(robot, tick.spheres, dt, qp.rows[first:last], h[first:last])
     for row in range(p):
         wanted = h[row]
         h[row] = max(wanted, 0.0, -2.0 * (wanted + tick.relax_speed[row] * dt))
@@ -240,7 +167,7 @@ def _write_rows(tick: TickArrays, qp: QpArrays, dt: float) -> None:
     for row in range(k):
         if np.isfinite(tick.rate[row]):
             b[row] = tick.rate[row] * dt
-    hold_frames(tick.robot, tick.held, dt, qp.rows[p:], b)
+    hold_frames(robot, tick.held, dt, qp.rows[p:], b)
     for row in range(k):
         qp.lower[nv + p + row] = b[row]
 
