@@ -6,6 +6,8 @@ configuration.update(configuration.integrate(solution.dq))
 """
 
 from wbc_suite.qp.com_task import ComTask
+from wbc_suite.qp.dynamics_space import Contact, MomentumTask
+from wbc_suite.qp.dynamics_stack import DynamicsSolution, DynamicsStack
 from wbc_suite.qp.equality import Equality, FrameEquality, LinearEquality
 from wbc_suite.qp.floor_limit import FloorLimit
 from wbc_suite.qp.frame_task import FrameTask
@@ -39,7 +41,10 @@ __all__ = [
     "BoxLimit",
     "ComTask",
     "Conflict",
+    "Contact",
     "DampingTask",
+    "DynamicsSolution",
+    "DynamicsStack",
     "Equality",
     "Fallback",
     "FloorLimit",
@@ -53,6 +58,7 @@ __all__ = [
     "LinearEquality",
     "LinkPair",
     "LookAtTask",
+    "MomentumTask",
     "OutOfReach",
     "PositionLimit",
     "PostureTask",
