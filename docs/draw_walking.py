@@ -1,0 +1,121 @@
+"""Draw the film and the strip of the page on walking: `make pictures`.
+
+GR1 walks, is pushed from the side, and goes on; so does Spot with its arm.
+"""
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from PIL import Image
+
+from wbc_suite.control import (
+    RobotState,
+    build_composite_controller,
+    load_composite_controller_config,
+)
+from wbc_suite.envs import Simulation
+from wbc_suite.robot import load_robot
+from wbc_suite.scene import attach_robot, empty_arena
+from wbc_suite.sensing.renderer import make_renderer
+from wbc_suite.viewers.offscreen import add_studio
+
+IMAGES = Path(__file__).parent / "images"
+PERIOD = 0.02  # s between two actions
+RATE = 12.5  # pictures a second
+SECONDS = 7.0
+PUSHED = (3.0, 3.1)  # s
+SIZE = (400, 400)
+SHOWN = (1.0, 2.6, 3.2, 3.6, 4.2, 6.0)  # s; moments of the strip
+ROBOTS = {"GR1FreeBody": (0.4, 280.0, 2.6), "SpotWithArm": (0.8, 450.0, 2.2)}
+"""Speed, m/s; push from the right, N; distance of the camera, m."""
+
+
+class Walk:
+    """One robot that walks in the studio."""
+
+    def __init__(self, name: str) -> None:
+        self.speed, self.force, distance = ROBOTS[name]
+        robot = load_robot(name)
+        spec = empty_arena()
+        attach_robot(spec, robot, "robot0_")
+        add_studio(spec)
+        self.model = spec.compile()
+        self.data = mujoco.MjData(self.model)
+        state = RobotState(self.model, self.data, robot, prefix="robot0_")
+        posture = robot.keyframe("ready")
+        places, _ = state.joint_addresses(tuple(posture))
+        self.data.qpos[places] = list(posture.values())
+        self.data.qpos[:7] = (*robot.root.pos, *robot.root.quat)
+        mujoco.mj_forward(self.model, self.data)
+        config = load_composite_controller_config("WHOLE_BODY_ID", robot)
+        self.controller = build_composite_controller(config, state)
+        pairs = [(state, self.controller)]
+        self.simulation = Simulation(self.model, self.data, pairs)
+        self.simulation.start()
+        self.trunk = self.data.body("robot0_" + robot.links[0].name)
+        self.camera = mujoco.MjvCamera()
+        self.camera.azimuth, self.camera.elevation = 150.0, -8.0
+        self.camera.distance = distance
+        self.height = 0.9 * self.trunk.xpos[2]
+        width, height = SIZE
+        self.renderer = make_renderer(
+            self.model, width=2 * width, height=2 * height, preset="quality"
+        )
+
+    def advance(self, time: float) -> None:
+        """Simulate until a time, s."""
+        layout = self.controller.layout
+        hold = self.controller.hold_action
+        action = layout.pack({"walk": [self.speed, 0.0, 0.0]}, base=hold)
+        while self.data.time < time:
+            pushed = PUSHED[0] <= self.data.time < PUSHED[1]
+            self.trunk.xfrc_applied[1] = self.force if pushed else 0.0
+            self.controller.set_goal(action if self.data.time > 0.3 else hold, PERIOD)
+            self.simulation.tick(round(PERIOD / self.simulation.timestep))
+
+    def picture(self) -> Image.Image:
+        """Return what the camera, which follows the trunk, sees."""
+        self.camera.lookat[:] = self.trunk.xpos
+        self.camera.lookat[2] = self.height
+        self.renderer.update_scene(self.data, self.camera)
+        large = Image.fromarray(self.renderer.render())
+        return large.resize(SIZE, Image.Resampling.LANCZOS)
+
+
+def side_by_side(pictures: list[Image.Image]) -> Image.Image:
+    """Return pictures of one height in a row."""
+    return Image.fromarray(np.concatenate([np.asarray(p) for p in pictures], axis=1))
+
+
+def main() -> None:
+    """Draw the film and the strip."""
+    walks = [Walk(name) for name in ROBOTS]
+    film: list[Image.Image] = []
+    strips: list[list[Image.Image]] = [[] for _ in walks]
+    for k in range(round(SECONDS * RATE)):
+        time = (k + 1) / RATE
+        for walk in walks:
+            walk.advance(time)
+        pictures = [walk.picture() for walk in walks]
+        film.append(side_by_side(pictures))
+        if any(abs(time - moment) < 0.5 / RATE for moment in SHOWN):
+            for strip, picture in zip(strips, pictures, strict=True):
+                strip.append(picture.resize((200, 200), Image.Resampling.LANCZOS))
+    rows = [np.asarray(side_by_side(strip)) for strip in strips]
+    Image.fromarray(np.concatenate(rows)).save(
+        IMAGES / "walking.jpg", quality=85, optimize=True
+    )
+    film[0].save(
+        IMAGES / "walking.webp",
+        save_all=True,
+        append_images=film[1:],
+        duration=round(1000 / RATE),
+        loop=0,
+        quality=45,
+        method=4,
+    )
+
+
+if __name__ == "__main__":
+    main()
