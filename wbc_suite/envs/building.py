@@ -85,12 +85,7 @@ def compose(
 
 
 class StartPosture:
-    """Writes the keyframe `ready` of one robot, with noise on the arms' joints.
-
-    Args:
-        state: The robot in the simulation.
-        noise: The noise, drawn at each call; None for none.
-    """
+    """Writes the keyframe `ready` of one robot, with noise on the arms' joints."""
 
     def __init__(self, state: RobotState, noise: NoiseConfig | None) -> None:
         robot = state.robot
@@ -120,15 +115,12 @@ class StartPosture:
 
 def _root(state: RobotState) -> tuple[Indices, Vector]:
     """Return the indices of the root's pose in qpos, and its start value."""
-    root, model = state.robot.root, state.model
+    root = state.robot.root
     if root.kind == "free":
-        first = int(model.joint(f"{state.prefix}root").qposadr[0])
-        return np.arange(first, first + 7, dtype=np.int64), np.array(
-            [*root.pos, *root.quat]
-        )
-    index, _ = state.joint_addresses(
-        state.robot.root_joint_names if root.kind == "planar" else ()
-    )
+        first = int(state.model.joint(f"{state.prefix}root").qposadr[0])
+        return np.arange(first, first + 7), np.array([*root.pos, *root.quat])
+    names = state.robot.root_joint_names if root.kind == "planar" else ()
+    index, _ = state.joint_addresses(names)
     return index, np.zeros(len(index))
 
 
@@ -149,14 +141,10 @@ def simulate(
     mujoco.mj_forward(model, data)
     for state in states:
         aim_robot_view(state)
-    configs = [
-        load_composite_controller_config(given, robot)
-        for given, robot in zip(config.controller_list, robots, strict=True)
-    ]
-    pairs = [
-        (state, build_composite_controller(config, state))
-        for config, state in zip(configs, states, strict=True)
-    ]
+    pairs: list[tuple[RobotState, CompositeController]] = []
+    for given, state in zip(config.controller_list, states, strict=True):
+        controller = load_composite_controller_config(given, state.robot)
+        pairs.append((state, build_composite_controller(controller, state)))
     simulation = Simulation(
         model, data, pairs, compiled=config.compiled, lite=config.lite_physics
     )
@@ -199,11 +187,7 @@ def make_cameras(simulation: Simulation, config: EnvConfig) -> tuple[Cameras, Di
 
 
 def count_substeps(simulation: Simulation, config: EnvConfig) -> int:
-    """Return the physics steps of a control period.
-
-    Raises:
-        ConfigError: If it is no whole number.
-    """
+    """Return the physics steps of a control period; ConfigError if not whole."""
     period = 1.0 / (config.control_freq * simulation.timestep)
     count = round(period)
     if count < 1 or abs(period - count) > 1e-6:

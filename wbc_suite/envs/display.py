@@ -16,11 +16,7 @@ WATCH_PAGE = "wbc_suite.viewers.watch_page"
 class Display:
     """Shows a simulation in one render mode.
 
-    Args:
-        simulation: What is shown.
-        cameras: Cameras of the scene.
-        config: Its `render_mode`: `human` serves a page and keeps to real time, the
-            others return arrays; and camera, size and rate of the pictures.
+    Mode `human` serves a page and keeps to real time, the others return arrays.
     """
 
     def __init__(

@@ -40,20 +40,13 @@ class VectorRobotEnv(gymnasium.vector.VectorEnv[Observations, Array, NDArray[Any
         autoreset_mode: When an environment whose episode is over begins the next:
             `NextStep` in the next step, whose action is ignored; `SameStep` at once,
             with `final_obs` and `final_info`; `Disabled` by `reset`.
-        arguments: Arguments of every environment; see `EnvConfig`.
-
-    Raises:
-        ConfigError: If an argument is wrong.
-        UnknownNameError: If a benchmark, robot or controller is unknown.
+        arguments: Arguments of every environment, and errors: see `RobotEnv`.
 
     Attributes:
         envs: The environments.
     """
 
-    metadata = {
-        **RobotEnv.metadata,
-        "autoreset_mode": AutoresetMode.NEXT_STEP,
-    }
+    metadata = {**RobotEnv.metadata, "autoreset_mode": AutoresetMode.NEXT_STEP}
     closed = True  # until it is made: Gymnasium closes what is not
 
     def __init__(
@@ -77,10 +70,9 @@ class VectorRobotEnv(gymnasium.vector.VectorEnv[Observations, Array, NDArray[Any
         self.action_space = batch_space(first.action_space, num_envs)
         self.single_observation_space = first.observation_space
         self.observation_space = batch_space(first.observation_space, num_envs)
-        self._places = first.observation_buffer.places
-        self._values: Matrix = np.zeros(
-            (num_envs, len(first.observation_buffer.values))
-        )
+        buffer = first.observation_buffer
+        self._places = buffer.places
+        self._values: Matrix = np.zeros((num_envs, len(buffer.values)))
         self._rewards: Array = np.zeros(num_envs)
         self._terminated: Flags = np.zeros(num_envs, dtype=np.bool_)
         self._truncated: Flags = np.zeros(num_envs, dtype=np.bool_)
@@ -119,10 +111,7 @@ class VectorRobotEnv(gymnasium.vector.VectorEnv[Observations, Array, NDArray[Any
     def step(
         self, actions: Any
     ) -> tuple[Observations, NDArray[Any], NDArray[Any], NDArray[Any], Info]:
-        """Advance every environment one control period.
-
-        Args:
-            actions: One row per environment, shape (num_envs, size).
+        """Advance every environment; actions have shape (num_envs, size).
 
         Raises:
             ActionError: If an action is wrong; names the environment. Then no
@@ -227,9 +216,7 @@ class VectorRobotEnv(gymnasium.vector.VectorEnv[Observations, Array, NDArray[Any
     def _for_each(self, do: Callable[[int], None], indices: Iterable[int]) -> None:
         """Call `do` with every index, on all threads.
 
-        Raises:
-            Exception: The error of the first environment, with its index, after all
-                environments are done.
+        When all are done, the error of the first environment that failed is raised.
         """
         waiting, failed = deque(indices), dict[int, Exception]()
 

@@ -20,12 +20,10 @@ Picture = NDArray[Any]
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class CameraRequest:
-    """An observed camera.
+    """An observed camera; sizes in pixels.
 
     Attributes:
         name: Name of the camera; keys start with it.
-        width: Width of its pictures, pixels.
-        height: Height of its pictures, pixels.
         depth: Whether depth is observed.
         segmentations: Observed levels of segmentation.
     """
@@ -109,10 +107,7 @@ class Cameras:
 
     def black(self) -> dict[str, Picture]:
         """Return black pictures in place of the observed ones, by key."""
-        return {
-            key: np.zeros(space.shape or (), space.dtype)
-            for key, space in self.space.items()
-        }
+        return {k: np.zeros(s.shape or (), s.dtype) for k, s in self.space.items()}
 
     def image(self, camera: str, *, width: int, height: int) -> NDArray[np.uint8]:
         """Return a picture, RGB, shape (height, width, 3)."""

@@ -206,8 +206,7 @@ class Observables:
         change, old = self.changes.get(key), self._channels.pop(key, None)
         if change is None or not change.active:
             return
-        place = self.buffer.places[key]
-        bound = self.buffer.bounds[key]
+        place, bound = self.buffer.places[key], self.buffer.bounds[key]
         channel = _Channel(change, place, bound, self._model.opt.timestep)
         if old is None:
             channel.start(self.buffer.values, self._rng)
@@ -252,10 +251,9 @@ class _Channel:
         reset = getattr(self._filter, "reset", None)
         if reset is not None:
             reset()
-        enabled = self._change.enabled
-        self._shown = (
-            self._taken(values, rng) if enabled else values[self._place].copy()
-        )
+        self._shown = values[self._place].copy()
+        if self._change.enabled:
+            self._shown = self._taken(values, rng)
 
     def sample(self, values: Vector, rng: np.random.Generator) -> None:
         """Take a sample if one is due, and release those whose delay is over."""
@@ -265,8 +263,7 @@ class _Channel:
             wait = delay(rng) if callable(delay) else delay
             due = self._step + round(wait / self._timestep)
             self._coming.append((due, self._taken(values, rng)))
-        arrived = [k for k, (due, _) in enumerate(self._coming) if due <= self._step]
-        for _ in range(arrived[-1] + 1 if arrived else 0):
+        while any(due <= self._step for due, _ in self._coming):
             self._shown = self._coming.popleft()[1]
 
     def show(self, values: Vector) -> None:

@@ -53,10 +53,7 @@ class Projection:
         return cls(K=K, T_wc=T_wc, width=width, height=height)
 
     def to_pixels(self, points: ArrayLike) -> tuple[Array, Array]:
-        """Project points of the world.
-
-        Args:
-            points: In the world, m, shape (..., 3).
+        """Project points of the world, m, shape (..., 3).
 
         Returns:
             Pixels, shape (..., 2), and depths along the camera's axis, m, shape (...).
@@ -86,26 +83,17 @@ class Projection:
     def point_cloud(self, depth: ArrayLike) -> Array:
         """Return the point of the world at each pixel, shape (height, width, 3), m.
 
-        Args:
-            depth: Depth picture, m, shape (height, width) or (height, width, 1).
+        `depth` is in m, shape (height, width) or (height, width, 1).
         """
-        flat = np.asarray(depth, dtype=np.float64).reshape(self.height, self.width)
-        pixels = np.stack(
-            np.meshgrid(np.arange(self.width), np.arange(self.height)), axis=-1
-        )
-        return self.to_world(pixels, flat)
+        flat = np.reshape(depth, (self.height, self.width))
+        columns, rows = np.meshgrid(np.arange(self.width), np.arange(self.height))
+        return self.to_world(np.stack([columns, rows], axis=-1), flat)
 
     def normals(self, depth: ArrayLike) -> Array:
-        """Return the surface normal at each pixel, in the world, towards the camera.
+        """Return surface normals in the world, towards the camera, (height, width, 3).
 
         Normals are computed from differences of neighbouring points, so they are wrong
-        along edges.
-
-        Args:
-            depth: As `point_cloud` takes it.
-
-        Returns:
-            Unit vectors, shape (height, width, 3).
+        along edges. `depth` is as `point_cloud` takes it.
         """
         points = self.point_cloud(depth)
         down, right = np.gradient(points, axis=(0, 1))

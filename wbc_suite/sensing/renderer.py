@@ -70,14 +70,9 @@ def make_renderer(
 
     It belongs to the thread that makes it. Making one takes 0.1 to 0.7 s, so keep it,
     and close it (``with make_renderer(...) as renderer``). The model is unchanged when
-    this returns.
-
-    Args:
-        model: What to draw.
-        width: Width of the picture, pixels.
-        height: Height of the picture, pixels.
-        preset: None takes `RenderPreset.FAST` when the processor draws and
-            `RenderPreset.QUALITY` when a graphics card does.
+    this returns. Width and height of the picture are in pixels. Without a preset it is
+    `RenderPreset.FAST` when the processor draws, and `RenderPreset.QUALITY` when a
+    graphics card does.
 
     Raises:
         DeviceError: If nothing on this machine can draw; the message names the remedy.
@@ -97,12 +92,8 @@ def make_renderer(
 class Renderer:
     """Draws pictures, depths and segmentations of one size; see `make_renderer`.
 
-    Row 0 of a picture is its upper edge.
-
-    Attributes:
-        scene: MuJoCo's scene, filled by `update_scene`.
-        width: Width of a picture, pixels.
-        height: Height of a picture, pixels.
+    Row 0 of a picture is its upper edge. `scene` is MuJoCo's scene, filled by
+    `update_scene`; `width` and `height` of a picture are in pixels.
     """
 
     def __init__(
@@ -135,10 +126,8 @@ class Renderer:
     ) -> None:
         """Take the scene from a state.
 
-        Args:
-            data: The state.
-            camera: Index or name of a camera of the model, -1 for a free camera that
-                shows everything, or a camera of your own.
+        `camera` is the index or name of a camera of the model, -1 for a free camera
+        that shows everything, or a camera of your own.
         """
         if isinstance(camera, str):
             camera = int(self.model.camera(camera).id)
@@ -194,8 +183,7 @@ class Renderer:
     def read_geoms(self, labels: Labels) -> Labels:
         """Return the label of the geom at each pixel, shape (height, width).
 
-        Args:
-            labels: The label of each geom, and last that of the background.
+        `labels` has the label of each geom, and last that of the background.
         """
         mujoco.mjr_readPixels(self._colors, None, self._area, self._context)
         found = np.full(self.scene.ngeom + 1, -1, dtype=np.int64)
@@ -278,11 +266,8 @@ def outside(
 ) -> Indices:
     """Return geoms outside of a camera's picture, by their bounding spheres.
 
-    Args:
-        model: The scene.
-        data: Its state.
-        camera: A camera of the model with no optics but a field of view.
-        aspect: Width of its picture over its height.
+    Cameras with optics besides a field of view give none. `aspect` is the width of the
+    picture over its height.
     """
     if model.cam_projection[camera] or model.cam_sensorsize[camera].any():
         return np.empty(0, dtype=np.int64)
@@ -311,24 +296,19 @@ def _settings_of(
     size: tuple[int, int],
 ) -> Iterator[None]:
     """Write settings into the model, where a new context reads them once."""
-    wanted = [
-        (model.vis.global_, {"offwidth": size[0], "offheight": size[1]}),
-        (model.vis.quality, dict(zip(QUALITY_FIELDS, QUALITIES[preset], strict=True))),
-    ]
-    kept = [(part, {k: getattr(part, k) for k in values}) for part, values in wanted]
-    planes = list(floors)
-    sizes = model.geom_size[planes].copy()
-    _write(wanted)
-    for plane, floor in floors.items():
-        model.geom_size[plane] = floor.size
+    screen, quality = model.vis.global_, model.vis.quality
+    wanted = [(screen, "offwidth", size[0]), (screen, "offheight", size[1])]
+    values = zip(QUALITY_FIELDS, QUALITIES[preset], strict=True)
+    wanted += [(quality, name, value) for name, value in values]
+    kept = [(part, name, getattr(part, name)) for part, name, _ in wanted]
+    sizes = model.geom_size.copy()
     try:
+        for setting in wanted:
+            setattr(*setting)
+        for plane, floor in floors.items():
+            model.geom_size[plane] = floor.size
         yield
     finally:
-        model.geom_size[planes] = sizes
-        _write(kept)
-
-
-def _write(settings: list[tuple[Any, dict[str, int]]]) -> None:
-    for part, values in settings:
-        for name, value in values.items():
-            setattr(part, name, value)
+        model.geom_size[:] = sizes
+        for setting in kept:
+            setattr(*setting)

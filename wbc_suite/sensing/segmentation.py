@@ -28,10 +28,6 @@ class SegmentationLevel(StrEnum):
 class Labels:
     """Numbers of visible geoms, 1, 2, ...; 0 is the background.
 
-    Args:
-        model: The scene.
-        robots: The robots in it.
-
     Attributes:
         names: Name of each number, by level.
     """
