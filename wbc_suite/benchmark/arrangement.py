@@ -2,20 +2,37 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Protocol
+from typing import Annotated, Any, Protocol, TypeAlias, runtime_checkable
+
+from pydantic import AfterValidator, PositiveFloat
 
 from wbc_suite.errors import ConfigError
 from wbc_suite.robot import RobotDescription
+from wbc_suite.robot.shapes import Real
 from wbc_suite.scene import place_robot
 
 
+def _with_default(values: dict[str, Any]) -> dict[str, Any]:
+    if "default" not in values:
+        raise ValueError("an entry named 'default' is needed")
+    return values
+
+
+Places: TypeAlias = Annotated[
+    dict[str, tuple[Real, Real]], AfterValidator(_with_default)
+]
+"""Position of each robot, m; `default` is that of all others."""
+
+Opposed: TypeAlias = Annotated[dict[str, PositiveFloat], AfterValidator(_with_default)]
+"""Distance of each of two opposed robots from the middle, m; `default` likewise."""
+
+
+@runtime_checkable
 class TwoArmPlaces(Protocol):
     """Places of robots in the file of a two-arm benchmark; distances in m.
 
     Attributes:
-        name: Name of the benchmark.
-        places: Place of a single robot, and of two in parallel; `default` is for all
-            others.
+        places: Place of a single robot, and of two in parallel.
         opposed: Distance of each of two robots that face one another from the middle.
         apart: Distance of each of two robots in parallel from its place.
     """

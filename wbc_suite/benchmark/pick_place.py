@@ -38,13 +38,10 @@ class PickPlaceConfig(ObjectBenchmarkConfig):
 
     Attributes:
         pick_one: Whether each episode has one of the objects, drawn at reset.
-        objects: The objects to be sorted.
-        source: The bin where objects start.
         target: The bin with the quadrants.
-        region: Region of the first bin where objects start.
+        region: Region of the `source` bin where objects start.
         height: Largest height of a placed object above the floor of its bin, m.
         lift_height: Height to which lifting is rewarded, above the target bin, m.
-        stages: Numbers of the shaped reward.
     """
 
     pick_one: bool = False
@@ -62,9 +59,6 @@ class PickPlace(ObjectBenchmark):
 
     Source of geometry and reward: the benchmark of this name in robosuite 1.5, see
     `Lift`. Unlike there, an object that a hand still holds is not placed.
-
-    Args:
-        path: `tasks/pick_place.toml`, or a file of the same form.
     """
 
     def __init__(self, path: Path) -> None:
@@ -97,11 +91,8 @@ class PickPlace(ObjectBenchmark):
     def reset(self, rng: np.random.Generator) -> None:
         """Place the objects in the first bin; with `pick_one`, one of them."""
         self.park(self.sorting.draw(rng))
-        in_bin = UniformSampler(
-            names=self.sorting.active,
-            region=self.config.region,
-            origin=self.config.source.center,
-        )
+        region, origin = self.config.region, self.config.source.center
+        in_bin = UniformSampler(names=self.sorting.active, region=region, origin=origin)
         self.place_objects(rng, self.sampler or in_bin)
 
     def observables(self) -> dict[str, Reading]:

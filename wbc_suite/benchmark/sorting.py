@@ -8,7 +8,7 @@ import numpy as np
 
 from wbc_suite.benchmark.staged_reward import StagedReward
 from wbc_suite.scene.objects import ObjectState
-from wbc_suite.sensing.reading import Reading, constant, selected
+from wbc_suite.sensing.reading import Reading, computed, selected
 
 
 class SortingBenchmark(Protocol):
@@ -85,14 +85,12 @@ class Sorting:
         poses_of = self._benchmark.hand_poses_of
         if not self._pick_one:
             return poses_of({name: name for name in self._names})
-        each = [
-            poses_of({"obj": name}) | {"obj_id": constant(k)}
-            for k, name in enumerate(self._names)
-        ]
-        return {
+        each = [poses_of({"obj": name}) for name in self._names]
+        readings = {
             key: selected([poses[key] for poses in each], lambda: self.number)
             for key in each[0]
         }
+        return readings | {"obj_id": computed(1, lambda: self.number)}
 
     def is_placed(self, name: str) -> bool:
         """Whether an object lies at its place, and no hand is near or grasps it."""

@@ -54,9 +54,6 @@ class Stack(ObjectBenchmark):
 
     Source of geometry and reward: the benchmark of this name in robosuite 1.5, see
     `Lift`.
-
-    Args:
-        path: `tasks/stack.toml`, or a file of the same form.
     """
 
     def __init__(self, path: Path) -> None:

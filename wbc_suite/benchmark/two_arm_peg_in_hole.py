@@ -9,13 +9,9 @@ import mujoco
 import numpy as np
 from pydantic import Field, PositiveFloat, model_validator
 
-from wbc_suite.benchmark.arrangement import arrange_two_arms
+from wbc_suite.benchmark.arrangement import Opposed
 from wbc_suite.benchmark.base import load_config
-from wbc_suite.benchmark.object_benchmark import (
-    ObjectBenchmark,
-    ObjectBenchmarkConfig,
-    Opposed,
-)
+from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
 from wbc_suite.control import RobotState
 from wbc_suite.errors import ConfigError
 from wbc_suite.robot import RobotDescription
@@ -87,9 +83,6 @@ class TwoArmPegInHole(ObjectBenchmark):
 
     Source of geometry and reward: the benchmark of this name in robosuite 1.5, see
     `Lift`.
-
-    Args:
-        path: `tasks/two_arm_peg_in_hole.toml`, or a file of the same form.
     """
 
     robots: Sequence[str] = ("Panda", "Panda")
@@ -111,7 +104,7 @@ class TwoArmPegInHole(ObjectBenchmark):
                 "gripper_types at 'default', and describe robots without grippers; "
                 f"{' and '.join(gripping)} have one."
             )
-        return arrange_two_arms(self.config, robots, configuration)
+        return super().arrange(robots, configuration)
 
     def furnish(self, spec: mujoco.MjSpec) -> None:
         """Add cameras."""
@@ -127,13 +120,10 @@ class TwoArmPegInHole(ObjectBenchmark):
 
     def equip(self, spec: mujoco.MjSpec, robots: Sequence[RobotDescription]) -> None:
         """Fix peg and plate to the wrists, before the hands' frames."""
-        frames = [
-            robot_prefix(i) + frame
-            for i, robot in enumerate(robots)
-            for frame in robot.hands.values()
-        ]
-        for frame, attached in zip(frames, self.objects(), strict=True):
-            fix_to_frame(spec, attached, frame)
+        attached = iter(self.objects())
+        for i, robot in enumerate(robots):
+            for frame in robot.hands.values():
+                fix_to_frame(spec, next(attached), robot_prefix(i) + frame)
 
     def bind(
         self, model: mujoco.MjModel, data: mujoco.MjData, robots: Sequence[RobotState]
@@ -151,22 +141,15 @@ class TwoArmPegInHole(ObjectBenchmark):
     def _peg(self, radius: float) -> SceneObject:
         """Return a peg along z with its lower end at the wrist."""
         numbers = self.config.peg
-        rod = cylinder(
-            PEG, radius, numbers.half_length, color=numbers.color, material="wood"
-        )
-        at = (0.0, 0.0, numbers.half_length)
-        return rod.with_mass(numbers.mass).fixed(at)
+        half, color = numbers.half_length, numbers.color
+        rod = cylinder(PEG, radius, half, color=color, material="wood")
+        return rod.with_mass(numbers.mass).fixed((0.0, 0.0, half))
 
     def _plate(self) -> SceneObject:
         """Return a plate on a stem, parallel to z."""
         numbers = self.config.plate
-        plate = plate_with_hole(
-            PLATE,
-            half_size=numbers.half_size,
-            hole=numbers.hole,
-            half_thickness=numbers.half_thickness,
-            color=numbers.color,
-        )
+        sizes = numbers.model_dump(exclude={"mass", "stem"})
+        plate = plate_with_hole(PLATE, **sizes)
         half = numbers.stem / 2
         stem = Part(
             kind="box",
@@ -191,12 +174,9 @@ class TwoArmPegInHole(ObjectBenchmark):
 
     def observables(self) -> dict[str, Reading]:
         """Return poses of hole and peg, and their alignment."""
-        hole = body_position(self.states[PLATE].body)
-        peg = self.states[PEG].body
-        return {
-            "hole_pos": hole,
-            "hole_quat": body_quat(self.states[PLATE].body),
-            "peg_to_hole": offset(hole, body_position(peg)),
+        readings, peg = self.world_poses_of({"hole": PLATE}), self.states[PEG].body
+        return readings | {
+            "peg_to_hole": offset(readings["hole_pos"], body_position(peg)),
             "peg_quat": body_quat(peg),
             "angle": computed(1, lambda: self.alignment()[2]),
             "t": computed(1, lambda: self.alignment()[0]),
