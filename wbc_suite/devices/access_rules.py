@@ -38,9 +38,8 @@ def token_for(host: str) -> str | None:
 class AccessRules:
     """Decide which requests are admitted.
 
-    Args:
-        token: Secret that clients need; None admits those of this machine.
-        cookie: Name of the cookie that stands for the token.
+    Clients need the token; without one those of this machine are admitted. `cookie` is
+    the name of the cookie that stands for it.
     """
 
     def __init__(self, token: str | None, cookie: str) -> None:

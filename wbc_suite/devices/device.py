@@ -25,10 +25,9 @@ class Device(Protocol):
 
 
 class Scripted:
-    """A device without hardware: it returns given states, then the last one again.
+    """A device without hardware: one given state per read, then the last one again.
 
-    Args:
-        states: One state per read; may be an endless generator.
+    The states may be an endless generator.
     """
 
     def __init__(self, states: Iterable[DeviceState]) -> None:
@@ -77,10 +76,7 @@ def device_names() -> tuple[str, ...]:
 
 
 def find_device(name: str) -> Callable[..., Device]:
-    """Return the class or factory of a device.
-
-    Args:
-        name: Name of a device, or `module:Class`.
+    """Return the class or factory of a device by its name, or of `module:Class`.
 
     Raises:
         UnknownNameError: If there is no device of this name.

@@ -19,12 +19,8 @@ COLOURS = ((0.9, 0.3, 0.2, 0.5), (0.2, 0.5, 0.9, 0.5), (0.3, 0.7, 0.3, 0.5))
 class MjGui:
     """Boxes at the robot's limbs that are dragged: double click, then Ctrl and drag.
 
-    The window displays a copy of the scene with the boxes added.
-
-    Args:
-        env: Environment whose limbs are dragged.
-        launch: Opens a window on a model and its data; MuJoCo's passive viewer.
-        clock: Source of time, s.
+    The window displays a copy of the scene with the boxes added. `launch` opens a
+    window on a model and its data, by default MuJoCo's passive viewer.
     """
 
     help = "MuJoCo's window: double click a box, then Ctrl and drag.\n"
@@ -60,11 +56,10 @@ class MjGui:
         with self._viewer.lock():
             self._copy()
             mujoco.mj_kinematics(self._model, self._data)
-            limbs = {
-                port.name: LimbInput(pose=self._pose(k))
-                for k, port in enumerate(self._ports)
-            }
+            poses = [self._pose(k) for k in range(len(self._ports))]
         self._viewer.sync()
+        names = (port.name for port in self._ports)
+        limbs = {n: LimbInput(pose=T) for n, T in zip(names, poses, strict=True)}
         return DeviceState(time=self._clock(), limbs=limbs)
 
     def stop(self) -> None:

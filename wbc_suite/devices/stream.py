@@ -31,12 +31,9 @@ POLICY = (
 class Stream:
     """A device that listens: the first client that sends frames moves the robot.
 
-    It listens on 127.0.0.1 by default. On any other address clients need a token.
-
-    Args:
-        host: Address to listen on.
-        port: Port; 0 takes any free port.
-        tls: Whether to encrypt, with a key made on this machine; WebXR requires it.
+    It listens on 127.0.0.1 by default; on any other address clients need a token. Port
+    0 is any free one. `tls` encrypts with a key made on this machine, which WebXR
+    requires.
 
     Attributes:
         token: Secret that clients need; None on a loopback address.
@@ -75,12 +72,10 @@ class Stream:
             DeviceError: If the port is not available, or a key cannot be made.
         """
         routes = [web.get(path, self._send_page) for path in PAGES]
+        routes.append(web.get(SOCKET, self._receive))
+        tls = server_context() if self._tls else None
         self._server = WebServer(
-            self._host,
-            self._port,
-            [*routes, web.get(SOCKET, self._receive)],
-            token=self.token,
-            tls=server_context() if self._tls else None,
+            self._host, self._port, routes, token=self.token, tls=tls
         )
         self._port = self._server.port
 

@@ -35,13 +35,10 @@ class WebServer:
 
     Args:
         host: Address to listen on.
-        port: Port to listen on; 0 takes any free port.
+        port: Port to listen on; 0 takes any free one.
         routes: Handlers of admitted requests.
         token: Secret that clients need; None if `host` is a loopback address.
         tls: Server side of TLS; None for plain HTTP.
-
-    Attributes:
-        port: Port that is listened on.
 
     Raises:
         DeviceError: If the port is not available, or a token is missing.

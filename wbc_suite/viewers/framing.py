@@ -38,21 +38,17 @@ VIEWS: dict[ViewName, View] = {
 
 
 def fit_camera(view: View, points: Matrix, *, aspect: float) -> mujoco.MjvCamera:
-    """Return a free camera that has all points in its picture.
+    """Return a free camera that has all points, m, shape (n, 3), in its picture.
 
     In camera axes a point at offset (r, u, f) to the right, up and forward of the
     look-at point is inside when ``|u| <= (d + f) tan(fov / 2)`` and ``|r| <= aspect
-    (d + f) tan(fov / 2)``; d is the smallest distance at which all are.
-
-    Args:
-        view: The direction.
-        points: Points of the subject, m, world axes, shape (n, 3).
-        aspect: Width over height of the picture.
+    (d + f) tan(fov / 2)``; d is the smallest distance at which all are. `aspect` is the
+    width of the picture over its height.
     """
     azimuth, elevation = np.radians([view.azimuth, view.elevation])
-    level = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
-    forward = np.cos(elevation) * level + np.sin(elevation) * np.array([0.0, 0.0, 1.0])
     right = np.array([np.sin(azimuth), -np.cos(azimuth), 0.0])
+    level = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+    forward = np.append(np.cos(elevation) * level[:2], np.sin(elevation))
     axes = np.array([right, np.cross(right, forward), forward])
     local = points @ axes.T
     middle = (local.min(axis=0) + local.max(axis=0)) / 2.0
@@ -75,10 +71,10 @@ def subject_corners(
     Only bodies whose names start with the subject count.
     """
     signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8).T
-    seen = model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE
-    seen &= model.geom_group < 3  # hidden by default in MuJoCo's viewers
-    names = (model.body(body).name for body in model.geom_bodyid)
-    seen &= np.array([name.startswith(subject) for name in names])
+    names = [model.body(body).name for body in model.geom_bodyid]
+    seen = np.array([name.startswith(subject) for name in names])
+    seen &= model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE
+    seen &= model.geom_group < 3  # others are hidden by default in MuJoCo's viewers
     centre, half = model.geom_aabb[seen, :3], model.geom_aabb[seen, 3:]
     local = centre[:, None] + signs * half[:, None]
     rotation = data.geom_xmat[seen].reshape(-1, 3, 3)

@@ -16,30 +16,13 @@ from wbc_suite.viewers.framing import VIEWS, View, ViewName, fit_camera, subject
 if TYPE_CHECKING:
     from wbc_suite.robot import RobotDescription
 
-__all__ = [
-    "VIEWS",
-    "Camera",
-    "Image",
-    "Mark",
-    "View",
-    "add_studio",
-    "render_model",
-    "render_robot",
-]
-
 Image: TypeAlias = NDArray[np.uint8]
 """Picture, shape (height, width, 3), RGB."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Mark:
-    """A sphere that is drawn but not simulated.
-
-    Attributes:
-        position: Centre in the world, m, shape (3,).
-        rgba: Colour and opacity.
-        radius: m.
-    """
+    """A sphere that is drawn but not simulated; position in the world and radius, m."""
 
     position: Vector
     rgba: tuple[float, float, float, float] = (0.10, 0.55, 0.95, 0.6)
@@ -56,12 +39,8 @@ def render_robot(
 ) -> Image:
     """Return a picture of a robot at one of its keyframes, in the studio.
 
-    Args:
-        robot: Robot to draw.
-        view: A view, or its name in `VIEWS`.
-        keyframe: A key of ``robot.keyframes``.
-        size: Width and height in pixels.
-        preset: Quality; see `make_renderer`.
+    `view` is a view or its name in `VIEWS`, `size` the width and height in pixels; for
+    `preset` see `make_renderer`.
 
     Raises:
         UnknownNameError: If there is no such keyframe or view.
@@ -71,10 +50,9 @@ def render_robot(
     spec = robot.to_mjspec()
     ground = float(subject_corners(*_pose(spec, posture))[:, 2].min())
     add_studio(spec, ground=ground)
-    model, data = _pose(spec, posture)
     width, height = size
     return render_model(
-        model, data, width=width, height=height, camera=view, preset=preset
+        *_pose(spec, posture), width=width, height=height, camera=view, preset=preset
     )
 
 
@@ -114,8 +92,8 @@ class Camera:
         data: State at which the camera is fitted to the subject; positions are those of
             the last `mujoco.mj_forward`.
         view: A `View`, its name in `VIEWS`, or the name of a camera of the model.
-        width: Of the picture, in pixels.
-        height: Of the picture, in pixels.
+        width: Width of the picture, pixels.
+        height: Height of the picture, pixels.
         preset: Quality; see `make_renderer`.
         subject: Prefix of the bodies that the picture has to contain; all by default.
 
@@ -135,25 +113,16 @@ class Camera:
         preset: RenderPreset | str | None = None,
         subject: str = "",
     ) -> None:
-        found = _find_view(model, view)
-        self._view = found if isinstance(found, View) else None
-        self._camera: mujoco.MjvCamera | str = (
-            fit_camera(
-                found, subject_corners(model, data, subject), aspect=width / height
-            )
-            if isinstance(found, View)
-            else found
-        )
+        self._view = _find_view(model, view)
+        self._camera: mujoco.MjvCamera | str = str(view)
+        if self._view is not None:
+            corners = subject_corners(model, data, subject)
+            self._camera = fit_camera(self._view, corners, aspect=width / height)
         self._fov = float(model.vis.global_.fovy)
         self._renderer = make_renderer(model, width=width, height=height, preset=preset)
 
     def take(self, data: mujoco.MjData, marks: Sequence[Mark] = ()) -> Image:
-        """Return a picture, with marks that are not in the simulation.
-
-        Args:
-            data: The state; positions are those of the last `mujoco.mj_forward`.
-            marks: Spheres to add.
-        """
+        """Return a picture of a state after `mujoco.mj_forward`, with marks added."""
         self._renderer.update_scene(data, self._camera)
         scene = self._renderer.scene
         if self._view is not None:
@@ -184,9 +153,7 @@ class Camera:
 def add_studio(spec: mujoco.MjSpec, *, ground: float = 0.0) -> None:
     """Add background, ground, and key, fill and rim light to a scene.
 
-    Args:
-        spec: Changed in place; compile it afterwards.
-        ground: Height of the floor, m.
+    Compile it afterwards. `ground` is the height of the floor, m.
     """
     spec.add_texture(
         name="studio_sky",
@@ -232,15 +199,14 @@ def add_studio(spec: mujoco.MjSpec, *, ground: float = 0.0) -> None:
         )
 
 
-def _find_view(model: mujoco.MjModel, camera: View | str) -> View | str:
-    if isinstance(camera, View):
-        return camera
-    if camera in VIEWS:
-        return VIEWS[camera]
+def _find_view(model: mujoco.MjModel, view: View | str) -> View | None:
+    """Return a view, or None for the name of a camera of the model."""
+    if isinstance(view, View) or view in VIEWS:
+        return view if isinstance(view, View) else VIEWS[view]
     cameras = [model.camera(i).name for i in range(model.ncam)]
-    if camera not in cameras:
-        raise UnknownNameError("view or camera", camera, [*VIEWS, *cameras])
-    return camera
+    if view not in cameras:
+        raise UnknownNameError("view or camera", view, [*VIEWS, *cameras])
+    return None
 
 
 def _set_field_of_view(scene: mujoco.MjvScene, old: float, new: float) -> None:

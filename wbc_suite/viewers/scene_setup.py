@@ -74,9 +74,7 @@ def set_up_scene(server: "viser.ViserServer", *, label: str) -> None:
 def set_camera(server: "viser.ViserServer", box: tuple[Vector, Vector]) -> None:
     """Point the cameras of new clients at a box, from its front right and above.
 
-    Args:
-        server: Server of the clients.
-        box: Corners with the smallest and the largest coordinates, shape (3,), m.
+    Its two corners have the smallest and the largest coordinates, shape (3,), m.
     """
     position, look_at = _camera(box, VIEWS["Front"])
     server.initial_camera.position = tuple(position)
@@ -111,13 +109,9 @@ def add_plot(
     *,
     height: int = 150,
 ) -> "viser.GuiUplotHandle":
-    """Add a plot over the time in s, without data.
+    """Add a plot over the time in s, without data; its height is in pixels.
 
-    Args:
-        server: Server of the page.
-        title: Title of the plot.
-        curves: Colour of each curve in CSS notation, by its label.
-        height: In pixels.
+    `curves` is the colour of each curve in CSS notation, by its label.
     """
     lines = [{"label": k, "stroke": c, "width": 2} for k, c in curves.items()]
     return server.gui.add_uplot(

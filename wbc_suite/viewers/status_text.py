@@ -57,12 +57,7 @@ def _describe_limit(limit: ActiveLimit) -> str:
 
 
 def explain(status: LimbStatus, *, at_most: int = 3) -> str:
-    """Return why a limb is not at its target; empty if it is, or moves there.
-
-    Args:
-        status: State of the limb.
-        at_most: Number of reasons to name.
-    """
+    """Return why a limb is not at its target; empty if it is, or moves there."""
     error = _tracking_error(status)
     reasons = [r for r in status.reasons if not is_transient(r)]
     if status.reached or not error or (status.reasons and not reasons):
