@@ -7,7 +7,6 @@ outside of the picture too; here floors are coarse and such geoms are left out.
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Self, TypeAlias
 
@@ -228,37 +227,26 @@ class Renderer:
         """Scale the textures of coarse floors to the size that MuJoCo draws."""
         for geom in self.scene.geoms[: self.scene.ngeom]:
             if geom.type == PLANE and geom.objid in self._floors:
-                geom.texrepeat[:] *= self._floors[geom.objid].repeats
+                geom.texrepeat[:] *= self._floors[geom.objid][:2]
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Floor:
-    """An infinite plane drawn as a finite one, which stays below the camera.
+def coarse_floors(model: mujoco.MjModel) -> dict[int, Array]:
+    """Return the size of the finite plane drawn for each infinite one, by its geom.
 
-    Attributes:
-        size: Half sides and half a piece's, m, as a plane's size in MJCF.
-        repeats: Factors on the material's repeats. MuJoCo spans a finite plane by its
-            texture, and an infinite one every 2 m.
+    The plane reaches beyond the horizon and its middle is a corner of the texture. Its
+    size has half sides and half a piece's, m, as in MJCF. MuJoCo spans a finite plane
+    by its texture, and an infinite one every 2 m: half sides are factors on repeats.
     """
-
-    size: tuple[float, float, float]
-    repeats: tuple[float, float]
-
-
-def coarse_floors(model: mujoco.MjModel) -> dict[int, Floor]:
-    """Return the finite plane drawn for each infinite one of a model, by its geom."""
     infinite = (model.geom_type == PLANE) & (model.geom_size[:, :2] <= 0.0).all(1)
-    return {int(i): _floor(model, int(i)) for i in np.flatnonzero(infinite)}
-
-
-def _floor(model: mujoco.MjModel, geom: int) -> Floor:
-    """Make a plane to beyond the horizon whose middle is a corner of the texture."""
-    material = int(model.geom_matid[geom])
-    repeat = np.ones(2) if material < 0 else np.array(model.mat_texrepeat[material])
-    period = 4.0 / np.where(repeat > 0.0, repeat, 1.0)  # m; half a plane holds n
     far = 1.1 * float(model.vis.map.zfar) * float(model.stat.extent)
-    x, y = (np.ceil(far / period) * period).tolist()
-    return Floor(size=(x, y, max(x, y) / PIECES), repeats=(x, y))
+    floors = {}
+    for geom in np.flatnonzero(infinite).tolist():
+        material = int(model.geom_matid[geom])
+        repeat = np.ones(2) if material < 0 else model.mat_texrepeat[material]
+        period = 4.0 / np.where(repeat > 0.0, repeat, 1.0)  # m; half a plane holds n
+        half = np.ceil(far / period) * period
+        floors[geom] = np.append(half, half.max() / PIECES)
+    return floors
 
 
 def outside(
@@ -292,12 +280,12 @@ def _beside(across: Array, z: Array, half_angle: float) -> Array:
 def _settings_of(
     model: mujoco.MjModel,
     preset: RenderPreset,
-    floors: dict[int, Floor],
-    size: tuple[int, int],
+    floors: dict[int, Array],
+    picture: tuple[int, int],
 ) -> Iterator[None]:
     """Write settings into the model, where a new context reads them once."""
     screen, quality = model.vis.global_, model.vis.quality
-    wanted = [(screen, "offwidth", size[0]), (screen, "offheight", size[1])]
+    wanted = [(screen, "offwidth", picture[0]), (screen, "offheight", picture[1])]
     values = zip(QUALITY_FIELDS, QUALITIES[preset], strict=True)
     wanted += [(quality, name, value) for name, value in values]
     kept = [(part, name, getattr(part, name)) for part, name, _ in wanted]
@@ -305,8 +293,8 @@ def _settings_of(
     try:
         for setting in wanted:
             setattr(*setting)
-        for plane, floor in floors.items():
-            model.geom_size[plane] = floor.size
+        for plane, size in floors.items():
+            model.geom_size[plane] = size
         yield
     finally:
         model.geom_size[:] = sizes
