@@ -22,7 +22,6 @@ class Benchmark(Protocol):
     """A task: a scene, start states, a reward and a success; no controller.
 
     Attributes:
-        name: Its name.
         horizon: Default number of actions in an episode.
         robots: Default robots.
         gripper: Default gripper of the robots; None for their own.

@@ -71,10 +71,12 @@ class NutAssembly(ObjectBenchmark):
         super().__init__(config)
         self.sorting = Sorting(
             self,
-            config.nuts,
-            pick_one=config.pick_one,
+            {name: self.goal(name) for name in config.nuts},
+            within=lambda dx, dy: math.hypot(dx, dy) < config.aside,
+            grip=lambda name: self.site(f"{name}_handle"),
+            floor=config.table.center[2],
+            **config.model_dump(include={"height", "lift_height", "pick_one"}),
             stages=config.stages,
-            lifted=config.table.center[2] + config.lift_height,
         )
 
     def furnish(self, spec: mujoco.MjSpec) -> None:
@@ -121,20 +123,6 @@ class NutAssembly(ObjectBenchmark):
         pegs = self.config.pegs
         dx, dy = pegs.square if name == "SquareNut" else pegs.round
         return x + dx, y + dy
-
-    def lies(self, name: str) -> bool:
-        """Whether a nut lies around its peg."""
-        height = self.states[name].position.item(2) - self.config.table.center[2]
-        return 0.0 < height < self.config.height and self.is_over(name)
-
-    def is_over(self, name: str) -> bool:
-        """Whether the middle of a nut is near the axis of its peg."""
-        x, y, _ = self.states[name].position.tolist()
-        return math.dist((x, y), self.goal(name)) < self.config.aside
-
-    def nearest_hand(self, name: str) -> float:
-        """Return the distance of the nearest hand to the handle of a nut, m."""
-        return self.distance(self.site(f"{name}_handle"))
 
     def success(self) -> bool:
         """Whether each nut lies around its peg; see `Sorting`."""

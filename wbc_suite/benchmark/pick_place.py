@@ -64,12 +64,15 @@ class PickPlace(ObjectBenchmark):
     def __init__(self, path: Path) -> None:
         self.config = config = load_config(PickPlaceConfig, path)
         super().__init__(config)
+        length, width, _ = config.target.size
         self.sorting = Sorting(
             self,
-            config.objects,
-            pick_one=config.pick_one,
+            {name: self.goal(name) for name in config.objects},
+            within=lambda dx, dy: abs(dx) < length / 4 and abs(dy) < width / 4,
+            grip=lambda name: self.states[name].position,
+            floor=config.target.center[2],
+            **config.model_dump(include={"height", "lift_height", "pick_one"}),
             stages=config.stages,
-            lifted=config.target.center[2] + config.lift_height,
         )
 
     def furnish(self, spec: mujoco.MjSpec) -> None:
@@ -105,22 +108,6 @@ class PickPlace(ObjectBenchmark):
         length, width, _ = self.config.target.size
         side, end = QUADRANTS[name]
         return x + side * length / 4, y + end * width / 4
-
-    def lies(self, name: str) -> bool:
-        """Whether an object is low in its quadrant."""
-        height = self.states[name].position.item(2) - self.config.target.center[2]
-        return self.is_over(name) and 0.0 < height < self.config.height
-
-    def is_over(self, name: str) -> bool:
-        """Whether the origin of an object is in its quadrant, or above it."""
-        x, y, _ = self.states[name].position.tolist()
-        gx, gy = self.goal(name)
-        length, width, _ = self.config.target.size
-        return abs(x - gx) < length / 4 and abs(y - gy) < width / 4
-
-    def nearest_hand(self, name: str) -> float:
-        """Return the distance of the nearest hand to an object, m."""
-        return self.distance(self.states[name].position.tolist())
 
     def success(self) -> bool:
         """Whether each object lies in its quadrant; see `Sorting`."""

@@ -92,12 +92,8 @@ class SpaceMouse:
     """One SpaceMouse for the selected hand, or one for each hand.
 
     The left button closes and opens the gripper. The right one selects the next hand,
-    or moves all hands home if each has a mouse.
-
-    Args:
-        hands: Limb of each mouse, in the order in which they are found.
-        find: Opens all connected mice.
-        clock: Source of time, s.
+    or moves all hands home if each has a mouse. `hands` has the limb of each mouse, in
+    the order in which they are found.
     """
 
     help = "SpaceMouse: left button closes and opens, right button: next hand.\n"

@@ -66,11 +66,7 @@ class Stream:
         return f"Stream: open {self.url} in a browser, or send pose frames.\n"
 
     def start(self) -> None:
-        """Listen.
-
-        Raises:
-            DeviceError: If the port is not available, or a key cannot be made.
-        """
+        """Listen; for errors see `WebServer` and `server_context`."""
         routes = [web.get(path, self._send_page) for path in PAGES]
         routes.append(web.get(SOCKET, self._receive))
         tls = server_context() if self._tls else None

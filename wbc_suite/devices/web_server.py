@@ -33,12 +33,8 @@ class WebServer:
     aiohttp limits the size of request lines and header fields (8 kB each). Connections
     beyond `CONNECTIONS`, and those without a request for `HEAD_TIMEOUT`, are closed.
 
-    Args:
-        host: Address to listen on.
-        port: Port to listen on; 0 takes any free one.
-        routes: Handlers of admitted requests.
-        token: Secret that clients need; None if `host` is a loopback address.
-        tls: Server side of TLS; None for plain HTTP.
+    Port 0 is any free one. `token` is the secret that clients need; None if `host` is a
+    loopback address. Without `tls` it is plain HTTP.
 
     Raises:
         DeviceError: If the port is not available, or a token is missing.

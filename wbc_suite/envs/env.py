@@ -212,12 +212,10 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
     def reset_to(self, physics: ArrayLike) -> Observation:
         """Start an episode at a physics state: time, qpos, qvel in one vector.
 
-        All else, such as sizes of objects, is drawn as at a reset.
-
-        Raises:
-            ConfigError: If its size is wrong, or a value is not finite.
+        All else, such as sizes of objects, is drawn as at a reset. For errors see
+        `write_physics`.
         """
-        self._start(self.np_random, np.array(physics, dtype=np.float64))
+        self._start(self.np_random, physics)
         return self.observation()
 
     def begin_at(
@@ -226,7 +224,7 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         """Start an episode like another one; see `beginning`."""
         rng = np.random.default_rng(0)
         rng.bit_generator.state = dict(began_with)
-        self._start(rng, None if placed is None else np.array(placed, dtype=np.float64))
+        self._start(rng, placed)
 
     @property
     def made_of(self) -> tuple[Any, dict[str, Any]]:
@@ -256,8 +254,9 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         self.observables.prepare(state["state"].observables)
         self.set_state(state["state"])
 
-    def _start(self, rng: np.random.Generator, placed: Vector | None = None) -> None:
+    def _start(self, rng: np.random.Generator, given: ArrayLike | None = None) -> None:
         """Bring robots, objects and controllers to the start of an episode."""
+        placed = None if given is None else np.array(given, dtype=np.float64)
         self.beginning: tuple[Mapping[str, Any], Vector | None]
         self.beginning = rng.bit_generator.state, placed
         self._taken: list[Vector] = []

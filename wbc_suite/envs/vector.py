@@ -131,11 +131,7 @@ class VectorRobotEnv(SyncVectorEnv[Observations, Array]):
         )
 
     def set_attr(self, name: str, values: Any) -> None:
-        """Set an attribute of each environment: a list has a value for each.
-
-        Raises:
-            ConfigError: If there are more or fewer values than environments.
-        """
+        """Set an attribute of each environment: a list must have a value for each."""
         if isinstance(values, list | tuple) and len(values) != self.num_envs:
             raise ConfigError(
                 f"set_attr: {len(values)} values for {self.num_envs} environments."

@@ -32,9 +32,6 @@ class PhysicsWatch:
     them, that names the array or the warning. The warnings' own texts go to `logging`,
     unless the process has its own handler, not to a file in the working folder.
 
-    Args:
-        data: The simulation's data.
-
     Attributes:
         state: The checked arrays, for the control loop.
     """

@@ -20,13 +20,7 @@ Picture = NDArray[Any]
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class CameraRequest:
-    """An observed camera; sizes in pixels.
-
-    Attributes:
-        name: Name of the camera; keys start with it.
-        depth: Whether depth is observed.
-        segmentations: Observed levels of segmentation.
-    """
+    """An observed camera; its name starts the keys, sizes are in pixels."""
 
     name: str
     width: int
@@ -41,17 +35,10 @@ class CameraRequest:
 
 
 class Cameras:
-    """Takes pictures of a simulation.
+    """Takes pictures of a simulation; for `preset` see `make_renderer`.
 
     Renderers are made when they are first used, one for each size of picture, and
     belong to the first thread that draws. Row 0 of a picture is its upper edge.
-
-    Args:
-        model: The scene.
-        data: Its state.
-        robots: The robots in it.
-        requests: The observed cameras.
-        preset: Quality of pictures; see `make_renderer`.
 
     Attributes:
         labels: Numbers of segmentations, and their names.

@@ -43,10 +43,8 @@ _PROBE_SECONDS = 60.0
 class GlBackend:
     """A backend that drew a picture on this machine.
 
-    Attributes:
-        name: ``egl``, ``osmesa``, ``wheel`` (OSMesa of the wheel lavavu-osmesa),
-            ``cgl``, or the value of ``MUJOCO_GL``.
-        renderer: OpenGL's name of the renderer, ``GL_RENDERER``.
+    Its name is ``egl``, ``osmesa``, ``wheel`` (OSMesa of the wheel lavavu-osmesa),
+    ``cgl``, or the value of ``MUJOCO_GL``; its renderer is OpenGL's ``GL_RENDERER``.
     """
 
     name: str

@@ -15,15 +15,10 @@ def pairs_in_contact(data: mujoco.MjData) -> list[list[int]]:
 
 
 class Hand:
-    """One hand: the site between its fingers, and the bodies of its gripper.
-
-    Args:
-        state: The robot in the simulation.
-        name: `right`, `left`, or the frame's own name.
-        frame: The frame between the fingers.
-        links: Links of the gripper.
+    """One hand: the frame between its fingers, and the links of its gripper.
 
     Attributes:
+        name: `right`, `left`, or the frame's own name.
         site: The frame's site in the simulation.
         position: Position of the frame in the world, m. A view.
         gripper_bodies: Bodies of the gripper, with the one it is mounted on.

@@ -27,11 +27,10 @@ Maker: TypeAlias = Callable[[mujoco.MjModel, mujoco.MjData], Reading]
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Change:
-    """How an observation differs from the true value.
+    """How an observation differs from the true value; see `sensing.noise`.
 
     Attributes:
-        noise: Function of values and a generator that returns noisy values.
-        delay: Delay, s, or a function that draws one for each sample.
+        delay: s, or a function that draws one for each sample.
         filter: Function that returns filtered values; its `reset` is called at a reset.
         sampling_rate: Samples per second; None for one per physics step.
         enabled: Whether samples are taken; otherwise the last value is kept.
@@ -59,12 +58,7 @@ class Change:
 
 
 class Observables:
-    """All observations of one simulation but pictures.
-
-    Args:
-        model: The scene.
-        data: Its state.
-        groups: Readings by key, by the group's key.
+    """All observations of one simulation but pictures, by key, by the group's key.
 
     Attributes:
         buffer: The last observation; a new one after keys were added or removed.
@@ -112,14 +106,10 @@ class Observables:
         self._connect(key)
 
     def add(self, key: str, make: Maker, *, group: str, **changes: Any) -> None:
-        """Add an observation from now on.
+        """Add an observation with a new key from now on; for `changes` see `modify`.
 
-        Args:
-            key: A new key.
-            make: Function of model and data that returns the reading; copies of the
-                environment call it again.
-            group: Key of the vector that includes it; it may be new.
-            changes: See `modify`.
+        `make` returns the reading of model and data; copies of the environment call it
+        again. `group` is the key of the vector that includes it; it may be new.
 
         Raises:
             ConfigError: If the key is taken.

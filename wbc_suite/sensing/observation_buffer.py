@@ -20,11 +20,8 @@ class ObservationBuffer:
     """Reads all observations but pictures from a simulation.
 
     Readings follow one another in one buffer, group by group: a group's key names all
-    of its readings, as `object-state` names all readings of objects.
-
-    Args:
-        data: State of the simulation.
-        groups: Readings by key, by the group's key; empty groups are left out.
+    of its readings, as `object-state` names all readings of objects. Empty groups are
+    left out.
 
     Attributes:
         values: All readings of the last `update`, shape (size,). A buffer.

@@ -24,8 +24,6 @@ class Projection:
     Attributes:
         K: Intrinsics, pixels, shape (3, 3): (u, v, 1) ~ K (x, y, z).
         T_wc: Extrinsics: pose of the camera in the world, shape (4, 4).
-        width: Width of the picture, pixels.
-        height: Height of the picture, pixels.
     """
 
     K: Matrix
@@ -67,11 +65,9 @@ class Projection:
         return pixels, depth
 
     def to_world(self, pixels: ArrayLike, depth: ArrayLike) -> Array:
-        """Return the points of the world at pixels.
+        """Return the points of the world at pixels (u, v), shape (..., 2).
 
-        Args:
-            pixels: (u, v), shape (..., 2).
-            depth: Distance along the camera's axis, m, shape (...).
+        `depth` is the distance along the camera's axis, m, shape (...).
         """
         rays = np.asarray(pixels, dtype=np.float64) - self.K[:2, 2]
         rays = np.concatenate(

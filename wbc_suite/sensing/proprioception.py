@@ -84,11 +84,8 @@ def _gripper_groups(robot: RobotDescription) -> dict[str, tuple[str, ...]]:
 def _body_joints(robot: RobotDescription) -> tuple[str, ...]:
     """Return the independent joints but those of grippers, in the robot's order."""
     fingers = {joint for joints in _gripper_groups(robot).values() for joint in joints}
-    return tuple(
-        joint.name
-        for joint in robot.joints
-        if joint.name not in fingers and joint.mimic is None
-    )
+    own = (joint.name for joint in robot.joints if joint.mimic is None)
+    return tuple(name for name in own if name not in fingers)
 
 
 def add_contact_sensors(

@@ -25,9 +25,7 @@ XYZW = np.array([1, 2, 3, 0])
 class Reading:
     """Some values of the simulation.
 
-    Attributes:
-        size: Number of values.
-        bind: Returns the function that reads them from one simulation's data.
+    `bind` returns the function that reads them from one simulation's data.
     """
 
     size: int

@@ -63,10 +63,7 @@ class PlayerStatus:
 class EpisodePlayer:
     """Play episodes one after the other; commands may come from any thread.
 
-    Args:
-        names: Names of the episodes.
-        load: Loads one; called in the thread that calls `advance`.
-        clock: Source of time, s.
+    `load` loads one by its name, in the thread that calls `advance`.
     """
 
     def __init__(

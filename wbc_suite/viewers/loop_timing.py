@@ -27,11 +27,6 @@ class LoopTimer:
             timer.finish_step()
         timer.stop()
 
-    Args:
-        period: Time between two steps, s.
-        clock: Source of wall time, s.
-        sleep: Suspends the thread for a time, s.
-
     Attributes:
         idle: Set while the loop sleeps between two ticks or does not run. Other threads
             then take Python's lock without delaying it.

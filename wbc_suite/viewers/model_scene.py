@@ -27,12 +27,7 @@ DEFAULT_COLOR = (0.5, 0.5, 0.5, 1.0)
 
 
 class ModelScene:
-    """Draws the geoms of a model and moves them.
-
-    Args:
-        server: Server whose scene is drawn on.
-        model: Model to draw; static geoms are drawn, planes are not.
-    """
+    """Draws the geoms of a model but planes, static ones included, and moves them."""
 
     def __init__(self, server: "viser.ViserServer", model: mujoco.MjModel) -> None:
         self._server = server

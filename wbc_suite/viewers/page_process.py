@@ -70,16 +70,12 @@ class PageProcess:
         self._thread.start()
 
     def wait(self) -> None:
-        """Wait until the page can be opened.
-
-        Raises:
-            DeviceError: If the port is not available, or the page's process ended.
-        """
+        """Wait until the page can be opened; see `check`."""
         self._opened.wait()
         self.check()
 
     def check(self) -> None:
-        """Raise a `DeviceError` if the page's process ended by itself."""
+        """Raise a `DeviceError` if the port is not available, or the process ended."""
         if self._error:
             raise DeviceError(self._error)
 

@@ -40,9 +40,8 @@ WebSocket: TypeAlias = web.WebSocketResponse | aiohttp.ClientWebSocketResponse
 class PageServer:
     """A viser server, the proxy in front of it, and the address that opens the page.
 
-    Args:
-        host: Address to listen on. Any but a loopback address creates a token.
-        port: Port to listen on; 0 takes any free port, None the first free of `PORTS`.
+    Any host but a loopback address creates a token. Port 0 is any free one, None the
+    first free of `PORTS`.
 
     Attributes:
         server: The viser server.

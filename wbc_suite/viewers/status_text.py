@@ -28,8 +28,16 @@ def plain(name: str) -> str:
 def describe_reason(reason: Reason) -> str:
     """Return one of the controller's reasons as part of a sentence."""
     match reason:
-        case ActiveLimit():
-            return _describe_limit(reason)
+        case ActiveLimit(kind=LimitKind.POSITION, subject=joint, side=side):
+            return f"{plain(str(joint))} is at its {side} limit"
+        case ActiveLimit(kind=LimitKind.VELOCITY, subject=joint):
+            return f"{plain(str(joint))} is at its velocity limit"
+        case ActiveLimit(
+            kind=LimitKind.SELF_COLLISION, subject=LinkPair(first, second)
+        ):
+            return f"{plain(first)} would touch {plain(second)}"
+        case ActiveLimit(kind=LimitKind.FLOOR, subject=link):
+            return f"{plain(str(link))} would touch the floor"
         case Conflict(other):
             return f"conflict with {plain(other)}"
         case Contact(link, other):
@@ -41,19 +49,6 @@ def describe_reason(reason: Reason) -> str:
         case OutOfReach():
             return "out of reach"
     return str(reason)
-
-
-def _describe_limit(limit: ActiveLimit) -> str:
-    match limit.kind, limit.subject:
-        case LimitKind.POSITION, joint:
-            return f"{plain(str(joint))} is at its {limit.side} limit"
-        case LimitKind.VELOCITY, joint:
-            return f"{plain(str(joint))} is at its velocity limit"
-        case LimitKind.SELF_COLLISION, LinkPair(first, second):
-            return f"{plain(first)} would touch {plain(second)}"
-        case LimitKind.FLOOR, link:
-            return f"{plain(str(link))} would touch the floor"
-    return str(limit)
 
 
 def explain(status: LimbStatus, *, at_most: int = 3) -> str:
