@@ -51,8 +51,7 @@ class DoorConfig(ObjectBenchmarkConfig):
 class Door(ObjectBenchmark):
     """A door with a lever is to be opened.
 
-    Source of geometry and reward: the benchmark of this name in robosuite 1.5, see
-    `Lift`.
+    Source of geometry and reward: robosuite 1.5, see `Lift`.
     """
 
     needs_gripper = False  # a lever can be pushed down, and the door pulled, without

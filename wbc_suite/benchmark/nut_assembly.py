@@ -62,8 +62,7 @@ class NutAssemblyConfig(ObjectBenchmarkConfig):
 class NutAssembly(ObjectBenchmark):
     """Each nut is to lie around its peg, the hand withdrawn.
 
-    Source of geometry and reward: the benchmark of this name in robosuite 1.5, see
-    `Lift`.
+    Source of geometry and reward: robosuite 1.5, see `Lift`.
     """
 
     def __init__(self, path: Path) -> None:

@@ -192,9 +192,7 @@ class ObjectBenchmark(ABC):
     def poses_of(self, names: Iterable[str], to: str = "") -> dict[str, Reading]:
         """Return poses of objects by key, and their offsets from each hand.
 
-        Args:
-            names: The objects.
-            to: End of the offsets' keys: `_pos` where existing datasets have it.
+        `to` is the end of the offsets' keys: `_pos` where existing datasets have it.
         """
         names = tuple(names)
         readings = self.world_poses_of({name: name for name in names})
@@ -205,13 +203,10 @@ class ObjectBenchmark(ABC):
         return readings
 
     def hand_poses_of(self, names: Mapping[str, str]) -> dict[str, Reading]:
-        """Return poses of objects in the world and in the frames of the hands.
+        """Return poses of objects, by label, in the world and in the hands' frames.
 
         Keys are those of existing datasets: `{label}_pos`, `{label}_quat`, and
         `{label}_to_robot0_eef_pos`, `_quat`; quaternions are x y z w.
-
-        Args:
-            names: Name of each object, by its label in keys.
         """
         readings = self.world_poses_of(names)
         for label, name in names.items():

@@ -57,8 +57,8 @@ class PickPlaceConfig(ObjectBenchmarkConfig):
 class PickPlace(ObjectBenchmark):
     """Each object is to lie in its own quadrant of the second bin, the hand withdrawn.
 
-    Source of geometry and reward: the benchmark of this name in robosuite 1.5, see
-    `Lift`. Unlike there, an object that a hand still holds is not placed.
+    Source of geometry and reward: robosuite 1.5, see `Lift`. Unlike there, an
+    object that a hand still holds is not placed.
     """
 
     def __init__(self, path: Path) -> None:

@@ -57,8 +57,7 @@ class ToolHangConfig(ObjectBenchmarkConfig):
 class ToolHang(ObjectBenchmark):
     """The frame is to stand in its stand, and the wrench to hang on the frame's hook.
 
-    Source of the task: the benchmark of this name in robosuite 1.5, see `Lift`, which
-    has no shaped reward for it.
+    Source of the task: robosuite 1.5, see `Lift`; no shaped reward there.
     """
 
     def __init__(self, path: Path) -> None:

@@ -60,8 +60,7 @@ class TwoArmHandover(ObjectBenchmark):
     `data.userdata[0]` is 1 once both have held it in the air. Otherwise an arm that
     takes the hammer from the table by itself would succeed.
 
-    Source of geometry and reward: the benchmark of this name in robosuite 1.5, see
-    `Lift`.
+    Source of geometry and reward: robosuite 1.5, see `Lift`.
     """
 
     robots: Sequence[str] = ("Panda", "Panda")

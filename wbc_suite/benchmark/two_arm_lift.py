@@ -72,8 +72,8 @@ class TwoArmLift(ObjectBenchmark):
 
     Arm 0 grasps `handle0`, which starts towards -y, and arm 1 `handle1`.
 
-    Source of geometry and reward: the benchmark of this name in robosuite 1.5, see
-    `Lift`. Unlike there, both hands must hold the pot.
+    Source of geometry and reward: robosuite 1.5, see `Lift`. Unlike there, both
+    hands must hold the pot.
     """
 
     robots: Sequence[str] = ("Panda", "Panda")

@@ -12,7 +12,6 @@ from pydantic import Field, PositiveFloat, model_validator
 from wbc_suite.benchmark.arrangement import Opposed
 from wbc_suite.benchmark.base import load_config
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
-from wbc_suite.control import RobotState
 from wbc_suite.errors import ConfigError
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.elements import Rgba
@@ -81,8 +80,7 @@ class TwoArmPegInHoleConfig(ObjectBenchmarkConfig):
 class TwoArmPegInHole(ObjectBenchmark):
     """The peg on the wrist of arm 0 is to go through the plate on that of arm 1.
 
-    Source of geometry and reward: the benchmark of this name in robosuite 1.5, see
-    `Lift`.
+    Source of geometry and reward: robosuite 1.5, see `Lift`.
     """
 
     robots: Sequence[str] = ("Panda", "Panda")
@@ -125,14 +123,6 @@ class TwoArmPegInHole(ObjectBenchmark):
             for frame in robot.hands.values():
                 fix_to_frame(spec, next(attached), robot_prefix(i) + frame)
 
-    def bind(
-        self, model: mujoco.MjModel, data: mujoco.MjData, robots: Sequence[RobotState]
-    ) -> None:
-        """Look up the poses of peg and plate."""
-        super().bind(model, data, robots)
-        peg, plate = self.states[PEG], self.states[PLATE]
-        self._poses = peg.position, peg.rotation, plate.position, plate.rotation
-
     def reset(self, rng: np.random.Generator) -> None:
         """Draw the peg's radius."""
         radius = rng.uniform(*self.config.peg.radius)
@@ -166,11 +156,11 @@ class TwoArmPegInHole(ObjectBenchmark):
         With p the peg's middle, v its axis away from the wrist, h the hole's middle and
         n the plate's normal: t = (h - p) . v, d = |(h - p) - t v|, cosine = |n . v|.
         """
-        p, R_peg, h, R_plate = self._poses
-        axis, to_hole = R_peg[:, 2], h - p
+        peg, plate = self.states[PEG], self.states[PLATE]
+        axis, to_hole = peg.rotation[:, 2], plate.position - peg.position
         depth = float(to_hole @ axis)
         distance = float(np.linalg.norm(to_hole - depth * axis))
-        return depth, distance, min(abs(float(R_plate[:, 2] @ axis)), 1.0)
+        return depth, distance, min(abs(float(plate.rotation[:, 2] @ axis)), 1.0)
 
     def observables(self) -> dict[str, Reading]:
         """Return poses of hole and peg, and their alignment."""

@@ -100,8 +100,7 @@ class TwoArmTransport(ObjectBenchmark):
     The start bin, closed by a lid, with the payload in it, is in front of arm 0; the
     target bin, with the trash in it, and the trash bin are in front of arm 1.
 
-    Source of geometry and success: the benchmark of this name in robosuite 1.5, see
-    `Lift`; it has no shaped reward.
+    Source of geometry and success: robosuite 1.5, see `Lift`; no shaped reward there.
     """
 
     robots: Sequence[str] = ("Panda", "Panda")

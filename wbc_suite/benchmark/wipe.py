@@ -81,8 +81,8 @@ class Wipe(ObjectBenchmark):
     lies flat wipes its whole face, a tilted one its edge, a finger next to nothing.
     Which marks are wiped is kept in `data.userdata`.
 
-    Source of geometry and reward: the benchmark of this name in robosuite 1.5, see
-    `Lift`. Its shaped reward leaves [0, 1]; here it is clipped to that.
+    Source of geometry and reward: robosuite 1.5, see `Lift`. Its shaped reward
+    leaves [0, 1]; here it is clipped to that.
 
     Attributes:
         marks: Positions of the marks in the world, shape (n, 3), m.

@@ -56,10 +56,12 @@ class MjGui:
         with self._viewer.lock():
             self._copy()
             mujoco.mj_kinematics(self._model, self._data)
-            poses = [self._pose(k) for k in range(len(self._ports))]
+            limbs = {}
+            for k, port in enumerate(self._ports):
+                turn = pin.Quaternion(*self._data.mocap_quat[k]).normalized()
+                pose = pin.SE3(turn, self._data.mocap_pos[k])
+                limbs[port.name] = LimbInput(pose=pose)
         self._viewer.sync()
-        names = (port.name for port in self._ports)
-        limbs = {n: LimbInput(pose=T) for n, T in zip(names, poses, strict=True)}
         return DeviceState(time=self._clock(), limbs=limbs)
 
     def stop(self) -> None:
@@ -67,10 +69,6 @@ class MjGui:
         if self._viewer is not None:
             self._viewer.close()
         self._viewer = None
-
-    def _pose(self, k: int) -> pin.SE3:
-        position, wxyz = self._data.mocap_pos[k], self._data.mocap_quat[k]
-        return pin.XYZQUATToSE3(np.array([*position, *np.roll(wxyz, -1)]))
 
     def _copy(self) -> None:
         self._data.qpos[:] = self._env.simulation.data.qpos

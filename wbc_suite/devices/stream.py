@@ -10,11 +10,10 @@ from importlib import resources
 
 from aiohttp import WSCloseCode, WSMsgType, web
 
-from wbc_suite.devices.access_rules import token_for
 from wbc_suite.devices.pose_frame import MAX_BUTTONS, MAX_BYTES, PoseFrame
 from wbc_suite.devices.state import DeviceState
 from wbc_suite.devices.tls import server_context
-from wbc_suite.devices.web_server import WebServer, page_url
+from wbc_suite.devices.web_server import WebServer, page_url, token_for
 from wbc_suite.errors import DeviceError
 
 SOCKET = "/frames"

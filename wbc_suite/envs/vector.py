@@ -39,9 +39,6 @@ class VectorRobotEnv(SyncVectorEnv[Observations, Array]):
             `NextStep` in the next step, whose action is ignored; `SameStep` at once,
             with `final_obs` and `final_info`; `Disabled` by `reset`.
         arguments: Arguments of every environment, and errors: see `RobotEnv`.
-
-    Attributes:
-        envs: The environments.
     """
 
     metadata = {**RobotEnv.metadata, "autoreset_mode": AutoresetMode.NEXT_STEP}

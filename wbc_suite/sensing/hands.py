@@ -70,15 +70,11 @@ def gripper_links(robot: RobotDescription, side: str, frame: str) -> list[str]:
         for joint in synergy.open
     }
     moved: set[str] = set()
-    palms: set[str] = set()
-    for link in robot.links:
+    carriers: set[str] = set()
+    for link in robot.links:  # parents before children
         joint = link.joint
-        driven = joint is not None and (
-            joint.name in joints
-            or (joint.mimic is not None and joint.mimic.joint in joints)
-        )
-        if driven or (joint is None and link.parent in moved):
+        movers = {joint.name, joint.mimic and joint.mimic.joint} if joint else set()
+        if movers & joints or (joint is None and link.parent in moved):
             moved.add(link.name)
-            if link.parent is not None and link.parent not in moved:
-                palms.add(link.parent)
-    return [*sorted(moved | palms)] or [robot.frame(frame).link]
+            carriers |= {link.parent} if link.parent else set()
+    return sorted(moved | carriers) or [robot.frame(frame).link]

@@ -68,11 +68,7 @@ def render_robot(
     """Return a picture of a robot at one of its keyframes, in the studio.
 
     `view` is a view or its name in `VIEWS`, `size` the width and height in pixels; for
-    `preset` see `make_renderer`.
-
-    Raises:
-        UnknownNameError: If there is no such keyframe or view.
-        DeviceError: If this machine has no renderer.
+    `preset` see `make_renderer`, and for errors `Camera`.
     """
     posture = robot.keyframe(keyframe)
     spec = robot.to_mjspec()

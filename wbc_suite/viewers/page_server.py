@@ -19,8 +19,7 @@ from urllib.parse import quote
 import aiohttp
 from aiohttp import WSMsgType, hdrs, web
 
-from wbc_suite.devices.access_rules import token_for
-from wbc_suite.devices.web_server import WebServer, page_url
+from wbc_suite.devices.web_server import WebServer, page_url, token_for
 from wbc_suite.errors import DeviceError
 
 if TYPE_CHECKING:

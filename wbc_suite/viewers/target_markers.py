@@ -87,10 +87,10 @@ def _copy(info: SessionInfo, name: str, snapshot: Snapshot) -> TriangleMesh:
         body, mesh = model.geom_bodyid[geom], geom_mesh(model, geom)
         is_visual = model.geom_group[geom] < COLLISION_GROUP
         if body in chosen and is_visual and mesh is not None:
-            T_body_geom = _pose(model.geom_pos[geom], model.geom_quat[geom])
-            T_world_body = _pose(
-                snapshot.body_positions[body], snapshot.body_quaternions[body]
-            )
+            turn = pin.Quaternion(*model.geom_quat[geom])
+            T_body_geom = pin.SE3(turn, model.geom_pos[geom])
+            turn = pin.Quaternion(*snapshot.body_quaternions[body])
+            T_world_body = pin.SE3(turn, snapshot.body_positions[body])
             T = T_limb_world * T_world_body * T_body_geom
             parts.append(mesh.moved(T.translation, T.rotation))
     return merge(parts) if parts else ellipsoid_mesh(np.full(3, BALL))
@@ -105,7 +105,3 @@ def _own_bodies(model: mujoco.MjModel, root: int, others: set[int]) -> set[int]:
         if model.body_parentid[body] in carried:
             carried.add(body)
     return {root} if carried & others else carried
-
-
-def _pose(position: np.ndarray, wxyz: np.ndarray) -> pin.SE3:
-    return pin.XYZQUATToSE3(np.concatenate([position, np.roll(wxyz, -1)]))
