@@ -157,7 +157,7 @@ class Cameras:
     def _read_labels(
         self, renderer: Renderer, level: SegmentationLevel
     ) -> NDArray[np.int32]:
-        return renderer.read_geoms(self.labels.of_geoms(level))[..., None]
+        return renderer.read_geoms(self.labels.numbers[level])[..., None]
 
     def _read_depth(self, renderer: Renderer) -> NDArray[np.float32]:
         depth = renderer.read_depth()
@@ -171,7 +171,9 @@ class Cameras:
         if request.depth:
             spaces[f"{request.name}_depth"] = box(0, self.far, (*size, 1), np.float32)
         for level in request.segmentations:
-            most = self.labels.largest(level)
-            key = request.segmentation_key(level)
+            key, most = (
+                request.segmentation_key(level),
+                self.labels.numbers[level].max(),
+            )
             spaces[key] = box(0, most, (*size, 1), np.int32)
         return spaces

@@ -27,15 +27,17 @@ DEFAULT_COLOR = (0.5, 0.5, 0.5, 1.0)
 
 
 class ModelScene:
-    """Draws the geoms of a model but planes, static ones included, and moves them."""
+    """Draws the geoms of a model but planes, static ones included, and moves them.
+
+    Attributes:
+        nodes: Names of the bodies' scene nodes.
+    """
 
     def __init__(self, server: "viser.ViserServer", model: mujoco.MjModel) -> None:
         self._server = server
         self._parents = model.body_parentid.copy()
-        self._names = _node_names(model)
-        self._frames = [
-            server.scene.add_frame(name, show_axes=False) for name in self._names
-        ]
+        self.nodes = _node_names(model)
+        self._frames = [server.scene.add_frame(n, show_axes=False) for n in self.nodes]
         self._shown = np.tile([0.0, 0, 0, 1, 0, 0, 0], (model.nbody, 1))
         self.collision_shapes: list[viser.MeshHandle] = []
         self.visual_shapes: list[viser.MeshHandle] = []
@@ -44,7 +46,7 @@ class ModelScene:
             kind = "collision" if collision else "visual"
             mesh = triangle_meshes.merge(parts)
             handle = server.scene.add_mesh_simple(
-                f"{self._names[body]}/{kind}_{len(shapes)}",
+                f"{self.nodes[body]}/{kind}_{len(shapes)}",
                 mesh.vertices,
                 mesh.faces,
                 color=tuple(round(255 * c) for c in colour[:3]),  # type: ignore[arg-type]
@@ -53,10 +55,6 @@ class ModelScene:
                 visible=not collision,
             )
             shapes.append(handle)
-
-    def node(self, body: int) -> str:
-        """Return the name of a body's scene node."""
-        return self._names[body]
 
     def update(self, positions: Matrix, quaternions: Matrix) -> int:
         """Send the poses that changed since the last call; return their number.

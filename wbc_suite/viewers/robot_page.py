@@ -125,10 +125,9 @@ class Overlays:
         scene: ModelScene,
     ) -> None:
         self._model, self._data = model, data
-        links = [scene.node(body) for body in range(1, model.nbody)]
-        places = [(f"{link}/frame", IDENTITY, ORIGIN) for link in links]
+        places = [(f"{link}/frame", IDENTITY, ORIGIN) for link in scene.nodes[1:]]
         for site in range(model.nsite):
-            link, name = scene.node(model.site_bodyid[site]), model.site(site).name
+            link, name = scene.nodes[model.site_bodyid[site]], model.site(site).name
             place = model.site_quat[site], model.site_pos[site]
             places.append((f"{link}/frame_{name}", *place))
         self._frames = [
@@ -145,7 +144,7 @@ class Overlays:
         ]
         self._inertias = [
             server.scene.add_box(
-                f"{scene.node(body)}/inertia",
+                f"{scene.nodes[body]}/inertia",
                 dimensions=tuple(2.0 * equivalent_box(mass, model.body_inertia[body])),
                 color=INERTIA_COLOUR,
                 opacity=0.45,
