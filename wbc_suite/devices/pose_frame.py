@@ -10,7 +10,6 @@ from wbc_suite.devices.state import DeviceState, LimbInput
 from wbc_suite.errors import DeviceError
 from wbc_suite.tomlfile import FrozenModel
 
-FORMAT = "wbc-pose-frame/1"
 MAX_BYTES = 32_768
 """Maximum size of a frame; two hands with all their joints take 4 kB."""
 MAX_BUTTONS = 32

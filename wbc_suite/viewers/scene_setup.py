@@ -17,14 +17,12 @@ Colour: TypeAlias = tuple[int, int, int]
 """Red, green and blue, 0 to 255."""
 
 FIELD_OF_VIEW = np.deg2rad(42.0)  # vertical
-VIEWS = MappingProxyType(
-    {
-        "Front": np.array([1.0, -0.62, 0.5]),
-        "Left": np.array([0.1, 1.0, 0.25]),
-        "Behind": np.array([-1.0, -0.35, 0.6]),
-        "Above": np.array([-0.15, 0.0, 1.0]),
-    }
-)
+VIEWS = {
+    "Front": np.array([1.0, -0.62, 0.5]),
+    "Left": np.array([0.1, 1.0, 0.25]),
+    "Behind": np.array([-1.0, -0.35, 0.6]),
+    "Above": np.array([-0.15, 0.0, 1.0]),
+}
 """Direction from the robot, which faces x, to the camera."""
 BRAND = (38, 98, 132)
 
