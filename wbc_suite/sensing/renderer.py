@@ -267,13 +267,9 @@ def outside(
     inside = z < radii
     angle = 0.5 * np.radians(model.cam_fovy[camera])
     for across, half_angle in ((y, angle), (x, np.arctan(aspect * np.tan(angle)))):
-        inside &= _beside(across, z, half_angle) < radii
+        beside = np.abs(across) * np.cos(half_angle) + z * np.sin(half_angle)
+        inside &= beside < radii  # m, outside of the two planes through the camera
     return np.flatnonzero(~inside)
-
-
-def _beside(across: Array, z: Array, half_angle: float) -> Array:
-    """Return distances of points outside of two planes through the camera, m."""
-    return np.abs(across) * np.cos(half_angle) + z * np.sin(half_angle)
 
 
 @contextmanager
