@@ -76,5 +76,6 @@ def gripper_links(robot: RobotDescription, side: str, frame: str) -> list[str]:
         movers = {joint.name, joint.mimic and joint.mimic.joint} if joint else set()
         if movers & joints or (joint is None and link.parent in moved):
             moved.add(link.name)
-            carriers |= {link.parent} if link.parent else set()
+            if link.parent is not None:
+                carriers.add(link.parent)
     return sorted(moved | carriers) or [robot.frame(frame).link]
