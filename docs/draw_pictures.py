@@ -7,8 +7,7 @@ from PIL import Image
 
 from wbc_suite.robot import RobotDescription, load_robot
 from wbc_suite.scene import attach_robot, place_robot, robot_prefix
-from wbc_suite.viewers.framing import View
-from wbc_suite.viewers.offscreen import add_studio, render_model
+from wbc_suite.viewers.offscreen import View, add_studio, render_model
 
 IMAGES = Path(__file__).parent / "images"
 PLACES = {

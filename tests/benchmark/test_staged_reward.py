@@ -77,21 +77,16 @@ class Tray:
 
     def __init__(self):
         self.states = {
-            name: SimpleNamespace(position=np.array([x, 0.0, 0.0]))
+            name: SimpleNamespace(position=np.array([x, 0.0, 0.01]))
             for name, x in (("a", 0.0), ("b", 1.0))
         }
-        self.placed, self.held, self.hand = set(), set(), 1.0
+        self.held, self.hand = set(), 1.0
 
-    def goal(self, name):
-        return (0.0, 0.5)
+    def place(self, *names):
+        for name, state in self.states.items():
+            state.position[1] = 0.5 if name in names else 0.0
 
-    def is_over(self, name):
-        return name in self.placed
-
-    def lies(self, name):
-        return name in self.placed
-
-    def nearest_hand(self, name):
+    def distance(self, point):
         return self.hand
 
     def grasped(self, name):
@@ -99,17 +94,41 @@ class Tray:
 
 
 def sorting(tray, *, pick_one=False):
-    return Sorting(tray, ["a", "b"], pick_one=pick_one, stages=STAGES, lifted=0.3)
+    return Sorting(
+        tray,
+        {"a": (0.0, 0.5), "b": (1.0, 0.5)},
+        within=lambda dx, dy: math.hypot(dx, dy) < 0.1,
+        grip=lambda name: tray.states[name].position,
+        floor=0.0,
+        height=0.05,
+        lift_height=0.3,
+        pick_one=pick_one,
+        stages=STAGES,
+    )
+
+
+@pytest.mark.parametrize(
+    ("offset", "placed"),
+    [
+        *(((0, 0, 0), True), ((0.09, 0, 0), True), ((0.11, 0, 0), False)),
+        *(((0, 0, 0.03), True), ((0, 0, 0.05), False), ((0, 0, -0.02), False)),
+    ],
+)
+def test_an_object_lies_in_its_place_and_low(offset, placed):
+    tray = Tray()
+    tray.place("a")
+    tray.states["a"].position += offset
+    assert sorting(tray).is_placed("a") == placed
 
 
 def test_objects_count_once_they_lie_and_are_left():
     tray = Tray()
     rules = sorting(tray)
     assert rules.progress() < 0.05
-    tray.placed = {"a"}
+    tray.place("a")
     assert 0.5 <= rules.progress() < 0.55
     assert not rules.success()
-    tray.placed = {"a", "b"}
+    tray.place("a", "b")
     assert rules.success()
     assert rules.progress() == 1.0
     tray.hand = 0.0
@@ -121,8 +140,9 @@ def test_objects_count_once_they_lie_and_are_left():
 
 def test_the_best_of_the_others_is_rewarded():
     tray = Tray()
-    tray.placed, tray.held = {"a"}, {"b"}
-    tray.states["b"].position[:] = 0.0, 0.5, 0.3  # lifted, above its goal
+    tray.place("a")
+    tray.held = {"b"}
+    tray.states["b"].position[:] = 1.0, 0.5, 0.3  # lifted, above its goal
     tray.hand = 0.2
     assert sorting(tray).progress() == pytest.approx((1.0 + 0.7) / 2)
 
@@ -143,8 +163,8 @@ def test_each_object_is_picked_and_the_others_are_not_used():
         assert ["a", "b"][rules.number] == name
         assert [name, *unused] in (["a", "b"], ["b", "a"])
         picked.add(name)
-        tray.placed = {name}
+        tray.place(name)
         assert rules.success()
-        tray.placed = set(unused)
+        tray.place(*unused)
         assert not rules.success()
     assert picked == {"a", "b"}

@@ -8,8 +8,7 @@ import pytest
 from aiohttp import web
 
 from wbc_suite.devices import web_server
-from wbc_suite.devices.access_rules import is_loopback
-from wbc_suite.devices.web_server import WebServer
+from wbc_suite.devices.web_server import WebServer, is_loopback
 from wbc_suite.errors import DeviceError
 
 TOKEN = "right-token"

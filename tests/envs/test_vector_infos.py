@@ -4,7 +4,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from wbc_suite.envs.vector_infos import gather_infos
+from wbc_suite.envs.vector import gather_infos
 
 
 class Reporter(gymnasium.Env):

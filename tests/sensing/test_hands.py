@@ -109,7 +109,7 @@ def test_labels_tell_robot_gripper_and_object_apart(scene):
     assert set(labels.names[SegmentationLevel.CLASS].values()) >= {
         *("Panda", "gripper", "cube")
     }
-    of = labels.of_geoms(SegmentationLevel.INSTANCE)
+    of = labels.numbers[SegmentationLevel.INSTANCE]
     assert of.shape == (model.ngeom + 1,)
     assert of[-1] == 0
     for geom in range(model.ngeom):
@@ -121,10 +121,10 @@ def test_labels_tell_robot_gripper_and_object_apart(scene):
 def test_every_geom_is_an_element_of_its_own(scene):
     model, _, state = scene
     labels = Labels(model, [state])
-    numbers = labels.of_geoms(SegmentationLevel.ELEMENT)
+    numbers = labels.numbers[SegmentationLevel.ELEMENT]
     assert sorted(numbers[:-1]) == [*range(1, model.ngeom + 1)]
-    assert labels.largest(SegmentationLevel.ELEMENT) == model.ngeom
-    assert labels.largest(SegmentationLevel.INSTANCE) < model.ngeom
+    assert labels.numbers[SegmentationLevel.ELEMENT].max() == model.ngeom
+    assert labels.numbers[SegmentationLevel.INSTANCE].max() < model.ngeom
 
 
 @pytest.mark.parametrize(

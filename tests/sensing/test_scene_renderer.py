@@ -135,7 +135,7 @@ def test_only_what_lies_outside_is_left_out(scene):
 def test_coarse_floors_hold_whole_tiles_and_only_infinite_planes(scene):
     model, _ = scene
     (floor,) = coarse_floors(model).values()
-    half = np.array(floor.size[:2])
+    half = floor[:2]
     assert (half > model.vis.map.zfar * model.stat.extent).all()
     tiles = 0.5 * half * model.material("tiles").texrepeat
     np.testing.assert_allclose(tiles, np.round(tiles), atol=1e-4)

@@ -75,4 +75,4 @@ def test_one_mesh_per_body_kind_and_colour(scene):
     assert len(scene.visual_shapes) == 3
     assert len(scene.collision_shapes) == 1
     assert not scene.collision_shapes[0].visible
-    assert scene.node(3) == "/world/upper/fore/hand"
+    assert scene.nodes[3] == "/world/upper/fore/hand"

@@ -39,30 +39,13 @@ __all__ = [
     "register_benchmark",
 ]
 
-for _build, _names in (
-    (Door, ("Door",)),
-    (Lift, ("Lift",)),
-    (
-        NutAssembly,
-        (
-            *("NutAssembly", "NutAssemblySingle"),
-            *("NutAssemblySquare", "NutAssemblyRound"),
-        ),
-    ),
-    (
-        PickPlace,
-        (
-            *("PickPlace", "PickPlaceSingle"),
-            *("PickPlaceMilk", "PickPlaceBread", "PickPlaceCereal", "PickPlaceCan"),
-        ),
-    ),
-    (Stack, ("Stack",)),
-    (ToolHang, ("ToolHang",)),
-    (TwoArmHandover, ("TwoArmHandover",)),
-    (TwoArmLift, ("TwoArmLift",)),
-    (TwoArmPegInHole, ("TwoArmPegInHole",)),
-    (TwoArmTransport, ("TwoArmTransport",)),
-    (Wipe, ("Wipe",)),
+_VARIANTS = {
+    NutAssembly: ("Single", "Square", "Round"),
+    PickPlace: ("Single", "Milk", "Bread", "Cereal", "Can"),
+}
+for _build in (
+    *(Door, Lift, NutAssembly, PickPlace, Stack, ToolHang, Wipe),
+    *(TwoArmHandover, TwoArmLift, TwoArmPegInHole, TwoArmTransport),
 ):
-    for _name in _names:
-        register_benchmark(_name, _build)
+    for _variant in ("", *_VARIANTS.get(_build, ())):
+        register_benchmark(_build.__name__ + _variant, _build)

@@ -2,20 +2,39 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Protocol
+from typing import Annotated, Any, Protocol, TypeAlias, TypeVar, runtime_checkable
+
+from pydantic import AfterValidator, PositiveFloat
 
 from wbc_suite.errors import ConfigError
 from wbc_suite.robot import RobotDescription
+from wbc_suite.robot.shapes import Real
 from wbc_suite.scene import place_robot
 
+T = TypeVar("T")
 
+
+def _with_default(values: dict[str, Any]) -> dict[str, Any]:
+    if "default" not in values:
+        raise ValueError("an entry named 'default' is needed")
+    return values
+
+
+Places: TypeAlias = Annotated[
+    dict[str, tuple[Real, Real]], AfterValidator(_with_default)
+]
+"""Position of each robot, m; `default` is that of all others."""
+
+Opposed: TypeAlias = Annotated[dict[str, PositiveFloat], AfterValidator(_with_default)]
+"""Distance of each of two opposed robots from the middle, m; `default` likewise."""
+
+
+@runtime_checkable
 class TwoArmPlaces(Protocol):
     """Places of robots in the file of a two-arm benchmark; distances in m.
 
     Attributes:
-        name: Name of the benchmark.
-        places: Place of a single robot, and of two in parallel; `default` is for all
-            others.
+        places: Place of a single robot, and of two in parallel.
         opposed: Distance of each of two robots that face one another from the middle.
         apart: Distance of each of two robots in parallel from its place.
     """
@@ -45,7 +64,7 @@ def arrange_one(
             "env_configuration at 'default'."
         )
     (robot,) = robots
-    return (place_robot(robot, places.get(robot.name, places["default"]), 0.0),)
+    return (place_robot(robot, _own(places, robot), 0.0),)
 
 
 def arrange_two_arms(
@@ -76,19 +95,16 @@ def arrange_two_arms(
         )
     if alone:
         return arrange_one(config.name, robots, configuration, config.places)
-    stand = _opposed if configuration == "opposed" else _parallel
-    return stand(config, robots[0], -1), stand(config, robots[1], 1)
+    placed = []
+    for robot, side in zip(robots, (-1, 1), strict=True):
+        (x, y), yaw = _own(config.places, robot), 0.0
+        y += side * config.apart
+        if configuration == "opposed":
+            x, y = 0.0, side * _own(config.opposed, robot)
+            yaw = -side * math.pi / 2
+        placed.append(place_robot(robot, (x, y), yaw))
+    return tuple(placed)
 
 
-def _opposed(
-    config: TwoArmPlaces, robot: RobotDescription, side: int
-) -> RobotDescription:
-    distance = config.opposed.get(robot.name, config.opposed["default"])
-    return place_robot(robot, (0.0, side * distance), -side * math.pi / 2)
-
-
-def _parallel(
-    config: TwoArmPlaces, robot: RobotDescription, side: int
-) -> RobotDescription:
-    x, y = config.places.get(robot.name, config.places["default"])
-    return place_robot(robot, (x, y + side * config.apart), 0.0)
+def _own(places: Mapping[str, T], robot: RobotDescription) -> T:
+    return places.get(robot.name, places["default"])

@@ -22,7 +22,6 @@ class Benchmark(Protocol):
     """A task: a scene, start states, a reward and a success; no controller.
 
     Attributes:
-        name: Its name.
         horizon: Default number of actions in an episode.
         robots: Default robots.
         gripper: Default gripper of the robots; None for their own.
@@ -38,9 +37,7 @@ class Benchmark(Protocol):
     ) -> tuple[RobotDescription, ...]:
         """Return the robots at their places in the scene.
 
-        Args:
-            robots: One or several.
-            configuration: `default`, `single-robot`, `opposed` or `parallel`.
+        The configuration is `default`, `single-robot`, `opposed` or `parallel`.
 
         Raises:
             ConfigError: If their number or the configuration is not supported.
@@ -88,11 +85,9 @@ class Benchmark(Protocol):
         ...
 
     def reward(self, *, shaped: bool, success: bool | None = None) -> float:
-        """Return a reward in [0, 1]; 1 on success.
+        """Return a reward in [0, 1], 1 on success; if shaped, without success too.
 
-        Args:
-            shaped: Whether states without success get a shaped reward.
-            success: The present value of `success()`, if known.
+        `success` is the present value of `success()`, if known.
         """
         ...
 

@@ -14,13 +14,8 @@ from wbc_suite.robot.shapes import Vector3
 from wbc_suite.scene import TableConfig, add_table, add_table_cameras, objects
 from wbc_suite.scene.objects import SceneObject
 from wbc_suite.scene.placement import Region, UniformSampler
-from wbc_suite.sensing.reading import (
-    Reading,
-    body_position,
-    joint_positions,
-    offset,
-    site_position,
-)
+from wbc_suite.sensing import reading
+from wbc_suite.sensing.reading import Reading, site_position
 from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Vector
 
@@ -43,10 +38,7 @@ class DoorConfig(ObjectBenchmarkConfig):
 
     Attributes:
         latch: Whether the lever must be turned first.
-        table: The table that the door stands on.
-        origin: Origin of the region, m.
-        region: Region of the door.
-        reward: Numbers of the reward.
+        origin: Origin of the door's region, m.
     """
 
     latch: bool = True
@@ -59,11 +51,7 @@ class DoorConfig(ObjectBenchmarkConfig):
 class Door(ObjectBenchmark):
     """A door with a lever is to be opened.
 
-    Source of geometry and reward: the benchmark of this name in robosuite 1.5, see
-    `Lift`.
-
-    Args:
-        path: `tasks/door.toml`, or a file of the same form.
+    Source of geometry and reward: robosuite 1.5, see `Lift`.
     """
 
     needs_gripper = False  # a lever can be pushed down, and the door pulled, without
@@ -91,25 +79,24 @@ class Door(ObjectBenchmark):
     ) -> None:
         """Look up the hinges too."""
         super().bind(model, data, robots)
-        self._hinge, self._lever = (
-            int(model.joint(name).qposadr[0]) for name in (HINGE, LEVER)
-        )
+        self._hinge = int(model.joint(HINGE).qposadr[0])
+        self._lever = int(model.joint(LEVER).qposadr[0])
 
     def observables(self) -> dict[str, Reading]:
         """Return positions and angles of door and lever, and offsets from the hands.
 
         Keys are those of existing datasets.
         """
-        door = body_position(self.model.body(f"{DOOR}_panel").id)
+        door = reading.body_position(self.model.body(f"{DOOR}_panel").id)
         handle = site_position(self.model.site(GRIP).id)
         readings = {"door_pos": door, "handle_pos": handle}
         for side, hand in self.sided_hands():
             at = site_position(hand.site)
-            readings[f"door_to_{side}eef_pos"] = offset(door, at)
-            readings[f"handle_to_{side}eef_pos"] = offset(handle, at)
-        readings["hinge_qpos"] = joint_positions([self._hinge])
+            readings[f"door_to_{side}eef_pos"] = reading.offset(door, at)
+            readings[f"handle_to_{side}eef_pos"] = reading.offset(handle, at)
+        readings["hinge_qpos"] = reading.joint_positions([self._hinge])
         if self.config.latch:
-            readings["handle_qpos"] = joint_positions([self._lever])
+            readings["handle_qpos"] = reading.joint_positions([self._lever])
         return readings
 
     @property

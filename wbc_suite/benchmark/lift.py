@@ -53,9 +53,6 @@ class Lift(ObjectBenchmark):
 
     Source of geometry and reward: Zhu et al. (2020), "robosuite: A Modular Simulation
     Framework and Benchmark for Robot Learning", arXiv:2009.12293, and its release 1.5.
-
-    Args:
-        path: `tasks/lift.toml`, or a file of the same form.
     """
 
     def __init__(self, path: Path) -> None:

@@ -22,6 +22,7 @@ from wbc_suite.sensing.reading import Reading
 from wbc_suite.tomlfile import FrozenModel
 
 MAKERS = {"SquareNut": objects.square_nut, "RoundNut": objects.round_nut}
+BROWN, GREY = (0.66, 0.44, 0.24, 1.0), (0.58, 0.60, 0.63, 1.0)
 
 Nut = Literal["SquareNut", "RoundNut"]
 
@@ -41,14 +42,10 @@ class NutAssemblyConfig(ObjectBenchmarkConfig):
 
     Attributes:
         pick_one: Whether each episode has one of the nuts, drawn at reset.
-        nuts: The nuts.
-        table: The table.
-        pegs: The pegs on it.
         regions: Region where each nut starts, from the middle of the table's top.
         aside: Largest distance of a placed nut's middle from the axis of its peg, m.
         height: Largest height of a placed nut's middle above the table, m.
         lift_height: Height to which lifting is rewarded, above the table, m.
-        stages: Numbers of the shaped reward.
     """
 
     pick_one: bool = False
@@ -65,11 +62,7 @@ class NutAssemblyConfig(ObjectBenchmarkConfig):
 class NutAssembly(ObjectBenchmark):
     """Each nut is to lie around its peg, the hand withdrawn.
 
-    Source of geometry and reward: the benchmark of this name in robosuite 1.5, see
-    `Lift`.
-
-    Args:
-        path: `tasks/nut_assembly.toml`, or a file of the same form.
+    Source of geometry and reward: robosuite 1.5, see `Lift`.
     """
 
     def __init__(self, path: Path) -> None:
@@ -77,10 +70,12 @@ class NutAssembly(ObjectBenchmark):
         super().__init__(config)
         self.sorting = Sorting(
             self,
-            config.nuts,
-            pick_one=config.pick_one,
+            {name: self.goal(name) for name in config.nuts},
+            within=lambda dx, dy: math.hypot(dx, dy) < config.aside,
+            grip=lambda name: self.site(f"{name}_handle"),
+            floor=config.table.center[2],
+            **config.model_dump(include={"height", "lift_height", "pick_one"}),
             stages=config.stages,
-            lifted=config.table.center[2] + config.lift_height,
         )
 
     def furnish(self, spec: mujoco.MjSpec) -> None:
@@ -88,24 +83,18 @@ class NutAssembly(ObjectBenchmark):
         table, pegs = self.config.table, self.config.pegs
         add_table(spec, table)
         x, y, z = table.center
-        half = pegs.height / 2
+        half, width, radius = pegs.height / 2, pegs.half_width, pegs.radius
         square = Part(
-            kind="box",
-            size=(pegs.half_width, pegs.half_width, half),
-            color=(0.66, 0.44, 0.24, 1.0),
-            material="wood",
+            kind="box", size=(width, width, half), color=BROWN, material="wood"
         )
         round_ = Part(
-            kind="cylinder",
-            size=(pegs.radius, half),
-            color=(0.58, 0.60, 0.63, 1.0),
-            material="metal",
+            kind="cylinder", size=(radius, half), color=GREY, material="metal"
         )
-        for name, part, at in (
+        for name, part, (dx, dy) in (
             ("square_peg", square, pegs.square),
             ("round_peg", round_, pegs.round),
         ):
-            peg(name, part, (x + at[0], y + at[1], z)).add_to(spec)
+            peg(name, part, (x + dx, y + dy, z)).add_to(spec)
         add_table_cameras(spec, table.center)
 
     def objects(self) -> Sequence[SceneObject]:
@@ -115,12 +104,9 @@ class NutAssembly(ObjectBenchmark):
     def reset(self, rng: np.random.Generator) -> None:
         """Place each nut in its region; with `pick_one`, one of them."""
         self.park(self.sorting.draw(rng))
+        regions, origin = self.config.regions, self.config.table.center
         samplers = [
-            UniformSampler(
-                names=[name],
-                region=self.config.regions[name],
-                origin=self.config.table.center,
-            )
+            UniformSampler(names=[name], region=regions[name], origin=origin)
             for name in self.config.nuts
             if name in self.sorting.active
         ]
@@ -136,20 +122,6 @@ class NutAssembly(ObjectBenchmark):
         pegs = self.config.pegs
         dx, dy = pegs.square if name == "SquareNut" else pegs.round
         return x + dx, y + dy
-
-    def lies(self, name: str) -> bool:
-        """Whether a nut lies around its peg."""
-        height = self.states[name].position.item(2) - self.config.table.center[2]
-        return 0.0 < height < self.config.height and self.is_over(name)
-
-    def is_over(self, name: str) -> bool:
-        """Whether the middle of a nut is near the axis of its peg."""
-        x, y, _ = self.states[name].position.tolist()
-        return math.dist((x, y), self.goal(name)) < self.config.aside
-
-    def nearest_hand(self, name: str) -> float:
-        """Return the distance of the nearest hand to the handle of a nut, m."""
-        return self.distance(self.site(f"{name}_handle"))
 
     def success(self) -> bool:
         """Whether each nut lies around its peg; see `Sorting`."""

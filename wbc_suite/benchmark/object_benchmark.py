@@ -4,17 +4,21 @@ import logging
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Any, Literal
 
 import mujoco
 import numpy as np
-from pydantic import AfterValidator, BaseModel, PositiveFloat, PositiveInt
+from pydantic import BaseModel, PositiveInt
 
-from wbc_suite.benchmark.arrangement import arrange_one
+from wbc_suite.benchmark.arrangement import (
+    Places,
+    TwoArmPlaces,
+    arrange_one,
+    arrange_two_arms,
+)
 from wbc_suite.control import RobotState
 from wbc_suite.errors import PlacementError
 from wbc_suite.robot import RobotDescription
-from wbc_suite.robot.shapes import Real
 from wbc_suite.scene.objects import ObjectState, SceneObject
 from wbc_suite.scene.placement import Placed, Sampler
 from wbc_suite.sensing.hands import hands_of, pairs_in_contact
@@ -39,30 +43,14 @@ PARKED = (8.0, 8.0)
 BELOW_ONE = float(np.nextafter(1.0, 0.0))
 
 
-def _with_default(values: dict[str, Any]) -> dict[str, Any]:
-    if "default" not in values:
-        raise ValueError("an entry named 'default' is needed")
-    return values
-
-
-Places: TypeAlias = Annotated[
-    dict[str, tuple[Real, Real]], AfterValidator(_with_default)
-]
-"""Position of each robot, m; `default` is that of all others."""
-
-Opposed: TypeAlias = Annotated[dict[str, PositiveFloat], AfterValidator(_with_default)]
-"""Distance of each of two opposed robots from the middle, m; `default` likewise."""
-
-
 class ObjectBenchmarkConfig(BaseModel):
     """Contents of every file in `tasks/`.
 
     Attributes:
         format: Version of the file format.
-        name: Name of the benchmark.
         title: The task in a few words.
         horizon: Actions in an episode.
-        places: Position of each robot, m; `default` is that of all others.
+        places: Position of each robot, m.
     """
 
     model_config = FrozenModel.model_config
@@ -91,8 +79,7 @@ class ObjectBenchmark(ABC):
     needs_gripper = True
 
     def __init__(self, config: ObjectBenchmarkConfig) -> None:
-        self.name, self.horizon = config.name, config.horizon
-        self._places = config.places
+        self.name, self.horizon, self._placement = config.name, config.horizon, config
         self.sampler: Sampler | None = None
 
     @abstractmethod
@@ -114,8 +101,11 @@ class ObjectBenchmark(ABC):
     def arrange(
         self, robots: Sequence[RobotDescription], configuration: str
     ) -> tuple[RobotDescription, ...]:
-        """Return the one robot at its place, facing +x."""
-        return arrange_one(self.name, robots, configuration, self._places)
+        """Return the robots at their places; two arms if the file has such places."""
+        config = self._placement
+        if isinstance(config, TwoArmPlaces):
+            return arrange_two_arms(config, robots, configuration)
+        return arrange_one(self.name, robots, configuration, config.places)
 
     def build(self, spec: mujoco.MjSpec) -> None:
         """Add furniture, objects and cameras."""
@@ -202,14 +192,10 @@ class ObjectBenchmark(ABC):
     def poses_of(self, names: Iterable[str], to: str = "") -> dict[str, Reading]:
         """Return poses of objects by key, and their offsets from each hand.
 
-        Args:
-            names: The objects.
-            to: End of the offsets' keys: `_pos` where existing datasets have it.
+        `to` is the end of the offsets' keys: `_pos` where existing datasets have it.
         """
-        readings: dict[str, Reading] = {}
-        for name in names:
-            readings[f"{name}_pos"] = body_position(self.states[name].body)
-            readings[f"{name}_quat"] = body_quat(self.states[name].body)
+        names = tuple(names)
+        readings = self.world_poses_of({name: name for name in names})
         for name in names:
             for side, hand in self.sided_hands():
                 to_object = offset(readings[f"{name}_pos"], site_position(hand.site))
@@ -217,24 +203,26 @@ class ObjectBenchmark(ABC):
         return readings
 
     def hand_poses_of(self, names: Mapping[str, str]) -> dict[str, Reading]:
-        """Return poses of objects in the world and in the frames of the hands.
+        """Return poses of objects, by label, in the world and in the hands' frames.
 
         Keys are those of existing datasets: `{label}_pos`, `{label}_quat`, and
         `{label}_to_robot0_eef_pos`, `_quat`; quaternions are x y z w.
-
-        Args:
-            names: Name of each object, by its label in keys.
         """
-        bodies = {label: self.states[name].body for label, name in names.items()}
-        readings: dict[str, Reading] = {}
-        for label, body in bodies.items():
-            readings[f"{label}_pos"] = body_position(body)
-            readings[f"{label}_quat"] = body_quat(body)
-        for label, body in bodies.items():
+        readings = self.world_poses_of(names)
+        for label, name in names.items():
+            body = self.states[name].body
             for side, hand in self.sided_hands():
                 key = f"{label}_to_robot0_{side}eef"
                 readings[f"{key}_pos"] = relative_position(body, hand.site)
                 readings[f"{key}_quat"] = relative_quat(body, hand.site)
+        return readings
+
+    def world_poses_of(self, names: Mapping[str, str]) -> dict[str, Reading]:
+        """Return `{label}_pos` and `{label}_quat` (x y z w) of objects in the world."""
+        readings: dict[str, Reading] = {}
+        for label, name in names.items():
+            readings[f"{label}_pos"] = body_position(self.states[name].body)
+            readings[f"{label}_quat"] = body_quat(self.states[name].body)
         return readings
 
     def sided_hands(self) -> list[tuple[str, Any]]:
@@ -259,18 +247,14 @@ class ObjectBenchmark(ABC):
     def distance(self, point: Iterable[float]) -> float:
         """Return the distance of the nearest hand to a point, m."""
         point = [float(p) for p in point]
-        return min(
-            (math.dist(hand.position.tolist(), point) for hand in self.hands),
-            default=math.inf,
-        )
+        distances = (math.dist(hand.position.tolist(), point) for hand in self.hands)
+        return min(distances, default=math.inf)
 
     def site(self, name: str) -> Vector:
         """Position of a site in the world, m. A view."""
-        found = self._sites.get(name)
-        if found is None:
-            found = self.data.site_xpos[self.model.site(name).id]
-            self._sites[name] = found
-        return found
+        if name not in self._sites:
+            self._sites[name] = self.data.site_xpos[self.model.site(name).id]
+        return self._sites[name]
 
     def grasped(self, name: str) -> bool:
         """Whether two links of one gripper touch an object."""

@@ -38,13 +38,10 @@ class PickPlaceConfig(ObjectBenchmarkConfig):
 
     Attributes:
         pick_one: Whether each episode has one of the objects, drawn at reset.
-        objects: The objects to be sorted.
-        source: The bin where objects start.
         target: The bin with the quadrants.
-        region: Region of the first bin where objects start.
+        region: Region of the `source` bin where objects start.
         height: Largest height of a placed object above the floor of its bin, m.
         lift_height: Height to which lifting is rewarded, above the target bin, m.
-        stages: Numbers of the shaped reward.
     """
 
     pick_one: bool = False
@@ -60,22 +57,22 @@ class PickPlaceConfig(ObjectBenchmarkConfig):
 class PickPlace(ObjectBenchmark):
     """Each object is to lie in its own quadrant of the second bin, the hand withdrawn.
 
-    Source of geometry and reward: the benchmark of this name in robosuite 1.5, see
-    `Lift`. Unlike there, an object that a hand still holds is not placed.
-
-    Args:
-        path: `tasks/pick_place.toml`, or a file of the same form.
+    Source of geometry and reward: robosuite 1.5, see `Lift`. Unlike there, an
+    object that a hand still holds is not placed.
     """
 
     def __init__(self, path: Path) -> None:
         self.config = config = load_config(PickPlaceConfig, path)
         super().__init__(config)
+        length, width, _ = config.target.size
         self.sorting = Sorting(
             self,
-            config.objects,
-            pick_one=config.pick_one,
+            {name: self.goal(name) for name in config.objects},
+            within=lambda dx, dy: abs(dx) < length / 4 and abs(dy) < width / 4,
+            grip=lambda name: self.states[name].position,
+            floor=config.target.center[2],
+            **config.model_dump(include={"height", "lift_height", "pick_one"}),
             stages=config.stages,
-            lifted=config.target.center[2] + config.lift_height,
         )
 
     def furnish(self, spec: mujoco.MjSpec) -> None:
@@ -97,11 +94,8 @@ class PickPlace(ObjectBenchmark):
     def reset(self, rng: np.random.Generator) -> None:
         """Place the objects in the first bin; with `pick_one`, one of them."""
         self.park(self.sorting.draw(rng))
-        in_bin = UniformSampler(
-            names=self.sorting.active,
-            region=self.config.region,
-            origin=self.config.source.center,
-        )
+        region, origin = self.config.region, self.config.source.center
+        in_bin = UniformSampler(names=self.sorting.active, region=region, origin=origin)
         self.place_objects(rng, self.sampler or in_bin)
 
     def observables(self) -> dict[str, Reading]:
@@ -114,22 +108,6 @@ class PickPlace(ObjectBenchmark):
         length, width, _ = self.config.target.size
         side, end = QUADRANTS[name]
         return x + side * length / 4, y + end * width / 4
-
-    def lies(self, name: str) -> bool:
-        """Whether an object is low in its quadrant."""
-        height = self.states[name].position.item(2) - self.config.target.center[2]
-        return self.is_over(name) and 0.0 < height < self.config.height
-
-    def is_over(self, name: str) -> bool:
-        """Whether the origin of an object is in its quadrant, or above it."""
-        x, y, _ = self.states[name].position.tolist()
-        gx, gy = self.goal(name)
-        length, width, _ = self.config.target.size
-        return abs(x - gx) < length / 4 and abs(y - gy) < width / 4
-
-    def nearest_hand(self, name: str) -> float:
-        """Return the distance of the nearest hand to an object, m."""
-        return self.distance(self.states[name].position.tolist())
 
     def success(self) -> bool:
         """Whether each object lies in its quadrant; see `Sorting`."""

@@ -1,44 +1,14 @@
 """Rules of benchmarks in which each object belongs to a place of its own."""
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Protocol
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from wbc_suite.benchmark.object_benchmark import ObjectBenchmark
 from wbc_suite.benchmark.staged_reward import StagedReward
-from wbc_suite.scene.objects import ObjectState
-from wbc_suite.sensing.reading import Reading, constant, selected
-
-
-class SortingBenchmark(Protocol):
-    """What the rules need of a benchmark; most of it is in `ObjectBenchmark`."""
-
-    states: dict[str, ObjectState]
-
-    def goal(self, name: str) -> tuple[float, float]:
-        """Return the place of an object, x y in m."""
-        ...
-
-    def is_over(self, name: str) -> bool:
-        """Whether an object is at its place, or above it."""
-        ...
-
-    def lies(self, name: str) -> bool:
-        """Whether an object lies at its place."""
-        ...
-
-    def nearest_hand(self, name: str) -> float:
-        """Return the distance of the nearest hand to an object, m."""
-        ...
-
-    def grasped(self, name: str) -> bool:
-        """Whether a hand grasps an object."""
-        ...
-
-    def hand_poses_of(self, names: Mapping[str, str]) -> dict[str, Reading]:
-        """Return poses of objects by label; see `ObjectBenchmark`."""
-        ...
+from wbc_suite.sensing.reading import Reading, computed, selected
+from wbc_suite.typing import Vector
 
 
 class Sorting:
@@ -46,10 +16,14 @@ class Sorting:
 
     Args:
         benchmark: The benchmark.
-        names: Its objects.
-        pick_one: Whether each episode has one of them, drawn at reset.
+        goals: Middle of each object's place, x y, m.
+        within: Whether an offset x y from the middle, m, is inside of a place.
+        grip: Returns the point of an object that hands reach for, in the world, m.
+        floor: Height of the places, m.
+        height: Largest height of a placed object above the floor, m.
+        lift_height: Height to which lifting is rewarded, above the floor, m.
+        pick_one: Whether each episode has one of the objects, drawn at reset.
         stages: Staged reward of each object.
-        lifted: Height to which lifting is rewarded, m.
 
     Attributes:
         active: The objects of this episode.
@@ -58,15 +32,21 @@ class Sorting:
 
     def __init__(
         self,
-        benchmark: SortingBenchmark,
-        names: Sequence[str],
+        benchmark: ObjectBenchmark,
+        goals: Mapping[str, tuple[float, float]],
         *,
+        within: Callable[[float, float], bool],
+        grip: Callable[[str], Vector],
+        floor: float,
+        height: float,
+        lift_height: float,
         pick_one: bool,
         stages: StagedReward,
-        lifted: float,
     ) -> None:
-        self._benchmark, self._names, self._pick_one = benchmark, tuple(names), pick_one
-        self._stages, self._lifted = stages, lifted
+        self._benchmark, self._goals, self._names = benchmark, goals, tuple(goals)
+        self._within, self._grip, self._floor = within, grip, floor
+        self._height, self._lift_height = height, lift_height
+        self._pick_one, self._stages = pick_one, stages
         self.active, self.number = self._names, 0
 
     def draw(self, rng: np.random.Generator) -> list[str]:
@@ -85,22 +65,21 @@ class Sorting:
         poses_of = self._benchmark.hand_poses_of
         if not self._pick_one:
             return poses_of({name: name for name in self._names})
-        each = [
-            poses_of({"obj": name}) | {"obj_id": constant(k)}
-            for k, name in enumerate(self._names)
-        ]
-        return {
+        each = [poses_of({"obj": name}) for name in self._names]
+        readings = {
             key: selected([poses[key] for poses in each], lambda: self.number)
             for key in each[0]
         }
+        return readings | {"obj_id": computed(1, lambda: self.number)}
 
     def is_placed(self, name: str) -> bool:
         """Whether an object lies at its place, and no hand is near or grasps it."""
-        benchmark = self._benchmark
+        dx, dy, above = self._offset(name)
         return (
-            benchmark.lies(name)
-            and self._stages.has_left(benchmark.nearest_hand(name))
-            and not benchmark.grasped(name)
+            0.0 < above < self._height
+            and self._within(dx, dy)
+            and self._stages.has_left(self._benchmark.distance(self._grip(name)))
+            and not self._benchmark.grasped(name)
         )
 
     def success(self) -> bool:
@@ -118,12 +97,17 @@ class Sorting:
         return (len(self.active) - len(left) + best) / len(self.active)
 
     def _staged(self, name: str) -> float:
-        benchmark = self._benchmark
-        x, y, z = benchmark.states[name].position.tolist()
+        dx, dy, above = self._offset(name)
         return self._stages.value(
-            distance=benchmark.nearest_hand(name),
-            grasped=benchmark.grasped(name),
-            missing=max(self._lifted - z, 0.0),
-            aside=math.dist((x, y), benchmark.goal(name)),
-            over=benchmark.is_over(name),
+            distance=self._benchmark.distance(self._grip(name)),
+            grasped=self._benchmark.grasped(name),
+            missing=max(self._lift_height - above, 0.0),
+            aside=math.hypot(dx, dy),
+            over=self._within(dx, dy),
         )
+
+    def _offset(self, name: str) -> tuple[float, float, float]:
+        """Return the offset of an object from its place, m."""
+        x, y, z = self._benchmark.states[name].position.tolist()
+        goal_x, goal_y = self._goals[name]
+        return x - goal_x, y - goal_y, z - self._floor

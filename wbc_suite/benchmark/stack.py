@@ -52,11 +52,7 @@ class StackConfig(ObjectBenchmarkConfig):
 class Stack(ObjectBenchmark):
     """The smaller cube A is to rest on the larger cube B.
 
-    Source of geometry and reward: the benchmark of this name in robosuite 1.5, see
-    `Lift`.
-
-    Args:
-        path: `tasks/stack.toml`, or a file of the same form.
+    Source of geometry and reward: robosuite 1.5, see `Lift`.
     """
 
     def __init__(self, path: Path) -> None:

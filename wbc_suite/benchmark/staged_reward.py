@@ -8,16 +8,13 @@ from wbc_suite.tomlfile import FrozenModel
 
 
 class StagedReward(FrozenModel):
-    """Rewards of the stages, all below 1, and their scales.
+    """Rewards of the stages, all below 1, and their scales, 1/m.
 
     Attributes:
         reach: Largest reward of a hand near the object.
         grasp: Reward of a grasp.
         lift: Largest reward of lifting.
         hover: Largest reward above the target.
-        reach_scale: 1/m.
-        lift_scale: 1/m.
-        hover_scale: 1/m.
         withdrawn: A hand has left a placed object if its reach term is less.
     """
 

@@ -12,14 +12,8 @@ from wbc_suite.benchmark.base import load_config
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
 from wbc_suite.benchmark.staged_reward import StagedReward
 from wbc_suite.robot.shapes import Vector3
-from wbc_suite.scene import (
-    TableConfig,
-    add_camera,
-    add_table,
-    add_table_cameras,
-    objects,
-)
-from wbc_suite.scene.objects import SceneObject
+from wbc_suite.scene import TableConfig, add_camera, add_table, add_table_cameras
+from wbc_suite.scene.objects import SceneObject, hanging_frame, stand, wrench
 from wbc_suite.scene.placement import Region, SequentialSampler, UniformSampler
 from wbc_suite.sensing.reading import Reading, computed
 from wbc_suite.tomlfile import FrozenModel
@@ -45,13 +39,10 @@ class ToolHangConfig(ObjectBenchmarkConfig):
     """`tasks/tool_hang.toml`.
 
     Attributes:
-        table: The table.
         stand: Place of the stand from the middle of the table's top, m.
         frame: Region of the frame.
         tool: Region of the wrench.
-        inserted: Bounds of an inserted frame.
         clear: Least height of a hanging wrench above the table, m.
-        stages: Numbers of the shaped reward.
     """
 
     table: TableConfig
@@ -66,25 +57,18 @@ class ToolHangConfig(ObjectBenchmarkConfig):
 class ToolHang(ObjectBenchmark):
     """The frame is to stand in its stand, and the wrench to hang on the frame's hook.
 
-    Source of the task: the benchmark of this name in robosuite 1.5, see `Lift`, which
-    has no shaped reward for it.
-
-    Args:
-        path: `tasks/tool_hang.toml`, or a file of the same form.
+    Source of the task: robosuite 1.5, see `Lift`; no shaped reward there.
     """
 
     def __init__(self, path: Path) -> None:
         self.config = load_config(ToolHangConfig, path)
         super().__init__(self.config)
-        origin = self.config.table.center
-        self.sampler = SequentialSampler(
-            samplers=[
-                UniformSampler(
-                    names=[FRAME], region=self.config.frame, origin=origin, rest=FLAT
-                ),
-                UniformSampler(names=[TOOL], region=self.config.tool, origin=origin),
-            ]
+        config, origin = self.config, self.config.table.center
+        first = UniformSampler(
+            names=[FRAME], region=config.frame, origin=origin, rest=FLAT
         )
+        second = UniformSampler(names=[TOOL], region=config.tool, origin=origin)
+        self.sampler = SequentialSampler(samplers=[first, second])
 
     def furnish(self, spec: mujoco.MjSpec) -> None:
         """Add table and cameras; `sideview` is near the stand."""
@@ -97,11 +81,8 @@ class ToolHang(ObjectBenchmark):
         """Return stand, frame and wrench."""
         x, y, z = self.config.table.center
         dx, dy, dz = self.config.stand
-        return [
-            objects.stand(STAND).fixed((x + dx, y + dy, z + dz)),
-            objects.hanging_frame(FRAME),
-            objects.wrench(TOOL),
-        ]
+        fixed = stand(STAND).fixed((x + dx, y + dy, z + dz))
+        return [fixed, hanging_frame(FRAME), wrench(TOOL)]
 
     def observables(self) -> dict[str, Reading]:
         """Return poses in the world and in the frames of the hands, and both flags.

@@ -8,31 +8,16 @@ import mujoco
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
-from wbc_suite.benchmark.arrangement import arrange_two_arms
+from wbc_suite.benchmark.arrangement import Opposed
 from wbc_suite.benchmark.base import load_config
-from wbc_suite.benchmark.object_benchmark import (
-    ObjectBenchmark,
-    ObjectBenchmarkConfig,
-    Opposed,
-)
+from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
 from wbc_suite.control import RobotState
-from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.shapes import Size, SizeInterval
-from wbc_suite.scene import TableConfig, add_table, add_table_cameras
+from wbc_suite.scene import TableConfig, add_table, add_table_cameras, placement
 from wbc_suite.scene.objects import SceneObject, hammer
 from wbc_suite.scene.objects.tools import HAMMER_LYING
-from wbc_suite.scene.placement import (
-    Placements,
-    Region,
-    RejectionSampler,
-    UniformSampler,
-)
-from wbc_suite.sensing.reading import (
-    Reading,
-    body_position,
-    body_quat,
-    site_position,
-)
+from wbc_suite.scene.placement import Placements, Region
+from wbc_suite.sensing.reading import Reading, site_position
 from wbc_suite.tomlfile import FrozenModel
 
 HAMMER, HANDLE = "hammer", "hammer_handle"
@@ -75,11 +60,7 @@ class TwoArmHandover(ObjectBenchmark):
     `data.userdata[0]` is 1 once both have held it in the air. Otherwise an arm that
     takes the hammer from the table by itself would succeed.
 
-    Source of geometry and reward: the benchmark of this name in robosuite 1.5, see
-    `Lift`.
-
-    Args:
-        path: `tasks/two_arm_handover.toml`, or a file of the same form.
+    Source of geometry and reward: robosuite 1.5, see `Lift`.
     """
 
     robots: Sequence[str] = ("Panda", "Panda")
@@ -88,22 +69,15 @@ class TwoArmHandover(ObjectBenchmark):
         self.config = load_config(TwoArmHandoverConfig, path)
         super().__init__(self.config)
         self._head = 0.0
-        self.sampler = RejectionSampler(
-            sampler=UniformSampler(
-                names=[HAMMER],
-                region=self.config.hammer.region,
-                origin=self.config.table.center,
-                rest=HAMMER_LYING,
-            ),
-            accepts=self._rests,
-            wanted="its head lies on the table",
+        on_table = placement.UniformSampler(
+            names=[HAMMER],
+            region=self.config.hammer.region,
+            origin=self.config.table.center,
+            rest=HAMMER_LYING,
         )
-
-    def arrange(
-        self, robots: Sequence[RobotDescription], configuration: str
-    ) -> tuple[RobotDescription, ...]:
-        """Return the robots at their places; see `arrange_two_arms`."""
-        return arrange_two_arms(self.config, robots, configuration)
+        self.sampler = placement.RejectionSampler(
+            sampler=on_table, accepts=self._rests, wanted="its head lies on the table"
+        )
 
     def furnish(self, spec: mujoco.MjSpec) -> None:
         """Add table and cameras, and one entry of user data."""
@@ -114,8 +88,8 @@ class TwoArmHandover(ObjectBenchmark):
     def objects(self) -> Sequence[SceneObject]:
         """Return the hammer, of middle size."""
         numbers = self.config.hammer
-        sizes = (numbers.handle_radius, numbers.handle_length)
-        return [self._hammer(*(float(np.mean(size)) for size in sizes))]
+        radius, length = np.mean([numbers.handle_radius, numbers.handle_length], axis=1)
+        return [self._hammer(float(radius), float(length))]
 
     def _hammer(self, radius: float, length: float) -> SceneObject:
         numbers = self.config.hammer
@@ -178,16 +152,12 @@ class TwoArmHandover(ObjectBenchmark):
 
     def observables(self) -> dict[str, Reading]:
         """Return the pose of the hammer, its handle, and its offset from each hand."""
-        body = self.states[HAMMER].body
         handle = site_position(self.model.site(HANDLE).id)
         return {
-            "hammer_pos": body_position(body),
-            "hammer_quat": body_quat(body),
+            **self.world_poses_of({"hammer": HAMMER}),
             "handle_xpos": handle,
-            **{
-                f"gripper{i}_to_handle": self.offset_from_hand(i, handle)
-                for i in (0, 1)
-            },
+            "gripper0_to_handle": self.offset_from_hand(0, handle),
+            "gripper1_to_handle": self.offset_from_hand(1, handle),
         }
 
     def success(self) -> bool:

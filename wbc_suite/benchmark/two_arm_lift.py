@@ -7,25 +7,15 @@ from pathlib import Path
 import mujoco
 from pydantic import Field, NonNegativeFloat, PositiveFloat, field_validator
 
-from wbc_suite.benchmark.arrangement import arrange_two_arms
+from wbc_suite.benchmark.arrangement import Opposed
 from wbc_suite.benchmark.base import load_config
-from wbc_suite.benchmark.object_benchmark import (
-    ObjectBenchmark,
-    ObjectBenchmarkConfig,
-    Opposed,
-)
+from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
 from wbc_suite.control import RobotState
-from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.shapes import Size
 from wbc_suite.scene import TableConfig, add_table, add_table_cameras
 from wbc_suite.scene.objects import SceneObject, pot
 from wbc_suite.scene.placement import Region, UniformSampler
-from wbc_suite.sensing.reading import (
-    Reading,
-    body_position,
-    body_quat,
-    site_position,
-)
+from wbc_suite.sensing.reading import Reading, site_position
 from wbc_suite.tomlfile import FrozenModel
 
 POT, HANDLES = "pot", ("pot_handle0", "pot_handle1")
@@ -82,11 +72,8 @@ class TwoArmLift(ObjectBenchmark):
 
     Arm 0 grasps `handle0`, which starts towards -y, and arm 1 `handle1`.
 
-    Source of geometry and reward: the benchmark of this name in robosuite 1.5, see
-    `Lift`. Unlike there, both hands must hold the pot.
-
-    Args:
-        path: `tasks/two_arm_lift.toml`, or a file of the same form.
+    Source of geometry and reward: robosuite 1.5, see `Lift`. Unlike there, both
+    hands must hold the pot.
     """
 
     robots: Sequence[str] = ("Panda", "Panda")
@@ -95,16 +82,8 @@ class TwoArmLift(ObjectBenchmark):
         self.config = load_config(TwoArmLiftConfig, path)
         super().__init__(self.config)
         self.sampler = UniformSampler(
-            names=[POT],
-            region=self.config.pot.region,
-            origin=self.config.table.center,
+            names=[POT], region=self.config.pot.region, origin=self.config.table.center
         )
-
-    def arrange(
-        self, robots: Sequence[RobotDescription], configuration: str
-    ) -> tuple[RobotDescription, ...]:
-        """Return the robots at their places; see `arrange_two_arms`."""
-        return arrange_two_arms(self.config, robots, configuration)
 
     def furnish(self, spec: mujoco.MjSpec) -> None:
         """Add table and cameras."""
@@ -122,29 +101,20 @@ class TwoArmLift(ObjectBenchmark):
     ) -> None:
         """Look up the pot's handles: its geoms beyond the walls, on either side."""
         super().bind(model, data, robots)
+        geoms, wall = self.states[POT].geoms, self.config.pot.half_size[1]
         self._bars = [
-            {
-                geom
-                for geom in self.states[POT].geoms
-                if side * model.geom_pos[geom, 1] > self.config.pot.half_size[1]
-            }
+            {geom for geom in geoms if side * model.geom_pos[geom, 1] > wall}
             for side in (1.0, -1.0)
         ]
 
     def observables(self) -> dict[str, Reading]:
         """Return the pose of the pot, its handles, and their offsets from the hands."""
-        body = self.states[POT].body
-        sites = (self.model.site(handle).id for handle in HANDLES)
-        points = [site_position(site) for site in sites]
-        return {
-            "pot_pos": body_position(body),
-            "pot_quat": body_quat(body),
-            **{f"handle{i}_xpos": point for i, point in enumerate(points)},
-            **{
-                f"gripper{i}_to_handle{i}": self.offset_from_hand(i, point)
-                for i, point in enumerate(points)
-            },
-        }
+        points = [site_position(self.model.site(handle).id) for handle in HANDLES]
+        readings = self.world_poses_of({"pot": POT})
+        readings |= {f"handle{i}_xpos": point for i, point in enumerate(points)}
+        for i, point in enumerate(points):
+            readings[f"gripper{i}_to_handle{i}"] = self.offset_from_hand(i, point)
+        return readings
 
     @property
     def height(self) -> float:

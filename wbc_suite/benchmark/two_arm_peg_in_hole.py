@@ -9,14 +9,9 @@ import mujoco
 import numpy as np
 from pydantic import Field, PositiveFloat, model_validator
 
-from wbc_suite.benchmark.arrangement import arrange_two_arms
+from wbc_suite.benchmark.arrangement import Opposed
 from wbc_suite.benchmark.base import load_config
-from wbc_suite.benchmark.object_benchmark import (
-    ObjectBenchmark,
-    ObjectBenchmarkConfig,
-    Opposed,
-)
-from wbc_suite.control import RobotState
+from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
 from wbc_suite.errors import ConfigError
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.elements import Rgba
@@ -85,11 +80,7 @@ class TwoArmPegInHoleConfig(ObjectBenchmarkConfig):
 class TwoArmPegInHole(ObjectBenchmark):
     """The peg on the wrist of arm 0 is to go through the plate on that of arm 1.
 
-    Source of geometry and reward: the benchmark of this name in robosuite 1.5, see
-    `Lift`.
-
-    Args:
-        path: `tasks/two_arm_peg_in_hole.toml`, or a file of the same form.
+    Source of geometry and reward: robosuite 1.5, see `Lift`.
     """
 
     robots: Sequence[str] = ("Panda", "Panda")
@@ -111,7 +102,7 @@ class TwoArmPegInHole(ObjectBenchmark):
                 "gripper_types at 'default', and describe robots without grippers; "
                 f"{' and '.join(gripping)} have one."
             )
-        return arrange_two_arms(self.config, robots, configuration)
+        return super().arrange(robots, configuration)
 
     def furnish(self, spec: mujoco.MjSpec) -> None:
         """Add cameras."""
@@ -127,21 +118,10 @@ class TwoArmPegInHole(ObjectBenchmark):
 
     def equip(self, spec: mujoco.MjSpec, robots: Sequence[RobotDescription]) -> None:
         """Fix peg and plate to the wrists, before the hands' frames."""
-        frames = [
-            robot_prefix(i) + frame
-            for i, robot in enumerate(robots)
-            for frame in robot.hands.values()
-        ]
-        for frame, attached in zip(frames, self.objects(), strict=True):
-            fix_to_frame(spec, attached, frame)
-
-    def bind(
-        self, model: mujoco.MjModel, data: mujoco.MjData, robots: Sequence[RobotState]
-    ) -> None:
-        """Look up the poses of peg and plate."""
-        super().bind(model, data, robots)
-        peg, plate = self.states[PEG], self.states[PLATE]
-        self._poses = peg.position, peg.rotation, plate.position, plate.rotation
+        attached = iter(self.objects())
+        for i, robot in enumerate(robots):
+            for frame in robot.hands.values():
+                fix_to_frame(spec, next(attached), robot_prefix(i) + frame)
 
     def reset(self, rng: np.random.Generator) -> None:
         """Draw the peg's radius."""
@@ -151,22 +131,15 @@ class TwoArmPegInHole(ObjectBenchmark):
     def _peg(self, radius: float) -> SceneObject:
         """Return a peg along z with its lower end at the wrist."""
         numbers = self.config.peg
-        rod = cylinder(
-            PEG, radius, numbers.half_length, color=numbers.color, material="wood"
-        )
-        at = (0.0, 0.0, numbers.half_length)
-        return rod.with_mass(numbers.mass).fixed(at)
+        half, color = numbers.half_length, numbers.color
+        rod = cylinder(PEG, radius, half, color=color, material="wood")
+        return rod.with_mass(numbers.mass).fixed((0.0, 0.0, half))
 
     def _plate(self) -> SceneObject:
         """Return a plate on a stem, parallel to z."""
         numbers = self.config.plate
-        plate = plate_with_hole(
-            PLATE,
-            half_size=numbers.half_size,
-            hole=numbers.hole,
-            half_thickness=numbers.half_thickness,
-            color=numbers.color,
-        )
+        sizes = numbers.model_dump(exclude={"mass", "stem"})
+        plate = plate_with_hole(PLATE, **sizes)
         half = numbers.stem / 2
         stem = Part(
             kind="box",
@@ -183,20 +156,17 @@ class TwoArmPegInHole(ObjectBenchmark):
         With p the peg's middle, v its axis away from the wrist, h the hole's middle and
         n the plate's normal: t = (h - p) . v, d = |(h - p) - t v|, cosine = |n . v|.
         """
-        p, R_peg, h, R_plate = self._poses
-        axis, to_hole = R_peg[:, 2], h - p
+        peg, plate = self.states[PEG], self.states[PLATE]
+        axis, to_hole = peg.rotation[:, 2], plate.position - peg.position
         depth = float(to_hole @ axis)
         distance = float(np.linalg.norm(to_hole - depth * axis))
-        return depth, distance, min(abs(float(R_plate[:, 2] @ axis)), 1.0)
+        return depth, distance, min(abs(float(plate.rotation[:, 2] @ axis)), 1.0)
 
     def observables(self) -> dict[str, Reading]:
         """Return poses of hole and peg, and their alignment."""
-        hole = body_position(self.states[PLATE].body)
-        peg = self.states[PEG].body
-        return {
-            "hole_pos": hole,
-            "hole_quat": body_quat(self.states[PLATE].body),
-            "peg_to_hole": offset(hole, body_position(peg)),
+        readings, peg = self.world_poses_of({"hole": PLATE}), self.states[PEG].body
+        return readings | {
+            "peg_to_hole": offset(readings["hole_pos"], body_position(peg)),
             "peg_quat": body_quat(peg),
             "angle": computed(1, lambda: self.alignment()[2]),
             "t": computed(1, lambda: self.alignment()[0]),

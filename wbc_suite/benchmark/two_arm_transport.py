@@ -8,15 +8,10 @@ from pathlib import Path
 import mujoco
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
-from wbc_suite.benchmark.arrangement import arrange_two_arms
+from wbc_suite.benchmark.arrangement import Opposed
 from wbc_suite.benchmark.base import load_config
-from wbc_suite.benchmark.object_benchmark import (
-    ObjectBenchmark,
-    ObjectBenchmarkConfig,
-    Opposed,
-)
+from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
 from wbc_suite.control import RobotState
-from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.elements import Rgba
 from wbc_suite.robot.shapes import Size, Vector3
 from wbc_suite.scene import TableConfig, add_table_cameras, add_tables
@@ -35,9 +30,9 @@ from wbc_suite.tomlfile import FrozenModel
 LID, PAYLOAD, TRASH = "lid", "payload", "trash"
 START_BIN, TARGET_BIN, TRASH_BIN = "start_bin", "target_bin", "trash_bin"
 GOALS = {PAYLOAD: TARGET_BIN, TRASH: TRASH_BIN}
-GLASS = 0.3
-"""Opacity of the bins' walls."""
 LIGHT, DARK = (0.80, 0.62, 0.42, 1.0), (0.42, 0.27, 0.17, 1.0)
+GLASS = (0.75, 0.82, 0.88, 0.3)
+"""Colours of the bins, and of their walls."""
 
 
 class BinConfig(FrozenModel):
@@ -105,11 +100,7 @@ class TwoArmTransport(ObjectBenchmark):
     The start bin, closed by a lid, with the payload in it, is in front of arm 0; the
     target bin, with the trash in it, and the trash bin are in front of arm 1.
 
-    Source of geometry and success: the benchmark of this name in robosuite 1.5, see
-    `Lift`; it has no shaped reward.
-
-    Args:
-        path: `tasks/two_arm_transport.toml`, or a file of the same form.
+    Source of geometry and success: robosuite 1.5, see `Lift`; no shaped reward there.
     """
 
     robots: Sequence[str] = ("Panda", "Panda")
@@ -119,26 +110,23 @@ class TwoArmTransport(ObjectBenchmark):
         super().__init__(self.config)
         config, places = self.config, self._bin_places()
         floor, rim = config.bin.wall, config.bin.size[2]
-        self.sampler = SequentialSampler(
-            samplers=[
-                UniformSampler(
-                    names=[PAYLOAD],
-                    region=config.payload.region,
-                    origin=_above(places[START_BIN], floor),
-                    rest=HAMMER_LYING,
-                ),
-                UniformSampler(
-                    names=[LID],
-                    region=config.lid.region,
-                    origin=_above(places[START_BIN], rim),
-                ),
-                UniformSampler(
-                    names=[TRASH],
-                    region=config.trash.region,
-                    origin=_above(places[TARGET_BIN], floor),
-                ),
-            ]
+        in_start = UniformSampler(
+            names=[PAYLOAD],
+            region=config.payload.region,
+            origin=_above(places[START_BIN], floor),
+            rest=HAMMER_LYING,
         )
+        on_start = UniformSampler(
+            names=[LID],
+            region=config.lid.region,
+            origin=_above(places[START_BIN], rim),
+        )
+        in_target = UniformSampler(
+            names=[TRASH],
+            region=config.trash.region,
+            origin=_above(places[TARGET_BIN], floor),
+        )
+        self.sampler = SequentialSampler(samplers=[in_start, on_start, in_target])
 
     def _bin_places(self) -> dict[str, Vector3]:
         """Return the places of the bins: one near arm 0, two near arm 1."""
@@ -149,12 +137,6 @@ class TwoArmTransport(ObjectBenchmark):
             TARGET_BIN: (x + near, y, z),
             TRASH_BIN: (x - near, y, z),
         }
-
-    def arrange(
-        self, robots: Sequence[RobotDescription], configuration: str
-    ) -> tuple[RobotDescription, ...]:
-        """Return the robots at their places; see `arrange_two_arms`."""
-        return arrange_two_arms(self.config, robots, configuration)
 
     def furnish(self, spec: mujoco.MjSpec) -> None:
         """Add both tables and cameras."""
@@ -178,13 +160,10 @@ class TwoArmTransport(ObjectBenchmark):
         """Return a bin with translucent walls."""
         color = DARK if name == TRASH_BIN else LIGHT
         numbers = self.config.bin
-        floor, *walls = open_bin(
-            name, numbers.size, wall=numbers.wall, color=color
-        ).parts
-        clear = (0.75, 0.82, 0.88, GLASS)
-        glass = [replace(w, color=clear, material="plastic") for w in walls]
-        whole = SceneObject(name=name, parts=(floor, *glass))
-        return whole.fixed(at)
+        whole = open_bin(name, numbers.size, wall=numbers.wall, color=color)
+        floor, *walls = whole.parts
+        glass = [replace(w, color=GLASS, material="plastic") for w in walls]
+        return SceneObject(name=name, parts=(floor, *glass)).fixed(at)
 
     def bind(
         self, model: mujoco.MjModel, data: mujoco.MjData, robots: Sequence[RobotState]
@@ -195,28 +174,25 @@ class TwoArmTransport(ObjectBenchmark):
 
     def observables(self) -> dict[str, Reading]:
         """Return poses, offsets from the hands, and which objects are in their bins."""
-        bodies = {name: self.states[name].body for name in self.states}
-        handle_site = self.model.site(f"{LID}_handle").id
-        payload, trash = body_position(bodies[PAYLOAD]), body_position(bodies[TRASH])
-        handle = site_position(handle_site)
-        return {
-            "payload_pos": payload,
-            "payload_quat": body_quat(bodies[PAYLOAD]),
-            "trash_pos": trash,
-            "trash_quat": body_quat(bodies[TRASH]),
+        readings = self.world_poses_of({"payload": PAYLOAD, "trash": TRASH})
+        payload, trash = readings["payload_pos"], readings["trash_pos"]
+        handle = site_position(self.model.site(f"{LID}_handle").id)
+        target, waste = (self.states[name].body for name in (TARGET_BIN, TRASH_BIN))
+        return readings | {
             "lid_handle_pos": handle,
-            "lid_handle_quat": body_quat(bodies[LID]),
-            "target_bin_pos": body_position(bodies[TARGET_BIN]),
-            "trash_bin_pos": body_position(bodies[TRASH_BIN]),
+            "lid_handle_quat": body_quat(self.states[LID].body),
+            "target_bin_pos": body_position(target),
+            "trash_bin_pos": body_position(waste),
             "gripper0_to_payload": self.offset_from_hand(0, payload),
             "gripper0_to_lid_handle": self.offset_from_hand(0, handle),
             "gripper1_to_payload": self.offset_from_hand(1, payload),
             "gripper1_to_trash": self.offset_from_hand(1, trash),
-            "payload_in_target_bin": computed(
-                1, lambda: self.inside(PAYLOAD, TARGET_BIN)
-            ),
-            "trash_in_trash_bin": computed(1, lambda: self.inside(TRASH, TRASH_BIN)),
+            "payload_in_target_bin": computed(1, lambda: self._is_done(PAYLOAD)),
+            "trash_in_trash_bin": computed(1, lambda: self._is_done(TRASH)),
         }
+
+    def _is_done(self, name: str) -> bool:
+        return self.inside(name, GOALS[name])
 
     def inside(self, name: str, where: str) -> bool:
         """Whether an object touches a bin's floor, its middle between the walls."""
@@ -228,7 +204,7 @@ class TwoArmTransport(ObjectBenchmark):
 
     def success(self) -> bool:
         """Whether the payload is in the target bin and the trash in the trash bin."""
-        return all(self.inside(name, where) for name, where in GOALS.items())
+        return all(map(self._is_done, GOALS))
 
     def progress(self) -> float:
         """Return the shaped reward, which robosuite does not have.
@@ -240,7 +216,7 @@ class TwoArmTransport(ObjectBenchmark):
         """
         numbers, reward = self.config.reward, 0.0
         for name, where in GOALS.items():
-            if self.inside(name, where):
+            if self._is_done(name):
                 reward += numbers.inside
             else:
                 start, end = self.states[name].position, self.states[where].position

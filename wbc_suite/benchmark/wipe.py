@@ -33,10 +33,9 @@ class StrokeConfig(FrozenModel):
     Attributes:
         marks: Number of marks.
         step: Distance of consecutive marks, m.
-        width: Width of the stroke, m.
+        width: m.
         coverage: Share of each side of the table in which it stays.
         bend: Standard deviation of its turn from each mark to the next, rad.
-        color: Colour of the dirt.
     """
 
     marks: PositiveInt
@@ -66,10 +65,7 @@ class WipeConfig(ObjectBenchmarkConfig):
     """`tasks/wipe.toml`.
 
     Attributes:
-        table: The table.
-        stroke: The dirt.
         margin: Marks so near to the contact area are wiped, m.
-        reward: Numbers of the reward.
     """
 
     table: TableConfig
@@ -83,14 +79,10 @@ class Wipe(ObjectBenchmark):
 
     The hands wipe the convex hull of their contact points with the table. A pad that
     lies flat wipes its whole face, a tilted one its edge, a finger next to nothing.
-
     Which marks are wiped is kept in `data.userdata`.
 
-    Source of geometry and reward: the benchmark of this name in robosuite 1.5, see
-    `Lift`. Its shaped reward leaves [0, 1]; here it is clipped to that.
-
-    Args:
-        path: `tasks/wipe.toml`, or a file of the same form.
+    Source of geometry and reward: robosuite 1.5, see `Lift`. Its shaped reward
+    leaves [0, 1]; here it is clipped to that.
 
     Attributes:
         marks: Positions of the marks in the world, shape (n, 3), m.
@@ -199,8 +191,7 @@ class Wipe(ObjectBenchmark):
         for i, (a, b) in enumerate(pairs_in_contact(self.data)):
             if self._table not in (a, b):
                 continue
-            other = b if a == self._table else a
-            if any(hand.owns(other) for hand in self.hands):
+            if any(hand.owns(a) or hand.owns(b) for hand in self.hands):
                 mujoco.mj_contactForce(self.model, self.data, i, self._wrench)
                 force += abs(self._wrench.item(0))
                 points.append(self.data.contact.pos[i, :2])
@@ -209,18 +200,12 @@ class Wipe(ObjectBenchmark):
         return points, force, collided
 
     def wipe(self, wiped: ArrayLike) -> None:
-        """Set which marks are wiped off, measure the others and draw only them.
-
-        Args:
-            wiped: Shape (n,).
-        """
+        """Set which marks are wiped off, shape (n,); measure and draw the others."""
         self._wiped[:] = wiped
         left = self.marks[~self.wiped]
-        rest = left if len(left) else self.marks
-        centroid = rest.mean(axis=0)
-        self._measures[:3] = centroid
+        self._measures[:3] = (left if len(left) else self.marks).mean(axis=0)
         self._measures[PORTION] = self.wiped.mean()
-        distances = np.linalg.norm(left - centroid, axis=1)
+        distances = np.linalg.norm(left - self.centroid, axis=1)
         self._measures[RADIUS] = distances.max(initial=0.0)
         alpha = np.where(self.wiped, 0.0, self.config.stroke.color[3])
         self.model.geom_rgba[self._geoms, 3] = alpha
@@ -228,8 +213,7 @@ class Wipe(ObjectBenchmark):
     def observables(self) -> dict[str, Reading]:
         """Return the wiped portion, and centroid and radius of the marks left.
 
-        Keys are those of existing datasets; offsets to the centroid are added for each
-        hand.
+        Keys are those of existing datasets; offsets from the hands are added.
         """
         centroid = self._measure(CENTROID, 3)
         readings = {
@@ -295,14 +279,10 @@ class Wipe(ObjectBenchmark):
 
 
 def _distances(hull: Matrix, points: Matrix) -> Vector:
-    """Return the distances of points to the convex hull of others, in a plane.
+    """Return the distances of points to the convex hull of others, 0 inside, (n,).
 
-    Args:
-        hull: Points that span the hull, shape (k, 2), k >= 1.
-        points: Shape (n, 2).
-
-    Returns:
-        Distances, shape (n,); 0 inside.
+    The points, shape (n, 2), and those that span the hull, shape (k, 2), are in one
+    plane.
     """
     if len(hull) == 1:
         return np.linalg.norm(points - hull[0], axis=1)

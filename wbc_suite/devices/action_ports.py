@@ -31,8 +31,6 @@ class LimbPort:
     """A slice that commands the pose of a frame.
 
     Attributes:
-        name: Name of the slice.
-        kind: Components of the pose that it commands.
         body: Body that the frame is fixed to; -1 for none.
         measure: Returns the pose of the simulated frame in the world.
         encode: Returns the values of the slice for a target in the world.
@@ -53,7 +51,6 @@ class SpeedPort:
     """A slice that commands the velocity of a base.
 
     Attributes:
-        name: Name of the slice.
         axes: Indices of its values in forward, left, turn.
         unit: Velocity of a value of 1, m/s or rad/s.
     """
@@ -71,11 +68,8 @@ class SpeedPort:
 class JointPort:
     """A slice that commands joint positions, or steps of them.
 
-    Attributes:
-        name: Name of the slice.
-        joints: Names of the joints.
-        measure: Returns their positions, rad or m.
-        encode: Returns the values of the slice for target positions.
+    `measure` returns the positions of the joints, rad or m, and `encode` the values of
+    the slice for target positions.
     """
 
     name: str
@@ -94,8 +88,7 @@ def limb_ports(env: Any) -> dict[str, LimbPort]:
     for index, controller, slices in _robots(env):
         is_whole_body = hasattr(getattr(controller, "config", None), "frames")
         make = _whole_body if is_whole_body else _parts
-        found = make(env, controller, index, slices)
-        ports |= {port.name: port for port in found}
+        ports |= {p.name: p for p in make(env, controller, index, slices)}
     return ports
 
 
@@ -167,12 +160,9 @@ def _whole_body(
             f"and input_ref_frame 'world', not {type(controller).__name__} with "
             f"{config.input_type!r} and {config.input_ref_frame!r}."
         )
-    simulation = env.unwrapped.simulation
     for frame in config.frames:
         kind = frame.behaviour
-        body, measure = _reader(
-            simulation.model, simulation.data, frame.frame, f"robot{index}_"
-        )
+        body, measure = _reader(env.unwrapped.simulation, frame.frame, f"robot{index}_")
         yield LimbPort(
             name=slices[frame.name].name,
             kind=_limb_kind(kind),
@@ -186,16 +176,16 @@ def _limb_kind(kind: FrameKind) -> LimbKind:
     """Return the components of a pose that frames of a kind command."""
     if "yaw" in kind.labels:
         return LimbKind.PLANAR
-    position, orientation = any(kind.counted[:3]), any(kind.counted[3:])
-    if position and orientation:
-        return LimbKind.POSE
-    return LimbKind.POSITION if position else LimbKind.ORIENTATION
+    if not any(kind.counted[3:]):
+        return LimbKind.POSITION
+    return LimbKind.POSE if any(kind.counted[:3]) else LimbKind.ORIENTATION
 
 
 def _reader(
-    model: mujoco.MjModel, data: mujoco.MjData, frame: str | None, prefix: str
+    simulation: Any, frame: str | None, prefix: str
 ) -> tuple[int, Callable[[], pin.SE3]]:
     """Return a frame's body and a function of its pose; None: centre of mass."""
+    model, data = simulation.model, simulation.data
     if frame is None:
         names = [model.body(b).name for b in range(model.nbody)]
         root = next(b for b, name in enumerate(names) if name.startswith(prefix))

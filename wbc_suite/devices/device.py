@@ -25,10 +25,9 @@ class Device(Protocol):
 
 
 class Scripted:
-    """A device without hardware: it returns given states, then the last one again.
+    """A device without hardware: one given state per read, then the last one again.
 
-    Args:
-        states: One state per read; may be an endless generator.
+    The states may be an endless generator.
     """
 
     def __init__(self, states: Iterable[DeviceState]) -> None:
@@ -47,7 +46,7 @@ class Scripted:
         """Do nothing."""
 
 
-_BUILT_IN = {
+_DEVICES: dict[str, str | Callable[..., Device]] = {
     "dualsense": "wbc_suite.devices.gamepad:DualSense",
     "gamepad": "wbc_suite.devices.gamepad:Gamepad",
     "keyboard": "wbc_suite.devices.keyboard:Keyboard",
@@ -55,9 +54,7 @@ _BUILT_IN = {
     "spacemouse": "wbc_suite.devices.spacemouse:SpaceMouse",
     "stream": "wbc_suite.devices.stream:Stream",
 }
-"""Module and class by name; imported when the device is created."""
-
-_REGISTERED: dict[str, Callable[..., Device]] = {}
+"""Class or factory by name; those of a text are imported when one is created."""
 
 
 def register_device(name: str, make: Callable[..., Device]) -> None:
@@ -68,30 +65,27 @@ def register_device(name: str, make: Callable[..., Device]) -> None:
     """
     if name.lower() in device_names():
         raise ConfigError(f"A device named '{name}' exists already.")
-    _REGISTERED[name.lower()] = make
+    _DEVICES[name.lower()] = make
 
 
 def device_names() -> tuple[str, ...]:
     """Return the names of all devices."""
-    return tuple(sorted({*_BUILT_IN, *_REGISTERED}))
+    return tuple(sorted(_DEVICES))
 
 
 def find_device(name: str) -> Callable[..., Device]:
-    """Return the class or factory of a device.
-
-    Args:
-        name: Name of a device, or `module:Class`.
+    """Return the class or factory of a device by its name, or of `module:Class`.
 
     Raises:
         UnknownNameError: If there is no device of this name.
         DeviceError: If the module cannot be imported, or lacks the class.
     """
-    key = name.lower()
-    if key in _REGISTERED:
-        return _REGISTERED[key]
-    if ":" not in name and key not in _BUILT_IN:
+    found = _DEVICES.get(name.lower(), name)
+    if callable(found):
+        return found
+    module, colon, kind = found.partition(":")
+    if not colon:
         raise UnknownNameError("device", name, device_names())
-    module, _, kind = _BUILT_IN.get(key, name).partition(":")
     try:
         return getattr(importlib.import_module(module), kind)
     except (ImportError, AttributeError) as error:

@@ -1,5 +1,6 @@
 """USB and Bluetooth devices by their HID reports."""
 
+import contextlib
 import importlib
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -13,13 +14,7 @@ UDEV_RULE = 'KERNEL=="hidraw*", ATTRS{idVendor}=="%04x", MODE="0660", TAG+="uacc
 def open_hid(
     kind: str, vendors: Sequence[int], products: Sequence[int], count: int = 1
 ) -> list[Any]:
-    """Open devices in non-blocking mode.
-
-    Args:
-        kind: Name of the device, for error messages.
-        vendors: Vendor ids.
-        products: Product ids.
-        count: Number of devices that are needed.
+    """Open `count` devices in non-blocking mode; `kind` names them in messages.
 
     Raises:
         DeviceError: If hidapi or a device is missing, or may not be opened.
@@ -46,11 +41,10 @@ def open_hid(
         try:
             device.open_path(info["path"])
         except OSError as error:
+            rule = UDEV_RULE % info["vendor_id"]
             raise DeviceError(
                 f"{kind} was found but may not be opened. On Linux put this line into "
-                "/etc/udev/rules.d/70-wbc-suite.rules and plug it in again: "
-                + UDEV_RULE
-                % info["vendor_id"]
+                f"/etc/udev/rules.d/70-wbc-suite.rules and plug it in again: {rule}"
             ) from error
         device.set_nonblocking(True)
         opened.append(device)
@@ -59,11 +53,6 @@ def open_hid(
 
 def waiting_reports(device: Any) -> Iterator[bytes]:
     """Yield the queued reports; none if the device was unplugged."""
-    while True:
-        try:
-            report = bytes(device.read(128))
-        except (OSError, ValueError):
-            return
-        if not report:
-            return
-        yield report
+    with contextlib.suppress(OSError, ValueError):
+        while report := bytes(device.read(128)):
+            yield report

@@ -66,31 +66,25 @@ def unflatten(flat: Mapping[str, Any], time: float) -> DeviceState:
     Raises:
         DeviceError: If a value is not a number.
     """
-    numbers = {key: _number(key, value) for key, value in flat.items()}
     groups: dict[str, dict[str, float]] = {}
-    for key, x in numbers.items():
+    joints: dict[str, float] = {}
+    for key, value in flat.items():
         name, _, rest = key.partition(".")
-        groups.setdefault(name, {})[rest] = x
+        groups.setdefault(name, {})[rest] = _number(key, value)
+        if key.endswith(".pos"):
+            joints[key.removesuffix(".pos")] = groups[name][rest]
     buttons = groups.pop("button", {})
     return DeviceState(
         time=time,
         limbs={n: _limb(groups[n]) for n in sorted(groups) if _is_limb(groups[n])},
-        joints={
-            key.removesuffix(".pos"): x
-            for key, x in numbers.items()
-            if key.endswith(".pos")
-        },
+        joints=joints,
         base=_taken(groups.get("base", {}), BASE),
         buttons=frozenset(name for name, x in buttons.items() if x > 0.5),
     )
 
 
 class ToLeRobot:
-    """A device as a teleoperator of LeRobot.
-
-    Args:
-        device: The device.
-    """
+    """A device as a teleoperator of LeRobot."""
 
     name = "wbc_suite"
     is_calibrated = True

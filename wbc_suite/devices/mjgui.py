@@ -19,12 +19,8 @@ COLOURS = ((0.9, 0.3, 0.2, 0.5), (0.2, 0.5, 0.9, 0.5), (0.3, 0.7, 0.3, 0.5))
 class MjGui:
     """Boxes at the robot's limbs that are dragged: double click, then Ctrl and drag.
 
-    The window displays a copy of the scene with the boxes added.
-
-    Args:
-        env: Environment whose limbs are dragged.
-        launch: Opens a window on a model and its data; MuJoCo's passive viewer.
-        clock: Source of time, s.
+    The window displays a copy of the scene with the boxes added. `launch` opens a
+    window on a model and its data, by default MuJoCo's passive viewer.
     """
 
     help = "MuJoCo's window: double click a box, then Ctrl and drag.\n"
@@ -60,10 +56,11 @@ class MjGui:
         with self._viewer.lock():
             self._copy()
             mujoco.mj_kinematics(self._model, self._data)
-            limbs = {
-                port.name: LimbInput(pose=self._pose(k))
-                for k, port in enumerate(self._ports)
-            }
+            limbs = {}
+            for k, port in enumerate(self._ports):
+                turn = pin.Quaternion(*self._data.mocap_quat[k]).normalized()
+                pose = pin.SE3(turn, self._data.mocap_pos[k])
+                limbs[port.name] = LimbInput(pose=pose)
         self._viewer.sync()
         return DeviceState(time=self._clock(), limbs=limbs)
 
@@ -72,10 +69,6 @@ class MjGui:
         if self._viewer is not None:
             self._viewer.close()
         self._viewer = None
-
-    def _pose(self, k: int) -> pin.SE3:
-        position, wxyz = self._data.mocap_pos[k], self._data.mocap_quat[k]
-        return pin.XYZQUATToSE3(np.array([*position, *np.roll(wxyz, -1)]))
 
     def _copy(self) -> None:
         self._data.qpos[:] = self._env.simulation.data.qpos

@@ -4,12 +4,12 @@ from typing import Annotated, Literal
 
 import numpy as np
 import pinocchio as pin
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import Field, ValidationError, field_validator
 
 from wbc_suite.devices.state import DeviceState, LimbInput
 from wbc_suite.errors import DeviceError
+from wbc_suite.tomlfile import FrozenModel
 
-FORMAT = "wbc-pose-frame/1"
 MAX_BYTES = 32_768
 """Maximum size of a frame; two hands with all their joints take 4 kB."""
 MAX_BUTTONS = 32
@@ -22,17 +22,8 @@ Point = tuple[Number, Number, Number]
 Name = Annotated[str, Field(min_length=1, max_length=64)]
 
 
-class _Model(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-
-class Pose(_Model):
-    """A pose in a fixed frame: x forward, y left, z up.
-
-    Attributes:
-        position: m.
-        orientation: Unit quaternion, w x y z.
-    """
+class Pose(FrozenModel):
+    """A pose in a fixed frame, x forward, y left, z up: m, and a quaternion w x y z."""
 
     position: Point
     orientation: tuple[Number, Number, Number, Number]
@@ -50,15 +41,10 @@ class Pose(_Model):
         return pin.SE3(pin.Quaternion(w, x, y, z).normalized(), np.array(self.position))
 
 
-class PoseLimb(_Model):
-    """Input for one limb; absent fields give no input.
+class PoseLimb(FrozenModel):
+    """Input for one limb, see `LimbInput`; absent fields give no input.
 
-    Attributes:
-        pose: Pose of the wrist or the head.
-        twist: Velocity in axes of the world, m/s and rad/s.
-        engaged: Whether the robot's limb follows.
-        grip: Closing of the hand, -1 open .. 1 closed: one value, or one per synergy.
-        fingers: Positions of the hand's 25 joints, m, in the order of WebXR.
+    The pose is that of the wrist or the head.
     """
 
     pose: Pose | None = None
@@ -76,16 +62,11 @@ class PoseLimb(_Model):
 
     def limb_input(self) -> LimbInput:
         """Return the input as the pipeline reads it."""
-        return LimbInput(
-            pose=None if self.pose is None else self.pose.se3(),
-            twist=None if self.twist is None else np.array(self.twist),
-            engaged=self.engaged,
-            grip=None if self.grip is None else np.array(self.grip),
-            fingers=None if self.fingers is None else np.array(self.fingers),
-        )
+        pose = None if self.pose is None else self.pose.se3()
+        return LimbInput(pose=pose, **self.model_dump(exclude={"pose"}))
 
 
-class PoseFrame(_Model):
+class PoseFrame(FrozenModel):
     """State of a device at one moment.
 
     Attributes:
@@ -93,12 +74,8 @@ class PoseFrame(_Model):
         time: On the sender's clock, s; it must increase from frame to frame.
         limbs: By limb: `head`, `right` and `left` for the wrists, `hand` for the
             selected one, or a slice of the action.
-        joints: Positions by joint, rad or m, as a leader arm has them.
-        base: Velocity of the base: forward and left, m/s, and turn, rad/s.
-        height: Velocity of the torso's height, m/s.
-        buttons: Pressed buttons: `grip` (closes or opens the gripper of the selected
-            hand), `next`, `mirror`, `home`, `pause`, `reset`, `quit`, `keep`,
-            `discard`, `undo`, `success`. One frame is enough.
+        joints, base, height, buttons: See `DeviceState`. One frame with a pressed
+            button is enough.
     """
 
     format: Literal["wbc-pose-frame/1"]
@@ -128,12 +105,9 @@ class PoseFrame(_Model):
     def state(self) -> DeviceState:
         """Return the state that the frame describes."""
         return DeviceState(
-            time=self.time,
             limbs={name: limb.limb_input() for name, limb in self.limbs.items()},
-            joints=self.joints,
-            base=None if self.base is None else np.array(self.base),
-            height=self.height,
             buttons=frozenset(self.buttons),
+            **self.model_dump(include={"time", "joints", "base", "height"}),
         )
 
 

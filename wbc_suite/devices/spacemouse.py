@@ -31,10 +31,8 @@ _TO_OURS = np.array([[0, -1, 0], [-1, 0, 0], [0, 0, -1]], dtype=np.float64)
 def parse_axes(report: bytes, axes: Vector) -> Vector:
     """Return the deflections after a report, in the mouse's axes, shape (6,).
 
-    Args:
-        report: Number 1: translation, or all six axes in newer models; 2: rotation.
-            Others are ignored. Values are little-endian, 16 bits.
-        axes: Deflections before it, full deflection is 1, shape (6,).
+    Full deflection is 1. Report 1 is translation, or all six axes in newer models; 2 is
+    rotation; others are ignored. Values are little-endian, 16 bits.
     """
     axes = axes.copy()
     count = 6 if len(report) >= 13 and report[0] == 1 else 3
@@ -86,8 +84,7 @@ class _Mouse:
 
     def twist(self) -> Vector:
         """Return the velocity: forward, left, up, m/s and rad/s, shape (6,)."""
-        axes = shaped(self.axes)
-        linear, angular = _TO_OURS @ axes[:3], _TO_OURS @ axes[3:]
+        linear, angular = shaped(self.axes).reshape(2, 3) @ _TO_OURS.T
         return np.concatenate([SPEED * linear, TURN * angular])
 
 
@@ -95,12 +92,8 @@ class SpaceMouse:
     """One SpaceMouse for the selected hand, or one for each hand.
 
     The left button closes and opens the gripper. The right one selects the next hand,
-    or moves all hands home if each has a mouse.
-
-    Args:
-        hands: Limb of each mouse, in the order in which they are found.
-        find: Opens all connected mice.
-        clock: Source of time, s.
+    or moves all hands home if each has a mouse. `hands` has the limb of each mouse, in
+    the order in which they are found.
     """
 
     help = "SpaceMouse: left button closes and opens, right button: next hand.\n"

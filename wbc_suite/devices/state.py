@@ -88,11 +88,10 @@ class DeviceState:
     @property
     def finite(self) -> bool:
         """Whether all numbers are finite."""
-        numbers = [self.time, self.height, *self.joints.values()]
         base = () if self.base is None else self.base
-        return bool(np.isfinite([*numbers, *base]).all()) and all(
-            limb.finite for limb in self.limbs.values()
-        )
+        numbers = [self.time, self.height, *self.joints.values(), *base]
+        limbs = all(limb.finite for limb in self.limbs.values())
+        return limbs and bool(np.isfinite(numbers).all())
 
 
 def mirrored(state: DeviceState) -> DeviceState:

@@ -2,19 +2,22 @@
 
 import contextlib
 import json
+import shutil
+import ssl
+import subprocess
 import threading
 import time
 from dataclasses import replace
 from http import HTTPStatus
 from importlib import resources
+from pathlib import Path
 
 from aiohttp import WSCloseCode, WSMsgType, web
 
-from wbc_suite.devices.access_rules import token_for
+from wbc_suite.catalogue import user_cache
 from wbc_suite.devices.pose_frame import MAX_BUTTONS, MAX_BYTES, PoseFrame
 from wbc_suite.devices.state import DeviceState
-from wbc_suite.devices.tls import server_context
-from wbc_suite.devices.web_server import WebServer, page_url
+from wbc_suite.devices.web_server import WebServer, page_url, token_for
 from wbc_suite.errors import DeviceError
 
 SOCKET = "/frames"
@@ -22,6 +25,7 @@ PAGES = {"/": "controls.html", "/xr": "xr.html"}
 SENDERS = 8  # connected at a time; only one of them moves the robot
 FLOOD = 2000  # messages in a second that end a connection; a headset sends 90
 HEARTBEAT = 6.0  # s; a sender that is gone is disconnected after 1.5 times this
+DAYS = 825  # of validity of a certificate; the most that browsers accept
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
     "connect-src 'self'"
@@ -31,12 +35,9 @@ POLICY = (
 class Stream:
     """A device that listens: the first client that sends frames moves the robot.
 
-    It listens on 127.0.0.1 by default. On any other address clients need a token.
-
-    Args:
-        host: Address to listen on.
-        port: Port; 0 takes any free port.
-        tls: Whether to encrypt, with a key made on this machine; WebXR requires it.
+    It listens on 127.0.0.1 by default; on any other address clients need a token. Port
+    0 is any free one. `tls` encrypts with a key made on this machine, which WebXR
+    requires.
 
     Attributes:
         token: Secret that clients need; None on a loopback address.
@@ -69,18 +70,12 @@ class Stream:
         return f"Stream: open {self.url} in a browser, or send pose frames.\n"
 
     def start(self) -> None:
-        """Listen.
-
-        Raises:
-            DeviceError: If the port is not available, or a key cannot be made.
-        """
+        """Listen; for errors see `WebServer` and `server_context`."""
         routes = [web.get(path, self._send_page) for path in PAGES]
+        routes.append(web.get(SOCKET, self._receive))
+        tls = server_context() if self._tls else None
         self._server = WebServer(
-            self._host,
-            self._port,
-            [*routes, web.get(SOCKET, self._receive)],
-            token=self.token,
-            tls=server_context() if self._tls else None,
+            self._host, self._port, routes, token=self.token, tls=tls
         )
         self._port = self._server.port
 
@@ -154,3 +149,59 @@ class Stream:
 async def _report(sender: web.WebSocketResponse, text: str) -> None:
     with contextlib.suppress(ConnectionError):
         await sender.send_str(json.dumps({"error": text}))
+
+
+def server_context(folder: Path | None = None) -> ssl.SSLContext:
+    """Return the server side of TLS; the first call makes a key in the user's cache.
+
+    Raises:
+        DeviceError: If the key cannot be created or read.
+    """
+    folder = folder or user_cache() / "tls"
+    key, certificate = folder / "key.pem", folder / "certificate.pem"
+    if not (key.exists() and certificate.exists()):
+        make_key(key, certificate)
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.minimum_version = ssl.TLSVersion.TLSv1_2
+    try:
+        context.load_cert_chain(certificate, key)
+    except (OSError, ssl.SSLError) as error:
+        raise DeviceError(
+            f"The key in '{folder}' cannot be used: {error}. Delete the folder; the "
+            "next start creates a new one."
+        ) from error
+    return context
+
+
+def make_key(key: Path, certificate: Path) -> None:
+    """Create a key that only this user can read, and a self-signed certificate.
+
+    Raises:
+        DeviceError: If the program `openssl` is missing or fails.
+    """
+    program = shutil.which("openssl")
+    if program is None:
+        raise DeviceError(
+            "TLS needs a key, and the program 'openssl' to create it: install it (apt "
+            f"install openssl), or put key.pem and certificate.pem into '{key.parent}'."
+        )
+    key.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+    key.touch(mode=0o600)
+    made = subprocess.run(
+        [
+            program, "req", "-x509", "-newkey", "ec", "-nodes", "-sha256",
+            "-pkeyopt", "ec_paramgen_curve:prime256v1",
+            "-days", str(DAYS), "-subj", "/CN=wbc-suite",
+            "-addext", "subjectAltName=DNS:localhost,IP:127.0.0.1",
+            "-keyout", str(key), "-out", str(certificate),
+        ],
+        capture_output=True,
+        text=True,
+        check=False,
+    )  # fmt: skip
+    key.chmod(0o600)
+    if made.returncode != 0:
+        key.unlink()
+        raise DeviceError(
+            f"openssl failed to create a key: {made.stderr.strip()[-300:]}"
+        )

@@ -8,10 +8,7 @@ from wbc_suite.errors import DeviceError
 
 
 class StreamClient:
-    """Send pose frames to a stream.
-
-    Args:
-        url: The address that the stream prints, with its token if any.
+    """Send pose frames to the address that a stream prints, with its token if any.
 
     Raises:
         DeviceError: If there is no stream at the address.

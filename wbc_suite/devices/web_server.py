@@ -1,22 +1,50 @@
-"""The HTTP server of pages and streams: aiohttp in a thread, behind `AccessRules`."""
+"""The HTTP server of pages and streams: aiohttp in a thread, behind `AccessRules`.
+
+- A page of another site in the user's browser must not reach the server: the `Origin`
+  of a request must be the host that it asks for. Without a token that host must be a
+  loopback address, which stops DNS names that point at 127.0.0.1.
+- Clients on other machines need the token. The address that opens the page carries it
+  once; the answer replaces it by a cookie that scripts cannot read.
+"""
 
 import asyncio
 import contextlib
+import hmac
+import ipaddress
 import logging
+import secrets
 import socket
 import ssl
 import threading
 from collections.abc import Iterable
+from http import HTTPStatus
+from http.cookies import CookieError
+from urllib.parse import urlsplit
 
-from aiohttp import web
+from aiohttp import hdrs, web
 from aiohttp.typedefs import Handler
 
-from wbc_suite.devices.access_rules import AccessRules, is_loopback
 from wbc_suite.errors import DeviceError
+
+logger = logging.getLogger(__name__)
 
 CONNECTIONS = 256  # at a time; a browser opens one, and a few more while it loads
 HEAD_TIMEOUT = 10.0  # s, from a connection to its first complete request
 SHUTDOWN_TIMEOUT = 0.2  # s; handlers of open WebSockets are cancelled after it
+
+
+def is_loopback(host: str) -> bool:
+    """Return whether a host name or an address is this machine's loopback."""
+    if host == "localhost":
+        return True
+    with contextlib.suppress(ValueError):
+        return ipaddress.ip_address(host.strip("[]")).is_loopback
+    return False
+
+
+def token_for(host: str) -> str | None:
+    """Return a new secret of 128 bits, valid in a URL; None for a loopback address."""
+    return None if is_loopback(host) else secrets.token_urlsafe(16)
 
 
 def page_url(host: str, port: int, token: str | None, *, scheme: str = "http") -> str:
@@ -33,15 +61,8 @@ class WebServer:
     aiohttp limits the size of request lines and header fields (8 kB each). Connections
     beyond `CONNECTIONS`, and those without a request for `HEAD_TIMEOUT`, are closed.
 
-    Args:
-        host: Address to listen on.
-        port: Port to listen on; 0 takes any free port.
-        routes: Handlers of admitted requests.
-        token: Secret that clients need; None if `host` is a loopback address.
-        tls: Server side of TLS; None for plain HTTP.
-
-    Attributes:
-        port: Port that is listened on.
+    Port 0 is any free one. `token` is the secret that clients need; None if `host` is a
+    loopback address. Without `tls` it is plain HTTP.
 
     Raises:
         DeviceError: If the port is not available, or a token is missing.
@@ -151,3 +172,66 @@ def _reachable(host: str) -> str:
         probe.connect(("192.0.2.1", 9))  # sends nothing; selects the outgoing address
         return probe.getsockname()[0]
     return socket.gethostname()
+
+
+class AccessRules:
+    """Decide which requests are admitted.
+
+    Clients need the token; without one those of this machine are admitted. `cookie` is
+    the name of the cookie that stands for it.
+    """
+
+    def __init__(self, token: str | None, cookie: str) -> None:
+        self._token, self._cookie = token, cookie
+
+    def refusal(self, request: web.Request) -> web.Response | None:
+        """Return the refusal of a request, or None to admit it."""
+        if request.method != hdrs.METH_GET:
+            return _response(HTTPStatus.METHOD_NOT_ALLOWED, "Only GET is supported.")
+        host = request.headers.get(hdrs.HOST, "")
+        if self._token is None and not is_loopback(_host_name(host)):
+            return _response(
+                HTTPStatus.FORBIDDEN,
+                "This page is served to this machine only: open it as 127.0.0.1.",
+            )
+        origin = request.headers.get(hdrs.ORIGIN)
+        if origin is not None and urlsplit(origin).netloc != host:
+            logger.warning("Refused a request from a page of %s.", origin)
+            return _response(
+                HTTPStatus.FORBIDDEN, "Requests of other sites are refused."
+            )
+        return None if self._token is None else self._check_token(self._token, request)
+
+    def _check_token(self, token: str, request: web.Request) -> web.Response | None:
+        with contextlib.suppress(CookieError):
+            if _same(token, request.cookies.get(self._cookie, "")):
+                return None
+        if not _same(token, request.query.get("token", "")):
+            return _response(
+                HTTPStatus.UNAUTHORIZED,
+                "This page needs its token: open the whole address that the terminal "
+                "shows, with '?token=' and what follows.",
+            )
+        if request.headers.get(hdrs.UPGRADE, "").lower() == "websocket":
+            return None
+        response = _response(HTTPStatus.SEE_OTHER)
+        path = request.rel_url.raw_path.lstrip("/\\")  # a redirect to this host only
+        response.headers[hdrs.LOCATION] = f"/{path}"
+        response.set_cookie(self._cookie, token, httponly=True, samesite="Lax")
+        return response
+
+
+def _response(status: HTTPStatus, text: str = "") -> web.Response:
+    headers = {hdrs.CACHE_CONTROL: "no-store"}
+    return web.Response(status=status, text=text, headers=headers)
+
+
+def _same(token: str, candidate: str) -> bool:
+    return hmac.compare_digest(candidate.encode(), token.encode())
+
+
+def _host_name(host: str) -> str:
+    """Return the name in a Host header, without its port."""
+    with contextlib.suppress(ValueError):
+        return urlsplit(f"//{host}").hostname or ""
+    return ""

@@ -22,10 +22,7 @@ def make(
         benchmark: Name of the benchmark, such as `Lift`, ignoring case; or its file, or
             a class of your own (examples/08_own_environment.py).
         arguments: See `wbc_suite.envs.config.EnvConfig`: `robots`,
-            `controller_configs`, `control_freq`, `horizon`, `reward_shaping`, ...
-
-    Raises:
-        UnknownNameError: If the benchmark, a robot or a controller is unknown.
-        ConfigError: If an argument is wrong.
+            `controller_configs`, `control_freq`, `horizon`, `reward_shaping`, ...;
+            and for errors see `RobotEnv`.
     """
     return RobotEnv(benchmark, **arguments)

@@ -1,5 +1,7 @@
 """Parts of an environment: robots, scene, simulation, observations, cameras."""
 
+import importlib
+import time
 from typing import Any
 
 import gymnasium
@@ -15,7 +17,6 @@ from wbc_suite.control import (
     load_composite_controller_config,
 )
 from wbc_suite.envs.config import EnvConfig, NoiseConfig
-from wbc_suite.envs.display import Display
 from wbc_suite.envs.simulation import Simulation
 from wbc_suite.errors import ConfigError
 from wbc_suite.robot import RobotDescription, load_robot
@@ -35,7 +36,9 @@ from wbc_suite.sensing.proprioception import (
     proprioception,
     sensors_of,
 )
-from wbc_suite.typing import Indices, Vector
+
+WATCH_PAGE = "wbc_suite.viewers.watch_page"
+"""Imported when needed: `viewers` is a layer above `envs`."""
 
 
 def use_sampler(benchmark: Benchmark, config: EnvConfig) -> None:
@@ -87,19 +90,15 @@ def compose(
 class StartPosture:
     """Writes the keyframe `ready` of one robot, with noise on the arms' joints.
 
-    Args:
-        state: The robot in the simulation.
-        noise: The noise, drawn at each call; None for none.
+    The root is where the model has it: MuJoCo's reset of the data puts it there.
     """
 
     def __init__(self, state: RobotState, noise: NoiseConfig | None) -> None:
         robot = state.robot
         posture = robot.keyframe("ready")
         self._qpos, self._noise = state.data.qpos, noise
-        joints, _ = state.joint_addresses(tuple(posture))
-        self._index, self._values = _root(state)
-        self._index = np.concatenate([self._index, joints])
-        self._values = np.concatenate([self._values, list(posture.values())])
+        self._index, _ = state.joint_addresses(tuple(posture))
+        self._values = list(posture.values())
         groups = [group for group in robot.groups if group.endswith("arm")]
         arms = [name for group in groups for name in robot.groups[group]]
         self._arms, _ = state.joint_addresses(tuple(arms))
@@ -116,20 +115,6 @@ class StartPosture:
         draw = rng.normal(size=count) if gaussian else rng.uniform(-1.0, 1.0, count)
         moved = self._qpos[self._arms] + self._noise.magnitude * draw
         self._qpos[self._arms] = np.clip(moved, self._low, self._high)
-
-
-def _root(state: RobotState) -> tuple[Indices, Vector]:
-    """Return the indices of the root's pose in qpos, and its start value."""
-    root, model = state.robot.root, state.model
-    if root.kind == "free":
-        first = int(model.joint(f"{state.prefix}root").qposadr[0])
-        return np.arange(first, first + 7, dtype=np.int64), np.array(
-            [*root.pos, *root.quat]
-        )
-    index, _ = state.joint_addresses(
-        state.robot.root_joint_names if root.kind == "planar" else ()
-    )
-    return index, np.zeros(len(index))
 
 
 def simulate(
@@ -149,14 +134,10 @@ def simulate(
     mujoco.mj_forward(model, data)
     for state in states:
         aim_robot_view(state)
-    configs = [
-        load_composite_controller_config(given, robot)
-        for given, robot in zip(config.controller_list, robots, strict=True)
-    ]
-    pairs = [
-        (state, build_composite_controller(config, state))
-        for config, state in zip(configs, states, strict=True)
-    ]
+    pairs: list[tuple[RobotState, CompositeController]] = []
+    for given, state in zip(config.controller_list, states, strict=True):
+        controller = load_composite_controller_config(given, state.robot)
+        pairs.append((state, build_composite_controller(controller, state)))
     simulation = Simulation(
         model, data, pairs, compiled=config.compiled, lite=config.lite_physics
     )
@@ -184,6 +165,56 @@ def make_observables(
     return observables
 
 
+class Display:
+    """Shows a simulation in one render mode.
+
+    Mode `human` serves a page and keeps to real time, the others return arrays.
+    """
+
+    def __init__(
+        self, simulation: Simulation, cameras: Cameras, config: EnvConfig
+    ) -> None:
+        self._simulation, self._cameras, self._config = simulation, cameras, config
+        self._page: Any = None
+        self._due = 0.0
+
+    def render(self) -> Any:
+        """Return a picture, or None in mode `human`.
+
+        `rgb_array`: shape (height, width, 3), uint8. `depth_array`: shape (height,
+        width), float32, m along the camera's axis.
+
+        Raises:
+            ConfigError: If there is no render mode.
+        """
+        mode, camera = self._config.render_mode, self._config.render_camera
+        width, height = self._config.render_size
+        if mode == "human":
+            return self._show()
+        if mode == "rgb_array":
+            return self._cameras.image(camera, width=width, height=height)
+        if mode == "depth_array":
+            return self._cameras.depth(camera, width=width, height=height)[..., 0]
+        raise ConfigError("render: make the environment with render_mode.")
+
+    def close(self) -> None:
+        """Close the page."""
+        if self._page is not None:
+            self._page.stop()
+            self._page = None
+
+    def _show(self) -> None:
+        if self._page is None:
+            self._page = importlib.import_module(WATCH_PAGE).WatchPage(
+                self._simulation.model
+            )
+        data = self._simulation.data
+        self._page.show(data.xpos, data.xquat)
+        period = 1.0 / self._config.control_freq
+        time.sleep(min(max(self._due - time.monotonic(), 0.0), period))
+        self._due = time.monotonic() + period
+
+
 def make_cameras(simulation: Simulation, config: EnvConfig) -> tuple[Cameras, Display]:
     """Return the observed cameras, and the display of `render`."""
     cameras = Cameras(
@@ -199,11 +230,7 @@ def make_cameras(simulation: Simulation, config: EnvConfig) -> tuple[Cameras, Di
 
 
 def count_substeps(simulation: Simulation, config: EnvConfig) -> int:
-    """Return the physics steps of a control period.
-
-    Raises:
-        ConfigError: If it is no whole number.
-    """
+    """Return the physics steps of a control period; ConfigError if not whole."""
     period = 1.0 / (config.control_freq * simulation.timestep)
     count = round(period)
     if count < 1 or abs(period - count) > 1e-6:

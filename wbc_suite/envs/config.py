@@ -230,20 +230,19 @@ class EnvConfig(FrozenModel):
         """What is observed of cameras; empty without `use_camera_obs`."""
         if not self.use_camera_obs:
             return []
-        names = self.camera_name_list
-        columns = [_one_each(getattr(self, key), len(names)) for key in _PER_CAMERA]
-        return [
-            CameraRequest(
-                name=name,
-                height=height,
-                width=width,
-                depth=depth,
-                segmentations=_levels(segmentations),
+        requests = []
+        for k, name in enumerate(self.camera_name_list):
+            height, width, depth, levels = (
+                given[k] if isinstance(given, tuple) else given
+                for given in (getattr(self, key) for key in _PER_CAMERA)
             )
-            for name, height, width, depth, segmentations in zip(
-                names, *columns, strict=True
+            if not isinstance(levels, tuple):
+                levels = () if levels is None else (levels,)
+            request = CameraRequest(
+                name=name, height=height, width=width, depth=depth, segmentations=levels
             )
-        ]
+            requests.append(request)
+        return requests
 
     @property
     def robot_list(self) -> list[str | Path | RobotDescription]:
@@ -266,16 +265,6 @@ class EnvConfig(FrozenModel):
         return [given] * len(self.robot_list)
 
 
-def _one_each(given: Any, count: int) -> Sequence[Any]:
-    return given if isinstance(given, tuple) else (given,) * count
-
-
-def _levels(given: Segmentations) -> tuple[SegmentationLevel, ...]:
-    if given is None:
-        return ()
-    return (given,) if isinstance(given, SegmentationLevel) else given
-
-
 def parse_env_config(arguments: Mapping[str, Any]) -> EnvConfig:
     """Check arguments.
 
@@ -286,11 +275,7 @@ def parse_env_config(arguments: Mapping[str, Any]) -> EnvConfig:
 
 
 def checked_seed(seed: object) -> int | None:
-    """Return a seed, or None.
-
-    Raises:
-        ConfigError: If it is no whole number >= 0.
-    """
+    """Return a seed, or None; a ConfigError if it is no whole number >= 0."""
     if seed is None:
         return None
     if not isinstance(seed, int | np.integer) or isinstance(seed, bool) or seed < 0:

@@ -44,8 +44,6 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         ConfigError: If an argument is wrong.
 
     Attributes:
-        config: The arguments.
-        benchmark: Scene, reward and success.
         robots: Descriptions of the robots at their places.
         controllers: One composite controller per robot.
         action_layout: Slices of the action.
@@ -58,10 +56,7 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
             exceed a control period.
     """
 
-    metadata = {
-        "render_modes": ["human", "rgb_array", "depth_array"],
-        "render_fps": 20,
-    }
+    metadata = {"render_modes": ["human", "rgb_array", "depth_array"], "render_fps": 20}
 
     def __init__(
         self,
@@ -78,16 +73,11 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         made = simulate(self.benchmark, self.robots, self.config)
         self.simulation, self._postures = made
         self.controllers = self.simulation.controllers
-        several = len(self.controllers) > 1
-        self._driven = [
-            (state.prefix if several else "", controller, state)
-            for state, controller in self.simulation.pairs
-        ]
         self.action_layout = joint_layout(self.controllers)
         self.action_space = action_space(self.action_layout)
-        self._period = 1.0 / self.config.control_freq
-        observed = self.benchmark, self.simulation, self.config
-        self.observables = make_observables(*observed)
+        self.observables = make_observables(
+            self.benchmark, self.simulation, self.config
+        )
         self.cameras, self._display = make_cameras(self.simulation, self.config)
         self._spaces: tuple[ObservationBuffer, gymnasium.spaces.Dict] | None = None
         self._substeps = count_substeps(self.simulation, self.config)
@@ -152,8 +142,9 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         self.benchmark.after_step()
         self.observables.update()
         success = self.benchmark.success()
-        shaped = self.config.reward_shaping
-        reward = self.benchmark.reward(shaped=shaped, success=success)
+        reward = self.benchmark.reward(
+            shaped=self.config.reward_shaping, success=success
+        )
         info = self._info(clipped, success)
         terminated = self.config.terminate_on_success and success
         truncated = self._steps >= self.horizon
@@ -161,10 +152,8 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
 
     def observation(self) -> Observation:
         """Return the present observation; after a physics error pictures are black."""
-        observation: Observation = self.observation_buffer.observation()
-        pictures = self.cameras
-        observation |= pictures.black() if self._broken else pictures.observation()
-        return observation
+        pictures = self.cameras.black() if self._broken else self.cameras.observation()
+        return {**self.observation_buffer.observation(), **pictures}
 
     @property
     def observation_buffer(self) -> ObservationBuffer:
@@ -223,12 +212,10 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
     def reset_to(self, physics: ArrayLike) -> Observation:
         """Start an episode at a physics state: time, qpos, qvel in one vector.
 
-        All else, such as sizes of objects, is drawn as at a reset.
-
-        Raises:
-            ConfigError: If its size is wrong, or a value is not finite.
+        All else, such as sizes of objects, is drawn as at a reset. For errors see
+        `write_physics`.
         """
-        self._start(self.np_random, np.array(physics, dtype=np.float64))
+        self._start(self.np_random, physics)
         return self.observation()
 
     def begin_at(
@@ -237,7 +224,7 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         """Start an episode like another one; see `beginning`."""
         rng = np.random.default_rng(0)
         rng.bit_generator.state = dict(began_with)
-        self._start(rng, None if placed is None else np.array(placed, dtype=np.float64))
+        self._start(rng, placed)
 
     @property
     def made_of(self) -> tuple[Any, dict[str, Any]]:
@@ -267,8 +254,9 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         self.observables.prepare(state["state"].observables)
         self.set_state(state["state"])
 
-    def _start(self, rng: np.random.Generator, placed: Vector | None = None) -> None:
+    def _start(self, rng: np.random.Generator, given: ArrayLike | None = None) -> None:
         """Bring robots, objects and controllers to the start of an episode."""
+        placed = None if given is None else np.array(given, dtype=np.float64)
         self.beginning: tuple[Mapping[str, Any], Vector | None]
         self.beginning = rng.bit_generator.state, placed
         self._taken: list[Vector] = []
@@ -311,15 +299,15 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
             self.observables.sample()
 
     def _set_goals(self, action: Vector) -> None:
-        start = 0
+        start, period = 0, 1.0 / self.config.control_freq
         for controller in self.controllers:
             stop = start + controller.layout.size
-            controller.set_goal(action[start:stop], self._period)
+            controller.set_goal(action[start:stop], period)
             start = stop
 
     def _info(self, clipped: int, success: bool) -> dict[str, Any]:
         info = {"success": success, "is_success": success, "clipped": clipped}
-        for before, controller, state in self._driven:
-            for key, value in controller.info(state).items():
-                info[before + key] = value
+        for state, controller in self.simulation.pairs:
+            before = state.prefix if len(self.controllers) > 1 else ""
+            info |= {before + k: v for k, v in controller.info(state).items()}
         return info

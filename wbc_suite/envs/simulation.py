@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from contextlib import nullcontext
 
 import mujoco
 import numpy as np
@@ -40,7 +41,7 @@ class Simulation:
     Args:
         model: Compiled scene; its automatic reset is switched off.
         data: Its state.
-        pairs: Controllers with their robots.
+        pairs: Robots with their controllers.
         compiled: Whether the control laws are compiled. Otherwise the same functions
             run as plain Python, to be read in a debugger: 9 ms a step for a Panda.
         lite: Whether a tick ends with positions alone brought up to date. Else all that
@@ -48,11 +49,6 @@ class Simulation:
             sensors; MuJoCo leaves them one step behind.
 
     Attributes:
-        model: The scene.
-        data: The state.
-        pairs: The robots in the scene with their controllers.
-        robots: The robots.
-        controllers: The controllers.
         compiled: Whether the whole loop is compiled: not if a controller computes
             commands itself, see `SteppedController`.
         loop_calls: Number of calls of the loop in the last tick. Before each but the
@@ -135,20 +131,12 @@ class Simulation:
         return float(self.model.opt.timestep)
 
     def forward(self) -> None:
-        """Compute everything that follows from positions and velocities.
-
-        Raises:
-            PhysicsError: If the state is not finite or MuJoCo warns.
-        """
+        """Compute everything that follows from positions and velocities; see `tick`."""
         with self._watch:
             mujoco.mj_forward(self.model, self.data)
 
     def start(self) -> None:
-        """Compute what follows from the state, and let controllers start from there.
-
-        Raises:
-            PhysicsError: If the state is not finite or MuJoCo warns.
-        """
+        """Compute what follows from the state, and let controllers start from there."""
         self.forward()
         for state, controller in self.pairs:
             controller.reset(state)
@@ -163,12 +151,9 @@ class Simulation:
             PhysicsError: If MuJoCo warns, or the state is not finite; names the
                 warning. The state is left as it was found, for inspection.
         """
-        if self._prepared:
+        with nullcontext() if self._prepared else announced("the controllers"):
             self._advance(n)
-        else:
-            with announced("the controllers"):
-                self._advance(n)
-            self._prepared = True
+        self._prepared = True
         if not self.lite:
             self._refresh()
 

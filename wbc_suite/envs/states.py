@@ -25,8 +25,7 @@ class EnvState:
         placed: Physics state at the start, if the episode began with `reset_to`.
         taken: Actions since then.
         observables: State of observables that these do not determine.
-        rng: The present random generator.
-        seed: Its seed.
+        rng: The present random generator, and its `seed`.
     """
 
     began_with: Mapping[str, Any]

@@ -1,20 +1,18 @@
 """Several environments in one process, stepped in parallel threads."""
 
+import functools
 import os
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Unpack
 
-import gymnasium
 import numpy as np
-from gymnasium.vector import AutoresetMode
-from gymnasium.vector.utils import batch_space
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from numpy.typing import NDArray
 
 from wbc_suite.envs.config import EnvArguments, checked_seed
 from wbc_suite.envs.env import RobotEnv
-from wbc_suite.envs.vector_infos import gather_infos
 from wbc_suite.errors import ActionError, ConfigError
 from wbc_suite.typing import Array, Matrix
 
@@ -23,7 +21,7 @@ Info = dict[str, Any]
 Flags = NDArray[np.bool_]
 
 
-class VectorRobotEnv(gymnasium.vector.VectorEnv[Observations, Array, NDArray[Any]]):
+class VectorRobotEnv(SyncVectorEnv[Observations, Array]):
     """Copies of one environment with their own states, stepped in threads.
 
     Physics and control laws run without Python's lock; an idle thread takes the next
@@ -40,20 +38,10 @@ class VectorRobotEnv(gymnasium.vector.VectorEnv[Observations, Array, NDArray[Any
         autoreset_mode: When an environment whose episode is over begins the next:
             `NextStep` in the next step, whose action is ignored; `SameStep` at once,
             with `final_obs` and `final_info`; `Disabled` by `reset`.
-        arguments: Arguments of every environment; see `EnvConfig`.
-
-    Raises:
-        ConfigError: If an argument is wrong.
-        UnknownNameError: If a benchmark, robot or controller is unknown.
-
-    Attributes:
-        envs: The environments.
+        arguments: Arguments of every environment, and errors: see `RobotEnv`.
     """
 
-    metadata = {
-        **RobotEnv.metadata,
-        "autoreset_mode": AutoresetMode.NEXT_STEP,
-    }
+    metadata = {**RobotEnv.metadata, "autoreset_mode": AutoresetMode.NEXT_STEP}
     closed = True  # until it is made: Gymnasium closes what is not
 
     def __init__(
@@ -67,21 +55,14 @@ class VectorRobotEnv(gymnasium.vector.VectorEnv[Observations, Array, NDArray[Any
     ) -> None:
         _check_count("num_envs", num_envs)
         _check_count("threads", 1 if threads is None else threads)
-        self._mode = _mode(autoreset_mode)
-        self.num_envs = num_envs
-        self.envs = tuple(RobotEnv(benchmark, **arguments) for _ in range(num_envs))
+        make = functools.partial(RobotEnv, benchmark, **arguments)
+        self.envs: list[RobotEnv]  # pyright: ignore[reportIncompatibleVariableOverride] - all of one kind
+        super().__init__([make] * num_envs, autoreset_mode=_mode(autoreset_mode))
         first = self.envs[0]
-        self.metadata = {**first.metadata, "autoreset_mode": self._mode}
-        self.render_mode = first.render_mode
-        self.single_action_space = first.action_space
-        self.action_space = batch_space(first.action_space, num_envs)
-        self.single_observation_space = first.observation_space
-        self.observation_space = batch_space(first.observation_space, num_envs)
-        self._places = first.observation_buffer.places
-        self._values: Matrix = np.zeros(
-            (num_envs, len(first.observation_buffer.values))
-        )
-        self._rewards: Array = np.zeros(num_envs)
+        buffer = first.observation_buffer
+        self._places = buffer.places
+        self._values: Matrix = np.zeros((num_envs, len(buffer.values)))
+        self._last_rewards: Array = np.zeros(num_envs)
         self._terminated: Flags = np.zeros(num_envs, dtype=np.bool_)
         self._truncated: Flags = np.zeros(num_envs, dtype=np.bool_)
         self._pictures = tuple(first.cameras.space)
@@ -114,15 +95,12 @@ class VectorRobotEnv(gymnasium.vector.VectorEnv[Observations, Array, NDArray[Any
             infos[i] = self._begin(i, seeds[i])
 
         self._for_each(begin, chosen.tolist())
-        return self._observations(), gather_infos(infos)
+        return self._observe(), gather_infos(infos)
 
     def step(
         self, actions: Any
     ) -> tuple[Observations, NDArray[Any], NDArray[Any], NDArray[Any], Info]:
-        """Advance every environment one control period.
-
-        Args:
-            actions: One row per environment, shape (num_envs, size).
+        """Advance every environment; actions have shape (num_envs, size).
 
         Raises:
             ActionError: If an action is wrong; names the environment. Then no
@@ -130,7 +108,7 @@ class VectorRobotEnv(gymnasium.vector.VectorEnv[Observations, Array, NDArray[Any
             PhysicsError: If an environment's episode ended in one and it was not reset.
         """
         over = self._terminated | self._truncated
-        if self._mode is not AutoresetMode.NEXT_STEP:
+        if self.autoreset_mode is not AutoresetMode.NEXT_STEP:
             over[:] = False
         rows = self._checked(actions, ~over)
         infos: list[Info] = [{} for _ in self.envs]
@@ -139,71 +117,44 @@ class VectorRobotEnv(gymnasium.vector.VectorEnv[Observations, Array, NDArray[Any
             infos[i] = self._begin(i) if over[i] else self._advance(i, rows[i])
 
         self._for_each(advance, range(self.num_envs))
-        if self._mode is AutoresetMode.SAME_STEP:
+        if self.autoreset_mode is AutoresetMode.SAME_STEP:
             self._begin_next(infos)
         return (
-            self._observations(),
-            self._rewards.copy(),
+            self._observe(),
+            self._last_rewards.copy(),
             self._terminated.copy(),
             self._truncated.copy(),
             gather_infos(infos),
         )
 
-    def render(self) -> tuple[Any, ...]:
-        """Return a picture of each environment."""
-        return self.call("render")
-
-    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
-        """Call a method of each environment, or get its attribute, in this thread."""
-        found = [env.get_wrapper_attr(name) for env in self.envs]
-        return tuple(f(*args, **kwargs) if callable(f) else f for f in found)
-
-    def get_attr(self, name: str) -> tuple[Any, ...]:
-        """Return an attribute of each environment."""
-        return tuple(env.get_wrapper_attr(name) for env in self.envs)
-
     def set_attr(self, name: str, values: Any) -> None:
-        """Set an attribute of each environment: a list has a value for each.
-
-        Raises:
-            ConfigError: If there are more or fewer values than environments.
-        """
-        if not isinstance(values, list | tuple):
-            values = [values] * self.num_envs
-        if len(values) != self.num_envs:
+        """Set an attribute of each environment: a list must have a value for each."""
+        if isinstance(values, list | tuple) and len(values) != self.num_envs:
             raise ConfigError(
                 f"set_attr: {len(values)} values for {self.num_envs} environments."
             )
-        for env, value in zip(self.envs, values, strict=True):
-            env.set_wrapper_attr(name, value)
+        super().set_attr(name, values)
 
     def close_extras(self, **kwargs: Any) -> None:
         """End the threads and close the environments."""
         self._pool.shutdown()
-        for env in self.envs:
-            env.close()
-
-    @property
-    def np_random(self) -> tuple[np.random.Generator, ...]:  # pyright: ignore[reportIncompatibleMethodOverride] - as Gymnasium's own vector environments
-        """Random generators of the environments."""
-        return self.get_attr("np_random")
-
-    @property
-    def np_random_seed(self) -> tuple[int, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Seeds of the environments."""
-        return self.get_attr("np_random_seed")
+        super().close_extras(**kwargs)
 
     def _begin(self, i: int, seed: int | None = None) -> Info:
         env = self.envs[i]
         info = env.begin(seed)
         self._values[i] = env.observation_buffer.values
-        self._rewards[i], self._terminated[i], self._truncated[i] = 0.0, False, False
+        self._last_rewards[i], self._terminated[i], self._truncated[i] = (
+            0.0,
+            False,
+            False,
+        )
         return info
 
     def _advance(self, i: int, action: Array) -> Info:
         env = self.envs[i]
         reward, terminated, truncated, info = env.advance(action)
-        self._values[i], self._rewards[i] = env.observation_buffer.values, reward
+        self._values[i], self._last_rewards[i] = env.observation_buffer.values, reward
         self._terminated[i], self._truncated[i] = terminated, truncated
         return info
 
@@ -227,9 +178,7 @@ class VectorRobotEnv(gymnasium.vector.VectorEnv[Observations, Array, NDArray[Any
     def _for_each(self, do: Callable[[int], None], indices: Iterable[int]) -> None:
         """Call `do` with every index, on all threads.
 
-        Raises:
-            Exception: The error of the first environment, with its index, after all
-                environments are done.
+        When all are done, the error of the first environment that failed is raised.
         """
         waiting, failed = deque(indices), dict[int, Exception]()
 
@@ -277,7 +226,7 @@ class VectorRobotEnv(gymnasium.vector.VectorEnv[Observations, Array, NDArray[Any
                 raise _named(error, i) from None
         return rows
 
-    def _observations(self) -> Observations:
+    def _observe(self) -> Observations:
         observations = {
             key: self._values[:, at].copy() for key, at in self._places.items()
         }
@@ -337,3 +286,38 @@ def _processors() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
+
+
+def gather_infos(infos: Sequence[Info]) -> Info:
+    """Return one info whose values have an entry for each environment.
+
+    Each key has a mask `_{key}`, which environments have it. Numbers and arrays become
+    arrays, with zeros for environments without the key; dictionaries are gathered
+    likewise; all else becomes an array of objects, and so does `final_obs`.
+
+    Source: Gymnasium's documentation of `VectorEnv`.
+    """
+    gathered: Info = {}
+    for key in dict.fromkeys(key for info in infos for key in info):
+        has = np.array([key in info for info in infos])
+        values = [info.get(key) for info in infos]
+        first = values[int(has.argmax())]
+        if isinstance(first, dict) and key != "final_obs":
+            gathered[key] = gather_infos([value or {} for value in values])
+        else:
+            gathered[key] = _stacked(first, values, plain=key != "final_obs")
+        gathered[f"_{key}"] = has
+    return gathered
+
+
+def _stacked(first: Any, values: list[Any], *, plain: bool) -> NDArray[Any]:
+    if plain and isinstance(first, np.ndarray):
+        empty = np.zeros_like(first)
+    elif plain and isinstance(first, bool | int | float | np.number):
+        empty = type(first)(0)
+    else:
+        stacked = np.full(len(values), None, dtype=object)
+        for k, value in enumerate(values):
+            stacked[k] = value
+        return stacked
+    return np.array([empty if value is None else value for value in values])

@@ -32,9 +32,6 @@ class PhysicsWatch:
     them, that names the array or the warning. The warnings' own texts go to `logging`,
     unless the process has its own handler, not to a file in the working folder.
 
-    Args:
-        data: The simulation's data.
-
     Attributes:
         state: The checked arrays, for the control loop.
     """
@@ -80,11 +77,7 @@ class PhysicsWatch:
             ) from error
 
     def check(self, cause: BaseException | None = None) -> None:
-        """Raise an error if the state is not usable, or MuJoCo warned.
-
-        Raises:
-            PhysicsError: See above.
-        """
+        """Raise a `PhysicsError` if the state is not usable, or MuJoCo warned."""
         if self.is_sound() and math.isfinite(self._data.time):
             return
         # Numbers are mostly bad, and a controller mostly fails, where MuJoCo warned.
@@ -92,16 +85,14 @@ class PhysicsWatch:
         self._raise_numbers()
 
     def _raise_warnings(self, cause: BaseException | None) -> None:
-        raised = np.flatnonzero(
-            self.state.warnings != self.state.warnings_before
-        ).tolist()
-        if not raised:
-            return
-        raise PhysicsError(
-            f"MuJoCo reported {', '.join(_NAMES[k] for k in raised)} at {self._time} "
-            f"(index {int(self._data.warning.lastinfo[raised[0]])}). The state is no "
-            "longer to be trusted: reset."
-        ) from cause
+        new = self.state.warnings != self.state.warnings_before
+        raised = np.flatnonzero(new).tolist()
+        if raised:
+            raise PhysicsError(
+                f"MuJoCo reported {', '.join(_NAMES[k] for k in raised)} at "
+                f"{self._time} (index {int(self._data.warning.lastinfo[raised[0]])}). "
+                "The state is no longer to be trusted: reset."
+            ) from cause
 
     def _raise_numbers(self) -> None:
         for name, values in (*self._arrays.items(), ("time", self._data.time)):

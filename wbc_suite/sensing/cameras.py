@@ -20,15 +20,7 @@ Picture = NDArray[Any]
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class CameraRequest:
-    """An observed camera.
-
-    Attributes:
-        name: Name of the camera; keys start with it.
-        width: Width of its pictures, pixels.
-        height: Height of its pictures, pixels.
-        depth: Whether depth is observed.
-        segmentations: Observed levels of segmentation.
-    """
+    """An observed camera; its name starts the keys, sizes are in pixels."""
 
     name: str
     width: int
@@ -43,17 +35,10 @@ class CameraRequest:
 
 
 class Cameras:
-    """Takes pictures of a simulation.
+    """Takes pictures of a simulation; for `preset` see `make_renderer`.
 
     Renderers are made when they are first used, one for each size of picture, and
     belong to the first thread that draws. Row 0 of a picture is its upper edge.
-
-    Args:
-        model: The scene.
-        data: Its state.
-        robots: The robots in it.
-        requests: The observed cameras.
-        preset: Quality of pictures; see `make_renderer`.
 
     Attributes:
         labels: Numbers of segmentations, and their names.
@@ -109,10 +94,7 @@ class Cameras:
 
     def black(self) -> dict[str, Picture]:
         """Return black pictures in place of the observed ones, by key."""
-        return {
-            key: np.zeros(space.shape or (), space.dtype)
-            for key, space in self.space.items()
-        }
+        return {k: np.zeros(s.shape or (), s.dtype) for k, s in self.space.items()}
 
     def image(self, camera: str, *, width: int, height: int) -> NDArray[np.uint8]:
         """Return a picture, RGB, shape (height, width, 3)."""
@@ -175,7 +157,7 @@ class Cameras:
     def _read_labels(
         self, renderer: Renderer, level: SegmentationLevel
     ) -> NDArray[np.int32]:
-        return renderer.read_geoms(self.labels.of_geoms(level))[..., None]
+        return renderer.read_geoms(self.labels.numbers[level])[..., None]
 
     def _read_depth(self, renderer: Renderer) -> NDArray[np.float32]:
         depth = renderer.read_depth()
@@ -189,7 +171,9 @@ class Cameras:
         if request.depth:
             spaces[f"{request.name}_depth"] = box(0, self.far, (*size, 1), np.float32)
         for level in request.segmentations:
-            most = self.labels.largest(level)
-            key = request.segmentation_key(level)
+            key, most = (
+                request.segmentation_key(level),
+                self.labels.numbers[level].max(),
+            )
             spaces[key] = box(0, most, (*size, 1), np.int32)
         return spaces

@@ -43,10 +43,8 @@ _PROBE_SECONDS = 60.0
 class GlBackend:
     """A backend that drew a picture on this machine.
 
-    Attributes:
-        name: ``egl``, ``osmesa``, ``wheel`` (OSMesa of the wheel lavavu-osmesa),
-            ``cgl``, or the value of ``MUJOCO_GL``.
-        renderer: OpenGL's name of the renderer, ``GL_RENDERER``.
+    Its name is ``egl``, ``osmesa``, ``wheel`` (OSMesa of the wheel lavavu-osmesa),
+    ``cgl``, or the value of ``MUJOCO_GL``; its renderer is OpenGL's ``GL_RENDERER``.
     """
 
     name: str
@@ -85,12 +83,9 @@ def activate() -> GlBackend:
 
 
 def context_class() -> Callable[[int, int], Any]:
-    """Return MuJoCo's class of OpenGL contexts of the active backend.
+    """Return MuJoCo's class of OpenGL contexts of the active backend; see `activate`.
 
     Its arguments are width and height of the largest picture, pixels.
-
-    Raises:
-        DeviceError: See `activate`.
     """
     name = activate().name
     module = f"mujoco.{name}" if name in _MODULES else "mujoco"
@@ -100,8 +95,7 @@ def context_class() -> Callable[[int, int], Any]:
 def missing_environment() -> dict[str, str]:
     """Return environment variables that Python must be started with to draw.
 
-    They are those of the backend found on this machine earlier; empty if nothing is
-    missing or no backend is known yet.
+    Empty if nothing is missing, or no backend was found on this machine yet.
     """
     backend = None if _wanted() else _remembered()
     return _missing(backend) if backend else {}
@@ -132,10 +126,7 @@ def _wheel_environment() -> dict[str, str]:
     """Return the environment that makes PyOpenGL find the OSMesa of the wheel.
 
     The wheel's libraries have a hash in their names, so a link of the usual name leads
-    to them.
-
-    Raises:
-        ImportError: If the wheel is not installed.
+    to them. Raises ImportError if the wheel is not installed.
     """
     library = _wheel_library()
     if library is None:
@@ -156,8 +147,7 @@ def _wheel_environment() -> dict[str, str]:
 
 def _first_that_draws() -> GlBackend:
     for name in _CANDIDATES.get(platform.system(), ()):
-        renderer = _gl_renderer(name)
-        if renderer is not None:
+        if renderer := _gl_renderer(name):
             backend = GlBackend(name=name, renderer=renderer)
             logger.info("drawing with %s (%s)", name, renderer)
             _remember(backend)
@@ -184,8 +174,7 @@ with mujoco.Renderer(model, 8, 8) as renderer:
 
 def _gl_renderer(name: str) -> str | None:
     """Return ``GL_RENDERER`` of one backend, or None if it cannot draw."""
-    environment = dict(os.environ)
-    environment.pop("PYOPENGL_PLATFORM", None)
+    environment = {k: v for k, v in os.environ.items() if k != "PYOPENGL_PLATFORM"}
     try:
         wheel = name == "wheel"
         environment |= _wheel_environment() if wheel else {"MUJOCO_GL": name}

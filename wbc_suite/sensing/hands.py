@@ -15,15 +15,10 @@ def pairs_in_contact(data: mujoco.MjData) -> list[list[int]]:
 
 
 class Hand:
-    """One hand: the site between its fingers, and the bodies of its gripper.
-
-    Args:
-        state: The robot in the simulation.
-        name: `right`, `left`, or the frame's own name.
-        frame: The frame between the fingers.
-        links: Links of the gripper.
+    """One hand: the frame between its fingers, and the links of its gripper.
 
     Attributes:
+        name: `right`, `left`, or the frame's own name.
         site: The frame's site in the simulation.
         position: Position of the frame in the world, m. A view.
         gripper_bodies: Bodies of the gripper, with the one it is mounted on.
@@ -75,15 +70,12 @@ def gripper_links(robot: RobotDescription, side: str, frame: str) -> list[str]:
         for joint in synergy.open
     }
     moved: set[str] = set()
-    palms: set[str] = set()
-    for link in robot.links:
+    carriers: set[str] = set()
+    for link in robot.links:  # parents before children
         joint = link.joint
-        driven = joint is not None and (
-            joint.name in joints
-            or (joint.mimic is not None and joint.mimic.joint in joints)
-        )
-        if driven or (joint is None and link.parent in moved):
+        movers = {joint.name, joint.mimic and joint.mimic.joint} if joint else set()
+        if movers & joints or (joint is None and link.parent in moved):
             moved.add(link.name)
-            if link.parent is not None and link.parent not in moved:
-                palms.add(link.parent)
-    return [*sorted(moved | palms)] or [robot.frame(frame).link]
+            if link.parent is not None:
+                carriers.add(link.parent)
+    return sorted(moved | carriers) or [robot.frame(frame).link]

@@ -61,9 +61,7 @@ class UniformDelay:
 class LowPass:
     """First-order low-pass filter: y = share y + (1 - share) x.
 
-    Args:
-        share: Share of the old value, in [0, 1); after n samples share^n of a step is
-            left.
+    `share` is in [0, 1); after n samples share^n of a step is left.
     """
 
     def __init__(self, share: float) -> None:
@@ -83,11 +81,7 @@ class LowPass:
 
 
 class MovingAverage:
-    """Mean of the last samples.
-
-    Args:
-        count: Number of samples.
-    """
+    """Mean of the last `count` samples."""
 
     def __init__(self, count: int) -> None:
         self.count = check_count("MovingAverage: count", count, least=1)

@@ -27,11 +27,10 @@ Maker: TypeAlias = Callable[[mujoco.MjModel, mujoco.MjData], Reading]
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Change:
-    """How an observation differs from the true value.
+    """How an observation differs from the true value; see `sensing.noise`.
 
     Attributes:
-        noise: Function of values and a generator that returns noisy values.
-        delay: Delay, s, or a function that draws one for each sample.
+        delay: s, or a function that draws one for each sample.
         filter: Function that returns filtered values; its `reset` is called at a reset.
         sampling_rate: Samples per second; None for one per physics step.
         enabled: Whether samples are taken; otherwise the last value is kept.
@@ -59,12 +58,7 @@ class Change:
 
 
 class Observables:
-    """All observations of one simulation but pictures.
-
-    Args:
-        model: The scene.
-        data: Its state.
-        groups: Readings by key, by the group's key.
+    """All observations of one simulation but pictures, by key, by the group's key.
 
     Attributes:
         buffer: The last observation; a new one after keys were added or removed.
@@ -112,14 +106,10 @@ class Observables:
         self._connect(key)
 
     def add(self, key: str, make: Maker, *, group: str, **changes: Any) -> None:
-        """Add an observation from now on.
+        """Add an observation with a new key from now on; for `changes` see `modify`.
 
-        Args:
-            key: A new key.
-            make: Function of model and data that returns the reading; copies of the
-                environment call it again.
-            group: Key of the vector that includes it; it may be new.
-            changes: See `modify`.
+        `make` returns the reading of model and data; copies of the environment call it
+        again. `group` is the key of the vector that includes it; it may be new.
 
         Raises:
             ConfigError: If the key is taken.
@@ -206,8 +196,7 @@ class Observables:
         change, old = self.changes.get(key), self._channels.pop(key, None)
         if change is None or not change.active:
             return
-        place = self.buffer.places[key]
-        bound = self.buffer.bounds[key]
+        place, bound = self.buffer.places[key], self.buffer.bounds[key]
         channel = _Channel(change, place, bound, self._model.opt.timestep)
         if old is None:
             channel.start(self.buffer.values, self._rng)
@@ -252,10 +241,9 @@ class _Channel:
         reset = getattr(self._filter, "reset", None)
         if reset is not None:
             reset()
-        enabled = self._change.enabled
-        self._shown = (
-            self._taken(values, rng) if enabled else values[self._place].copy()
-        )
+        self._shown = values[self._place].copy()
+        if self._change.enabled:
+            self._shown = self._taken(values, rng)
 
     def sample(self, values: Vector, rng: np.random.Generator) -> None:
         """Take a sample if one is due, and release those whose delay is over."""
@@ -265,8 +253,7 @@ class _Channel:
             wait = delay(rng) if callable(delay) else delay
             due = self._step + round(wait / self._timestep)
             self._coming.append((due, self._taken(values, rng)))
-        arrived = [k for k, (due, _) in enumerate(self._coming) if due <= self._step]
-        for _ in range(arrived[-1] + 1 if arrived else 0):
+        while any(due <= self._step for due, _ in self._coming):
             self._shown = self._coming.popleft()[1]
 
     def show(self, values: Vector) -> None:

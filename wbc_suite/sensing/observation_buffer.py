@@ -20,11 +20,8 @@ class ObservationBuffer:
     """Reads all observations but pictures from a simulation.
 
     Readings follow one another in one buffer, group by group: a group's key names all
-    of its readings, as `object-state` names all readings of objects.
-
-    Args:
-        data: State of the simulation.
-        groups: Readings by key, by the group's key; empty groups are left out.
+    of its readings, as `object-state` names all readings of objects. Empty groups are
+    left out.
 
     Attributes:
         values: All readings of the last `update`, shape (size,). A buffer.
@@ -37,7 +34,9 @@ class ObservationBuffer:
         self, data: mujoco.MjData, groups: Mapping[str, Mapping[str, Reading]]
     ) -> None:
         self.places = _places(groups)
-        self.bounds = {key: _bound(key) for key in self.places}
+        self.bounds = {
+            key: 1.0 if key.endswith(UNIT_KEYS) else LARGEST for key in self.places
+        }
         size = max((place.stop for place in self.places.values()), default=0)
         self.values: Vector = np.zeros(size)
         self._high: Vector = np.zeros(size)
@@ -47,7 +46,6 @@ class ObservationBuffer:
                 place = self.places[key]
                 self._reads.append((self.values[place], reading.bind(data)))
                 self._high[place] = self.bounds[key]
-        self._low = -self._high
         # A group is a slice of a second copy, so that no two keys share memory.
         self._cuts = [(k, int(k in groups), place) for k, place in self.places.items()]
         boxes: dict[str, gymnasium.Space] = {}
@@ -60,8 +58,7 @@ class ObservationBuffer:
         """Read everything from the simulation into `values`, clipped to the bounds."""
         for place, read in self._reads:
             place[:] = read()
-        np.minimum(self.values, self._high, out=self.values)
-        np.maximum(self.values, self._low, out=self.values)
+        np.clip(self.values, -self._high, self._high, out=self.values)
 
     def observation(self) -> dict[str, Vector]:
         """Return copies of the last readings by key."""
@@ -81,7 +78,3 @@ def _places(groups: Mapping[str, Mapping[str, Reading]]) -> dict[str, slice]:
         if readings:
             places[group] = slice(begin, end)
     return places
-
-
-def _bound(key: str) -> float:
-    return 1.0 if key.endswith(UNIT_KEYS) else LARGEST

@@ -24,8 +24,6 @@ class Projection:
     Attributes:
         K: Intrinsics, pixels, shape (3, 3): (u, v, 1) ~ K (x, y, z).
         T_wc: Extrinsics: pose of the camera in the world, shape (4, 4).
-        width: Width of the picture, pixels.
-        height: Height of the picture, pixels.
     """
 
     K: Matrix
@@ -53,10 +51,7 @@ class Projection:
         return cls(K=K, T_wc=T_wc, width=width, height=height)
 
     def to_pixels(self, points: ArrayLike) -> tuple[Array, Array]:
-        """Project points of the world.
-
-        Args:
-            points: In the world, m, shape (..., 3).
+        """Project points of the world, m, shape (..., 3).
 
         Returns:
             Pixels, shape (..., 2), and depths along the camera's axis, m, shape (...).
@@ -70,11 +65,9 @@ class Projection:
         return pixels, depth
 
     def to_world(self, pixels: ArrayLike, depth: ArrayLike) -> Array:
-        """Return the points of the world at pixels.
+        """Return the points of the world at pixels (u, v), shape (..., 2).
 
-        Args:
-            pixels: (u, v), shape (..., 2).
-            depth: Distance along the camera's axis, m, shape (...).
+        `depth` is the distance along the camera's axis, m, shape (...).
         """
         rays = np.asarray(pixels, dtype=np.float64) - self.K[:2, 2]
         rays = np.concatenate(
@@ -86,26 +79,17 @@ class Projection:
     def point_cloud(self, depth: ArrayLike) -> Array:
         """Return the point of the world at each pixel, shape (height, width, 3), m.
 
-        Args:
-            depth: Depth picture, m, shape (height, width) or (height, width, 1).
+        `depth` is in m, shape (height, width) or (height, width, 1).
         """
-        flat = np.asarray(depth, dtype=np.float64).reshape(self.height, self.width)
-        pixels = np.stack(
-            np.meshgrid(np.arange(self.width), np.arange(self.height)), axis=-1
-        )
-        return self.to_world(pixels, flat)
+        flat = np.reshape(depth, (self.height, self.width))
+        columns, rows = np.meshgrid(np.arange(self.width), np.arange(self.height))
+        return self.to_world(np.stack([columns, rows], axis=-1), flat)
 
     def normals(self, depth: ArrayLike) -> Array:
-        """Return the surface normal at each pixel, in the world, towards the camera.
+        """Return surface normals in the world, towards the camera, (height, width, 3).
 
         Normals are computed from differences of neighbouring points, so they are wrong
-        along edges.
-
-        Args:
-            depth: As `point_cloud` takes it.
-
-        Returns:
-            Unit vectors, shape (height, width, 3).
+        along edges. `depth` is as `point_cloud` takes it.
         """
         points = self.point_cloud(depth)
         down, right = np.gradient(points, axis=(0, 1))

@@ -24,9 +24,6 @@ def proprioception(state: RobotState) -> dict[str, Reading]:
     Keys start with the robot's prefix. Joints are all but those of grippers, in the
     robot's order; with several hands their keys start with `right_` and `left_`.
     Quaternions are x y z w, positions are in the world.
-
-    Args:
-        state: The robot in the simulation.
     """
     readings = _joints(state) | _base(state) | _hands(state) | _grippers(state)
     return {state.prefix + key: found for key, found in readings.items()}
@@ -87,11 +84,8 @@ def _gripper_groups(robot: RobotDescription) -> dict[str, tuple[str, ...]]:
 def _body_joints(robot: RobotDescription) -> tuple[str, ...]:
     """Return the independent joints but those of grippers, in the robot's order."""
     fingers = {joint for joints in _gripper_groups(robot).values() for joint in joints}
-    return tuple(
-        joint.name
-        for joint in robot.joints
-        if joint.name not in fingers and joint.mimic is None
-    )
+    own = (joint.name for joint in robot.joints if joint.mimic is None)
+    return tuple(name for name in own if name not in fingers)
 
 
 def add_contact_sensors(
@@ -129,21 +123,19 @@ def sensors_of(state: RobotState) -> dict[str, Reading]:
     _, v = state.joint_addresses(_body_joints(robot))
     readings = {"joint_torque": reading.actuator_forces(v)}
     for sensor in robot.sensors:
-        first, size = _place(model, state.prefix + sensor.name)
-        readings[sensor.name] = reading.sensor_values(range(first, first + size))
+        places = _places(model, state.prefix + sensor.name)
+        readings[sensor.name] = reading.sensor_values(places)
     for frame in _feet(robot):
-        first, _ = _place(model, f"{state.prefix}{frame}_contact")
-        readings[f"{frame}_contact"] = _found(state.data, first)
+        found, *force = _places(model, f"{state.prefix}{frame}_contact")
+        readings[f"{frame}_contact"] = _is_positive(state.data, found)
         # MuJoCo gives the force of the foot on the ground.
-        readings[f"{frame}_contact_force"] = reading.sensor_values(
-            range(first + 1, first + 4), negated=True
-        )
+        readings[f"{frame}_contact_force"] = reading.sensor_values(force, negated=True)
     for side in robot.hands:
         links = _touching(robot, side)
         names = [f"{state.prefix}{side}_touch_{link}" for link in links]
         if names:
-            firsts = [_place(model, name)[0] for name in names]
-            readings[f"{side}_touch"] = _pressed(state.data, firsts)
+            forces = [_places(model, name)[1:] for name in names]
+            readings[f"{side}_touch"] = _norms(state.data, forces)
     return {state.prefix + key: found for key, found in readings.items()}
 
 
@@ -158,20 +150,19 @@ def _touching(robot: RobotDescription, side: str) -> list[str]:
     return [k.name for k in robot.links if k.name in links and k.collision]
 
 
-def _found(data: mujoco.MjData, first: int) -> Reading:
-    """Read whether a contact sensor has a contact."""
-    count = data.sensordata[first : first + 1]
-    return reading.computed(1, lambda: count > 0.0)
+def _is_positive(data: mujoco.MjData, place: int) -> Reading:
+    return reading.computed(1, lambda: data.sensordata[place] > 0.0)
 
 
-def _pressed(data: mujoco.MjData, firsts: list[int]) -> Reading:
-    """Read the norms of the forces of contact sensors, N."""
-    places = np.add.outer(firsts, np.arange(1, 4))
+def _norms(data: mujoco.MjData, places: list[range]) -> Reading:
+    """Read the norms of vectors in sensordata."""
+    index = np.array(places)
     return reading.computed(
-        len(firsts), lambda: np.linalg.norm(data.sensordata[places], axis=1)
+        len(index), lambda: np.linalg.norm(data.sensordata[index], axis=1)
     )
 
 
-def _place(model: mujoco.MjModel, name: str) -> tuple[int, int]:
+def _places(model: mujoco.MjModel, name: str) -> range:
+    """Return the indices of a sensor's values in sensordata."""
     sensor = model.sensor(name)
-    return int(sensor.adr[0]), int(sensor.dim[0])
+    return range(sensor.adr[0], sensor.adr[0] + sensor.dim[0])

@@ -25,9 +25,7 @@ XYZW = np.array([1, 2, 3, 0])
 class Reading:
     """Some values of the simulation.
 
-    Attributes:
-        size: Number of values.
-        bind: Returns the function that reads them from one simulation's data.
+    `bind` returns the function that reads them from one simulation's data.
     """
 
     size: int
@@ -71,7 +69,7 @@ def user_values(addresses: Iterable[int]) -> Reading:
 
 def body_position(body: int) -> Reading:
     """Read the position of a body in the world, m."""
-    return _row("xpos", body)
+    return Reading(size=3, bind=lambda data: _view(data.xpos[body]))
 
 
 def body_quat(body: int) -> Reading:
@@ -86,22 +84,12 @@ def body_quat(body: int) -> Reading:
 
 def site_position(site: int) -> Reading:
     """Read the position of a site in the world, m."""
-    return _row("site_xpos", site)
+    return Reading(size=3, bind=lambda data: _view(data.site_xpos[site]))
 
 
 def site_quat(site: int) -> Reading:
     """Read the orientation of a site in the world, x y z w, largest entry positive."""
-
-    def bind(data: mujoco.MjData) -> Read:
-        matrix, quat = data.site_xmat[site], np.empty(4)
-
-        def read() -> Vector:
-            mujoco.mju_mat2Quat(quat, matrix)
-            return quat[XYZW]
-
-        return read
-
-    return Reading(size=4, bind=bind)
+    return _quat_of(lambda data: _view(data.site_xmat[site]))
 
 
 def offset(to: Reading, start: Reading) -> Reading:
@@ -134,15 +122,9 @@ def relative_quat(body: int, site: int) -> Reading:
     def bind(data: mujoco.MjData) -> Read:
         R_wb = data.xmat[body].reshape(3, 3)
         R_sw = data.site_xmat[site].reshape(3, 3).T
-        quat = np.empty(4)
+        return lambda: np.reshape(R_sw @ R_wb, 9)
 
-        def read() -> Vector:
-            mujoco.mju_mat2Quat(quat, (R_sw @ R_wb).ravel())
-            return quat[XYZW]
-
-        return read
-
-    return Reading(size=4, bind=bind)
+    return _quat_of(bind)
 
 
 def constant(value: float) -> Reading:
@@ -151,12 +133,7 @@ def constant(value: float) -> Reading:
 
 
 def selected(options: Sequence[Reading], index: Callable[[], int]) -> Reading:
-    """Read one of several readings of equal size.
-
-    Args:
-        options: The readings.
-        index: Returns the index of the one to read now.
-    """
+    """Read one of several readings of equal size; `index` returns which one."""
 
     def bind(data: mujoco.MjData) -> Read:
         reads = [option.bind(data) for option in options]
@@ -192,11 +169,20 @@ def _entries(
     return Reading(size=size, bind=bind)
 
 
-def _row(field: str, row: int) -> Reading:
-    """Read one row of an array of positions."""
+def _view(values: Vector) -> Read:
+    return lambda: values
+
+
+def _quat_of(bind_matrix: Callable[[mujoco.MjData], Read]) -> Reading:
+    """Read a rotation matrix as x y z w; `bind_matrix` binds its nine entries."""
 
     def bind(data: mujoco.MjData) -> Read:
-        position = getattr(data, field)[row]
-        return lambda: position
+        matrix, quat = bind_matrix(data), np.empty(4)
 
-    return Reading(size=3, bind=bind)
+        def read() -> Vector:
+            mujoco.mju_mat2Quat(quat, matrix())
+            return quat[XYZW]
+
+        return read
+
+    return Reading(size=4, bind=bind)

@@ -7,7 +7,6 @@ outside of the picture too; here floors are coarse and such geoms are left out.
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Self, TypeAlias
 
@@ -70,14 +69,9 @@ def make_renderer(
 
     It belongs to the thread that makes it. Making one takes 0.1 to 0.7 s, so keep it,
     and close it (``with make_renderer(...) as renderer``). The model is unchanged when
-    this returns.
-
-    Args:
-        model: What to draw.
-        width: Width of the picture, pixels.
-        height: Height of the picture, pixels.
-        preset: None takes `RenderPreset.FAST` when the processor draws and
-            `RenderPreset.QUALITY` when a graphics card does.
+    this returns. Width and height of the picture are in pixels. Without a preset it is
+    `RenderPreset.FAST` when the processor draws, and `RenderPreset.QUALITY` when a
+    graphics card does.
 
     Raises:
         DeviceError: If nothing on this machine can draw; the message names the remedy.
@@ -97,12 +91,8 @@ def make_renderer(
 class Renderer:
     """Draws pictures, depths and segmentations of one size; see `make_renderer`.
 
-    Row 0 of a picture is its upper edge.
-
-    Attributes:
-        scene: MuJoCo's scene, filled by `update_scene`.
-        width: Width of a picture, pixels.
-        height: Height of a picture, pixels.
+    Row 0 of a picture is its upper edge. `scene` is MuJoCo's scene, filled by
+    `update_scene`; `width` and `height` of a picture are in pixels.
     """
 
     def __init__(
@@ -135,10 +125,8 @@ class Renderer:
     ) -> None:
         """Take the scene from a state.
 
-        Args:
-            data: The state.
-            camera: Index or name of a camera of the model, -1 for a free camera that
-                shows everything, or a camera of your own.
+        `camera` is the index or name of a camera of the model, -1 for a free camera
+        that shows everything, or a camera of your own.
         """
         if isinstance(camera, str):
             camera = int(self.model.camera(camera).id)
@@ -194,8 +182,7 @@ class Renderer:
     def read_geoms(self, labels: Labels) -> Labels:
         """Return the label of the geom at each pixel, shape (height, width).
 
-        Args:
-            labels: The label of each geom, and last that of the background.
+        `labels` has the label of each geom, and last that of the background.
         """
         mujoco.mjr_readPixels(self._colors, None, self._area, self._context)
         found = np.full(self.scene.ngeom + 1, -1, dtype=np.int64)
@@ -240,37 +227,26 @@ class Renderer:
         """Scale the textures of coarse floors to the size that MuJoCo draws."""
         for geom in self.scene.geoms[: self.scene.ngeom]:
             if geom.type == PLANE and geom.objid in self._floors:
-                geom.texrepeat[:] *= self._floors[geom.objid].repeats
+                geom.texrepeat[:] *= self._floors[geom.objid][:2]
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Floor:
-    """An infinite plane drawn as a finite one, which stays below the camera.
+def coarse_floors(model: mujoco.MjModel) -> dict[int, Array]:
+    """Return the size of the finite plane drawn for each infinite one, by its geom.
 
-    Attributes:
-        size: Half sides and half a piece's, m, as a plane's size in MJCF.
-        repeats: Factors on the material's repeats. MuJoCo spans a finite plane by its
-            texture, and an infinite one every 2 m.
+    The plane reaches beyond the horizon and its middle is a corner of the texture. Its
+    size has half sides and half a piece's, m, as in MJCF. MuJoCo spans a finite plane
+    by its texture, and an infinite one every 2 m: half sides are factors on repeats.
     """
-
-    size: tuple[float, float, float]
-    repeats: tuple[float, float]
-
-
-def coarse_floors(model: mujoco.MjModel) -> dict[int, Floor]:
-    """Return the finite plane drawn for each infinite one of a model, by its geom."""
     infinite = (model.geom_type == PLANE) & (model.geom_size[:, :2] <= 0.0).all(1)
-    return {int(i): _floor(model, int(i)) for i in np.flatnonzero(infinite)}
-
-
-def _floor(model: mujoco.MjModel, geom: int) -> Floor:
-    """Make a plane to beyond the horizon whose middle is a corner of the texture."""
-    material = int(model.geom_matid[geom])
-    repeat = np.ones(2) if material < 0 else np.array(model.mat_texrepeat[material])
-    period = 4.0 / np.where(repeat > 0.0, repeat, 1.0)  # m; half a plane holds n
     far = 1.1 * float(model.vis.map.zfar) * float(model.stat.extent)
-    x, y = (np.ceil(far / period) * period).tolist()
-    return Floor(size=(x, y, max(x, y) / PIECES), repeats=(x, y))
+    floors = {}
+    for geom in np.flatnonzero(infinite).tolist():
+        material = int(model.geom_matid[geom])
+        repeat = np.ones(2) if material < 0 else model.mat_texrepeat[material]
+        period = 4.0 / np.where(repeat > 0.0, repeat, 1.0)  # m; half a plane holds n
+        half = np.ceil(far / period) * period
+        floors[geom] = np.append(half, half.max() / PIECES)
+    return floors
 
 
 def outside(
@@ -278,11 +254,8 @@ def outside(
 ) -> Indices:
     """Return geoms outside of a camera's picture, by their bounding spheres.
 
-    Args:
-        model: The scene.
-        data: Its state.
-        camera: A camera of the model with no optics but a field of view.
-        aspect: Width of its picture over its height.
+    Cameras with optics besides a field of view give none. `aspect` is the width of the
+    picture over its height.
     """
     if model.cam_projection[camera] or model.cam_sensorsize[camera].any():
         return np.empty(0, dtype=np.int64)
@@ -294,41 +267,32 @@ def outside(
     inside = z < radii
     angle = 0.5 * np.radians(model.cam_fovy[camera])
     for across, half_angle in ((y, angle), (x, np.arctan(aspect * np.tan(angle)))):
-        inside &= _beside(across, z, half_angle) < radii
+        beside = np.abs(across) * np.cos(half_angle) + z * np.sin(half_angle)
+        inside &= beside < radii  # m, outside of the two planes through the camera
     return np.flatnonzero(~inside)
-
-
-def _beside(across: Array, z: Array, half_angle: float) -> Array:
-    """Return distances of points outside of two planes through the camera, m."""
-    return np.abs(across) * np.cos(half_angle) + z * np.sin(half_angle)
 
 
 @contextmanager
 def _settings_of(
     model: mujoco.MjModel,
     preset: RenderPreset,
-    floors: dict[int, Floor],
-    size: tuple[int, int],
+    floors: dict[int, Array],
+    picture: tuple[int, int],
 ) -> Iterator[None]:
     """Write settings into the model, where a new context reads them once."""
-    wanted = [
-        (model.vis.global_, {"offwidth": size[0], "offheight": size[1]}),
-        (model.vis.quality, dict(zip(QUALITY_FIELDS, QUALITIES[preset], strict=True))),
-    ]
-    kept = [(part, {k: getattr(part, k) for k in values}) for part, values in wanted]
-    planes = list(floors)
-    sizes = model.geom_size[planes].copy()
-    _write(wanted)
-    for plane, floor in floors.items():
-        model.geom_size[plane] = floor.size
+    screen, quality = model.vis.global_, model.vis.quality
+    wanted = [(screen, "offwidth", picture[0]), (screen, "offheight", picture[1])]
+    values = zip(QUALITY_FIELDS, QUALITIES[preset], strict=True)
+    wanted += [(quality, name, value) for name, value in values]
+    kept = [(part, name, getattr(part, name)) for part, name, _ in wanted]
+    sizes = model.geom_size.copy()
     try:
+        for setting in wanted:
+            setattr(*setting)
+        for plane, size in floors.items():
+            model.geom_size[plane] = size
         yield
     finally:
-        model.geom_size[planes] = sizes
-        _write(kept)
-
-
-def _write(settings: list[tuple[Any, dict[str, int]]]) -> None:
-    for part, values in settings:
-        for name, value in values.items():
-            setattr(part, name, value)
+        model.geom_size[:] = sizes
+        for setting in kept:
+            setattr(*setting)

@@ -28,12 +28,9 @@ class SegmentationLevel(StrEnum):
 class Labels:
     """Numbers of visible geoms, 1, 2, ...; 0 is the background.
 
-    Args:
-        model: The scene.
-        robots: The robots in it.
-
     Attributes:
         names: Name of each number, by level.
+        numbers: Number of each geom, then 0, shape (ngeom + 1,), by level.
     """
 
     def __init__(self, model: mujoco.MjModel, robots: Sequence[RobotState]) -> None:
@@ -45,21 +42,13 @@ class Labels:
             model.geom(i).name or f"{instances[i]}_geom{i}" for i in range(model.ngeom)
         ]
         self.names: dict[SegmentationLevel, dict[int, str]] = {}
-        self._numbers: dict[SegmentationLevel, NDArray[np.int32]] = {}
+        self.numbers: dict[SegmentationLevel, NDArray[np.int32]] = {}
         found = elements, instances, classes
         for level, names in zip(SegmentationLevel, found, strict=True):
             numbers = {name: i for i, name in enumerate(dict.fromkeys(names), 1)}
             self.names[level] = {i: name for name, i in numbers.items()}
             of_geoms = [*(numbers[name] for name in names), 0]
-            self._numbers[level] = np.array(of_geoms, dtype=np.int32)
-
-    def largest(self, level: SegmentationLevel) -> int:
-        """Return the largest number of a level."""
-        return max(self.names[level], default=0)
-
-    def of_geoms(self, level: SegmentationLevel) -> NDArray[np.int32]:
-        """Return the number of each geom, then 0, shape (ngeom + 1,)."""
-        return self._numbers[level]
+            self.numbers[level] = np.array(of_geoms, dtype=np.int32)
 
 
 def _instances(model: mujoco.MjModel, robots: Sequence[RobotState]) -> list[str]:

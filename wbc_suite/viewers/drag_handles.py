@@ -36,14 +36,11 @@ class HandleMode(StrEnum):
 
 @dataclass(slots=True)
 class _Handle:
-    """One client's handle of one limb.
+    """One client's handle of one limb; `node` is in that client's scene.
 
     Attributes:
-        node: The handle in that client's scene.
-        dragging: Whether the client drags it now.
         apart: Whether the client moved it with the clutch disengaged; it then stays
             where it is.
-        hidden: Whether the client hides it.
     """
 
     node: "viser.TransformControlsHandle"
@@ -63,9 +60,7 @@ class _Client:
 class DragHandles:
     """The handles of all clients, kept at the targets of their limbs.
 
-    Args:
-        session: Session that receives the drags.
-        scales: Size of each limb's handle, m.
+    `scales` is the size of each limb's handle, m.
     """
 
     def __init__(self, session: "Session", scales: Mapping[str, float]) -> None:
@@ -76,11 +71,8 @@ class DragHandles:
 
     def add_client(self, client: "viser.ClientHandle") -> None:
         """Create the handles of a new client."""
-        limbs = self._session.snapshot.limbs
-        handles = {
-            name: self._add(client, limb, limbs[name])
-            for name, limb in self._limbs.items()
-        }
+        status = self._session.snapshot.limbs
+        handles = {n: self._add(client, k, status[n]) for n, k in self._limbs.items()}
         self._clients[client.client_id] = _Client(handles)
 
     def remove_client(self, client: int) -> None:

@@ -22,7 +22,6 @@ class Clip:
     """One episode, ready to be displayed.
 
     Attributes:
-        name: Name of the episode.
         states: Physics states, shape (n, 1 + nq + nv), n >= 1.
         times: Their times since the first, s, shape (n,).
         effort: Norm of the action at each state, scaled to 0 .. 1, shape (n,).
@@ -43,7 +42,7 @@ class Clip:
         return float(self.times[-1])
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class PlayerStatus:
     """State of the playback.
 
@@ -51,7 +50,6 @@ class PlayerStatus:
         clip: The episode; None before the first `advance` and after an error.
         frame: Index of the displayed state.
         position: Time since the start of the episode, s.
-        playing: Whether it plays.
         error: Why the chosen episode cannot be displayed; else empty.
     """
 
@@ -65,10 +63,7 @@ class PlayerStatus:
 class EpisodePlayer:
     """Play episodes one after the other; commands may come from any thread.
 
-    Args:
-        names: Names of the episodes.
-        load: Loads one; called in the thread that calls `advance`.
-        clock: Source of time, s.
+    `load` loads one by its name, in the thread that calls `advance`.
     """
 
     def __init__(
@@ -95,13 +90,7 @@ class EpisodePlayer:
                 position = min(self._position, clip.length)
                 after = np.searchsorted(clip.times, position + 1e-9, side="right")
                 frame = int(after) - 1
-            return PlayerStatus(
-                clip=clip,
-                frame=frame,
-                position=position,
-                playing=self._playing,
-                error=self._error,
-            )
+            return PlayerStatus(clip, frame, position, self._playing, self._error)
 
     def toggle(self) -> None:
         """Pause or resume; at the end, play from the start."""
@@ -127,12 +116,12 @@ class EpisodePlayer:
 
     def choose(self, name: str) -> None:
         """Go to the start of an episode."""
-        self._choose(self.names.index(name))
+        self._go_to(self.names.index(name))
 
     def skip(self, episodes: int) -> None:
         """Move by a number of episodes; the first follows the last."""
         with self._lock:
-            self._choose((self._wanted + episodes) % len(self.names))
+            self._go_to((self._wanted + episodes) % len(self.names))
 
     def set_speed(self, speed: float) -> None:
         """Set the playback speed."""
@@ -161,7 +150,7 @@ class EpisodePlayer:
                     self.skip(1)
             return self.status
 
-    def _choose(self, wanted: int) -> None:
+    def _go_to(self, wanted: int) -> None:
         with self._lock:
             self._wanted, self._position, self._error = wanted, 0.0, ""
 
@@ -169,13 +158,10 @@ class EpisodePlayer:
 def open_player(
     dataset: Dataset, names: Sequence[str], env: RobotEnv, *, by_states: bool
 ) -> EpisodePlayer:
-    """Return a player of a dataset's episodes.
+    """Return a player of episodes of a dataset, which must stay open.
 
-    Args:
-        dataset: Dataset; it must stay open.
-        names: Names of the episodes.
-        env: Environment in which they are loaded, by the thread of `advance`.
-        by_states: Whether to display recorded states; else actions are replayed.
+    They are loaded in `env`, by the thread of `advance`. With `by_states` recorded
+    states are displayed; else actions are replayed.
     """
     return EpisodePlayer(
         names, lambda name: load_clip(env, dataset.episode(name), by_states=by_states)

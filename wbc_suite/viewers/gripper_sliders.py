@@ -21,13 +21,7 @@ USER_TIME = 1.0  # s; after the user moved a slider, it is not updated for so lo
 
 
 class GripperSliders:
-    """A slider for the whole gripper and, below it, one per synergy.
-
-    Args:
-        server: Server of the page.
-        session: Session with the gripper.
-        name: Name of the gripper.
-    """
+    """A slider for the whole gripper and, below it, one per synergy."""
 
     def __init__(
         self, server: "viser.ViserServer", session: "Session", name: str

@@ -57,8 +57,6 @@ class LimbTarget:
     """A limb of the pipeline that several clients may drag; a session locks the calls.
 
     Attributes:
-        stages: Pipeline from the clients' input to the limb's target.
-        ownership: Which client holds the limb.
         enabled: Whether the clutch is engaged.
         rest: Number of ticks that the limb has rested since its release; None if it
             was not released lately.
@@ -76,11 +74,9 @@ class LimbTarget:
         return LimbInfo(name=port.name, kind=port.kind, body=port.body)
 
     def status(self, report: Mapping[str, Any], *, now: float) -> LimbStatus:
-        """Return the state of the limb.
+        """Return the state at wall time `now`, s.
 
-        Args:
-            report: The controller's report of its frame; empty before a solve.
-            now: Wall time, s.
+        `report` is the controller's report of the frame; empty before a solve.
         """
         measured = self.stages.port.measure()
         return LimbStatus(
@@ -112,16 +108,10 @@ class LimbTarget:
     def drag(
         self, client: int, T_world_input: pin.SE3, *, now: float, grab: bool = False
     ) -> bool:
-        """Take the limb and move its target with the input.
+        """Take the limb and move its target with the input at wall time `now`, s.
 
-        Args:
-            client: Who drags.
-            T_world_input: Pose of the input.
-            now: Wall time, s.
-            grab: Whether to latch the input first; the target does not move then.
-
-        Returns:
-            False if another client holds the limb, or the pose is invalid.
+        With `grab` the input is latched first; the target does not move then. False if
+        another client holds the limb, or the pose is invalid.
         """
         if not (_is_valid(T_world_input) and self.ownership.take(client, now)):
             return False
@@ -147,12 +137,7 @@ class LimbTarget:
 
         Otherwise a target that was dragged far out of reach would have to be dragged
         all the way back before the limb moves again. The target of a limb that was not
-        released lately stays.
-
-        Args:
-            before: Status of the limb before this tick.
-            period: Time since then, s.
-            now: Wall time, s.
+        released lately stays. `before` is the status one period, s, ago.
         """
         if self.rest is None:
             return
@@ -163,16 +148,12 @@ class LimbTarget:
             self.rest = None
         elif self.rest * period > REST_TIME:
             self.rest = None
-            if (
-                before.position_error > MAX_POSITION_ERROR
-                or before.orientation_error > MAX_ORIENTATION_ERROR
-            ):
+            far = before.position_error > MAX_POSITION_ERROR
+            if far or before.orientation_error > MAX_ORIENTATION_ERROR:
                 self.stages.place(measured)
 
 
 def _is_valid(T_world_input: pin.SE3) -> bool:
     """Return whether all numbers of a pose are finite and not excessive."""
-    position, rotation = T_world_input.translation, T_world_input.rotation
-    return bool(
-        (np.abs(position) < MAX_COORDINATE).all() and np.isfinite(rotation).all()
-    )
+    near = np.abs(T_world_input.translation) < MAX_COORDINATE
+    return bool(near.all() and np.isfinite(T_world_input.rotation).all())

@@ -27,11 +27,6 @@ class LoopTimer:
             timer.finish_step()
         timer.stop()
 
-    Args:
-        period: Time between two steps, s.
-        clock: Source of wall time, s.
-        sleep: Suspends the thread for a time, s.
-
     Attributes:
         idle: Set while the loop sleeps between two ticks or does not run. Other threads
             then take Python's lock without delaying it.
@@ -91,10 +86,8 @@ def raise_priority(rank: int) -> None:
     """Give this thread a real-time priority, if the system permits it.
 
     Linux permits it to administrators and to users with `rtprio` in
-    /etc/security/limits.conf. Threads that this one starts do not inherit it.
-
-    Args:
-        rank: Priority from 1; the highest runs first.
+    /etc/security/limits.conf. Threads that this one starts do not inherit it. The
+    highest rank from 1 on runs first.
     """
     with contextlib.suppress(AttributeError, OSError):
         policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK

@@ -27,31 +27,26 @@ DEFAULT_COLOR = (0.5, 0.5, 0.5, 1.0)
 
 
 class ModelScene:
-    """Draws the geoms of a model and moves them.
+    """Draws the geoms of a model but planes, static ones included, and moves them.
 
-    Args:
-        server: Server whose scene is drawn on.
-        model: Model to draw; static geoms are drawn, planes are not.
+    Attributes:
+        nodes: Names of the bodies' scene nodes.
     """
 
     def __init__(self, server: "viser.ViserServer", model: mujoco.MjModel) -> None:
         self._server = server
         self._parents = model.body_parentid.copy()
-        self._names = _node_names(model)
-        self._frames = [
-            server.scene.add_frame(name, show_axes=False) for name in self._names
-        ]
+        self.nodes = _node_names(model)
+        self._frames = [server.scene.add_frame(n, show_axes=False) for n in self.nodes]
         self._shown = np.tile([0.0, 0, 0, 1, 0, 0, 0], (model.nbody, 1))
         self.collision_shapes: list[viser.MeshHandle] = []
         self.visual_shapes: list[viser.MeshHandle] = []
         for (body, collision, colour), parts in _parts(model).items():
             shapes = self.collision_shapes if collision else self.visual_shapes
-            kind, mesh = (
-                "collision" if collision else "visual",
-                triangle_meshes.merge(parts),
-            )
+            kind = "collision" if collision else "visual"
+            mesh = triangle_meshes.merge(parts)
             handle = server.scene.add_mesh_simple(
-                f"{self._names[body]}/{kind}_{len(shapes)}",
+                f"{self.nodes[body]}/{kind}_{len(shapes)}",
                 mesh.vertices,
                 mesh.faces,
                 color=tuple(round(255 * c) for c in colour[:3]),  # type: ignore[arg-type]
@@ -61,19 +56,11 @@ class ModelScene:
             )
             shapes.append(handle)
 
-    def node(self, body: int) -> str:
-        """Return the name of a body's scene node."""
-        return self._names[body]
-
     def update(self, positions: Matrix, quaternions: Matrix) -> int:
-        """Send the poses that changed since the last call.
+        """Send the poses that changed since the last call; return their number.
 
-        Args:
-            positions: Positions of all bodies in the world, shape (nbody, 3).
-            quaternions: Their orientations (wxyz), shape (nbody, 4).
-
-        Returns:
-            Number of positions and orientations that were sent.
+        Positions of all bodies in the world have shape (nbody, 3), their orientations
+        (wxyz) shape (nbody, 4). A position and an orientation count as two.
         """
         poses = relative_poses(positions, quaternions, self._parents)
         change = np.abs(poses - self._shown)
@@ -92,15 +79,10 @@ class ModelScene:
 def relative_poses(
     positions: Matrix, quaternions: Matrix, parents: np.ndarray
 ) -> Matrix:
-    """Return the pose of every body in its parent's frame.
+    """Return position and quaternion of every body in its parent's frame, shape (n, 7).
 
-    Args:
-        positions: Positions in the world, shape (n, 3).
-        quaternions: Orientations in the world (wxyz), shape (n, 4).
-        parents: Index of each body's parent, shape (n,); the world is its own.
-
-    Returns:
-        Position and quaternion (wxyz, w >= 0) side by side, shape (n, 7).
+    Quaternions are wxyz, with w >= 0. Positions and orientations (wxyz) in the world
+    have shapes (n, 3) and (n, 4), indices of parents (n,); the world is its own parent.
     """
     rotations = Rotation.from_quat(quaternions, scalar_first=True)
     to_parents = rotations[parents].inv()
@@ -114,12 +96,8 @@ def robot_box(
 ) -> tuple[Vector, Vector]:
     """Return two corners of a box around the first robot, m.
 
-    Robots in a scene carry the prefix `robot0_`; a model without it is all robot.
-
-    Args:
-        model: Model with at least one geom that is not a plane.
-        positions: Positions of all bodies in the world, shape (nbody, 3).
-        quaternions: Their orientations (wxyz), shape (nbody, 4).
+    Robots in a scene carry the prefix `robot0_`; a model without it is all robot. It
+    has at least one geom that is not a plane. For poses see `ModelScene.update`.
     """
     names = [model.body(body).name for body in range(model.nbody)]
     prefix = "robot0_" if any(n.startswith("robot0_") for n in names) else ""
@@ -179,8 +157,7 @@ def geom_mesh(model: mujoco.MjModel, geom: int) -> TriangleMesh | None:
                 model.mesh_vert[vertex : vertex + asset.vertnum[0]].astype(np.float64),
                 model.mesh_face[face : face + asset.facenum[0]].astype(np.int64),
             )
-        case _:
-            return None
+    return None
 
 
 def colored_meshes(model: mujoco.MjModel, geom: int) -> list[tuple[Rgba, TriangleMesh]]:

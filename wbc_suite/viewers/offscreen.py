@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Self, TypeAlias
+from typing import TYPE_CHECKING, Literal, Self, TypeAlias
 
 import mujoco
 import numpy as np
@@ -10,36 +10,47 @@ from numpy.typing import NDArray
 
 from wbc_suite.errors import UnknownNameError
 from wbc_suite.sensing.renderer import RenderPreset, make_renderer
-from wbc_suite.typing import Vector
-from wbc_suite.viewers.framing import VIEWS, View, ViewName, fit_camera, subject_corners
+from wbc_suite.typing import Matrix, Vector
 
 if TYPE_CHECKING:
     from wbc_suite.robot import RobotDescription
-
-__all__ = [
-    "VIEWS",
-    "Camera",
-    "Image",
-    "Mark",
-    "View",
-    "add_studio",
-    "render_model",
-    "render_robot",
-]
 
 Image: TypeAlias = NDArray[np.uint8]
 """Picture, shape (height, width, 3), RGB."""
 
 
+ViewName: TypeAlias = Literal["three_quarter", "front", "side", "back"]
+
+
 @dataclass(frozen=True, kw_only=True, slots=True)
-class Mark:
-    """A sphere that is drawn but not simulated.
+class View:
+    """The direction of a camera, degrees; its distance follows from the subject.
 
     Attributes:
-        position: Centre in the world, m, shape (3,).
-        rgba: Colour and opacity.
-        radius: m.
+        azimuth: About the world's z axis; 180 is along -x, into the face of a robot
+            that faces +x.
+        elevation: Above the horizon; negative looks down.
+        fov: Vertical field of view.
+        margin: Size of the picture over that of the subject.
     """
+
+    azimuth: float
+    elevation: float
+    fov: float = 28.0
+    margin: float = 1.08
+
+
+VIEWS: dict[ViewName, View] = {
+    "three_quarter": View(azimuth=145.0, elevation=-14.0),
+    "front": View(azimuth=180.0, elevation=-6.0),
+    "side": View(azimuth=90.0, elevation=-6.0),
+    "back": View(azimuth=0.0, elevation=-6.0),
+}
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Mark:
+    """A sphere that is drawn but not simulated; position in the world and radius, m."""
 
     position: Vector
     rgba: tuple[float, float, float, float] = (0.10, 0.55, 0.95, 0.6)
@@ -56,25 +67,16 @@ def render_robot(
 ) -> Image:
     """Return a picture of a robot at one of its keyframes, in the studio.
 
-    Args:
-        robot: Robot to draw.
-        view: A view, or its name in `VIEWS`.
-        keyframe: A key of ``robot.keyframes``.
-        size: Width and height in pixels.
-        preset: Quality; see `make_renderer`.
-
-    Raises:
-        UnknownNameError: If there is no such keyframe or view.
-        DeviceError: If this machine has no renderer.
+    `view` is a view or its name in `VIEWS`, `size` the width and height in pixels; for
+    `preset` see `make_renderer`, and for errors `Camera`.
     """
     posture = robot.keyframe(keyframe)
     spec = robot.to_mjspec()
     ground = float(subject_corners(*_pose(spec, posture))[:, 2].min())
     add_studio(spec, ground=ground)
-    model, data = _pose(spec, posture)
     width, height = size
     return render_model(
-        model, data, width=width, height=height, camera=view, preset=preset
+        *_pose(spec, posture), width=width, height=height, camera=view, preset=preset
     )
 
 
@@ -109,14 +111,13 @@ def render_model(
 class Camera:
     """A fixed camera for a sequence of pictures.
 
+    The size of the pictures is in pixels; for `preset` see `make_renderer`.
+
     Args:
         model: Model to draw.
         data: State at which the camera is fitted to the subject; positions are those of
             the last `mujoco.mj_forward`.
         view: A `View`, its name in `VIEWS`, or the name of a camera of the model.
-        width: Of the picture, in pixels.
-        height: Of the picture, in pixels.
-        preset: Quality; see `make_renderer`.
         subject: Prefix of the bodies that the picture has to contain; all by default.
 
     Raises:
@@ -135,25 +136,16 @@ class Camera:
         preset: RenderPreset | str | None = None,
         subject: str = "",
     ) -> None:
-        found = _find_view(model, view)
-        self._view = found if isinstance(found, View) else None
-        self._camera: mujoco.MjvCamera | str = (
-            fit_camera(
-                found, subject_corners(model, data, subject), aspect=width / height
-            )
-            if isinstance(found, View)
-            else found
-        )
+        self._view = _find_view(model, view)
+        self._camera: mujoco.MjvCamera | str = str(view)
+        if self._view is not None:
+            corners = subject_corners(model, data, subject)
+            self._camera = fit_camera(self._view, corners, aspect=width / height)
         self._fov = float(model.vis.global_.fovy)
         self._renderer = make_renderer(model, width=width, height=height, preset=preset)
 
     def take(self, data: mujoco.MjData, marks: Sequence[Mark] = ()) -> Image:
-        """Return a picture, with marks that are not in the simulation.
-
-        Args:
-            data: The state; positions are those of the last `mujoco.mj_forward`.
-            marks: Spheres to add.
-        """
+        """Return a picture of a state after `mujoco.mj_forward`, with marks added."""
         self._renderer.update_scene(data, self._camera)
         scene = self._renderer.scene
         if self._view is not None:
@@ -184,9 +176,7 @@ class Camera:
 def add_studio(spec: mujoco.MjSpec, *, ground: float = 0.0) -> None:
     """Add background, ground, and key, fill and rim light to a scene.
 
-    Args:
-        spec: Changed in place; compile it afterwards.
-        ground: Height of the floor, m.
+    Compile it afterwards. `ground` is the height of the floor, m.
     """
     spec.add_texture(
         name="studio_sky",
@@ -232,15 +222,59 @@ def add_studio(spec: mujoco.MjSpec, *, ground: float = 0.0) -> None:
         )
 
 
-def _find_view(model: mujoco.MjModel, camera: View | str) -> View | str:
-    if isinstance(camera, View):
-        return camera
-    if camera in VIEWS:
-        return VIEWS[camera]
-    cameras = [model.camera(i).name for i in range(model.ncam)]
-    if camera not in cameras:
-        raise UnknownNameError("view or camera", camera, [*VIEWS, *cameras])
+def fit_camera(view: View, points: Matrix, *, aspect: float) -> mujoco.MjvCamera:
+    """Return a free camera that has all points, m, shape (n, 3), in its picture.
+
+    In camera axes a point at offset (r, u, f) to the right, up and forward of the
+    look-at point is inside when ``|u| <= (d + f) tan(fov / 2)`` and ``|r| <= aspect
+    (d + f) tan(fov / 2)``; d is the smallest distance at which all are. `aspect` is the
+    width of the picture over its height.
+    """
+    azimuth, elevation = np.radians([view.azimuth, view.elevation])
+    right = np.array([np.sin(azimuth), -np.cos(azimuth), 0.0])
+    level = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+    forward = np.append(np.cos(elevation) * level[:2], np.sin(elevation))
+    axes = np.array([right, np.cross(right, forward), forward])
+    local = points @ axes.T
+    middle = (local.min(axis=0) + local.max(axis=0)) / 2.0
+    offset = local - middle
+    tangent = np.tan(np.radians(view.fov) / 2.0) / view.margin
+    reach = np.maximum(np.abs(offset[:, 1]), np.abs(offset[:, 0]) / aspect)
+    camera = mujoco.MjvCamera()
+    camera.type = mujoco.mjtCamera.mjCAMERA_FREE
+    camera.lookat[:] = middle @ axes
+    camera.azimuth, camera.elevation = view.azimuth, view.elevation
+    camera.distance = float(np.max(reach / tangent - offset[:, 2]))
     return camera
+
+
+def subject_corners(
+    model: mujoco.MjModel, data: mujoco.MjData, subject: str = ""
+) -> Matrix:
+    """Return the corners of all geoms' boxes in the world, shape (n, 3); no planes.
+
+    Only bodies whose names start with the subject count.
+    """
+    signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8).T
+    names = [model.body(body).name for body in model.geom_bodyid]
+    seen = np.array([name.startswith(subject) for name in names])
+    seen &= model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE
+    seen &= model.geom_group < 3  # others are hidden by default in MuJoCo's viewers
+    centre, half = model.geom_aabb[seen, :3], model.geom_aabb[seen, 3:]
+    local = centre[:, None] + signs * half[:, None]
+    rotation = data.geom_xmat[seen].reshape(-1, 3, 3)
+    world = data.geom_xpos[seen, None] + local @ rotation.transpose(0, 2, 1)
+    return world.reshape(-1, 3)
+
+
+def _find_view(model: mujoco.MjModel, view: View | str) -> View | None:
+    """Return a view, or None for the name of a camera of the model."""
+    if isinstance(view, View) or view in VIEWS:
+        return view if isinstance(view, View) else VIEWS[view]
+    cameras = [model.camera(i).name for i in range(model.ncam)]
+    if view not in cameras:
+        raise UnknownNameError("view or camera", view, [*VIEWS, *cameras])
+    return None
 
 
 def _set_field_of_view(scene: mujoco.MjvScene, old: float, new: float) -> None:

@@ -45,12 +45,7 @@ COMMANDS = (
 
 
 class PageProcess:
-    """Serve a session's page from another process.
-
-    Args:
-        session: Session to display.
-        host, port: See `PageServer`.
-        label: Title of the panel.
+    """Serve a session's page from another process; for host and port see `PageServer`.
 
     Attributes:
         url: The address that opens the page.
@@ -65,11 +60,9 @@ class PageProcess:
         self._opened, self._stopping = threading.Event(), threading.Event()
         context = multiprocessing.get_context("spawn")
         self._pipe, remote = context.Pipe()
+        arguments = remote, session.info, host, port, label
         self._process = context.Process(
-            target=_serve,
-            args=(remote, session.info, host, port, label),
-            name="page",
-            daemon=True,
+            target=_serve, args=arguments, name="page", daemon=True
         )
         self._process.start()
         remote.close()
@@ -77,16 +70,12 @@ class PageProcess:
         self._thread.start()
 
     def wait(self) -> None:
-        """Wait until the page can be opened.
-
-        Raises:
-            DeviceError: If the port is not available, or the page's process ended.
-        """
+        """Wait until the page can be opened; see `check`."""
         self._opened.wait()
         self.check()
 
     def check(self) -> None:
-        """Raise a `DeviceError` if the page's process ended by itself."""
+        """Raise a `DeviceError` if the port is not available, or the process ended."""
         if self._error:
             raise DeviceError(self._error)
 
@@ -145,13 +134,7 @@ class PageProcess:
 
 
 class RemoteSession:
-    """A `TeleopSession` in another process.
-
-    Its other methods are those named in `COMMANDS`.
-
-    Args:
-        pipe: Connection to the process with the session.
-        info: Constant properties of the session.
+    """A `TeleopSession` in another process; its other methods are those in `COMMANDS`.
 
     Attributes:
         lost: Set when the session has ended; requests do nothing from then on.

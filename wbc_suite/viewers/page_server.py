@@ -19,8 +19,7 @@ from urllib.parse import quote
 import aiohttp
 from aiohttp import WSMsgType, hdrs, web
 
-from wbc_suite.devices.access_rules import token_for
-from wbc_suite.devices.web_server import WebServer, page_url
+from wbc_suite.devices.web_server import WebServer, page_url, token_for
 from wbc_suite.errors import DeviceError
 
 if TYPE_CHECKING:
@@ -40,9 +39,8 @@ WebSocket: TypeAlias = web.WebSocketResponse | aiohttp.ClientWebSocketResponse
 class PageServer:
     """A viser server, the proxy in front of it, and the address that opens the page.
 
-    Args:
-        host: Address to listen on. Any but a loopback address creates a token.
-        port: Port to listen on; 0 takes any free port, None the first free of `PORTS`.
+    Any host but a loopback address creates a token. Port 0 is any free one, None the
+    first free of `PORTS`.
 
     Attributes:
         server: The viser server.
@@ -54,8 +52,7 @@ class PageServer:
     """
 
     def __init__(self, host: str = "127.0.0.1", port: int | None = None) -> None:
-        self.host = host
-        self.token = token_for(host)
+        self.host, self.token = host, token_for(host)
         self.server = _start_viser()
         try:
             self._proxy = self._start_proxy(PORTS if port is None else [port])
@@ -143,22 +140,19 @@ def proxy(port: int) -> list[web.AbstractRouteDef]:
 
 async def _fetch(request: web.Request, target: str) -> web.Response:
     """Fetch a page or a file; its encoding is left as it is."""
-    accepted = {
-        hdrs.ACCEPT_ENCODING: request.headers.get(hdrs.ACCEPT_ENCODING, "identity")
-    }
+    encoding = request.headers.get(hdrs.ACCEPT_ENCODING, "identity")
     async with (
         aiohttp.ClientSession(
-            auto_decompress=False, connector=aiohttp.TCPConnector(force_close=True)
+            auto_decompress=False,
+            connector=aiohttp.TCPConnector(force_close=True),
+            headers={hdrs.ACCEPT_ENCODING: encoding},
         ) as session,
-        session.get(target, headers=accepted, allow_redirects=False) as answer,
+        session.get(target, allow_redirects=False) as answer,
     ):
         kept = (hdrs.CONTENT_TYPE, hdrs.CONTENT_ENCODING)
-        headers = {
-            name: answer.headers[name] for name in kept if name in answer.headers
-        }
-        return web.Response(
-            status=answer.status, body=await answer.read(), headers=headers
-        )
+        headers = {k: answer.headers[k] for k in kept if k in answer.headers}
+        body = await answer.read()
+        return web.Response(status=answer.status, body=body, headers=headers)
 
 
 async def _relay(request: web.Request, target: str) -> web.WebSocketResponse:

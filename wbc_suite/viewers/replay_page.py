@@ -37,11 +37,7 @@ KEYS: dict[str, tuple[str, Callable[[EpisodePlayer], None]]] = {
 class ReplayPage:
     """Serve a player of episodes; a thread of its own advances it and sends updates.
 
-    Args:
-        player: Player of episodes of `env`.
-        env: Environment in which states are displayed.
-        site: Server of the page, which is stopped with the page.
-        label: Title of the panel.
+    States are displayed in `env`, and `site`, the server, is stopped with the page.
     """
 
     def __init__(

@@ -28,11 +28,7 @@ def show_in_window(
     """Play episodes until the window is closed.
 
     Space pauses and resumes; left and right step by a state, up and down by an episode.
-
-    Args:
-        player: Player of episodes of `env`.
-        env: Environment to display.
-        launch: Opens a window; MuJoCo's passive viewer by default.
+    `launch` opens a window, MuJoCo's passive viewer by default.
 
     Raises:
         DeviceError: If there is no display.

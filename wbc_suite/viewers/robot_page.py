@@ -28,9 +28,7 @@ LEAST_HALF = 1e-3  # m; thinner boxes of inertia would not be visible
 class RobotPage:
     """Serve a page that displays one robot in the posture of its sliders.
 
-    Args:
-        robot: Robot to display.
-        site: Server of the page, which is stopped with the page.
+    The server of the page, `site`, is stopped with the page.
     """
 
     def __init__(self, robot: RobotDescription, site: PageServer) -> None:
@@ -45,7 +43,9 @@ class RobotPage:
             f"**{robot.title or robot.name}**  \n"
             f"{robot.dof} joints, {robot.mass:.1f} kg, {robot.root.kind} root"
         )
-        self._add_postures()
+        names = {**{name: name for name in robot.keyframes}, "zero": None}
+        postures = site.server.gui.add_button_group("Posture", tuple(names))
+        postures.on_click(lambda _: self.set_keyframe(names[postures.value]))
         self._overlays = Overlays(site.server, self.model, self.data, self.scene)
         self._add_joints()
         self.set_keyframe(next(iter(robot.keyframes), None))
@@ -83,28 +83,15 @@ class RobotPage:
         """Return the position of a joint, rad or m."""
         return float(self.data.joint(joint).qpos[0])
 
-    def _add_postures(self) -> None:
-        postures = self.site.server.gui.add_button_group(
-            "Posture", (*self.robot.keyframes, "zero")
-        )
-        postures.on_click(
-            lambda _: self.set_keyframe(
-                None if postures.value == "zero" else postures.value
-            )
-        )
-
     def _add_joints(self) -> None:
         followers = {j.name for j in self.robot.joints if j.mimic is not None}
         for group, joints in self.robot.groups.items():
-            own = [name for name in joints if name not in followers]
-            if not own:
-                continue
-            folder = self.site.server.gui.add_folder(
-                plain(group).capitalize(), expand_by_default="arm" in group
-            )
-            with folder:
-                for name in own:
-                    self._add_joint(name, group)
+            if own := [name for name in joints if name not in followers]:
+                with self.site.server.gui.add_folder(
+                    plain(group).capitalize(), expand_by_default="arm" in group
+                ):
+                    for name in own:
+                        self._add_joint(name, group)
 
     def _add_joint(self, name: str, group: str) -> None:
         joint, low, high = self.model.joint(name), -UNBOUNDED, UNBOUNDED
@@ -128,14 +115,7 @@ class RobotPage:
 
 
 class Overlays:
-    """Checkboxes that show shapes, frames, centre of mass and inertia.
-
-    Args:
-        server: Server of the page.
-        model: Model of the robot.
-        data: Its state, which `update` reads.
-        scene: The drawn robot.
-    """
+    """Checkboxes that show shapes, frames, centre of mass and inertia of a scene."""
 
     def __init__(
         self,
@@ -145,10 +125,9 @@ class Overlays:
         scene: ModelScene,
     ) -> None:
         self._model, self._data = model, data
-        links = [scene.node(body) for body in range(1, model.nbody)]
-        places = [(f"{link}/frame", IDENTITY, ORIGIN) for link in links]
+        places = [(f"{link}/frame", IDENTITY, ORIGIN) for link in scene.nodes[1:]]
         for site in range(model.nsite):
-            link, name = scene.node(model.site_bodyid[site]), model.site(site).name
+            link, name = scene.nodes[model.site_bodyid[site]], model.site(site).name
             place = model.site_quat[site], model.site_pos[site]
             places.append((f"{link}/frame_{name}", *place))
         self._frames = [
@@ -165,7 +144,7 @@ class Overlays:
         ]
         self._inertias = [
             server.scene.add_box(
-                f"{scene.node(body)}/inertia",
+                f"{scene.nodes[body]}/inertia",
                 dimensions=tuple(2.0 * equivalent_box(mass, model.body_inertia[body])),
                 color=INERTIA_COLOUR,
                 opacity=0.45,
@@ -220,15 +199,9 @@ class Overlays:
 def equivalent_box(mass: float, inertia: Vector) -> Vector:
     """Return the half sizes of the solid box that has these principal inertias.
 
-    For a box of half sizes a: I_x = m (a_y^2 + a_z^2) / 3, and so on around; so
-    a_x^2 = 3 (I_y + I_z - I_x) / (2 m).
-
-    Args:
-        mass: Mass in kg.
-        inertia: Principal moments of inertia, shape (3,), in kg m^2.
-
-    Returns:
-        Half sizes, shape (3,), in m.
+    For a box of half sizes a, m, shape (3,): I_x = m (a_y^2 + a_z^2) / 3, and so on
+    around; so a_x^2 = 3 (I_y + I_z - I_x) / (2 m). The mass is in kg, the inertia in
+    kg m^2, shape (3,).
     """
     squares = 1.5 * (inertia.sum() - 2.0 * inertia) / mass
     return np.maximum(np.sqrt(np.maximum(squares, 0.0)), LEAST_HALF)

@@ -17,14 +17,12 @@ Colour: TypeAlias = tuple[int, int, int]
 """Red, green and blue, 0 to 255."""
 
 FIELD_OF_VIEW = np.deg2rad(42.0)  # vertical
-VIEWS = MappingProxyType(
-    {
-        "Front": np.array([1.0, -0.62, 0.5]),
-        "Left": np.array([0.1, 1.0, 0.25]),
-        "Behind": np.array([-1.0, -0.35, 0.6]),
-        "Above": np.array([-0.15, 0.0, 1.0]),
-    }
-)
+VIEWS = {
+    "Front": np.array([1.0, -0.62, 0.5]),
+    "Left": np.array([0.1, 1.0, 0.25]),
+    "Behind": np.array([-1.0, -0.35, 0.6]),
+    "Above": np.array([-0.15, 0.0, 1.0]),
+}
 """Direction from the robot, which faces x, to the camera."""
 BRAND = (38, 98, 132)
 
@@ -74,9 +72,7 @@ def set_up_scene(server: "viser.ViserServer", *, label: str) -> None:
 def set_camera(server: "viser.ViserServer", box: tuple[Vector, Vector]) -> None:
     """Point the cameras of new clients at a box, from its front right and above.
 
-    Args:
-        server: Server of the clients.
-        box: Corners with the smallest and the largest coordinates, shape (3,), m.
+    Its two corners have the smallest and the largest coordinates, shape (3,), m.
     """
     position, look_at = _camera(box, VIEWS["Front"])
     server.initial_camera.position = tuple(position)
@@ -111,13 +107,9 @@ def add_plot(
     *,
     height: int = 150,
 ) -> "viser.GuiUplotHandle":
-    """Add a plot over the time in s, without data.
+    """Add a plot over the time in s, without data; its height is in pixels.
 
-    Args:
-        server: Server of the page.
-        title: Title of the plot.
-        curves: Colour of each curve in CSS notation, by its label.
-        height: In pixels.
+    `curves` is the colour of each curve in CSS notation, by its label.
     """
     lines = [{"label": k, "stroke": c, "width": 2} for k, c in curves.items()]
     return server.gui.add_uplot(

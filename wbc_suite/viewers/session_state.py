@@ -14,13 +14,7 @@ from wbc_suite.typing import Matrix, Vector
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LimbInfo:
-    """Constant properties of a limb.
-
-    Attributes:
-        name: Name of its slice of the action.
-        kind: Which part of a pose is commanded.
-        body: Body that carries the controlled frame; -1 for none.
-    """
+    """Constant properties of a limb: as those of its `LimbPort`."""
 
     name: str
     kind: LimbKind
@@ -36,14 +30,7 @@ class LimbInfo:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SessionInfo:
-    """Constant properties of a session.
-
-    Attributes:
-        model: The simulated model.
-        limbs: Limbs that can be dragged, by name.
-        grippers: Names of each gripper's synergies, by the gripper's name.
-        records: Whether the session can record episodes.
-    """
+    """Constant properties of a session: limbs, and synergies of grippers, by name."""
 
     model: mujoco.MjModel
     limbs: Mapping[str, LimbInfo]
@@ -61,8 +48,8 @@ class LimbStatus:
             measured.
         position_error: Tracking error of the commanded position, m.
         orientation_error: Tracking error of the commanded orientation, rad.
-        reached: Whether the controller can bring the frame to its target.
-        reasons: Why it cannot.
+        reached: Whether the controller can bring the frame to its target; else
+            `reasons` says why not.
         holder: Client that holds the limb, or None.
         enabled: Whether the limb's clutch is engaged.
         acting: What stages of the pipeline do to the target.
@@ -94,8 +81,6 @@ class Snapshot:
         step_time: Duration of a step of control and physics, s.
         latency: Median time from an input to its joint target, s; nan before any.
         speed: Simulated time per wall time.
-        paused: Whether the simulation is paused.
-        success: Whether the benchmark counts as solved.
         message: Message to the user, possibly empty.
         device: State of the device beside the page, as the pipeline reports it.
         selected: Limb that a device for one hand moves; empty if none is used.

@@ -28,8 +28,16 @@ def plain(name: str) -> str:
 def describe_reason(reason: Reason) -> str:
     """Return one of the controller's reasons as part of a sentence."""
     match reason:
-        case ActiveLimit():
-            return _describe_limit(reason)
+        case ActiveLimit(kind=LimitKind.POSITION, subject=joint, side=side):
+            return f"{plain(str(joint))} is at its {side} limit"
+        case ActiveLimit(kind=LimitKind.VELOCITY, subject=joint):
+            return f"{plain(str(joint))} is at its velocity limit"
+        case ActiveLimit(
+            kind=LimitKind.SELF_COLLISION, subject=LinkPair(first, second)
+        ):
+            return f"{plain(first)} would touch {plain(second)}"
+        case ActiveLimit(kind=LimitKind.FLOOR, subject=link):
+            return f"{plain(str(link))} would touch the floor"
         case Conflict(other):
             return f"conflict with {plain(other)}"
         case Contact(link, other):
@@ -43,26 +51,8 @@ def describe_reason(reason: Reason) -> str:
     return str(reason)
 
 
-def _describe_limit(limit: ActiveLimit) -> str:
-    match limit.kind, limit.subject:
-        case LimitKind.POSITION, joint:
-            return f"{plain(str(joint))} is at its {limit.side} limit"
-        case LimitKind.VELOCITY, joint:
-            return f"{plain(str(joint))} is at its velocity limit"
-        case LimitKind.SELF_COLLISION, LinkPair(first, second):
-            return f"{plain(first)} would touch {plain(second)}"
-        case LimitKind.FLOOR, link:
-            return f"{plain(str(link))} would touch the floor"
-    return str(limit)
-
-
 def explain(status: LimbStatus, *, at_most: int = 3) -> str:
-    """Return why a limb is not at its target; empty if it is, or moves there.
-
-    Args:
-        status: State of the limb.
-        at_most: Number of reasons to name.
-    """
+    """Return why a limb is not at its target; empty if it is, or moves there."""
     error = _tracking_error(status)
     reasons = [r for r in status.reasons if not is_transient(r)]
     if status.reached or not error or (status.reasons and not reasons):

@@ -1,7 +1,7 @@
 """Markers of targets: a translucent copy of each limb, a line and a label."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
@@ -24,11 +24,7 @@ BALL = 0.04  # m, radius of the marker of a frame without geoms
 class TargetMarkers:
     """A translucent copy of each limb at its target, with a line to the limb.
 
-    Args:
-        server: Server whose scene is drawn on.
-        info: The limbs, and the model that they belong to.
-        snapshot: State at the start; copies are taken in this posture.
-        colours: Colour of each limb.
+    Copies are taken in the posture of `snapshot`, the state at the start.
     """
 
     def __init__(
@@ -38,12 +34,10 @@ class TargetMarkers:
         snapshot: Snapshot,
         colours: Mapping[str, Colour],
     ) -> None:
-        self._nodes: dict[str, viser.SceneNodeHandle] = {}
-        self._lines: dict[str, viser.LineSegmentsHandle] = {}
-        self._labels: dict[str, viser.LabelHandle] = {}
+        self._markers: dict[str, tuple[Any, Any, Any]] = {}
         for name in info.limbs:
             mesh = _copy(info, name, snapshot)
-            self._nodes[name] = server.scene.add_mesh_simple(
+            node = server.scene.add_mesh_simple(
                 f"/targets/{name}",
                 mesh.vertices,
                 mesh.faces,
@@ -53,32 +47,30 @@ class TargetMarkers:
                 receive_shadow=False,
                 visible=False,
             )
-            self._lines[name] = server.scene.add_line_segments(
+            line = server.scene.add_line_segments(
                 f"/target_lines/{name}",
                 np.zeros((1, 2, 3), dtype=np.float32),
                 colors=colours[name],
                 thickness=0.006,
                 visible=False,
             )
-            self._labels[name] = server.scene.add_label(
+            label = server.scene.add_label(
                 f"/target_labels/{name}", "", anchor="bottom-center", visible=False
             )
+            self._markers[name] = node, line, label
 
     def update(self, snapshot: Snapshot, notes: Mapping[str, str]) -> None:
         """Move the markers; `notes` are the labels of limbs, possibly empty."""
         for name, status in snapshot.limbs.items():
-            apart = status.position_error > NEAR or status.orientation_error > TURNED
-            node, line = self._nodes[name], self._lines[name]
-            node.visible = apart
+            node, line, label = self._markers[name]
             line.visible = status.position_error > NEAR
-            if apart:
+            node.visible = line.visible or status.orientation_error > TURNED
+            if node.visible:
                 place(node, status.target)
             if line.visible:
-                line.points = np.array(
-                    [[status.measured.translation, status.target.translation]],
-                    dtype=np.float32,
-                )
-            label, text = self._labels[name], notes.get(name, "")
+                ends = status.measured.translation, status.target.translation
+                line.points = np.array([ends], dtype=np.float32)
+            text = notes.get(name, "")
             label.visible = bool(text)
             if text:
                 label.text = text
@@ -95,10 +87,10 @@ def _copy(info: SessionInfo, name: str, snapshot: Snapshot) -> TriangleMesh:
         body, mesh = model.geom_bodyid[geom], geom_mesh(model, geom)
         is_visual = model.geom_group[geom] < COLLISION_GROUP
         if body in chosen and is_visual and mesh is not None:
-            T_body_geom = _pose(model.geom_pos[geom], model.geom_quat[geom])
-            T_world_body = _pose(
-                snapshot.body_positions[body], snapshot.body_quaternions[body]
-            )
+            turn = pin.Quaternion(*model.geom_quat[geom])
+            T_body_geom = pin.SE3(turn, model.geom_pos[geom])
+            turn = pin.Quaternion(*snapshot.body_quaternions[body])
+            T_world_body = pin.SE3(turn, snapshot.body_positions[body])
             T = T_limb_world * T_world_body * T_body_geom
             parts.append(mesh.moved(T.translation, T.rotation))
     return merge(parts) if parts else ellipsoid_mesh(np.full(3, BALL))
@@ -113,7 +105,3 @@ def _own_bodies(model: mujoco.MjModel, root: int, others: set[int]) -> set[int]:
         if model.body_parentid[body] in carried:
             carried.add(body)
     return {root} if carried & others else carried
-
-
-def _pose(position: np.ndarray, wxyz: np.ndarray) -> pin.SE3:
-    return pin.XYZQUATToSE3(np.concatenate([position, np.roll(wxyz, -1)]))

@@ -13,11 +13,7 @@ log = logging.getLogger(__name__)
 
 
 class WatchPage:
-    """Serve a scene on this machine; its address is logged.
-
-    Args:
-        model: The scene.
-    """
+    """Serve a scene on this machine; its address is logged."""
 
     def __init__(self, model: mujoco.MjModel) -> None:
         self.site = PageServer()
