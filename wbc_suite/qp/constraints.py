@@ -55,8 +55,8 @@ class Constraints:
         row_limits = [x for x in limits if isinstance(x, RowLimit)]
         for part in (*row_limits, *equalities):
             part.bind(configuration)
-        self._limits, self.inequalities = _with_rows(row_limits)
-        self._equalities, self.equalities = _with_rows(equalities)
+        self._limits, self.inequalities = with_rows(row_limits)
+        self._equalities, self.equalities = with_rows(equalities)
         self.names = tuple((x.name, x.dim) for x in equalities)
         speeds = [limit.relax_speed for limit in row_limits for _ in range(limit.dim)]
         self.relax_speed: Vector = np.array(speeds, dtype=np.float64)
@@ -136,10 +136,10 @@ class Constraints:
         return (*names, *(str(self.subject(int(i))[1]) for i in rows))
 
 
-Part = TypeVar("Part", RowLimit, Equality)
+Part = TypeVar("Part", RowLimit, Equality, RowTask)
 
 
-def _with_rows(parts: Sequence[Part]) -> tuple[list[tuple[Part, slice]], int]:
+def with_rows(parts: Sequence[Part]) -> tuple[list[tuple[Part, slice]], int]:
     """Return each part with its rows, one after another, and their number."""
     ends = np.cumsum([0, *(part.dim for part in parts)]).tolist()
     slices = [slice(a, b) for a, b in pairwise(ends)]

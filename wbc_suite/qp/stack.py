@@ -14,6 +14,7 @@ from wbc_suite.qp.escape import Escape
 from wbc_suite.qp.fallback import Ladder
 from wbc_suite.qp.frame_task import FrameTask
 from wbc_suite.qp.joint_limits import AccelerationLimit, PositionLimit, VelocityLimit
+from wbc_suite.qp.kernel import Kernel
 from wbc_suite.qp.level import make_levels, tick_layout
 from wbc_suite.qp.limit import BoxLimit, Limit, LimitKind, unlimited_bounds
 from wbc_suite.qp.problem import Problem
@@ -174,7 +175,7 @@ class TaskStack:
         """Evaluate tasks, limits and equalities that have no kernel."""
         if not self.is_compiled:
             for level in self.levels:
-                level.prepare(self.configuration)
+                level.evaluate(self.configuration, Kernel.PYTHON)
             self._constraints.prepare(self.configuration, dt, self.levels[0].qp)
         self._tick.prepared[0] = 1
 
