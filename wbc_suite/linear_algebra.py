@@ -159,13 +159,9 @@ def row_space(W: Matrix, tolerance: float, V: Matrix, lengths: Vector) -> int:
     """Write an orthonormal basis of the rows of W, longest first; return the rank.
 
     Gram-Schmidt with pivoting; each vector is orthogonalised twice ("twice is enough",
-    Giraud et al. 2005). Rows that are left shorter than the tolerance are dropped.
-
-    Args:
-        W: Rows, shape (m, n); destroyed.
-        tolerance: Absolute length below which a row counts as dependent.
-        V: Output, shape (at least min(m, n), n).
-        lengths: Output, what was left of each chosen row, descending.
+    Giraud et al. 2005). Rows of W, shape (m, n), are destroyed. Those that are left
+    shorter than the tolerance are dropped; V, shape (min(m, n), n) or more, gets the
+    others, and `lengths` what was left of each, descending.
     """
     m, n = W.shape
     rank = 0

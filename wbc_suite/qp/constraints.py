@@ -25,12 +25,8 @@ class Constraints:
     """Inequality rows, then equality rows, in the order in which a problem has them.
 
     The first self-collision limit, the first floor limit and the equalities of this
-    package are written by kernels; others by their own `rows` before each tick.
-
-    Args:
-        configuration: The robot; limits and equalities are bound to it here.
-        limits: Limits; those with rows are used.
-        equalities: Equality rows.
+    package are written by kernels; others by their own `rows` before each tick. All are
+    bound here. Limits without rows are left out.
 
     Attributes:
         inequalities: Number of inequality rows.

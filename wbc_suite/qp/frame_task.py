@@ -30,14 +30,12 @@ class FrameTask(RowTask):
     `max_angular_speed dt`. A target that is not finite holds the frame where it is.
 
     Args:
-        frame: Name of the frame.
         position_cost: [cost]/m, one number or one per world axis.
         orientation_cost: [cost]/rad, one number or one per axis of the frame.
         target: Target pose; without one the pose at binding time is held.
-        max_linear_speed: Greatest speed asked for, m/s.
-        max_angular_speed: Greatest angular speed asked for, rad/s.
 
-    Gain and level are those of `RowTask`. Reports call the task by its frame.
+    Gain and level are those of `RowTask`, speeds in m/s and rad/s. Reports call the
+    task by its frame.
 
     Source: Lynch and Park (2017), "Modern Robotics", section 6.3; SO(3) Jacobian from
     Chirikjian (2012), "Stochastic Models, Information Theory, and Lie Groups", 10.86.
@@ -86,8 +84,7 @@ class FrameTask(RowTask):
     def set_target(self, target: pin.SE3 | Matrix) -> None:
         """Set the target pose T_wt: an SE3 or a homogeneous matrix, shape (4, 4).
 
-        Values that are not finite are accepted: the tick then holds the frame and
-        reports it.
+        Values that are not finite are accepted: a tick holds the frame and reports it.
 
         Raises:
             ConfigError: If the shape is wrong or the rotation is no rotation.
@@ -131,11 +128,7 @@ def pose_costs(
 
 
 def homogeneous(owner: str, pose: pin.SE3 | Matrix) -> Matrix:
-    """Return a pose given in either form as a matrix, shape (4, 4).
-
-    Raises:
-        ConfigError: If the shape is wrong, or a finite rotation is not orthonormal.
-    """
+    """Return a pose as a matrix, shape (4, 4), or raise; see `FrameTask.set_target`."""
     if isinstance(pose, pin.SE3):
         return pose.homogeneous
     matrix = check_array(f"{owner}: the pose, an SE3 or a matrix,", pose, (4, 4))

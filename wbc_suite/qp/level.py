@@ -39,13 +39,8 @@ class TickLayout:
 class Level:
     """Tasks of one strict level with their arrays, and the arrays of their problem.
 
-    Args:
-        configuration: The robot.
-        tasks: Tasks of this level; they are bound here.
-        layout: Layout of the stack.
-        results: Results of the stack.
-        k: Number of the level.
-        above: Number of rows of all levels above, and of the stack's equalities.
+    Tasks are bound here. Layout and results are those of the stack, in which this is
+    level k; `above` is the number of rows above it and of the stack's equalities.
 
     Attributes:
         tasks: Arrays of the tasks.

@@ -22,15 +22,14 @@ class RelativeFrameTask(RowTask):
     `v_f - v_r - w_r x (p_wf - p_wr)`.
 
     Args:
-        frame: Name of the frame f.
-        root: Name of the frame r.
+        frame: Name of f.
+        root: Name of r.
         position_cost: [cost]/m, one number or one per axis of r.
         orientation_cost: [cost]/rad, one number or one per axis of f.
         target: Pose T_rt; without one the pose at binding time is held.
-        max_linear_speed: Greatest relative speed asked for, m/s.
-        max_angular_speed: Greatest relative angular speed asked for, rad/s.
 
-    Gain and level are those of `RowTask`. Reports call the task "frame in root".
+    Gain and level are those of `RowTask`, speeds in m/s and rad/s and relative. Reports
+    call the task "frame in root".
     """
 
     def __init__(

@@ -111,7 +111,7 @@ class SelfCollisionLimit(RowLimit):
     def drop_touching(self, configuration: Configuration) -> None:
         """Leave out the capsule pairs that are nearer than the margin right now."""
         count, robot = len(self._pairs), configuration.robot
-        arrays = self._make_arrays(configuration, rows=count, influence=self.margin)
+        arrays = self._make_arrays(configuration, count, self.margin)
         compute_joint_poses(robot)
         G, h = np.zeros((count, configuration.nv)), np.zeros(count)
         self_collision_rows(robot, as_argument(arrays), 1.0, G, h)
@@ -127,13 +127,12 @@ class SelfCollisionLimit(RowLimit):
             UnknownNameError: If a link is no frame of the model.
         """
         if self._model is not configuration.model:
-            options = {"rows": self.dim, "influence": self.influence}
-            self.arrays = self._make_arrays(configuration, **options)
+            self.arrays = self._make_arrays(configuration, self.dim, self.influence)
             self.argument = as_argument(self.arrays)
             self._model = configuration.model
 
     def _make_arrays(
-        self, configuration: Configuration, *, rows: int, influence: float
+        self, configuration: Configuration, rows: int, influence: float
     ) -> CapsuleArrays:
         count, frames = len(self._capsules), configuration.model.frames
         links = [frames[configuration.frame_id(c.link)] for c in self._capsules]

@@ -125,7 +125,7 @@ class TaskStack:
         frames = [t for t in tasks if isinstance(t, FrameTask)]
         self._escape: Escape | None = None
         if escape and frames:
-            self._escape = Escape(configuration, frames, self.bounds, self._copy)
+            self._escape = Escape(self, frames)
         self._is_alone = self._escape is None and self.is_compiled
         self._last: Solution | None = None
 
@@ -191,8 +191,7 @@ class TaskStack:
             q = self.configuration.q
             if math.isfinite(q.dot(q)):
                 if self._escape is not None:
-                    bias = self._escape.bias(dt, self.v_previous, self._pressed)
-                    self._set_bias(bias)
+                    self._escape.update(dt)
                 self.prepare(dt)
             self._tick.prepared[0] = 1
         status, k = solve_tick(self.arrays, dt, 0)
@@ -269,16 +268,8 @@ class TaskStack:
             record,
         )
 
-    def step(self, dt: float, bias: Matrix | None) -> None:
-        """Solve and move the configuration one step, with a bias on single joints."""
-        self._set_bias(bias)
-        self.configuration.update(self.configuration.integrate(self.solve(dt).dq))
-
-    def _set_bias(self, bias: Matrix | None) -> None:
-        self.levels[0].tasks.bias[:] = 0.0 if bias is None else bias
-
-    def _copy(self) -> "TaskStack":
-        """Return a copy of the stack on a copy of the robot, where it is now."""
+    def copy(self) -> "TaskStack":
+        """Return a copy without escape on a copy of the robot, where it is now."""
         return TaskStack(
             Configuration(self.configuration.model, self.configuration.q),
             self.tasks,
@@ -291,7 +282,7 @@ class TaskStack:
             warm=self._warm,
         )
 
-    def _pressed(self) -> Indices:
+    def pressed(self) -> Indices:
         """Return the velocity indices pressed against position limits last tick."""
         if not self._tick.solved[0]:
             return np.zeros(0, dtype=np.int64)

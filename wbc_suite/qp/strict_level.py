@@ -66,12 +66,7 @@ def _decided_directions(rows: Matrix, V: Matrix, level: LevelArrays) -> int:
     Near a singularity the direction that they are losing turns quickly. Were it handed
     over meanwhile, the lower level would bend a stretched arm and the upper stretch it
     again, at full acceleration. So until the singularity is left, what was theirs at
-    the last tick stays theirs.
-
-    Args:
-        rows: Rows of all levels above and of the equalities; destroyed.
-        V: Output, shape (nv, nv).
-        level: Holds the basis of the last tick.
+    the last tick stays theirs. Their rows are destroyed.
     """
     kept, counts, lengths = level.kept, level.kept_counts, level.lengths
     rank = row_space(rows, _RANK_TOLERANCE, V, lengths)

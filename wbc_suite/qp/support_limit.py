@@ -164,10 +164,7 @@ def _pressure_map(configuration: Configuration, omega: float, mass: float) -> Ma
 
 
 def convex_hull(points: Matrix) -> Matrix:
-    """Return the corners of the convex hull of points in a plane, counterclockwise.
-
-    Args:
-        points: Shape (n, 2).
+    """Return the corners of the convex hull of points, (n, 2), counterclockwise.
 
     Source: Andrew (1979), "Another efficient algorithm for convex hulls in two
     dimensions", Information Processing Letters 9(5).
