@@ -215,9 +215,7 @@ def pseudo_inverse(A: Matrix, tolerance: float, out: Matrix) -> None:
     for _ in range(_JACOBI_SWEEPS):
         if not _jacobi_sweep(A, V):
             break
-    largest = 0.0
-    for i in range(n):
-        largest = max(largest, A[i, i])
+    largest = np.diag(A).max()
     for i in range(n):
         for j in range(n):
             out[i, j] = 0.0
@@ -229,9 +227,7 @@ def pseudo_inverse(A: Matrix, tolerance: float, out: Matrix) -> None:
 @compiled
 def _jacobi_sweep(A: Matrix, V: Matrix) -> bool:
     """Rotate all off-diagonal entries to zero once; return whether there were any."""
-    n, rotated, size = A.shape[0], False, 0.0
-    for i in range(n):
-        size = max(size, abs(A[i, i]))
+    n, rotated, size = A.shape[0], False, np.abs(np.diag(A)).max()
     for i in range(n):
         for j in range(i + 1, n):
             if abs(A[i, j]) <= 1e-15 * size:

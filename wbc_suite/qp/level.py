@@ -40,7 +40,7 @@ class Level:
     """Tasks of one strict level with their arrays, and the arrays of their problem.
 
     Tasks are bound here. Layout and results are those of the stack, in which this is
-    level k; `above` is the number of rows above it and of the stack's equalities.
+    level k.
 
     Attributes:
         tasks: Arrays of the tasks.
@@ -57,10 +57,11 @@ class Level:
         results: Records,
         *,
         k: int,
-        above: int,
     ) -> None:
         for task in tasks:
             task.bind(configuration)
+        above = sum(size for _, size in layout.equalities)
+        above += sum(task.dim for level in layout.levels[:k] for task, _ in level)
         own, p, nv = results[f"level {k}"], layout.inequalities, configuration.nv
         multipliers = own["multipliers"]
         self._rows = layout.levels[k]
@@ -151,7 +152,7 @@ def tick_layout(
         ("residual", float, (1,)),
         ("all_finite", float, (1,)),
     ]
-    for k, own in enumerate(_by_level(tasks)):
+    for k, own in enumerate(by_level(tasks)):
         level, m = with_rows([task for task in own if isinstance(task, RowTask)])
         levels.append(level)
         size = nv + rows.inequalities + (nv if k else rows.equalities)
@@ -174,24 +175,7 @@ def tick_layout(
     )
 
 
-def make_levels(
-    configuration: Configuration,
-    tasks: Sequence[Task],
-    layout: TickLayout,
-    results: Records,
-) -> list[Level]:
-    """Return the strict levels, the first first; tasks are bound."""
-    levels: list[Level] = []
-    above = sum(size for _, size in layout.equalities)
-    for k, own in enumerate(_by_level(tasks)):
-        rows = above if k else 0
-        level = Level(configuration, own, layout, results, k=k, above=rows)
-        above += len(level.tasks.e)
-        levels.append(level)
-    return levels
-
-
-def _by_level(tasks: Sequence[Task]) -> list[list[Task]]:
+def by_level(tasks: Sequence[Task]) -> list[list[Task]]:
     """Return the tasks of each strict level, the first first."""
     numbers = sorted({task.level for task in tasks}) or [0]
     return [[task for task in tasks if task.level == k] for k in numbers]

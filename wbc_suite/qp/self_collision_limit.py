@@ -57,6 +57,10 @@ class SelfCollisionLimit(RowLimit):
         influence: Pairs further apart than this are left out, m.
         rate: Approach speed per distance left, 1/s.
 
+    Attributes:
+        found: Pair of each row of the last tick, nearest first; -1 for none.
+        distances: Distance of each row's pair, m; inf for none.
+
     Raises:
         ConfigError: If a number is out of range.
 
@@ -128,6 +132,7 @@ class SelfCollisionLimit(RowLimit):
         """
         if self._model is not configuration.model:
             self.arrays = self._make_arrays(configuration, self.dim, self.influence)
+            self.found, self.distances = self.arrays.found, self.arrays.distance
             self.argument = as_argument(self.arrays)
             self._model = configuration.model
 
@@ -170,16 +175,6 @@ class SelfCollisionLimit(RowLimit):
     def reset(self) -> None:
         """Discard the list of near pairs."""
         self.arrays.listed_count[0] = -1
-
-    @property
-    def found(self) -> Indices:
-        """Pair of each row of the last tick, nearest first; -1 where there is none."""
-        return self.arrays.found
-
-    @property
-    def distances(self) -> Vector:
-        """Distance of each row's pair at the last tick, m; inf where there is none."""
-        return self.arrays.distance
 
     @property
     def pair_count(self) -> int:

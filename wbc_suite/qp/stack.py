@@ -15,7 +15,7 @@ from wbc_suite.qp.fallback import Ladder
 from wbc_suite.qp.frame_task import FrameTask
 from wbc_suite.qp.joint_limits import AccelerationLimit, PositionLimit, VelocityLimit
 from wbc_suite.qp.kernel import Kernel
-from wbc_suite.qp.level import make_levels, tick_layout
+from wbc_suite.qp.level import Level, by_level, tick_layout
 from wbc_suite.qp.limit import BoxLimit, Limit, LimitKind, unlimited_bounds
 from wbc_suite.qp.problem import Problem
 from wbc_suite.qp.report import TaskReport, TickRecord
@@ -114,7 +114,10 @@ class TaskStack:
         self._layout = tick_layout(configuration, tasks, rows)
         self._buffer: Vector = np.zeros(self._layout.dtype.itemsize // 8)
         results = self._layout.results(self._buffer)
-        self.levels = make_levels(configuration, tasks, self._layout, results)
+        self.levels = [
+            Level(configuration, own, self._layout, results, k=k)
+            for k, own in enumerate(by_level(tasks))
+        ]
         rows.fill_constants(self.levels[0].qp)
         self._warm = solver == "daqp" if warm is None else warm
         self.is_compiled = all(x.is_compiled for x in (rows, *self.levels))

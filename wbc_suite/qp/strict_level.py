@@ -9,9 +9,7 @@ from wbc_suite.qp.problem import UNBOUNDED
 from wbc_suite.qp.task_kernels import TaskArrays
 from wbc_suite.typing import Indices, Matrix, Vector
 
-MAX_LEVELS = 6
-"""Greatest number of strict levels of a stack."""
-
+MAX_LEVELS = 6  # of a stack
 _LOST_DIRECTION = 0.05  # share of a unit vector outside the present basis
 _SINGULAR = 2e-2  # shortest over longest row, under which a singularity is near
 _RANK_TOLERANCE = 1e-6  # rows of an upper level shorter than this bind nothing
