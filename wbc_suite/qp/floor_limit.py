@@ -87,11 +87,7 @@ class FloorLimit(RowLimit):
         self._model: pin.Model | None = None  # that the arrays belong to
 
     def bind(self, configuration: Configuration) -> None:
-        """Resolve links to joints. Stacks on one model share the arrays.
-
-        Raises:
-            UnknownNameError: If a link is no frame of the model.
-        """
+        """Resolve links to joints; UnknownNameError if one is no frame of the model."""
         model, sphere = configuration.model, self._spheres.copy()
         if self._model is model:
             return

@@ -50,11 +50,7 @@ class JointCouplingTask(RowTask):
         self.offset = check_number(f"Task '{self.name}': the offset", offset)
 
     def bind(self, configuration: Configuration) -> None:
-        """Resolve both joints.
-
-        Raises:
-            ConfigError: If one has not exactly one parameter.
-        """
+        """Resolve both joints; ConfigError if one has not exactly one parameter."""
         joints = [
             configuration.model.joints[configuration.joint_id(name)]
             for name in (self.follower, self.leader)

@@ -33,7 +33,6 @@ from wbc_suite.qp.tick import (
 from wbc_suite.typing import Indices, Matrix, Records, Vector
 
 _SOLVED = TickStatus.SOLVED.value
-_NO_NAMES: tuple[tuple[str, ...], ...] = ((),)
 
 
 class TaskStack:
@@ -246,7 +245,7 @@ class TaskStack:
         """Copy the step and what explains it."""
         tick, nv = self._tick, self.configuration.nv
         values, solved = self._buffer.copy(), int(tick.solved[0])
-        held = _NO_NAMES * solved
+        held: tuple[tuple[str, ...], ...] = ((),) * solved
         if not values[2 * nv + 1]:
             held = tuple(level.held() for level in self.levels[:solved])
         pressed: tuple[tuple[Indices, Matrix], ...] = ()
