@@ -159,13 +159,9 @@ def row_space(W: Matrix, tolerance: float, V: Matrix, lengths: Vector) -> int:
     """Write an orthonormal basis of the rows of W, longest first; return the rank.
 
     Gram-Schmidt with pivoting; each vector is orthogonalised twice ("twice is enough",
-    Giraud et al. 2005). Rows that are left shorter than the tolerance are dropped.
-
-    Args:
-        W: Rows, shape (m, n); destroyed.
-        tolerance: Absolute length below which a row counts as dependent.
-        V: Output, shape (at least min(m, n), n).
-        lengths: Output, what was left of each chosen row, descending.
+    Giraud et al. 2005). Rows of W, shape (m, n), are destroyed. Those that are left
+    shorter than the tolerance are dropped; V, shape (min(m, n), n) or more, gets the
+    others, and `lengths` what was left of each, descending.
     """
     m, n = W.shape
     rank = 0
@@ -219,9 +215,7 @@ def pseudo_inverse(A: Matrix, tolerance: float, out: Matrix) -> None:
     for _ in range(_JACOBI_SWEEPS):
         if not _jacobi_sweep(A, V):
             break
-    largest = 0.0
-    for i in range(n):
-        largest = max(largest, A[i, i])
+    largest = np.diag(A).max()
     for i in range(n):
         for j in range(n):
             out[i, j] = 0.0
@@ -233,9 +227,7 @@ def pseudo_inverse(A: Matrix, tolerance: float, out: Matrix) -> None:
 @compiled
 def _jacobi_sweep(A: Matrix, V: Matrix) -> bool:
     """Rotate all off-diagonal entries to zero once; return whether there were any."""
-    n, rotated, size = A.shape[0], False, 0.0
-    for i in range(n):
-        size = max(size, abs(A[i, i]))
+    n, rotated, size = A.shape[0], False, np.abs(np.diag(A)).max()
     for i in range(n):
         for j in range(i + 1, n):
             if abs(A[i, j]) <= 1e-15 * size:

@@ -17,7 +17,7 @@ from wbc_suite.qp import (
     VelocityLimit,
     WeightLimit,
 )
-from wbc_suite.qp.support_limit import convex_hull
+from wbc_suite.qp.standing_limits import convex_hull
 
 DT = 0.01
 FEET = ("right_foot", "left_foot")

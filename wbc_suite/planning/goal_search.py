@@ -99,12 +99,10 @@ class GoalSearch:
     def start(
         self, starts: Sequence[Vector], held: Vector, trail: Sequence[TimedState] = ()
     ) -> None:
-        """Begin; the tasks have their targets.
+        """Begin at initial configurations, best first; the tasks have their targets.
 
-        Args:
-            starts: Initial configurations, best first.
-            held: Configuration at which the frames of the equalities are held.
-            trail: Earlier states of the robot, the latest first.
+        Frames of equalities are held as they are at `held`. The trail has earlier
+        states of the robot, the latest first.
         """
         self._trail = trail
         self._configuration.update(held)

@@ -109,10 +109,8 @@ class MotionPlanner:
             return None
         motion = self.stop(now)
         end, still = motion.position_of(goal), np.zeros_like(motion.origin)
-        back = [
-            motion.trajectory.segments[0].reversed,
-            *self._retraced(motion, [now, *trail]),
-        ]
+        first = motion.trajectory.segments[0].reversed
+        back = [first, *self._retraced(motion, [now, *trail])]
         exits = [segment.state(segment.duration) for segment in back]
         times = np.cumsum([segment.duration for segment in back])
         times += [float((np.abs(x - end) / self._speed).max()) for x, _ in exits]

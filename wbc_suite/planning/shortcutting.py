@@ -27,12 +27,8 @@ def shorten_path(
 
     Yields None after each attempt, and at last the path.
 
-    Args:
-        path: Configurations.
-        attempts: How many shortcuts to try.
-        speed: Velocity limits, shape (nv,); lengths are measured in time.
-        is_free: Returns whether the straight line between two configurations is free.
-        rng: Random numbers.
+    Lengths are measured in time at the velocity limits, `speed`, shape (nv,). `is_free`
+    returns whether the straight line between two configurations is free.
 
     Source: Geraerts and Overmars (2007), "Creating High-quality Paths for Motion
     Planning", IJRR 26(8).

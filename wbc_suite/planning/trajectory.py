@@ -71,15 +71,14 @@ class Segment:
 
 
 class Trajectory:
-    """Segments one after the other, at least one; each begins where the last ends."""
+    """Segments one after the other, at least one; each begins where the last ends.
+
+    Attributes:
+        segments: A new tuple whenever the trajectory changes.
+    """
 
     def __init__(self, segments: Iterable[Segment]) -> None:
         self._set(segments)
-
-    @property
-    def segments(self) -> tuple[Segment, ...]:
-        """The segments, a new tuple whenever the trajectory changes."""
-        return self._segments
 
     @property
     def duration(self) -> float:
@@ -94,22 +93,22 @@ class Trajectory:
     def state(self, time: float) -> State:
         """Return positions and velocities at a time; the last ones afterwards."""
         k = min(bisect.bisect_left(self._ends, time), len(self._ends) - 1)
-        return self._segments[k].state(time - self._start(k))
+        return self.segments[k].state(time - self._start(k))
 
     def extend(self, segments: Iterable[Segment]) -> None:
         """Append segments."""
-        self._set([*self._segments, *segments])
+        self._set([*self.segments, *segments])
 
     def replace(self, first: float, segment: Segment, last: float) -> None:
         """Put a segment in place of all that is between two times."""
         before = [
             part.between(0.0, first - self._start(k))
-            for k, part in enumerate(self._segments)
+            for k, part in enumerate(self.segments)
             if first > self._start(k)
         ]
         after = [
             part.between(last - self._start(k), part.duration)
-            for k, part in enumerate(self._segments)
+            for k, part in enumerate(self.segments)
             if last < self._ends[k]
         ]
         self._set([*before, segment, *after])
@@ -118,8 +117,8 @@ class Trajectory:
         return self._ends[k - 1] if k else 0.0
 
     def _set(self, segments: Iterable[Segment]) -> None:
-        self._segments = tuple(segments)
-        durations = [segment.duration for segment in self._segments]
+        self.segments = tuple(segments)
+        durations = [segment.duration for segment in self.segments]
         self._ends: list[float] = np.cumsum(durations).tolist()
 
 

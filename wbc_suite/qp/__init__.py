@@ -10,7 +10,7 @@ from wbc_suite.qp.dynamics_space import Contact, MomentumTask
 from wbc_suite.qp.dynamics_stack import DynamicsSolution, DynamicsStack
 from wbc_suite.qp.equality import Equality, FrameEquality, LinearEquality
 from wbc_suite.qp.floor_limit import FloorLimit
-from wbc_suite.qp.frame_task import FrameTask
+from wbc_suite.qp.frame_task import FrameTask, RelativeFrameTask
 from wbc_suite.qp.joint_coupling_task import JointCouplingTask
 from wbc_suite.qp.joint_limits import AccelerationLimit, PositionLimit, VelocityLimit
 from wbc_suite.qp.kernel import Kernel
@@ -18,7 +18,6 @@ from wbc_suite.qp.limit import BoxLimit, Limit, LimitKind, RowLimit
 from wbc_suite.qp.look_at_task import LookAtTask
 from wbc_suite.qp.posture_task import DampingTask, PostureTask
 from wbc_suite.qp.problem import Problem
-from wbc_suite.qp.relative_frame_task import RelativeFrameTask
 from wbc_suite.qp.report import (
     ActiveLimit,
     Conflict,
@@ -31,9 +30,8 @@ from wbc_suite.qp.report import (
 from wbc_suite.qp.self_collision_limit import LinkPair, SelfCollisionLimit
 from wbc_suite.qp.solution import Fallback, Solution
 from wbc_suite.qp.stack import TaskStack
-from wbc_suite.qp.support_limit import Sole, SupportLimit
+from wbc_suite.qp.standing_limits import Sole, SupportLimit, WeightLimit
 from wbc_suite.qp.task import JointTask, RowTask, Task
-from wbc_suite.qp.weight_limit import WeightLimit
 
 __all__ = [
     "AccelerationLimit",

@@ -80,7 +80,7 @@ def _find_nearest(robot: RobotArrays, capsules: CapsuleArrays) -> None:
             square += x * x
         d = np.sqrt(square) - capsules.radius[a] - capsules.radius[b]
         if d < limit:
-            insert_nearest(found, distance, total, pair, d)
+            insert_nearest(found, distance, total, pair, float(d))
             total += 1
 
 

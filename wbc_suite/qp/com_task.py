@@ -17,7 +17,6 @@ class ComTask(RowTask):
     Args:
         cost: [cost]/m, one number or one per world axis.
         target: Point p*, m, shape (3,); without one the point at binding time.
-        max_speed: Greatest speed asked for, m/s.
 
     Other arguments are those of `RowTask`.
     """

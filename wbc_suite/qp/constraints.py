@@ -25,12 +25,8 @@ class Constraints:
     """Inequality rows, then equality rows, in the order in which a problem has them.
 
     The first self-collision limit, the first floor limit and the equalities of this
-    package are written by kernels; others by their own `rows` before each tick.
-
-    Args:
-        configuration: The robot; limits and equalities are bound to it here.
-        limits: Limits; those with rows are used.
-        equalities: Equality rows.
+    package are written by kernels; others by their own `rows` before each tick. All are
+    bound here. Limits without rows are left out.
 
     Attributes:
         inequalities: Number of inequality rows.
@@ -55,8 +51,8 @@ class Constraints:
         row_limits = [x for x in limits if isinstance(x, RowLimit)]
         for part in (*row_limits, *equalities):
             part.bind(configuration)
-        self._limits, self.inequalities = _with_rows(row_limits)
-        self._equalities, self.equalities = _with_rows(equalities)
+        self._limits, self.inequalities = with_rows(row_limits)
+        self._equalities, self.equalities = with_rows(equalities)
         self.names = tuple((x.name, x.dim) for x in equalities)
         speeds = [limit.relax_speed for limit in row_limits for _ in range(limit.dim)]
         self.relax_speed: Vector = np.array(speeds, dtype=np.float64)
@@ -136,10 +132,10 @@ class Constraints:
         return (*names, *(str(self.subject(int(i))[1]) for i in rows))
 
 
-Part = TypeVar("Part", RowLimit, Equality)
+Part = TypeVar("Part", RowLimit, Equality, RowTask)
 
 
-def _with_rows(parts: Sequence[Part]) -> tuple[list[tuple[Part, slice]], int]:
+def with_rows(parts: Sequence[Part]) -> tuple[list[tuple[Part, slice]], int]:
     """Return each part with its rows, one after another, and their number."""
     ends = np.cumsum([0, *(part.dim for part in parts)]).tolist()
     slices = [slice(a, b) for a, b in pairwise(ends)]

@@ -59,12 +59,10 @@ class FrameEquality(Equality):
     `FrameEquality("base", directions=("y",), hold_pose=False)`.
 
     Args:
-        frame: Name of the frame.
         directions: Which local directions are held, of x y z roll pitch yaw.
         hold_pose: Whether drift is led back.
         target: Pose T_wt to hold; the pose at binding time when absent.
         gain: Fraction of the drift that one step removes, (0, 1].
-        name: How reports call it; the frame's name when absent.
 
     Raises:
         ConfigError: If the gain is out of range.
@@ -120,8 +118,7 @@ class FrameEquality(Equality):
         """Return the drift e, m and rad in the frame's axes, shape (6,)."""
         compute_joint_poses(configuration.robot)
         held, error = HeldFrames.of(configuration, [(self, 0)]), np.empty(6)
-        frame = held.joint[0], held.offset[0], held.target[0]
-        _drift(configuration.robot, *frame, np.empty(12), error)
+        _drift(configuration.robot, as_argument(held), 0, np.empty(12), error)
         return error
 
 
@@ -131,7 +128,6 @@ class LinearEquality(Equality):
     Args:
         matrix: Rows, shape (dim, nv).
         rate: Right-hand side per second, shape (dim,); zero when absent.
-        name: How reports call the rows.
 
     Raises:
         ConfigError: If shapes differ or a value is not finite.
@@ -218,7 +214,7 @@ def hold_frames(
     """
     T, error = np.empty(12), np.empty(6)
     for t in range(held.joint.shape[0]):
-        _drift(robot, held.joint[t], held.offset[t], held.target[t], T, error)
+        _drift(robot, held, t, T, error)
         finite = True
         for i in range(6):
             error[i] *= held.gain[t]
@@ -242,16 +238,11 @@ def hold_frames(
 
 @compiled
 def _drift(
-    robot: RobotArrays,
-    joint: int,
-    offset: Vector,
-    target: Vector,
-    T: Vector,
-    error: Vector,
+    robot: RobotArrays, held: HeldFrames, t: int, T: Vector, error: Vector
 ) -> None:
     """Write the pose of a frame, and its drift in the frame's axes, shape (6,)."""
-    multiply_poses(robot.pose[joint], offset, T)
-    E = np.empty((3, 3))
+    target, E = held.target[t], np.empty((3, 3))
+    multiply_poses(robot.pose[held.joint[t]], held.offset[t], T)
     finite = relative_rotation(T, target, E)
     log3(E, error[3:])
     for i in range(3):

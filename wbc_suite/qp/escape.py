@@ -8,7 +8,7 @@ Whether that helps is simulated beforehand on a copy of the robot, a few steps p
 so that a robot whose target is out of reach stands still.
 """
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -17,8 +17,7 @@ import numpy as np
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.frame_task import FrameTask
 from wbc_suite.qp.lie import is_usable
-from wbc_suite.qp.limit import JointBounds
-from wbc_suite.typing import Indices, Matrix, Vector
+from wbc_suite.typing import Indices, Vector
 
 if TYPE_CHECKING:
     from wbc_suite.qp.stack import TaskStack
@@ -46,29 +45,15 @@ class _Drive:
 
 
 class Escape:
-    """Monitors frame tasks, and returns the bias of each tick.
+    """Monitors frame tasks of a stack, and drives joints with two position limits."""
 
-    Args:
-        configuration: The robot.
-        tasks: The frame tasks to monitor.
-        bounds: The joints' limits; only joints with two position limits are driven.
-        make_copy: Returns a copy for simulation, at the present configuration.
-    """
-
-    def __init__(
-        self,
-        configuration: Configuration,
-        tasks: Sequence[FrameTask],
-        bounds: JointBounds,
-        make_copy: Callable[[], "TaskStack"],
-    ) -> None:
-        self._configuration, self._tasks = configuration, tuple(tasks)
-        self._bounds, self._make_copy = bounds, make_copy
-        self._range = bounds.q_upper - bounds.q_lower
-        limited = np.isfinite(self._range) & (bounds.q_index >= 0)
+    def __init__(self, stack: "TaskStack", tasks: Sequence[FrameTask]) -> None:
+        self._stack, self._tasks = stack, tuple(tasks)
+        self._configuration, self._bounds = stack.configuration, stack.bounds
+        self._range = self._bounds.q_upper - self._bounds.q_lower
+        limited = np.isfinite(self._range) & (self._bounds.q_index >= 0)
         self._limited = np.flatnonzero(limited)
-        self._supports = [t.support(configuration) for t in self._tasks]
-        self._bias: Matrix = np.zeros((2, configuration.nv))
+        self._supports = [t.support(self._configuration) for t in self._tasks]
         self.reset()
 
     def reset(self) -> None:
@@ -79,34 +64,24 @@ class Escape:
         self._targets: Vector | None = None  # of the search or drive
         self._simulated: Vector | None = None  # targets that have been simulated
 
-    def bias(
-        self, dt: float, v: Vector, pressed: Callable[[], Indices]
-    ) -> Matrix | None:
-        """Return squared costs and weighted steps, shape (2, nv), or None.
-
-        Args:
-            dt: Step, s.
-            v: Velocity of the previous tick, shape (nv,).
-            pressed: Returns velocity indices of joints pressed against position limits.
-        """
+    def update(self, dt: float) -> None:
+        """Write the bias of the next tick to the tasks of the stack's first level."""
+        v = self._stack.v_previous
         self._still = self._still + dt if max(v.max(), -v.min()) < _STILL else 0.0
+        self._stack.levels[0].tasks.bias[:] = 0.0
         if self._drive is None and self._search is None:
             if self._still < _STANDING_TIME or not self._is_stuck():
-                return None
+                return
             self._targets = self._present_targets()
-            self._search = self._simulate(pressed())
+            self._search = self._simulate(self._stack.pressed())
         if self._targets_moved(self._targets, 1e-2):
             self._drive, self._search = None, None
-            return None
         if self._search is not None:
             self._advance(max(1, round(_STEPS_PER_SECOND * dt)))
-        if self._drive is None:
-            return None
-        if self._is_over(self._drive, self._configuration.q):
+        if self._drive is not None and self._is_over(self._drive, self._stack):
             self._drive = None
-            return None
-        self._drive.time += dt
-        return self._bias_of(self._drive, self._configuration.q, dt)
+        if self._drive is not None:
+            self._push(self._drive, self._stack, dt)
 
     def _advance(self, steps: int) -> None:
         """Simulate some more steps; begin the drive that was found."""
@@ -127,44 +102,43 @@ class Escape:
         for joints in (np.intersect1d(pressed, chain), chain):
             if not len(joints):
                 continue
-            copy, drive = self._make_copy(), _Drive(joints)
+            copy, drive = self._stack.copy(), _Drive(joints)
             robot = copy.configuration
-            while not self._is_over(drive, robot.q):
-                copy.step(_STEP, self._bias_of(drive, robot.q, _STEP))
-                drive.time += _STEP
+            while not self._is_over(drive, copy):
+                self._push(drive, copy, _STEP)
+                robot.update(robot.integrate(copy.solve(_STEP).dq))
                 yield
+            copy.levels[0].tasks.bias[:] = 0.0
             for _ in range(round(_SETTLE_TIME / _STEP)):
-                copy.step(_STEP, None)
+                robot.update(robot.integrate(copy.solve(_STEP).dq))
                 yield
             if np.linalg.norm(self._errors(robot)) < _BETTER * before:
                 return _Drive(joints)
         return None
 
-    def _is_over(self, drive: _Drive, q: Vector) -> bool:
-        joints = drive.joints
-        left = np.abs(self._to_middle(joints, q))
-        arrived = bool((left < _ARRIVED * self._range[joints]).all())
+    def _is_over(self, drive: _Drive, stack: "TaskStack") -> bool:
+        left = np.abs(self._to_middle(drive.joints, stack))
+        arrived = bool((left < _ARRIVED * self._range[drive.joints]).all())
         return arrived or drive.time > _DRIVE_TIME
 
-    def _bias_of(self, drive: _Drive, q: Vector, dt: float) -> Matrix:
-        joints = drive.joints
+    def _push(self, drive: _Drive, stack: "TaskStack", dt: float) -> None:
+        """Write the bias of a drive: squared costs and weighted steps."""
+        joints, bias = drive.joints, stack.levels[0].tasks.bias
         cost = _DRIVE_COST * max(float(t.cost.max()) for t in self._tasks)
         speed = np.minimum(self._bounds.v_max[joints], 3.0) * _DRIVE_SPEED * dt
-        step = self._to_middle(joints, q)
-        self._bias[:] = 0.0
-        self._bias[0, joints] = cost**2
-        self._bias[1, joints] = cost**2 * np.clip(step, -speed, speed)
-        return self._bias
+        step = np.clip(self._to_middle(joints, stack), -speed, speed)
+        bias[:] = 0.0
+        bias[0, joints], bias[1, joints] = cost**2, cost**2 * step
+        drive.time += dt
 
-    def _to_middle(self, joints: Indices, q: Vector) -> Vector:
-        bounds = self._bounds
+    def _to_middle(self, joints: Indices, stack: "TaskStack") -> Vector:
+        bounds, q = self._bounds, stack.configuration.q
         middle = 0.5 * (bounds.q_upper[joints] + bounds.q_lower[joints])
         return middle - q[bounds.q_index[joints]]
 
     def _is_stuck(self) -> bool:
-        if self._simulated is not None and not self._targets_moved(
-            self._simulated, 1e-3
-        ):
+        tried = self._simulated
+        if tried is not None and not self._targets_moved(tried, 1e-3):
             return False
         return any(e > _FAR for e in self._errors(self._configuration))
 
@@ -173,10 +147,8 @@ class Escape:
         errors: list[float] = []
         for task in self._tasks:
             error = task.error(configuration)
-            costs = task.cost
-            if not np.isfinite(error).all():
-                error = np.zeros(6)
-            kept = np.where(costs > 0.0, error, 0.0)
+            counts = (task.cost > 0.0) & np.isfinite(error).all()
+            kept = np.where(counts, error, 0.0)
             kept[3:] *= _ARM
             errors.append(float(np.linalg.norm(kept)))
         return errors

@@ -52,6 +52,10 @@ class FloorLimit(RowLimit):
         rate: Speed per distance left, 1/s.
         braking: Deceleration, m/s^2.
 
+    Attributes:
+        found: Sphere of each row of the last tick, lowest first; -1 for none.
+        distances: Distance of each row's sphere from the floor, m; inf for none.
+
     Raises:
         ConfigError: If a number is out of range.
     """
@@ -83,11 +87,7 @@ class FloorLimit(RowLimit):
         self._model: pin.Model | None = None  # that the arrays belong to
 
     def bind(self, configuration: Configuration) -> None:
-        """Resolve links to joints. Stacks on one model share the arrays.
-
-        Raises:
-            UnknownNameError: If a link is no frame of the model.
-        """
+        """Resolve links to joints; UnknownNameError if one is no frame of the model."""
         model, sphere = configuration.model, self._spheres.copy()
         if self._model is model:
             return
@@ -106,6 +106,7 @@ class FloorLimit(RowLimit):
             found=np.full(self.dim, -1, dtype=np.int64),
             distance=np.full(self.dim, np.inf),
         )
+        self.found, self.distances = self.arrays.found, self.arrays.distance
         self.argument = as_argument(self.arrays)
         self._model = model
 
@@ -115,16 +116,6 @@ class FloorLimit(RowLimit):
         """Write the rows of the lowest spheres, `-J_z dq <= ...`."""
         compute_joint_poses(configuration.robot)
         floor_rows(configuration.robot, self.argument, dt, G, h)
-
-    @property
-    def found(self) -> Indices:
-        """Sphere of each row of the last tick, lowest first; -1 where there is none."""
-        return self.arrays.found
-
-    @property
-    def distances(self) -> Vector:
-        """Distance of each row's sphere from the floor, m; inf where there is none."""
-        return self.arrays.distance
 
     def subject(self, row: int) -> str:
         """Return the link of a row of the last tick."""

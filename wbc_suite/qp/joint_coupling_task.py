@@ -16,14 +16,10 @@ class JointCouplingTask(RowTask):
     shares the bending of a hip.
 
     Args:
-        follower: Name of the joint that follows.
-        leader: Name of the joint that leads.
         ratio: Radians (or metres) of the follower per radian (or metre) of the leader.
         offset: The follower's position when the leader is at zero, rad or m.
-        cost: [cost]/rad or [cost]/m.
-        max_speed: Greatest speed asked for, rad/s or m/s.
 
-    Gain and level are those of `RowTask`. Reports call it "follower - leader".
+    Other arguments are those of `RowTask`. Reports call it "follower - leader".
     """
 
     unit = "rad"
@@ -54,11 +50,7 @@ class JointCouplingTask(RowTask):
         self.offset = check_number(f"Task '{self.name}': the offset", offset)
 
     def bind(self, configuration: Configuration) -> None:
-        """Resolve both joints.
-
-        Raises:
-            ConfigError: If one has not exactly one parameter.
-        """
+        """Resolve both joints; ConfigError if one has not exactly one parameter."""
         joints = [
             configuration.model.joints[configuration.joint_id(name)]
             for name in (self.follower, self.leader)

@@ -6,10 +6,8 @@ from enum import IntEnum
 class Kernel(IntEnum):
     """What computes a task, a limit or an equality in each tick."""
 
-    PYTHON = 0
-    """Its own method, before the tick."""
-    CONSTANT = 1
-    """Its own method, once."""
+    PYTHON = 0  # its own method, before the tick
+    CONSTANT = 1  # its own method, once
     FRAME = 2
     COM = 3
     POSTURE = 4

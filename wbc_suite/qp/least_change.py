@@ -19,7 +19,8 @@ def least_change(
 
     The dual active-set method: from x = 0, the most violated row becomes active; rows
     whose multiplier would change sign on the way become inactive. Each step ends at
-    the optimum over its active rows, and there are finitely many sets.
+    the optimum over its active rows, and there are finitely many sets. Return whether
+    the bounds are feasible and x is the optimum.
 
     Args:
         rows: Rows of length 1 or, where they are zero, without bounds; shape (m, n).
@@ -27,9 +28,6 @@ def least_change(
         high: Upper bounds, shape (m,).
         x: Output, shape (n,).
         work: Scratch, shape (2 n + 3, n).
-
-    Returns:
-        Whether the bounds are feasible and x is the optimum.
 
     Source: Goldfarb, Idnani (1983), "A numerically stable dual method for solving
     strictly convex quadratic programs", Mathematical Programming 27.

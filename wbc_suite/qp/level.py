@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,7 @@ import numpy as np
 from wbc_suite.compiling import as_argument
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.active_set import QpArrays, make_qp_arrays
-from wbc_suite.qp.constraints import Constraints
+from wbc_suite.qp.constraints import Constraints, with_rows
 from wbc_suite.qp.frame_task import FrameTask
 from wbc_suite.qp.kernel import Kernel, kernel_of
 from wbc_suite.qp.limit import unlimited_bounds
@@ -22,15 +21,6 @@ from wbc_suite.typing import Indices, Matrix, Records, Vector
 
 
 @dataclass(frozen=True, slots=True)
-class LevelLayout:
-    """Names of a level's row tasks, units of their errors, and where their rows are."""
-
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    slices: tuple[slice, ...]
-
-
-@dataclass(frozen=True, slots=True)
 class TickLayout:
     """Names of a stack's joints and rows, and where its results are in one buffer."""
 
@@ -38,7 +28,7 @@ class TickLayout:
     units: tuple[str, ...]  # of their positions
     equalities: Sequence[tuple[str, int]]  # name and number of rows of each
     inequalities: int  # number of rows
-    levels: tuple[LevelLayout, ...]
+    levels: tuple[list[tuple[RowTask, slice]], ...]  # row tasks, each with its rows
     dtype: np.dtype[np.void]  # of all results; begins with "x" and "v"
 
     def results(self, buffer: Vector) -> Records:
@@ -49,13 +39,8 @@ class TickLayout:
 class Level:
     """Tasks of one strict level with their arrays, and the arrays of their problem.
 
-    Args:
-        configuration: The robot.
-        tasks: Tasks of this level; they are bound here.
-        layout: Layout of the stack.
-        results: Results of the stack.
-        k: Number of the level.
-        above: Number of rows of all levels above, and of the stack's equalities.
+    Tasks are bound here. Layout and results are those of the stack, in which this is
+    level k.
 
     Attributes:
         tasks: Arrays of the tasks.
@@ -72,17 +57,17 @@ class Level:
         results: Records,
         *,
         k: int,
-        above: int,
     ) -> None:
         for task in tasks:
             task.bind(configuration)
+        above = sum(size for _, size in layout.equalities)
+        above += sum(task.dim for level in layout.levels[:k] for task, _ in level)
         own, p, nv = results[f"level {k}"], layout.inequalities, configuration.nv
         multipliers = own["multipliers"]
-        self._row_tasks = [t for t in tasks if isinstance(t, RowTask)]
+        self._rows = layout.levels[k]
         self._joint_tasks = [t for t in tasks if isinstance(t, JointTask)]
-        self._slices = layout.levels[k].slices
-        rows, joints, finite = self._row_tasks, self._joint_tasks, results["all_finite"]
-        self.tasks = _task_arrays(configuration, rows, joints, own, finite)
+        rows, finite = [task for task, _ in self._rows], results["all_finite"]
+        self.tasks = _task_arrays(configuration, rows, self._joint_tasks, own, finite)
         self.qp: QpArrays = make_qp_arrays(
             self.tasks.W,
             self.tasks.e,
@@ -105,12 +90,7 @@ class Level:
         self._copies = self._attach_rows()
         kernels = *self.tasks.kernel, *self.tasks.joint_kernel
         self.is_compiled = Kernel.PYTHON not in kernels
-        self._evaluate(configuration, Kernel.CONSTANT)
-
-    def prepare(self, configuration: Configuration) -> None:
-        """Evaluate what has no kernel."""
-        if not self.is_compiled:
-            self._evaluate(configuration, Kernel.PYTHON)
+        self.evaluate(configuration, Kernel.CONSTANT)
 
     def reset(self) -> None:
         """Discard the active set and the basis of the last tick."""
@@ -135,30 +115,28 @@ class Level:
 
     def held(self) -> tuple[str, ...]:
         """Return the names of the tasks whose target was not finite."""
-        tasks = *self._row_tasks, *self._joint_tasks
+        tasks = *(task for task, _ in self._rows), *self._joint_tasks
         held = *np.isnan(self.tasks.distances[:, 0]), *(self.tasks.joint_finite == 0)
         return tuple(t.name for t, is_held in zip(tasks, held, strict=True) if is_held)
 
     def _attach_rows(self) -> list[Vector]:
         """Let targets and costs follow those of the tasks; return the copies."""
-        tasks, rows = self.tasks, self._row_tasks
-        shared = [task.cost_row for task in rows]
-        copies = [tasks.cost[own] for own in self._slices]
-        shared += [task.target_row for task in (*rows, *self._joint_tasks)]
-        copies += [*tasks.target, *tasks.joint_target]
-        copies = [x[: y.values.size] for x, y in zip(copies, shared, strict=True)]
-        for row, copy in zip(shared, copies, strict=True):
-            row.attach(copy)
+        tasks, copies = self.tasks, list[Vector]()
+        for (task, rows), target in zip(self._rows, tasks.target, strict=True):
+            copies += [tasks.cost[rows], target[: task.target_row.values.size]]
+            task.cost_row.attach(copies[-2])
+            task.target_row.attach(copies[-1])
+        for task, target in zip(self._joint_tasks, tasks.joint_target, strict=True):
+            copies.append(target[: task.target_row.values.size])
+            task.target_row.attach(copies[-1])
         return copies
 
-    def _evaluate(self, configuration: Configuration, kernel: Kernel) -> None:
+    def evaluate(self, configuration: Configuration, kernel: Kernel) -> None:
         """Evaluate all tasks of a kind in Python."""
         tasks = self.tasks
         for k in np.flatnonzero(tasks.kernel == kernel).tolist():
-            rows = self._slices[k]
-            self._row_tasks[k].evaluate(
-                configuration, tasks.error[rows], tasks.jacobian[rows]
-            )
+            task, rows = self._rows[k]
+            task.evaluate(configuration, tasks.error[rows], tasks.jacobian[rows])
         for k in np.flatnonzero(tasks.joint_kernel == kernel).tolist():
             self._joint_tasks[k].evaluate(configuration, tasks.joint_error[k])
 
@@ -167,28 +145,21 @@ def tick_layout(
     configuration: Configuration, tasks: Sequence[Task], rows: Constraints
 ) -> TickLayout:
     """Return the names of a stack, and where its results are in one buffer."""
-    nv, levels = configuration.nv, list[LevelLayout]()
+    nv, levels = configuration.nv, list[list[tuple[RowTask, slice]]]()
     fields: list[Any] = [
         ("x", float, (nv,)),
         ("v", float, (nv,)),
         ("residual", float, (1,)),
         ("all_finite", float, (1,)),
     ]
-    for k, own in enumerate(_by_level(tasks)):
-        row_tasks = [task for task in own if isinstance(task, RowTask)]
-        ends = np.cumsum([0, *(task.dim for task in row_tasks)]).tolist()
-        levels.append(
-            LevelLayout(
-                names=tuple(task.name for task in row_tasks),
-                units=tuple(task.unit for task in row_tasks),
-                slices=tuple(slice(a, b) for a, b in pairwise(ends)),
-            )
-        )
+    for k, own in enumerate(by_level(tasks)):
+        level, m = with_rows([task for task in own if isinstance(task, RowTask)])
+        levels.append(level)
         size = nv + rows.inequalities + (nv if k else rows.equalities)
         results = [
-            ("distances", float, (len(row_tasks), 2)),
-            ("W", float, (ends[-1], nv)),
-            ("e", float, (ends[-1],)),
+            ("distances", float, (len(level), 2)),
+            ("W", float, (m, nv)),
+            ("e", float, (m,)),
             ("diagonal", float, (2, nv)),
             ("x", float, (nv,)),
             ("multipliers", float, (size,)),
@@ -204,24 +175,7 @@ def tick_layout(
     )
 
 
-def make_levels(
-    configuration: Configuration,
-    tasks: Sequence[Task],
-    layout: TickLayout,
-    results: Records,
-) -> list[Level]:
-    """Return the strict levels, the first first; tasks are bound."""
-    levels: list[Level] = []
-    above = sum(size for _, size in layout.equalities)
-    for k, own in enumerate(_by_level(tasks)):
-        rows = above if k else 0
-        level = Level(configuration, own, layout, results, k=k, above=rows)
-        above += len(level.tasks.e)
-        levels.append(level)
-    return levels
-
-
-def _by_level(tasks: Sequence[Task]) -> list[list[Task]]:
+def by_level(tasks: Sequence[Task]) -> list[list[Task]]:
     """Return the tasks of each strict level, the first first."""
     numbers = sorted({task.level for task in tasks}) or [0]
     return [[task for task in tasks if task.level == k] for k in numbers]

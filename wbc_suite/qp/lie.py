@@ -3,6 +3,7 @@
 import numpy as np
 
 from wbc_suite.compiling import compiled
+from wbc_suite.linear_algebra import dot
 from wbc_suite.typing import Matrix, Vector
 
 FAR = 1e9  # m or rad; a target beyond it counts as not finite: squares may overflow
@@ -84,10 +85,7 @@ def is_usable(target: Vector) -> bool:
 @compiled
 def saturate(step: Vector, limit: float) -> None:
     """Shorten a step in place to the given length, keeping its direction."""
-    norm = 0.0
-    for i in range(step.shape[0]):
-        norm += step[i] * step[i]
-    norm = np.sqrt(norm)
+    norm = np.sqrt(dot(step, step, step.shape[0]))
     if norm > limit:
         for i in range(step.shape[0]):
             step[i] *= limit / norm

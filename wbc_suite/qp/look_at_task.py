@@ -30,14 +30,11 @@ class LookAtTask(RowTask):
     vanishes, but any motion leaves that place.
 
     Args:
-        frame: Name of the frame.
         axis: The axis a in the frame, shape (3,); normalised.
         target: Point p, m, world axes, shape (3,); without one, 1 m along the axis at
             binding time.
-        cost: [cost]/rad.
-        max_angular_speed: Greatest speed asked for, rad/s.
 
-    Gain and level are those of `RowTask`. Reports call the task "frame looks".
+    Other arguments are those of `RowTask`, in rad. Reports call the task "frame looks".
 
     Raises:
         ConfigError: If the axis has no length.

@@ -3,10 +3,10 @@
 import numpy as np
 
 from wbc_suite.compiling import compiled
+from wbc_suite.linear_algebra import dot
 from wbc_suite.typing import Indices, Matrix, Vector
 
-UNBOUNDED = 1e30
-"""A bound at or beyond it binds nothing (the convention of most solvers)."""
+UNBOUNDED = 1e30  # a bound at or beyond it binds nothing, as in most solvers
 
 
 class Problem:
@@ -108,12 +108,7 @@ def worst_violation(x: Vector, rows: Matrix, lower: Vector, upper: Vector) -> fl
     """
     n, worst = x.shape[0], 0.0
     for i in range(lower.shape[0]):
-        if i < n:
-            y = x[i]
-        else:
-            y = 0.0
-            for j in range(n):
-                y += rows[i - n, j] * x[j]
+        y = x[i] if i < n else dot(rows[i - n], x, n)
         if not np.isfinite(y):
             return np.inf
         worst = max(worst, lower[i] - y, y - upper[i])

@@ -6,8 +6,9 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from wbc_suite.qp.level import LevelLayout, TickLayout
+from wbc_suite.qp.level import TickLayout
 from wbc_suite.qp.limit import LimitKind
+from wbc_suite.qp.task import RowTask
 from wbc_suite.typing import Indices, Matrix, Vector
 
 _SHARE = 0.1  # part of a task's pull that something must oppose to be named
@@ -113,7 +114,7 @@ class TaskReport:
 class LevelRecord:
     """What a tick left of one level; see `TaskArrays` for what has no comment."""
 
-    layout: LevelLayout
+    tasks: list[tuple[RowTask, slice]]  # row tasks, each with its rows
     held: tuple[str, ...]  # names of the tasks whose target was not finite
     pressed: Indices  # (k,), rows with a multiplier other than zero
     rows: Matrix  # (k, nv), these rows
@@ -135,15 +136,14 @@ class LevelRecord:
         `f . g_i / (g_i . g_i)`. A task that is not met though it hardly pulls has its
         limb stretched: no joint moves it nearer.
         """
-        slices, rest = self.layout.slices, self.e - self.W @ self.x
-        pulls = [self.W[rows].T @ rest[rows] for rows in slices]
-        pull, rows = pulls[task], slices[task]
+        rest, (own, rows) = self.e - self.W @ self.x, self.tasks[task]
+        pull = self.W[rows].T @ rest[rows]
         greatest = float(np.linalg.norm(self.W[rows]) * np.linalg.norm(rest[rows]))
         square = float(pull @ pull)
         others: list[tuple[Reason, Vector]] = [
-            (Conflict(other), -force)
-            for other, force in zip(self.layout.names, pulls, strict=True)
-            if other != self.layout.names[task]
+            (Conflict(other.name), -self.W[rows].T @ rest[rows])
+            for other, rows in self.tasks
+            if other is not own
         ]
         joints = self.diagonal[0] * self.x - self.diagonal[1]
         forces = [*opponents, *others, (Conflict("posture"), joints)]
@@ -168,9 +168,7 @@ class TickRecord(NamedTuple):
     kinds: Indices  # (2 nv,), `LimitKind` of each lower, then each upper bound
     held: tuple[tuple[str, ...], ...]
     pressed: tuple[tuple[Indices, Matrix], ...]
-    subjects: Mapping[
-        int, tuple[LimitKind, object, str]
-    ]  # by inequality row, with unit
+    subjects: Mapping[int, tuple[LimitKind, object, str]]  # by row, with its unit
 
     @property
     def levels(self) -> list[LevelRecord]:
@@ -201,16 +199,17 @@ class TickRecord(NamedTuple):
         found: dict[str, TaskReport] = {}
         for k, level in enumerate(self.levels):
             opponents = list(self._opponents(level, is_first=k == 0))
-            for n, name in enumerate(level.layout.names):
+            for n, (task, _) in enumerate(level.tasks):
                 distance, angle = (float(x) for x in level.distances[n])
                 near = distance <= position_tolerance and angle <= orientation_tolerance
                 reasons: tuple[Reason, ...] = ()
-                if name in level.held:
+                if task.name in level.held:
                     reasons = (TargetNotFinite(),)
                 elif not near:
                     reasons = level.reasons(n, opponents)
-                unit = level.layout.units[n]
-                found[name] = TaskReport(name, distance, angle, unit, near, reasons)
+                found[task.name] = TaskReport(
+                    task.name, distance, angle, task.unit, near, reasons
+                )
         return found
 
     def _limit(self, i: int, multiplier: float) -> ActiveLimit:

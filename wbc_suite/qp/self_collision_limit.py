@@ -57,6 +57,10 @@ class SelfCollisionLimit(RowLimit):
         influence: Pairs further apart than this are left out, m.
         rate: Approach speed per distance left, 1/s.
 
+    Attributes:
+        found: Pair of each row of the last tick, nearest first; -1 for none.
+        distances: Distance of each row's pair, m; inf for none.
+
     Raises:
         ConfigError: If a number is out of range.
 
@@ -111,7 +115,7 @@ class SelfCollisionLimit(RowLimit):
     def drop_touching(self, configuration: Configuration) -> None:
         """Leave out the capsule pairs that are nearer than the margin right now."""
         count, robot = len(self._pairs), configuration.robot
-        arrays = self._make_arrays(configuration, rows=count, influence=self.margin)
+        arrays = self._make_arrays(configuration, count, self.margin)
         compute_joint_poses(robot)
         G, h = np.zeros((count, configuration.nv)), np.zeros(count)
         self_collision_rows(robot, as_argument(arrays), 1.0, G, h)
@@ -127,13 +131,13 @@ class SelfCollisionLimit(RowLimit):
             UnknownNameError: If a link is no frame of the model.
         """
         if self._model is not configuration.model:
-            options = {"rows": self.dim, "influence": self.influence}
-            self.arrays = self._make_arrays(configuration, **options)
+            self.arrays = self._make_arrays(configuration, self.dim, self.influence)
+            self.found, self.distances = self.arrays.found, self.arrays.distance
             self.argument = as_argument(self.arrays)
             self._model = configuration.model
 
     def _make_arrays(
-        self, configuration: Configuration, *, rows: int, influence: float
+        self, configuration: Configuration, rows: int, influence: float
     ) -> CapsuleArrays:
         count, frames = len(self._capsules), configuration.model.frames
         links = [frames[configuration.frame_id(c.link)] for c in self._capsules]
@@ -171,16 +175,6 @@ class SelfCollisionLimit(RowLimit):
     def reset(self) -> None:
         """Discard the list of near pairs."""
         self.arrays.listed_count[0] = -1
-
-    @property
-    def found(self) -> Indices:
-        """Pair of each row of the last tick, nearest first; -1 where there is none."""
-        return self.arrays.found
-
-    @property
-    def distances(self) -> Vector:
-        """Distance of each row's pair at the last tick, m; inf where there is none."""
-        return self.arrays.distance
 
     @property
     def pair_count(self) -> int:

@@ -10,22 +10,22 @@ from wbc_suite.typing import Vector
 
 
 class Fallback(IntEnum):
-    """How far a tick had to retreat from the problem as stated, mildest first."""
+    """How far a tick had to retreat from the problem as stated, mildest first.
+
+    `str` says what was done: limit rows were relaxed, and so on.
+    """
 
     NONE = 0
-    """Solved as stated."""
     LEVEL = 1
-    """A lower level could not be solved and was left out."""
     LIMITS = 2
-    """Inequality rows were relaxed, by the least that accelerations allow."""
+    """By the least that accelerations allow."""
     ACCELERATION = 3
-    """Acceleration limits were dropped for this tick."""
     SLACK = 4
-    """Equality and inequality rows were relaxed; bounds of joints are kept."""
+    """The bounds of joints are kept."""
     BOX = 5
-    """Damped least squares within the bounds of joints, rows left out."""
+    """Damped least squares."""
     HOLD = 6
-    """Inputs or results are not finite: the robot stands still."""
+    """Inputs or results are not finite."""
 
     def __str__(self) -> str:
         return _SENTENCES[self]

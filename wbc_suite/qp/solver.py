@@ -124,11 +124,13 @@ class QpsolversSolver:
             return None
         if not solution.found or solution.x is None or solution.z_box is None:
             return None
-        rows = np.zeros(len(problem.G))
+        multipliers = np.zeros(len(problem.upper))
+        nv, rows = problem.nv, len(problem.G)
+        multipliers[:nv] = solution.z_box
         if used.any():
-            rows[used] = solution.z
-        of_equalities = solution.y if problem.equalities else ()
-        multipliers = np.concatenate([solution.z_box, rows, of_equalities])
+            multipliers[nv : nv + rows][used] = solution.z
+        if problem.equalities:
+            multipliers[nv + rows :] = solution.y
         return np.array(solution.x), multipliers
 
 

@@ -14,7 +14,8 @@ from wbc_suite.qp.escape import Escape
 from wbc_suite.qp.fallback import Ladder
 from wbc_suite.qp.frame_task import FrameTask
 from wbc_suite.qp.joint_limits import AccelerationLimit, PositionLimit, VelocityLimit
-from wbc_suite.qp.level import make_levels, tick_layout
+from wbc_suite.qp.kernel import Kernel
+from wbc_suite.qp.level import Level, by_level, tick_layout
 from wbc_suite.qp.limit import BoxLimit, Limit, LimitKind, unlimited_bounds
 from wbc_suite.qp.problem import Problem
 from wbc_suite.qp.report import TaskReport, TickRecord
@@ -32,7 +33,6 @@ from wbc_suite.qp.tick import (
 from wbc_suite.typing import Indices, Matrix, Records, Vector
 
 _SOLVED = TickStatus.SOLVED.value
-_NO_NAMES: tuple[tuple[str, ...], ...] = ((),)
 
 
 class TaskStack:
@@ -113,7 +113,10 @@ class TaskStack:
         self._layout = tick_layout(configuration, tasks, rows)
         self._buffer: Vector = np.zeros(self._layout.dtype.itemsize // 8)
         results = self._layout.results(self._buffer)
-        self.levels = make_levels(configuration, tasks, self._layout, results)
+        self.levels = [
+            Level(configuration, own, self._layout, results, k=k)
+            for k, own in enumerate(by_level(tasks))
+        ]
         rows.fill_constants(self.levels[0].qp)
         self._warm = solver == "daqp" if warm is None else warm
         self.is_compiled = all(x.is_compiled for x in (rows, *self.levels))
@@ -124,7 +127,7 @@ class TaskStack:
         frames = [t for t in tasks if isinstance(t, FrameTask)]
         self._escape: Escape | None = None
         if escape and frames:
-            self._escape = Escape(configuration, frames, self.bounds, self._copy)
+            self._escape = Escape(self, frames)
         self._is_alone = self._escape is None and self.is_compiled
         self._last: Solution | None = None
 
@@ -174,7 +177,7 @@ class TaskStack:
         """Evaluate tasks, limits and equalities that have no kernel."""
         if not self.is_compiled:
             for level in self.levels:
-                level.prepare(self.configuration)
+                level.evaluate(self.configuration, Kernel.PYTHON)
             self._constraints.prepare(self.configuration, dt, self.levels[0].qp)
         self._tick.prepared[0] = 1
 
@@ -190,8 +193,7 @@ class TaskStack:
             q = self.configuration.q
             if math.isfinite(q.dot(q)):
                 if self._escape is not None:
-                    bias = self._escape.bias(dt, self.v_previous, self._pressed)
-                    self._set_bias(bias)
+                    self._escape.update(dt)
                 self.prepare(dt)
             self._tick.prepared[0] = 1
         status, k = solve_tick(self.arrays, dt, 0)
@@ -243,7 +245,7 @@ class TaskStack:
         """Copy the step and what explains it."""
         tick, nv = self._tick, self.configuration.nv
         values, solved = self._buffer.copy(), int(tick.solved[0])
-        held = _NO_NAMES * solved
+        held: tuple[tuple[str, ...], ...] = ((),) * solved
         if not values[2 * nv + 1]:
             held = tuple(level.held() for level in self.levels[:solved])
         pressed: tuple[tuple[Indices, Matrix], ...] = ()
@@ -268,16 +270,8 @@ class TaskStack:
             record,
         )
 
-    def step(self, dt: float, bias: Matrix | None) -> None:
-        """Solve and move the configuration one step, with a bias on single joints."""
-        self._set_bias(bias)
-        self.configuration.update(self.configuration.integrate(self.solve(dt).dq))
-
-    def _set_bias(self, bias: Matrix | None) -> None:
-        self.levels[0].tasks.bias[:] = 0.0 if bias is None else bias
-
-    def _copy(self) -> "TaskStack":
-        """Return a copy of the stack on a copy of the robot, where it is now."""
+    def copy(self) -> "TaskStack":
+        """Return a copy without escape on a copy of the robot, where it is now."""
         return TaskStack(
             Configuration(self.configuration.model, self.configuration.q),
             self.tasks,
@@ -290,7 +284,7 @@ class TaskStack:
             warm=self._warm,
         )
 
-    def _pressed(self) -> Indices:
+    def pressed(self) -> Indices:
         """Return the velocity indices pressed against position limits last tick."""
         if not self._tick.solved[0]:
             return np.zeros(0, dtype=np.int64)

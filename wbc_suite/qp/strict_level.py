@@ -9,9 +9,7 @@ from wbc_suite.qp.problem import UNBOUNDED
 from wbc_suite.qp.task_kernels import TaskArrays
 from wbc_suite.typing import Indices, Matrix, Vector
 
-MAX_LEVELS = 6
-"""Greatest number of strict levels of a stack."""
-
+MAX_LEVELS = 6  # of a stack
 _LOST_DIRECTION = 0.05  # share of a unit vector outside the present basis
 _SINGULAR = 2e-2  # shortest over longest row, under which a singularity is near
 _RANK_TOLERANCE = 1e-6  # rows of an upper level shorter than this bind nothing
@@ -66,12 +64,7 @@ def _decided_directions(rows: Matrix, V: Matrix, level: LevelArrays) -> int:
     Near a singularity the direction that they are losing turns quickly. Were it handed
     over meanwhile, the lower level would bend a stretched arm and the upper stretch it
     again, at full acceleration. So until the singularity is left, what was theirs at
-    the last tick stays theirs.
-
-    Args:
-        rows: Rows of all levels above and of the equalities; destroyed.
-        V: Output, shape (nv, nv).
-        level: Holds the basis of the last tick.
+    the last tick stays theirs. Their rows are destroyed.
     """
     kept, counts, lengths = level.kept, level.kept_counts, level.lengths
     rank = row_space(rows, _RANK_TOLERANCE, V, lengths)

@@ -64,17 +64,7 @@ def write_tasks(
     rows' linearisation leaves out: a second derivative is no larger than the longest
     lever arm, which is the row's largest entry. It vanishes with the error, and makes
     the step a descent where a target cannot be reached (Levenberg-Marquardt with a
-    bound in place of a guess).
-
-    Args:
-        robot: The robot.
-        tasks: The tasks.
-        dt: Step, s.
-        damping: Constant part of mu, [cost]^2/rad^2.
-        curvature: Factor of the part that follows the error; 1 bounds, 0 is without.
-
-    Returns:
-        Whether all rows are finite.
+    bound in place of a guess). Return whether all rows are finite.
     """
     compute_joint_poses(robot)
     mu, total = damping, 0.0
@@ -109,14 +99,9 @@ def frame_error(
 ) -> None:
     """Write the error of a frame and its Jacobian; see `FrameTask` for the equations.
 
-    Args:
-        robot: The robot; joint poses are current.
-        joint: Parent joint of the frame.
-        offset: Pose of the frame in its joint, by columns, shape (12,).
-        target: Target pose [R p] row by row, shape (12,).
-        support: Velocity indices that move the frame; other columns stay as they are.
-        error: Output, shape (6,); NaN for a target that is not finite.
-        jacobian: Output, shape (6, nv); for such a target, that of no rotation.
+    Joint poses are current; joint, offset, target and support are as in `TaskArrays`.
+    For a target that is not finite the error, shape (6,), is NaN, and the Jacobian,
+    shape (6, nv), that of no rotation. Columns outside the support stay as they are.
     """
     T, E, A = np.empty(12), np.empty((3, 3)), np.empty((3, 3))
     multiply_poses(robot.pose[joint], offset, T)

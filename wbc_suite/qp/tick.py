@@ -95,7 +95,7 @@ def solve_tick(tick: TickArrays, dt: float, start: int) -> tuple[int, int]:
             damping = levels[k - 1].tasks.mu[0]
         if not write_tasks(tick.robot, level.tasks, dt, damping, tick.curvature):
             return TickStatus.BAD_ROWS.value, k
-        if k == 0 and _is_soft(level.qp):
+        if k == 0 and level.qp.counts[0] > 0:  # the cost of soft rows
             level.qp.weight[0] = RETURN_WEIGHT * stiffness(level.tasks)
         if not tick.warm or not solve_warm(level.qp) or not _is_feasible(tick, k):
             return TickStatus.UNSOLVED.value, k
@@ -170,15 +170,6 @@ def _write_rows(tick: TickArrays, qp: QpArrays, dt: float) -> None:
     hold_frames(robot, tick.held, dt, qp.rows[p:], b)
     for row in range(k):
         qp.lower[nv + p + row] = b[row]
-
-
-@compiled
-def _is_soft(qp: QpArrays) -> bool:
-    """Return whether a row is outside its limit."""
-    for row in range(qp.counts[0]):
-        if qp.wanted[row] < qp.upper[qp.x.shape[0] + row]:
-            return True
-    return False
 
 
 @compiled

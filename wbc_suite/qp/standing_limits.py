@@ -1,6 +1,6 @@
-"""Keep a robot that stands on its soles from tipping over."""
+"""Limits of robots that stand: where they would tip, what their motors carry."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,12 +11,14 @@ from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.limit import LimitKind, RowLimit
 from wbc_suite.qp.problem import UNBOUNDED
-from wbc_suite.typing import Matrix, Vector
+from wbc_suite.typing import Indices, Matrix, Vector
 
 GRAVITY = 9.81  # m/s^2
 RETURN_SPEED = 0.05  # m/s, from outside the limit
 JUMP = 2.0  # m/s; a root that moved faster was put elsewhere
 MOVED = 1e-3  # m; soles that moved by less keep their polygon
+WEIGHT_RATE = 5.0  # 1/s; how fast what is left of a motor's effort may be used up
+WEIGHT_RETURN = 0.1  # of the effort per second, from beyond it
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -155,6 +157,56 @@ class SupportLimit(RowLimit):
         self._offsets: Vector = np.einsum("ij,ij->i", self._normals, hull)
 
 
+class WeightLimit(RowLimit):
+    """Keep the torque that gravity asks of some motors within their efforts.
+
+    With g(q) the generalised gravity, two rows for each joint i,
+
+        -+ (dg_i / dq) v <= rate (limit_i +- g_i).
+
+    Args:
+        torques: Greatest torque or force of each joint by name, N m or N.
+
+    Raises:
+        ConfigError: If a limit is not positive.
+    """
+
+    kind = LimitKind.EFFORT
+    unit = "N m"
+
+    def __init__(self, torques: Mapping[str, float]) -> None:
+        for name, value in torques.items():
+            check_number(f"WeightLimit: '{name}'", value, above=0.0)
+        self.names = tuple(torques)
+        self._torques: Vector = np.array(list(torques.values()), dtype=np.float64)
+        self.dim = 2 * len(self.names)
+
+    def bind(self, configuration: Configuration) -> None:
+        """Resolve the joints."""
+        joints = [configuration.joint_id(name) for name in self.names]
+        self._index: Indices = np.array(
+            [configuration.model.joints[j].idx_v for j in joints], dtype=np.int64
+        )
+
+    def rows(
+        self, configuration: Configuration, dt: float, G: Matrix, h: Vector
+    ) -> None:
+        """Write two rows per joint: upper, then lower."""
+        model, data, q = configuration.model, configuration.data, configuration.q
+        slope = pin.computeGeneralizedGravityDerivatives(model, data, q)[self._index]
+        torque = pin.computeGeneralizedGravity(model, data, q)[self._index]
+        count = len(self.names)
+        G[:count], G[count:] = slope, -slope
+        room = np.concatenate([self._torques - torque, self._torques + torque])
+        h[:] = dt * np.maximum(
+            WEIGHT_RATE * room, -WEIGHT_RETURN * np.tile(self._torques, 2)
+        )
+
+    def subject(self, row: int) -> str:
+        """Return which motor carries all it can."""
+        return f"{self.names[row % len(self.names)]} carries all it can"
+
+
 def _pressure_map(configuration: Configuration, omega: float, mass: float) -> Matrix:
     """Return P, shape (2, nv): acceleration a moves the pressure point to c - P a."""
     model, data = configuration.model, configuration.data
@@ -164,10 +216,7 @@ def _pressure_map(configuration: Configuration, omega: float, mass: float) -> Ma
 
 
 def convex_hull(points: Matrix) -> Matrix:
-    """Return the corners of the convex hull of points in a plane, counterclockwise.
-
-    Args:
-        points: Shape (n, 2).
+    """Return the corners of the convex hull of points, (n, 2), counterclockwise.
 
     Source: Andrew (1979), "Another efficient algorithm for convex hulls in two
     dimensions", Information Processing Letters 9(5).
