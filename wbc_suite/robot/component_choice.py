@@ -14,7 +14,6 @@ Choice = str | Mapping[str, str] | None
 """A component for every side, or one per side; None keeps those of the assembly."""
 
 Reader = Callable[[Part], Component]
-"""Reads the component of a part."""
 
 
 def choose(
@@ -27,12 +26,7 @@ def choose(
 ) -> Assembly:
     """Return the assembly with the caller's components in place of its own.
 
-    Args:
-        assembly: The assembly of the file.
-        gripper: A gripper for all sides, or a mapping from side to gripper.
-        base: A base.
-        read: Reads a part's component.
-        catalogue: Where alternatives for the error messages are looked up.
+    Alternatives for the error messages are looked up in the catalogue.
 
     Raises:
         DescriptionError: If the robot has no place for it, or it fits the other hand.

@@ -27,14 +27,12 @@ class Header(FrozenModel):
     """Name, kind and sources of a component.
 
     Attributes:
-        name: Unique name.
         kind: Its folder in the catalogue.
         side: The only side that a hand fits; absent if it fits both.
         extends: Another component of the same folder; tables of this file, such as
             `synergy`, replace its tables.
         title: Display name.
-        source: Source of the figures.
-        license: Licence of the figures.
+        source: Source of the figures; `license` is theirs too.
         deviations: Each deliberate difference from the source, with its reason.
     """
 
@@ -49,14 +47,7 @@ class Header(FrozenModel):
 
 
 class Component(Elements):
-    """One component file, such as `robots/arm/panda.toml`.
-
-    Attributes:
-        format: Version of the format.
-        component: Name, kind and sources.
-        synergies: Gripper commands.
-        mirror: How the other side is generated; None to define all links.
-    """
+    """One component file, such as `robots/arm/panda.toml`."""
 
     format: Literal[1]
     component: Header
@@ -69,7 +60,6 @@ class Part(Posed):
     """One component of an assembly.
 
     Attributes:
-        name: Name of the part, such as `arm` or `right_gripper`.
         component: Catalogue name with folder, such as `gripper/panda_hand`, or a path
             to a TOML file relative to the assembly's file.
         on: Mount that carries it, `part.mount`; absent for the first part.
@@ -101,14 +91,10 @@ class Assembly(FrozenModel):
     """One assembly file, such as `robots/panda.toml`.
 
     Attributes:
-        format: Version of the format.
         assembly: Name; `extends` names another assembly that this one changes.
         parts: Components, each mounted on an earlier one.
         root: Connection to the world; by default that of the first part.
         lock: Groups whose joints are fixed at the `ready` posture.
-        frames: Further frames.
-        cameras: Further cameras.
-        sensors: Further sensors.
         keyframes: Postures of the whole robot; they override those of components.
         contacts: Pairs of links, across components too, that never collide.
     """
