@@ -15,11 +15,6 @@ if TYPE_CHECKING:
     import mujoco
 
 _SIDES = {"right", "left"}
-ROOT_JOINTS = {
-    "fixed": (),
-    "planar": ("root_x", "root_y", "root_yaw"),
-    "free": ("root",),
-}
 
 
 class RobotDescription(Elements):
@@ -61,7 +56,9 @@ class RobotDescription(Elements):
     @property
     def root_joint_names(self) -> tuple[str, ...]:
         """Names of the root's joints: none, three (planar) or one (free)."""
-        return ROOT_JOINTS[self.root.kind]
+        if self.root.kind == "free":
+            return ("root",)
+        return tuple(joint.name for joint in self.root.joints)
 
     @cached_property
     def dof(self) -> int:

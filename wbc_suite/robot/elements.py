@@ -250,6 +250,27 @@ class Root(Posed):
     effort: tuple[Positive, Positive] = (2000.0, 1000.0)
     damping: tuple[NotNegative, NotNegative] = (0.0, 0.0)
 
+    @property
+    def joints(self) -> tuple[Joint, ...]:
+        """The joints of a planar root (x, y, yaw); none for other kinds."""
+        if self.kind != "planar":
+            return ()
+        return tuple(
+            Joint(
+                name=name,
+                type="hinge" if k else "slide",
+                axis=axis,
+                velocity=self.velocity[k],
+                effort=self.effort[k],
+                damping=self.damping[k],
+            )
+            for name, axis, k in (
+                ("root_x", (1.0, 0.0, 0.0), 0),
+                ("root_y", (0.0, 1.0, 0.0), 0),
+                ("root_yaw", (0.0, 0.0, 1.0), 1),
+            )
+        )
+
 
 class Elements(BaseModel):
     """The elements that a component and a robot have in common.

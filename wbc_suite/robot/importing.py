@@ -49,13 +49,7 @@ class NameTable:
         self._taken: set[str] = set(RESERVED)
 
     def take(self, original: str, kind: str) -> str:
-        """Return a unique name that is as close as possible to the original.
-
-        Args:
-            original: Name in the file.
-            kind: Kind of item ("link", "joint", "frame"): the suffix if the name is
-                already taken.
-        """
+        """Return a unique name close to the original; `kind` is a suffix if needed."""
         plain = re.sub(r"[^A-Za-z0-9_]", "_", original)[:MAX_NAME]
         if not re.match(r"[A-Za-z]", plain):
             plain = f"{kind}_{plain.lstrip('_')}".rstrip("_")
@@ -105,7 +99,7 @@ def describe_import(
     limbs = infer_limbs(checked)
     keyframes = others.pop("keyframes", {})
     data: dict[str, Any] = {
-        "name": _robot_name(name),
+        "name": NameTable().take(name, "robot"),
         "source": f"imported from {source.name}",
         "root": root,
         "links": checked,
@@ -120,11 +114,6 @@ def describe_import(
         return robot
     ready = robot.keyframes["ready"] | standing_legs(robot)
     return robot.model_copy(update={"keyframes": robot.keyframes | {"ready": ready}})
-
-
-def _robot_name(name: str) -> str:
-    plain = re.sub(r"[^A-Za-z0-9_]", "_", name)
-    return plain if re.match(r"[A-Za-z]", plain) else f"robot_{plain}".rstrip("_")
 
 
 def _link(fields: LinkFields, source: Path) -> Link:

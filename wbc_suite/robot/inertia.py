@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+import pinocchio as pin
 
 from wbc_suite.robot.shape_geometry import shape_bounds
 from wbc_suite.typing import Matrix, Vector
@@ -29,6 +30,11 @@ def inertia_matrix(inertia: tuple[float, ...]) -> Matrix:
     """Return the symmetric (3, 3) matrix of `xx yy zz xy xz yz`."""
     xx, yy, zz, xy, xz, yz = inertia
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def inertia_of(link: "Link") -> pin.Inertia:
+    """Return the inertia of a link in its axes."""
+    return pin.Inertia(link.mass, np.asarray(link.com), inertia_matrix(link.inertia))
 
 
 def inertia_fields(tensor: Matrix) -> tuple[float, ...]:

@@ -7,7 +7,7 @@ import pinocchio as pin
 
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.elements import Joint, Link
-from wbc_suite.robot.inertia import inertia_matrix
+from wbc_suite.robot.inertia import inertia_of
 from wbc_suite.robot.poses import se3_of
 from wbc_suite.typing import Vector
 
@@ -50,16 +50,10 @@ def build_pinocchio(robot: RobotDescription) -> Any:
 
 
 def _add_root(model: Any, robot: RobotDescription) -> tuple[int, Any]:
-    """Add the root's joints; return the first link's joint and its pose in that joint.
-
-    A planar root is a chain of three joints with the equations of MuJoCo's three
-    joints of one body.
-    """
-    pose = se3_of(robot.root)
-    linear, angular = robot.root.velocity
-    if robot.root.kind == "fixed":
-        return 0, pose
+    """Add the root's joints; return the last one and the first link's pose in it."""
+    joint, pose = 0, se3_of(robot.root)
     if robot.root.kind == "free":
+        linear, angular = robot.root.velocity
         lower = np.array([-np.inf] * 3 + [-1.01] * 4)
         velocity = np.array([linear] * 3 + [angular] * 3)
         free = pin.JointModelFreeFlyer()
@@ -70,24 +64,8 @@ def _add_root(model: Any, robot: RobotDescription) -> tuple[int, Any]:
         )
         model.addJointFrame(joint)
         return joint, pin.SE3.Identity()
-    joint = 0
-    chain = (pin.JointModelPX(), pin.JointModelPY(), pin.JointModelRZ())
-    force, torque = robot.root.effort
-    damp, damp_yaw = robot.root.damping
-    bound = np.array([np.inf])
-    for name, kind, speed, effort, damping in zip(
-        robot.root_joint_names,
-        chain,
-        (linear, linear, angular),
-        (force, force, torque),
-        (damp, damp, damp_yaw),
-        strict=True,
-    ):
-        limits = (np.array([effort]), np.array([speed]), -bound, bound)
-        joint = model.addJoint(joint, kind, pose, name, *limits)
-        model.damping[model.joints[joint].idx_v] = damping
-        model.addJointFrame(joint)
-        pose = pin.SE3.Identity()
+    for own in robot.root.joints:
+        joint, pose = _add_joint(model, own, joint, pose), pin.SE3.Identity()
     return joint, pose
 
 
@@ -128,9 +106,7 @@ def _joint_model(axis: Vector, *, hinge: bool) -> Any:
 
 def _add_body(model: Any, link: Link, joint: int, pose: Any) -> None:
     if link.mass > 0.0:
-        tensor = inertia_matrix(link.inertia)
-        inertia = pin.Inertia(link.mass, np.asarray(link.com), tensor)
-        model.appendBodyToJoint(joint, inertia, pose)
+        model.appendBodyToJoint(joint, inertia_of(link), pose)
     parent = model.getFrameId(model.names[joint], pin.FrameType.JOINT) if joint else -1
     model.addBodyFrame(link.name, joint, pose, parent)
 

@@ -18,7 +18,6 @@ from wbc_suite.robot.mesh_files import write_stl
 from wbc_suite.robot.poses import HasPose, pose_fields, se3_of
 from wbc_suite.robot.shape_geometry import along_z, mesh_of, shape_bounds
 from wbc_suite.robot.shapes import Box, Capsule, Cylinder, Posed, Shape, Sphere
-from wbc_suite.typing import Matrix
 
 UNLIMITED = 1e6
 """Written for limits that URDF requires and the robot lacks; read as no limit."""
@@ -62,32 +61,15 @@ def write_urdf(robot: RobotDescription, *, mesh_dir: Path | None = None) -> str:
     return '<?xml version="1.0"?>\n' + tostring(root, "unicode") + "\n"
 
 
-def rpy_of(rotation: Matrix) -> tuple[float, float, float]:
-    """Compute fixed-axis roll, pitch, yaw of a rotation, shape (3, 3).
-
-    R = Rz(yaw) Ry(pitch) Rx(roll). Roll and pitch are computed from Rz(-yaw) R, so that
-    the product keeps full precision near pitch = +-90 degrees, where roll and yaw are
-    not unique.
-    """
-    yaw = float(np.arctan2(rotation[1, 0], rotation[0, 0]))
-    c, s = np.cos(yaw), np.sin(yaw)
-    level = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) @ rotation
-    pitch = float(np.arctan2(-level[2, 0], level[0, 0]))
-    roll = float(np.arctan2(-level[1, 2], level[1, 1]))
-    return roll, pitch, yaw
-
-
 def _numbers(values: object) -> str:
     """Write numbers with all digits, so that reading them gives equal values."""
-    return " ".join(
-        repr(float(v) + 0.0) for v in np.asarray(values, dtype=np.float64).ravel()
-    )
+    array = np.asarray(values, dtype=np.float64) + 0.0
+    return " ".join(map(repr, array.ravel().tolist()))
 
 
 def _origin(pose: pin.SE3) -> Element:
-    return Element(
-        "origin", xyz=_numbers(pose.translation), rpy=_numbers(rpy_of(pose.rotation))
-    )
+    rpy = pin.rpy.matrixToRpy(pose.rotation)
+    return Element("origin", xyz=_numbers(pose.translation), rpy=_numbers(rpy))
 
 
 def _connection(

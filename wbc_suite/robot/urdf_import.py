@@ -16,7 +16,7 @@ from wbc_suite.robot.importing import (
     describe_import,
     overlapping_links,
 )
-from wbc_suite.robot.inertia import inertia_fields
+from wbc_suite.robot.inertia import inertia_fields, inertia_matrix
 from wbc_suite.robot.poses import pose_fields
 from wbc_suite.robot.urdf_elements import (
     Branch,
@@ -258,11 +258,10 @@ def _inertial(link: Element, where: str) -> dict[str, Any]:
     mass, tensor = element.find("mass"), element.find("inertia")
     if mass is None or tensor is None:
         raise DescriptionError(f"{where}: <inertial> needs <mass> and <inertia>.")
-    xx, yy, zz, xy, xz, yz = (
-        number(tensor, key, where=where, default=0.0)
-        for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+    keys = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+    own = inertia_matrix(
+        tuple(number(tensor, key, where=where, default=0.0) for key in keys)
     )
-    own = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     R = pose.rotation
     turned = own if np.array_equal(R, np.eye(3)) else R @ own @ R.T
     kilograms = number(mass, "value", where=where)

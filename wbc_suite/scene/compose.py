@@ -8,7 +8,7 @@ import pinocchio as pin
 
 from wbc_suite.control import RobotState
 from wbc_suite.robot import RobotDescription
-from wbc_suite.robot.poses import pose_fields, se3_of
+from wbc_suite.robot.poses import pose_at, pose_fields, se3_of
 from wbc_suite.robot.shapes import Vector3
 from wbc_suite.scene.objects.scene_object import TORSION, SceneObject
 
@@ -43,8 +43,7 @@ def place_robot(
     so that the models of all engines use the same world frame.
     """
     robot = _on_the_floor(robot)
-    turn = pin.Quaternion(np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2))
-    place = pin.SE3(turn.matrix(), np.array([*position, 0.0]))
+    place = pin.SE3(pin.utils.rotate("z", yaw), np.array([*position, 0.0]))
     root = pose_fields(place * se3_of(robot.root))
     return robot.with_root(robot.root.kind, **root)
 
@@ -115,8 +114,7 @@ def fix_to_frame(spec: mujoco.MjSpec, attached: SceneObject, frame: str) -> None
     """
     site = spec.site(frame)
     at = pin.SE3(pin.Quaternion(*site.quat).normalized().matrix(), site.pos)
-    own = pin.SE3(pin.Quaternion(*attached.quat).matrix(), np.array(attached.pos))
-    pose = pose_fields(at * own)
+    pose = pose_fields(at * pose_at(attached.pos, attached.quat))
     attached.fixed(pose["pos"], pose["quat"]).add_to(spec, site.parent)
 
 
@@ -229,5 +227,4 @@ def _extent(state: RobotState) -> tuple[np.ndarray, np.ndarray]:
 def _yaw_only(pose: pin.SE3) -> pin.SE3:
     """Return the pose without roll and pitch."""
     yaw = np.arctan2(pose.rotation[1, 0], pose.rotation[0, 0])
-    turn = pin.Quaternion(np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2))
-    return pin.SE3(turn.matrix(), pose.translation)
+    return pin.SE3(pin.utils.rotate("z", yaw), pose.translation)
