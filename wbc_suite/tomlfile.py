@@ -1,8 +1,4 @@
-"""Read TOML files into frozen pydantic models, with errors that name file and key.
-
-All files of the catalogue and of users are read by `load_model`, which enforces the
-size limit and words the errors.
-"""
+"""Read TOML files into frozen pydantic models, with errors that name file and key."""
 
 import json
 import tomllib
@@ -19,7 +15,6 @@ MAX_BYTES = 4_000_000
 """Largest file that is read; the largest in the catalogue has about 60 kB."""
 
 M = TypeVar("M", bound=BaseModel)
-
 
 FROZEN = ConfigDict(
     frozen=True, extra="forbid", allow_inf_nan=False, populate_by_name=True
@@ -42,6 +37,24 @@ def read_toml(path: Path) -> dict[str, Any]:
     return parse_toml(read_text(path), source=str(path))
 
 
+def read_bytes(path: Path, *, most: int) -> bytes:
+    """Read a file of limited size.
+
+    Raises:
+        ConfigError: If the file is missing or too large.
+    """
+    try:
+        size = path.stat().st_size
+        if size > most:
+            raise ConfigError(
+                f"{path}: the file has {size} bytes; at most {most} are read. Is this "
+                "the right file?"
+            )
+        return path.read_bytes()
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read ({error.strerror}).") from error
+
+
 def read_text(path: Path) -> str:
     """Read one text file.
 
@@ -49,15 +62,7 @@ def read_text(path: Path) -> str:
         ConfigError: If the file is missing, too large or not UTF-8.
     """
     try:
-        size = path.stat().st_size
-        if size > MAX_BYTES:
-            raise ConfigError(
-                f"{path}: the file has {size} bytes; at most {MAX_BYTES} are read. Is "
-                "this the right file?"
-            )
-        return path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be read ({error.strerror}).") from error
+        return read_bytes(path, most=MAX_BYTES).decode("utf-8")
     except UnicodeDecodeError as error:
         raise ConfigError(f"{path}: not a readable TOML file: {error}") from error
 
@@ -116,15 +121,9 @@ def parse_model(
 ) -> M:
     """Validate plain data against a model.
 
-    Args:
-        model: Model of the data.
-        data: Tables as `parse_toml` returns them.
-        source: File or item, for the message.
-        within: Key of the data in the file, where it is a part of it.
-        error: Class of the error.
-
     Raises:
-        ConfigError: Names source, key, value and rule of the first faults.
+        ConfigError: Or another `error`. Names the source (a file or an item), key,
+            value and rule of the first faults; `within` is the key of the data in it.
     """
     try:
         return model.model_validate(data)

@@ -23,13 +23,9 @@ MAX_STRIPS = 4
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class EnclosingCapsule:
-    """All points within `radius` of a segment.
+    """All points within `radius` of a segment in a link's frame, m.
 
-    Attributes:
-        link: Link that carries it.
-        start: One end of the segment in the link's frame, m, shape (3,).
-        end: The other end; equal to `start` for a sphere.
-        radius: Radius, m.
+    The ends have the shape (3,) and are equal for a sphere.
     """
 
     link: str
@@ -57,13 +53,10 @@ def enclosing_capsules(robot: RobotDescription) -> tuple[EnclosingCapsule, ...]:
 
 
 def collision_spheres(robot: RobotDescription) -> dict[str, Matrix]:
-    """Return the spheres whose hulls are the collision shapes, by link.
+    """Return the spheres whose hulls are the collision shapes, for links that have any.
 
-    The lowest sphere gives a shape's exact height over a plane. Links without
-    collision shapes are left out.
-
-    Returns:
-        For each link rows x, y, z in the link's frame and the radius, m, shape (n, 4).
+    Rows are x, y, z in the link's frame and the radius, m, shape (n, 4). The lowest
+    sphere gives a shape's exact height over a plane.
     """
     return {
         link.name: np.concatenate([_in_link(shape) for shape in link.collision])

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from wbc_suite.robot.elements import Frame, Joint, Link, rigid_bodies
+from wbc_suite.robot.elements import Frame, Link, rigid_bodies
 
 if TYPE_CHECKING:
     from wbc_suite.robot.importing import NameTable
@@ -58,7 +58,6 @@ class Limb:
     """Joints of one arm, gripper, head, torso, base, or of all legs.
 
     Attributes:
-        name: Name of the group, such as `right_arm`.
         kind: One of `KINDS`.
         links: Links that its joints move, in depth-first order.
     """
@@ -182,13 +181,12 @@ def infer_role(name: str) -> str:
 
 def infer_ready(links: Sequence[Link]) -> dict[str, float]:
     """Return a posture with each joint at the value in its range nearest to zero."""
-    joints = [link.joint for link in links if link.joint is not None]
-    return {j.name: _nearest_zero(j) for j in joints if j.independent}
-
-
-def _nearest_zero(joint: Joint) -> float:
-    low, high = joint.range or (0.0, 0.0)
-    return min(max(0.0, low), high)
+    ready: dict[str, float] = {}
+    for joint in (link.joint for link in links):
+        if joint is not None and joint.independent:
+            low, high = joint.range or (0.0, 0.0)
+            ready[joint.name] = min(max(0.0, low), high)
+    return ready
 
 
 def _words(name: str) -> list[str]:

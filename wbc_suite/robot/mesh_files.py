@@ -94,7 +94,10 @@ def skin_triangles(shape: SkinMesh) -> tuple[Matrix, Indices]:
         ConfigError: If the file is not a mesh, or the extra `skins` is not installed.
     """
     path = Path(shape.file)
-    kept = user_cache() / "skins" / f"{_cache_key(path, shape.scale)}.npz"
+    state = path.stat()
+    key = f"{CACHE_VERSION} {path} {state.st_size} {state.st_mtime_ns} {shape.scale}"
+    name = hashlib.sha256(key.encode()).hexdigest()[:32]
+    kept = user_cache() / "skins" / f"{name}.npz"
     if kept.is_file():
         with np.load(kept, allow_pickle=False) as data:
             vertices, faces = data["vertices"], data["faces"]
@@ -146,12 +149,6 @@ def _import_extra(name: str) -> Any:
             f"skin: meshes need {name.replace('_', '-')}, which is not installed. "
             "Install it with: pip install 'wbc-suite[skins]'"
         ) from None
-
-
-def _cache_key(path: Path, scale: Vector3) -> str:
-    state = path.stat()
-    text = f"{CACHE_VERSION} {path} {state.st_size} {state.st_mtime_ns} {scale}"
-    return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
 def _write_cache(path: Path, vertices: Matrix, faces: Indices) -> None:

@@ -41,27 +41,16 @@ _UNITS = {"K": 10, "M": 20, "G": 30, "T": 40, "P": 50, "E": 60}
 _PNG = b"\x89PNG\r\n\x1a\n"
 
 
-def compile_mjcf(path: Path) -> mujoco.MjModel:
+def compile_mjcf(path: Path) -> tuple[mujoco.MjModel, mujoco.MjSpec]:
     """Compile an MJCF file and all files of its folder that it includes.
 
-    Raises:
-        ConfigError: If it is not MJCF, or names a file outside its folder.
-        DescriptionError: If it exceeds a limit, or MuJoCo refuses it.
-    """
-    return _read(path)[1]
-
-
-def read_mjcf_spec(path: Path) -> mujoco.MjSpec:
-    """Read an MJCF file with the checks of `compile_mjcf`, to attach it to a scene.
+    Returns:
+        The model, and its specification, which can be attached to a scene.
 
     Raises:
         ConfigError: If it is not MJCF, or names a file outside its folder.
         DescriptionError: If it exceeds a limit, or MuJoCo refuses it.
     """
-    return _read(path)[0]
-
-
-def _read(path: Path) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
     roots = _included(path)
     total = sum(_element_count(root, path) for root in roots)
     if total > MAX_ELEMENTS:
@@ -78,7 +67,7 @@ def _read(path: Path) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
             _check_numbers(element, path)
     try:
         spec = mujoco.MjSpec.from_file(str(path))
-        return spec, spec.compile()
+        return spec.compile(), spec
     except (ValueError, RuntimeError, MemoryError) as error:  # MuJoCo raises all three
         raise DescriptionError(f"{path}: MuJoCo refuses it: {error}") from error
 
@@ -101,10 +90,8 @@ def _included(path: Path) -> list[Element]:
         roots[resolved] = root
         if len(roots) > MAX_FILES:
             raise ConfigError(f"{path}: it includes more than {MAX_FILES} files.")
-        named = [
-            e.get("file", "") for tag in ("include", "model") for e in root.iter(tag)
-        ]
-        waiting += [path.parent / name for name in named]
+        for element in (*root.iter("include"), *root.iter("model")):
+            waiting.append(path.parent / element.get("file", ""))
     return list(roots.values())
 
 

@@ -44,7 +44,7 @@ def read_mjcf(path: Path | str) -> RobotDescription:
             ball joints, springs or flexible parts, or is unphysical.
     """
     path = Path(path)
-    m = compile_mjcf(path)
+    m, _ = compile_mjcf(path)
     faults = list(_faults(m))
     if faults:
         shown = join_first(faults, separator="; ")

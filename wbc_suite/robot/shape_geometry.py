@@ -57,17 +57,14 @@ def mesh_of(shape: Shape | SkinMesh) -> tuple[Matrix, Indices] | None:
 
 @cached_by_shape
 def _mesh_of(shape: Shape) -> tuple[Matrix, Indices] | None:
-    match shape:
-        case Hull():
-            mesh = _convex_hull(support_points(shape))
-        case Box(radius=radius) if radius > 0.0:
-            mesh = _convex_hull(support_points(shape))
-        case Cylinder(radius_to=radius) if radius is not None:
-            mesh = _convex_hull(support_points(shape))
-        case Loft():
-            mesh = _loft_mesh(shape)
-        case _:
-            return None
+    rounded = isinstance(shape, Box) and shape.radius > 0.0
+    cone = isinstance(shape, Cylinder) and shape.radius_to is not None
+    if isinstance(shape, Loft):
+        mesh = _loft_mesh(shape)
+    elif isinstance(shape, Hull) or rounded or cone:
+        mesh = _convex_hull(support_points(shape))
+    else:
+        return None
     for array in mesh:
         array.flags.writeable = False
     return mesh
@@ -273,14 +270,11 @@ def _loft_faces(rings: int, n: int) -> Indices:
 
 
 def fit_hull(points: Matrix) -> dict[str, Any]:
-    """Return the fields of a hull that approximates the convex hull of points.
+    """Return the fields of a hull that approximates the convex hull of points (n, 3).
 
     A flat cloud gives a thin box. A hull with more than `HULL_POINTS` corners keeps
     the extreme corners along evenly spread directions, the axes among them. It then
     lies inside the exact hull and touches it in each of these directions.
-
-    Args:
-        points: Point cloud in m, shape (n, 3).
     """
     low, high = points.min(axis=0), points.max(axis=0)
     centred = points - points.mean(axis=0)

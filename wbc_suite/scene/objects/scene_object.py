@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from wbc_suite.errors import ConfigError, DescriptionError
-from wbc_suite.robot.mjcf_compile import read_mjcf_spec
+from wbc_suite.robot.mjcf_compile import compile_mjcf
 from wbc_suite.robot.shape_geometry import mesh_of
 from wbc_suite.robot.shapes import Box, Cylinder, Hull, Loft, Vector3
 from wbc_suite.scene.materials import material_named, use_material
@@ -255,7 +255,7 @@ class MjcfObject:
             ConfigError: If the file is no MJCF, or names a file outside its folder.
             DescriptionError: If MuJoCo rejects it, or it has not exactly one body.
         """
-        own = read_mjcf_spec(self.path)
+        _, own = compile_mjcf(self.path)
         bodies = own.worldbody.bodies
         if len(bodies) != 1:
             raise DescriptionError(
