@@ -56,12 +56,7 @@ def compute_torques(
 
         v_j = v_parent + S qd,    a_j = a_parent + S qdd + v_j x S qd.
 
-    Args:
-        robot: The robot; its joint poses are computed where they are not current.
-        inertias: Its inertia.
-        v: Velocities, shape (nv,).
-        a: Accelerations, shape (nv,).
-        tau: Output, torques and forces, shape (nv,).
+    v, a and the output tau have the shape (nv,).
 
     Source: Featherstone (2008), "Rigid Body Dynamics Algorithms", section 5.3.
     """

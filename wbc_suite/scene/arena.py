@@ -1,5 +1,6 @@
 """Arenas: floor, sky, lights and tables."""
 
+import itertools
 from collections.abc import Mapping
 from typing import Annotated, TypeAlias
 
@@ -89,15 +90,12 @@ def add_table(spec: mujoco.MjSpec, table: TableConfig, name: str = "table") -> N
         material="wood",
         friction=table.friction,
     )
-    for i, (side, end) in enumerate(((-1, -1), (-1, 1), (1, -1), (1, 1))):
+    x, y, z = LEG_AT * length / 2, LEG_AT * width / 2, -thickness - height / 2
+    for i, (side, end) in enumerate(itertools.product((-1, 1), repeat=2)):
         body.add_geom(
             name=f"{name}_leg{i}",
             type=mujoco.mjtGeom.mjGEOM_BOX,
-            pos=(
-                side * LEG_AT * length / 2,
-                end * LEG_AT * width / 2,
-                -thickness - height / 2,
-            ),
+            pos=(side * x, end * y, z),
             size=(0.025, 0.025, height / 2),
             material="table_leg",
         )
@@ -106,13 +104,7 @@ def add_table(spec: mujoco.MjSpec, table: TableConfig, name: str = "table") -> N
 def add_tables(
     spec: mujoco.MjSpec, table: TableConfig, centers: Mapping[str, Vector3]
 ) -> None:
-    """Add several equal tables, such as one in front of each arm.
-
-    Args:
-        spec: The scene.
-        table: Size and friction of all.
-        centers: Middle of each top's upper face, m, by the name of its body and top.
-    """
+    """Add equal tables at the middles of their tops' upper faces, m, by name."""
     for name, center in centers.items():
         given = table.model_dump() | {"center": center}
         add_table(spec, TableConfig(**given), name)
@@ -123,11 +115,8 @@ def add_table_cameras(
 ) -> None:
     """Add the cameras of table-top benchmarks, under the names of existing datasets.
 
-    Args:
-        spec: The scene.
-        center: Middle of the table's upper face, m.
-        side: Side of `sideview`: -1 for -y, 1 for +y.
-        before: Distance of `agentview` from the table's middle along x, m.
+    `center` is the middle of the table's upper face, m. `sideview` looks from the side
+    -1 (-y) or 1 (+y), `agentview` from `before` the middle along x, m.
     """
     x, y, z = center
     middle = (x - 0.15, y, z + 0.25)
@@ -138,14 +127,10 @@ def add_table_cameras(
 
 
 def _add_textures(spec: mujoco.MjSpec) -> None:
-    flat, gradient = (
-        mujoco.mjtBuiltin.mjBUILTIN_FLAT,
-        mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
-    )
     spec.add_texture(
         name="sky",
         type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
-        builtin=gradient,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
         rgb1=(0.93, 0.95, 0.97),
         rgb2=(0.62, 0.68, 0.75),
         width=64,  # a gradient needs no more, and every environment holds it
@@ -154,7 +139,7 @@ def _add_textures(spec: mujoco.MjSpec) -> None:
     spec.add_texture(
         name="floor",
         type=mujoco.mjtTexture.mjTEXTURE_2D,
-        builtin=flat,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT,
         rgb1=(0.79, 0.80, 0.80),
         rgb2=(0.79, 0.80, 0.80),
         mark=mujoco.mjtMark.mjMARK_EDGE,

@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from wbc_suite.errors import UnknownNameError
+from wbc_suite.errors import look_up
 from wbc_suite.robot.shapes import Vector3
 
 FRICTION = (1.0, 0.005, 0.0001)
@@ -24,14 +24,11 @@ PIXELS = 128
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Material:
-    """One material.
+    """One material; specular, shininess and reflectance are MuJoCo's, from 0 to 1.
 
     Attributes:
         density: kg/m^3.
         pixels: Function that computes its texture of n pixels, shape (n, n, 3).
-        specular: Specular reflection of lights, 0 to 1.
-        shininess: Sharpness of that, 0 to 1.
-        reflectance: Reflection of the surroundings, 0 to 1.
         friction: Sliding, torsional, rolling.
     """
 
@@ -127,14 +124,8 @@ a filled folding box."""
 
 
 def material_named(name: str) -> Material:
-    """Return a material.
-
-    Raises:
-        UnknownNameError: If there is none of that name.
-    """
-    if name not in MATERIALS:
-        raise UnknownNameError("material", name, MATERIALS)
-    return MATERIALS[name]
+    """Return a material; raises UnknownNameError."""
+    return look_up("material", name, MATERIALS)
 
 
 def use_material(spec: mujoco.MjSpec, name: str) -> str:
