@@ -29,20 +29,12 @@ class FrozenModel(BaseModel):
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """Parse one TOML file.
-
-    Raises:
-        ConfigError: If the file is missing, too large, not UTF-8 or not TOML.
-    """
+    """Parse one TOML file; raises ConfigError."""
     return parse_toml(read_text(path), source=str(path))
 
 
 def read_bytes(path: Path, *, most: int) -> bytes:
-    """Read a file of limited size.
-
-    Raises:
-        ConfigError: If the file is missing or too large.
-    """
+    """Read a file; raises ConfigError if it is missing or too large."""
     try:
         size = path.stat().st_size
         if size > most:
@@ -56,11 +48,7 @@ def read_bytes(path: Path, *, most: int) -> bytes:
 
 
 def read_text(path: Path) -> str:
-    """Read one text file.
-
-    Raises:
-        ConfigError: If the file is missing, too large or not UTF-8.
-    """
+    """Read a text file; raises ConfigError if missing, too large or not UTF-8."""
     try:
         return read_bytes(path, most=MAX_BYTES).decode("utf-8")
     except UnicodeDecodeError as error:
@@ -68,11 +56,7 @@ def read_text(path: Path) -> str:
 
 
 def parse_toml(text: str, *, source: str) -> dict[str, Any]:
-    """Parse TOML text.
-
-    Raises:
-        ConfigError: If the text is not TOML.
-    """
+    """Parse TOML text; raises ConfigError."""
     try:
         return tomllib.loads(text)
     except RecursionError as error:
@@ -82,11 +66,7 @@ def parse_toml(text: str, *, source: str) -> dict[str, Any]:
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """Parse one JSON file that holds an object.
-
-    Raises:
-        ConfigError: If it is missing, too large, not JSON, or not an object.
-    """
+    """Parse one JSON file that holds an object; raises ConfigError."""
     text = read_text(path)
     try:
         found = json.loads(text, parse_constant=_no_constant)
@@ -103,11 +83,7 @@ def _no_constant(text: str) -> float:
 
 
 def load_model(model: type[M], path: Path) -> M:
-    """Read one TOML file into a model.
-
-    Raises:
-        ConfigError: Names file, key, value, the rule, and the nearest legal name.
-    """
+    """Read one TOML file into a model; raises ConfigError as `parse_model` does."""
     return parse_model(model, read_toml(path), source=str(path))
 
 

@@ -122,8 +122,8 @@ class Conversion:
     def a_to_pinocchio(self, qpos: Vector, qvel: Vector, qacc: Vector) -> Vector:
         """Return Pinocchio's acceleration: `a_lin = R^T a_world - w x v_body`.
 
-        With `qacc = 0` and `pin.rnea(model, data, q, v, a)` it also yields the bias
-        force: `bias_mj = B^T rnea(q, v, a)`.
+        With `qacc = 0`, `pin.rnea` of it gives the bias force: `bias_mj = B^T rnea(q,
+        v, a)`.
         """
         v = self.v_to_pinocchio(qpos, qvel)
         a = self.v_to_pinocchio(qpos, qacc)
@@ -155,11 +155,7 @@ class Conversion:
         return self.jacobian_to_mujoco(qpos, half[:, :].T.copy()).T
 
     def jacobian_to_mujoco(self, qpos: Vector, jacobian: Matrix) -> Matrix:
-        """Return `J_mj = J_pin B`, shape (m, nv of MuJoCo).
-
-        MuJoCo's `mj_jac*` functions give world axes at the point: compare them with
-        Pinocchio's LOCAL_WORLD_ALIGNED.
-        """
+        """Return `J_mj = J_pin B`, shape (m, nv of MuJoCo), from `aligned` axes."""
         out = np.zeros((jacobian.shape[0], self.nv_mujoco))
         out[:, self.v_index] = jacobian
         for free in self._free:

@@ -1,7 +1,6 @@
 """Forward kinematics, joint Jacobians and centre of mass, compiled.
 
-Tests hold these kernels to Pinocchio at 1e-12: `pin.computeJointJacobians`,
-`pin.jacobianCenterOfMass`. They are kernels so that compiled loops can call them.
+Tests hold these kernels to Pinocchio at 1e-12.
 """
 
 from enum import IntEnum
@@ -25,11 +24,8 @@ class RobotArrays(NamedTuple):
         q: Joint positions, shape (nq,).
         is_current: Whether joint poses with Jacobians, the centre of mass, and
             Pinocchio's data belong to the present q, shape (3,).
-        kind: `JointKind` of each joint.
-        parent: Parent of each joint.
-        q_start: First position of each joint.
-        v_start: First velocity of each joint.
-        v_count: Number of velocities of each joint.
+        kind: `JointKind` of each joint; then its parent, first position, first velocity
+            and number of velocities.
         mount: Pose of each joint in its parent at q = 0, shape (njoints, 12).
         axis: Axis of each joint, shape (njoints, 3).
         mass: Mass that each joint carries itself, kg.
@@ -131,8 +127,7 @@ def compute_joint_poses(robot: RobotArrays) -> None:
     """Compute joint poses and Jacobians from q, unless they are current.
 
     A joint's pose is `T_parent T_mount T_joint(q)`. The column of a revolute joint with
-    the axis a and the origin p is `(p x a, a)`, of a prismatic one `(a, 0)`. No joint
-    but the universe may be of kind `OTHER`.
+    the axis a and the origin p is `(p x a, a)`, of a prismatic one `(a, 0)`.
     """
     if robot.is_current[0]:
         return

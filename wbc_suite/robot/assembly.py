@@ -18,6 +18,7 @@ from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.elements import Elements, Frame, Link, Mount, Root, Synergy
 from wbc_suite.robot.poses import compose
 from wbc_suite.robot.robot_file import (
+    SOURCES,
     Assembly,
     Component,
     Header,
@@ -32,8 +33,6 @@ LISTS = ("frames", "cameras", "actuators", "sensors", "connects")
 """Lists of a component that are joined in an assembly."""
 TABLES = ("groups", "keyframes", "materials", "synergies", "skins")
 """Fields of a robot that are joined by name."""
-SOURCES = ("name", "title", "source", "license", "deviations")
-"""Fields of a component's header that its robot has as well."""
 
 
 def describe_component(
@@ -87,7 +86,7 @@ def assemble(
     base: Choice = None,
     skins: SkinFinder | None = None,
 ) -> RobotDescription:
-    """Read an assembly file and mount its parts, or the caller's choices for them.
+    """Read an assembly file and mount its parts.
 
     Raises:
         DescriptionError: If a part, a mount or a name does not fit.
@@ -271,11 +270,7 @@ def _names(link: Link) -> tuple[str, ...]:
 
 
 def _located(part: Part, folder: Path) -> Part:
-    """Return the part with an absolute path to its component's file.
-
-    Raises:
-        ConfigError: If the path leaves the folder of the assembly.
-    """
+    """Return the part with an absolute path below the assembly's folder."""
     if not is_path(part.component):
         return part
     path = (folder / part.component).resolve()

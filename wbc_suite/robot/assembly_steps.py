@@ -19,11 +19,7 @@ M = TypeVar("M", bound=BaseModel)
 
 
 def depth_first(links: tuple[Link, ...]) -> tuple[Link, ...]:
-    """Order links depth-first, as both engines number their joints.
-
-    Links that are not connected to the root come last, in their own order; the
-    validation reports them.
-    """
+    """Order links depth-first, as engines number joints; unconnected ones come last."""
     children: dict[str | None, list[Link]] = {}
     for link in links:
         children.setdefault(link.parent, []).append(link)
@@ -114,11 +110,7 @@ def with_colors(shapes: tuple[S, ...], colors: Mapping[str, str]) -> tuple[S, ..
 
 
 def locked(data: dict[str, Any], groups: tuple[str, ...]) -> dict[str, Any]:
-    """Fix the joints of groups at their `ready` values in fields of a description.
-
-    Raises:
-        UnknownNameError: If a group does not exist.
-    """
+    """Fix joints of groups, in fields of a description, at their `ready` values."""
     names = {j for group in groups for j in look_up("group", group, data["groups"])}
     names |= {
         link.joint.name

@@ -1,8 +1,6 @@
 """Capsules and spheres that enclose collision shapes, for the QP's distance limits.
 
-A capsule distance takes six multiplications, a mesh distance takes a search. The
-controller keeps the capsules apart and the simulator collides the exact shapes. Each
-capsule encloses its shape, so separated capsules mean separated shapes.
+Each capsule encloses its shape, which the simulator collides exactly.
 """
 
 import itertools
@@ -73,9 +71,8 @@ def _in_link(shape: Shape) -> Matrix:
 def collision_pairs(robot: RobotDescription) -> frozenset[frozenset[str]]:
     """Return the pairs of links that can collide with each other.
 
-    Excluded are pairs on one rigid body, neighbours over a joint, the pairs of
-    `contacts.exclude`, and pairs of links of one gripper. All but the last are
-    the simulator's own rules.
+    By the simulator's rules these are not links of one rigid body, neighbours over a
+    joint and pairs of `contacts.exclude`. Links of one gripper are left out as well.
     """
     rigid = rigid_bodies(robot.links)
     parent = {link.name: rigid[link.parent] for link in robot.links if link.parent}
@@ -133,8 +130,7 @@ def _around_cylinder(start: Vector, end: Vector, radius: float) -> Segment:
     """Return the capsule of least volume on a cylinder's axis.
 
     Its segment ends a distance `u` before the cylinder's end faces. Its radius reaches
-    their rims: `rho^2 = r^2 + u^2`. With u = 0 a flat cylinder would grow by its radius
-    at either face.
+    their rims: `rho^2 = r^2 + u^2`.
     """
     length = float(np.linalg.norm(end - start))
     u = np.linspace(0.0, length / 2, 101)

@@ -24,14 +24,7 @@ def choose(
     read: Reader,
     catalogue: Catalogue,
 ) -> Assembly:
-    """Return the assembly with the caller's components in place of its own.
-
-    Alternatives for the error messages are looked up in the catalogue.
-
-    Raises:
-        DescriptionError: If the robot has no place for it, or it fits the other hand.
-        UnknownNameError: If no such component exists.
-    """
+    """Return the assembly with the caller's components in place of its own."""
     for kind, choice in (("gripper", gripper), ("base", base)):
         _check(assembly, kind, choice)
     parts = tuple(_replaced(assembly.parts, {"gripper": gripper, "base": base}))

@@ -22,8 +22,7 @@ class RobotDescription(Elements):
 
     It is validated on construction: names are unique, inertias are physical, references
     resolve. The MuJoCo and the Pinocchio model built from it have the same joint names
-    and one velocity index per joint, in the same order. Source, licence and deviations
-    are those of `robot_file.Header`.
+    and one velocity index per joint, in the same order.
 
     Attributes:
         synergies: Gripper commands, by gripper.
@@ -144,8 +143,7 @@ class RobotDescription(Elements):
     def to_pinocchio(self) -> Any:
         """Build the Pinocchio model (`pinocchio.Model`) without geometry.
 
-        Mimic joints are independent joints here, so that nv and the order of velocities
-        equal those of MuJoCo.
+        Mimic joints are independent, so that velocities are ordered as in MuJoCo.
         """
         from wbc_suite.robot.pinocchio_export import build_pinocchio
 
@@ -166,11 +164,7 @@ class RobotDescription(Elements):
     def with_root(
         self, kind: Literal["fixed", "planar", "free"], **changes: Any
     ) -> "RobotDescription":
-        """Return the robot with another kind, and other fields, of its root.
-
-        Raises:
-            DescriptionError: If a field of the root is invalid.
-        """
+        """Return the robot with another kind, and other fields, of its root."""
         data = {key: getattr(self, key) for key in type(self).model_fields}
         data["root"] = self.root.model_dump() | {"kind": kind} | changes
         return parse_model(type(self), data, source=self.name, error=DescriptionError)

@@ -62,9 +62,8 @@ Limits: TypeAlias = Annotated[Range, AfterValidator(_rising)]
 class Mimic(FrozenModel):
     """A joint that follows another: `q = ratio * q_joint + offset`.
 
-    Attributes:
-        closed: Whether a `[[connect]]` enforces the relation in MuJoCo. MuJoCo then
-            gets no second constraint; other engines use this relation.
+    If it is `closed`, a `[[connect]]` enforces the relation in MuJoCo, which gets no
+    second constraint; other engines use this relation.
     """
 
     joint: Name
@@ -150,12 +149,7 @@ class Mount(Posed):
 
 
 class Camera(Posed):
-    """A camera; it looks along its -z axis with y up, as in MuJoCo.
-
-    Attributes:
-        fovy: Vertical field of view, degrees (the unit of MuJoCo).
-        resolution: Width and height in pixels.
-    """
+    """A camera; it looks along -z with y up and a vertical field of view in degrees."""
 
     name: Name
     link: Name
@@ -166,12 +160,8 @@ class Camera(Posed):
 class Actuator(FrozenModel):
     """An actuator that differs from the default of one torque motor per joint.
 
-    Attributes:
-        kind: `motor` takes a torque, `position` a setpoint with gains kp and kd,
-            `velocity` a speed with gain kd.
-        kp: Stiffness, N m/rad or N/m.
-        kd: Damping, N m s/rad or N s/m.
-        effort: Largest effort; the joint's own when absent.
+    A `motor` takes a torque, `position` a setpoint with gains kp and kd, `velocity` a
+    speed with gain kd. The effort limit is the joint's own when absent.
     """
 
     joint: Name

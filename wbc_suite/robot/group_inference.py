@@ -1,7 +1,7 @@
 """Infer groups, end-effector frames and a ready posture of an imported robot.
 
-URDF and MJCF define neither. The inference uses the words of link and joint names and
-the structure of the tree. Users edit the result after `to_toml()`.
+The words of link and joint names, and the structure of the tree, give them. Users edit
+the result after `to_toml()`.
 """
 
 import re
@@ -55,12 +55,7 @@ END_WORDS = {
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Limb:
-    """Joints of one arm, gripper, head, torso, base, or of all legs.
-
-    Attributes:
-        kind: One of `KINDS`.
-        links: Links that its joints move, in depth-first order.
-    """
+    """Joints of one arm, gripper, head, torso or base, or of all legs."""
 
     name: str
     kind: str
@@ -86,8 +81,7 @@ def infer_limbs(links: Sequence[Link]) -> tuple[Limb, ...]:
 
     A link without a known word in its names belongs to the limb of its parent. Branches
     of an arm form a gripper; a chain below a torso or the root is an arm. A single arm
-    is the right one, as everywhere in this package. Several arms without a side are
-    numbered.
+    is the right one; several arms without a side are numbered.
     """
     traits = _traits(links)
     arms = list(dict.fromkeys(x.top for x in traits.values() if x.kind == "arm"))
@@ -148,8 +142,8 @@ def infer_frames(
 ) -> tuple[Frame, ...]:
     """Return the given frames, and `eef`, `foot`, `head`, `torso` at the limbs' ends.
 
-    A given frame of the right name is used. Otherwise a new frame is placed at a given
-    frame or link with a word of `END_WORDS`. A gripper gets a `tcp` only there.
+    A new frame is placed at a given frame or link with a word of `END_WORDS`, or else
+    at the tip. A gripper gets a `tcp` only in the first case.
     """
     frames = {frame.name: frame for frame in given}
     for limb in limbs:
@@ -234,11 +228,7 @@ def _depth(name: str | None, above: dict[str, str | None]) -> int:
 def _placed(
     links: Sequence[Link], limb: Limb, tip: Link, given: Sequence[Frame]
 ) -> dict[str, Any] | None:
-    """Return the pose of an inferred frame: at a frame or link with an end word.
-
-    Otherwise it is at the tip. For a gripper the palm is searched, and the result is
-    None if no word is found.
-    """
+    """Return the pose of an inferred frame; None for a gripper without an end word."""
     rigid = rigid_bodies(links)
     if limb.kind == "gripper":
         palm = rigid[str(limb.links[0].parent)]

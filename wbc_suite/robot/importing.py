@@ -39,10 +39,9 @@ MAX_MESSAGE = 800
 
 
 class NameTable:
-    """Assigns unique names of letters, digits and `_`.
+    """Assigns names of letters, digits and `_`, unique over links, joints and frames.
 
-    URDF has separate names for links and joints, and allows any character; ours are
-    unique together. Equal files give equal names.
+    Equal files give equal names.
     """
 
     def __init__(self) -> None:
@@ -77,8 +76,7 @@ def describe_import(
     """Check imported links and frames, and infer what the file does not define.
 
     Groups, end effectors and a `ready` posture are inferred unless `others` has them.
-    An implausible centre of mass or inertia is only a warning, because meshes that
-    could not be read leave the shapes incomplete.
+    An implausible inertia is only a warning, since some meshes may not be read.
 
     Raises:
         DescriptionError: If the robot is inconsistent or unphysical.
@@ -188,8 +186,8 @@ def _accept_implausible(links: Sequence[Link], source: Path) -> list[Link]:
 def overlapping_links(robot: RobotDescription) -> tuple[tuple[str, str], ...]:
     """Return pairs of links that overlap in the posture `ready`, few joints apart.
 
-    Hulls of meshes, and shapes drawn with a margin, can reach past the next link into
-    the one after it. In a simulation they would permanently push each other apart.
+    Hulls of meshes can reach past the next link; such links would push each other
+    apart.
     """
     model = robot.to_mjspec().compile()
     data = mujoco.MjData(model)

@@ -46,11 +46,7 @@ def write_stl(path: Path, vertices: Matrix, faces: Indices) -> None:
 
 
 def read_points(path: Path) -> Matrix:
-    """Read the vertices, shape (n, 3), of an STL or OBJ file.
-
-    Raises:
-        DescriptionError: If the file is too large, of another kind, or broken.
-    """
+    """Read the vertices (n, 3) of an STL or OBJ file; raises DescriptionError."""
     size = path.stat().st_size
     if size > MAX_BYTES:
         raise DescriptionError(

@@ -29,12 +29,9 @@ NAMED = ("frames", "mounts", "cameras", "sensors", "actuators", "connects")
 
 
 class Mirror(FrozenModel):
-    """The side that is defined, and the one that is generated.
+    """The word in names (between underscores) of the defined side, and of the other.
 
-    Attributes:
-        source: Word in a name (between underscores) that marks the defined side.
-        target: The word that replaces it on the other side.
-        plane: Plane of reflection in the axes of the component's first link.
+    The plane of reflection is in the axes of the component's first link.
     """
 
     source: Name = "left"
@@ -43,11 +40,7 @@ class Mirror(FrozenModel):
 
 
 def reflect_component(component: "Component", *, source: str) -> "Component":
-    """Return the component with both sides.
-
-    Raises:
-        DescriptionError: If no link belongs to the defined side.
-    """
+    """Return the component with both sides; raises DescriptionError."""
     mirror = component.mirror
     if mirror is None:
         return component

@@ -1,7 +1,7 @@
 """Check and compile MJCF files from untrusted sources.
 
-A file of a hundred bytes can request 10^9 bodies or a height field of 10^10 points. The
-file size does not limit this, so the requested sizes are computed before compilation.
+A file of a hundred bytes can request 10^9 bodies or a height field of 10^10 points, so
+the requested sizes are computed before compilation.
 """
 
 import math
@@ -42,10 +42,7 @@ _PNG = b"\x89PNG\r\n\x1a\n"
 
 
 def compile_mjcf(path: Path) -> tuple[mujoco.MjModel, mujoco.MjSpec]:
-    """Compile an MJCF file and all files of its folder that it includes.
-
-    Returns:
-        The model, and its specification, which can be attached to a scene.
+    """Compile an MJCF file and what it includes to a model and its specification.
 
     Raises:
         ConfigError: If it is not MJCF, or names a file outside its folder.

@@ -120,8 +120,7 @@ def _add_joint(body: mujoco.MjsBody, joint: Joint, *, limb: bool) -> None:
 def _inertias(robot: RobotDescription) -> dict[str, pin.Inertia]:
     """Return the inertias of the links in their axes.
 
-    MuJoCo needs mass on each moving body. A moving link without mass therefore gets the
-    inertia of the links that are fixed to it, which does not change the dynamics.
+    MuJoCo needs mass on each moving body: one without gets that of links fixed to it.
     """
     inertias = {link.name: inertia_of(link) for link in robot.links}
     rigid = rigid_bodies(robot.links)
@@ -227,8 +226,7 @@ def _add_constraints(spec: mujoco.MjSpec, robot: RobotDescription) -> None:
 def _welded_neighbours(robot: RobotDescription) -> Iterable[tuple[str, str]]:
     """Yield pairs of a static link of a fixed robot and a link that moves on it.
 
-    MuJoCo excludes contacts between a body and its parent, unless the parent is welded
-    to the world.
+    MuJoCo itself excludes bodies and parents, except parents welded to the world.
     """
     if robot.root.kind != "fixed":
         return

@@ -1,9 +1,8 @@
 """Write shapes as MuJoCo geoms: collision geoms, and one visual mesh per link.
 
-Every geom of a model costs time in every physics step, even if it is only drawn (135 of
-175 geoms in a scene with a Panda). The opaque shapes of a link are therefore merged
-into one mesh. A MuJoCo mesh has one colour, so the colours of a robot are the pixels of
-a small texture, the palette, and each vertex refers to its pixel.
+Each geom costs time in every physics step (135 of 175 geoms in a scene with a Panda are
+only drawn), so the opaque shapes of a link are merged into one mesh. Its vertices refer
+to pixels of a small texture, the palette, because a mesh has one colour.
 """
 
 from functools import lru_cache
@@ -79,13 +78,7 @@ def _set_contact(geom: mujoco.MjsGeom, shape: Shape) -> None:
 
 
 class VisualGeoms:
-    """Adds the visual geoms of the links of one robot.
-
-    Args:
-        spec: Specification for meshes and the palette.
-        robot: The robot.
-        merged: Whether the opaque shapes of a link become one mesh.
-    """
+    """Adds the visual geoms of the links of a robot, `merged` or one per shape."""
 
     def __init__(
         self, spec: mujoco.MjSpec, robot: RobotDescription, *, merged: bool

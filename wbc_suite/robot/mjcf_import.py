@@ -33,10 +33,10 @@ def read_mjcf(path: Path | str) -> RobotDescription:
     """Read an MJCF file.
 
     MuJoCo compiles it. Bodies become links, sites become frames, joint equalities
-    become mimic joints. A body with several joints becomes a chain with links of a
-    microgram between them. Items of the world body (floors, lights) are ignored. Meshes
-    become convex hulls. Groups and end effectors are inferred; `to_toml()` writes the
-    result for editing.
+    become mimic joints, meshes become convex hulls. A body with several joints becomes
+    a chain with links of a microgram. Items of the world body (floors, lights) are
+    ignored. Groups and end effectors are inferred; `to_toml()` writes the result for
+    editing.
 
     Raises:
         ConfigError: If the file is not MJCF, or refers to files outside its folder.

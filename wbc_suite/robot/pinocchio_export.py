@@ -18,8 +18,8 @@ GRAVITY = np.array([0.0, 0.0, -9.81])
 def build_pinocchio(robot: RobotDescription) -> Any:
     """Build `pinocchio.Model`; see `RobotDescription.to_pinocchio`.
 
-    Each link is a BODY frame and each described frame an OP_FRAME. Unlimited joints
-    have infinite limits. Keyframes are reference configurations.
+    Links are BODY frames, described frames OP_FRAMEs, keyframes reference
+    configurations.
     """
     model = pin.Model()
     model.name = robot.name
@@ -73,7 +73,7 @@ def _add_joint(model: Any, joint: Joint, parent: int, pose: Any) -> int:
     low, high = joint.range or (-np.inf, np.inf)
     index = model.addJoint(
         parent,
-        _joint_model(np.asarray(joint.axis), hinge=joint.type == "hinge"),
+        _joint_model(joint),
         pose,
         joint.name,
         np.array([joint.effort or np.inf]),
@@ -89,19 +89,17 @@ def _add_joint(model: Any, joint: Joint, parent: int, pose: Any) -> int:
     return index
 
 
-def _joint_model(axis: Vector, *, hinge: bool) -> Any:
-    """Return the joint model of an axis; for exactly x, y or z the faster one."""
-    aligned = (
-        (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ)
-        if hinge
-        else (pin.JointModelPX, pin.JointModelPY, pin.JointModelPZ)
-    )
-    for k in range(3):
-        if np.array_equal(axis, np.eye(3)[k]):
-            return aligned[k]()
-    if hinge:
-        return pin.JointModelRevoluteUnaligned(axis)
-    return pin.JointModelPrismaticUnaligned(axis)
+def _joint_model(joint: Joint) -> Any:
+    """Return the joint model; for an axis that is exactly x, y or z the faster one."""
+    if joint.type == "hinge":
+        aligned = (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ)
+        general = pin.JointModelRevoluteUnaligned
+    else:
+        aligned = (pin.JointModelPX, pin.JointModelPY, pin.JointModelPZ)
+        general = pin.JointModelPrismaticUnaligned
+    if sorted(joint.axis) == [0.0, 0.0, 1.0]:
+        return aligned[joint.axis.index(1.0)]()
+    return general(np.asarray(joint.axis))
 
 
 def _add_body(model: Any, link: Link, joint: int, pose: Any) -> None:

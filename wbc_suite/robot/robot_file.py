@@ -31,8 +31,7 @@ class Header(FrozenModel):
         side: The only side that a hand fits; absent if it fits both.
         extends: Another component of the same folder; tables of this file, such as
             `synergy`, replace its tables.
-        title: Display name.
-        source: Source of the figures; `license` is theirs too.
+        source: Source of the figures, with their license.
         deviations: Each deliberate difference from the source, with its reason.
     """
 
@@ -44,6 +43,10 @@ class Header(FrozenModel):
     source: str = ""
     license: str = ""
     deviations: tuple[str, ...] = ()
+
+
+SOURCES = ("name", "title", "source", "license", "deviations")
+"""Fields of a component's header that its robot has as well."""
 
 
 class Component(Elements):
@@ -112,9 +115,7 @@ class Assembly(FrozenModel):
 
 
 def read_robot_file(path: Path) -> Component | Assembly:
-    """Read a file that holds a component or an assembly.
-
-    A file is parsed again only if its text has changed.
+    """Read a file that holds a component or an assembly; parsed once for equal text.
 
     Raises:
         ConfigError: If the file is neither, or violates the format.
@@ -185,8 +186,7 @@ RPY: dict[str, Any] = {
 def robot_schema(kind: Literal["component", "assembly"]) -> dict[str, Any]:
     """Return the JSON Schema of a robot file, for completion in editors.
 
-    It covers names, types, choices and simple bounds. `wbc-suite check` covers
-    references, the tree and physics.
+    `wbc-suite check` covers more: references, the tree and physics.
     """
     model = Component if kind == "component" else Assembly
     schema = model.model_json_schema(by_alias=True)

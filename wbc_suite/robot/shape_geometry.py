@@ -44,13 +44,10 @@ CORNERS = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
 
 
 def mesh_of(shape: Shape | SkinMesh) -> tuple[Matrix, Indices] | None:
-    """Compute the triangle mesh of a shape that is not a primitive.
+    """Compute the read-only mesh of a shape that is not a primitive of MuJoCo, or None.
 
-    Equal shapes share one mesh, which is read-only.
-
-    Returns:
-        Vertices, shape (n, 3), in the shape's own frame, and faces, shape (m, 3),
-        counter-clockwise from outside; None for a primitive of the physics engine.
+    Vertices, shape (n, 3), are in the shape's own frame; faces, shape (m, 3), are
+    counter-clockwise from outside.
     """
     return skin_triangles(shape) if isinstance(shape, SkinMesh) else _mesh_of(shape)
 
@@ -71,12 +68,9 @@ def _mesh_of(shape: Shape) -> tuple[Matrix, Indices] | None:
 
 
 def hull_spheres(shape: Shape) -> Matrix:
-    """Return spheres whose convex hull is the shape, in its own frame.
+    """Return spheres x y z radius (n, 4) with the shape as convex hull, in its frame.
 
     An ellipsoid is replaced by its bounding box, which is larger at the corners.
-
-    Returns:
-        Rows x, y, z, radius in m, shape (n, 4).
     """
     match shape:
         case Sphere(radius=radius):
@@ -95,11 +89,7 @@ def hull_spheres(shape: Shape) -> Matrix:
 
 
 def support_points(shape: Shape) -> Matrix:
-    """Compute points, shape (n, 3), whose convex hull is the shape, in its frame.
-
-    Raises:
-        DescriptionError: If the shape is a sphere, capsule or ellipsoid.
-    """
+    """Compute points (n, 3) with the shape as convex hull; raises for round shapes."""
     match shape:
         case Hull() | Box():
             spheres = hull_spheres(shape)
@@ -272,9 +262,9 @@ def _loft_faces(rings: int, n: int) -> Indices:
 def fit_hull(points: Matrix) -> dict[str, Any]:
     """Return the fields of a hull that approximates the convex hull of points (n, 3).
 
-    A flat cloud gives a thin box. A hull with more than `HULL_POINTS` corners keeps
-    the extreme corners along evenly spread directions, the axes among them. It then
-    lies inside the exact hull and touches it in each of these directions.
+    A flat cloud gives a thin box. Of more than `HULL_POINTS` corners the extreme ones
+    along evenly spread directions are kept, where the hull touches the exact one from
+    inside.
     """
     low, high = points.min(axis=0), points.max(axis=0)
     centred = points - points.mean(axis=0)

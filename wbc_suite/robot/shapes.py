@@ -203,7 +203,6 @@ class Loft(ShapeFields):
     """A surface over rings along one axis (visuals only; may be non-convex).
 
     Attributes:
-        axis: Normal of the rings.
         sections: Rows `[position, centre_u, centre_v, half_u, half_v]`; u and v are the
             two other axes in the order x, y, z.
         exponent: Superellipse exponent of a ring: 2 ellipse, 4 squircle, 8 nearly box.
@@ -229,12 +228,7 @@ class Loft(ShapeFields):
 
 
 class SkinMesh(ShapeFields):
-    """A mesh file that replaces a link's visual shapes, see `robot.skins`.
-
-    Attributes:
-        file: Absolute path of an STL or OBJ file.
-        scale: Factors along the file's axes.
-    """
+    """A mesh file (absolute path) that replaces a link's visual shapes."""
 
     shape: Literal["skin"]
     file: str

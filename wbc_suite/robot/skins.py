@@ -1,9 +1,8 @@
 """Skins: meshes of other packages, drawn instead of a robot's own visual shapes.
 
-This package ships no meshes. A table `robots/skin/NAME.toml` lists the mesh files of a
-public package for each link of component NAME. The files are found in an installed
-package, which is not imported, or in a folder of the user. Masses, joints and
-collisions do not change.
+A table `robots/skin/NAME.toml` lists the mesh files of a public package for each link
+of component NAME. They are found in an installed package, which is not imported, or in
+a folder of the user. Physics does not change.
 """
 
 import importlib.util
@@ -114,11 +113,7 @@ class SkinFinder:
     def meshes(
         self, component: str, links: Iterable[str]
     ) -> dict[str, tuple[SkinMesh, ...]]:
-        """Return the meshes of each link of a component; empty without a skin.
-
-        Raises:
-            UnknownNameError: If the table names a link that the component lacks.
-        """
+        """Return the meshes of each link of a component; empty without a skin."""
         if not self._catalogue.holds("robots/skin", component):
             return {}
         path = self._catalogue.find("robots/skin", component, kind="skin")
@@ -145,11 +140,7 @@ class SkinFinder:
         }
 
     def report_missing(self) -> None:
-        """Log a warning about missing meshes.
-
-        Raises:
-            ConfigError: If no mesh at all was found.
-        """
+        """Log a warning about missing meshes; raises ConfigError if none was found."""
         where = f" below {self._folder}" if self._folder else ""
         lines = [
             f"the meshes of {', '.join(names)} were not found{where}. To install "
@@ -193,12 +184,7 @@ class SkinFinder:
 
 
 def read_skin(path: Path) -> SkinTable:
-    """Read a table of meshes.
-
-    Raises:
-        ConfigError: If the file violates the format.
-        UnknownNameError: If the provider is unknown.
-    """
+    """Read a table of meshes; raises ConfigError or UnknownNameError."""
     table = load_model(SkinTable, path)
     look_up("provider of meshes", table.provider, PROVIDERS)
     return table

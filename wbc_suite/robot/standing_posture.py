@@ -22,13 +22,10 @@ the leg's length. Knees of quadrupeds point backward, those of humanoids forward
 def standing_legs(robot: RobotDescription) -> dict[str, float]:
     """Return positions of the pitch joints of legs, by name, rad.
 
-    In each leg the hinges about y are moved so that the foot is below the uppermost of
-    them and its sole keeps the inclination of the posture `ready`. A leg without such a
-    posture has no entry.
-
-    Args:
-        robot: Chains to a frame with role `foot` are legs; other joints keep the
-            posture `ready`.
+    In each chain to a frame with role `foot` the hinges about y are moved so that the
+    foot is below the uppermost of them and its sole keeps the inclination of the
+    posture `ready`, in which other joints stay. A leg without such a posture has no
+    entry.
     """
     model = robot.to_pinocchio()
     data = model.createData()

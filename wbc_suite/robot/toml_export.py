@@ -6,7 +6,7 @@ from typing import Any, TypeAlias, cast
 
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.elements import Elements
-from wbc_suite.robot.robot_file import Component, Header
+from wbc_suite.robot.robot_file import SOURCES, Component, Header
 
 ONE_A_LINE = ("visual", "collision", "spheres", "sections", "exclude")
 """Lists that are written with one entry per line."""
@@ -22,14 +22,7 @@ def write_toml(robot: RobotDescription) -> str:
     data["synergies"] = tuple(s for own in robot.synergies.values() for s in own)
     component = Component(
         format=1,
-        component=Header(
-            name=robot.name,
-            kind="body",
-            title=robot.title,
-            source=robot.source,
-            license=robot.license,
-            deviations=robot.deviations,
-        ),
+        component=Header(kind="body", **{key: getattr(robot, key) for key in SOURCES}),
         **data,
     )
     fields = component.model_dump(by_alias=True, exclude_defaults=True)

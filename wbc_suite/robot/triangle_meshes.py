@@ -1,7 +1,6 @@
 """Triangle meshes of primitives, with MuJoCo's resolution.
 
-Vertices at sharp edges are repeated, one copy per face, because renderers smooth the
-normals of shared vertices.
+Vertices at sharp edges are repeated, because renderers smooth normals of shared ones.
 """
 
 import math

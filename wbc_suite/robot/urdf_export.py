@@ -1,8 +1,7 @@
 """Write a robot description as URDF text.
 
-URDF has trees of links with boxes, cylinders, spheres and meshes. It has no armature,
-acceleration limits, actuators, sensors, cameras, keyframes, groups or closed loops, so
-these are omitted. `write_urdf` lists what is converted.
+URDF has no armature, acceleration limits, actuators, sensors, cameras, keyframes,
+groups or closed loops, so these are omitted. `write_urdf` lists what is converted.
 """
 
 from collections.abc import Iterator
@@ -35,12 +34,8 @@ def write_urdf(robot: RobotDescription, *, mesh_dir: Path | None = None) -> str:
       velocity limit, get the limit `UNLIMITED`; a joint without motor has effort 0.
     - Frames become massless links on fixed joints.
     - A capsule becomes a cylinder and two spheres. Ellipsoids, hulls, lofts, cones and
-      rounded boxes become their bounding boxes, or meshes if `mesh_dir` is given.
-
-    Args:
-        robot: The robot.
-        mesh_dir: Folder for STL files of the shapes that are not URDF primitives. The
-            text refers to them relative to the folder's parent; save it there.
+      rounded boxes become their bounding boxes, or STL files in `mesh_dir`, which the
+      text refers to relative to the folder's parent.
     """
     root = Element("robot", name=robot.name)
     # For MuJoCo, which would infer a mass for links without one.

@@ -23,9 +23,7 @@ LOG = logging.getLogger(__name__)
 class MeshFolder:
     """Finds mesh files in one folder, and never outside it.
 
-    Args:
-        urdf: The URDF file.
-        root: The folder; by default the ROS package of the file, or its folder.
+    By default it is the ROS package of the URDF file, or its folder.
     """
 
     def __init__(self, urdf: Path, root: Path | None) -> None:
@@ -34,12 +32,7 @@ class MeshFolder:
         self._shapes: dict[tuple[str | float, ...], dict[str, Any] | None] = {}
 
     def hull(self, filename: str, scale: Vector) -> dict[str, Any] | None:
-        """Return the fields of a mesh's hull; None if it is missing or unsupported.
-
-        Raises:
-            ConfigError: If the file lies outside the folder.
-            DescriptionError: If the file is broken.
-        """
+        """Return the fields of a mesh's hull; None if it is missing or unsupported."""
         key = (filename, *scale.tolist())
         if key not in self._shapes:
             path = self._find(filename)
@@ -91,15 +84,7 @@ def _package_of(urdf: Path) -> Path:
 
 
 class UrdfShapes:
-    """Reads `<visual>` and `<collision>` elements as fields of shapes.
-
-    Args:
-        robot: The root element.
-        meshes: Finds mesh files.
-
-    Attributes:
-        colors: Colours of the materials, by valid name.
-    """
+    """Reads shapes of links; `colors` are those of the materials, by valid name."""
 
     def __init__(self, robot: Element, meshes: MeshFolder) -> None:
         self._meshes = meshes

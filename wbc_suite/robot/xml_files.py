@@ -20,8 +20,7 @@ def read_xml(path: Path) -> Element:
     """Parse one XML file into elements.
 
     A document type declaration is refused, because it can define entities that grow
-    without bound or read other files. Namespace prefixes need no declaration, which
-    vendors' files often omit.
+    without bound or read other files. Namespace prefixes need no declaration.
 
     Raises:
         ConfigError: If the file is missing, too large, too deep or not plain XML.
@@ -58,11 +57,7 @@ def read_xml(path: Path) -> Element:
 
 
 def inside(root: Path, path: Path, *, source: Path) -> Path:
-    """Return a path with resolved links, if it lies in a folder.
-
-    Raises:
-        ConfigError: If the path lies outside the folder.
-    """
+    """Return a path with resolved links; raises ConfigError outside of a folder."""
     resolved = path.resolve()
     if not resolved.is_relative_to(root.resolve()):
         raise ConfigError(

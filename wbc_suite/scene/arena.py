@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from wbc_suite.robot.shapes import Size, Vector3
 from wbc_suite.scene.compose import add_camera
-from wbc_suite.scene.materials import FRICTION, wood_pixels
+from wbc_suite.scene.materials import FRICTION, add_texture, wood_pixels
 from wbc_suite.tomlfile import FrozenModel
 
 WOOD_SIZE = 512
@@ -26,13 +26,7 @@ Friction: TypeAlias = Annotated[float, Field(ge=0.0, le=1e3)]
 
 
 class TableConfig(FrozenModel):
-    """A table.
-
-    Attributes:
-        size: Length along x, width along y, thickness of the top, m.
-        center: Middle of the top's upper face, m.
-        friction: Sliding, torsional, rolling.
-    """
+    """A table: length, width and thickness of its top, middle of its upper face, m."""
 
     size: tuple[Size, Size, Size] = (0.8, 0.8, 0.05)
     center: Vector3 = (0.0, 0.0, 0.8)
@@ -151,16 +145,9 @@ def _add_textures(spec: mujoco.MjSpec) -> None:
     floor.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "floor"
     floor.texrepeat = (1, 1)
     floor.texuniform = True
-    planks = spec.add_texture(
-        name="wood",
-        type=mujoco.mjtTexture.mjTEXTURE_2D,
-        nchannel=3,
-        width=WOOD_SIZE,
-        height=WOOD_SIZE,
-    )
-    planks.data = wood_pixels(WOOD_SIZE).tobytes()
     wood = spec.add_material(name="wood", specular=0.2, shininess=0.3)
-    wood.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "wood"
+    planks = wood_pixels(WOOD_SIZE)
+    add_texture(spec, wood, mujoco.mjtTexture.mjTEXTURE_2D, planks)
     wood.texrepeat = (1, 1)
     spec.add_material(name="table_leg", rgba=(0.32, 0.33, 0.35, 1), specular=0.4)
 

@@ -58,8 +58,7 @@ def _on_the_floor(robot: RobotDescription) -> RobotDescription:
     model = robot.to_mjspec().compile()
     data = mujoco.MjData(model)
     if "ready" in robot.keyframes:
-        for name, value in robot.keyframe("ready").items():
-            data.qpos[model.joint(name).qposadr[0]] = value
+        mujoco.mj_resetDataKeyframe(model, data, model.key("ready").id)
     mujoco.mj_kinematics(model, data)
     solid = np.flatnonzero(model.geom_contype | model.geom_conaffinity)
     low, _ = _geom_bounds(model, data, solid, pin.SE3.Identity())

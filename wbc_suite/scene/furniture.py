@@ -18,14 +18,7 @@ GHOST = 0.3
 
 
 class BinConfig(FrozenModel):
-    """A bin on legs.
-
-    Attributes:
-        size: Inner length along x, width along y, and height of the walls, m.
-        center: Middle of its floor, m.
-        wall: Thickness of walls and floor, m.
-        color: Colour of walls and floor.
-    """
+    """A bin on legs: inner length, width and height, and middle of its floor, m."""
 
     size: tuple[Size, Size, Size]
     center: Vector3

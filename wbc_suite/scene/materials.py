@@ -142,13 +142,21 @@ def use_material(spec: mujoco.MjSpec, name: str) -> str:
     )
     if material.pixels is not None:
         # A square cube texture shows the same picture on all six sides.
-        texture = spec.add_texture(
-            name=own,
-            type=mujoco.mjtTexture.mjTEXTURE_CUBE,
-            nchannel=3,
-            width=PIXELS,
-            height=PIXELS,
-        )
-        texture.data = material.pixels(PIXELS).tobytes()
-        added.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = own
+        kind = mujoco.mjtTexture.mjTEXTURE_CUBE
+        add_texture(spec, added, kind, material.pixels(PIXELS))
     return own
+
+
+def add_texture(
+    spec: mujoco.MjSpec,
+    material: mujoco.MjsMaterial,
+    kind: mujoco.mjtTexture,
+    pixels: NDArray[np.uint8],
+) -> None:
+    """Add pixels, shape (height, width, 3), as the texture of a material."""
+    height, width, _ = pixels.shape
+    texture = spec.add_texture(
+        name=material.name, type=kind, nchannel=3, width=width, height=height
+    )
+    texture.data = pixels.tobytes()
+    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = material.name

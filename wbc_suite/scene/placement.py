@@ -1,8 +1,4 @@
-"""Samplers of start poses of objects that do not touch one another.
-
-An object is represented by its upright bounding cylinder: two objects are apart if
-their cylinders are.
-"""
+"""Samplers of start poses of objects whose upright bounding cylinders are apart."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -13,7 +9,7 @@ from numpy.random import Generator
 
 from wbc_suite.errors import PlacementError
 from wbc_suite.robot.shapes import Interval, Real, Vector3
-from wbc_suite.scene.objects.object_state import Extent
+from wbc_suite.scene.objects.object_state import Extent, ObjectState
 from wbc_suite.scene.objects.scene_object import STANDING, Quat
 from wbc_suite.tomlfile import FrozenModel
 
@@ -23,14 +19,6 @@ LAYOUTS = 20
 """How often all objects of a sampler are placed before an error."""
 ON_TOP = 1e-9
 """Tolerance of rounding between an object and its support, m."""
-
-
-class Measured(Protocol):
-    """An object whose bounding cylinder can be measured."""
-
-    def extent(self, quat: Quat = STANDING) -> Extent:
-        """Return its bounding cylinder when turned by `quat`."""
-        ...
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -52,7 +40,7 @@ class Placed:
         return not (above or below)
 
 
-Objects: TypeAlias = Mapping[str, Measured]
+Objects: TypeAlias = Mapping[str, ObjectState]
 Taken: TypeAlias = Mapping[str, Placed]
 Placements: TypeAlias = dict[str, Placed]
 
@@ -61,12 +49,7 @@ class Sampler(Protocol):
     """Draws start poses of some objects."""
 
     def sample(self, rng: Generator, objects: Objects, taken: Taken) -> Placements:
-        """Return a pose for each of the sampler's objects.
-
-        Args:
-            rng: Source of randomness.
-            objects: All objects, by name.
-            taken: Objects that are placed already.
+        """Return a pose for each of the sampler's objects, clear of those `taken`.
 
         Raises:
             PlacementError: If no free place is found; names what to relax.
@@ -77,10 +60,9 @@ class Sampler(Protocol):
 class Region(FrozenModel):
     """Rectangle of a surface with a range of orientations.
 
+    Ranges of x and y are from the surface's origin, m; yaw is about the vertical, rad.
+
     Attributes:
-        x: Smallest and largest x from the surface's origin, m.
-        y: Smallest and largest y, m.
-        yaw: Smallest and largest angle about the vertical, rad.
         clearance: Height above the surface, m.
         inside: Whether objects lie inside entirely, or only their origins.
         gap: Least distance between objects, m.
@@ -98,11 +80,8 @@ class Region(FrozenModel):
 class UniformSampler:
     """Draws poses uniformly in a region, without contact between objects.
 
-    Attributes:
-        names: The objects.
-        region: Where they are placed.
-        origin: Origin of the surface in the world, m.
-        rest: Orientation before the turn about the vertical; w x y z.
+    The surface has its origin in the world, m; `rest` is the orientation before the
+    turn about the vertical.
     """
 
     names: Sequence[str]
@@ -146,8 +125,9 @@ class UniformSampler:
     def _at(self, x: float, y: float, yaw: float, extent: Extent) -> Placed:
         ox, oy, oz = self.origin
         height = oz + self.region.clearance + extent.bottom
-        turn = (math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))
-        quat = _product(turn, self.rest)
+        c, s = math.cos(yaw / 2), math.sin(yaw / 2)
+        w, i, j, k = self.rest  # turned by yaw
+        quat = (c * w - s * k, c * i - s * j, c * j + s * i, c * k + s * w)
         return Placed(position=(ox + x, oy + y, height), quat=quat, extent=extent)
 
     def _explain(self, name: str, extent: Extent, taken: Mapping[str, Placed]) -> str:
@@ -178,12 +158,9 @@ class SequentialSampler:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class OnTopSampler:
-    """Draws poses on top of an object that is placed already.
+    """Draws poses on top of an object, the support, that is placed already.
 
-    Attributes:
-        names: The objects.
-        support: The object below.
-        region: Region relative to the support's origin; it does not turn with it.
+    The region is relative to the support's origin and does not turn with it.
     """
 
     names: Sequence[str]
@@ -209,13 +186,7 @@ class OnTopSampler:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class RejectionSampler:
-    """Calls a sampler until a condition holds for its poses.
-
-    Attributes:
-        sampler: Draws poses.
-        accepts: The condition.
-        wanted: Description of the condition, for the error.
-    """
+    """Calls a sampler until its poses are accepted; `wanted` describes that."""
 
     sampler: Sampler
     accepts: Callable[[Placements], bool]
@@ -232,14 +203,3 @@ class RejectionSampler:
             f"In {TRIES} tries there was no place for {', '.join(found)} where "
             f"{self.wanted}. Change the region, or the sizes of the objects."
         )
-
-
-def _product(a: Quat, b: Quat) -> Quat:
-    """Return the product of two quaternions: rotation by b, then by a."""
-    (aw, ax, ay, az), (bw, bx, by, bz) = a, b
-    return (
-        aw * bw - ax * bx - ay * by - az * bz,
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-    )
