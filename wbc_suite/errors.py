@@ -9,8 +9,7 @@ import difflib
 from collections.abc import Collection, Mapping, Sequence
 from typing import TypeVar
 
-MAX_NAMES = 25
-"""Largest number of names in a message."""
+MAX_NAMES = 25  # largest number of names in a message
 
 T = TypeVar("T")
 

@@ -21,8 +21,7 @@ from wbc_suite.typing import Indices, Matrix, Vector
 Axes = Literal["local", "aligned", "world"]
 """Axes of a Jacobian: the frame's own, world axes at the frame, world at its origin."""
 
-UNLIMITED = 1e6
-"""rad or m; joints with a greater limit have none."""
+UNLIMITED = 1e6  # rad or m; joints with a greater limit have none
 
 _REFERENCE = {
     "local": pin.ReferenceFrame.LOCAL,

@@ -15,8 +15,7 @@ from wbc_suite.robot.shape_geometry import hull_spheres, support_points
 from wbc_suite.robot.shapes import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
 from wbc_suite.typing import Matrix, Vector
 
-MAX_STRIPS = 4
-"""Largest number of parallel capsules for a flat box."""
+MAX_STRIPS = 4  # largest number of parallel capsules for a flat box
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

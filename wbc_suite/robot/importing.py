@@ -24,18 +24,15 @@ from wbc_suite.tomlfile import parse_model
 
 LOG = logging.getLogger(__name__)
 
-LinkFields: TypeAlias = dict[str, Any]
-"""Fields of one `Link`, before validation."""
+LinkFields: TypeAlias = dict[str, Any]  # fields of one `Link`, before validation
 
 MAX_NAME = 70
 """Characters kept of a name in the file; our limit of 80 leaves room for a suffix."""
-OVERLAP = 1e-3
-"""Smallest penetration in m that counts as an overlap."""
+OVERLAP = 1e-3  # smallest penetration in m that counts as an overlap
 MAX_JOINTS_BETWEEN = 3
 """Largest number of joints between overlapping links that are excluded from contact.
 Links farther apart, such as an arm and the trunk, overlap because of the posture."""
-MAX_MESSAGE = 800
-"""Largest number of characters of a list in a message."""
+MAX_MESSAGE = 800  # largest number of characters of a list in a message
 
 
 class NameTable:

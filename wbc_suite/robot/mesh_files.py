@@ -13,10 +13,8 @@ from wbc_suite.errors import ConfigError, DescriptionError
 from wbc_suite.robot.shapes import SkinMesh, Vector3, cached_by_shape
 from wbc_suite.typing import Indices, Matrix
 
-READABLE = (".stl", ".obj")
-"""Suffixes of the files that `read_points` can read."""
-MAX_BYTES = 100_000_000
-"""Largest mesh file that is read."""
+READABLE = (".stl", ".obj")  # suffixes of the files that `read_points` can read
+MAX_BYTES = 100_000_000  # largest mesh file that is read
 
 TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("tag", "<u2")])
 """One record of a binary STL file, which begins with 80 bytes and a count."""
@@ -24,12 +22,9 @@ HEADER = 84
 
 EDGE = 0.008
 """Edge length in m to which skins are decimated; finer meshes render slowly."""
-MIN_TRIANGLES = 400
-"""Number of triangles below which a skin is not decimated."""
-AGGRESSION = 5.0
-"""How quickly edges are collapsed; the default of 7 tears thin shells."""
-CACHE_VERSION = 1
-"""Raised when the content of the cache changes."""
+MIN_TRIANGLES = 400  # number of triangles below which a skin is not decimated
+AGGRESSION = 5.0  # how quickly edges are collapsed; the default of 7 tears thin shells
+CACHE_VERSION = 1  # raised when the content of the cache changes
 
 
 def write_stl(path: Path, vertices: Matrix, faces: Indices) -> None:

@@ -13,8 +13,7 @@ import mujoco
 from wbc_suite.errors import ConfigError, DescriptionError
 from wbc_suite.robot.xml_files import Element, inside, read_xml
 
-MAX_FILES = 50
-"""Largest number of XML files that include one another."""
+MAX_FILES = 50  # largest number of XML files that include one another
 MAX_ELEMENTS = 20_000
 """Largest number of elements, including generated ones; a kitchen has 5,000.
 MuJoCo takes 3 s to compile 20,000, and over a minute for 120,000."""
@@ -22,14 +21,11 @@ MAX_COPIES = 10_000
 """Largest number of elements that one `replicate`, `composite` or `flexcomp` makes."""
 MAX_POINTS = 20_000_000
 """Largest number of points of a height field, texture, camera or sensor: 160 MB."""
-MAX_ROWS = 100_000
-"""Largest number of contacts, constraints, keys, or user numbers."""
-MAX_MEMORY = 1 << 32
-"""Largest value of `memory`, bytes."""
+MAX_ROWS = 100_000  # largest number of contacts, constraints, keys, or user numbers
+MAX_MEMORY = 1 << 32  # largest value of `memory`, bytes
 MAX_MESH_PARAMETER = 500
 """Largest parameter of a builtin mesh: the number of faces grows with its square."""
-MAX_FILE = 200_000_000
-"""Largest mesh or picture file, bytes."""
+MAX_FILE = 200_000_000  # largest mesh or picture file, bytes
 
 _GENERATORS = ("replicate", "composite", "flexcomp")
 _POINTS = (

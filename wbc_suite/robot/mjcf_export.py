@@ -23,8 +23,7 @@ STOP_MARGIN = 3e-3
 limits only at the start of a step (2 ms), and contacts accelerate joints to up to
 2.6 rad/s. Controllers keep limbs at least this far inside. Fingers rest at their limits
 and have no margin."""
-SITE_GROUP = 4
-"""Site group of frames, hidden by default."""
+SITE_GROUP = 4  # site group of frames, hidden by default
 
 STIFF = (0.005, 1.0)
 """Time constant in s and damping ratio of couplings, stable with a step of 2 ms."""

@@ -35,10 +35,8 @@ from wbc_suite.robot.triangle_meshes import (
 )
 from wbc_suite.typing import Indices, Matrix
 
-VISUAL_GROUP = 2
-"""Geom group of shapes that are only drawn."""
-COLLISION_GROUP = 3
-"""Geom group of shapes that only collide."""
+VISUAL_GROUP = 2  # geom group of shapes that are only drawn
+COLLISION_GROUP = 3  # geom group of shapes that only collide
 
 STATED_SOLMIX = 1000.0
 """Weight of a stated contact stiffness, so that it prevails over the default (1).
@@ -48,8 +46,7 @@ With equal weights a pad sinks 3.4 mm into a cube of 0.1 kg; with this one 0.2 m
 
 GREY = (0.5, 0.5, 0.52, 1.0)
 PALETTE = "palette"
-ROW = 4
-"""Row alignment of OpenGL textures, in pixels."""
+ROW = 4  # row alignment of OpenGL textures, in pixels
 
 Drawn = Shape | SkinMesh
 Rgba = tuple[float, float, float, float]

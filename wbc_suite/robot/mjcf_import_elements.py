@@ -13,8 +13,7 @@ from wbc_suite.typing import Vector
 
 LOG = logging.getLogger(__name__)
 
-VISUAL_GROUPS = 3
-"""Groups 0, 1 and 2 are drawn, as in MuJoCo's own viewer."""
+VISUAL_GROUPS = 3  # groups 0, 1 and 2 are drawn, as in MuJoCo's own viewer
 GEOM = mujoco.mjtGeom
 TERRAINS = (GEOM.mjGEOM_PLANE, GEOM.mjGEOM_HFIELD, GEOM.mjGEOM_SDF)
 """Geoms that robots do not have."""

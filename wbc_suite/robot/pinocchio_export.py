@@ -11,8 +11,7 @@ from wbc_suite.robot.inertia import inertia_of
 from wbc_suite.robot.poses import se3_of
 from wbc_suite.typing import Vector
 
-GRAVITY = np.array([0.0, 0.0, -9.81])
-"""m/s^2; the default of MuJoCo."""
+GRAVITY = np.array([0.0, 0.0, -9.81])  # m/s^2; the default of MuJoCo
 
 
 def build_pinocchio(robot: RobotDescription) -> Any:

@@ -29,17 +29,13 @@ from wbc_suite.robot.shapes import (
 )
 from wbc_suite.typing import Indices, Matrix, Vector
 
-RING_POINTS = 24
-"""Points on one ring of a loft or a cone; half as many on a small one."""
-SMALL = 0.02
-"""Largest radius in m of shapes that get coarser rings and spheres."""
-HULL_POINTS = 64
-"""Largest number of points of a hull in the file format."""
+RING_POINTS = 24  # points on one ring of a loft or a cone; half as many on a small one
+SMALL = 0.02  # largest radius in m of shapes that get coarser rings and spheres
+HULL_POINTS = 64  # largest number of points of a hull in the file format
 MIN_HALF_SIZE = 1e-3
 """Smallest half size in m of the box that replaces a flat point cloud."""
 
-DOWN = (0.0, 1.0, 0.0, 0.0)
-"""Rotation from z to -z."""
+DOWN = (0.0, 1.0, 0.0, 0.0)  # rotation from z to -z
 CORNERS = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
 
 

@@ -8,11 +8,9 @@ from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.elements import Frame
 from wbc_suite.typing import Vector
 
-TOLERANCE = 0.02
-"""Largest residual in m of a posture that is accepted."""
+TOLERANCE = 0.02  # largest residual in m of a posture that is accepted
 
-MIN_COSINE = 0.9
-"""Smallest cosine between the axis of a pitch joint and y."""
+MIN_COSINE = 0.9  # smallest cosine between the axis of a pitch joint and y
 
 START = {2: ((0.55, -1.1), 0.85), 3: ((-0.3, 0.6, -0.3), 0.95)}
 """By number of hinges: initial angles about y, rad, and height of the hip as part of

@@ -33,8 +33,7 @@ def write_toml(robot: RobotDescription) -> str:
     return "\n\n".join(tables) + "\n"
 
 
-Table: TypeAlias = dict[str, Any]
-"""A model as plain data."""
+Table: TypeAlias = dict[str, Any]  # a model as plain data
 
 
 def _tables(name: str, value: Table | list[Table]) -> Iterator[str]:

@@ -18,8 +18,7 @@ Screws and fingers deviate from round by at most 0.4 mm, links of 5 cm by 0.3 mm
 largest resolution is that of MuJoCo's primitives.
 """
 
-SHARP = 0.8
-"""Cosine of the smallest angle of a sharp edge, as in MuJoCo."""
+SHARP = 0.8  # cosine of the smallest angle of a sharp edge, as in MuJoCo
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,8 +11,7 @@ from wbc_suite.errors import ConfigError, DescriptionError, did_you_mean, join_f
 from wbc_suite.robot.xml_files import Element, read_xml
 from wbc_suite.typing import Vector
 
-MAX_LINKS = 500
-"""Largest number of links, as in robot files."""
+MAX_LINKS = 500  # largest number of links, as in robot files
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -10,8 +10,7 @@ from wbc_suite.tomlfile import read_bytes
 
 MAX_BYTES = 8_000_000
 """Largest XML file that is read; large humanoids have about 200 kB."""
-MAX_DEPTH = 400
-"""Largest nesting depth; MJCF nests one body per link of a chain."""
+MAX_DEPTH = 400  # largest nesting depth; MJCF nests one body per link of a chain
 
 Element: TypeAlias = ElementTree.Element
 

@@ -12,15 +12,13 @@ from wbc_suite.scene.compose import add_camera
 from wbc_suite.scene.materials import FRICTION, add_texture, wood_pixels
 from wbc_suite.tomlfile import FrozenModel
 
-WOOD_SIZE = 512
-"""Pixels along each side of the table's texture."""
+WOOD_SIZE = 512  # pixels along each side of the table's texture
 
 LEG_AT = 0.5
 """Distance of a table's legs from its middle, as a share of half its side; further out
 they would stand on the feet of robots' pedestals, which reach 24 cm under it."""
 
-LEAST_LEG = 0.01
-"""Shortest legs of a table, m."""
+LEAST_LEG = 0.01  # shortest legs of a table, m
 
 Friction: TypeAlias = Annotated[float, Field(ge=0.0, le=1e3)]
 

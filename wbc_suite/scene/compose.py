@@ -19,8 +19,7 @@ SMALL = 24
 """Degrees of freedom up to which constraint islands cost more than they save: without
 them a step of Lift takes 6 % less at 15 and 18, as long at 30 and 15 % more at 60."""
 
-GROUNDED = 0.03
-"""Depth by which feet and mounts may reach into the floor, m."""
+GROUNDED = 0.03  # depth by which feet and mounts may reach into the floor, m
 
 ROBOT_VIEW = "robotview"
 """Name of the camera behind each robot, after the robot's prefix."""

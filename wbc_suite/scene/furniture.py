@@ -13,8 +13,7 @@ from wbc_suite.tomlfile import FrozenModel
 
 LEG: Color = (0.32, 0.33, 0.35, 1.0)
 LEG_RADIUS, INSET = 0.012, 0.03
-GHOST = 0.3
-"""Opacity of visual goals."""
+GHOST = 0.3  # opacity of visual goals
 
 
 class BinConfig(FrozenModel):

@@ -18,8 +18,7 @@ from wbc_suite.robot.shapes import Vector3
 FRICTION = (1.0, 0.005, 0.0001)
 """Sliding, torsional, rolling; the default of this field's table-top benchmarks."""
 
-PIXELS = 128
-"""Along each side of a texture."""
+PIXELS = 128  # along each side of a texture
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -13,12 +13,9 @@ from wbc_suite.scene.objects.object_state import Extent, ObjectState
 from wbc_suite.scene.objects.scene_object import STANDING, Quat
 from wbc_suite.tomlfile import FrozenModel
 
-TRIES = 300
-"""Poses drawn for one object before all objects are placed again."""
-LAYOUTS = 20
-"""How often all objects of a sampler are placed before an error."""
-ON_TOP = 1e-9
-"""Tolerance of rounding between an object and its support, m."""
+TRIES = 300  # poses drawn for one object before all objects are placed again
+LAYOUTS = 20  # how often all objects of a sampler are placed before an error
+ON_TOP = 1e-9  # tolerance of rounding between an object and its support, m
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
