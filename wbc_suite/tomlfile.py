@@ -1,6 +1,7 @@
 """Read TOML files into frozen pydantic models, with errors that name file and key."""
 
 import json
+import re
 import tomllib
 import types
 import typing
@@ -129,6 +130,12 @@ def _explain(model: type[BaseModel], item: Any, within: str) -> str:
     return f"{where}{message}.{hint}"
 
 
+_TYPE_NAME = re.compile(
+    r"(constrained-|tuple\[|literal\[|list\[).*|float|int|str|bool|none"
+)
+"""Pydantic's names of types, which stand among the keys of a location."""
+
+
 def _resolve(
     loc: tuple[int | str, ...], model: type[BaseModel]
 ) -> tuple[str, list[type[BaseModel]]]:
@@ -145,7 +152,7 @@ def _resolve(
         tagged = [m for m in models if part in _tags(m)]
         if tagged and len(models) > 1:
             models = tagged
-        elif models or not _is_type_name(part):
+        elif models or not _TYPE_NAME.fullmatch(part):
             text += f".{part}" if text else part
             models = _value_models(models, part)
     return text, models
@@ -159,13 +166,6 @@ def _tags(model: type[BaseModel]) -> tuple[object, ...]:
             if len(literals) == 1 or name == "type":
                 return literals
     return ()
-
-
-def _is_type_name(part: str) -> bool:
-    """Whether a part of a location is pydantic's name of a type instead of a key."""
-    return part.startswith(("constrained-", "tuple[", "literal[", "list[")) or part in (
-        *("float", "int", "str", "bool", "none"),
-    )
 
 
 def _value_models(models: list[type[BaseModel]], key: str) -> list[type[BaseModel]]:

@@ -81,15 +81,12 @@ class Configuration:
         """Discard what was computed from q, after q itself was written to."""
         self.arrays.is_current.fill(0)
         if self._by_pinocchio:  # it has joints that the kernels do not know
-            self._copy_from_pinocchio()
-
-    def _copy_from_pinocchio(self) -> None:
-        data, arrays = self.data, self.arrays
-        for row, T in zip(arrays.pose, data.oMi, strict=True):
-            row[:] = pack_pose(T)
-        # Pinocchio gives a single column as a vector.
-        arrays.jacobian[:] = data.J.reshape(6, self.nv).T
-        arrays.is_current[0] = 1
+            data, arrays = self.data, self.arrays
+            for row, T in zip(arrays.pose, data.oMi, strict=True):
+                row[:] = pack_pose(T)
+            # Pinocchio gives a single column as a vector.
+            arrays.jacobian[:] = data.J.reshape(6, self.nv).T
+            arrays.is_current[0] = 1
 
     @property
     def data(self) -> pin.Data:

@@ -83,7 +83,13 @@ _KINDS = {
 def robot_arrays(model: pin.Model) -> RobotArrays:
     """Return the arrays of a model at its neutral configuration, not yet computed."""
     count, nv = int(model.njoints), int(model.nv)
-    kind, axis = _kinds_and_axes(model)
+    kind = np.full(count, JointKind.OTHER, dtype=np.int64)
+    axis = np.zeros((count, 3))
+    for j, joint in enumerate(list(model.joints)[1:], start=1):
+        name = joint.shortname().removeprefix("JointModel")
+        if name in _KINDS:
+            kind[j], fixed = _KINDS[name]
+            axis[j] = joint.extract().axis if fixed is None else fixed
     pose = np.zeros((count, 12))
     pose[0] = pack_pose(pin.SE3.Identity())
     return RobotArrays(
@@ -108,18 +114,6 @@ def robot_arrays(model: pin.Model) -> RobotArrays:
 def pack_pose(T: pin.SE3) -> Vector:
     """Return a pose as a row: its rotation column by column, then its position."""
     return np.concatenate([T.rotation.T.ravel(), T.translation])
-
-
-def _kinds_and_axes(model: pin.Model) -> tuple[Indices, Matrix]:
-    """Return kind and axis of each joint, the universe first."""
-    kinds = np.full(len(model.joints), JointKind.OTHER, dtype=np.int64)
-    axes = np.zeros((len(model.joints), 3))
-    for j, joint in enumerate(list(model.joints)[1:], start=1):
-        name = joint.shortname().removeprefix("JointModel")
-        if name in _KINDS:
-            kinds[j], axis = _KINDS[name]
-            axes[j] = joint.extract().axis if axis is None else axis
-    return kinds, axes
 
 
 @compiled

@@ -33,20 +33,17 @@ class EnclosingCapsule:
 
 def enclosing_capsules(robot: RobotDescription) -> tuple[EnclosingCapsule, ...]:
     """Compute the capsules around all collision shapes, in the order of the links."""
-    capsules: list[EnclosingCapsule] = []
-    for link in robot.links:
-        for shape in link.collision:
-            rotation, offset = rotation_matrix(shape), np.asarray(shape.pos)
-            for start, end, radius in _capsules(shape):
-                capsules.append(
-                    EnclosingCapsule(
-                        link=link.name,
-                        start=offset + rotation @ start,
-                        end=offset + rotation @ end,
-                        radius=radius,
-                    )
-                )
-    return tuple(capsules)
+    return tuple(
+        EnclosingCapsule(
+            link=link.name,
+            start=np.asarray(shape.pos) + rotation_matrix(shape) @ start,
+            end=np.asarray(shape.pos) + rotation_matrix(shape) @ end,
+            radius=radius,
+        )
+        for link in robot.links
+        for shape in link.collision
+        for start, end, radius in _capsules(shape)
+    )
 
 
 def collision_spheres(robot: RobotDescription) -> dict[str, Matrix]:

@@ -118,7 +118,10 @@ def _traits(links: Sequence[Link]) -> dict[str, _Traits]:
         above = traits.get(parent or "", _Traits())
         words = [*_words(link.joint.name), *_words(link.name)]
         kind = next((KIND_OF[w] for w in words if w in KIND_OF), None)
-        kind = kind or _inherited_kind(above.kind, branches=owners.count(parent) > 1)
+        if kind is None and above.kind == "arm" and owners.count(parent) > 1:
+            kind = "gripper"
+        elif kind is None:
+            kind = above.kind if above.kind in ("leg", "gripper", "head") else "arm"
         same_limb = above.kind in ("arm", "leg", "gripper")
         side = above.side if same_limb else ""
         if not (kind == "gripper" and same_limb):  # "left finger" of a right hand
@@ -126,12 +129,6 @@ def _traits(links: Sequence[Link]) -> dict[str, _Traits]:
         top = above.top if above.kind == kind else link.name
         traits[link.name] = _Traits(kind, side, top)
     return traits
-
-
-def _inherited_kind(above: str, *, branches: bool) -> str:
-    if above == "arm" and branches:
-        return "gripper"
-    return above if above in ("arm", "leg", "gripper", "head") else "arm"
 
 
 def infer_frames(

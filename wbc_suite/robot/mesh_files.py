@@ -49,9 +49,10 @@ def read_points(path: Path) -> Matrix:
         )
     try:
         data = path.read_bytes()
+        count = int.from_bytes(data[HEADER - 4 : HEADER], "little")  # in a binary STL
         if path.suffix.lower() == ".obj":
             points = _text_points(data, b"v")
-        elif len(data) >= HEADER and _stl_size(data) == size:
+        elif size == HEADER + count * TRIANGLE.itemsize:
             records = np.frombuffer(data, dtype=TRIANGLE, offset=HEADER)
             points = records["corners"].reshape(-1, 3).astype(np.float64)
         else:
@@ -61,11 +62,6 @@ def read_points(path: Path) -> Matrix:
     if len(points) == 0 or not np.isfinite(points).all():
         raise DescriptionError(f"{path}: not a readable mesh: no finite points.")
     return np.unique(points, axis=0)
-
-
-def _stl_size(data: bytes) -> int:
-    count = int(np.frombuffer(data, dtype="<u4", offset=HEADER - 4, count=1)[0])
-    return HEADER + count * TRIANGLE.itemsize
 
 
 def _text_points(data: bytes, keyword: bytes) -> Matrix:

@@ -59,19 +59,12 @@ def add_collision_geoms(
     for index, shape in enumerate(link.collision):
         geom = _add_geom(spec, body, shape, f"{link.name}_collision{index}")
         geom.group, geom.mass, geom.rgba = COLLISION_GROUP, 0.0, _rgba(robot, shape)
-        _set_contact(geom, shape)
-
-
-def _set_contact(geom: mujoco.MjsGeom, shape: Shape) -> None:
-    if shape.friction is not None:
-        geom.friction = shape.friction
-    if shape.condim is not None:
-        geom.condim = shape.condim
-    if shape.solref is not None:
-        geom.solref[:2] = shape.solref
-        geom.solmix = STATED_SOLMIX
-    if shape.margin is not None:
-        geom.margin = shape.margin
+        if shape.solref is not None:
+            geom.solref[:2] = shape.solref
+            geom.solmix = STATED_SOLMIX
+        for key in ("friction", "condim", "margin"):
+            if (value := getattr(shape, key)) is not None:
+                setattr(geom, key, value)
 
 
 class VisualGeoms:

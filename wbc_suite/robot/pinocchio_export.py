@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.robot.description import RobotDescription
-from wbc_suite.robot.elements import Joint, Link
+from wbc_suite.robot.elements import Joint
 from wbc_suite.robot.inertia import inertia_of
 from wbc_suite.robot.poses import se3_of
 from wbc_suite.typing import Vector
@@ -35,7 +35,11 @@ def build_pinocchio(robot: RobotDescription) -> Any:
             joint = _add_joint(model, link.joint, joint, pose)
             pose = pin.SE3.Identity()
         joint_of[link.name], pose_in_joint[link.name] = joint, pose
-        _add_body(model, link, joint, pose)
+        if link.mass > 0.0:
+            model.appendBodyToJoint(joint, inertia_of(link), pose)
+        kind = pin.FrameType.JOINT
+        parent = model.getFrameId(model.names[joint], kind) if joint else -1
+        model.addBodyFrame(link.name, joint, pose, parent)
     for frame in robot.frames:
         pose = pose_in_joint[frame.link] * se3_of(frame)
         parent = model.getFrameId(frame.link, pin.FrameType.BODY)
@@ -99,13 +103,6 @@ def _joint_model(joint: Joint) -> Any:
     if sorted(joint.axis) == [0.0, 0.0, 1.0]:
         return aligned[joint.axis.index(1.0)]()
     return general(np.asarray(joint.axis))
-
-
-def _add_body(model: Any, link: Link, joint: int, pose: Any) -> None:
-    if link.mass > 0.0:
-        model.appendBodyToJoint(joint, inertia_of(link), pose)
-    parent = model.getFrameId(model.names[joint], pin.FrameType.JOINT) if joint else -1
-    model.addBodyFrame(link.name, joint, pose, parent)
 
 
 def _configuration(model: Any, robot: RobotDescription, name: str) -> Vector:

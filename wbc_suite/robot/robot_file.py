@@ -122,8 +122,13 @@ def read_robot_file(path: Path) -> Component | Assembly:
         UnknownNameError: If it extends a component that does not exist.
     """
     text = read_text(path)
-    base = _extended_file(path, text)
-    return _parsed(str(path), text, base and read_text(base))
+    name = as_table(_tables(str(path), text).get("component")).get("extends")
+    if not isinstance(name, str):
+        return _parsed(str(path), text, None)
+    beside = [p.stem for p in path.parent.glob("*.toml") if p != path]
+    if name not in beside:
+        raise UnknownNameError("component to extend", name, beside)
+    return _parsed(str(path), text, read_text(path.with_name(f"{name}.toml")))
 
 
 @lru_cache(maxsize=256)
@@ -138,7 +143,14 @@ def _parsed(source: str, text: str, base: str | None) -> Component | Assembly:
     data = _tables(source, text)
     if "component" in data:
         if base is not None:
-            data = _extended(data, _tables(source, base), source=source)
+            header, inherited = data["component"], _tables(source, base)
+            above = as_table(inherited.get("component"))
+            if "extends" in above:
+                raise ConfigError(
+                    f"{source}: '{header['extends']}' itself extends another "
+                    f"component; extend '{above['extends']}' instead."
+                )
+            data = inherited | data | {"component": above | header}
         component = parse_model(Component, data, source=source, error=DescriptionError)
         return reflect_component(component, source=source)
     if "assembly" in data:
@@ -147,30 +159,6 @@ def _parsed(source: str, text: str, base: str | None) -> Component | Assembly:
         f"{source}: a robot file needs a table [component] (links and joints) or "
         f"[assembly] (parts); found {', '.join(sorted(data)) or 'nothing'}."
     )
-
-
-def _extended_file(path: Path, text: str) -> Path | None:
-    """Return the file in the same folder that a component extends."""
-    name = as_table(_tables(str(path), text).get("component")).get("extends")
-    if not isinstance(name, str):
-        return None
-    beside = [p.stem for p in path.parent.glob("*.toml") if p != path]
-    if name not in beside:
-        raise UnknownNameError("component to extend", name, beside)
-    return path.with_name(f"{name}.toml")
-
-
-def _extended(
-    data: dict[str, Any], base: dict[str, Any], *, source: str
-) -> dict[str, Any]:
-    """Return the tables of a component with those that it inherits."""
-    header, inherited = as_table(data["component"]), as_table(base.get("component"))
-    if "extends" in inherited:
-        raise ConfigError(
-            f"{source}: '{header['extends']}' itself extends another component; extend "
-            f"'{inherited['extends']}' instead."
-        )
-    return base | data | {"component": inherited | header}
 
 
 RPY: dict[str, Any] = {

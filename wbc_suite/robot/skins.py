@@ -6,6 +6,7 @@ a folder of the user. Physics does not change.
 """
 
 import importlib.util
+import itertools
 import logging
 import os
 import sys
@@ -33,10 +34,6 @@ def _module(name: str) -> Iterator[Path]:
     return map(Path, (spec and spec.submodule_search_locations) or ())
 
 
-def _on_path(folder: str) -> Iterator[Path]:
-    return (Path(place) / folder for place in sys.path)
-
-
 def _menagerie() -> Iterator[Path]:
     """Yield the caches of `mujoco-menagerie`: one folder per model and version."""
     if root := os.environ.get("MENAGERIE_ROOT"):
@@ -48,6 +45,7 @@ def _menagerie() -> Iterator[Path]:
     yield Path(own) / "models"
 
 
+ROBOT_DATA = "cmeel.prefix/share/example-robot-data/robots"
 PROVIDERS: Mapping[str, tuple[str, Callable[[], Iterable[Path]]]] = {
     "robosuite": (
         "pip install --no-deps robosuite",
@@ -59,7 +57,7 @@ PROVIDERS: Mapping[str, tuple[str, Callable[[], Iterable[Path]]]] = {
     ),
     "example_robot_data": (
         "pip install --no-deps example-robot-data",
-        lambda: _on_path("cmeel.prefix/share/example-robot-data/robots"),
+        lambda: (Path(p) / ROBOT_DATA for p in sys.path),
     ),
     "mujoco_menagerie": (
         "pip install mujoco-menagerie, and its command to fetch the model",
@@ -192,9 +190,6 @@ def read_skin(path: Path) -> SkinTable:
 
 def _common_end(one: Path, other: Path) -> int:
     """Return how many trailing parts of two paths are equal, ignoring case."""
-    count = 0
-    for a, b in zip(reversed(one.parts), reversed(other.parts), strict=False):
-        if a.casefold() != b.casefold():
-            break
-        count += 1
-    return count
+    pairs = zip(reversed(one.parts), reversed(other.parts), strict=False)
+    same = (a.casefold() == b.casefold() for a, b in pairs)
+    return sum(1 for _ in itertools.takewhile(bool, same))

@@ -48,21 +48,19 @@ def _tables(name: str, value: Table | list[Table]) -> Iterator[str]:
 
 
 def _table(head: str, items: Table) -> str:
-    rows = (f"{key} = {_pretty(key, value)}" for key, value in _sorted(items).items())
-    return "\n".join([head, *rows])
+    rows = [head]
+    for key, value in _sorted(items).items():
+        text = _inline(value)
+        if key in ONE_A_LINE:
+            text = "[\n" + "".join(f"  {_inline(item)},\n" for item in value) + "]"
+        rows.append(f"{key} = {text}")
+    return "\n".join(rows)
 
 
 def _sorted(items: Table) -> Table:
     """Return the table with its identifying keys first."""
     first = [key for key in ("name", "shape", "parent", "link") if key in items]
     return {key: items[key] for key in dict.fromkeys([*first, *items])}
-
-
-def _pretty(key: str, value: Any) -> str:
-    if key in ONE_A_LINE:
-        rows = "".join(f"  {_inline(item)},\n" for item in value)
-        return f"[\n{rows}]"
-    return _inline(value)
 
 
 def _inline(value: Any) -> str:

@@ -43,19 +43,15 @@ def creased(mesh: TriangleMesh) -> TriangleMesh:
     weighted = np.cross(b - a, c - a)
     flat, near = _unit(weighted), np.ones(mesh.faces.shape, dtype=bool)
     for _ in range(2):  # the second mean excludes faces across sharp edges
-        smooth = _gathered(mesh, weighted, near)
+        total = np.zeros((len(mesh.vertices), 3))
+        for k in range(3):
+            np.add.at(total, mesh.faces[near[:, k], k], weighted[near[:, k]])
+        smooth = _unit(total)
         near = np.einsum("fi,fki->fk", flat, smooth[mesh.faces]) >= SHARP
     faces = mesh.faces.copy()
     faces[~near] = len(mesh.vertices) + np.arange(np.count_nonzero(~near))
     own = mesh.vertices[mesh.faces[~near]]
     return TriangleMesh(np.concatenate([mesh.vertices, own]), faces)
-
-
-def _gathered(mesh: TriangleMesh, weighted: Matrix, near: np.ndarray) -> Matrix:
-    total = np.zeros((len(mesh.vertices), 3))
-    for k in range(3):
-        np.add.at(total, mesh.faces[near[:, k], k], weighted[near[:, k]])
-    return _unit(total)
 
 
 def _unit(vectors: Matrix) -> Matrix:

@@ -94,20 +94,12 @@ def _joint(robot: RobotDescription, link: Link) -> Element:
     SubElement(element, "axis", xyz=_numbers(joint.axis))
     element.append(_limit(joint))
     if joint.damping or joint.frictionloss:
-        SubElement(
-            element,
-            "dynamics",
-            damping=_numbers(joint.damping),
-            friction=_numbers(joint.frictionloss),
-        )
+        damping, friction = _numbers(joint.damping), _numbers(joint.frictionloss)
+        SubElement(element, "dynamics", damping=damping, friction=friction)
     if joint.mimic is not None:
-        SubElement(
-            element,
-            "mimic",
-            joint=joint.mimic.joint,
-            multiplier=_numbers(joint.mimic.ratio),
-            offset=_numbers(joint.mimic.offset),
-        )
+        ratio, offset = _numbers(joint.mimic.ratio), _numbers(joint.mimic.offset)
+        leader = joint.mimic.joint
+        SubElement(element, "mimic", joint=leader, multiplier=ratio, offset=offset)
     return element
 
 
@@ -125,7 +117,14 @@ def _limit(joint: Joint) -> Element:
 def _link(robot: RobotDescription, link: Link, mesh_dir: Path | None) -> Element:
     element = Element("link", name=link.name)
     if link.mass > 0.0:
-        element.append(_inertial(link))
+        inertial = SubElement(element, "inertial")
+        inertial.append(_origin(pin.SE3(np.eye(3), np.asarray(link.com))))
+        SubElement(inertial, "mass", value=_numbers(link.mass))
+        keys = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+        moments: dict[str, str] = dict(
+            zip(keys, map(_numbers, link.inertia), strict=True)
+        )
+        SubElement(inertial, "inertia", moments)
     for kind, shapes in (("visual", link.visual), ("collision", link.collision)):
         for index, shape in enumerate(shapes):
             stem = f"{link.name}_{kind}{index}"
@@ -135,15 +134,6 @@ def _link(robot: RobotDescription, link: Link, mesh_dir: Path | None) -> Element
                 SubElement(item, "geometry").append(geometry)
                 if kind == "visual":
                     item.append(_material(robot, shape))
-    return element
-
-
-def _inertial(link: Link) -> Element:
-    element = Element("inertial")
-    element.append(_origin(pin.SE3(np.eye(3), np.asarray(link.com))))
-    SubElement(element, "mass", value=_numbers(link.mass))
-    xx, yy, zz, xy, xz, yz = (_numbers(v) for v in link.inertia)
-    SubElement(element, "inertia", ixx=xx, ixy=xy, ixz=xz, iyy=yy, iyz=yz, izz=zz)
     return element
 
 
@@ -175,11 +165,8 @@ def _primitives(
             yield own, Element("sphere", radius=_numbers(radius))
         case Cylinder(radius_to=None) | Capsule():
             pose, half = along_z(shape)
-            radius = _numbers(shape.radius)
-            yield (
-                se3_of(pose),
-                Element("cylinder", radius=radius, length=_numbers(2 * half)),
-            )
+            radius, length = _numbers(shape.radius), _numbers(2 * half)
+            yield se3_of(pose), Element("cylinder", radius=radius, length=length)
             if isinstance(shape, Capsule):
                 for end in (shape.start, shape.end):
                     ball = Element("sphere", radius=radius)

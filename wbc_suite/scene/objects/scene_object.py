@@ -76,6 +76,12 @@ class Part:
         if (self.surface is not None) != (self.kind == "mesh"):
             raise ConfigError("A part has a surface if, and only if, it is a mesh.")
 
+    @property
+    def own_density(self) -> float:
+        """Density, by default the material's, kg/m^3."""
+        default = material_named(self.material).density
+        return default if self.density is None else self.density
+
     def add_to(
         self, spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, *, visual: bool
     ) -> None:
@@ -83,9 +89,8 @@ class Part:
         geom = body.add_geom(name=name, pos=self.pos, quat=self.quat, rgba=self.color)
         if visual:
             geom.material = use_material(spec, self.material)
-        material = material_named(self.material)
-        geom.density = material.density if self.density is None else self.density
-        geom.friction = self.friction or material.friction
+        geom.density = self.own_density
+        geom.friction = self.friction or material_named(self.material).friction
         geom.group = DRAWN_GROUP if self.drawn else HIDDEN_GROUP
         if self.solid:
             geom.condim = SLIDING if self.kind == "box" else TORSION
@@ -190,17 +195,12 @@ class SceneObject:
     def with_mass(self, mass: float) -> "SceneObject":
         """Return it with its densities scaled to a mass, kg; children keep theirs."""
         factor = mass / float(self.compiled_alone().body_mass.sum())
-        parts = tuple(replace(p, density=factor * _density(p)) for p in self.parts)
+        parts = tuple(replace(p, density=factor * p.own_density) for p in self.parts)
         return replace(self, parts=parts)
 
     def fixed(self, pos: Vector3, quat: Quat = STANDING) -> "SceneObject":
         """Return it fixed to the world."""
         return replace(self, motion="fixed", pos=pos, quat=quat)
-
-
-def _density(part: Part) -> float:
-    given = part.density
-    return material_named(part.material).density if given is None else given
 
 
 def _add_hinge(body: mujoco.MjsBody, name: str, hinge: Hinge) -> None:
