@@ -139,20 +139,15 @@ class Conversion:
             classical[free.pinocchio] += np.cross(v[free.angular], v[free.pinocchio])
         return self.v_to_mujoco(qpos, classical)
 
-    def tau_to_pinocchio(self, qpos: Vector, tau: Vector) -> Vector:
-        """Return `tau_pin = B^-T tau_mj`, shape (nv,); B is orthogonal."""
-        return self.v_to_pinocchio(qpos, tau)
-
-    def tau_to_mujoco(
-        self, qpos: Vector, tau: Vector, out: Vector | None = None
-    ) -> Vector:
-        """Return generalised forces `tau_mj = B^T tau_pin`, full MuJoCo size."""
-        return self.v_to_mujoco(qpos, tau, out)
+    tau_to_pinocchio = v_to_pinocchio
+    """Convert generalised forces as velocities, `B^-T = B`, since B is orthogonal."""
+    tau_to_mujoco = v_to_mujoco
+    """Convert generalised forces as velocities."""
 
     def mass_matrix_to_mujoco(self, qpos: Vector, mass_matrix: Matrix) -> Matrix:
         """Return `M_mj = B^T M_pin B`, full MuJoCo size (nv, nv)."""
         half = self.jacobian_to_mujoco(qpos, mass_matrix)
-        return self.jacobian_to_mujoco(qpos, half[:, :].T.copy()).T
+        return self.jacobian_to_mujoco(qpos, half.T).T
 
     def jacobian_to_mujoco(self, qpos: Vector, jacobian: Matrix) -> Matrix:
         """Return `J_mj = J_pin B`, shape (m, nv of MuJoCo), from `aligned` axes."""

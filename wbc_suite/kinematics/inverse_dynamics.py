@@ -62,12 +62,8 @@ def compute_torques(
     """
     compute_joint_poses(robot)
     parents, columns, count = robot.parent, robot.jacobian, robot.parent.shape[0]
-    velocities, rates, forces = (
-        inertias.velocity,
-        inertias.acceleration,
-        inertias.force,
-    )
-    starts, counts = robot.v_start, robot.v_count
+    velocities, rates = inertias.velocity, inertias.acceleration
+    forces, starts, counts = inertias.force, robot.v_start, robot.v_count
     for j in range(1, count):
         velocity, rate = velocities[j], rates[j]
         for i in range(6):

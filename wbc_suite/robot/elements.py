@@ -183,10 +183,9 @@ class Sensor(FrozenModel):
 class Synergy(FrozenModel):
     """One gripper command that moves several joints from open to closed.
 
+    In an assembly a gripper has the name of its part.
+
     Attributes:
-        gripper: Name of the gripper; needed only in a component with several. In an
-            assembly a gripper has the name of its part.
-        open: Joint values when open; `closed` has the same joints.
         grasps: Commands (-1 open to 1 closed) before and after closing, by name of a
             grasp, such as `pinch`; -1 and 1 for other grasps. The frame of the same
             name, or else the `tcp`, gives the pose: the gripper approaches along z,
@@ -223,14 +222,8 @@ class Contacts(FrozenModel):
 class Root(Posed):
     """Connection of the robot's first link to the world.
 
-    Attributes:
-        kind: `fixed`; `planar` (slides along x and y, turns about z); `free`.
-        drive: Whether a planar base can move sideways (`holonomic`) or not
-            (`differential`).
-        actuated: Whether the planar joints have motors.
-        velocity: Speed limits of a moving root, m/s and rad/s.
-        effort: Force and torque limits of an actuated planar root, N and N m.
-        damping: Viscous friction of planar joints, N s/m and N m s/rad.
+    Limits and damping are for moving and turning: m/s and rad/s, N and N m, N s/m and
+    N m s/rad. A planar base that is not `holonomic` cannot move sideways.
     """
 
     kind: Literal["fixed", "planar", "free"] = "fixed"
@@ -263,15 +256,7 @@ class Root(Posed):
 
 
 class Elements(BaseModel):
-    """The elements that a component and a robot have in common.
-
-    The keys of tables are singular, as TOML writes them: `[[link]]`, `[[frame]]`.
-
-    Attributes:
-        links: Links, parents before children.
-        groups: Joint names by group, such as `right_arm`.
-        keyframes: Joint values by name of the posture; other joints are zero.
-    """
+    """The elements of a component and of a robot; keys of tables are singular."""
 
     model_config = FROZEN
 

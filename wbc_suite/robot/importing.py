@@ -78,7 +78,10 @@ def describe_import(
     Raises:
         DescriptionError: If the robot is inconsistent or unphysical.
     """
-    checked = [_link(fields, source) for fields in _without_chains(links)]
+    checked: list[Link] = []
+    for fields in _without_chains(links):
+        where = f"{source}: link '{fields['name']}'"
+        checked.append(parse_model(Link, fields, source=where, error=DescriptionError))
     _check_masses(checked, source)
     checked = _physical(checked, source, mend=mend_inertias)
     checked = _accept_implausible(checked, source)
@@ -109,11 +112,6 @@ def describe_import(
         return robot
     ready = robot.keyframes["ready"] | standing_legs(robot)
     return robot.model_copy(update={"keyframes": robot.keyframes | {"ready": ready}})
-
-
-def _link(fields: LinkFields, source: Path) -> Link:
-    where = f"{source}: link '{fields['name']}'"
-    return parse_model(Link, fields, source=where, error=DescriptionError)
 
 
 def _without_chains(links: Sequence[LinkFields]) -> Sequence[LinkFields]:

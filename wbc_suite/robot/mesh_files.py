@@ -3,6 +3,7 @@
 import hashlib
 import importlib
 import os
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -90,7 +91,11 @@ def skin_triangles(shape: SkinMesh) -> tuple[Matrix, Indices]:
             vertices, faces = data["vertices"], data["faces"]
     else:
         vertices, faces = _decimated(*_read_mesh(path, shape.scale))
-        _write_cache(kept, vertices, faces)
+        with suppress(OSError):  # the folder cannot be written
+            kept.parent.mkdir(parents=True, exist_ok=True)
+            part = kept.with_suffix(f".{os.getpid()}.npz")
+            np.savez_compressed(part, vertices=vertices.astype(np.float32), faces=faces)
+            part.replace(kept)
     return vertices.astype(np.float64), faces.astype(np.int64)
 
 
@@ -136,14 +141,3 @@ def _import_extra(name: str) -> Any:
             f"skin: meshes need {name.replace('_', '-')}, which is not installed. "
             "Install it with: pip install 'wbc-suite[skins]'"
         ) from None
-
-
-def _write_cache(path: Path, vertices: Matrix, faces: Indices) -> None:
-    """Store a decimated mesh, unless the folder cannot be written."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        part = path.with_suffix(f".{os.getpid()}.npz")
-        np.savez_compressed(part, vertices=vertices.astype(np.float32), faces=faces)
-        part.replace(path)
-    except OSError:
-        return

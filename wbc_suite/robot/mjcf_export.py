@@ -19,10 +19,9 @@ with a step of 2 ms. With MuJoCo's default of 20 ms a joint overshoots its limit
 STOP_SOLIMP = (0.95, 0.99, 0.001)
 """Smallest and largest impedance of joint limits, and the width between, m or rad."""
 STOP_MARGIN = 3e-3
-"""Distance in rad at which the limit of a limb joint becomes active. MuJoCo tests
-limits only at the start of a step (2 ms), and contacts accelerate joints to up to
-2.6 rad/s. Controllers keep limbs at least this far inside. Fingers rest at their limits
-and have no margin."""
+"""Distance in rad at which the limit of a limb joint becomes active, since MuJoCo tests
+limits only at the start of a step (2 ms), and contacts accelerate joints to 2.6 rad/s.
+Controllers keep limbs this far inside; fingers rest at their limits and have none."""
 SITE_GROUP = 4  # site group of frames, hidden by default
 
 STIFF = (0.005, 1.0)

@@ -39,10 +39,8 @@ VISUAL_GROUP = 2  # geom group of shapes that are only drawn
 COLLISION_GROUP = 3  # geom group of shapes that only collide
 
 STATED_SOLMIX = 1000.0
-"""Weight of a stated contact stiffness, so that it prevails over the default (1).
-
-With equal weights a pad sinks 3.4 mm into a cube of 0.1 kg; with this one 0.2 mm.
-"""
+"""Weight of a stated contact stiffness, so that it prevails over the default (1): a pad
+sinks 0.2 mm into a cube of 0.1 kg, and 3.4 mm with equal weights."""
 
 GREY = (0.5, 0.5, 0.52, 1.0)
 PALETTE = "palette"

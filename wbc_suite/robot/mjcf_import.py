@@ -147,7 +147,7 @@ class _Importer:
             sensors=list(self._sensors()),
             actuators=actuators,
             connects=list(self._connects()),
-            contacts={"exclude": self._excludes()},
+            contacts={"exclude": list(self._excludes())},
         )
 
     def _root(self) -> tuple[dict[str, Any], int | None]:

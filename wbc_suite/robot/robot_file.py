@@ -1,4 +1,7 @@
-"""Robot files (TOML): components, assemblies of components, and their JSON Schema."""
+"""Robot files (TOML): components, assemblies of components, and their JSON Schema.
+
+`docs/robots.md` is the reference of all keys.
+"""
 
 from functools import lru_cache
 from pathlib import Path
@@ -24,16 +27,7 @@ from wbc_suite.tomlfile import FrozenModel, parse_model, parse_toml, read_text
 
 
 class Header(FrozenModel):
-    """Name, kind and sources of a component.
-
-    Attributes:
-        kind: Its folder in the catalogue.
-        side: The only side that a hand fits; absent if it fits both.
-        extends: Another component of the same folder; tables of this file, such as
-            `synergy`, replace its tables.
-        source: Source of the figures, with their license.
-        deviations: Each deliberate difference from the source, with its reason.
-    """
+    """Name, kind (folder in the catalogue) and sources of a component."""
 
     name: Name
     kind: Literal["arm", "body", "gripper", "base"]
@@ -62,15 +56,8 @@ class Component(Elements):
 class Part(Posed):
     """One component of an assembly.
 
-    Attributes:
-        component: Catalogue name with folder, such as `gripper/panda_hand`, or a path
-            to a TOML file relative to the assembly's file.
-        on: Mount that carries it, `part.mount`; absent for the first part.
-        side: Prefix of the component's frames, groups, cameras and sensors, so that
-            `tcp` becomes `right_tcp`.
-        rename: Whether links and joints get that prefix too; by default if two parts
-            have the same component.
-        choice: Argument of `load_robot` that replaces the component.
+    If `rename` is absent, links and joints get the prefix of the side when two parts
+    have the same component.
     """
 
     name: Name
@@ -91,16 +78,7 @@ class AssemblyHeader(FrozenModel):
 
 
 class Assembly(FrozenModel):
-    """One assembly file, such as `robots/panda.toml`.
-
-    Attributes:
-        assembly: Name; `extends` names another assembly that this one changes.
-        parts: Components, each mounted on an earlier one.
-        root: Connection to the world; by default that of the first part.
-        lock: Groups whose joints are fixed at the `ready` posture.
-        keyframes: Postures of the whole robot; they override those of components.
-        contacts: Pairs of links, across components too, that never collide.
-    """
+    """One assembly file, such as `robots/panda.toml`; it overrides its parts."""
 
     format: Literal[1]
     assembly: AssemblyHeader

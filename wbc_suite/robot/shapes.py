@@ -202,11 +202,10 @@ class Hull(ShapeFields):
 class Loft(ShapeFields):
     """A surface over rings along one axis (visuals only; may be non-convex).
 
-    Attributes:
-        sections: Rows `[position, centre_u, centre_v, half_u, half_v]`; u and v are the
-            two other axes in the order x, y, z.
-        exponent: Superellipse exponent of a ring: 2 ellipse, 4 squircle, 8 nearly box.
-        smooth: Interpolate the rings by a smooth curve instead of lines.
+    Rows of `sections` are `[position, centre_u, centre_v, half_u, half_v]`; u and v are
+    the two other axes in the order x, y, z. The exponent is that of a superellipse: 2
+    ellipse, 4 squircle, 8 nearly box. `smooth` interpolates by a curve instead of
+    lines.
     """
 
     shape: Literal["loft"]

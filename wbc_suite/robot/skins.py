@@ -47,10 +47,7 @@ def _menagerie() -> Iterator[Path]:
 
 ROBOT_DATA = "cmeel.prefix/share/example-robot-data/robots"
 PROVIDERS: Mapping[str, tuple[str, Callable[[], Iterable[Path]]]] = {
-    "robosuite": (
-        "pip install --no-deps robosuite",
-        lambda: _module("robosuite"),
-    ),
+    "robosuite": ("pip install --no-deps robosuite", lambda: _module("robosuite")),
     "fourier_robot_descriptions": (
         "pip install --no-deps fourier-robot-descriptions",
         lambda: _module("fourier_robot_descriptions"),

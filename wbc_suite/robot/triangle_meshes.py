@@ -13,10 +13,7 @@ from wbc_suite.typing import Indices, Matrix, Vector
 
 RESOLUTION = ((0.006, 10, 4), (0.02, 16, 8), (math.inf, 28, 16))
 """Largest radius in m; segments around the axis; stacks from pole to pole, all even.
-
-Screws and fingers deviate from round by at most 0.4 mm, links of 5 cm by 0.3 mm. The
-largest resolution is that of MuJoCo's primitives.
-"""
+The largest are those of MuJoCo; fingers are round to 0.4 mm, links to 0.3 mm."""
 
 SHARP = 0.8  # cosine of the smallest angle of a sharp edge, as in MuJoCo
 

@@ -53,22 +53,16 @@ class MeshFolder:
             )
 
     def _find(self, filename: str) -> Path | None:
-        for candidate in self._candidates(filename):
-            path = inside(self._root, candidate, source=self._urdf)
-            if path.is_file():
-                return path
-        return None
-
-    def _candidates(self, filename: str) -> Iterator[Path]:
         scheme, separator, rest = filename.partition("://")
+        candidates: list[Path] = []
         if not separator:
-            yield self._urdf.parent / filename
+            candidates = [self._urdf.parent / filename]
         elif scheme == "file":
-            yield Path(rest)
+            candidates = [Path(rest)]
         elif scheme in ("package", "model"):
-            package, _, below = rest.partition("/")
-            yield self._root / package / below
-            yield self._root / below
+            candidates = [self._root / rest, self._root / rest.partition("/")[2]]
+        paths = (inside(self._root, c, source=self._urdf) for c in candidates)
+        return next((path for path in paths if path.is_file()), None)
 
 
 def _package_of(urdf: Path) -> Path:
@@ -100,10 +94,7 @@ class UrdfShapes:
                 self.colors[name] = tuple(np.clip(rgba, 0.0, 1.0).tolist())
 
     def of(self, link: Element) -> dict[str, list[dict[str, Any]]]:
-        """Return the shapes of a link.
-
-        If no visual shape can be read, the collision shapes are drawn.
-        """
+        """Return a link's shapes; without readable visuals, collision is drawn."""
         visual = [
             shape | {"color": self._color(item)}
             for item in link.findall("visual")

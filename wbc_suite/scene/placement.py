@@ -104,28 +104,21 @@ class UniformSampler:
         raise PlacementError(self._explain(*failed))
 
     def _place(self, rng: Generator, extent: Extent, taken: Taken) -> Placed | None:
-        (x0, x1), (y0, y1) = self._ends(extent)
-        if x0 <= x1 and y0 <= y1:
-            for _ in range(TRIES):
-                x, y = rng.uniform(x0, x1), rng.uniform(y0, y1)
-                yaw = rng.uniform(*self.region.yaw)
-                placed = self._at(x, y, yaw, extent)
-                if not any(placed.touches(o, self.region.gap) for o in taken.values()):
-                    return placed
+        region, (ox, oy, oz) = self.region, self.origin
+        kept = extent.radius if region.inside else 0.0
+        x0, x1 = region.x[0] + kept, region.x[1] - kept
+        y0, y1 = region.y[0] + kept, region.y[1] - kept
+        height = oz + region.clearance + extent.bottom
+        w, i, j, k = self.rest
+        for _ in range(TRIES if x0 <= x1 and y0 <= y1 else 0):
+            position = (ox + rng.uniform(x0, x1), oy + rng.uniform(y0, y1), height)
+            half = rng.uniform(*region.yaw) / 2
+            c, s = math.cos(half), math.sin(half)
+            quat = (c * w - s * k, c * i - s * j, c * j + s * i, c * k + s * w)
+            placed = Placed(position=position, quat=quat, extent=extent)
+            if not any(placed.touches(o, region.gap) for o in taken.values()):
+                return placed
         return None
-
-    def _ends(self, extent: Extent) -> tuple[tuple[float, float], tuple[float, float]]:
-        kept = extent.radius if self.region.inside else 0.0
-        (x0, x1), (y0, y1) = self.region.x, self.region.y
-        return (x0 + kept, x1 - kept), (y0 + kept, y1 - kept)
-
-    def _at(self, x: float, y: float, yaw: float, extent: Extent) -> Placed:
-        ox, oy, oz = self.origin
-        height = oz + self.region.clearance + extent.bottom
-        c, s = math.cos(yaw / 2), math.sin(yaw / 2)
-        w, i, j, k = self.rest  # turned by yaw
-        quat = (c * w - s * k, c * i - s * j, c * j + s * i, c * k + s * w)
-        return Placed(position=(ox + x, oy + y, height), quat=quat, extent=extent)
 
     def _explain(self, name: str, extent: Extent, taken: Mapping[str, Placed]) -> str:
         region = self.region
