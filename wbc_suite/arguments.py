@@ -11,25 +11,21 @@ import numpy as np
 from wbc_suite.errors import ConfigError, shortened
 from wbc_suite.typing import Array
 
-_REAL = "fiu"  # NumPy's kinds of real numbers
-
 
 def check_array(what: str, value: object, shape: tuple[int, ...] | None) -> Array:
     """Return real numbers as a float64 array, copied only if needed.
 
-    Args:
-        what: Owner and argument, for the message: "Task 'hand': the target".
-        value: Anything.
-        shape: Required shape; None for any.
+    `what` names owner and argument for the message: "Task 'hand': the target".
 
     Raises:
-        ConfigError: If the value is not an array of real numbers of that shape.
+        ConfigError: If the value is not an array of real numbers of that shape; any
+            shape is allowed if it is None.
     """
     try:
         array = np.asarray(value)
     except ValueError as error:  # rows of different lengths
         raise ConfigError(f"{what} is not an array: {_shown(value)}.") from error
-    if array.dtype.kind not in _REAL and array.size:
+    if array.dtype.kind not in "fiu" and array.size:  # float, int, unsigned
         raise ConfigError(f"{what} must hold real numbers, not {_shown(value)}.")
     if shape is not None and array.shape != shape:
         raise ConfigError(f"{what} has shape {array.shape}, but must have {shape}.")
@@ -47,27 +43,21 @@ def check_number(
 ) -> float:
     """Return a real number as a float.
 
-    Args:
-        what: Owner and argument, for the message.
-        value: Anything.
-        above: Exclusive lower bound.
-        least: Inclusive lower bound.
-        most: Inclusive upper bound.
-        allow_inf: Whether positive infinity is allowed, as in "no limit".
-
     Raises:
-        ConfigError: If it is not a number, or violates a bound.
+        ConfigError: If it is not a number, not greater than `above`, not from `least`
+            to `most`, or infinite; `allow_inf` permits +inf, as in "no limit".
     """
     number = float(check_array(what, value, ()))
     valid = above < number and least <= number <= most
     if not (valid and (math.isfinite(number) or allow_inf)):
-        rules = [
-            *(() if allow_inf else ("finite",)),
-            *((f"greater than {above:g}",) if above > -math.inf else ()),
-            *((f"at least {least:g}",) if least > -math.inf else ()),
-            *((f"at most {most:g}",) if most < math.inf else ()),
-        ]
-        raise ConfigError(f"{what} is {value}, but must be {', '.join(rules)}.")
+        rules = {
+            "finite": not allow_inf,
+            f"greater than {above:g}": above > -math.inf,
+            f"at least {least:g}": least > -math.inf,
+            f"at most {most:g}": most < math.inf,
+        }
+        shown = ", ".join(rule for rule, applies in rules.items() if applies)
+        raise ConfigError(f"{what} is {value}, but must be {shown}.")
     return number
 
 

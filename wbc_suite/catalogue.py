@@ -56,12 +56,7 @@ def _own_name(path: Path) -> str:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Catalogue:
-    """A list of folders with one layout; files of later folders take precedence.
-
-    Attributes:
-        root: The folder that holds `robots/`, `tasks/` and `controllers/`.
-        extra: Further folders with the same layout.
-    """
+    """Folders with `robots/`, `tasks/`, `controllers/`; later ones take precedence."""
 
     root: Path = field(default_factory=_default_root)
     extra: tuple[Path, ...] = field(default_factory=_default_extra)
@@ -77,12 +72,12 @@ class Catalogue:
 
     def names(self, folder: str) -> tuple[str, ...]:
         """Return the sorted file stems under a folder such as `robots/gripper`."""
-        return tuple(sorted({p.stem for p in self._files(folder)}))
+        return tuple(path.stem for path in self.files(folder))
 
     def files(self, folder: str) -> tuple[Path, ...]:
         """Return the files of `names`, in the same order."""
-        found = {p.stem: p for p in self._files(folder)}
-        return tuple(found[name] for name in self.names(folder))
+        found = {path.stem: path for path in self._files(folder)}
+        return tuple(found[name] for name in sorted(found))
 
     def called(self, folder: str) -> tuple[str, ...]:
         """Return the names that files declare, such as `Robotiq85Gripper`.
@@ -100,15 +95,11 @@ class Catalogue:
     ) -> Path:
         """Return the file with a name, ignoring case and underscores.
 
-        Args:
-            folder: Folder relative to a root, such as `robots` or `robots/arm`.
-            name: Name to look up.
-            kind: Kind of item for the error, such as "robot" or "gripper".
-            side: Side to insert into a name that lacks it: on the right, `InspireHand`
-                is the file `inspire_right_hand`.
+        A side is inserted into a name that lacks it: on the right, `InspireHand` is the
+        file `inspire_right_hand`.
 
         Raises:
-            UnknownNameError: If no folder has such a file.
+            UnknownNameError: If no folder has such a file; names the kind of item.
             ConfigError: If the folder leads out of the catalogue.
         """
         if ".." in Path(str(folder)).parts:

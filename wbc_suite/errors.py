@@ -6,17 +6,16 @@ what is allowed, and what to do.
 """
 
 import difflib
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from typing import TypeVar
 
-MAX_NAMES = 25
-"""Largest number of names in a message."""
+MAX_NAMES = 25  # largest number of names in a message
+
+T = TypeVar("T")
 
 
 def did_you_mean(name: str, known: Collection[str]) -> str:
-    """Return " Did you mean 'x'?" for the closest spelling, or "" if none is close.
-
-    Case is ignored.
-    """
+    """Return " Did you mean 'x'?" for the closest spelling, or ""; case is ignored."""
     folded = {k.casefold(): k for k in known}
     close = difflib.get_close_matches(name.casefold(), folded, n=1)
     return f" Did you mean '{folded[close[0]]}'?" if close else ""
@@ -49,7 +48,7 @@ class DescriptionError(ConfigError):
 class UnknownNameError(WbcError, LookupError):
     """A name is missing from the collection it was looked up in.
 
-    Attributes:
+    Args:
         kind: Kind of item, such as "robot".
         name: Name that was asked for.
         known: Existing names.
@@ -65,6 +64,14 @@ class UnknownNameError(WbcError, LookupError):
     def __reduce__(self) -> tuple[type, tuple[object, ...]]:
         """Support pickling, since vector environments send errors across processes."""
         return type(self), (self.kind, self.name, self.known)
+
+
+def look_up(kind: str, name: str, items: Mapping[str, T]) -> T:
+    """Return the item with a name; raises UnknownNameError."""
+    try:
+        return items[name]
+    except (KeyError, TypeError):
+        raise UnknownNameError(kind, name, items) from None
 
 
 class ActionError(WbcError, ValueError):

@@ -1,10 +1,7 @@
-"""Read TOML files into frozen pydantic models, with errors that name file and key.
-
-All files of the catalogue and of users are read by `load_model`, which enforces the
-size limit and words the errors.
-"""
+"""Read TOML files into frozen pydantic models, with errors that name file and key."""
 
 import json
+import re
 import tomllib
 import types
 import typing
@@ -20,7 +17,6 @@ MAX_BYTES = 4_000_000
 
 M = TypeVar("M", bound=BaseModel)
 
-
 FROZEN = ConfigDict(
     frozen=True, extra="forbid", allow_inf_nan=False, populate_by_name=True
 )
@@ -34,40 +30,34 @@ class FrozenModel(BaseModel):
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """Parse one TOML file.
-
-    Raises:
-        ConfigError: If the file is missing, too large, not UTF-8 or not TOML.
-    """
+    """Parse one TOML file; raises ConfigError."""
     return parse_toml(read_text(path), source=str(path))
 
 
-def read_text(path: Path) -> str:
-    """Read one text file.
-
-    Raises:
-        ConfigError: If the file is missing, too large or not UTF-8.
-    """
+def read_bytes(path: Path, *, most: int) -> bytes:
+    """Read a file; raises ConfigError if it is missing or too large."""
     try:
         size = path.stat().st_size
-        if size > MAX_BYTES:
+        if size > most:
             raise ConfigError(
-                f"{path}: the file has {size} bytes; at most {MAX_BYTES} are read. Is "
-                "this the right file?"
+                f"{path}: the file has {size} bytes; at most {most} are read. Is this "
+                "the right file?"
             )
-        return path.read_text(encoding="utf-8")
+        return path.read_bytes()
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read ({error.strerror}).") from error
+
+
+def read_text(path: Path) -> str:
+    """Read a text file; raises ConfigError if missing, too large or not UTF-8."""
+    try:
+        return read_bytes(path, most=MAX_BYTES).decode("utf-8")
     except UnicodeDecodeError as error:
         raise ConfigError(f"{path}: not a readable TOML file: {error}") from error
 
 
 def parse_toml(text: str, *, source: str) -> dict[str, Any]:
-    """Parse TOML text.
-
-    Raises:
-        ConfigError: If the text is not TOML.
-    """
+    """Parse TOML text; raises ConfigError."""
     try:
         return tomllib.loads(text)
     except RecursionError as error:
@@ -77,11 +67,7 @@ def parse_toml(text: str, *, source: str) -> dict[str, Any]:
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """Parse one JSON file that holds an object.
-
-    Raises:
-        ConfigError: If it is missing, too large, not JSON, or not an object.
-    """
+    """Parse one JSON file that holds an object; raises ConfigError."""
     text = read_text(path)
     try:
         found = json.loads(text, parse_constant=_no_constant)
@@ -98,11 +84,7 @@ def _no_constant(text: str) -> float:
 
 
 def load_model(model: type[M], path: Path) -> M:
-    """Read one TOML file into a model.
-
-    Raises:
-        ConfigError: Names file, key, value, the rule, and the nearest legal name.
-    """
+    """Read one TOML file into a model; raises ConfigError as `parse_model` does."""
     return parse_model(model, read_toml(path), source=str(path))
 
 
@@ -116,15 +98,9 @@ def parse_model(
 ) -> M:
     """Validate plain data against a model.
 
-    Args:
-        model: Model of the data.
-        data: Tables as `parse_toml` returns them.
-        source: File or item, for the message.
-        within: Key of the data in the file, where it is a part of it.
-        error: Class of the error.
-
     Raises:
-        ConfigError: Names source, key, value and rule of the first faults.
+        ConfigError: Or another `error`. Names the source (a file or an item), key,
+            value and rule of the first faults; `within` is the key of the data in it.
     """
     try:
         return model.model_validate(data)
@@ -154,6 +130,12 @@ def _explain(model: type[BaseModel], item: Any, within: str) -> str:
     return f"{where}{message}.{hint}"
 
 
+_TYPE_NAME = re.compile(
+    r"(constrained-|tuple\[|literal\[|list\[).*|float|int|str|bool|none"
+)
+"""Pydantic's names of types, which stand among the keys of a location."""
+
+
 def _resolve(
     loc: tuple[int | str, ...], model: type[BaseModel]
 ) -> tuple[str, list[type[BaseModel]]]:
@@ -170,7 +152,7 @@ def _resolve(
         tagged = [m for m in models if part in _tags(m)]
         if tagged and len(models) > 1:
             models = tagged
-        elif models or not _is_type_name(part):
+        elif models or not _TYPE_NAME.fullmatch(part):
             text += f".{part}" if text else part
             models = _value_models(models, part)
     return text, models
@@ -184,13 +166,6 @@ def _tags(model: type[BaseModel]) -> tuple[object, ...]:
             if len(literals) == 1 or name == "type":
                 return literals
     return ()
-
-
-def _is_type_name(part: str) -> bool:
-    """Whether a part of a location is pydantic's name of a type instead of a key."""
-    return part.startswith(("constrained-", "tuple[", "literal[", "list[")) or part in (
-        *("float", "int", "str", "bool", "none"),
-    )
 
 
 def _value_models(models: list[type[BaseModel]], key: str) -> list[type[BaseModel]]:

@@ -7,7 +7,7 @@ import pinocchio as pin
 
 from wbc_suite.arguments import check_array
 from wbc_suite.compiling import as_argument
-from wbc_suite.errors import ConfigError, UnknownNameError
+from wbc_suite.errors import ConfigError, look_up
 from wbc_suite.kinematics.forward import (
     JointKind,
     RobotArrays,
@@ -16,14 +16,12 @@ from wbc_suite.kinematics.forward import (
     pack_pose,
     robot_arrays,
 )
-from wbc_suite.kinematics.tangent_space import TangentSpace
 from wbc_suite.typing import Indices, Matrix, Vector
 
 Axes = Literal["local", "aligned", "world"]
 """Axes of a Jacobian: the frame's own, world axes at the frame, world at its origin."""
 
-UNLIMITED = 1e6
-"""rad or m; joints with a greater limit have none."""
+UNLIMITED = 1e6  # rad or m; joints with a greater limit have none
 
 _REFERENCE = {
     "local": pin.ReferenceFrame.LOCAL,
@@ -36,15 +34,11 @@ _ROOT_NAMES = ("root_x", "root_y", "root_yaw")
 class Configuration:
     """Joint positions q with everything that follows from them.
 
-    `update` takes new positions; what follows from them is computed when it is first
-    asked for, and read off from then on. Twists are linear first, then angular.
-
-    Args:
-        model: The Pinocchio model; shared, not copied.
-        q: Joint positions, shape (nq,); the neutral ones when absent.
+    What follows from them is computed when it is first asked for. Twists are linear
+    first, then angular. The Pinocchio model is shared, not copied.
 
     Attributes:
-        q: Joint positions, shape (nq,); move them with `update`.
+        q: Joint positions, shape (nq,), neutral by default; move them with `update`.
         arrays: What compiled kernels read and write.
         robot: The argument of kernels that stands for `arrays`.
         root_linear: Velocity indices that translate a free or planar root.
@@ -61,7 +55,9 @@ class Configuration:
         self.model = model
         self._data: pin.Data = model.createData()
         self.nq, self.nv = int(model.nq), int(model.nv)
-        self._tangent = TangentSpace(model)
+        # The configurations of most robots are a vector space; others have quaternions
+        # or joints that turn without end.
+        self._is_vector_space = self.nq == self.nv
         self.arrays: RobotArrays = robot_arrays(model)
         self.robot = as_argument(self.arrays)
         self.q: Vector = self.arrays.q
@@ -73,11 +69,7 @@ class Configuration:
         self.update(self.q if q is None else q)
 
     def update(self, q: Vector) -> None:
-        """Move to q.
-
-        Args:
-            q: Joint positions, shape (nq,). Values are taken as they are; the task
-                stack answers positions that are not finite by holding still.
+        """Move to q, shape (nq,), whose values are not checked.
 
         Raises:
             ConfigError: If the shape is wrong.
@@ -89,15 +81,12 @@ class Configuration:
         """Discard what was computed from q, after q itself was written to."""
         self.arrays.is_current.fill(0)
         if self._by_pinocchio:  # it has joints that the kernels do not know
-            self._copy_from_pinocchio()
-
-    def _copy_from_pinocchio(self) -> None:
-        data, arrays = self.data, self.arrays
-        for row, T in zip(arrays.pose, data.oMi, strict=True):
-            row[:] = pack_pose(T)
-        # Pinocchio gives a single column as a vector.
-        arrays.jacobian[:] = data.J.reshape(6, self.nv).T
-        arrays.is_current[0] = 1
+            data, arrays = self.data, self.arrays
+            for row, T in zip(arrays.pose, data.oMi, strict=True):
+                row[:] = pack_pose(T)
+            # Pinocchio gives a single column as a vector.
+            arrays.jacobian[:] = data.J.reshape(6, self.nv).T
+            arrays.is_current[0] = 1
 
     @property
     def data(self) -> pin.Data:
@@ -109,51 +98,37 @@ class Configuration:
 
     @property
     def joint_poses(self) -> Matrix:
-        """Joint poses in the world, shape (njoints, 12), a view.
-
-        The rotation column by column, then the position.
-        """
+        """Joint poses in the world, shape (njoints, 12), a view; see `pack_pose`."""
         compute_joint_poses(self.robot)
         return self.arrays.pose
 
     @property
     def joint_jacobians(self) -> Matrix:
-        """Joint Jacobians, transposed, shape (nv, 6), a view.
-
-        World axes at the world's origin.
-        """
+        """Transposed joint Jacobians in `world` axes, shape (nv, 6), a view."""
         compute_joint_poses(self.robot)
         return self.arrays.jacobian
 
     def integrate(self, dq: Vector) -> Vector:
         """Return `q (+) dq`: the configuration reached by the tangent step dq (nv,)."""
-        return self._tangent.integrate(self.q, self._checked("dq", dq, self.nv))
+        dq = self._checked("dq", dq, self.nv)
+        if self._is_vector_space:
+            return self.q + dq
+        return pin.integrate(self.model, self.q, dq)
 
     def difference(self, q: Vector) -> Vector:
         """Return `q (-) self.q`, shape (nv,): the tangent step from here to q."""
-        return self._tangent.difference(self.q, self._checked("q", q, self.nq))
+        q = self._checked("q", q, self.nq)
+        if self._is_vector_space:
+            return q - self.q
+        return pin.difference(self.model, self.q, q)
 
     def frame_id(self, name: str) -> int:
-        """Return the index of a frame.
-
-        Raises:
-            UnknownNameError: If the model has no such frame.
-        """
-        try:
-            return self._frame_ids[name]
-        except (KeyError, TypeError):
-            raise UnknownNameError("frame", name, self._frame_ids) from None
+        """Return the index of a frame; raises UnknownNameError."""
+        return look_up("frame", name, self._frame_ids)
 
     def joint_id(self, name: str) -> int:
-        """Return the index of a joint.
-
-        Raises:
-            UnknownNameError: If the model has no such joint.
-        """
-        try:
-            return self._joint_ids[name]
-        except (KeyError, TypeError):
-            raise UnknownNameError("joint", name, self._joint_ids) from None
+        """Return the index of a joint; raises UnknownNameError."""
+        return look_up("joint", name, self._joint_ids)
 
     def velocity_names(self) -> tuple[str, ...]:
         """Return one name for each velocity; "root[3]" for joints with several."""
@@ -191,17 +166,11 @@ class Configuration:
         return pin.updateFramePlacement(self.model, self.data, k).copy()
 
     def frame_jacobian(self, frame: str | int, axes: Axes = "local") -> Matrix:
-        """Return a frame's Jacobian, shape (6, nv), linear rows first.
-
-        `J v` is the frame's twist: in its own axes ("local"), in world axes at the
-        frame's origin ("aligned"), or the spatial twist ("world").
-        """
+        """Return a frame's Jacobian, shape (6, nv): `J v` is its twist in the axes."""
         k = self._resolve(frame)
-        if axes not in tuple(_REFERENCE):
-            raise UnknownNameError("axes", axes, _REFERENCE)
-        data = self.data
+        reference, data = look_up("axes", axes, _REFERENCE), self.data
         pin.updateFramePlacement(self.model, data, k)
-        J = pin.getFrameJacobian(self.model, data, k, _REFERENCE[axes])
+        J = pin.getFrameJacobian(self.model, data, k, reference)
         return J.reshape(6, self.nv)
 
     @property

@@ -21,7 +21,7 @@ Sources: MuJoCo documentation, "Computation: floating objects"; Pinocchio's
 `JointModelFreeFlyer`. Each statement is tested numerically against both engines.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -31,15 +31,17 @@ from wbc_suite.errors import DescriptionError, UnknownNameError
 from wbc_suite.kinematics.configuration import named_joints
 from wbc_suite.typing import Indices, Matrix, Vector
 
-_FREE_Q = [0, 1, 2, 4, 5, 6, 3]  # where x y z qx qy qz qw stand in MuJoCo's qpos
-_BALL_Q = [1, 2, 3, 0]
+_Q_ORDER = {
+    int(mujoco.mjtJoint.mjJNT_FREE): [0, 1, 2, 4, 5, 6, 3],
+    int(mujoco.mjtJoint.mjJNT_BALL): [1, 2, 3, 0],
+}
+"""Where Pinocchio's parameters of a joint stand among MuJoCo's; [0] for the others."""
 
 
-@dataclass(frozen=True, slots=True)
-class _FreeJoint:
-    """Where one free joint sits: first indices in qpos and both velocities."""
+class _FreeJoint(NamedTuple):
+    """The parts of one free joint in MuJoCo's and Pinocchio's arrays."""
 
-    quaternion: Indices  # of w x y z in qpos, shape (4,)
+    quaternion: slice  # w x y z in qpos
     mujoco: slice  # linear part of qvel
     pinocchio: slice  # linear part of v
     angular: slice  # angular part of v
@@ -48,14 +50,10 @@ class _FreeJoint:
 class Conversion:
     """Conversion between a MuJoCo model and a Pinocchio model of one robot.
 
-    Joints are matched by name. The MuJoCo model may hold more than the robot (objects,
-    a second robot): on its side arrays have the full size, and entries that belong to
-    no Pinocchio joint are left at zero, or untouched when `out` is given.
-
-    Args:
-        mujoco_model: The compiled MuJoCo model.
-        pinocchio_model: The Pinocchio model.
-        prefix: Text before each joint name on the MuJoCo side ("robot0_").
+    Joints are matched by name, after a prefix on the MuJoCo side ("robot0_"). That
+    model may hold more than the robot (objects, a second robot): on its side arrays
+    have the full size, and entries that belong to no Pinocchio joint are left at zero,
+    or untouched when `out` is given.
 
     Raises:
         UnknownNameError: A Pinocchio joint has no namesake in the MuJoCo model.
@@ -80,7 +78,7 @@ class Conversion:
             k = names[prefix + name]
             q0 = int(mujoco_model.jnt_qposadr[k])
             v0 = int(mujoco_model.jnt_dofadr[k])
-            order = _q_order(int(mujoco_model.jnt_type[k]))
+            order = _Q_ORDER.get(mujoco_model.jnt_type[k], [0])
             if (joint.nq, joint.nv) != (len(order), max(1, len(order) - 1)):
                 raise DescriptionError(
                     f"Joint '{name}' has {joint.nq} parameters and {joint.nv} "
@@ -88,15 +86,8 @@ class Conversion:
                     "Build continuous joints as one-parameter revolute joints."
                 )
             if len(order) == 7:
-                iv = joint.idx_v
-                free.append(
-                    _FreeJoint(
-                        quaternion=np.arange(q0 + 3, q0 + 7),
-                        mujoco=slice(v0, v0 + 3),
-                        pinocchio=slice(iv, iv + 3),
-                        angular=slice(iv + 3, iv + 6),
-                    )
-                )
+                starts = ((q0 + 3, 4), (v0, 3), (joint.idx_v, 3), (joint.idx_v + 3, 3))
+                free.append(_FreeJoint(*(slice(i, i + n) for i, n in starts)))
             q_index += [q0 + i for i in order]
             v_index += [v0 + i for i in range(joint.nv)]
         self.q_index: Indices = np.array(q_index, dtype=np.int64)
@@ -131,8 +122,8 @@ class Conversion:
     def a_to_pinocchio(self, qpos: Vector, qvel: Vector, qacc: Vector) -> Vector:
         """Return Pinocchio's acceleration: `a_lin = R^T a_world - w x v_body`.
 
-        With `qacc = 0` and `pin.rnea(model, data, q, v, a)` it also yields the bias
-        force: `bias_mj = B^T rnea(q, v, a)`.
+        With `qacc = 0`, `pin.rnea` of it gives the bias force: `bias_mj = B^T rnea(q,
+        v, a)`.
         """
         v = self.v_to_pinocchio(qpos, qvel)
         a = self.v_to_pinocchio(qpos, qacc)
@@ -148,44 +139,23 @@ class Conversion:
             classical[free.pinocchio] += np.cross(v[free.angular], v[free.pinocchio])
         return self.v_to_mujoco(qpos, classical)
 
-    def tau_to_pinocchio(self, qpos: Vector, tau: Vector) -> Vector:
-        """Return generalised forces `tau_pin = B^-T tau_mj`, shape (nv,).
-
-        B is orthogonal, so forces turn as velocities do.
-        """
-        return self.v_to_pinocchio(qpos, tau)
-
-    def tau_to_mujoco(
-        self, qpos: Vector, tau: Vector, out: Vector | None = None
-    ) -> Vector:
-        """Return generalised forces `tau_mj = B^T tau_pin`, full MuJoCo size."""
-        return self.v_to_mujoco(qpos, tau, out)
+    tau_to_pinocchio = v_to_pinocchio
+    """Convert generalised forces as velocities, `B^-T = B`, since B is orthogonal."""
+    tau_to_mujoco = v_to_mujoco
+    """Convert generalised forces as velocities."""
 
     def mass_matrix_to_mujoco(self, qpos: Vector, mass_matrix: Matrix) -> Matrix:
         """Return `M_mj = B^T M_pin B`, full MuJoCo size (nv, nv)."""
         half = self.jacobian_to_mujoco(qpos, mass_matrix)
-        return self.jacobian_to_mujoco(qpos, half[:, :].T.copy()).T
+        return self.jacobian_to_mujoco(qpos, half.T).T
 
     def jacobian_to_mujoco(self, qpos: Vector, jacobian: Matrix) -> Matrix:
-        """Return `J_mj = J_pin B`, shape (m, nv of MuJoCo).
-
-        MuJoCo's `mj_jac*` functions give world axes at the point: compare them with
-        Pinocchio's LOCAL_WORLD_ALIGNED.
-        """
+        """Return `J_mj = J_pin B`, shape (m, nv of MuJoCo), from `aligned` axes."""
         out = np.zeros((jacobian.shape[0], self.nv_mujoco))
         out[:, self.v_index] = jacobian
         for free in self._free:
             out[:, free.mujoco] = jacobian[:, free.pinocchio] @ _rotation(qpos, free).T
         return out
-
-
-def _q_order(joint_type: int) -> list[int]:
-    """Return where Pinocchio's parameters stand among MuJoCo's, one joint."""
-    if joint_type == mujoco.mjtJoint.mjJNT_FREE:
-        return _FREE_Q
-    if joint_type == mujoco.mjtJoint.mjJNT_BALL:
-        return _BALL_Q
-    return [0]
 
 
 def _rotation(qpos: Vector, free: _FreeJoint) -> Matrix:

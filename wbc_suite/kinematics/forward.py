@@ -1,7 +1,6 @@
 """Forward kinematics, joint Jacobians and centre of mass, compiled.
 
-Tests hold these kernels to Pinocchio at 1e-12: `pin.computeJointJacobians`,
-`pin.jacobianCenterOfMass`. They are kernels so that compiled loops can call them.
+Tests hold these kernels to Pinocchio at 1e-12.
 """
 
 from enum import IntEnum
@@ -25,11 +24,8 @@ class RobotArrays(NamedTuple):
         q: Joint positions, shape (nq,).
         is_current: Whether joint poses with Jacobians, the centre of mass, and
             Pinocchio's data belong to the present q, shape (3,).
-        kind: `JointKind` of each joint.
-        parent: Parent of each joint.
-        q_start: First position of each joint.
-        v_start: First velocity of each joint.
-        v_count: Number of velocities of each joint.
+        kind: `JointKind` of each joint; then its parent, first position, first velocity
+            and number of velocities.
         mount: Pose of each joint in its parent at q = 0, shape (njoints, 12).
         axis: Axis of each joint, shape (njoints, 3).
         mass: Mass that each joint carries itself, kg.
@@ -87,7 +83,13 @@ _KINDS = {
 def robot_arrays(model: pin.Model) -> RobotArrays:
     """Return the arrays of a model at its neutral configuration, not yet computed."""
     count, nv = int(model.njoints), int(model.nv)
-    kind, axis = _kinds_and_axes(model)
+    kind = np.full(count, JointKind.OTHER, dtype=np.int64)
+    axis = np.zeros((count, 3))
+    for j, joint in enumerate(list(model.joints)[1:], start=1):
+        name = joint.shortname().removeprefix("JointModel")
+        if name in _KINDS:
+            kind[j], fixed = _KINDS[name]
+            axis[j] = joint.extract().axis if fixed is None else fixed
     pose = np.zeros((count, 12))
     pose[0] = pack_pose(pin.SE3.Identity())
     return RobotArrays(
@@ -114,25 +116,12 @@ def pack_pose(T: pin.SE3) -> Vector:
     return np.concatenate([T.rotation.T.ravel(), T.translation])
 
 
-def _kinds_and_axes(model: pin.Model) -> tuple[Indices, Matrix]:
-    """Return kind and axis of each joint, the universe first."""
-    kinds = np.full(len(model.joints), JointKind.OTHER, dtype=np.int64)
-    axes = np.zeros((len(model.joints), 3))
-    for j, joint in enumerate(list(model.joints)[1:], start=1):
-        name = joint.shortname().removeprefix("JointModel")
-        if name in _KINDS:
-            kinds[j], axis = _KINDS[name]
-            axes[j] = joint.extract().axis if axis is None else axis
-    return kinds, axes
-
-
 @compiled
 def compute_joint_poses(robot: RobotArrays) -> None:
     """Compute joint poses and Jacobians from q, unless they are current.
 
     A joint's pose is `T_parent T_mount T_joint(q)`. The column of a revolute joint with
-    the axis a and the origin p is `(p x a, a)`, of a prismatic one `(a, 0)`. No joint
-    but the universe may be of kind `OTHER`.
+    the axis a and the origin p is `(p x a, a)`, of a prismatic one `(a, 0)`.
     """
     if robot.is_current[0]:
         return

@@ -56,23 +56,14 @@ def compute_torques(
 
         v_j = v_parent + S qd,    a_j = a_parent + S qdd + v_j x S qd.
 
-    Args:
-        robot: The robot; its joint poses are computed where they are not current.
-        inertias: Its inertia.
-        v: Velocities, shape (nv,).
-        a: Accelerations, shape (nv,).
-        tau: Output, torques and forces, shape (nv,).
+    v, a and the output tau have the shape (nv,).
 
     Source: Featherstone (2008), "Rigid Body Dynamics Algorithms", section 5.3.
     """
     compute_joint_poses(robot)
     parents, columns, count = robot.parent, robot.jacobian, robot.parent.shape[0]
-    velocities, rates, forces = (
-        inertias.velocity,
-        inertias.acceleration,
-        inertias.force,
-    )
-    starts, counts = robot.v_start, robot.v_count
+    velocities, rates = inertias.velocity, inertias.acceleration
+    forces, starts, counts = inertias.force, robot.v_start, robot.v_count
     for j in range(1, count):
         velocity, rate = velocities[j], rates[j]
         for i in range(6):

@@ -4,7 +4,6 @@ Tests hold the kernels to Pinocchio: `pin.integrate` and `pin.difference`.
 """
 
 import numpy as np
-import pinocchio as pin
 
 from wbc_suite.compiling import compiled
 from wbc_suite.kinematics.forward import JointKind, RobotArrays
@@ -20,10 +19,7 @@ def integrate_joints(robot: RobotArrays, dq: Vector) -> None:
 
 @compiled
 def integrate(robot: RobotArrays, q: Vector, dq: Vector) -> None:
-    """Move a configuration of the robot in place: `q (+) dq`.
-
-    No joint but the universe may be of kind `OTHER`.
-    """
+    """Move q in place: `q (+) dq`; the robot has no joint of kind `OTHER`."""
     kinds, q_start, v_start = robot.kind, robot.q_start, robot.v_start
     for j in range(1, kinds.shape[0]):
         k, i = q_start[j], v_start[j]
@@ -35,10 +31,7 @@ def integrate(robot: RobotArrays, q: Vector, dq: Vector) -> None:
 
 @compiled
 def difference(robot: RobotArrays, origin: Vector, q: Vector, out: Vector) -> None:
-    """Write the step from one configuration to another, `q (-) origin`, shape (nv,).
-
-    No joint but the universe may be of kind `OTHER`.
-    """
+    """Write `q (-) origin`, shape (nv,); the robot has no joint of kind `OTHER`."""
     kinds, q_start, v_start = robot.kind, robot.q_start, robot.v_start
     for j in range(1, kinds.shape[0]):
         k, i = q_start[j], v_start[j]
@@ -122,29 +115,3 @@ def _integrate_free(q: Vector, dq: Vector) -> None:
     norm = np.sqrt(q[3] ** 2 + q[4] ** 2 + q[5] ** 2 + q[6] ** 2)
     for n in range(3, 7):  # of both signs, the one nearer to the quaternion before
         q[n] /= norm if u >= 0.0 else -norm
-
-
-class TangentSpace:
-    """The `(+)` and `(-)` of a model's configurations.
-
-    Most robots' configurations are a vector space; those with quaternions, or with
-    joints that turn without end, are not, and Pinocchio knows how.
-
-    Args:
-        model: Pinocchio model.
-    """
-
-    def __init__(self, model: pin.Model) -> None:
-        self._model = None if model.nq == model.nv else model
-
-    def integrate(self, q: Vector, step: Vector) -> Vector:
-        """Return `q (+) step`, shape (nq,)."""
-        if self._model is None:
-            return q + step
-        return pin.integrate(self._model, q, step)
-
-    def difference(self, origin: Vector, q: Vector) -> Vector:
-        """Return `q (-) origin`, shape (nv,): the tangent step from there to q."""
-        if self._model is None:
-            return q - origin
-        return pin.difference(self._model, origin, q)

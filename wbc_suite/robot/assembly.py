@@ -1,6 +1,5 @@
 """Join components into one robot."""
 
-import itertools
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -19,6 +18,7 @@ from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.elements import Elements, Frame, Link, Mount, Root, Synergy
 from wbc_suite.robot.poses import compose
 from wbc_suite.robot.robot_file import (
+    SOURCES,
     Assembly,
     Component,
     Header,
@@ -31,8 +31,8 @@ from wbc_suite.tomlfile import parse_model
 
 LISTS = ("frames", "cameras", "actuators", "sensors", "connects")
 """Lists of a component that are joined in an assembly."""
-SOURCES = ("name", "title", "source", "license", "deviations")
-"""Fields of a component's header that its robot has as well."""
+TABLES = ("groups", "keyframes", "materials", "synergies", "skins")
+"""Fields of a robot that are joined by name."""
 
 
 def describe_component(
@@ -88,13 +88,6 @@ def assemble(
 ) -> RobotDescription:
     """Read an assembly file and mount its parts.
 
-    Args:
-        path: The assembly's file.
-        catalogue: Where components are looked up.
-        gripper: Other grippers: a name for all, or a mapping from side to name.
-        base: Another base.
-        skins: Finds the meshes to draw.
-
     Raises:
         DescriptionError: If a part, a mount or a name does not fit.
         UnknownNameError: If a component does not exist.
@@ -147,24 +140,24 @@ class _Builder:
         self, path: Path, catalogue: Catalogue, skins: SkinFinder | None
     ) -> None:
         self._path, self._catalogue, self._finder = path, catalogue, skins
-        self._root = Root()
-        self._links: list[Link] = []
         self._mounts: dict[str, Mount] = {}
         self._headers: list[Header] = []
-        self._lists: dict[str, list[Any]] = {key: [] for key in LISTS}
-        self._groups: dict[str, tuple[str, ...]] = {}
-        self._keyframes: dict[str, dict[str, float]] = {}
-        self._materials: dict[str, Any] = {}
-        self._synergies: dict[str, tuple[Synergy, ...]] = {}
-        self._skins: dict[str, tuple[SkinMesh, ...]] = {}
+        self._links: list[Link] = []
         self._excludes: list[tuple[str, str]] = []
+        self._fields: dict[str, Any] = {key: [] for key in LISTS}
+        self._fields |= {key: {} for key in TABLES}
 
     def mount(self, part: Part, *, shared: bool) -> None:
         """Add one component."""
         component = self.read(part)
         bodies = self._prefix(part, component, shared=shared)
-        colors = self._renamed_colors(component, part.name)
-        self._skins |= _skins(component, self._finder, bodies, colors)
+        fields, known = self._fields, self._fields["materials"]
+        colors = {  # a name that has another colour elsewhere gets a prefix
+            name: f"{part.name}_{name}"
+            for name, color in component.materials.items()
+            if known.get(name, color) != color
+        }
+        fields["skins"] |= _skins(component, self._finder, bodies, colors)
         component = prefixed(
             recolored(component, colors),
             items=f"{part.side}_" if part.side else "",
@@ -172,20 +165,19 @@ class _Builder:
             part=part.name,
         )
         links = depth_first(component.links)
-        if not self._links:
-            self._root = component.root
+        fields.setdefault("root", component.root)
         first = links[0].model_copy(update=self._placement(part, links[0]))
         self._links += [first, *links[1:]]
         for mount in component.mounts:
             self._mounts[f"{part.name}.{mount.name}"] = mount
-        for key, items in self._lists.items():
-            items.extend(getattr(component, key))
+        for key in LISTS:
+            fields[key] += getattr(component, key)
         for group, joints in component.groups.items():
-            self._groups[group] = (*self._groups.get(group, ()), *joints)
+            fields["groups"][group] = (*fields["groups"].get(group, ()), *joints)
         self._add_keyframes(component.keyframes)
-        self._materials |= component.materials
+        fields["materials"] |= component.materials
+        fields["synergies"] |= _by_gripper(component.synergies, part.name)
         self._excludes += component.contacts.exclude
-        self._synergies |= _by_gripper(component.synergies, part.name)
         self._headers.append(component.component)
 
     def add_bare_tcp(self, part: Part) -> None:
@@ -196,7 +188,7 @@ class _Builder:
         name = f"{part.side}_tcp" if part.side else "tcp"
         fields = {"name": name, "link": mount.link, "role": "tcp"}
         frame = Frame.model_validate(fields | compose(mount, part))
-        self._lists["frames"].append(frame)
+        self._fields["frames"].append(frame)
 
     def read(self, part: Part) -> Component:
         """Read the component of a part."""
@@ -225,11 +217,6 @@ class _Builder:
         fitting = (c for c in choices if not any(c + name in taken for name in own))
         return choices[0] if part.rename is False else next(fitting, choices[0])
 
-    def _renamed_colors(self, component: Component, part: str) -> dict[str, str]:
-        """Return new names for materials whose name has another colour elsewhere."""
-        own, known = component.materials, self._materials
-        return {n: f"{part}_{n}" for n, c in own.items() if known.get(n, c) != c}
-
     def _placement(self, part: Part, link: Link) -> dict[str, Any]:
         if not self._links:
             return {}
@@ -246,36 +233,31 @@ class _Builder:
         return compose(mount, part, link) | {"parent": mount.link}
 
     def _add_keyframes(self, keyframes: Mapping[str, dict[str, float]]) -> None:
+        known = self._fields["keyframes"]
         for name, values in keyframes.items():
-            self._keyframes[name] = self._keyframes.get(name, {}) | values
+            known[name] = known.get(name, {}) | values
 
     def finish(self, assembly: Assembly) -> RobotDescription:
         """Return the validated robot."""
         self._add_keyframes(assembly.keyframes)
-        header = assembly.assembly
-        deviations = itertools.chain(*(own.deviations for own in self._headers))
-        data: dict[str, Any] = {
-            key: [*items, *getattr(assembly, key, ())]
-            for key, items in self._lists.items()
-        }
-        data |= {
+        fields, header = self._fields, assembly.assembly
+        for key in LISTS:
+            fields[key] += getattr(assembly, key, ())
+        fields |= {
             "name": header.name,
             "title": header.title,
             "source": _joined(own.source for own in self._headers),
             "license": _joined(own.license for own in self._headers),
-            "deviations": (*deviations, *header.deviations),
-            "root": assembly.root or self._root,
+            "deviations": [
+                text for own in (*self._headers, header) for text in own.deviations
+            ],
+            "root": assembly.root or fields.get("root", Root()),
             "links": depth_first(tuple(self._links)),
-            "groups": self._groups,
-            "keyframes": self._keyframes,
-            "materials": self._materials,
-            "synergies": self._synergies,
-            "skins": self._skins,
             "contacts": {"exclude": (*self._excludes, *assembly.contacts.exclude)},
         }
-        data = locked(data, assembly.lock)
+        fields = locked(fields, assembly.lock)
         return parse_model(
-            RobotDescription, data, source=str(self._path), error=DescriptionError
+            RobotDescription, fields, source=str(self._path), error=DescriptionError
         )
 
 
@@ -288,11 +270,7 @@ def _names(link: Link) -> tuple[str, ...]:
 
 
 def _located(part: Part, folder: Path) -> Part:
-    """Return the part with an absolute path to its component's file.
-
-    Raises:
-        ConfigError: If the path leaves the folder of the assembly.
-    """
+    """Return the part with an absolute path below the assembly's folder."""
     if not is_path(part.component):
         return part
     path = (folder / part.component).resolve()

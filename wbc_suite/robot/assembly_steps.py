@@ -4,8 +4,9 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
+from pydantic import BaseModel
 
-from wbc_suite.errors import UnknownNameError
+from wbc_suite.errors import look_up
 from wbc_suite.robot.elements import Link
 from wbc_suite.robot.poses import joint_motion, pose_fields, se3_of
 from wbc_suite.robot.shapes import Shape, SkinMesh
@@ -14,14 +15,11 @@ if TYPE_CHECKING:
     from wbc_suite.robot.robot_file import Component
 
 S = TypeVar("S", bound=Shape | SkinMesh)
+M = TypeVar("M", bound=BaseModel)
 
 
 def depth_first(links: tuple[Link, ...]) -> tuple[Link, ...]:
-    """Order links depth-first, as both engines number their joints.
-
-    Links that are not connected to the root come last, in their own order; the
-    validation reports them.
-    """
+    """Order links depth-first, as engines number joints; unconnected ones come last."""
     children: dict[str | None, list[Link]] = {}
     for link in links:
         children.setdefault(link.parent, []).append(link)
@@ -43,12 +41,11 @@ def prefixed(
 ) -> "Component":
     """Prefix the names of a component.
 
-    Args:
-        component: The component.
-        items: Prefix of frames, cameras, sensors and groups.
-        bodies: Prefix of links and joints.
-        part: New name of a group `gripper`.
+    Links and joints get `bodies`; frames, cameras, sensors and groups get `items`. A
+    group `gripper` gets the name of the part.
     """
+    in_link: dict[str, str] = dict.fromkeys(("name", "parent", "joint"), bodies)
+    elsewhere: dict[str, str] = dict.fromkeys(("link", "other", "joint"), bodies)
 
     def all_of(names: Iterable[str]) -> tuple[str, ...]:
         return tuple(bodies + name for name in names)
@@ -57,7 +54,8 @@ def prefixed(
         return {bodies + joint: value for joint, value in positions.items()}
 
     update: dict[str, Any] = {
-        "links": tuple(_prefixed_link(link, bodies) for link in component.links),
+        "links": tuple(_prefixed(link, in_link) for link in component.links),
+        "mounts": tuple(_prefixed(mount, elsewhere) for mount in component.mounts),
         "groups": {
             (part if group == "gripper" else items + group): all_of(joints)
             for group, joints in component.groups.items()
@@ -70,40 +68,23 @@ def prefixed(
             s.model_copy(update={"open": values(s.open), "closed": values(s.closed)})
             for s in component.synergies
         ),
-        "mounts": tuple(
-            mount.model_copy(update={"link": bodies + mount.link})
-            for mount in component.mounts
-        ),
     }
-    prefixes = {"name": items, "frame": items}
-    prefixes |= dict.fromkeys(("link", "other", "joint"), bodies)
+    elsewhere |= {"name": items, "frame": items}
     for field in ("frames", "cameras", "sensors", "actuators", "connects"):
-        update[field] = tuple(
-            item.model_copy(
-                update={
-                    key: prefix + getattr(item, key)
-                    for key, prefix in prefixes.items()
-                    if hasattr(item, key)
-                }
-            )
-            for item in getattr(component, field)
-        )
+        own = getattr(component, field)
+        update[field] = tuple(_prefixed(item, elsewhere) for item in own)
     return component.model_copy(update=update)
 
 
-def _prefixed_link(link: Link, prefix: str) -> Link:
-    if not prefix:
-        return link
-    update: dict[str, Any] = {"name": prefix + link.name}
-    if link.parent is not None:
-        update["parent"] = prefix + link.parent
-    if link.joint is not None:
-        joint: dict[str, Any] = {"name": prefix + link.joint.name}
-        if link.joint.mimic is not None:
-            leader = prefix + link.joint.mimic.joint
-            joint["mimic"] = link.joint.mimic.model_copy(update={"joint": leader})
-        update["joint"] = link.joint.model_copy(update=joint)
-    return link.model_copy(update=update)
+def _prefixed(item: M, prefixes: Mapping[str, str]) -> M:
+    """Prefix the names under some keys of an item, and of the models in it."""
+    update: dict[str, Any] = {}
+    for key, value in item:
+        if isinstance(value, BaseModel):
+            update[key] = _prefixed(value, prefixes)
+        elif isinstance(value, str) and key in prefixes:
+            update[key] = prefixes[key] + value
+    return item.model_copy(update=update)
 
 
 def recolored(component: "Component", colors: Mapping[str, str]) -> "Component":
@@ -129,21 +110,8 @@ def with_colors(shapes: tuple[S, ...], colors: Mapping[str, str]) -> tuple[S, ..
 
 
 def locked(data: dict[str, Any], groups: tuple[str, ...]) -> dict[str, Any]:
-    """Fix the joints of some groups at their `ready` values.
-
-    Args:
-        data: Fields of a `RobotDescription`.
-        groups: Names of groups.
-
-    Raises:
-        UnknownNameError: If a group does not exist.
-    """
-    if not groups:
-        return data
-    for group in groups:
-        if group not in data["groups"]:
-            raise UnknownNameError("group", group, data["groups"])
-    names = {joint for group in groups for joint in data["groups"][group]}
+    """Fix joints of groups, in fields of a description, at their `ready` values."""
+    names = {j for group in groups for j in look_up("group", group, data["groups"])}
     names |= {
         link.joint.name
         for link in data["links"]

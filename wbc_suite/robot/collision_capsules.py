@@ -1,8 +1,6 @@
 """Capsules and spheres that enclose collision shapes, for the QP's distance limits.
 
-A capsule distance takes six multiplications, a mesh distance takes a search. The
-controller keeps the capsules apart and the simulator collides the exact shapes. Each
-capsule encloses its shape, so separated capsules mean separated shapes.
+Each capsule encloses its shape, which the simulator collides exactly.
 """
 
 import itertools
@@ -17,19 +15,14 @@ from wbc_suite.robot.shape_geometry import hull_spheres, support_points
 from wbc_suite.robot.shapes import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
 from wbc_suite.typing import Matrix, Vector
 
-MAX_STRIPS = 4
-"""Largest number of parallel capsules for a flat box."""
+MAX_STRIPS = 4  # largest number of parallel capsules for a flat box
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class EnclosingCapsule:
-    """All points within `radius` of a segment.
+    """All points within `radius` of a segment in a link's frame, m.
 
-    Attributes:
-        link: Link that carries it.
-        start: One end of the segment in the link's frame, m, shape (3,).
-        end: The other end; equal to `start` for a sphere.
-        radius: Radius, m.
+    The ends have the shape (3,) and are equal for a sphere.
     """
 
     link: str
@@ -40,30 +33,24 @@ class EnclosingCapsule:
 
 def enclosing_capsules(robot: RobotDescription) -> tuple[EnclosingCapsule, ...]:
     """Compute the capsules around all collision shapes, in the order of the links."""
-    capsules: list[EnclosingCapsule] = []
-    for link in robot.links:
-        for shape in link.collision:
-            rotation, offset = rotation_matrix(shape), np.asarray(shape.pos)
-            for start, end, radius in _capsules(shape):
-                capsules.append(
-                    EnclosingCapsule(
-                        link=link.name,
-                        start=offset + rotation @ start,
-                        end=offset + rotation @ end,
-                        radius=radius,
-                    )
-                )
-    return tuple(capsules)
+    return tuple(
+        EnclosingCapsule(
+            link=link.name,
+            start=np.asarray(shape.pos) + rotation_matrix(shape) @ start,
+            end=np.asarray(shape.pos) + rotation_matrix(shape) @ end,
+            radius=radius,
+        )
+        for link in robot.links
+        for shape in link.collision
+        for start, end, radius in _capsules(shape)
+    )
 
 
 def collision_spheres(robot: RobotDescription) -> dict[str, Matrix]:
-    """Return the spheres whose hulls are the collision shapes, by link.
+    """Return the spheres whose hulls are the collision shapes, for links that have any.
 
-    The lowest sphere gives a shape's exact height over a plane. Links without
-    collision shapes are left out.
-
-    Returns:
-        For each link rows x, y, z in the link's frame and the radius, m, shape (n, 4).
+    Rows are x, y, z in the link's frame and the radius, m, shape (n, 4). The lowest
+    sphere gives a shape's exact height over a plane.
     """
     return {
         link.name: np.concatenate([_in_link(shape) for shape in link.collision])
@@ -80,9 +67,8 @@ def _in_link(shape: Shape) -> Matrix:
 def collision_pairs(robot: RobotDescription) -> frozenset[frozenset[str]]:
     """Return the pairs of links that can collide with each other.
 
-    Excluded are pairs on one rigid body, neighbours over a joint, the pairs of
-    `contacts.exclude`, and pairs of links of one gripper. All but the last are
-    the simulator's own rules.
+    By the simulator's rules these are not links of one rigid body, neighbours over a
+    joint and pairs of `contacts.exclude`. Links of one gripper are left out as well.
     """
     rigid = rigid_bodies(robot.links)
     parent = {link.name: rigid[link.parent] for link in robot.links if link.parent}
@@ -140,8 +126,7 @@ def _around_cylinder(start: Vector, end: Vector, radius: float) -> Segment:
     """Return the capsule of least volume on a cylinder's axis.
 
     Its segment ends a distance `u` before the cylinder's end faces. Its radius reaches
-    their rims: `rho^2 = r^2 + u^2`. With u = 0 a flat cylinder would grow by its radius
-    at either face.
+    their rims: `rho^2 = r^2 + u^2`.
     """
     length = float(np.linalg.norm(end - start))
     u = np.linspace(0.0, length / 2, 101)

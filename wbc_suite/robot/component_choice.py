@@ -14,7 +14,6 @@ Choice = str | Mapping[str, str] | None
 """A component for every side, or one per side; None keeps those of the assembly."""
 
 Reader = Callable[[Part], Component]
-"""Reads the component of a part."""
 
 
 def choose(
@@ -25,19 +24,7 @@ def choose(
     read: Reader,
     catalogue: Catalogue,
 ) -> Assembly:
-    """Return the assembly with the caller's components in place of its own.
-
-    Args:
-        assembly: The assembly of the file.
-        gripper: A gripper for all sides, or a mapping from side to gripper.
-        base: A base.
-        read: Reads a part's component.
-        catalogue: Where alternatives for the error messages are looked up.
-
-    Raises:
-        DescriptionError: If the robot has no place for it, or it fits the other hand.
-        UnknownNameError: If no such component exists.
-    """
+    """Return the assembly with the caller's components in place of its own."""
     for kind, choice in (("gripper", gripper), ("base", base)):
         _check(assembly, kind, choice)
     parts = tuple(_replaced(assembly.parts, {"gripper": gripper, "base": base}))

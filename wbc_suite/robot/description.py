@@ -1,12 +1,11 @@
 """`RobotDescription`: a complete robot, and the exports to each engine."""
 
-from collections.abc import Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import Field, model_validator
 
-from wbc_suite.errors import DescriptionError, UnknownNameError
+from wbc_suite.errors import DescriptionError, look_up
 from wbc_suite.robot.elements import Elements, Frame, Joint, Link, Name, Synergy
 from wbc_suite.robot.shapes import Shape, SkinMesh
 from wbc_suite.robot.validation import check_description
@@ -15,15 +14,7 @@ from wbc_suite.tomlfile import parse_model
 if TYPE_CHECKING:
     import mujoco
 
-T = TypeVar("T")
 _SIDES = {"right", "left"}
-
-
-def _find(kind: str, name: str, items: Mapping[str, T]) -> T:
-    try:
-        return items[name]
-    except (KeyError, TypeError):
-        raise UnknownNameError(kind, name, items) from None
 
 
 class RobotDescription(Elements):
@@ -31,15 +22,9 @@ class RobotDescription(Elements):
 
     It is validated on construction: names are unique, inertias are physical, references
     resolve. The MuJoCo and the Pinocchio model built from it have the same joint names
-    and one velocity index per joint, in the same order. `Elements` has the other
-    attributes.
+    and one velocity index per joint, in the same order.
 
     Attributes:
-        name: Name of the robot.
-        title: Display name.
-        source: Source of the figures.
-        license: Licence of the figures.
-        deviations: Each deliberate difference from the source, with its reason.
         synergies: Gripper commands, by gripper.
         skins: Meshes drawn instead of a link's visual shapes, see `robot.skins`.
     """
@@ -70,12 +55,9 @@ class RobotDescription(Elements):
     @property
     def root_joint_names(self) -> tuple[str, ...]:
         """Names of the root's joints: none, three (planar) or one (free)."""
-        names: dict[str, tuple[str, ...]] = {
-            "fixed": (),
-            "planar": ("root_x", "root_y", "root_yaw"),
-            "free": ("root",),
-        }
-        return names[self.root.kind]
+        if self.root.kind == "free":
+            return ("root",)
+        return tuple(joint.name for joint in self.root.joints)
 
     @cached_property
     def dof(self) -> int:
@@ -91,8 +73,7 @@ class RobotDescription(Elements):
     def hands(self) -> dict[str, str]:
         """Frame of each hand by side, or by frame name if it has no side.
 
-        This is the frame with role `tcp`, or `eef` on a side without gripper. The
-        right hand comes first.
+        It has the role `tcp`, or `eef` on a side without gripper; right comes first.
         """
         tcp, eef = self._sided("tcp"), self._sided("eef")
         if tcp:  # other `eef` frames are not further hands
@@ -115,15 +96,15 @@ class RobotDescription(Elements):
 
     def link(self, name: str) -> Link:
         """Return a link by name; raises UnknownNameError."""
-        return _find("link", name, self._links_by_name)
+        return look_up("link", name, self._links_by_name)
 
     def joint(self, name: str) -> Joint:
         """Return a joint by name; raises UnknownNameError."""
-        return _find("joint", name, {joint.name: joint for joint in self.joints})
+        return look_up("joint", name, {joint.name: joint for joint in self.joints})
 
     def frame(self, name: str) -> Frame:
         """Return a frame by name; raises UnknownNameError."""
-        return _find("frame", name, {frame.name: frame for frame in self.frames})
+        return look_up("frame", name, {frame.name: frame for frame in self.frames})
 
     def drawn(self, link: Link) -> tuple[Shape | SkinMesh, ...]:
         """Return the skin of a link, or else its visual shapes."""
@@ -135,11 +116,11 @@ class RobotDescription(Elements):
 
     def group(self, name: str) -> tuple[str, ...]:
         """Return the joints of a group; raises UnknownNameError."""
-        return _find("group", name, self.groups)
+        return look_up("group", name, self.groups)
 
     def keyframe(self, name: str) -> dict[str, float]:
         """Return the values of all joints in a posture; followers are computed."""
-        given = _find("keyframe", name, self.keyframes)
+        given = look_up("keyframe", name, self.keyframes)
         values = dict.fromkeys(self.joint_names, 0.0) | given
         for joint in self.joints:
             if joint.mimic is not None:
@@ -148,10 +129,7 @@ class RobotDescription(Elements):
         return values
 
     def to_mjspec(self) -> "mujoco.MjSpec":
-        """Build the MuJoCo specification, which can be compiled or attached.
-
-        Physics options keep MuJoCo's defaults; the scene sets them.
-        """
+        """Build the MuJoCo specification; physics options keep MuJoCo's defaults."""
         from wbc_suite.robot.mjcf_export import build_mjspec
 
         return build_mjspec(self)
@@ -165,8 +143,7 @@ class RobotDescription(Elements):
     def to_pinocchio(self) -> Any:
         """Build the Pinocchio model (`pinocchio.Model`) without geometry.
 
-        Mimic joints are independent joints here, so that nv and the order of velocities
-        equal those of MuJoCo.
+        Mimic joints are independent, so that velocities are ordered as in MuJoCo.
         """
         from wbc_suite.robot.pinocchio_export import build_pinocchio
 
@@ -187,17 +164,7 @@ class RobotDescription(Elements):
     def with_root(
         self, kind: Literal["fixed", "planar", "free"], **changes: Any
     ) -> "RobotDescription":
-        """Return the robot with another root.
-
-        Args:
-            kind: Kind of the root.
-            changes: Other fields of `Root`.
-
-        Raises:
-            DescriptionError: If a field of the root is invalid.
-        """
-        data: dict[str, Any] = {
-            key: getattr(self, key) for key in type(self).model_fields
-        }
+        """Return the robot with another kind, and other fields, of its root."""
+        data = {key: getattr(self, key) for key in type(self).model_fields}
         data["root"] = self.root.model_dump() | {"kind": kind} | changes
         return parse_model(type(self), data, source=self.name, error=DescriptionError)

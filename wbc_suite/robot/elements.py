@@ -4,7 +4,6 @@ Each model is one table of a component's TOML file; `docs/robots.md` is the refe
 the format. SI units, radians, quaternions w x y z. A link's frame is at its joint.
 """
 
-import math
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal, TypeAlias
 
@@ -14,11 +13,10 @@ from pydantic import (
     BeforeValidator,
     Field,
     PositiveInt,
-    field_validator,
     model_validator,
 )
 
-from wbc_suite.robot.shapes import ROUNDING, Posed, Real, Shape, Vector3
+from wbc_suite.robot.shapes import Axis, Posed, Real, Shape, Vector3
 from wbc_suite.tomlfile import FROZEN, FrozenModel
 
 Name: TypeAlias = Annotated[
@@ -29,8 +27,6 @@ Positive: TypeAlias = Annotated[float, Field(gt=0.0, le=1e9)]
 NotNegative: TypeAlias = Annotated[float, Field(ge=0.0, le=1e9)]
 Command: TypeAlias = Annotated[float, Field(ge=-1.0, le=1.0)]
 Moment: TypeAlias = Annotated[float, Field(ge=-1e6, le=1e6)]
-
-
 Channel: TypeAlias = Annotated[float, Field(ge=0.0, le=1.0)]
 Rgb: TypeAlias = tuple[Channel, Channel, Channel]
 
@@ -66,12 +62,8 @@ Limits: TypeAlias = Annotated[Range, AfterValidator(_rising)]
 class Mimic(FrozenModel):
     """A joint that follows another: `q = ratio * q_joint + offset`.
 
-    Attributes:
-        joint: The leading joint.
-        ratio: Motion of this joint per unit of the leader's motion.
-        offset: Position of this joint when the leader is at zero.
-        closed: Whether a `[[connect]]` enforces the relation in MuJoCo. MuJoCo then
-            gets no second constraint; other engines use this relation.
+    If it is `closed`, a `[[connect]]` enforces the relation in MuJoCo, which gets no
+    second constraint; other engines use this relation.
     """
 
     joint: Name
@@ -83,24 +75,20 @@ class Mimic(FrozenModel):
 class Joint(FrozenModel):
     """One degree of freedom between a link and its parent.
 
+    Units are rad and N m for a hinge, m and N for a slide; limits may be absent.
+
     Attributes:
-        name: Unique name.
-        type: `hinge` (radians) or `slide` (metres).
         axis: Axis in the link's frame; normalised on reading.
-        range: Position limits; absent for an unlimited joint.
-        velocity: Largest speed, rad/s or m/s.
-        acceleration: Largest acceleration, rad/s^2 or m/s^2; optional.
-        effort: Largest torque or force, N m or N; a joint without effort has no motor.
+        effort: Largest torque or force; a joint without effort has no motor.
         armature: Rotor inertia seen at the joint, kg m^2 or kg.
-        damping: Viscous friction, N m s/rad or N s/m (MuJoCo only).
-        frictionloss: Dry friction, N m or N (MuJoCo only).
-        mimic: Coupling to a leading joint.
+        damping: Viscous friction (MuJoCo only).
+        frictionloss: Dry friction (MuJoCo only).
         passive: A joint without motor that belongs to no group, such as a caster.
     """
 
     name: Name
     type: Literal["hinge", "slide"] = "hinge"
-    axis: Vector3 = (0.0, 0.0, 1.0)
+    axis: Axis = (0.0, 0.0, 1.0)
     range: Limits | None = None
     velocity: Positive | None = None
     acceleration: Positive | None = None
@@ -116,30 +104,17 @@ class Joint(FrozenModel):
         """Whether the joint follows no other and is not passive."""
         return self.mimic is None and not self.passive
 
-    @field_validator("axis")
-    @classmethod
-    def _normalise_axis(cls, axis: Vector3) -> Vector3:
-        norm = math.hypot(*axis)
-        if abs(norm - 1.0) > 1e-3:
-            raise ValueError(f"an axis must have length 1, this one has {norm:.6g}")
-        if abs(norm - 1.0) < ROUNDING:
-            return axis
-        x, y, z = (component / norm for component in axis)
-        return (x, y, z)
-
 
 class Link(Posed):
     """A rigid body; `pos` and `quat` place its frame in its parent's frame.
 
     Attributes:
-        name: Unique name.
         parent: Parent link; absent for the root of a component.
         mass: Mass in kg; a link with a joint needs one.
         com: Centre of mass in the link's frame, m.
         inertia: Inertia about the centre of mass in the link's axes, kg m^2, in the
             order xx yy zz xy xz yz.
         joint: Joint to the parent; absent for a fixed link.
-        visual: Shapes to draw.
         collision: Shapes to collide with (primitives and hulls).
         accept: Plausibility rules (`com`, `inertia`) that this link may violate, each
             with the reason.
@@ -174,14 +149,7 @@ class Mount(Posed):
 
 
 class Camera(Posed):
-    """A camera; it looks along its -z axis with y up, as in MuJoCo.
-
-    Attributes:
-        name: Unique name.
-        link: Link that carries it.
-        fovy: Vertical field of view, degrees (the unit of MuJoCo).
-        resolution: Width and height in pixels.
-    """
+    """A camera; it looks along -z with y up and a vertical field of view in degrees."""
 
     name: Name
     link: Name
@@ -192,13 +160,8 @@ class Camera(Posed):
 class Actuator(FrozenModel):
     """An actuator that differs from the default of one torque motor per joint.
 
-    Attributes:
-        joint: Joint that it drives.
-        kind: `motor` takes a torque, `position` a setpoint with gains kp and kd,
-            `velocity` a speed with gain kd.
-        kp: Stiffness, N m/rad or N/m.
-        kd: Damping, N m s/rad or N s/m.
-        effort: Largest effort; the joint's own when absent.
+    A `motor` takes a torque, `position` a setpoint with gains kp and kd, `velocity` a
+    speed with gain kd. The effort limit is the joint's own when absent.
     """
 
     joint: Name
@@ -220,12 +183,9 @@ class Sensor(FrozenModel):
 class Synergy(FrozenModel):
     """One gripper command that moves several joints from open to closed.
 
+    In an assembly a gripper has the name of its part.
+
     Attributes:
-        name: Unique name within the gripper.
-        gripper: Name of the gripper; needed only in a component with several. In an
-            assembly a gripper has the name of its part.
-        open: Joint values when open.
-        closed: The same joints' values when closed.
         grasps: Commands (-1 open to 1 closed) before and after closing, by name of a
             grasp, such as `pinch`; -1 and 1 for other grasps. The frame of the same
             name, or else the `tcp`, gives the pose: the gripper approaches along z,
@@ -262,14 +222,8 @@ class Contacts(FrozenModel):
 class Root(Posed):
     """Connection of the robot's first link to the world.
 
-    Attributes:
-        kind: `fixed`; `planar` (slides along x and y, turns about z); `free`.
-        drive: Whether a planar base can move sideways (`holonomic`) or not
-            (`differential`).
-        actuated: Whether the planar joints have motors.
-        velocity: Speed limits of a moving root, m/s and rad/s.
-        effort: Force and torque limits of an actuated planar root, N and N m.
-        damping: Viscous friction of planar joints, N s/m and N m s/rad.
+    Limits and damping are for moving and turning: m/s and rad/s, N and N m, N s/m and
+    N m s/rad. A planar base that is not `holonomic` cannot move sideways.
     """
 
     kind: Literal["fixed", "planar", "free"] = "fixed"
@@ -279,26 +233,30 @@ class Root(Posed):
     effort: tuple[Positive, Positive] = (2000.0, 1000.0)
     damping: tuple[NotNegative, NotNegative] = (0.0, 0.0)
 
+    @property
+    def joints(self) -> tuple[Joint, ...]:
+        """The joints of a planar root (x, y, yaw); none for other kinds."""
+        if self.kind != "planar":
+            return ()
+        return tuple(
+            Joint(
+                name=name,
+                type="hinge" if k else "slide",
+                axis=axis,
+                velocity=self.velocity[k],
+                effort=self.effort[k],
+                damping=self.damping[k],
+            )
+            for name, axis, k in (
+                ("root_x", (1.0, 0.0, 0.0), 0),
+                ("root_y", (0.0, 1.0, 0.0), 0),
+                ("root_yaw", (0.0, 0.0, 1.0), 1),
+            )
+        )
+
 
 class Elements(BaseModel):
-    """The elements that a component and a robot have in common.
-
-    The keys of tables are singular, as TOML writes them: `[[link]]`, `[[frame]]`.
-
-    Attributes:
-        materials: Colours by name, red green blue alpha; alpha may be left out.
-        links: Links, parents before children.
-        frames: Named poses on links.
-        mounts: Poses where components can be mounted.
-        cameras: Cameras.
-        actuators: Actuators that differ from the default.
-        sensors: Sensors.
-        connects: Closed loops.
-        groups: Joint names by group, such as `right_arm`.
-        keyframes: Joint values by name of the posture; other joints are zero.
-        contacts: Pairs of links that do not collide.
-        root: Connection of the first link to the world.
-    """
+    """The elements of a component and of a robot; keys of tables are singular."""
 
     model_config = FROZEN
 

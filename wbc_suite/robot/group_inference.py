@@ -1,7 +1,7 @@
 """Infer groups, end-effector frames and a ready posture of an imported robot.
 
-URDF and MJCF define neither. The inference uses the words of link and joint names and
-the structure of the tree. Users edit the result after `to_toml()`.
+The words of link and joint names, and the structure of the tree, give them. Users edit
+the result after `to_toml()`.
 """
 
 import re
@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from wbc_suite.robot.elements import Frame, Joint, Link, rigid_bodies
+from wbc_suite.robot.elements import Frame, Link, rigid_bodies
 
 if TYPE_CHECKING:
     from wbc_suite.robot.importing import NameTable
@@ -55,13 +55,7 @@ END_WORDS = {
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Limb:
-    """Joints of one arm, gripper, head, torso, base, or of all legs.
-
-    Attributes:
-        name: Name of the group, such as `right_arm`.
-        kind: One of `KINDS`.
-        links: Links that its joints move, in depth-first order.
-    """
+    """Joints of one arm, gripper, head, torso or base, or of all legs."""
 
     name: str
     kind: str
@@ -87,8 +81,7 @@ def infer_limbs(links: Sequence[Link]) -> tuple[Limb, ...]:
 
     A link without a known word in its names belongs to the limb of its parent. Branches
     of an arm form a gripper; a chain below a torso or the root is an arm. A single arm
-    is the right one, as everywhere in this package. Several arms without a side are
-    numbered.
+    is the right one; several arms without a side are numbered.
     """
     traits = _traits(links)
     arms = list(dict.fromkeys(x.top for x in traits.values() if x.kind == "arm"))
@@ -125,7 +118,10 @@ def _traits(links: Sequence[Link]) -> dict[str, _Traits]:
         above = traits.get(parent or "", _Traits())
         words = [*_words(link.joint.name), *_words(link.name)]
         kind = next((KIND_OF[w] for w in words if w in KIND_OF), None)
-        kind = kind or _inherited_kind(above.kind, branches=owners.count(parent) > 1)
+        if kind is None and above.kind == "arm" and owners.count(parent) > 1:
+            kind = "gripper"
+        elif kind is None:
+            kind = above.kind if above.kind in ("leg", "gripper", "head") else "arm"
         same_limb = above.kind in ("arm", "leg", "gripper")
         side = above.side if same_limb else ""
         if not (kind == "gripper" and same_limb):  # "left finger" of a right hand
@@ -133,12 +129,6 @@ def _traits(links: Sequence[Link]) -> dict[str, _Traits]:
         top = above.top if above.kind == kind else link.name
         traits[link.name] = _Traits(kind, side, top)
     return traits
-
-
-def _inherited_kind(above: str, *, branches: bool) -> str:
-    if above == "arm" and branches:
-        return "gripper"
-    return above if above in ("arm", "leg", "gripper", "head") else "arm"
 
 
 def infer_frames(
@@ -149,8 +139,8 @@ def infer_frames(
 ) -> tuple[Frame, ...]:
     """Return the given frames, and `eef`, `foot`, `head`, `torso` at the limbs' ends.
 
-    A given frame of the right name is used. Otherwise a new frame is placed at a given
-    frame or link with a word of `END_WORDS`. A gripper gets a `tcp` only there.
+    A new frame is placed at a given frame or link with a word of `END_WORDS`, or else
+    at the tip. A gripper gets a `tcp` only in the first case.
     """
     frames = {frame.name: frame for frame in given}
     for limb in limbs:
@@ -182,13 +172,12 @@ def infer_role(name: str) -> str:
 
 def infer_ready(links: Sequence[Link]) -> dict[str, float]:
     """Return a posture with each joint at the value in its range nearest to zero."""
-    joints = [link.joint for link in links if link.joint is not None]
-    return {j.name: _nearest_zero(j) for j in joints if j.independent}
-
-
-def _nearest_zero(joint: Joint) -> float:
-    low, high = joint.range or (0.0, 0.0)
-    return min(max(0.0, low), high)
+    ready: dict[str, float] = {}
+    for joint in (link.joint for link in links):
+        if joint is not None and joint.independent:
+            low, high = joint.range or (0.0, 0.0)
+            ready[joint.name] = min(max(0.0, low), high)
+    return ready
 
 
 def _words(name: str) -> list[str]:
@@ -236,11 +225,7 @@ def _depth(name: str | None, above: dict[str, str | None]) -> int:
 def _placed(
     links: Sequence[Link], limb: Limb, tip: Link, given: Sequence[Frame]
 ) -> dict[str, Any] | None:
-    """Return the pose of an inferred frame: at a frame or link with an end word.
-
-    Otherwise it is at the tip. For a gripper the palm is searched, and the result is
-    None if no word is found.
-    """
+    """Return the pose of an inferred frame; None for a gripper without an end word."""
     rigid = rigid_bodies(links)
     if limb.kind == "gripper":
         palm = rigid[str(limb.links[0].parent)]

@@ -24,38 +24,28 @@ from wbc_suite.tomlfile import parse_model
 
 LOG = logging.getLogger(__name__)
 
-LinkFields: TypeAlias = dict[str, Any]
-"""Fields of one `Link`, before validation."""
+LinkFields: TypeAlias = dict[str, Any]  # fields of one `Link`, before validation
 
 MAX_NAME = 70
 """Characters kept of a name in the file; our limit of 80 leaves room for a suffix."""
-OVERLAP = 1e-3
-"""Smallest penetration in m that counts as an overlap."""
+OVERLAP = 1e-3  # smallest penetration in m that counts as an overlap
 MAX_JOINTS_BETWEEN = 3
 """Largest number of joints between overlapping links that are excluded from contact.
 Links farther apart, such as an arm and the trunk, overlap because of the posture."""
-MAX_MESSAGE = 800
-"""Largest number of characters of a list in a message."""
+MAX_MESSAGE = 800  # largest number of characters of a list in a message
 
 
 class NameTable:
-    """Assigns unique names of letters, digits and `_`.
+    """Assigns names of letters, digits and `_`, unique over links, joints and frames.
 
-    URDF has separate names for links and joints, and allows any character; ours are
-    unique together. Equal files give equal names.
+    Equal files give equal names.
     """
 
     def __init__(self) -> None:
         self._taken: set[str] = set(RESERVED)
 
     def take(self, original: str, kind: str) -> str:
-        """Return a unique name that is as close as possible to the original.
-
-        Args:
-            original: Name in the file.
-            kind: Kind of item ("link", "joint", "frame"): the suffix if the name is
-                already taken.
-        """
+        """Return a unique name close to the original; `kind` is a suffix if needed."""
         plain = re.sub(r"[^A-Za-z0-9_]", "_", original)[:MAX_NAME]
         if not re.match(r"[A-Za-z]", plain):
             plain = f"{kind}_{plain.lstrip('_')}".rstrip("_")
@@ -83,13 +73,15 @@ def describe_import(
     """Check imported links and frames, and infer what the file does not define.
 
     Groups, end effectors and a `ready` posture are inferred unless `others` has them.
-    An implausible centre of mass or inertia is only a warning, because meshes that
-    could not be read leave the shapes incomplete.
+    An implausible inertia is only a warning, since some meshes may not be read.
 
     Raises:
         DescriptionError: If the robot is inconsistent or unphysical.
     """
-    checked = [_link(fields, source) for fields in _without_chains(links)]
+    checked: list[Link] = []
+    for fields in _without_chains(links):
+        where = f"{source}: link '{fields['name']}'"
+        checked.append(parse_model(Link, fields, source=where, error=DescriptionError))
     _check_masses(checked, source)
     checked = _physical(checked, source, mend=mend_inertias)
     checked = _accept_implausible(checked, source)
@@ -105,7 +97,7 @@ def describe_import(
     limbs = infer_limbs(checked)
     keyframes = others.pop("keyframes", {})
     data: dict[str, Any] = {
-        "name": _robot_name(name),
+        "name": NameTable().take(name, "robot"),
         "source": f"imported from {source.name}",
         "root": root,
         "links": checked,
@@ -120,16 +112,6 @@ def describe_import(
         return robot
     ready = robot.keyframes["ready"] | standing_legs(robot)
     return robot.model_copy(update={"keyframes": robot.keyframes | {"ready": ready}})
-
-
-def _robot_name(name: str) -> str:
-    plain = re.sub(r"[^A-Za-z0-9_]", "_", name)
-    return plain if re.match(r"[A-Za-z]", plain) else f"robot_{plain}".rstrip("_")
-
-
-def _link(fields: LinkFields, source: Path) -> Link:
-    where = f"{source}: link '{fields['name']}'"
-    return parse_model(Link, fields, source=where, error=DescriptionError)
 
 
 def _without_chains(links: Sequence[LinkFields]) -> Sequence[LinkFields]:
@@ -199,8 +181,8 @@ def _accept_implausible(links: Sequence[Link], source: Path) -> list[Link]:
 def overlapping_links(robot: RobotDescription) -> tuple[tuple[str, str], ...]:
     """Return pairs of links that overlap in the posture `ready`, few joints apart.
 
-    Hulls of meshes, and shapes drawn with a margin, can reach past the next link into
-    the one after it. In a simulation they would permanently push each other apart.
+    Hulls of meshes can reach past the next link; such links would push each other
+    apart.
     """
     model = robot.to_mjspec().compile()
     data = mujoco.MjData(model)

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+import pinocchio as pin
 
 from wbc_suite.robot.shape_geometry import shape_bounds
 from wbc_suite.typing import Matrix, Vector
@@ -15,20 +16,22 @@ INERTIA_SLACK = 1e-6
 """Relative slack of the triangle inequality; vendors round their tensors."""
 GYRATION_RANGE = (0.08, 1.1)
 """Plausible radius of gyration over half the diagonal of the link's shapes."""
-SMALLEST_MASS = 1e-9
-"""Smallest accepted mass in kg; MuJoCo refuses masses below 1e-15."""
-SMALLEST_MOMENT = 1e-14
-"""Principal moments below count as not positive, kg m^2."""
+SMALLEST_MASS = 1e-9  # smallest accepted mass in kg; MuJoCo refuses masses below 1e-15
+SMALLEST_MOMENT = 1e-14  # principal moments below count as not positive, kg m^2
 COM_SLACK = 0.10
 """Part of the bounding box by which the centre of mass may lie outside it."""
-MIN_GYRATION = 1e-3
-"""Smallest radius of gyration in m of a corrected inertia."""
+MIN_GYRATION = 1e-3  # smallest radius of gyration in m of a corrected inertia
 
 
 def inertia_matrix(inertia: tuple[float, ...]) -> Matrix:
     """Return the symmetric (3, 3) matrix of `xx yy zz xy xz yz`."""
     xx, yy, zz, xy, xz, yz = inertia
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def inertia_of(link: "Link") -> pin.Inertia:
+    """Return the inertia of a link in its axes."""
+    return pin.Inertia(link.mass, np.asarray(link.com), inertia_matrix(link.inertia))
 
 
 def inertia_fields(tensor: Matrix) -> tuple[float, ...]:

@@ -1,7 +1,5 @@
 """`load_robot`: read a robot from the catalogue or from a TOML, URDF or MJCF file."""
 
-from collections.abc import Iterator
-from contextlib import suppress
 from pathlib import Path
 from typing import Literal
 
@@ -76,17 +74,9 @@ def _locate(name: str, catalogue: Catalogue) -> Path:
     try:
         return catalogue.find("robots", stem, kind="robot")
     except UnknownNameError as error:
-        raise UnknownNameError(
-            "robot", name, [*_components(stem, catalogue)] or error.known
-        ) from None
-
-
-def _components(name: str, catalogue: Catalogue) -> Iterator[str]:
-    """Yield the components with a name, each with its folder."""
-    for folder in FOLDERS:
-        with suppress(UnknownNameError):
-            catalogue.find(f"robots/{folder}", name, kind=folder)
-            yield f"{folder}/{name}"
+        folders = (f for f in FOLDERS if catalogue.holds(f"robots/{f}", stem))
+        components = [f"{folder}/{stem}" for folder in folders]
+        raise UnknownNameError("robot", name, components or error.known) from None
 
 
 def _read(

@@ -3,6 +3,7 @@
 import hashlib
 import importlib
 import os
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +14,8 @@ from wbc_suite.errors import ConfigError, DescriptionError
 from wbc_suite.robot.shapes import SkinMesh, Vector3, cached_by_shape
 from wbc_suite.typing import Indices, Matrix
 
-READABLE = (".stl", ".obj")
-"""Suffixes of the files that `read_points` can read."""
-MAX_BYTES = 100_000_000
-"""Largest mesh file that is read."""
+READABLE = (".stl", ".obj")  # suffixes of the files that `read_points` can read
+MAX_BYTES = 100_000_000  # largest mesh file that is read
 
 TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("tag", "<u2")])
 """One record of a binary STL file, which begins with 80 bytes and a count."""
@@ -24,12 +23,9 @@ HEADER = 84
 
 EDGE = 0.008
 """Edge length in m to which skins are decimated; finer meshes render slowly."""
-MIN_TRIANGLES = 400
-"""Number of triangles below which a skin is not decimated."""
-AGGRESSION = 5.0
-"""How quickly edges are collapsed; the default of 7 tears thin shells."""
-CACHE_VERSION = 1
-"""Raised when the content of the cache changes."""
+MIN_TRIANGLES = 400  # number of triangles below which a skin is not decimated
+AGGRESSION = 5.0  # how quickly edges are collapsed; the default of 7 tears thin shells
+CACHE_VERSION = 1  # raised when the content of the cache changes
 
 
 def write_stl(path: Path, vertices: Matrix, faces: Indices) -> None:
@@ -46,11 +42,7 @@ def write_stl(path: Path, vertices: Matrix, faces: Indices) -> None:
 
 
 def read_points(path: Path) -> Matrix:
-    """Read the vertices, shape (n, 3), of an STL or OBJ file.
-
-    Raises:
-        DescriptionError: If the file is too large, of another kind, or broken.
-    """
+    """Read the vertices (n, 3) of an STL or OBJ file; raises DescriptionError."""
     size = path.stat().st_size
     if size > MAX_BYTES:
         raise DescriptionError(
@@ -58,9 +50,10 @@ def read_points(path: Path) -> Matrix:
         )
     try:
         data = path.read_bytes()
+        count = int.from_bytes(data[HEADER - 4 : HEADER], "little")  # in a binary STL
         if path.suffix.lower() == ".obj":
             points = _text_points(data, b"v")
-        elif len(data) >= HEADER and _stl_size(data) == size:
+        elif size == HEADER + count * TRIANGLE.itemsize:
             records = np.frombuffer(data, dtype=TRIANGLE, offset=HEADER)
             points = records["corners"].reshape(-1, 3).astype(np.float64)
         else:
@@ -70,11 +63,6 @@ def read_points(path: Path) -> Matrix:
     if len(points) == 0 or not np.isfinite(points).all():
         raise DescriptionError(f"{path}: not a readable mesh: no finite points.")
     return np.unique(points, axis=0)
-
-
-def _stl_size(data: bytes) -> int:
-    count = int(np.frombuffer(data, dtype="<u4", offset=HEADER - 4, count=1)[0])
-    return HEADER + count * TRIANGLE.itemsize
 
 
 def _text_points(data: bytes, keyword: bytes) -> Matrix:
@@ -94,13 +82,20 @@ def skin_triangles(shape: SkinMesh) -> tuple[Matrix, Indices]:
         ConfigError: If the file is not a mesh, or the extra `skins` is not installed.
     """
     path = Path(shape.file)
-    kept = user_cache() / "skins" / f"{_cache_key(path, shape.scale)}.npz"
+    state = path.stat()
+    key = f"{CACHE_VERSION} {path} {state.st_size} {state.st_mtime_ns} {shape.scale}"
+    name = hashlib.sha256(key.encode()).hexdigest()[:32]
+    kept = user_cache() / "skins" / f"{name}.npz"
     if kept.is_file():
         with np.load(kept, allow_pickle=False) as data:
             vertices, faces = data["vertices"], data["faces"]
     else:
         vertices, faces = _decimated(*_read_mesh(path, shape.scale))
-        _write_cache(kept, vertices, faces)
+        with suppress(OSError):  # the folder cannot be written
+            kept.parent.mkdir(parents=True, exist_ok=True)
+            part = kept.with_suffix(f".{os.getpid()}.npz")
+            np.savez_compressed(part, vertices=vertices.astype(np.float32), faces=faces)
+            part.replace(kept)
     return vertices.astype(np.float64), faces.astype(np.int64)
 
 
@@ -146,20 +141,3 @@ def _import_extra(name: str) -> Any:
             f"skin: meshes need {name.replace('_', '-')}, which is not installed. "
             "Install it with: pip install 'wbc-suite[skins]'"
         ) from None
-
-
-def _cache_key(path: Path, scale: Vector3) -> str:
-    state = path.stat()
-    text = f"{CACHE_VERSION} {path} {state.st_size} {state.st_mtime_ns} {scale}"
-    return hashlib.sha256(text.encode()).hexdigest()[:32]
-
-
-def _write_cache(path: Path, vertices: Matrix, faces: Indices) -> None:
-    """Store a decimated mesh, unless the folder cannot be written."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        part = path.with_suffix(f".{os.getpid()}.npz")
-        np.savez_compressed(part, vertices=vertices.astype(np.float32), faces=faces)
-        part.replace(path)
-    except OSError:
-        return

@@ -9,7 +9,6 @@ as in vendors' models. Definitions of the file override the reflection.
 """
 
 import re
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -19,23 +18,20 @@ from wbc_suite.errors import DescriptionError
 from wbc_suite.robot.elements import Joint, Link, Name
 from wbc_suite.robot.inertia import inertia_fields, inertia_matrix
 from wbc_suite.robot.poses import HasPose, rotation_matrix
+from wbc_suite.robot.shapes import Capsule, Cylinder, Hull, Loft, Shape
 from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Matrix, Vector
 
 if TYPE_CHECKING:
     from wbc_suite.robot.robot_file import Component
 
-POSED = ("frames", "mounts", "cameras")
-NAMED = ("sensors", "actuators", "connects")
+NAMED = ("frames", "mounts", "cameras", "sensors", "actuators", "connects")
 
 
 class Mirror(FrozenModel):
-    """The side that is defined, and the one that is generated.
+    """The word in names (between underscores) of the defined side, and of the other.
 
-    Attributes:
-        source: Word in a name (between underscores) that marks the defined side.
-        target: The word that replaces it on the other side.
-        plane: Plane of reflection in the axes of the component's first link.
+    The plane of reflection is in the axes of the component's first link.
     """
 
     source: Name = "left"
@@ -44,11 +40,7 @@ class Mirror(FrozenModel):
 
 
 def reflect_component(component: "Component", *, source: str) -> "Component":
-    """Return the component with both sides.
-
-    Raises:
-        DescriptionError: If no link belongs to the defined side.
-    """
+    """Return the component with both sides; raises DescriptionError."""
     mirror = component.mirror
     if mirror is None:
         return component
@@ -81,8 +73,7 @@ class _Reflection:
         links = self._links()
         return {
             "links": links,
-            **{k: self._posed(getattr(c, k)) for k in POSED},
-            **{k: self._renamed(getattr(c, k)) for k in NAMED},
+            **{k: self._both_sides(getattr(c, k)) for k in NAMED},
             "groups": self._groups(c.groups),
             "keyframes": {k: self._values(v) for k, v in c.keyframes.items()},
             "contacts": c.contacts.model_copy(
@@ -179,20 +170,18 @@ class _Reflection:
             )
         return joint.model_copy(update=update)
 
-    def _shape(self, shape: Any, d: Matrix) -> Any:  # any shape, and the same kind back
+    def _shape(self, shape: Shape, d: Matrix) -> Shape:
         update = self._moved(shape, d)
-        inner = {
-            key: self._point(getattr(shape, key))
-            for key in ("start", "end")
-            if hasattr(shape, key)
-        }
-        if hasattr(shape, "spheres"):
-            update["spheres"] = tuple(
-                (*self._point(s[:3]), s[3]) for s in shape.spheres
-            )
-        if hasattr(shape, "sections"):
-            update["sections"] = self._sections(shape.axis, shape.sections)
-        return shape.model_copy(update=update | inner)
+        match shape:
+            case Capsule(start=start, end=end) | Cylinder(start=start, end=end):
+                update |= {"start": self._point(start), "end": self._point(end)}
+            case Hull(spheres=spheres):
+                update["spheres"] = tuple((*self._point(s[:3]), s[3]) for s in spheres)
+            case Loft(axis=axis, sections=sections):
+                update["sections"] = self._sections(axis, sections)
+            case _:
+                pass
+        return shape.model_copy(update=update)
 
     def _point(self, point: tuple[float, ...]) -> tuple[float, ...]:
         return _floats(self._s @ np.asarray(point))
@@ -209,27 +198,20 @@ class _Reflection:
         ]
         return tuple(rows if along > 0 else rows[::-1])
 
-    def _posed(self, items: tuple[Any, ...]) -> tuple[Any, ...]:
-        return self._renamed(items, extra=lambda i: self._moved(i, self._d(i.link)))
-
-    def _renamed(
-        self,
-        items: tuple[Any, ...],
-        extra: Callable[[Any], dict[str, Any]] | None = None,
-    ) -> tuple[Any, ...]:
-        """Return the items, and copies of the defined side with changed names."""
+    def _both_sides(self, items: tuple[Any, ...]) -> tuple[Any, ...]:
+        """Return the items, and the images of those of the defined side."""
         known = {getattr(item, "name", None) for item in items} - {None}
         made: list[Any] = []
         for item in items:
-            names = {
+            update: dict[str, Any] = {
                 key: self.name(value)
                 for key, value in item
                 if isinstance(value, str) and self.matches(value)
             }
-            if names and names.get("name") not in known:
-                made.append(
-                    item.model_copy(update=names | (extra(item) if extra else {}))
-                )
+            if update and update.get("name") not in known:
+                if hasattr(item, "quat"):
+                    update |= self._moved(item, self._d(item.link))
+                made.append(item.model_copy(update=update))
         return (*items, *made)
 
     def _groups(

@@ -1,7 +1,7 @@
 """Check and compile MJCF files from untrusted sources.
 
-A file of a hundred bytes can request 10^9 bodies or a height field of 10^10 points. The
-file size does not limit this, so the requested sizes are computed before compilation.
+A file of a hundred bytes can request 10^9 bodies or a height field of 10^10 points, so
+the requested sizes are computed before compilation.
 """
 
 import math
@@ -13,8 +13,7 @@ import mujoco
 from wbc_suite.errors import ConfigError, DescriptionError
 from wbc_suite.robot.xml_files import Element, inside, read_xml
 
-MAX_FILES = 50
-"""Largest number of XML files that include one another."""
+MAX_FILES = 50  # largest number of XML files that include one another
 MAX_ELEMENTS = 20_000
 """Largest number of elements, including generated ones; a kitchen has 5,000.
 MuJoCo takes 3 s to compile 20,000, and over a minute for 120,000."""
@@ -22,14 +21,11 @@ MAX_COPIES = 10_000
 """Largest number of elements that one `replicate`, `composite` or `flexcomp` makes."""
 MAX_POINTS = 20_000_000
 """Largest number of points of a height field, texture, camera or sensor: 160 MB."""
-MAX_ROWS = 100_000
-"""Largest number of contacts, constraints, keys, or user numbers."""
-MAX_MEMORY = 1 << 32
-"""Largest value of `memory`, bytes."""
+MAX_ROWS = 100_000  # largest number of contacts, constraints, keys, or user numbers
+MAX_MEMORY = 1 << 32  # largest value of `memory`, bytes
 MAX_MESH_PARAMETER = 500
 """Largest parameter of a builtin mesh: the number of faces grows with its square."""
-MAX_FILE = 200_000_000
-"""Largest mesh or picture file, bytes."""
+MAX_FILE = 200_000_000  # largest mesh or picture file, bytes
 
 _GENERATORS = ("replicate", "composite", "flexcomp")
 _POINTS = (
@@ -41,27 +37,13 @@ _UNITS = {"K": 10, "M": 20, "G": 30, "T": 40, "P": 50, "E": 60}
 _PNG = b"\x89PNG\r\n\x1a\n"
 
 
-def compile_mjcf(path: Path) -> mujoco.MjModel:
-    """Compile an MJCF file and all files of its folder that it includes.
+def compile_mjcf(path: Path) -> tuple[mujoco.MjModel, mujoco.MjSpec]:
+    """Compile an MJCF file and what it includes to a model and its specification.
 
     Raises:
         ConfigError: If it is not MJCF, or names a file outside its folder.
         DescriptionError: If it exceeds a limit, or MuJoCo refuses it.
     """
-    return _read(path)[1]
-
-
-def read_mjcf_spec(path: Path) -> mujoco.MjSpec:
-    """Read an MJCF file with the checks of `compile_mjcf`, to attach it to a scene.
-
-    Raises:
-        ConfigError: If it is not MJCF, or names a file outside its folder.
-        DescriptionError: If it exceeds a limit, or MuJoCo refuses it.
-    """
-    return _read(path)[0]
-
-
-def _read(path: Path) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
     roots = _included(path)
     total = sum(_element_count(root, path) for root in roots)
     if total > MAX_ELEMENTS:
@@ -78,7 +60,7 @@ def _read(path: Path) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
             _check_numbers(element, path)
     try:
         spec = mujoco.MjSpec.from_file(str(path))
-        return spec, spec.compile()
+        return spec.compile(), spec
     except (ValueError, RuntimeError, MemoryError) as error:  # MuJoCo raises all three
         raise DescriptionError(f"{path}: MuJoCo refuses it: {error}") from error
 
@@ -101,10 +83,8 @@ def _included(path: Path) -> list[Element]:
         roots[resolved] = root
         if len(roots) > MAX_FILES:
             raise ConfigError(f"{path}: it includes more than {MAX_FILES} files.")
-        named = [
-            e.get("file", "") for tag in ("include", "model") for e in root.iter(tag)
-        ]
-        waiting += [path.parent / name for name in named]
+        for element in (*root.iter("include"), *root.iter("model")):
+            waiting.append(path.parent / element.get("file", ""))
     return list(roots.values())
 
 

@@ -7,8 +7,8 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.robot.description import RobotDescription
-from wbc_suite.robot.elements import Actuator, Joint, Link, rigid_bodies
-from wbc_suite.robot.inertia import inertia_matrix
+from wbc_suite.robot.elements import Actuator, Joint, rigid_bodies
+from wbc_suite.robot.inertia import inertia_fields, inertia_of
 from wbc_suite.robot.mjcf_export_geoms import VisualGeoms, add_collision_geoms
 from wbc_suite.robot.poses import se3_of
 
@@ -19,12 +19,10 @@ with a step of 2 ms. With MuJoCo's default of 20 ms a joint overshoots its limit
 STOP_SOLIMP = (0.95, 0.99, 0.001)
 """Smallest and largest impedance of joint limits, and the width between, m or rad."""
 STOP_MARGIN = 3e-3
-"""Distance in rad at which the limit of a limb joint becomes active. MuJoCo tests
-limits only at the start of a step (2 ms), and contacts accelerate joints to up to
-2.6 rad/s. Controllers keep limbs at least this far inside. Fingers rest at their limits
-and have no margin."""
-SITE_GROUP = 4
-"""Site group of frames, hidden by default."""
+"""Distance in rad at which the limit of a limb joint becomes active, since MuJoCo tests
+limits only at the start of a step (2 ms), and contacts accelerate joints to 2.6 rad/s.
+Controllers keep limbs this far inside; fingers rest at their limits and have none."""
+SITE_GROUP = 4  # site group of frames, hidden by default
 
 STIFF = (0.005, 1.0)
 """Time constant in s and damping ratio of couplings, stable with a step of 2 ms."""
@@ -43,12 +41,8 @@ def build_mjspec(robot: RobotDescription, *, merged: bool = True) -> mujoco.MjSp
     """Build the MuJoCo specification of a robot.
 
     Links become bodies, frames become sites, and each joint with an effort gets a
-    torque motor of its own name unless the description gives another.
-
-    Args:
-        robot: The robot.
-        merged: Whether the visual shapes of a link become one mesh, which is faster to
-            simulate and to draw.
+    torque motor of its own name unless the description gives another. `merged` visual
+    shapes of a link become one mesh, which is faster to simulate and to draw.
     """
     spec = mujoco.MjSpec()
     spec.modelname = robot.name
@@ -60,8 +54,15 @@ def build_mjspec(robot: RobotDescription, *, merged: bool = True) -> mujoco.MjSp
     limb_joints = {joint for name in limbs for joint in robot.groups[name]}
     visual = VisualGeoms(spec, robot, merged=merged)
     for link in robot.links:
-        parent = bodies[link.parent or "world"]
-        bodies[link.name] = body = _add_body(parent, robot, link)
+        placed = robot.root if link.parent is None else link
+        body = bodies[link.parent or "world"].add_body(
+            name=link.name, pos=placed.pos, quat=placed.quat
+        )
+        bodies[link.name] = body
+        if link.parent is None and robot.root.kind == "free":
+            body.add_joint(name="root", type=mujoco.mjtJoint.mjJNT_FREE)
+        for joint in robot.root.joints if link.parent is None else ():
+            _add_joint(body, joint, limb=False)
         if link.joint is not None:
             _add_joint(body, link.joint, limb=link.joint.name in limb_joints)
         _set_inertia(body, inertias[link.name])
@@ -93,39 +94,12 @@ def write_mjcf(robot: RobotDescription) -> str:
     return spec.to_xml()
 
 
-def _add_body(
-    parent: mujoco.MjsBody, robot: RobotDescription, link: Link
-) -> mujoco.MjsBody:
-    placed = robot.root if link.parent is None else link
-    body = parent.add_body(name=link.name, pos=placed.pos, quat=placed.quat)
-    if link.parent is None:
-        _add_root_joints(body, robot)
-    return body
-
-
-def _add_root_joints(body: mujoco.MjsBody, robot: RobotDescription) -> None:
-    if robot.root.kind == "free":
-        body.add_joint(name="root", type=mujoco.mjtJoint.mjJNT_FREE)
-    if robot.root.kind == "planar":
-        slide, hinge = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
-        kinds = ((slide, (1, 0, 0)), (slide, (0, 1, 0)), (hinge, (0, 0, 1)))
-        linear, angular = robot.root.damping
-        for name, (kind, axis), damping in zip(
-            robot.root_joint_names, kinds, (linear, linear, angular), strict=True
-        ):
-            joint = body.add_joint(name=name, type=kind, axis=axis)
-            joint.damping[0] = damping
-
-
 def _add_joint(body: mujoco.MjsBody, joint: Joint, *, limb: bool) -> None:
     """Add a joint; hinges of limbs have a margin before their limits."""
-    kinds = {
-        "hinge": mujoco.mjtJoint.mjJNT_HINGE,
-        "slide": mujoco.mjtJoint.mjJNT_SLIDE,
-    }
+    kinds = mujoco.mjtJoint
     added = body.add_joint(
         name=joint.name,
-        type=kinds[joint.type],
+        type=kinds.mjJNT_HINGE if joint.type == "hinge" else kinds.mjJNT_SLIDE,
         axis=joint.axis,
         armature=joint.armature,
         frictionloss=joint.frictionloss,
@@ -144,15 +118,9 @@ def _add_joint(body: mujoco.MjsBody, joint: Joint, *, limb: bool) -> None:
 def _inertias(robot: RobotDescription) -> dict[str, pin.Inertia]:
     """Return the inertias of the links in their axes.
 
-    MuJoCo needs mass on each moving body. A moving link without mass therefore gets the
-    inertia of the links that are fixed to it, which does not change the dynamics.
+    MuJoCo needs mass on each moving body: one without gets that of links fixed to it.
     """
-    inertias = {
-        link.name: pin.Inertia(
-            link.mass, np.asarray(link.com), inertia_matrix(link.inertia)
-        )
-        for link in robot.links
-    }
+    inertias = {link.name: inertia_of(link) for link in robot.links}
     rigid = rigid_bodies(robot.links)
     placement: dict[str, pin.SE3] = {}
     for link in robot.links:
@@ -171,27 +139,19 @@ def _inertias(robot: RobotDescription) -> dict[str, pin.Inertia]:
 def _set_inertia(body: mujoco.MjsBody, inertia: pin.Inertia) -> None:
     if inertia.mass == 0.0:
         return
-    about = inertia.inertia
     body.explicitinertial = True
     body.mass = inertia.mass
     body.ipos = inertia.lever
-    if not about.any():  # a point mass, which MuJoCo refuses as a full tensor
+    if inertia.inertia.any():
+        body.fullinertia = inertia_fields(inertia.inertia)
+    else:  # a point mass, which MuJoCo refuses as a full tensor
         body.inertia = np.zeros(3)
-        return
-    body.fullinertia = [
-        about[0, 0], about[1, 1], about[2, 2], about[0, 1], about[0, 2], about[1, 2]
-    ]  # fmt: skip
 
 
 def _add_actuators(spec: mujoco.MjSpec, robot: RobotDescription) -> None:
-    if robot.root.kind == "planar" and robot.root.actuated:
-        force, torque = robot.root.effort
-        efforts = (force, force, torque)
-        for name, effort in zip(robot.root_joint_names, efforts, strict=True):
-            motor = Actuator(joint=name, kind="motor")
-            _add_actuator(spec, Joint(name=name, effort=effort), motor)
+    root = robot.root.joints if robot.root.actuated else ()
     given = {actuator.joint: actuator for actuator in robot.actuators}
-    for joint in robot.joints:
+    for joint in (*root, *robot.joints):
         actuator = given.get(joint.name)
         if actuator is None and joint.effort and joint.independent:
             actuator = Actuator(joint=joint.name, kind="motor")
@@ -264,8 +224,7 @@ def _add_constraints(spec: mujoco.MjSpec, robot: RobotDescription) -> None:
 def _welded_neighbours(robot: RobotDescription) -> Iterable[tuple[str, str]]:
     """Yield pairs of a static link of a fixed robot and a link that moves on it.
 
-    MuJoCo excludes contacts between a body and its parent, unless the parent is welded
-    to the world.
+    MuJoCo itself excludes bodies and parents, except parents welded to the world.
     """
     if robot.root.kind != "fixed":
         return
@@ -281,14 +240,10 @@ def _welded_neighbours(robot: RobotDescription) -> Iterable[tuple[str, str]]:
 
 
 def _add_keyframes(spec: mujoco.MjSpec, robot: RobotDescription) -> None:
+    start = [0.0] * len(robot.root.joints)
+    if robot.root.kind == "free":
+        start = [*robot.root.pos, *robot.root.quat]
     for name in robot.keyframes:
         values = robot.keyframe(name)
         joints = [values[joint] for joint in robot.joint_names]
-        spec.add_key(name=name, qpos=np.array([*_root_qpos(robot), *joints]))
-
-
-def _root_qpos(robot: RobotDescription) -> Iterable[float]:
-    """Return the root coordinates of the robot's own pose, in MuJoCo's order."""
-    if robot.root.kind == "free":
-        return (*robot.root.pos, *robot.root.quat)
-    return (0.0,) * len(robot.root_joint_names)
+        spec.add_key(name=name, qpos=np.array([*start, *joints]))

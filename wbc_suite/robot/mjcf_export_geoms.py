@@ -1,9 +1,8 @@
 """Write shapes as MuJoCo geoms: collision geoms, and one visual mesh per link.
 
-Every geom of a model costs time in every physics step, even if it is only drawn (135 of
-175 geoms in a scene with a Panda). The opaque shapes of a link are therefore merged
-into one mesh. A MuJoCo mesh has one colour, so the colours of a robot are the pixels of
-a small texture, the palette, and each vertex refers to its pixel.
+Each geom costs time in every physics step (135 of 175 geoms in a scene with a Panda are
+only drawn), so the opaque shapes of a link are merged into one mesh. Its vertices refer
+to pixels of a small texture, the palette, because a mesh has one colour.
 """
 
 from functools import lru_cache
@@ -36,21 +35,16 @@ from wbc_suite.robot.triangle_meshes import (
 )
 from wbc_suite.typing import Indices, Matrix
 
-VISUAL_GROUP = 2
-"""Geom group of shapes that are only drawn."""
-COLLISION_GROUP = 3
-"""Geom group of shapes that only collide."""
+VISUAL_GROUP = 2  # geom group of shapes that are only drawn
+COLLISION_GROUP = 3  # geom group of shapes that only collide
 
 STATED_SOLMIX = 1000.0
-"""Weight of a stated contact stiffness, so that it prevails over the default (1).
-
-With equal weights a pad sinks 3.4 mm into a cube of 0.1 kg; with this one 0.2 mm.
-"""
+"""Weight of a stated contact stiffness, so that it prevails over the default (1): a pad
+sinks 0.2 mm into a cube of 0.1 kg, and 3.4 mm with equal weights."""
 
 GREY = (0.5, 0.5, 0.52, 1.0)
 PALETTE = "palette"
-ROW = 4
-"""Row alignment of OpenGL textures, in pixels."""
+ROW = 4  # row alignment of OpenGL textures, in pixels
 
 Drawn = Shape | SkinMesh
 Rgba = tuple[float, float, float, float]
@@ -63,29 +57,16 @@ def add_collision_geoms(
     for index, shape in enumerate(link.collision):
         geom = _add_geom(spec, body, shape, f"{link.name}_collision{index}")
         geom.group, geom.mass, geom.rgba = COLLISION_GROUP, 0.0, _rgba(robot, shape)
-        _set_contact(geom, shape)
-
-
-def _set_contact(geom: mujoco.MjsGeom, shape: Shape) -> None:
-    if shape.friction is not None:
-        geom.friction = shape.friction
-    if shape.condim is not None:
-        geom.condim = shape.condim
-    if shape.solref is not None:
-        geom.solref[:2] = shape.solref
-        geom.solmix = STATED_SOLMIX
-    if shape.margin is not None:
-        geom.margin = shape.margin
+        if shape.solref is not None:
+            geom.solref[:2] = shape.solref
+            geom.solmix = STATED_SOLMIX
+        for key in ("friction", "condim", "margin"):
+            if (value := getattr(shape, key)) is not None:
+                setattr(geom, key, value)
 
 
 class VisualGeoms:
-    """Adds the visual geoms of the links of one robot.
-
-    Args:
-        spec: Specification for meshes and the palette.
-        robot: The robot.
-        merged: Whether the opaque shapes of a link become one mesh.
-    """
+    """Adds the visual geoms of the links of a robot, `merged` or one per shape."""
 
     def __init__(
         self, spec: mujoco.MjSpec, robot: RobotDescription, *, merged: bool

@@ -15,8 +15,8 @@ from wbc_suite.robot.importing import LinkFields, NameTable, describe_import
 from wbc_suite.robot.inertia import inertia_fields
 from wbc_suite.robot.mjcf_compile import compile_mjcf
 from wbc_suite.robot.mjcf_export import SENSOR_TYPES
-from wbc_suite.robot.mjcf_import_elements import pose_at, read_actuators, read_shapes
-from wbc_suite.robot.poses import joint_motion, pose_fields
+from wbc_suite.robot.mjcf_import_elements import read_actuators, read_shapes
+from wbc_suite.robot.poses import joint_motion, pose_at, pose_fields
 from wbc_suite.typing import Vector
 
 LOG = logging.getLogger(__name__)
@@ -33,10 +33,10 @@ def read_mjcf(path: Path | str) -> RobotDescription:
     """Read an MJCF file.
 
     MuJoCo compiles it. Bodies become links, sites become frames, joint equalities
-    become mimic joints. A body with several joints becomes a chain with links of a
-    microgram between them. Items of the world body (floors, lights) are ignored. Meshes
-    become convex hulls. Groups and end effectors are inferred; `to_toml()` writes the
-    result for editing.
+    become mimic joints, meshes become convex hulls. A body with several joints becomes
+    a chain with links of a microgram. Items of the world body (floors, lights) are
+    ignored. Groups and end effectors are inferred; `to_toml()` writes the result for
+    editing.
 
     Raises:
         ConfigError: If the file is not MJCF, or refers to files outside its folder.
@@ -44,7 +44,7 @@ def read_mjcf(path: Path | str) -> RobotDescription:
             ball joints, springs or flexible parts, or is unphysical.
     """
     path = Path(path)
-    m = compile_mjcf(path)
+    m, _ = compile_mjcf(path)
     faults = list(_faults(m))
     if faults:
         shown = join_first(faults, separator="; ")
@@ -122,8 +122,8 @@ class _Importer:
         for b in range(1, m.nbody):
             original = m.body(b).name or f"body{b}"
             self._bodies[b] = self._names.take(original, "link")
-        own = range(m.njnt) if rooted is None else self._below(rooted)
-        for j in own:
+        # The joints of the root come first.
+        for j in range(int(m.body_jntnum[rooted or 0]), m.njnt):
             self._joints[j] = self._names.take(_joint_name(m, j), "joint")
         efforts, actuators = read_actuators(m, self._joints)
         links: list[LinkFields] = []
@@ -149,10 +149,6 @@ class _Importer:
             connects=list(self._connects()),
             contacts={"exclude": list(self._excludes())},
         )
-
-    def _below(self, rooted: int) -> range:
-        """Return the joints that do not belong to the root."""
-        return range(int(self._m.body_jntnum[rooted]), self._m.njnt)
 
     def _root(self) -> tuple[dict[str, Any], int | None]:
         """Return the fields of the root and its body; None if the world is the root."""

@@ -7,43 +7,30 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.robot.poses import pose_fields
+from wbc_suite.robot.poses import pose_at, pose_fields
 from wbc_suite.robot.shape_geometry import fit_hull
 from wbc_suite.typing import Vector
 
 LOG = logging.getLogger(__name__)
 
-VISUAL_GROUPS = 3
-"""Groups 0, 1 and 2 are drawn, as in MuJoCo's own viewer."""
-UNSUPPORTED = (
-    mujoco.mjtGeom.mjGEOM_PLANE,
-    mujoco.mjtGeom.mjGEOM_HFIELD,
-    mujoco.mjtGeom.mjGEOM_SDF,
-)
-"""Geoms of terrains, which robots do not have."""
+VISUAL_GROUPS = 3  # groups 0, 1 and 2 are drawn, as in MuJoCo's own viewer
+GEOM = mujoco.mjtGeom
+TERRAINS = (GEOM.mjGEOM_PLANE, GEOM.mjGEOM_HFIELD, GEOM.mjGEOM_SDF)
+"""Geoms that robots do not have."""
 DEFAULTS = {"friction": (1.0, 0.005, 0.0001), "solref": (0.02, 1.0)}
-
-
-def pose_at(pos: Vector, quat: Vector) -> pin.SE3:
-    """Return the pose of MuJoCo's pos and quat (w x y z)."""
-    return pin.SE3(pin.Quaternion(*quat).matrix(), np.array(pos))
 
 
 def read_shapes(
     m: mujoco.MjModel, body: int, offset: Vector
 ) -> dict[str, list[dict[str, Any]]]:
-    """Return the visual and the collision shapes of a body.
+    """Return the visual and the collision shapes of a body, placed in its link.
 
-    Args:
-        m: The compiled model.
-        body: Id of the body.
-        offset: Origin of the body in the link's frame, m.
+    The offset is the origin of the body in the link's frame, m.
     """
     visual: list[dict[str, Any]] = []
     collision: list[dict[str, Any]] = []
-    first, count = int(m.body_geomadr[body]), int(m.body_geomnum[body])
-    for g in range(first, first + count):
-        if m.geom_type[g] in UNSUPPORTED:
+    for g in np.flatnonzero(m.geom_bodyid == body).tolist():
+        if m.geom_type[g] in TERRAINS:
             continue
         shape = _shape(m, g)
         own = pin.SE3(np.eye(3), np.asarray(shape.pop("pos", np.zeros(3))))
@@ -57,17 +44,16 @@ def read_shapes(
 
 
 def _shape(m: mujoco.MjModel, g: int) -> dict[str, Any]:
-    kinds = mujoco.mjtGeom
     size = m.geom_size[g].tolist()
     match m.geom_type[g]:
-        case kinds.mjGEOM_BOX:
+        case GEOM.mjGEOM_BOX:
             return {"shape": "box", "size": size}
-        case kinds.mjGEOM_SPHERE:
+        case GEOM.mjGEOM_SPHERE:
             return {"shape": "sphere", "radius": size[0]}
-        case kinds.mjGEOM_ELLIPSOID:
+        case GEOM.mjGEOM_ELLIPSOID:
             return {"shape": "ellipsoid", "size": size}
-        case kinds.mjGEOM_CAPSULE | kinds.mjGEOM_CYLINDER:
-            capsule = m.geom_type[g] == kinds.mjGEOM_CAPSULE
+        case GEOM.mjGEOM_CAPSULE | GEOM.mjGEOM_CYLINDER:
+            capsule = m.geom_type[g] == GEOM.mjGEOM_CAPSULE
             return {
                 "shape": "capsule" if capsule else "cylinder",
                 "from": [0.0, 0.0, -size[1]],

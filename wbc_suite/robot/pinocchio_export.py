@@ -6,20 +6,19 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.robot.description import RobotDescription
-from wbc_suite.robot.elements import Joint, Link
-from wbc_suite.robot.inertia import inertia_matrix
+from wbc_suite.robot.elements import Joint
+from wbc_suite.robot.inertia import inertia_of
 from wbc_suite.robot.poses import se3_of
 from wbc_suite.typing import Vector
 
-GRAVITY = np.array([0.0, 0.0, -9.81])
-"""m/s^2; the default of MuJoCo."""
+GRAVITY = np.array([0.0, 0.0, -9.81])  # m/s^2; the default of MuJoCo
 
 
 def build_pinocchio(robot: RobotDescription) -> Any:
     """Build `pinocchio.Model`; see `RobotDescription.to_pinocchio`.
 
-    Each link is a BODY frame and each described frame an OP_FRAME. Unlimited joints
-    have infinite limits. Keyframes are reference configurations.
+    Links are BODY frames, described frames OP_FRAMEs, keyframes reference
+    configurations.
     """
     model = pin.Model()
     model.name = robot.name
@@ -36,7 +35,11 @@ def build_pinocchio(robot: RobotDescription) -> Any:
             joint = _add_joint(model, link.joint, joint, pose)
             pose = pin.SE3.Identity()
         joint_of[link.name], pose_in_joint[link.name] = joint, pose
-        _add_body(model, link, joint, pose)
+        if link.mass > 0.0:
+            model.appendBodyToJoint(joint, inertia_of(link), pose)
+        kind = pin.FrameType.JOINT
+        parent = model.getFrameId(model.names[joint], kind) if joint else -1
+        model.addBodyFrame(link.name, joint, pose, parent)
     for frame in robot.frames:
         pose = pose_in_joint[frame.link] * se3_of(frame)
         parent = model.getFrameId(frame.link, pin.FrameType.BODY)
@@ -50,16 +53,10 @@ def build_pinocchio(robot: RobotDescription) -> Any:
 
 
 def _add_root(model: Any, robot: RobotDescription) -> tuple[int, Any]:
-    """Add the root's joints; return the first link's joint and its pose in that joint.
-
-    A planar root is a chain of three joints with the equations of MuJoCo's three
-    joints of one body.
-    """
-    pose = se3_of(robot.root)
-    linear, angular = robot.root.velocity
-    if robot.root.kind == "fixed":
-        return 0, pose
+    """Add the root's joints; return the last one and the first link's pose in it."""
+    joint, pose = 0, se3_of(robot.root)
     if robot.root.kind == "free":
+        linear, angular = robot.root.velocity
         lower = np.array([-np.inf] * 3 + [-1.01] * 4)
         velocity = np.array([linear] * 3 + [angular] * 3)
         free = pin.JointModelFreeFlyer()
@@ -70,24 +67,8 @@ def _add_root(model: Any, robot: RobotDescription) -> tuple[int, Any]:
         )
         model.addJointFrame(joint)
         return joint, pin.SE3.Identity()
-    joint = 0
-    chain = (pin.JointModelPX(), pin.JointModelPY(), pin.JointModelRZ())
-    force, torque = robot.root.effort
-    damp, damp_yaw = robot.root.damping
-    bound = np.array([np.inf])
-    for name, kind, speed, effort, damping in zip(
-        robot.root_joint_names,
-        chain,
-        (linear, linear, angular),
-        (force, force, torque),
-        (damp, damp, damp_yaw),
-        strict=True,
-    ):
-        limits = (np.array([effort]), np.array([speed]), -bound, bound)
-        joint = model.addJoint(joint, kind, pose, name, *limits)
-        model.damping[model.joints[joint].idx_v] = damping
-        model.addJointFrame(joint)
-        pose = pin.SE3.Identity()
+    for own in robot.root.joints:
+        joint, pose = _add_joint(model, own, joint, pose), pin.SE3.Identity()
     return joint, pose
 
 
@@ -95,7 +76,7 @@ def _add_joint(model: Any, joint: Joint, parent: int, pose: Any) -> int:
     low, high = joint.range or (-np.inf, np.inf)
     index = model.addJoint(
         parent,
-        _joint_model(np.asarray(joint.axis), hinge=joint.type == "hinge"),
+        _joint_model(joint),
         pose,
         joint.name,
         np.array([joint.effort or np.inf]),
@@ -111,28 +92,17 @@ def _add_joint(model: Any, joint: Joint, parent: int, pose: Any) -> int:
     return index
 
 
-def _joint_model(axis: Vector, *, hinge: bool) -> Any:
-    """Return the joint model of an axis; for exactly x, y or z the faster one."""
-    aligned = (
-        (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ)
-        if hinge
-        else (pin.JointModelPX, pin.JointModelPY, pin.JointModelPZ)
-    )
-    for k in range(3):
-        if np.array_equal(axis, np.eye(3)[k]):
-            return aligned[k]()
-    if hinge:
-        return pin.JointModelRevoluteUnaligned(axis)
-    return pin.JointModelPrismaticUnaligned(axis)
-
-
-def _add_body(model: Any, link: Link, joint: int, pose: Any) -> None:
-    if link.mass > 0.0:
-        tensor = inertia_matrix(link.inertia)
-        inertia = pin.Inertia(link.mass, np.asarray(link.com), tensor)
-        model.appendBodyToJoint(joint, inertia, pose)
-    parent = model.getFrameId(model.names[joint], pin.FrameType.JOINT) if joint else -1
-    model.addBodyFrame(link.name, joint, pose, parent)
+def _joint_model(joint: Joint) -> Any:
+    """Return the joint model; for an axis that is exactly x, y or z the faster one."""
+    if joint.type == "hinge":
+        aligned = (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ)
+        general = pin.JointModelRevoluteUnaligned
+    else:
+        aligned = (pin.JointModelPX, pin.JointModelPY, pin.JointModelPZ)
+        general = pin.JointModelPrismaticUnaligned
+    if sorted(joint.axis) == [0.0, 0.0, 1.0]:
+        return aligned[joint.axis.index(1.0)]()
+    return general(np.asarray(joint.axis))
 
 
 def _configuration(model: Any, robot: RobotDescription, name: str) -> Vector:

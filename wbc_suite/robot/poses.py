@@ -1,32 +1,26 @@
 """Poses of description items as `pinocchio.SE3`, and back."""
 
-from typing import Any, Protocol
+from typing import Any, TypeAlias
 
 import numpy as np
 import pinocchio as pin
 from scipy.spatial.transform import Rotation
 
-from wbc_suite.robot.shapes import Vector3
+from wbc_suite.robot.shapes import Posed, ShapeFields
 from wbc_suite.typing import Matrix, Vector
 
-
-class HasPose(Protocol):
-    """An item of a description with a pose: a link, a frame, a shape, ..."""
-
-    @property
-    def pos(self) -> Vector3:
-        """Position, m."""
-        ...
-
-    @property
-    def quat(self) -> tuple[float, float, float, float]:
-        """Orientation, w x y z."""
-        ...
+HasPose: TypeAlias = Posed | ShapeFields
+"""An item of a description with a pose: a link, a frame, a shape, ..."""
 
 
-def se3_of(posed: HasPose) -> Any:
-    """Return the pose of an item as `pinocchio.SE3`."""
-    return pin.SE3(pin.Quaternion(*posed.quat).matrix(), np.asarray(posed.pos))
+def pose_at(pos: Any, quat: Any) -> pin.SE3:
+    """Return the pose of a position and a quaternion w x y z."""
+    return pin.SE3(pin.Quaternion(*quat).matrix(), np.array(pos))
+
+
+def se3_of(posed: HasPose) -> pin.SE3:
+    """Return the pose of an item."""
+    return pose_at(posed.pos, posed.quat)
 
 
 def rotation_matrix(posed: HasPose) -> Matrix:

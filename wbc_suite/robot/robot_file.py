@@ -1,4 +1,7 @@
-"""Robot files (TOML): components, assemblies of components, and their JSON Schema."""
+"""Robot files (TOML): components, assemblies of components, and their JSON Schema.
+
+`docs/robots.md` is the reference of all keys.
+"""
 
 from functools import lru_cache
 from pathlib import Path
@@ -24,19 +27,7 @@ from wbc_suite.tomlfile import FrozenModel, parse_model, parse_toml, read_text
 
 
 class Header(FrozenModel):
-    """Name, kind and sources of a component.
-
-    Attributes:
-        name: Unique name.
-        kind: Its folder in the catalogue.
-        side: The only side that a hand fits; absent if it fits both.
-        extends: Another component of the same folder; tables of this file, such as
-            `synergy`, replace its tables.
-        title: Display name.
-        source: Source of the figures.
-        license: Licence of the figures.
-        deviations: Each deliberate difference from the source, with its reason.
-    """
+    """Name, kind (folder in the catalogue) and sources of a component."""
 
     name: Name
     kind: Literal["arm", "body", "gripper", "base"]
@@ -48,15 +39,12 @@ class Header(FrozenModel):
     deviations: tuple[str, ...] = ()
 
 
-class Component(Elements):
-    """One component file, such as `robots/arm/panda.toml`.
+SOURCES = ("name", "title", "source", "license", "deviations")
+"""Fields of a component's header that its robot has as well."""
 
-    Attributes:
-        format: Version of the format.
-        component: Name, kind and sources.
-        synergies: Gripper commands.
-        mirror: How the other side is generated; None to define all links.
-    """
+
+class Component(Elements):
+    """One component file, such as `robots/arm/panda.toml`."""
 
     format: Literal[1]
     component: Header
@@ -68,16 +56,8 @@ class Component(Elements):
 class Part(Posed):
     """One component of an assembly.
 
-    Attributes:
-        name: Name of the part, such as `arm` or `right_gripper`.
-        component: Catalogue name with folder, such as `gripper/panda_hand`, or a path
-            to a TOML file relative to the assembly's file.
-        on: Mount that carries it, `part.mount`; absent for the first part.
-        side: Prefix of the component's frames, groups, cameras and sensors, so that
-            `tcp` becomes `right_tcp`.
-        rename: Whether links and joints get that prefix too; by default if two parts
-            have the same component.
-        choice: Argument of `load_robot` that replaces the component.
+    If `rename` is absent, links and joints get the prefix of the side when two parts
+    have the same component.
     """
 
     name: Name
@@ -98,20 +78,7 @@ class AssemblyHeader(FrozenModel):
 
 
 class Assembly(FrozenModel):
-    """One assembly file, such as `robots/panda.toml`.
-
-    Attributes:
-        format: Version of the format.
-        assembly: Name; `extends` names another assembly that this one changes.
-        parts: Components, each mounted on an earlier one.
-        root: Connection to the world; by default that of the first part.
-        lock: Groups whose joints are fixed at the `ready` posture.
-        frames: Further frames.
-        cameras: Further cameras.
-        sensors: Further sensors.
-        keyframes: Postures of the whole robot; they override those of components.
-        contacts: Pairs of links, across components too, that never collide.
-    """
+    """One assembly file, such as `robots/panda.toml`; it overrides its parts."""
 
     format: Literal[1]
     assembly: AssemblyHeader
@@ -126,17 +93,20 @@ class Assembly(FrozenModel):
 
 
 def read_robot_file(path: Path) -> Component | Assembly:
-    """Read a file that holds a component or an assembly.
-
-    A file is parsed again only if its text has changed.
+    """Read a file that holds a component or an assembly; parsed once for equal text.
 
     Raises:
         ConfigError: If the file is neither, or violates the format.
         UnknownNameError: If it extends a component that does not exist.
     """
     text = read_text(path)
-    base = _extended_file(path, text)
-    return _parsed(str(path), text, base and read_text(base))
+    name = as_table(_tables(str(path), text).get("component")).get("extends")
+    if not isinstance(name, str):
+        return _parsed(str(path), text, None)
+    beside = [p.stem for p in path.parent.glob("*.toml") if p != path]
+    if name not in beside:
+        raise UnknownNameError("component to extend", name, beside)
+    return _parsed(str(path), text, read_text(path.with_name(f"{name}.toml")))
 
 
 @lru_cache(maxsize=256)
@@ -151,7 +121,14 @@ def _parsed(source: str, text: str, base: str | None) -> Component | Assembly:
     data = _tables(source, text)
     if "component" in data:
         if base is not None:
-            data = _extended(data, _tables(source, base), source=source)
+            header, inherited = data["component"], _tables(source, base)
+            above = as_table(inherited.get("component"))
+            if "extends" in above:
+                raise ConfigError(
+                    f"{source}: '{header['extends']}' itself extends another "
+                    f"component; extend '{above['extends']}' instead."
+                )
+            data = inherited | data | {"component": above | header}
         component = parse_model(Component, data, source=source, error=DescriptionError)
         return reflect_component(component, source=source)
     if "assembly" in data:
@@ -160,30 +137,6 @@ def _parsed(source: str, text: str, base: str | None) -> Component | Assembly:
         f"{source}: a robot file needs a table [component] (links and joints) or "
         f"[assembly] (parts); found {', '.join(sorted(data)) or 'nothing'}."
     )
-
-
-def _extended_file(path: Path, text: str) -> Path | None:
-    """Return the file in the same folder that a component extends."""
-    name = as_table(_tables(str(path), text).get("component")).get("extends")
-    if not isinstance(name, str):
-        return None
-    beside = [p.stem for p in path.parent.glob("*.toml") if p != path]
-    if name not in beside:
-        raise UnknownNameError("component to extend", name, beside)
-    return path.with_name(f"{name}.toml")
-
-
-def _extended(
-    data: dict[str, Any], base: dict[str, Any], *, source: str
-) -> dict[str, Any]:
-    """Return the tables of a component with those that it inherits."""
-    header, inherited = as_table(data["component"]), as_table(base.get("component"))
-    if "extends" in inherited:
-        raise ConfigError(
-            f"{source}: '{header['extends']}' itself extends another component; extend "
-            f"'{inherited['extends']}' instead."
-        )
-    return base | data | {"component": inherited | header}
 
 
 RPY: dict[str, Any] = {
@@ -199,8 +152,7 @@ RPY: dict[str, Any] = {
 def robot_schema(kind: Literal["component", "assembly"]) -> dict[str, Any]:
     """Return the JSON Schema of a robot file, for completion in editors.
 
-    It covers names, types, choices and simple bounds. `wbc-suite check` covers
-    references, the tree and physics.
+    `wbc-suite check` covers more: references, the tree and physics.
     """
     model = Component if kind == "component" else Assembly
     schema = model.model_json_schema(by_alias=True)

@@ -29,57 +29,44 @@ from wbc_suite.robot.shapes import (
 )
 from wbc_suite.typing import Indices, Matrix, Vector
 
-RING_POINTS = 24
-"""Points on one ring of a loft or a cone; half as many on a small one."""
-SMALL = 0.02
-"""Largest radius in m of shapes that get coarser rings and spheres."""
-HULL_POINTS = 64
-"""Largest number of points of a hull in the file format."""
+RING_POINTS = 24  # points on one ring of a loft or a cone; half as many on a small one
+SMALL = 0.02  # largest radius in m of shapes that get coarser rings and spheres
+HULL_POINTS = 64  # largest number of points of a hull in the file format
 MIN_HALF_SIZE = 1e-3
 """Smallest half size in m of the box that replaces a flat point cloud."""
 
-DOWN = (0.0, 1.0, 0.0, 0.0)
-"""Rotation from z to -z."""
+DOWN = (0.0, 1.0, 0.0, 0.0)  # rotation from z to -z
 CORNERS = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
 
 
 def mesh_of(shape: Shape | SkinMesh) -> tuple[Matrix, Indices] | None:
-    """Compute the triangle mesh of a shape that is not a primitive.
+    """Compute the read-only mesh of a shape that is not a primitive of MuJoCo, or None.
 
-    Equal shapes share one mesh, which is read-only.
-
-    Returns:
-        Vertices, shape (n, 3), in the shape's own frame, and faces, shape (m, 3),
-        counter-clockwise from outside; None for a primitive of the physics engine.
+    Vertices, shape (n, 3), are in the shape's own frame; faces, shape (m, 3), are
+    counter-clockwise from outside.
     """
     return skin_triangles(shape) if isinstance(shape, SkinMesh) else _mesh_of(shape)
 
 
 @cached_by_shape
 def _mesh_of(shape: Shape) -> tuple[Matrix, Indices] | None:
-    match shape:
-        case Hull():
-            mesh = _convex_hull(support_points(shape))
-        case Box(radius=radius) if radius > 0.0:
-            mesh = _convex_hull(support_points(shape))
-        case Cylinder(radius_to=radius) if radius is not None:
-            mesh = _convex_hull(support_points(shape))
-        case Loft():
-            mesh = _loft_mesh(shape)
-        case _:
-            return None
+    rounded = isinstance(shape, Box) and shape.radius > 0.0
+    cone = isinstance(shape, Cylinder) and shape.radius_to is not None
+    if isinstance(shape, Loft):
+        mesh = _loft_mesh(shape)
+    elif isinstance(shape, Hull) or rounded or cone:
+        mesh = _convex_hull(support_points(shape))
+    else:
+        return None
     for array in mesh:
         array.flags.writeable = False
     return mesh
 
 
 def hull_spheres(shape: Shape) -> Matrix:
-    """Return spheres whose convex hull is the shape, in its own frame.
+    """Return spheres x y z radius (n, 4) with the shape as convex hull, in its frame.
 
     An ellipsoid is replaced by its bounding box, which is larger at the corners.
-
-    Returns:
-        Rows x, y, z, radius in m, shape (n, 4).
     """
     match shape:
         case Sphere(radius=radius):
@@ -98,11 +85,7 @@ def hull_spheres(shape: Shape) -> Matrix:
 
 
 def support_points(shape: Shape) -> Matrix:
-    """Compute points, shape (n, 3), whose convex hull is the shape, in its frame.
-
-    Raises:
-        DescriptionError: If the shape is a sphere, capsule or ellipsoid.
-    """
+    """Compute points (n, 3) with the shape as convex hull; raises for round shapes."""
     match shape:
         case Hull() | Box():
             spheres = hull_spheres(shape)
@@ -273,14 +256,11 @@ def _loft_faces(rings: int, n: int) -> Indices:
 
 
 def fit_hull(points: Matrix) -> dict[str, Any]:
-    """Return the fields of a hull that approximates the convex hull of points.
+    """Return the fields of a hull that approximates the convex hull of points (n, 3).
 
-    A flat cloud gives a thin box. A hull with more than `HULL_POINTS` corners keeps
-    the extreme corners along evenly spread directions, the axes among them. It then
-    lies inside the exact hull and touches it in each of these directions.
-
-    Args:
-        points: Point cloud in m, shape (n, 3).
+    A flat cloud gives a thin box. Of more than `HULL_POINTS` corners the extreme ones
+    along evenly spread directions are kept, where the hull touches the exact one from
+    inside.
     """
     low, high = points.min(axis=0), points.max(axis=0)
     centred = points - points.mean(axis=0)

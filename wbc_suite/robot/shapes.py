@@ -7,7 +7,7 @@ sizes, as in MJCF. A hull is the convex hull of spheres, a loft a surface over r
 import itertools
 import math
 from collections.abc import Callable
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Annotated, Any, Literal, TypeAlias, TypeVar, cast
 
 from pydantic import AfterValidator, BaseModel, Field, model_validator
@@ -38,19 +38,23 @@ ROUNDING = 1e-14
 """Lengths this close to 1 are not normalised, so that exported files stay equal."""
 
 
-def _unit(q: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
-    norm = math.sqrt(sum(c * c for c in q))
-    if abs(norm - 1.0) > 1e-6:
-        raise ValueError(
-            f"a quaternion w x y z must have length 1, this one has {norm:.9g}"
-        )
-    if abs(norm - 1.0) < ROUNDING:
-        return q
-    w, x, y, z = (c / norm for c in q)
-    return (w, x, y, z)
+def _unit(
+    values: tuple[float, ...], *, what: str, tolerance: float
+) -> tuple[float, ...]:
+    """Normalise a vector of nearly length 1."""
+    norm = math.hypot(*values)
+    if abs(norm - 1.0) > tolerance:
+        raise ValueError(f"{what} must have length 1, this one has {norm:.9g}")
+    return values if abs(norm - 1.0) < ROUNDING else tuple(v / norm for v in values)
 
 
-Quaternion: TypeAlias = Annotated[tuple[Real, Real, Real, Real], AfterValidator(_unit)]
+Axis: TypeAlias = Annotated[
+    Vector3, AfterValidator(partial(_unit, what="an axis", tolerance=1e-3))
+]
+Quaternion: TypeAlias = Annotated[
+    tuple[Real, Real, Real, Real],
+    AfterValidator(partial(_unit, what="a quaternion w x y z", tolerance=1e-6)),
+]
 """Unit quaternion w x y z; normalised on reading (rounded files are off by 1e-10)."""
 
 Color: TypeAlias = str | tuple[float, float, float] | tuple[float, float, float, float]
@@ -68,7 +72,7 @@ def quaternion_from_rpy(rpy: Vector3) -> tuple[float, float, float, float]:
     )
 
 
-def _accept_rpy(data: Any) -> Any:
+def _convert_rpy(data: Any) -> Any:
     """Replace the key `rpy` of a table by `quat`."""
     fields = as_table(data)
     if "rpy" not in fields:
@@ -90,10 +94,7 @@ class Posed(BaseModel):
     pos: Vector3 = (0.0, 0.0, 0.0)
     quat: Quaternion = (1.0, 0.0, 0.0, 0.0)
 
-    @model_validator(mode="before")
-    @classmethod
-    def _convert_rpy(cls, data: Any) -> Any:
-        return _accept_rpy(data)
+    _rpy = model_validator(mode="before")(_convert_rpy)
 
 
 def as_table(data: Any) -> dict[str, Any]:
@@ -105,11 +106,8 @@ class ShapeFields(BaseModel):
     """Fields of every shape: pose, colour and contact parameters.
 
     Attributes:
-        pos: Origin of the shape in the link's frame, m.
-        quat: Orientation w x y z in the link's frame; files may have `rpy`.
-        color: Name in `[materials]`, or red green blue (alpha) from 0 to 1.
         friction: Sliding, torsional and rolling friction; MuJoCo's default when absent.
-        condim: Contact dimension (1, 3, 4 or 6).
+        condim: Contact dimension.
         solref: Time constant in s and damping ratio of the contact.
         margin: Distance in m at which contacts become active.
     """
@@ -124,10 +122,7 @@ class ShapeFields(BaseModel):
     solref: tuple[Real, Real] | None = None
     margin: Real | None = None
 
-    @model_validator(mode="before")
-    @classmethod
-    def _convert_rpy(cls, data: Any) -> Any:
-        return _accept_rpy(data)
+    _rpy = model_validator(mode="before")(_convert_rpy)
 
 
 class Box(ShapeFields):
@@ -160,6 +155,12 @@ class Ellipsoid(ShapeFields):
     size: tuple[Size, Size, Size]
 
 
+def _check_length(shape: Any) -> Any:
+    if math.dist(shape.start, shape.end) < 1e-6:
+        raise ValueError("'from' and 'to' are the same point: use a sphere")
+    return shape
+
+
 class Capsule(ShapeFields):
     """A cylinder along a segment, with half spheres around its end points."""
 
@@ -168,10 +169,7 @@ class Capsule(ShapeFields):
     end: Vector3 = Field(alias="to")
     radius: Size
 
-    @model_validator(mode="after")
-    def _has_length(self) -> "Capsule":
-        _check_length(self.start, self.end)
-        return self
+    _length = model_validator(mode="after")(_check_length)
 
 
 class Cylinder(ShapeFields):
@@ -183,15 +181,7 @@ class Cylinder(ShapeFields):
     radius: Size
     radius_to: Size | None = None
 
-    @model_validator(mode="after")
-    def _has_length(self) -> "Cylinder":
-        _check_length(self.start, self.end)
-        return self
-
-
-def _check_length(start: Vector3, end: Vector3) -> None:
-    if math.dist(start, end) < 1e-6:
-        raise ValueError("'from' and 'to' are the same point: use a sphere")
+    _length = model_validator(mode="after")(_check_length)
 
 
 class Hull(ShapeFields):
@@ -212,12 +202,10 @@ class Hull(ShapeFields):
 class Loft(ShapeFields):
     """A surface over rings along one axis (visuals only; may be non-convex).
 
-    Attributes:
-        axis: Normal of the rings.
-        sections: Rows `[position, centre_u, centre_v, half_u, half_v]`; u and v are the
-            two other axes in the order x, y, z.
-        exponent: Superellipse exponent of a ring: 2 ellipse, 4 squircle, 8 nearly box.
-        smooth: Interpolate the rings by a smooth curve instead of lines.
+    Rows of `sections` are `[position, centre_u, centre_v, half_u, half_v]`; u and v are
+    the two other axes in the order x, y, z. The exponent is that of a superellipse: 2
+    ellipse, 4 squircle, 8 nearly box. `smooth` interpolates by a curve instead of
+    lines.
     """
 
     shape: Literal["loft"]
@@ -239,12 +227,7 @@ class Loft(ShapeFields):
 
 
 class SkinMesh(ShapeFields):
-    """A mesh file that replaces a link's visual shapes, see `robot.skins`.
-
-    Attributes:
-        file: Absolute path of an STL or OBJ file.
-        scale: Factors along the file's axes.
-    """
+    """A mesh file (absolute path) that replaces a link's visual shapes."""
 
     shape: Literal["skin"]
     file: str

@@ -1,17 +1,16 @@
 """Skins: meshes of other packages, drawn instead of a robot's own visual shapes.
 
-This package ships no meshes. A table `robots/skin/NAME.toml` lists the mesh files of a
-public package for each link of component NAME. The files are found in an installed
-package, which is not imported, or in a folder of the user. Masses, joints and
-collisions do not change.
+A table `robots/skin/NAME.toml` lists the mesh files of a public package for each link
+of component NAME. They are found in an installed package, which is not imported, or in
+a folder of the user. Physics does not change.
 """
 
 import importlib.util
+import itertools
 import logging
 import os
 import sys
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Literal
@@ -19,7 +18,7 @@ from typing import Literal
 from pydantic import Field
 
 from wbc_suite.catalogue import Catalogue, user_cache_root
-from wbc_suite.errors import ConfigError, UnknownNameError
+from wbc_suite.errors import ConfigError, UnknownNameError, look_up
 from wbc_suite.robot.elements import Name
 from wbc_suite.robot.shapes import Color, Posed, SkinMesh, Vector3
 from wbc_suite.tomlfile import FrozenModel, load_model
@@ -30,56 +29,43 @@ MESHES = "meshes"
 """Name of the skin from installed packages; any other skin is a folder."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Provider:
-    """A package with meshes, and how to install it."""
-
-    install: str
-    module: str | None = None
-    shared: str | None = None  # folder below an entry of sys.path
-
-    def folders(self) -> Iterator[Path]:
-        """Yield the folders that the paths of tables are relative to."""
-        if self.module is not None:
-            spec = importlib.util.find_spec(self.module)
-            for place in (spec and spec.submodule_search_locations) or ():
-                yield Path(place)
-        if self.shared is not None:
-            for place in sys.path:
-                if (folder := Path(place) / self.shared).is_dir():
-                    yield folder
+def _module(name: str) -> Iterator[Path]:
+    spec = importlib.util.find_spec(name)
+    return map(Path, (spec and spec.submodule_search_locations) or ())
 
 
-class _Menagerie(_Provider):
-    """The cache of the package `mujoco-menagerie`: one folder per model and version."""
-
-    def folders(self) -> Iterator[Path]:
-        if root := os.environ.get("MENAGERIE_ROOT"):
-            yield Path(root)
-        home = user_cache_root()
-        if sys.platform == "darwin":
-            home = Path.home() / "Library/Caches"
-        own = os.environ.get("MENAGERIE_CACHE_DIR") or home / "mujoco_menagerie"
-        yield Path(own) / "models"
+def _menagerie() -> Iterator[Path]:
+    """Yield the caches of `mujoco-menagerie`: one folder per model and version."""
+    if root := os.environ.get("MENAGERIE_ROOT"):
+        yield Path(root)
+    home = user_cache_root()
+    if sys.platform == "darwin":
+        home = Path.home() / "Library/Caches"
+    own = os.environ.get("MENAGERIE_CACHE_DIR") or home / "mujoco_menagerie"
+    yield Path(own) / "models"
 
 
-PROVIDERS: Mapping[str, _Provider] = {
-    "robosuite": _Provider("pip install --no-deps robosuite", module="robosuite"),
-    "fourier_robot_descriptions": _Provider(
+ROBOT_DATA = "cmeel.prefix/share/example-robot-data/robots"
+PROVIDERS: Mapping[str, tuple[str, Callable[[], Iterable[Path]]]] = {
+    "robosuite": ("pip install --no-deps robosuite", lambda: _module("robosuite")),
+    "fourier_robot_descriptions": (
         "pip install --no-deps fourier-robot-descriptions",
-        module="fourier_robot_descriptions",
+        lambda: _module("fourier_robot_descriptions"),
     ),
-    "example_robot_data": _Provider(
+    "example_robot_data": (
         "pip install --no-deps example-robot-data",
-        shared="cmeel.prefix/share/example-robot-data/robots",
+        lambda: (Path(p) / ROBOT_DATA for p in sys.path),
     ),
-    "mujoco_menagerie": _Menagerie(
-        "pip install mujoco-menagerie, and its command to fetch the model"
+    "mujoco_menagerie": (
+        "pip install mujoco-menagerie, and its command to fetch the model",
+        _menagerie,
     ),
-    "robotiq_description": _Provider(
-        "a folder with the meshes of the ROS package robotiq_description"
+    "robotiq_description": (
+        "a folder with the meshes of the ROS package robotiq_description",
+        tuple,
     ),
 }
+"""How to install each package with meshes, and the folders that paths start from."""
 
 
 class _Piece(Posed):
@@ -102,10 +88,8 @@ class SkinTable(FrozenModel):
 class SkinFinder:
     """Finds the meshes of components and reports missing ones once.
 
-    Args:
-        skin: `"meshes"` for those of installed packages, or a folder: meshes are then
-            looked up there by path or, if only one file matches, by name.
-        catalogue: Where the tables are.
+    The skin "meshes" are those of installed packages; in a folder meshes are looked up
+    by path or, if only one file matches, by name.
 
     Raises:
         ConfigError: If the folder does not exist.
@@ -124,15 +108,7 @@ class SkinFinder:
     def meshes(
         self, component: str, links: Iterable[str]
     ) -> dict[str, tuple[SkinMesh, ...]]:
-        """Return the meshes of each link of a component; empty without a skin.
-
-        Args:
-            component: Name of the component.
-            links: Names of its links.
-
-        Raises:
-            UnknownNameError: If the table names a link that the component lacks.
-        """
+        """Return the meshes of each link of a component; empty without a skin."""
         if not self._catalogue.holds("robots/skin", component):
             return {}
         path = self._catalogue.find("robots/skin", component, kind="skin")
@@ -150,11 +126,8 @@ class SkinFinder:
         return {
             link: tuple(
                 SkinMesh.model_validate(
-                    {
-                        **piece.model_dump(),
-                        "shape": "skin",
-                        "file": str(files[piece.file]),
-                    }
+                    piece.model_dump()
+                    | {"shape": "skin", "file": str(files[piece.file])}
                 )
                 for piece in own
             )
@@ -162,15 +135,11 @@ class SkinFinder:
         }
 
     def report_missing(self) -> None:
-        """Log a warning about missing meshes.
-
-        Raises:
-            ConfigError: If no mesh at all was found.
-        """
+        """Log a warning about missing meshes; raises ConfigError if none was found."""
         where = f" below {self._folder}" if self._folder else ""
         lines = [
             f"the meshes of {', '.join(names)} were not found{where}. To install "
-            f"them: {PROVIDERS[provider].install}"
+            f"them: {PROVIDERS[provider][0]}"
             for provider, names in self._missing.items()
         ]
         if lines and not self._found:
@@ -186,7 +155,7 @@ class SkinFinder:
             return self._in_folder(inside)
         first, *rest = inside.parts
         versioned = "/".join((f"{first}-*", *rest))  # the folder name-1a2b of a version
-        for folder in PROVIDERS[table.provider].folders():
+        for folder in PROVIDERS[table.provider][1]():
             for path in (folder / inside, *folder.glob(versioned)):
                 if path.is_file():
                     return path
@@ -210,23 +179,14 @@ class SkinFinder:
 
 
 def read_skin(path: Path) -> SkinTable:
-    """Read a table of meshes.
-
-    Raises:
-        ConfigError: If the file violates the format.
-        UnknownNameError: If the provider is unknown.
-    """
+    """Read a table of meshes; raises ConfigError or UnknownNameError."""
     table = load_model(SkinTable, path)
-    if table.provider not in PROVIDERS:
-        raise UnknownNameError("provider of meshes", table.provider, PROVIDERS)
+    look_up("provider of meshes", table.provider, PROVIDERS)
     return table
 
 
 def _common_end(one: Path, other: Path) -> int:
     """Return how many trailing parts of two paths are equal, ignoring case."""
-    count = 0
-    for a, b in zip(reversed(one.parts), reversed(other.parts), strict=False):
-        if a.casefold() != b.casefold():
-            break
-        count += 1
-    return count
+    pairs = zip(reversed(one.parts), reversed(other.parts), strict=False)
+    same = (a.casefold() == b.casefold() for a, b in pairs)
+    return sum(1 for _ in itertools.takewhile(bool, same))

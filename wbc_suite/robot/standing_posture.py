@@ -8,11 +8,9 @@ from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.elements import Frame
 from wbc_suite.typing import Vector
 
-TOLERANCE = 0.02
-"""Largest residual in m of a posture that is accepted."""
+TOLERANCE = 0.02  # largest residual in m of a posture that is accepted
 
-MIN_COSINE = 0.9
-"""Smallest cosine between the axis of a pitch joint and y."""
+MIN_COSINE = 0.9  # smallest cosine between the axis of a pitch joint and y
 
 START = {2: ((0.55, -1.1), 0.85), 3: ((-0.3, 0.6, -0.3), 0.95)}
 """By number of hinges: initial angles about y, rad, and height of the hip as part of
@@ -22,13 +20,10 @@ the leg's length. Knees of quadrupeds point backward, those of humanoids forward
 def standing_legs(robot: RobotDescription) -> dict[str, float]:
     """Return positions of the pitch joints of legs, by name, rad.
 
-    In each leg the hinges about y are moved so that the foot is below the uppermost of
-    them and its sole keeps the inclination of the posture `ready`. A leg without such a
-    posture has no entry.
-
-    Args:
-        robot: Chains to a frame with role `foot` are legs; other joints keep the
-            posture `ready`.
+    In each chain to a frame with role `foot` the hinges about y are moved so that the
+    foot is below the uppermost of them and its sole keeps the inclination of the
+    posture `ready`, in which other joints stay. A leg without such a posture has no
+    entry.
     """
     model = robot.to_pinocchio()
     data = model.createData()

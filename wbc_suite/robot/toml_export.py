@@ -6,7 +6,7 @@ from typing import Any, TypeAlias, cast
 
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.elements import Elements
-from wbc_suite.robot.robot_file import Component, Header
+from wbc_suite.robot.robot_file import SOURCES, Component, Header
 
 ONE_A_LINE = ("visual", "collision", "spheres", "sections", "exclude")
 """Lists that are written with one entry per line."""
@@ -22,14 +22,7 @@ def write_toml(robot: RobotDescription) -> str:
     data["synergies"] = tuple(s for own in robot.synergies.values() for s in own)
     component = Component(
         format=1,
-        component=Header(
-            name=robot.name,
-            kind="body",
-            title=robot.title,
-            source=robot.source,
-            license=robot.license,
-            deviations=robot.deviations,
-        ),
+        component=Header(kind="body", **{key: getattr(robot, key) for key in SOURCES}),
         **data,
     )
     fields = component.model_dump(by_alias=True, exclude_defaults=True)
@@ -40,8 +33,7 @@ def write_toml(robot: RobotDescription) -> str:
     return "\n\n".join(tables) + "\n"
 
 
-Table: TypeAlias = dict[str, Any]
-"""A model as plain data."""
+Table: TypeAlias = dict[str, Any]  # a model as plain data
 
 
 def _tables(name: str, value: Table | list[Table]) -> Iterator[str]:
@@ -56,21 +48,19 @@ def _tables(name: str, value: Table | list[Table]) -> Iterator[str]:
 
 
 def _table(head: str, items: Table) -> str:
-    rows = (f"{key} = {_pretty(key, value)}" for key, value in _sorted(items).items())
-    return "\n".join([head, *rows])
+    rows = [head]
+    for key, value in _sorted(items).items():
+        text = _inline(value)
+        if key in ONE_A_LINE:
+            text = "[\n" + "".join(f"  {_inline(item)},\n" for item in value) + "]"
+        rows.append(f"{key} = {text}")
+    return "\n".join(rows)
 
 
 def _sorted(items: Table) -> Table:
     """Return the table with its identifying keys first."""
     first = [key for key in ("name", "shape", "parent", "link") if key in items]
     return {key: items[key] for key in dict.fromkeys([*first, *items])}
-
-
-def _pretty(key: str, value: Any) -> str:
-    if key in ONE_A_LINE:
-        rows = "".join(f"  {_inline(item)},\n" for item in value)
-        return f"[\n{rows}]"
-    return _inline(value)
 
 
 def _inline(value: Any) -> str:

@@ -11,8 +11,7 @@ from wbc_suite.errors import ConfigError, DescriptionError, did_you_mean, join_f
 from wbc_suite.robot.xml_files import Element, read_xml
 from wbc_suite.typing import Vector
 
-MAX_LINKS = 500
-"""Largest number of links, as in robot files."""
+MAX_LINKS = 500  # largest number of links, as in robot files
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -46,20 +45,8 @@ class Branch:
         return pose_of(self.joint, where=self.where)
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class UrdfTree:
-    """One URDF file: its element `<robot>`, and its branches in depth-first order."""
-
-    robot: Element
-    branches: tuple[Branch, ...]
-
-    def below(self, name: str) -> list[Branch]:
-        """Return the branches whose parent is a link."""
-        return [branch for branch in self.branches if branch.parent == name]
-
-
-def read_tree(path: Path) -> UrdfTree:
-    """Read a URDF file.
+def read_tree(path: Path) -> tuple[Element, tuple[Branch, ...]]:
+    """Return the element `<robot>` of a URDF file, and its branches depth-first.
 
     Raises:
         ConfigError: If it is not URDF.
@@ -84,7 +71,7 @@ def read_tree(path: Path) -> UrdfTree:
                 f"'{name}'; a link has one parent."
             )
         above[child] = (parent, joint)
-    return UrdfTree(robot=robot, branches=tuple(_depth_first(links, above, path)))
+    return robot, tuple(_depth_first(links, above, path))
 
 
 def _check_root(robot: Element, path: Path) -> None:
@@ -158,11 +145,7 @@ def numbers(
     where: str,
     default: Sequence[float] | None = None,
 ) -> Vector:
-    """Read an attribute of several finite numbers, shape (count,).
-
-    Raises:
-        DescriptionError: If it is missing without a default, or malformed.
-    """
+    """Read an attribute of finite numbers, shape (count,); raises DescriptionError."""
     text = element.get(key)
     if text is None:
         if default is None:

@@ -1,8 +1,7 @@
 """Write a robot description as URDF text.
 
-URDF has trees of links with boxes, cylinders, spheres and meshes. It has no armature,
-acceleration limits, actuators, sensors, cameras, keyframes, groups or closed loops, so
-these are omitted. `write_urdf` lists what is converted.
+URDF has no armature, acceleration limits, actuators, sensors, cameras, keyframes,
+groups or closed loops, so these are omitted. `write_urdf` lists what is converted.
 """
 
 from collections.abc import Iterator
@@ -18,7 +17,6 @@ from wbc_suite.robot.mesh_files import write_stl
 from wbc_suite.robot.poses import HasPose, pose_fields, se3_of
 from wbc_suite.robot.shape_geometry import along_z, mesh_of, shape_bounds
 from wbc_suite.robot.shapes import Box, Capsule, Cylinder, Posed, Shape, Sphere
-from wbc_suite.typing import Matrix
 
 UNLIMITED = 1e6
 """Written for limits that URDF requires and the robot lacks; read as no limit."""
@@ -36,12 +34,8 @@ def write_urdf(robot: RobotDescription, *, mesh_dir: Path | None = None) -> str:
       velocity limit, get the limit `UNLIMITED`; a joint without motor has effort 0.
     - Frames become massless links on fixed joints.
     - A capsule becomes a cylinder and two spheres. Ellipsoids, hulls, lofts, cones and
-      rounded boxes become their bounding boxes, or meshes if `mesh_dir` is given.
-
-    Args:
-        robot: The robot.
-        mesh_dir: Folder for STL files of the shapes that are not URDF primitives. The
-            text refers to them relative to the folder's parent; save it there.
+      rounded boxes become their bounding boxes, or STL files in `mesh_dir`, which the
+      text refers to relative to the folder's parent.
     """
     root = Element("robot", name=robot.name)
     # For MuJoCo, which would infer a mass for links without one.
@@ -62,32 +56,15 @@ def write_urdf(robot: RobotDescription, *, mesh_dir: Path | None = None) -> str:
     return '<?xml version="1.0"?>\n' + tostring(root, "unicode") + "\n"
 
 
-def rpy_of(rotation: Matrix) -> tuple[float, float, float]:
-    """Compute fixed-axis roll, pitch, yaw of a rotation, shape (3, 3).
-
-    R = Rz(yaw) Ry(pitch) Rx(roll). Roll and pitch are computed from Rz(-yaw) R, so that
-    the product keeps full precision near pitch = +-90 degrees, where roll and yaw are
-    not unique.
-    """
-    yaw = float(np.arctan2(rotation[1, 0], rotation[0, 0]))
-    c, s = np.cos(yaw), np.sin(yaw)
-    level = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) @ rotation
-    pitch = float(np.arctan2(-level[2, 0], level[0, 0]))
-    roll = float(np.arctan2(-level[1, 2], level[1, 1]))
-    return roll, pitch, yaw
-
-
 def _numbers(values: object) -> str:
     """Write numbers with all digits, so that reading them gives equal values."""
-    return " ".join(
-        repr(float(v) + 0.0) for v in np.asarray(values, dtype=np.float64).ravel()
-    )
+    array = np.asarray(values, dtype=np.float64) + 0.0
+    return " ".join(map(repr, array.ravel().tolist()))
 
 
 def _origin(pose: pin.SE3) -> Element:
-    return Element(
-        "origin", xyz=_numbers(pose.translation), rpy=_numbers(rpy_of(pose.rotation))
-    )
+    rpy = pin.rpy.matrixToRpy(pose.rotation)
+    return Element("origin", xyz=_numbers(pose.translation), rpy=_numbers(rpy))
 
 
 def _connection(
@@ -117,20 +94,12 @@ def _joint(robot: RobotDescription, link: Link) -> Element:
     SubElement(element, "axis", xyz=_numbers(joint.axis))
     element.append(_limit(joint))
     if joint.damping or joint.frictionloss:
-        SubElement(
-            element,
-            "dynamics",
-            damping=_numbers(joint.damping),
-            friction=_numbers(joint.frictionloss),
-        )
+        damping, friction = _numbers(joint.damping), _numbers(joint.frictionloss)
+        SubElement(element, "dynamics", damping=damping, friction=friction)
     if joint.mimic is not None:
-        SubElement(
-            element,
-            "mimic",
-            joint=joint.mimic.joint,
-            multiplier=_numbers(joint.mimic.ratio),
-            offset=_numbers(joint.mimic.offset),
-        )
+        ratio, offset = _numbers(joint.mimic.ratio), _numbers(joint.mimic.offset)
+        leader = joint.mimic.joint
+        SubElement(element, "mimic", joint=leader, multiplier=ratio, offset=offset)
     return element
 
 
@@ -148,7 +117,14 @@ def _limit(joint: Joint) -> Element:
 def _link(robot: RobotDescription, link: Link, mesh_dir: Path | None) -> Element:
     element = Element("link", name=link.name)
     if link.mass > 0.0:
-        element.append(_inertial(link))
+        inertial = SubElement(element, "inertial")
+        inertial.append(_origin(pin.SE3(np.eye(3), np.asarray(link.com))))
+        SubElement(inertial, "mass", value=_numbers(link.mass))
+        keys = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+        moments: dict[str, str] = dict(
+            zip(keys, map(_numbers, link.inertia), strict=True)
+        )
+        SubElement(inertial, "inertia", moments)
     for kind, shapes in (("visual", link.visual), ("collision", link.collision)):
         for index, shape in enumerate(shapes):
             stem = f"{link.name}_{kind}{index}"
@@ -158,15 +134,6 @@ def _link(robot: RobotDescription, link: Link, mesh_dir: Path | None) -> Element
                 SubElement(item, "geometry").append(geometry)
                 if kind == "visual":
                     item.append(_material(robot, shape))
-    return element
-
-
-def _inertial(link: Link) -> Element:
-    element = Element("inertial")
-    element.append(_origin(pin.SE3(np.eye(3), np.asarray(link.com))))
-    SubElement(element, "mass", value=_numbers(link.mass))
-    xx, yy, zz, xy, xz, yz = (_numbers(v) for v in link.inertia)
-    SubElement(element, "inertia", ixx=xx, ixy=xy, ixz=xz, iyy=yy, iyz=yz, izz=zz)
     return element
 
 
@@ -198,11 +165,8 @@ def _primitives(
             yield own, Element("sphere", radius=_numbers(radius))
         case Cylinder(radius_to=None) | Capsule():
             pose, half = along_z(shape)
-            radius = _numbers(shape.radius)
-            yield (
-                se3_of(pose),
-                Element("cylinder", radius=radius, length=_numbers(2 * half)),
-            )
+            radius, length = _numbers(shape.radius), _numbers(2 * half)
+            yield se3_of(pose), Element("cylinder", radius=radius, length=length)
             if isinstance(shape, Capsule):
                 for end in (shape.start, shape.end):
                     ball = Element("sphere", radius=radius)

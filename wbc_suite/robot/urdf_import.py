@@ -16,11 +16,10 @@ from wbc_suite.robot.importing import (
     describe_import,
     overlapping_links,
 )
-from wbc_suite.robot.inertia import inertia_fields
+from wbc_suite.robot.inertia import inertia_fields, inertia_matrix
 from wbc_suite.robot.poses import pose_fields
 from wbc_suite.robot.urdf_elements import (
     Branch,
-    UrdfTree,
     number,
     numbers,
     pose_of,
@@ -53,19 +52,19 @@ def read_urdf(
         path: The file.
         mesh_root: Folder that meshes are read from, and that `package://` refers to;
             by default the ROS package of the file, or its folder.
-        mend_inertias: Replace an unphysical inertia by the nearest physical one, with
-            a warning, instead of raising.
+        mend_inertias: Replace unphysical inertias by the nearest physical ones.
 
     Raises:
         ConfigError: If the file is not URDF, or refers to files outside the folder.
         DescriptionError: If the robot is inconsistent or unphysical.
     """
     path = Path(path)
-    tree = read_tree(path)
+    element, branches = read_tree(path)
     meshes = MeshFolder(path, mesh_root)
     try:
-        importer = _Importer(tree, UrdfShapes(tree.robot, meshes))
-        robot = importer.robot(path, mend_inertias=mend_inertias)
+        importer = _Importer(branches, UrdfShapes(element, meshes))
+        name = element.get("name", "") or path.stem
+        robot = importer.robot(name, path, mend_inertias=mend_inertias)
     except DescriptionError as error:
         if str(error).startswith(str(path)):
             raise
@@ -86,14 +85,13 @@ def read_urdf(
 class _Importer:
     """Converts the elements of one file to the fields of a description."""
 
-    def __init__(self, tree: UrdfTree, shapes: UrdfShapes) -> None:
-        self._tree = tree
-        self._shapes = shapes
+    def __init__(self, branches: tuple[Branch, ...], shapes: UrdfShapes) -> None:
+        self._branches, self._shapes = branches, shapes
         self._names = NameTable()
         self._links: dict[str, str] = {}
         self._joints: dict[str, str] = {}
 
-    def robot(self, path: Path, *, mend_inertias: bool) -> RobotDescription:
+    def robot(self, name: str, path: Path, *, mend_inertias: bool) -> RobotDescription:
         root, branches = self._root()
         frames = _frame_names(branches)
         kept = [branch for branch in branches if branch.name not in frames]
@@ -105,7 +103,7 @@ class _Importer:
                 self._joints[original] = self._names.take(original, "joint")
         first = kept[0]
         return describe_import(
-            name=self._tree.robot.get("name", "") or path.stem,
+            name=name,
             source=path,
             root=root,
             links=[self._link(branch, first=branch is first) for branch in kept],
@@ -117,15 +115,15 @@ class _Importer:
 
     def _root(self) -> tuple[dict[str, Any], tuple[Branch, ...]]:
         """Return the fields of the root, and the branches without the world."""
-        world, *rest = self._tree.branches
-        below = self._tree.below(world.name)
-        moving = [b for b in self._tree.branches if b.kind in ("floating", "planar")]
+        world, *rest = self._branches
+        below = [b for b in rest if b.parent == world.name]
+        moving = [b for b in rest if b.kind in ("floating", "planar")]
         first = below[0] if len(below) == 1 and _is_bare(world) else None
         if first is None or first.kind not in ROOT_KINDS:
             _refuse_roots(moving)
-            return {"kind": "fixed"}, self._tree.branches
+            return {"kind": "fixed"}, self._branches
         if world.name != "world" and not moving:
-            return {"kind": "fixed"}, self._tree.branches
+            return {"kind": "fixed"}, self._branches
         if first.joint is not None and first.kind == "planar":
             axis = _axis(first.joint, first.where)
             if not np.allclose(axis, (0.0, 0.0, 1.0)):
@@ -258,11 +256,10 @@ def _inertial(link: Element, where: str) -> dict[str, Any]:
     mass, tensor = element.find("mass"), element.find("inertia")
     if mass is None or tensor is None:
         raise DescriptionError(f"{where}: <inertial> needs <mass> and <inertia>.")
-    xx, yy, zz, xy, xz, yz = (
-        number(tensor, key, where=where, default=0.0)
-        for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+    keys = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+    own = inertia_matrix(
+        tuple(number(tensor, key, where=where, default=0.0) for key in keys)
     )
-    own = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     R = pose.rotation
     turned = own if np.array_equal(R, np.eye(3)) else R @ own @ R.T
     kilograms = number(mass, "value", where=where)

@@ -23,9 +23,7 @@ LOG = logging.getLogger(__name__)
 class MeshFolder:
     """Finds mesh files in one folder, and never outside it.
 
-    Args:
-        urdf: The URDF file.
-        root: The folder; by default the ROS package of the file, or its folder.
+    By default it is the ROS package of the URDF file, or its folder.
     """
 
     def __init__(self, urdf: Path, root: Path | None) -> None:
@@ -34,12 +32,7 @@ class MeshFolder:
         self._shapes: dict[tuple[str | float, ...], dict[str, Any] | None] = {}
 
     def hull(self, filename: str, scale: Vector) -> dict[str, Any] | None:
-        """Return the fields of a mesh's hull; None if it is missing or unsupported.
-
-        Raises:
-            ConfigError: If the file lies outside the folder.
-            DescriptionError: If the file is broken.
-        """
+        """Return the fields of a mesh's hull; None if it is missing or unsupported."""
         key = (filename, *scale.tolist())
         if key not in self._shapes:
             path = self._find(filename)
@@ -60,22 +53,16 @@ class MeshFolder:
             )
 
     def _find(self, filename: str) -> Path | None:
-        for candidate in self._candidates(filename):
-            path = inside(self._root, candidate, source=self._urdf)
-            if path.is_file():
-                return path
-        return None
-
-    def _candidates(self, filename: str) -> Iterator[Path]:
         scheme, separator, rest = filename.partition("://")
+        candidates: list[Path] = []
         if not separator:
-            yield self._urdf.parent / filename
+            candidates = [self._urdf.parent / filename]
         elif scheme == "file":
-            yield Path(rest)
+            candidates = [Path(rest)]
         elif scheme in ("package", "model"):
-            package, _, below = rest.partition("/")
-            yield self._root / package / below
-            yield self._root / below
+            candidates = [self._root / rest, self._root / rest.partition("/")[2]]
+        paths = (inside(self._root, c, source=self._urdf) for c in candidates)
+        return next((path for path in paths if path.is_file()), None)
 
 
 def _package_of(urdf: Path) -> Path:
@@ -91,15 +78,7 @@ def _package_of(urdf: Path) -> Path:
 
 
 class UrdfShapes:
-    """Reads `<visual>` and `<collision>` elements as fields of shapes.
-
-    Args:
-        robot: The root element.
-        meshes: Finds mesh files.
-
-    Attributes:
-        colors: Colours of the materials, by valid name.
-    """
+    """Reads shapes of links; `colors` are those of the materials, by valid name."""
 
     def __init__(self, robot: Element, meshes: MeshFolder) -> None:
         self._meshes = meshes
@@ -115,10 +94,7 @@ class UrdfShapes:
                 self.colors[name] = tuple(np.clip(rgba, 0.0, 1.0).tolist())
 
     def of(self, link: Element) -> dict[str, list[dict[str, Any]]]:
-        """Return the shapes of a link.
-
-        If no visual shape can be read, the collision shapes are drawn.
-        """
+        """Return a link's shapes; without readable visuals, collision is drawn."""
         visual = [
             shape | {"color": self._color(item)}
             for item in link.findall("visual")

@@ -1,5 +1,6 @@
 """Arenas: floor, sky, lights and tables."""
 
+import itertools
 from collections.abc import Mapping
 from typing import Annotated, TypeAlias
 
@@ -8,30 +9,22 @@ from pydantic import Field, model_validator
 
 from wbc_suite.robot.shapes import Size, Vector3
 from wbc_suite.scene.compose import add_camera
-from wbc_suite.scene.materials import FRICTION, wood_pixels
+from wbc_suite.scene.materials import FRICTION, add_texture, wood_pixels
 from wbc_suite.tomlfile import FrozenModel
 
-WOOD_SIZE = 512
-"""Pixels along each side of the table's texture."""
+WOOD_SIZE = 512  # pixels along each side of the table's texture
 
 LEG_AT = 0.5
 """Distance of a table's legs from its middle, as a share of half its side; further out
 they would stand on the feet of robots' pedestals, which reach 24 cm under it."""
 
-LEAST_LEG = 0.01
-"""Shortest legs of a table, m."""
+LEAST_LEG = 0.01  # shortest legs of a table, m
 
 Friction: TypeAlias = Annotated[float, Field(ge=0.0, le=1e3)]
 
 
 class TableConfig(FrozenModel):
-    """A table.
-
-    Attributes:
-        size: Length along x, width along y, thickness of the top, m.
-        center: Middle of the top's upper face, m.
-        friction: Sliding, torsional, rolling.
-    """
+    """A table: length, width and thickness of its top, middle of its upper face, m."""
 
     size: tuple[Size, Size, Size] = (0.8, 0.8, 0.05)
     center: Vector3 = (0.0, 0.0, 0.8)
@@ -89,15 +82,12 @@ def add_table(spec: mujoco.MjSpec, table: TableConfig, name: str = "table") -> N
         material="wood",
         friction=table.friction,
     )
-    for i, (side, end) in enumerate(((-1, -1), (-1, 1), (1, -1), (1, 1))):
+    x, y, z = LEG_AT * length / 2, LEG_AT * width / 2, -thickness - height / 2
+    for i, (side, end) in enumerate(itertools.product((-1, 1), repeat=2)):
         body.add_geom(
             name=f"{name}_leg{i}",
             type=mujoco.mjtGeom.mjGEOM_BOX,
-            pos=(
-                side * LEG_AT * length / 2,
-                end * LEG_AT * width / 2,
-                -thickness - height / 2,
-            ),
+            pos=(side * x, end * y, z),
             size=(0.025, 0.025, height / 2),
             material="table_leg",
         )
@@ -106,13 +96,7 @@ def add_table(spec: mujoco.MjSpec, table: TableConfig, name: str = "table") -> N
 def add_tables(
     spec: mujoco.MjSpec, table: TableConfig, centers: Mapping[str, Vector3]
 ) -> None:
-    """Add several equal tables, such as one in front of each arm.
-
-    Args:
-        spec: The scene.
-        table: Size and friction of all.
-        centers: Middle of each top's upper face, m, by the name of its body and top.
-    """
+    """Add equal tables at the middles of their tops' upper faces, m, by name."""
     for name, center in centers.items():
         given = table.model_dump() | {"center": center}
         add_table(spec, TableConfig(**given), name)
@@ -123,11 +107,8 @@ def add_table_cameras(
 ) -> None:
     """Add the cameras of table-top benchmarks, under the names of existing datasets.
 
-    Args:
-        spec: The scene.
-        center: Middle of the table's upper face, m.
-        side: Side of `sideview`: -1 for -y, 1 for +y.
-        before: Distance of `agentview` from the table's middle along x, m.
+    `center` is the middle of the table's upper face, m. `sideview` looks from the side
+    -1 (-y) or 1 (+y), `agentview` from `before` the middle along x, m.
     """
     x, y, z = center
     middle = (x - 0.15, y, z + 0.25)
@@ -138,14 +119,10 @@ def add_table_cameras(
 
 
 def _add_textures(spec: mujoco.MjSpec) -> None:
-    flat, gradient = (
-        mujoco.mjtBuiltin.mjBUILTIN_FLAT,
-        mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
-    )
     spec.add_texture(
         name="sky",
         type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
-        builtin=gradient,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
         rgb1=(0.93, 0.95, 0.97),
         rgb2=(0.62, 0.68, 0.75),
         width=64,  # a gradient needs no more, and every environment holds it
@@ -154,7 +131,7 @@ def _add_textures(spec: mujoco.MjSpec) -> None:
     spec.add_texture(
         name="floor",
         type=mujoco.mjtTexture.mjTEXTURE_2D,
-        builtin=flat,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT,
         rgb1=(0.79, 0.80, 0.80),
         rgb2=(0.79, 0.80, 0.80),
         mark=mujoco.mjtMark.mjMARK_EDGE,
@@ -166,16 +143,9 @@ def _add_textures(spec: mujoco.MjSpec) -> None:
     floor.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "floor"
     floor.texrepeat = (1, 1)
     floor.texuniform = True
-    planks = spec.add_texture(
-        name="wood",
-        type=mujoco.mjtTexture.mjTEXTURE_2D,
-        nchannel=3,
-        width=WOOD_SIZE,
-        height=WOOD_SIZE,
-    )
-    planks.data = wood_pixels(WOOD_SIZE).tobytes()
     wood = spec.add_material(name="wood", specular=0.2, shininess=0.3)
-    wood.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "wood"
+    planks = wood_pixels(WOOD_SIZE)
+    add_texture(spec, wood, mujoco.mjtTexture.mjTEXTURE_2D, planks)
     wood.texrepeat = (1, 1)
     spec.add_material(name="table_leg", rgba=(0.32, 0.33, 0.35, 1), specular=0.4)
 

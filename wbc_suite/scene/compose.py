@@ -8,19 +8,18 @@ import pinocchio as pin
 
 from wbc_suite.control import RobotState
 from wbc_suite.robot import RobotDescription
-from wbc_suite.robot.poses import pose_fields, se3_of
+from wbc_suite.robot.poses import pose_at, pose_fields, se3_of
 from wbc_suite.robot.shapes import Vector3
 from wbc_suite.scene.objects.scene_object import TORSION, SceneObject
+from wbc_suite.typing import Indices, Matrix, Vector
 
 log = logging.getLogger(__name__)
 
 SMALL = 24
-"""Degrees of freedom up to which constraint islands cost more than they save: a physics
-step of Lift takes 6 % less without them at 15 and at 18, as long at 30 and 15 % more at
-60."""
+"""Degrees of freedom up to which constraint islands cost more than they save: without
+them a step of Lift takes 6 % less at 15 and 18, as long at 30 and 15 % more at 60."""
 
-GROUNDED = 0.03
-"""Depth by which feet and mounts may reach into the floor, m."""
+GROUNDED = 0.03  # depth by which feet and mounts may reach into the floor, m
 
 ROBOT_VIEW = "robotview"
 """Name of the camera behind each robot, after the robot's prefix."""
@@ -43,8 +42,7 @@ def place_robot(
     so that the models of all engines use the same world frame.
     """
     robot = _on_the_floor(robot)
-    turn = pin.Quaternion(np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2))
-    place = pin.SE3(turn.matrix(), np.array([*position, 0.0]))
+    place = pin.SE3(pin.utils.rotate("z", yaw), np.array([*position, 0.0]))
     root = pose_fields(place * se3_of(robot.root))
     return robot.with_root(robot.root.kind, **root)
 
@@ -59,14 +57,11 @@ def _on_the_floor(robot: RobotDescription) -> RobotDescription:
     model = robot.to_mjspec().compile()
     data = mujoco.MjData(model)
     if "ready" in robot.keyframes:
-        for name, value in robot.keyframe("ready").items():
-            data.qpos[model.joint(name).qposadr[0]] = value
+        mujoco.mj_resetDataKeyframe(model, data, model.key("ready").id)
     mujoco.mj_kinematics(model, data)
-    solid = (model.geom_contype | model.geom_conaffinity) > 0
-    upward = data.geom_xmat[solid].reshape(-1, 3, 3)[:, 2]  # rows of z
-    centre, half = np.split(model.geom_aabb[solid], 2, axis=1)
-    bottoms = data.geom_xpos[solid, 2] + np.sum(upward * centre - abs(upward) * half, 1)
-    depth = -float(bottoms.min(initial=0.0))
+    solid = np.flatnonzero(model.geom_contype | model.geom_conaffinity)
+    low, _ = _geom_bounds(model, data, solid, pin.SE3.Identity())
+    depth = -float(low[:, 2].min(initial=0.0))
     if depth < GROUNDED:
         return robot
     log.warning(
@@ -85,16 +80,10 @@ def attach_robot(
     *,
     frame: mujoco.MjsFrame | None = None,
 ) -> None:
-    """Add a robot at its own root pose; every name of it gets the prefix.
+    """Add a robot at its own root pose, on a frame or the world, with prefixed names.
 
     Fingers get torsional friction, so that an object does not turn about the line
     between them.
-
-    Args:
-        spec: The scene.
-        robot: The robot.
-        prefix: Text before its names.
-        frame: Frame that it is attached to; the world by default.
     """
     own = robot.to_mjspec()
     for key in list(own.keys):
@@ -106,17 +95,10 @@ def attach_robot(
 
 
 def fix_to_frame(spec: mujoco.MjSpec, attached: SceneObject, frame: str) -> None:
-    """Fix an object to the link of a robot in a scene.
-
-    Args:
-        spec: The scene, with the robot.
-        attached: The object; its own pose is relative to the frame.
-        frame: Name of a robot's frame, with the robot's prefix.
-    """
+    """Fix an object, whose pose is relative to it, to a robot's frame in a scene."""
     site = spec.site(frame)
     at = pin.SE3(pin.Quaternion(*site.quat).normalized().matrix(), site.pos)
-    own = pin.SE3(pin.Quaternion(*attached.quat).matrix(), np.array(attached.pos))
-    pose = pose_fields(at * own)
+    pose = pose_fields(at * pose_at(attached.pos, attached.quat))
     attached.fixed(pose["pos"], pose["quat"]).add_to(spec, site.parent)
 
 
@@ -160,22 +142,19 @@ def add_camera(
 ) -> None:
     """Add a fixed, level camera at `eye` with `target` in the middle of its picture.
 
-    Args:
-        spec: The scene.
-        name: Name of the camera.
-        eye: Position, m.
-        target: Point in the middle of the picture, m.
-        fovy: Vertical field of view, degrees.
+    Points are in m, the vertical field of view is in degrees.
     """
-    back = np.asarray(eye, dtype=np.float64) - np.asarray(target)
-    back /= np.linalg.norm(back)
+    pose = pose_fields(_looking_at(np.asarray(eye), np.asarray(target)))
+    spec.worldbody.add_camera(name=name, pos=eye, quat=pose["quat"], fovy=fovy)
+
+
+def _looking_at(eye: Vector, target: Vector) -> pin.SE3:
+    """Return the pose of a level camera, which looks along -z with y up."""
+    back = (eye - target) / np.linalg.norm(eye - target)
     up = np.array([0.0, 0.0, 1.0]) if abs(back[2]) < 0.99 else np.array([1.0, 0.0, 0.0])
     right = np.cross(up, back)
     right /= np.linalg.norm(right)
-    x, y, z, w = pin.Quaternion(
-        np.column_stack([right, np.cross(back, right), back])
-    ).coeffs()
-    spec.worldbody.add_camera(name=name, pos=eye, quat=(w, x, y, z), fovy=fovy)
+    return pin.SE3(np.column_stack([right, np.cross(back, right), back]), eye)
 
 
 def add_robot_view(spec: mujoco.MjSpec, robot: RobotDescription, prefix: str) -> None:
@@ -187,24 +166,20 @@ def add_robot_view(spec: mujoco.MjSpec, robot: RobotDescription, prefix: str) ->
 def aim_robot_view(state: RobotState) -> None:
     """Set the camera behind a robot so that it shows the robot and the space ahead."""
     model, data = state.model, state.data
-    low, high = _extent(state)
+    base = state.root_pose
+    yaw = np.arctan2(base.rotation[1, 0], base.rotation[0, 0])
+    upright = pin.SE3(pin.utils.rotate("z", yaw), base.translation)
+    low, high = _extent(state, upright)
     eye = np.array([low[0] - BEHIND, 0.0, high[2] + ABOVE])
     target = np.array([high[0] + AHEAD, 0.0, low[2] + 0.6 * (high[2] - low[2])])
-    back = (eye - target) / np.linalg.norm(eye - target)
-    right = np.array([0.0, -1.0, 0.0])
-    turn = np.column_stack([right, np.cross(back, right), back])
-    root = state.root_pose
-    upright = _yaw_only(root)
-    pose = root.inverse() * upright * pin.SE3(turn, eye)
+    pose = pose_fields(base.inverse() * upright * _looking_at(eye, target))
     camera = model.camera(state.prefix + ROBOT_VIEW).id
-    x, y, z, w = pin.Quaternion(pose.rotation).coeffs()
-    model.cam_pos[camera] = pose.translation
-    model.cam_quat[camera] = w, x, y, z
+    model.cam_pos[camera], model.cam_quat[camera] = pose["pos"], pose["quat"]
     mujoco.mj_camlight(model, data)
 
 
-def _extent(state: RobotState) -> tuple[np.ndarray, np.ndarray]:
-    """Return the corners of a box around the robot in its level base frame, m."""
+def _extent(state: RobotState, place: pin.SE3) -> tuple[Vector, Vector]:
+    """Return the corners of a box around the robot in another frame, m."""
     model, data = state.model, state.data
     solid = (model.geom_contype | model.geom_conaffinity) > 0
     own = [
@@ -213,21 +188,21 @@ def _extent(state: RobotState) -> tuple[np.ndarray, np.ndarray]:
         if model.body(body).name.startswith(state.prefix)
     ]
     own = [i for i in own if solid[i]] or own
-    place = _yaw_only(state.root_pose)
-    if not own:
+    if own:
+        low, high = _geom_bounds(model, data, np.array(own), place)
+    else:
         bodies = [state.model.body(state.prefix + x.name).id for x in state.robot.links]
-        points = (data.xpos[bodies] - place.translation) @ place.rotation
-        return points.min(axis=0), points.max(axis=0)
-    turns = place.rotation.T @ data.geom_xmat[own].reshape(-1, 3, 3)
-    middle, half = np.split(model.geom_aabb[own], 2, axis=1)
-    middles = (data.geom_xpos[own] - place.translation) @ place.rotation
+        low = high = (data.xpos[bodies] - place.translation) @ place.rotation
+    return low.min(axis=0), high.max(axis=0)
+
+
+def _geom_bounds(
+    model: mujoco.MjModel, data: mujoco.MjData, geoms: Indices, place: pin.SE3
+) -> tuple[Matrix, Matrix]:
+    """Return the corners of a box around each geom in a frame, m, shape (n, 3)."""
+    turns = place.rotation.T @ data.geom_xmat[geoms].reshape(-1, 3, 3)
+    middle, half = np.split(model.geom_aabb[geoms], 2, axis=1)
+    middles = (data.geom_xpos[geoms] - place.translation) @ place.rotation
     middles += np.einsum("gij,gj->gi", turns, middle)
     reach = np.einsum("gij,gj->gi", abs(turns), half)
-    return (middles - reach).min(axis=0), (middles + reach).max(axis=0)
-
-
-def _yaw_only(pose: pin.SE3) -> pin.SE3:
-    """Return the pose without roll and pitch."""
-    yaw = np.arctan2(pose.rotation[1, 0], pose.rotation[0, 0])
-    turn = pin.Quaternion(np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2))
-    return pin.SE3(turn.matrix(), pose.translation)
+    return middles - reach, middles + reach

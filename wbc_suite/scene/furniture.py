@@ -13,19 +13,11 @@ from wbc_suite.tomlfile import FrozenModel
 
 LEG: Color = (0.32, 0.33, 0.35, 1.0)
 LEG_RADIUS, INSET = 0.012, 0.03
-GHOST = 0.3
-"""Opacity of visual goals."""
+GHOST = 0.3  # opacity of visual goals
 
 
 class BinConfig(FrozenModel):
-    """A bin on legs.
-
-    Attributes:
-        size: Inner length along x, width along y, and height of the walls, m.
-        center: Middle of its floor, m.
-        wall: Thickness of walls and floor, m.
-        color: Colour of walls and floor.
-    """
+    """A bin on legs: inner length, width and height, and middle of its floor, m."""
 
     size: tuple[Size, Size, Size]
     center: Vector3

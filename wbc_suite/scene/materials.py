@@ -12,26 +12,22 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from wbc_suite.errors import UnknownNameError
+from wbc_suite.errors import look_up
 from wbc_suite.robot.shapes import Vector3
 
 FRICTION = (1.0, 0.005, 0.0001)
 """Sliding, torsional, rolling; the default of this field's table-top benchmarks."""
 
-PIXELS = 128
-"""Along each side of a texture."""
+PIXELS = 128  # along each side of a texture
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Material:
-    """One material.
+    """One material; specular, shininess and reflectance are MuJoCo's, from 0 to 1.
 
     Attributes:
         density: kg/m^3.
         pixels: Function that computes its texture of n pixels, shape (n, n, 3).
-        specular: Specular reflection of lights, 0 to 1.
-        shininess: Sharpness of that, 0 to 1.
-        reflectance: Reflection of the surroundings, 0 to 1.
         friction: Sliding, torsional, rolling.
     """
 
@@ -127,14 +123,8 @@ a filled folding box."""
 
 
 def material_named(name: str) -> Material:
-    """Return a material.
-
-    Raises:
-        UnknownNameError: If there is none of that name.
-    """
-    if name not in MATERIALS:
-        raise UnknownNameError("material", name, MATERIALS)
-    return MATERIALS[name]
+    """Return a material; raises UnknownNameError."""
+    return look_up("material", name, MATERIALS)
 
 
 def use_material(spec: mujoco.MjSpec, name: str) -> str:
@@ -151,13 +141,21 @@ def use_material(spec: mujoco.MjSpec, name: str) -> str:
     )
     if material.pixels is not None:
         # A square cube texture shows the same picture on all six sides.
-        texture = spec.add_texture(
-            name=own,
-            type=mujoco.mjtTexture.mjTEXTURE_CUBE,
-            nchannel=3,
-            width=PIXELS,
-            height=PIXELS,
-        )
-        texture.data = material.pixels(PIXELS).tobytes()
-        added.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = own
+        kind = mujoco.mjtTexture.mjTEXTURE_CUBE
+        add_texture(spec, added, kind, material.pixels(PIXELS))
     return own
+
+
+def add_texture(
+    spec: mujoco.MjSpec,
+    material: mujoco.MjsMaterial,
+    kind: mujoco.mjtTexture,
+    pixels: NDArray[np.uint8],
+) -> None:
+    """Add pixels, shape (height, width, 3), as the texture of a material."""
+    height, width, _ = pixels.shape
+    texture = spec.add_texture(
+        name=material.name, type=kind, nchannel=3, width=width, height=height
+    )
+    texture.data = pixels.tobytes()
+    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = material.name

@@ -1,8 +1,4 @@
-"""Samplers of start poses of objects that do not touch one another.
-
-An object is represented by its upright bounding cylinder: two objects are apart if
-their cylinders are.
-"""
+"""Samplers of start poses of objects whose upright bounding cylinders are apart."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -13,24 +9,13 @@ from numpy.random import Generator
 
 from wbc_suite.errors import PlacementError
 from wbc_suite.robot.shapes import Interval, Real, Vector3
-from wbc_suite.scene.objects.object_state import Extent
+from wbc_suite.scene.objects.object_state import Extent, ObjectState
 from wbc_suite.scene.objects.scene_object import STANDING, Quat
 from wbc_suite.tomlfile import FrozenModel
 
-TRIES = 300
-"""Poses drawn for one object before all objects are placed again."""
-LAYOUTS = 20
-"""How often all objects of a sampler are placed before an error."""
-ON_TOP = 1e-9
-"""Tolerance of rounding between an object and its support, m."""
-
-
-class Measured(Protocol):
-    """An object whose bounding cylinder can be measured."""
-
-    def extent(self, quat: Quat = STANDING) -> Extent:
-        """Return its bounding cylinder when turned by `quat`."""
-        ...
+TRIES = 300  # poses drawn for one object before all objects are placed again
+LAYOUTS = 20  # how often all objects of a sampler are placed before an error
+ON_TOP = 1e-9  # tolerance of rounding between an object and its support, m
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -52,7 +37,7 @@ class Placed:
         return not (above or below)
 
 
-Objects: TypeAlias = Mapping[str, Measured]
+Objects: TypeAlias = Mapping[str, ObjectState]
 Taken: TypeAlias = Mapping[str, Placed]
 Placements: TypeAlias = dict[str, Placed]
 
@@ -61,12 +46,7 @@ class Sampler(Protocol):
     """Draws start poses of some objects."""
 
     def sample(self, rng: Generator, objects: Objects, taken: Taken) -> Placements:
-        """Return a pose for each of the sampler's objects.
-
-        Args:
-            rng: Source of randomness.
-            objects: All objects, by name.
-            taken: Objects that are placed already.
+        """Return a pose for each of the sampler's objects, clear of those `taken`.
 
         Raises:
             PlacementError: If no free place is found; names what to relax.
@@ -77,10 +57,9 @@ class Sampler(Protocol):
 class Region(FrozenModel):
     """Rectangle of a surface with a range of orientations.
 
+    Ranges of x and y are from the surface's origin, m; yaw is about the vertical, rad.
+
     Attributes:
-        x: Smallest and largest x from the surface's origin, m.
-        y: Smallest and largest y, m.
-        yaw: Smallest and largest angle about the vertical, rad.
         clearance: Height above the surface, m.
         inside: Whether objects lie inside entirely, or only their origins.
         gap: Least distance between objects, m.
@@ -98,11 +77,8 @@ class Region(FrozenModel):
 class UniformSampler:
     """Draws poses uniformly in a region, without contact between objects.
 
-    Attributes:
-        names: The objects.
-        region: Where they are placed.
-        origin: Origin of the surface in the world, m.
-        rest: Orientation before the turn about the vertical; w x y z.
+    The surface has its origin in the world, m; `rest` is the orientation before the
+    turn about the vertical.
     """
 
     names: Sequence[str]
@@ -128,27 +104,21 @@ class UniformSampler:
         raise PlacementError(self._explain(*failed))
 
     def _place(self, rng: Generator, extent: Extent, taken: Taken) -> Placed | None:
-        (x0, x1), (y0, y1) = self._ends(extent)
-        if x0 <= x1 and y0 <= y1:
-            for _ in range(TRIES):
-                x, y = rng.uniform(x0, x1), rng.uniform(y0, y1)
-                yaw = rng.uniform(*self.region.yaw)
-                placed = self._at(x, y, yaw, extent)
-                if not any(placed.touches(o, self.region.gap) for o in taken.values()):
-                    return placed
+        region, (ox, oy, oz) = self.region, self.origin
+        kept = extent.radius if region.inside else 0.0
+        x0, x1 = region.x[0] + kept, region.x[1] - kept
+        y0, y1 = region.y[0] + kept, region.y[1] - kept
+        height = oz + region.clearance + extent.bottom
+        w, i, j, k = self.rest
+        for _ in range(TRIES if x0 <= x1 and y0 <= y1 else 0):
+            position = (ox + rng.uniform(x0, x1), oy + rng.uniform(y0, y1), height)
+            half = rng.uniform(*region.yaw) / 2
+            c, s = math.cos(half), math.sin(half)
+            quat = (c * w - s * k, c * i - s * j, c * j + s * i, c * k + s * w)
+            placed = Placed(position=position, quat=quat, extent=extent)
+            if not any(placed.touches(o, region.gap) for o in taken.values()):
+                return placed
         return None
-
-    def _ends(self, extent: Extent) -> tuple[tuple[float, float], tuple[float, float]]:
-        kept = extent.radius if self.region.inside else 0.0
-        (x0, x1), (y0, y1) = self.region.x, self.region.y
-        return (x0 + kept, x1 - kept), (y0 + kept, y1 - kept)
-
-    def _at(self, x: float, y: float, yaw: float, extent: Extent) -> Placed:
-        ox, oy, oz = self.origin
-        height = oz + self.region.clearance + extent.bottom
-        turn = (math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))
-        quat = _product(turn, self.rest)
-        return Placed(position=(ox + x, oy + y, height), quat=quat, extent=extent)
 
     def _explain(self, name: str, extent: Extent, taken: Mapping[str, Placed]) -> str:
         region = self.region
@@ -178,12 +148,9 @@ class SequentialSampler:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class OnTopSampler:
-    """Draws poses on top of an object that is placed already.
+    """Draws poses on top of an object, the support, that is placed already.
 
-    Attributes:
-        names: The objects.
-        support: The object below.
-        region: Region relative to the support's origin; it does not turn with it.
+    The region is relative to the support's origin and does not turn with it.
     """
 
     names: Sequence[str]
@@ -209,13 +176,7 @@ class OnTopSampler:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class RejectionSampler:
-    """Calls a sampler until a condition holds for its poses.
-
-    Attributes:
-        sampler: Draws poses.
-        accepts: The condition.
-        wanted: Description of the condition, for the error.
-    """
+    """Calls a sampler until its poses are accepted; `wanted` describes that."""
 
     sampler: Sampler
     accepts: Callable[[Placements], bool]
@@ -232,14 +193,3 @@ class RejectionSampler:
             f"In {TRIES} tries there was no place for {', '.join(found)} where "
             f"{self.wanted}. Change the region, or the sizes of the objects."
         )
-
-
-def _product(a: Quat, b: Quat) -> Quat:
-    """Return the product of two quaternions: rotation by b, then by a."""
-    (aw, ax, ay, az), (bw, bx, by, bz) = a, b
-    return (
-        aw * bw - ax * bx - ay * by - az * bz,
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-    )

@@ -10,14 +10,11 @@ INLAY: Color = (0.50, 0.33, 0.20, 1.0)
 BRASS: Color = (0.83, 0.62, 0.27, 1.0)
 
 HALF_WIDTH, HALF_HEIGHT, HALF_THICK = 0.145, 0.165, 0.012
-POST = 0.018
-"""Radius of the two posts, m."""
-GAP = 0.006
-"""Between panel and posts, m."""
+POST = 0.018  # radius of the two posts, m
+GAP = 0.006  # between panel and posts, m
 HANDLE_OUT = 0.058
 """From the panel's middle to the lever's axis, m: fingers fit behind the lever."""
-LEVER = 0.055
-"""Half length of the lever, m."""
+LEVER = 0.055  # half length of the lever, m
 
 metal = partial(Part, color=FRAME, material="metal")
 brass = partial(Part, color=BRASS, material="metal")
@@ -28,12 +25,9 @@ def door(name: str, *, latch: bool = True) -> SceneObject:
 
     Its origin is on the floor, below the middle of the panel. The panel is the body
     `{name}_panel`, the lever `{name}_handle`; their joints are `{name}_panel_joint` (0
-    closed) and `{name}_handle_joint` (0 level). Sites: `{name}_handle_grip`.
-
-    Args:
-        name: Its name.
-        latch: Whether a bolt behind the far post keeps it shut until the lever is
-            turned by 80 degrees; otherwise the lever is fixed.
+    closed) and `{name}_handle_joint` (0 level). Sites: `{name}_handle_grip`. With a
+    latch, a bolt behind the far post keeps it shut until the lever is turned by 80
+    degrees; otherwise the lever is fixed.
     """
     hinge_x = -(HALF_WIDTH + GAP)
     places, half = (hinge_x - POST, -hinge_x + POST), HALF_HEIGHT + 0.03

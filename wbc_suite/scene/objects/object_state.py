@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from wbc_suite.robot.poses import pose_at
 from wbc_suite.robot.shapes import Vector3
 from wbc_suite.scene.objects.scene_object import STANDING, Quat, SceneObject
 from wbc_suite.typing import Matrix, Vector
@@ -16,13 +17,7 @@ DIRECTIONS = 64
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Extent:
-    """Upright bounding cylinder of an object about its origin, m.
-
-    Attributes:
-        radius: Its radius.
-        bottom: Its extent below the origin.
-        top: Its extent above the origin.
-    """
+    """Upright bounding cylinder of an object, from `bottom` below its origin, m."""
 
     radius: float
     bottom: float
@@ -32,15 +27,11 @@ class Extent:
 class ObjectState:
     """One body of a compiled scene.
 
-    Args:
-        model: Compiled scene.
-        data: Its state.
-        name: Name of the body.
-
     Attributes:
         body: Its index.
         geoms: Its solid geoms, and those of its children.
         position: Position of its origin in the world, m. A view.
+        rotation: Rotation R_wb of its frame, shape (3, 3). A view.
     """
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, name: str) -> None:
@@ -52,7 +43,7 @@ class ObjectState:
             np.flatnonzero(solid & under[model.geom_bodyid]).tolist()
         )
         self.position: Vector = data.xpos[self.body]
-        self._rotation: Matrix = data.xmat[self.body].reshape(3, 3)
+        self.rotation: Matrix = data.xmat[self.body].reshape(3, 3)
         joint = model.body_jntadr[self.body]
         free = mujoco.mjtJoint.mjJNT_FREE
         self._q = self._v = -1
@@ -64,11 +55,6 @@ class ObjectState:
     def is_free(self) -> bool:
         """Whether it has a free joint."""
         return self._q >= 0
-
-    @property
-    def rotation(self) -> Matrix:
-        """Rotation R_wb of its frame, shape (3, 3). A view."""
-        return self._rotation
 
     def move(self, position: Sequence[float], quat: Quat = STANDING) -> None:
         """Write its pose, at rest; the simulation is not updated."""
@@ -82,11 +68,7 @@ class ObjectState:
         v[self._v : self._v + 6] = 0.0
 
     def resize_box(self, half_size: Vector3, *, density: float) -> None:
-        """Write another size into the compiled model of a free box.
-
-        Everything that the compiler derives from it follows: with the old bounds of the
-        broadphase, a larger box would penetrate before a contact is found.
-        """
+        """Write another size, and what follows from it, into a model's free box."""
         model, body, v = self.model, self.body, self._v
         (geom,) = self.geoms
         size = np.asarray(half_size)
@@ -107,14 +89,14 @@ class ObjectState:
     def reshape(self, changed: SceneObject) -> None:
         """Write the object with other sizes of its parts into the compiled model.
 
-        All values are those that the compiler computes for the object alone: places and
-        sizes, bounds of the broadphase, mass and inertia. The mass of an object that is
-        fixed to another body must not change.
+        All values, bounds of the broadphase and inertia too, are those that the
+        compiler computes for the object alone. An object fixed to another body must
+        keep its mass.
         """
         model, alone, body = self.model, changed.compiled_alone(), self.body
         for array, first, count in (
             ("geom", model.body_geomadr[body], alone.ngeom),
-            ("site", _first_site(model, body), alone.nsite),
+            ("site", np.searchsorted(model.site_bodyid, body), alone.nsite),
             ("bvh", model.body_bvhadr[body], alone.body_bvhnum[1]),
         ):
             for field in _SHAPE_FIELDS[array]:
@@ -131,9 +113,7 @@ class ObjectState:
 
     def extent(self, quat: Quat = STANDING) -> Extent:
         """Return the extent of its present solid geoms when it is turned by `quat`."""
-        turn = np.empty(9)
-        mujoco.mju_quat2Mat(turn, np.asarray(quat))
-        R = turn.reshape(3, 3)
+        R = pose_at((0.0, 0.0, 0.0), quat).rotation
         angles = np.linspace(0.0, 2 * np.pi, DIRECTIONS, endpoint=False)
         flat = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(DIRECTIONS)])
         ways = np.vstack([flat, (0.0, 0.0, -1.0), (0.0, 0.0, 1.0)]) @ R
@@ -157,11 +137,6 @@ _BODY_FIELDS = (
 )
 
 
-def _first_site(model: mujoco.MjModel, body: int) -> int:
-    """Return the index of a body's first site; sites are ordered by body."""
-    return int(np.searchsorted(model.site_bodyid, body))
-
-
 def _bodies_under(model: mujoco.MjModel, body: int) -> np.ndarray:
     """Mark a body and its descendants, shape (nbody,)."""
     marked = np.zeros(model.nbody, dtype=bool)
@@ -176,9 +151,8 @@ def _support(model: mujoco.MjModel, geom: int, ways: Matrix) -> Vector:
 
     h(u) is the largest u . p over the points p of the geom.
     """
-    turn = np.empty(9)
-    mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
-    u = ways @ turn.reshape(3, 3)
+    place = pose_at(model.geom_pos[geom], model.geom_quat[geom])
+    u = ways @ place.rotation
     kinds, size = mujoco.mjtGeom, model.geom_size[geom]
     match model.geom_type[geom]:
         case kinds.mjGEOM_SPHERE:
@@ -195,4 +169,4 @@ def _support(model: mujoco.MjModel, geom: int, ways: Matrix) -> Vector:
             reach = (u @ model.mesh_vert[first : first + count].T).max(axis=1)
         case _:
             reach = np.abs(u) @ size
-    return ways @ model.geom_pos[geom] + reach
+    return ways @ place.translation + reach

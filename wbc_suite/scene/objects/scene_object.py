@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from wbc_suite.errors import ConfigError, DescriptionError
-from wbc_suite.robot.mjcf_compile import read_mjcf_spec
+from wbc_suite.robot.mjcf_compile import compile_mjcf
 from wbc_suite.robot.shape_geometry import mesh_of
 from wbc_suite.robot.shapes import Box, Cylinder, Hull, Loft, Vector3
 from wbc_suite.scene.materials import material_named, use_material
@@ -47,14 +47,10 @@ class Part:
         size: As in MJCF: half lengths of a box or ellipsoid; radius of a ball; radius
             and half length along z of a cylinder or capsule, m.
         surface: Shape of a mesh: a hull, a loft, a rounded box or a cone.
-        pos: Middle, in the object's frame, m.
-        quat: Orientation, w x y z.
         color: Red green blue alpha, 0 to 1, times the material's texture.
         material: Name in `scene.materials`; also gives density and friction.
         solid: Whether it collides and has mass; otherwise it is visual only.
         drawn: Whether it is drawn; visuals may be finer than collision shapes.
-        density: kg/m^3; the material's by default.
-        friction: Sliding, torsional, rolling; the material's by default.
     """
 
     kind: Literal["box", "ball", "cylinder", "capsule", "ellipsoid", "mesh"]
@@ -70,7 +66,7 @@ class Part:
     friction: Vector3 | None = None
 
     def __post_init__(self) -> None:
-        material_named(self.material)
+        material_named(self.material)  # or raise
         wanted = _KINDS[self.kind][1] if self.kind in _KINDS else 0
         good = all(0.0 < s < np.inf for s in self.size)
         if len(self.size) != wanted or not good:
@@ -80,6 +76,12 @@ class Part:
         if (self.surface is not None) != (self.kind == "mesh"):
             raise ConfigError("A part has a surface if, and only if, it is a mesh.")
 
+    @property
+    def own_density(self) -> float:
+        """Density, by default the material's, kg/m^3."""
+        default = material_named(self.material).density
+        return default if self.density is None else self.density
+
     def add_to(
         self, spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, *, visual: bool
     ) -> None:
@@ -87,9 +89,8 @@ class Part:
         geom = body.add_geom(name=name, pos=self.pos, quat=self.quat, rgba=self.color)
         if visual:
             geom.material = use_material(spec, self.material)
-        material = material_named(self.material)
-        geom.density = material.density if self.density is None else self.density
-        geom.friction = self.friction or material.friction
+        geom.density = self.own_density
+        geom.friction = self.friction or material_named(self.material).friction
         geom.group = DRAWN_GROUP if self.drawn else HIDDEN_GROUP
         if self.solid:
             geom.condim = SLIDING if self.kind == "box" else TORSION
@@ -125,13 +126,8 @@ def _add_mesh(
 class Hinge:
     """Hinge joint between an object and its parent, named `{object}_joint`.
 
-    Attributes:
-        axis: Axis, in the object's frame, through its origin.
-        range: Smallest and largest angle, rad.
-        damping: N m s/rad.
-        friction: Dry friction, N m.
-        stiffness: Stiffness of the spring to angle zero, N m/rad.
-        armature: Inertia added to the joint, kg m^2.
+    The axis is in the object's frame, through its origin. SI units; `friction` is dry,
+    `stiffness` that of a spring to angle zero.
     """
 
     axis: Vector3
@@ -146,14 +142,13 @@ class Hinge:
 class SceneObject:
     """A body made of parts.
 
+    Its joint is `{name}_joint`; a part is `{name}` if it is the only one, else
+    `{name}_0`, ...; a site is `{name}_{site}`.
+
     Attributes:
-        name: Name of the body. Its joint is `{name}_joint`; a part is `{name}` if it is
-            the only one, else `{name}_0`, ...; a site is `{name}_{site}`.
-        parts: Its shapes.
         sites: Points of interest, in its frame, m.
         motion: `free`, `fixed` (placed at a reset, then still), or a hinge.
         pos: Position in the scene, or on its parent, m.
-        quat: Orientation there, w x y z.
         children: Objects attached to it.
     """
 
@@ -200,17 +195,12 @@ class SceneObject:
     def with_mass(self, mass: float) -> "SceneObject":
         """Return it with its densities scaled to a mass, kg; children keep theirs."""
         factor = mass / float(self.compiled_alone().body_mass.sum())
-        parts = tuple(replace(p, density=factor * _density(p)) for p in self.parts)
+        parts = tuple(replace(p, density=factor * p.own_density) for p in self.parts)
         return replace(self, parts=parts)
 
     def fixed(self, pos: Vector3, quat: Quat = STANDING) -> "SceneObject":
         """Return it fixed to the world."""
         return replace(self, motion="fixed", pos=pos, quat=quat)
-
-
-def _density(part: Part) -> float:
-    given = part.density
-    return material_named(part.material).density if given is None else given
 
 
 def _add_hinge(body: mujoco.MjsBody, name: str, hinge: Hinge) -> None:
@@ -232,14 +222,8 @@ class MjcfObject:
     """The one body below the world of an MJCF file, with its children.
 
     The file is untrusted: its size is limited, it may name no file outside of its own
-    folder, and it may load no plugins. Its names get the prefix `{name}_`.
-
-    Attributes:
-        name: Name of the body in the scene.
-        path: The file.
-        motion: `free` or `fixed`; joints of the body itself are left out.
-        pos: Position in the scene, m.
-        quat: Orientation there, w x y z.
+    folder, and it may load no plugins. Its names get the prefix `{name}_`. Joints of
+    the body itself are left out.
     """
 
     name: str
@@ -249,13 +233,8 @@ class MjcfObject:
     quat: Quat = STANDING
 
     def add_to(self, spec: mujoco.MjSpec) -> None:
-        """Add it to a scene.
-
-        Raises:
-            ConfigError: If the file is no MJCF, or names a file outside its folder.
-            DescriptionError: If MuJoCo rejects it, or it has not exactly one body.
-        """
-        own = read_mjcf_spec(self.path)
+        """Add it to a scene; raises as `compile_mjcf`, and unless it is one body."""
+        _, own = compile_mjcf(self.path)
         bodies = own.worldbody.bodies
         if len(bodies) != 1:
             raise DescriptionError(

@@ -6,7 +6,7 @@ from functools import partial
 
 from wbc_suite.robot.shapes import Vector3
 from wbc_suite.scene.objects.scene_object import Color, Part, SceneObject
-from wbc_suite.scene.objects.vessels import ring_of_boxes
+from wbc_suite.scene.objects.vessels import ring_of_boxes, walls_around
 
 WOOD: Color = (0.72, 0.50, 0.28, 1.0)
 STEEL: Color = (0.62, 0.64, 0.67, 1.0)
@@ -29,14 +29,8 @@ def hammer(
 ) -> SceneObject:
     """Make a hammer with its handle along z and its head above; origin in the handle.
 
-    Sites: `handle` (the middle of the handle, the origin), `head`.
-
-    Args:
-        name: Its name.
-        handle_radius: m.
-        handle_length: m.
-        head_half_size: Half size of the middle block of the head, m.
-        mass: kg.
+    Sites: `handle` (the middle of the handle, the origin), `head`. `head_half_size` is
+    that of the middle block of the head; m and kg.
     """
     h, top = head_half_size, handle_length / 2
     middle = top + h
@@ -66,28 +60,13 @@ def plate_with_hole(
     half_thickness: float = 0.01,
     color: Color = (0.30, 0.48, 0.68, 1.0),
 ) -> SceneObject:
-    """Make a square plate across z with a square hole in its middle.
+    """Make a square plate across z with a square hole, all in half sizes, m.
 
     Site: `hole`, its middle.
-
-    Args:
-        name: Its name.
-        half_size: Half of the edge of the plate, m.
-        hole: Half of the edge of the hole, m.
-        half_thickness: m.
-        color: Red green blue alpha.
     """
-    band, middle = (half_size - hole) / 2, (half_size + hole) / 2
-    parts = tuple(
-        Part(kind="box", size=(*size, half_thickness), pos=(*at, 0.0), color=color)
-        for size, at in (
-            ((half_size, band), (0.0, middle)),
-            ((half_size, band), (0.0, -middle)),
-            ((band, hole), (middle, 0.0)),
-            ((band, hole), (-middle, 0.0)),
-        )
-    )
-    return SceneObject(name=name, parts=parts, sites={"hole": (0.0, 0.0, 0.0)})
+    part, wall = partial(Part, kind="box", color=color), half_size - hole
+    parts = walls_around(hole, hole, wall, half_thickness, at=0.0, part=part)
+    return SceneObject(name=name, parts=tuple(parts), sites={"hole": (0.0, 0.0, 0.0)})
 
 
 def square_nut(
@@ -98,16 +77,10 @@ def square_nut(
     half_height: float = 0.01,
     handle: float = 0.028,
 ) -> SceneObject:
-    """Make a square nut of wood across z, with a handle along x.
+    """Make a square nut of wood across z, with a handle along x of a length in m.
 
-    Sites: `center` (the middle of the hole, the origin), `handle`.
-
-    Args:
-        name: Its name.
-        hole: Half of the edge of the hole, m.
-        outer: Half of the edge of the nut, m.
-        half_height: m.
-        handle: Length of the handle, m.
+    `hole` and `outer` are half edges, m. Sites: `center` (the middle of the hole, the
+    origin), `handle`.
     """
     plate = plate_with_hole(
         name, half_size=outer, hole=hole, half_thickness=half_height
@@ -126,14 +99,8 @@ def round_nut(
 ) -> SceneObject:
     """Make an eight-sided nut of metal across z, with a handle along x.
 
-    Sites: `center` (the middle of the hole, the origin), `handle`.
-
-    Args:
-        name: Its name.
-        hole: Radius of the inscribed circle of the hole, m.
-        outer: Radius of the inscribed circle of the nut, m.
-        half_height: m.
-        handle: Length of the handle, m.
+    `hole` and `outer` are radii of inscribed circles, m. Sites: `center` (the middle of
+    the hole, the origin), `handle`.
     """
     parts = ring_of_boxes(hole, outer, half_height, sides=8, color=STEEL)
     return _with_handle(name, parts, outer, half_height, handle)
@@ -164,15 +131,8 @@ def wrench(
 ) -> SceneObject:
     """Make a lying ring spanner, its shaft along x, a ring across z at each end.
 
+    `length` is from hole to hole, `hole` and `ring` are radii of inscribed circles, m.
     Sites: `hole1` (at +x), `hole2` (at -x), `grip` (the origin).
-
-    Args:
-        name: Its name.
-        length: Distance of the middles of the holes, m.
-        hole: Radius of the inscribed circle of a hole, m.
-        ring: Radius of the inscribed circle of a ring, m.
-        half_height: m.
-        mass: kg.
     """
     end = length / 2
     rings = [
@@ -202,29 +162,16 @@ def stand(
     wall: float = 0.005,
     height: float = 0.10,
 ) -> SceneObject:
-    """Make a board with a square socket that is open above.
+    """Make a board, half size in m, with a square socket that is open above.
 
-    Its origin is the middle of the lower face of the board. Sites: `socket` (the middle
-    of the upper end of the socket), `floor` (its lower end).
-
-    Args:
-        name: Its name.
-        half_size: Half size of the board, m.
-        hole: Half of the inner edge of the socket, m.
-        wall: Thickness of the walls of the socket, m.
-        height: Height of the walls, m.
+    Its origin is the middle of the lower face of the board; `hole` is half of the inner
+    edge, `wall` the thickness of the walls, m. Sites: `socket` (the middle of the upper
+    end of the socket), `floor` (its lower end).
     """
-    board = 2 * half_size[2]
-    side, middle, up = hole + wall, hole + wall / 2, board + height / 2
-    walls = (
-        ((side, wall / 2), (0.0, middle)),
-        ((side, wall / 2), (0.0, -middle)),
-        ((wall / 2, hole), (middle, 0.0)),
-        ((wall / 2, hole), (-middle, 0.0)),
-    )
+    board, half = 2 * half_size[2], height / 2
     parts = (
         wooden_box(size=half_size, pos=(0.0, 0.0, half_size[2])),
-        *(wooden_box(size=(*s, height / 2), pos=(*at, up)) for s, at in walls),
+        *walls_around(hole, hole, wall, half, at=board + half, part=wooden_box),
     )
     sites = {"socket": (0.0, 0.0, board + height), "floor": (0.0, 0.0, board)}
     return SceneObject(name=name, parts=parts, sites=sites)
@@ -240,15 +187,9 @@ def hanging_frame(
 ) -> SceneObject:
     """Make a rod along z with an arm along x at its upper end, whose tip is bent up.
 
-    Its origin is the middle of the rod. Sites: `tip` (the lower end of the rod),
-    `corner`, `hook` (where a tool hangs), `bend`, `hook_tip`, `grip`.
-
-    Args:
-        name: Its name.
-        length: Length of the rod, m.
-        arm: Length of the arm, m.
-        radius: Half of the thickness of the bars, m.
-        mass: kg.
+    Its origin is the middle of the rod; `radius` is half of the thickness of the bars,
+    m. Sites: `tip` (the lower end of the rod), `corner`, `hook` (where a tool hangs),
+    `bend`, `hook_tip`, `grip`.
     """
     end, bend, r = length / 2, 0.018, radius
     grip = (0.0, 0.0, 0.5 * end)

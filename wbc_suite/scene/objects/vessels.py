@@ -1,6 +1,7 @@
 """Vessels and lids: walls of boxes, and rings of boxes."""
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
@@ -22,45 +23,39 @@ def open_bin(
     color: Color = WOOD,
     material: str = "wood",
 ) -> SceneObject:
-    """Make a bin that is open above; its origin is the middle of its lower face.
+    """Make a bin, outer size in m, that is open above.
 
-    Site: `floor`, the middle of its floor.
-
-    Args:
-        name: Its name.
-        size: Outer length, width and height, m.
-        wall: Thickness of walls and floor, m.
-        color: Colour of all parts.
-        material: Material of all parts.
+    Its origin is the middle of its lower face. Site: `floor`, the middle of its floor.
     """
     x, y, z = (s / 2 for s in size)
-    side, end = (wall / 2, y, z), (x - wall, wall / 2, z)
-    walls = (
-        ((x, y, wall / 2), (0.0, 0.0, wall / 2)),
-        (side, (x - wall / 2, 0.0, z)),
-        (side, (wall / 2 - x, 0.0, z)),
-        (end, (0.0, y - wall / 2, z)),
-        (end, (0.0, wall / 2 - y, z)),
-    )
-    parts = tuple(
-        Part(kind="box", size=s, pos=p, color=color, material=material)
-        for s, p in walls
-    )
+    board = partial(Part, kind="box", color=color, material=material)
+    floor = board(size=(x, y, wall / 2), pos=(0.0, 0.0, wall / 2))
+    parts = (floor, *walls_around(x - wall, y - wall, wall, z, at=z, part=board))
     return SceneObject(name=name, parts=parts, sites={"floor": (0.0, 0.0, wall)})
+
+
+def walls_around(
+    x: float,
+    y: float,
+    wall: float,
+    half_height: float,
+    *,
+    at: float,
+    part: Callable[..., Part],
+) -> list[Part]:
+    """Return four walls, at a height, around a hole of half sizes x and y, m."""
+    side, end = (wall / 2, y + wall, half_height), (x, wall / 2, half_height)
+    out, up = x + wall / 2, y + wall / 2
+    places = ((side, out, 0.0), (side, -out, 0.0), (end, 0.0, up), (end, 0.0, -up))
+    return [part(size=size, pos=(px, py, at)) for size, px, py in places]
 
 
 def lid(
     name: str, size: Vector3, *, color: Color = WOOD, material: str = "wood"
 ) -> SceneObject:
-    """Make a board with a dark handle on top; its origin is the middle of the board.
+    """Make a board, size in m, with a dark handle on top; its origin is its middle.
 
     Site: `handle`.
-
-    Args:
-        name: Its name.
-        size: Length, width and thickness of the board, m.
-        color: Colour of the board.
-        material: Material of the board.
     """
     x, y, z = (s / 2 for s in size)
     grip, post, reach = 0.008, 0.02, min(0.05, 0.6 * y)
@@ -87,14 +82,8 @@ def ring_of_boxes(
 ) -> tuple[Part, ...]:
     """Return a ring about z made of boxes, since collision shapes are convex.
 
-    Args:
-        inner: Radius of the inscribed circle of the hole, m.
-        outer: Radius of the circle that the outer faces touch, m.
-        half_height: m.
-        sides: Number of boxes.
-        pos: Middle of the ring, m.
-        color: Colour of all boxes.
-        material: Material of all boxes.
+    `inner` is the radius of the circle in the hole, `outer` that of the circle that the
+    outer faces touch, `pos` the middle of the ring, m.
     """
     middle, thick = (inner + outer) / 2, (outer - inner) / 2
     width = outer * math.tan(math.pi / sides)
@@ -141,19 +130,11 @@ def pot(
     handle_radius: float = 0.01,
     handle_colors: tuple[Color, Color] = (GREEN, BLUE),
 ) -> SceneObject:
-    """Make a square pot with a handle on each side along y.
+    """Make a square pot, half of its outer size in m, with handles at +y and -y.
 
-    Its origin is its middle. Sites: `handle0` (at +y), `handle1` (at -y), `center`,
-    `bottom`.
-
-    Args:
-        name: Its name.
-        half_size: Half of its outer length, width and height, m.
-        wall: Thickness of walls and bottom, m.
-        handle_length: Length of a handle along y, m.
-        handle_width: Width of a handle along x, m.
-        handle_radius: Half of the thickness of its bars, m.
-        handle_colors: Colours of `handle0` and `handle1`.
+    Its origin is its middle. `handle_length` is along y, `handle_width` along x,
+    `handle_radius` half of the thickness of the bars, m. Sites: `handle0` (at +y),
+    `handle1` (at -y), `center`, `bottom`; colours are in the same order.
     """
     x, y, z = half_size
     outer = (2 * x, 2 * y, 2 * z)
