@@ -13,13 +13,8 @@ from wbc_suite.typing import Indices, Matrix, Vector
 class RobotState:
     """One robot among everything a MuJoCo simulation holds.
 
-    A live view: it owns no state, and reads MuJoCo's own arrays when asked.
-
-    Args:
-        model: Compiled scene.
-        data: Its state.
-        robot: The robot.
-        prefix: Text before the robot's names in the scene, such as `robot0_`.
+    A live view: it owns no state, and reads MuJoCo's own arrays when asked. The prefix
+    is the text before the robot's names in the scene, such as `robot0_`.
 
     Attributes:
         actuators: Names of the robot's actuators, without prefix; the order of tau.

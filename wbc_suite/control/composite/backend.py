@@ -39,11 +39,9 @@ class IkBackend(Protocol):
         ...
 
     def set_targets(self, targets: Matrix) -> None:
-        """Set the targets of all controlled frames.
+        """Set the targets of all controlled frames: poses, [R p] rows, shape (n, 12).
 
-        Args:
-            targets: Poses, [R p] row by row, shape (n, 12). Only the position counts
-                for the centre of mass.
+        Only the position counts for the centre of mass.
         """
         ...
 

@@ -16,10 +16,6 @@ class CompositeController(Protocol):
     The order of calls is `reset`, then `set_goal` once per action, then `prepare`
     before the first physics step and whenever its answer has expired. The laws act
     between `mj_step1` and `mj_step2` of every step, in the compiled loop.
-
-    Attributes:
-        layout: Slices of the action.
-        laws: Laws of the control loop.
     """
 
     layout: ActionLayout
@@ -39,12 +35,7 @@ class CompositeController(Protocol):
         ...
 
     def set_goal(self, action: Vector, period: float = 0.05) -> None:
-        """Take an action that `layout` has checked and clipped.
-
-        Args:
-            action: Shape (layout.size,).
-            period: Time until the next one, s.
-        """
+        """Take an action that `layout` has checked; the next comes in `period` s."""
         ...
 
     def prepare(self, state: RobotState) -> int:
@@ -89,8 +80,7 @@ class TickedController(CompositeController, Protocol):
 class DynamicController(CompositeController, Protocol):
     """A composite controller whose accelerations are those of one QP for all joints.
 
-    Attributes:
-        dynamics: What the QP's kernels read and write, see `solve_whole_body`.
+    Its kernels read and write `dynamics`, see `solve_whole_body`.
     """
 
     dynamics: WholeBodyDynamics

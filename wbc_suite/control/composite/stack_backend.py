@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 
 from wbc_suite.control.composite.backend import IkStep
-from wbc_suite.control.composite.frame_kinds import NO_SPEED_LIMIT
+from wbc_suite.control.composite.frame_kinds import NO_SPEED_LIMIT, set_target
 from wbc_suite.control.composite.qp_tasks import (
     TRACKING_COST,
     accelerations,
@@ -21,7 +21,6 @@ from wbc_suite.qp import (
     Conflict,
     Equality,
     FrameEquality,
-    FrameTask,
     PostureTask,
     Solution,
     SupportLimit,
@@ -105,7 +104,7 @@ class StackBackend:
     def set_targets(self, targets: Matrix) -> None:
         """Set the targets of all controlled frames."""
         for task, row in zip(self._tasks, targets, strict=True):
-            task.target_row.set(row if isinstance(task, FrameTask) else row[3::4])
+            set_target(task, row)
 
     def set_posture(self, q: Vector) -> None:
         """Set the posture to prefer."""
@@ -123,13 +122,7 @@ class StackBackend:
         return self._step(self._joint_stack, self._joint_stack.solve(dt), dt)
 
     def finish(self, dt: float, status: int, level: int) -> IkStep:
-        """Finish a tick of the stack that `solve_tick` has begun.
-
-        Args:
-            dt: Step, s.
-            status: The `TickStatus` that it returned.
-            level: Level at which it ended.
-        """
+        """Finish a tick that `solve_tick` has left with a `TickStatus` at a level."""
         return self._step(self.stack, self.stack.complete(dt, status, level), dt)
 
     def last_step(self) -> IkStep:

@@ -7,6 +7,7 @@ import pinocchio as pin
 
 from wbc_suite.compiling import as_argument, compiled, struct
 from wbc_suite.control.composite.qp_tasks import planar_joints
+from wbc_suite.control.composite.reduced_robot import joint_indices
 from wbc_suite.kinematics import Configuration
 from wbc_suite.kinematics.forward import RobotArrays
 from wbc_suite.kinematics.inverse_dynamics import (
@@ -25,13 +26,13 @@ SLACK = 1e-9  # N m or N
 
 @struct
 class TorqueArrays(NamedTuple):
-    """Motors of a robot, with scratch for `motors_suffice`.
+    """Motors of a robot, with scratch for `motors_suffice`; vectors have shape (nv,).
 
     Attributes:
         inertias: Inertia of the links.
-        max_torque: Greatest torque or force of each motor, shape (nv,).
-        torque: What a motion needs, shape (nv,).
-        acceleration: Its acceleration, shape (nv,).
+        max_torque: Greatest torque or force of each motor.
+        torque: What a motion needs.
+        acceleration: Its acceleration.
         is_grounded: Whether no contact forces are needed to move.
     """
 
@@ -46,14 +47,9 @@ class TorqueArrays(NamedTuple):
 def motors_suffice(
     motors: TorqueArrays, robot: RobotArrays, before: Vector, v: Vector, dt: float
 ) -> bool:
-    """Return whether no motor saturates when velocities change within dt.
+    """Return whether no motor saturates when a velocity becomes v within dt.
 
-    Args:
-        motors: The motors; the torques are written.
-        robot: The robot.
-        before: Velocity of the last step, shape (nv,).
-        v: Velocity of the next step, shape (nv,).
-        dt: Step, s.
+    The torques that this needs are written.
     """
     if not motors.is_grounded:
         return True
@@ -86,12 +82,7 @@ class TorqueLimiter:
     and all others as commanded, because they may have to brake. Where a joint could
     then not stop before its end, or its motor cannot hold it, one factor reduces all
     changes of velocity. With a free root contact forces are unknown, and nothing is
-    changed.
-
-    Args:
-        robot: The reduced robot.
-        configuration: Its configuration; read.
-        accelerations: Acceleration limits, shape (nv,).
+    changed. Acceleration limits have shape (nv,).
 
     Attributes:
         argument: The argument of kernels that stands for the motors.
@@ -122,12 +113,9 @@ class TorqueLimiter:
         self._high = np.where(low < high, high, np.inf)
 
     def apply(self, before: Vector, v: Vector, dt: float) -> Vector:
-        """Return a velocity that the motors can reach, near the one asked for.
+        """Return a velocity that motors can reach within dt seconds, near v.
 
-        Args:
-            before: Velocity of the last step, shape (nv,).
-            v: Velocity asked for, shape (nv,).
-            dt: Step, s.
+        The velocity before has shape (nv,) as well.
         """
         if motors_suffice(self.argument, self._configuration.robot, before, v, dt):
             return v
@@ -183,16 +171,11 @@ class TorqueLimiter:
 
 def _efforts(robot: RobotDescription, configuration: Configuration) -> Vector:
     """Return the effort of the motor of each velocity; inf where it is unknown."""
-    efforts = np.full(configuration.nv, np.inf)
-    model = configuration.model
-    for joint in robot.joints:
-        if joint.effort:
-            v = model.joints[configuration.joint_id(joint.name)].idx_v
-            efforts[v] = joint.effort
+    known = {joint.name: joint.effort for joint in robot.joints if joint.effort}
     if robot.root.actuated:
         force, torque = robot.root.effort
-        for name, effort in zip(
-            planar_joints(robot), (force, force, torque), strict=False
-        ):
-            efforts[model.joints[configuration.joint_id(name)].idx_v] = effort
+        known |= dict(zip(planar_joints(robot), (force, force, torque), strict=False))
+    _, v = joint_indices(configuration.model, tuple(known))
+    efforts = np.full(configuration.nv, np.inf)
+    efforts[v] = list(known.values())
     return efforts

@@ -6,15 +6,11 @@ from wbc_suite.control.part.base_velocity import (
 )
 from wbc_suite.control.part.controller import PartController, PoseInput
 from wbc_suite.control.part.ik_pose import IkPoseConfig, IkPoseController
-from wbc_suite.control.part.joint_position import (
+from wbc_suite.control.part.joint_controllers import (
     JointPositionConfig,
     JointPositionController,
-)
-from wbc_suite.control.part.joint_torque import (
     JointTorqueConfig,
     JointTorqueController,
-)
-from wbc_suite.control.part.joint_velocity import (
     JointVelocityConfig,
     JointVelocityController,
 )

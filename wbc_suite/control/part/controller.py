@@ -27,8 +27,8 @@ class PoseInput:
         body: Body of the simulation that the frame is fixed to.
         measure: Returns the frame's pose in the world.
         encode: Returns the values of the slice for a target in the world.
-        reference: Returns the pose of the body that goals move with, such as a base;
-            None where they stay in the world.
+        reference: Returns the pose of the body that goals move with; None where they
+            stay in the world.
     """
 
     action: ActionPart

@@ -32,8 +32,6 @@ class GripperController(PartController[ServoLaw]):
         grasp: Frame between the fingers; needed for widths.
 
     Attributes:
-        slices: The action slice.
-        law: The servos' setpoints.
         goal: Present action, shape (number of synergies,).
 
     Raises:
@@ -49,8 +47,8 @@ class GripperController(PartController[ServoLaw]):
         config: GripConfig | None = None,
         grasp: str | None = None,
     ) -> None:
-        self.name, self.config = name, config or GripConfig()
-        count = len(synergies)
+        self.config = config or GripConfig()
+        self.name, count = name, len(synergies)
         self._table: OpeningTable | None = None
         if self.config.input == "width":
             if count != 1 or grasp is None:
@@ -77,11 +75,8 @@ class GripperController(PartController[ServoLaw]):
 
     def reset(self, state: RobotState) -> None:
         """Take the present opening as the goal."""
-        lead = self._leading
-        q = state.data.qpos[self.law.drives["qpos"][lead]]
-        span = np.where(self._span[lead] == 0.0, np.inf, self._span[lead])
-        closed = (q - self._open[lead]) / span
-        command = np.clip(2.0 * closed - 1.0, -1.0, 1.0)
+        positions = state.data.qpos[self.law.drives["qpos"]]
+        command = np.clip(self._commands(positions), -1.0, 1.0)
         if self._table is not None:
             self.goal[:] = self._table.width(float(command[0]))
         else:
@@ -91,14 +86,12 @@ class GripperController(PartController[ServoLaw]):
     def set_goal(self, values: Vector, period: float) -> None:
         """Take the slice's values, shape (number of synergies,)."""
         self.goal[:] = values
-        command = self.goal
+        command, duration = self.goal, 0.0
         if self._table is not None:
             command = np.array([self._table.command(float(values[0]))])
-        if self.config.speed is None:
-            self.law.rest_at(self._setpoints(command))
-        else:
-            duration = self._duration(command, self.config.speed)
-            self.law.move(self._setpoints(command), duration)
+        if self.config.speed is not None:
+            duration = self._distance(command) / self.config.speed
+        self.law.move(self._setpoints(command), duration)
 
     @property
     def hold_action(self) -> Vector:
@@ -110,17 +103,19 @@ class GripperController(PartController[ServoLaw]):
         closed = 0.5 * (command[self._synergy] + 1.0)
         return self._open + closed * self._span
 
-    def _duration(self, command: Vector, speed: float) -> float:
-        """Return how long the setpoints take from their present place, s."""
-        now = (self.law.target()[0] - self._open) / np.where(
-            self._span == 0.0, np.inf, self._span
-        )
-        before = 2.0 * now[self._leading] - 1.0
-        distance = float(np.abs(command - before).max())
+    def _commands(self, positions: Vector) -> Vector:
+        """Return the commands of the synergies whose setpoints are these."""
+        lead = self._leading
+        span = np.where(self._span[lead] == 0.0, np.inf, self._span[lead])
+        return 2.0 * (positions[lead] - self._open[lead]) / span - 1.0
+
+    def _distance(self, command: Vector) -> float:
+        """Return how far commands are from the present setpoints, in values or m."""
+        before = self._commands(self.law.target()[0])
         if self._table is not None:
             width = self._table.width
-            distance = abs(width(float(command[0])) - width(float(before[0])))
-        return distance / speed
+            return abs(width(float(command[0])) - width(float(before[0])))
+        return float(np.abs(command - before).max())
 
     def _part(self, synergies: Sequence[Synergy]) -> ActionPart:
         count = len(synergies)
@@ -145,12 +140,8 @@ class OpeningTable:
 
     The width is measured along the y axis of the grasp frame, from its origin to the
     fingers on both sides, by their collision shapes; linkages follow their drives by
-    the ratios of the description. Between samples it is interpolated linearly.
-
-    Args:
-        synergy: Moves the fingers.
-        grasp: Frame between them.
-        state: The robot in the simulation; its state is not changed.
+    the ratios of the description. Between samples it is interpolated linearly. The
+    state of the simulation is not changed.
 
     Attributes:
         least: Width when closed, m.
@@ -172,17 +163,17 @@ class OpeningTable:
                 f"each other at frame '{grasp}', so it has no width. Use "
                 "'synergy'."
             )
-        widths = []
-        for command in self._commands:
-            now = self._hits(synergy, float(command))
-            # Fingers that overlap when closed would meet each other's inside.
-            widths.append(
-                sum(
-                    distance
-                    for (distance, body), (_, own) in zip(now, sides, strict=True)
-                    if body == own
+        # Fingers that overlap when closed would meet each other's inside.
+        widths = [
+            sum(
+                distance
+                for (distance, body), (_, own) in zip(
+                    self._hits(synergy, float(command)), sides, strict=True
                 )
+                if body == own
             )
+            for command in self._commands
+        ]
         self._widths: Vector = np.minimum.accumulate(widths)
         self.greatest, self.least = float(self._widths[0]), float(self._widths[-1])
 

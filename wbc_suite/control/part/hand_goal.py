@@ -1,39 +1,52 @@
 """Goals of a hand: absolute poses, or steps from the hand or the last goal."""
 
-from typing import Literal, Protocol
+from typing import Self
 
 import numpy as np
 import pinocchio as pin
+from pydantic import BaseModel, model_validator
 
 from wbc_suite.compiling import compiled
 from wbc_suite.control.loop.rigid_body import matrix_product
-from wbc_suite.control.part.part_settings import ROUNDING, InputFrame, Range, limits_of
+from wbc_suite.control.part.part_settings import (
+    ROUNDING,
+    GoalUpdate,
+    InputFrame,
+    InputType,
+    Range,
+    check_axes,
+    limits_of,
+)
 from wbc_suite.qp.lie import exp3, log3
+from wbc_suite.tomlfile import FROZEN
 from wbc_suite.typing import Matrix, Vector
 
 
-class GoalSettings(Protocol):
-    """Settings of a controller that moves the goal of a hand."""
+class HandSettings(BaseModel):
+    """Settings of controllers that move the goal of a hand, beside `PartSettings`.
 
-    @property
-    def input_ref_frame(self) -> InputFrame:
-        """Axes of the goal's steps."""
-        ...
+    Attributes:
+        input_type: `delta` steps, see `goal_update_mode`, or `absolute` goals.
+        input_ref_frame: Axes of the input: those of the world; of the robot's first
+            link, with which goals move; or of the hand's goal, for deltas only.
+        goal_update_mode: See `PartSettings`.
+        position_limits: Least and greatest coordinates of goals in the reference, m.
+        orientation_limits: Least and greatest components of the rotation vector from
+            the orientation at the start to a goal's, axes of the reference, rad.
+    """
 
-    @property
-    def goal_update_mode(self) -> Literal["achieved", "desired"]:
-        """What a step is added to."""
-        ...
+    model_config = FROZEN
 
-    @property
-    def position_limits(self) -> Range | None:
-        """Range of the goal's position, m."""
-        ...
+    input_type: InputType = "delta"
+    input_ref_frame: InputFrame = "base"
+    goal_update_mode: GoalUpdate = "achieved"
+    position_limits: Range | None = None
+    orientation_limits: Range | None = None
 
-    @property
-    def orientation_limits(self) -> Range | None:
-        """Range of the goal's orientation, rad."""
-        ...
+    @model_validator(mode="after")
+    def _axes_fit(self) -> Self:
+        check_axes(self.input_type, self.input_ref_frame)
+        return self
 
 
 class HandGoal:
@@ -44,18 +57,14 @@ class HandGoal:
     others keep their goal, since a hand that sags under a load would creep down at
     every step to the side. A step of zero keeps the goal.
 
-    Args:
-        settings: Meaning of steps, and limits.
+    Raises ConfigError if limits have a wrong number of values, or are empty.
 
     Attributes:
         flat: Rotation, row by row, and position, shape (12,). A buffer.
         position_limits: Least and greatest coordinates, m, shape (2, 3).
-
-    Raises:
-        ConfigError: If limits have a wrong number of values, or are empty.
     """
 
-    def __init__(self, settings: GoalSettings) -> None:
+    def __init__(self, settings: HandSettings) -> None:
         self._in_hand = settings.input_ref_frame == "eef"
         self._from_hand = settings.goal_update_mode == "achieved"
         self.position_limits = _limits(settings.position_limits, "position_limits")
@@ -84,12 +93,9 @@ class HandGoal:
         self._limit()
 
     def step(self, step: Vector, rotation: Matrix, position: Vector) -> None:
-        """Move the goal by a step; limits apply.
+        """Move the goal by a step, shape (6,); limits apply.
 
-        Args:
-            step: Linear, m, then a rotation vector, rad, shape (6,).
-            rotation: The hand's, shape (3, 3).
-            position: The hand's, shape (3,).
+        The step is linear, m, then a rotation vector, rad; the pose is the hand's.
         """
         if not np.abs(step).max() > ROUNDING:
             return
@@ -108,8 +114,7 @@ class HandGoal:
 
     def _limit(self) -> None:
         """Move the goal into its limits, component by component."""
-        low, high = self.position_limits
-        self._position[:] = np.minimum(np.maximum(self._position, low), high)
+        np.clip(self._position, *self.position_limits, out=self._position)
         if np.isinf(self._turn_limits).all():
             return
         turn = pin.log3(self._rotation @ self.start.T)
@@ -128,7 +133,7 @@ def move_goal(
     p_hand: Vector,
     from_hand: bool,
 ) -> None:
-    """Move a goal by a step along axes, in place.
+    """Move a goal (R, p) by a step along axes, in place.
 
     Args:
         R: Its rotation, shape (3, 3).
