@@ -1,4 +1,4 @@
-"""Composite controllers, by name."""
+"""Composite controllers; those of the package are registered here."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -8,25 +8,8 @@ from wbc_suite.control.composite.basic import (
     check_basic,
     default_basic_config,
 )
-from wbc_suite.control.composite.frame_kinds import (
-    FrameKind,
-    frame_kind_names,
-    register_frame_kind,
-)
 from wbc_suite.control.composite.hybrid import HybridMobileBase, check_hybrid
-from wbc_suite.control.composite.protocols import (
-    CompositeController,
-    SteppedController,
-)
-from wbc_suite.control.composite.registry import (
-    CompositeControllerName,
-    build_composite_controller,
-    composite_names,
-    default_composite,
-    load_composite_controller_config,
-    register_composite,
-    register_config_converter,
-)
+from wbc_suite.control.composite.registry import register_composite
 from wbc_suite.control.composite.whole_body import WholeBodyIK
 from wbc_suite.control.composite.whole_body_config import (
     default_whole_body_config,
@@ -38,23 +21,6 @@ from wbc_suite.control.composite.whole_body_dynamics_config import (
     default_dynamics_config,
 )
 from wbc_suite.control.state import RobotState
-
-__all__ = [
-    "BasicController",
-    "CompositeController",
-    "CompositeControllerName",
-    "FrameKind",
-    "SteppedController",
-    "build_composite_controller",
-    "composite_names",
-    "default_basic_config",
-    "default_composite",
-    "frame_kind_names",
-    "load_composite_controller_config",
-    "register_composite",
-    "register_config_converter",
-    "register_frame_kind",
-]
 
 
 def _whole_body_mink_ik(config: Mapping[str, Any], state: RobotState) -> WholeBodyIK:

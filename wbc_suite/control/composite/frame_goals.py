@@ -13,6 +13,7 @@ from wbc_suite.control.composite.frame_targets import (
     pose_of,
     row_of,
     write_frame_pose,
+    write_turn,
 )
 from wbc_suite.control.composite.whole_body_config import GoalsConfig
 from wbc_suite.kinematics import Configuration
@@ -116,14 +117,10 @@ def _bound(goal: Vector, home: Vector, limits: Vector) -> None:
     square = 0.0
     for i in range(3):
         square += (goal[4 * i + 3] - home[4 * i + 3]) ** 2
-        for j in range(3):
-            turn[i, j] = 0.0
-            for k in range(3):
-                turn[i, j] += home[4 * k + i] * goal[4 * k + j]
+    write_turn(home, goal, turn)
     share = min(1.0, limits[0] / max(np.sqrt(square), 1e-12))
     share_of_turn = min(1.0, limits[1] / max(log3(turn, vector), 1e-12))
-    for i in range(3):
-        vector[i] *= share_of_turn
+    vector *= share_of_turn
     exp3(vector[0], vector[1], vector[2], R)
     for i in range(3):
         goal[4 * i + 3] = home[4 * i + 3] + share * (goal[4 * i + 3] - home[4 * i + 3])

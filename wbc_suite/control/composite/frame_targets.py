@@ -135,14 +135,12 @@ def measure_frames(robot: RobotArrays, frames: FrameArrays) -> float:
         pose, goal, error = frames.pose[k], frames.goal[k], frames.error[k]
         if frames.joint[k] == CENTRE_OF_MASS:
             compute_com(robot)
-            _write_com(robot.com, pose)
+            pose[3::4] = robot.com
         else:
             write_frame_pose(robot.pose[frames.joint[k]], frames.offset[k], pose)
         for i in range(3):
             error[i] = goal[4 * i + 3] - pose[4 * i + 3]
-            for j in range(3):
-                turn[i, j] = pose[i] * goal[j]
-                turn[i, j] += pose[4 + i] * goal[4 + j] + pose[8 + i] * goal[8 + j]
+        write_turn(pose, goal, turn)
         log3(turn, error[3:])
         for part in range(2):
             square = 0.0
@@ -155,11 +153,12 @@ def measure_frames(robot: RobotArrays, frames: FrameArrays) -> float:
 
 
 @compiled
-def _write_com(com: Vector, pose: Vector) -> None:
+def write_turn(start: Vector, end: Vector, turn: Matrix) -> None:
+    """Write the rotation from a pose to another in the axes of the first, (3, 3)."""
     for i in range(3):
         for j in range(3):
-            pose[4 * i + j] = 1.0 if i == j else 0.0
-        pose[4 * i + 3] = com[i]
+            turn[i, j] = start[i] * end[j]
+            turn[i, j] += start[4 + i] * end[4 + j] + start[8 + i] * end[8 + j]
 
 
 @compiled
@@ -286,7 +285,7 @@ def _frame_arrays(
         braking=np.array([(f.linear_braking, f.angular_braking) for f in frames]),
         level=np.array([f.level for f in frames], dtype=np.int64),
         tolerance=np.array(config.tolerance, dtype=float),
-        pose=np.zeros((n, 12)),
+        pose=offset.copy(),
         goal=np.zeros((n, 12)),
         target=np.zeros((n, 12)),
         error=np.zeros((n, 6)),

@@ -81,18 +81,13 @@ class OscLaw(Law):
         The reference moves there from `start`, by default the goal itself, at constant
         velocities in `duration` seconds.
         """
-        start = goal if start is None else start
-        record = self.record
-        record["start"][0] = (*start.rotation.ravel(), *start.translation)
-        record["shift"][0] = goal.translation - start.translation
-        record["turn"][0] = pin.log3(start.rotation.T @ goal.rotation)
+        record, origin = self.record, goal if start is None else start
+        record["start"][0] = (*origin.rotation.ravel(), *origin.translation)
+        record["shift"], record["turn"] = 0.0, 0.0
+        if start is not None:
+            record["shift"] = goal.translation - start.translation
+            record["turn"] = pin.log3(start.rotation.T @ goal.rotation)
         record["since"], record["duration"] = 0.0, duration
-
-    def jump(self, goal: Vector) -> None:
-        """Set the goal at once: rotation row by row, and position, shape (12,)."""
-        record = self.record
-        record["start"][0], record["shift"], record["turn"] = goal, 0.0, 0.0
-        record["since"] = record["duration"] = 0.0
 
     def frames(self, state: RobotState) -> tuple[Matrix, Vector, Matrix, Vector]:
         """Return views of rotation and position of the reference, then of the site."""

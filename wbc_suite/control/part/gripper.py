@@ -155,7 +155,7 @@ class OpeningTable:
         self._state, self._grasp = state, state.prefix + grasp
         self._data = mujoco.MjData(state.model)
         self._commands = np.linspace(-1.0, 1.0, SAMPLES)
-        self._moving = self._moving_shapes(_followers(synergy, state))
+        self._moving = self._moving_shapes(_joint_values(synergy, -1.0, state))
         sides = self._hits(synergy, -1.0)
         if None in [body for _, body in sides]:
             raise ConfigError(
@@ -238,20 +238,8 @@ def _joint_values(
         joint: (1.0 - closed) * value + closed * synergy.closed[joint]
         for joint, value in synergy.open.items()
     }
-    followers = {j.name: j.mimic for j in state.robot.joints if j.mimic is not None}
-    for name in _followers(synergy, state):  # a leader comes before its followers
-        if name in followers:
-            mimic = followers[name]
-            values[name] = mimic.ratio * values[mimic.joint] + mimic.offset
+    for joint in state.robot.joints:
+        mimic = joint.mimic
+        if mimic is not None and mimic.joint in values:
+            values[joint.name] = mimic.ratio * values[mimic.joint] + mimic.offset
     return values
-
-
-def _followers(synergy: Synergy, state: RobotState) -> dict[str, None]:
-    """Return the synergy's joints and all that follow them, leaders first."""
-    found = dict.fromkeys(synergy.open)
-    mimics = [(j.name, j.mimic.joint) for j in state.robot.joints if j.mimic]
-    while True:
-        more = [a for a, leader in mimics if leader in found and a not in found]
-        if not more:
-            return found
-        found |= dict.fromkeys(more)

@@ -132,8 +132,7 @@ class IkPoseController(PartController[JointLaw]):
     def reset(self, state: RobotState) -> None:
         """Hold the hand where it is, and the posture that it has."""
         self._ik.reset(state)
-        hand = self._hand()
-        self._goal.reset(hand.rotation, hand.translation)
+        self._goal.reset(self._hand())
         self.law.aim(state.data.qpos[self.law.drives["qpos"]])
         self._due = state.time
 
@@ -144,13 +143,13 @@ class IkPoseController(PartController[JointLaw]):
             turn = pin.Quaternion(*values[[6, 3, 4, 5]]).normalized().matrix()
         if self.config.input_type == "absolute":
             rotation = self.goal.rotation if turn is None else turn
-            self._goal.set(rotation, values[:3])
+            self._goal.set(pin.SE3(rotation, values[:3]))
             return
         rotation = np.zeros(3) if turn is None else pin.log3(turn)
         angle = float(np.linalg.norm(rotation))
         rotation = rotation * min(1.0, self.config.turn_limit / max(angle, ROUNDING))
-        step, hand = np.concatenate([self._scaling(values[:3]), rotation]), self._hand()
-        self._goal.step(step, hand.rotation, hand.translation)
+        step = np.concatenate([self._scaling(values[:3]), rotation])
+        self._goal.step(step, self._hand())
 
     def prepare(self, state: RobotState) -> int:
         """Solve when it is time to; return how many physics steps are left."""

@@ -22,7 +22,7 @@ from wbc_suite.control.part.part_settings import (
 from wbc_suite.control.robot_parts import RobotPart
 from wbc_suite.control.state import RobotState
 from wbc_suite.errors import UnknownNameError
-from wbc_suite.typing import Matrix, Vector
+from wbc_suite.typing import Vector
 
 AXES = (Axis.X, Axis.Y, Axis.Z, Axis.RX, Axis.RY, Axis.RZ)
 UNITS = (*(Unit("m"),) * 3, *(Unit("rad"),) * 3)
@@ -136,8 +136,8 @@ class OscController(PartController[OscLaw]):
         for k, joint in enumerate(self.law.joints):
             posture[k] = self.config.posture.get(joint, posture[k])
         self.law.drives["position"] = posture
-        self._goal.reset(*self._hand())
-        self.law.jump(self._goal.flat)
+        self._goal.reset(self._hand())
+        self.law.set_goal(self.goal)
 
     def set_goal(self, values: Vector, period: float) -> None:
         """Take a step or a goal, shape (6,) or (3,), and gains as the mode has them."""
@@ -148,14 +148,11 @@ class OscController(PartController[OscLaw]):
         start = self.law.target_pose()[0] if ramp > 0.0 else None
         if self._input.scaled:
             self._step[:size] = self._input.scaling(values[:size])
-            self._goal.step(self._step, *self._hand())
+            self._goal.step(self._step, self._hand())
         else:
             turn = pin.exp3(values[3:6]) if size == 6 else self._goal.start
-            self._goal.set(turn, values[:3])
-        if start is None:
-            self.law.jump(self._goal.flat)
-        else:
-            self.law.set_goal(self.goal, start=start, duration=ramp)
+            self._goal.set(pin.SE3(turn, values[:3]))
+        self.law.set_goal(self.goal, start=start, duration=ramp)
 
     @property
     def goal(self) -> pin.SE3:
@@ -190,7 +187,7 @@ class OscController(PartController[OscLaw]):
         def encode(target: pin.SE3) -> Vector:
             goal = reference().actInv(target)
             if self._input.scaled:
-                step = self._goal.step_to(goal, reference().actInv(measure()))
+                step = self._goal.step_to(goal, self._hand())
                 values = self._input.scaling.inverse(step[: self.config.size])
             else:
                 values = self._absolute(goal)
@@ -210,7 +207,7 @@ class OscController(PartController[OscLaw]):
         values = np.concatenate([pose.translation, pin.log3(pose.rotation)])
         return values[: self.config.size]
 
-    def _hand(self) -> tuple[Matrix, Vector]:
-        """Return rotation, (3, 3), and position of the hand in the reference."""
+    def _hand(self) -> pin.SE3:
+        """Return the pose of the hand in the reference."""
         R_bw = self._R_body.T
-        return R_bw @ self._R_site, R_bw @ (self._p_site - self._p_body)
+        return pin.SE3(R_bw @ self._R_site, R_bw @ (self._p_site - self._p_body))
