@@ -72,12 +72,10 @@ def hands_of(robot: RobotDescription) -> dict[str, str]:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class RobotPart:
-    """A part of a robot that one controller drives.
+    """A part of a robot that one controller drives; its slice has the same name.
 
-    Attributes:
-        name: Its name, which is that of its action slice as well.
-        joints: Its driven joints, from its root on.
-        hand: Frame of the hand at its end; None where it does not end in one.
+    Joints are the driven ones, from the root on; the hand is the frame of the hand at
+    the part's end, None without one.
     """
 
     name: str

@@ -31,13 +31,9 @@ class RobotState:
     ) -> None:
         self.model, self.data, self.robot, self.prefix = model, data, robot, prefix
         self.conversion = Conversion(model, robot.to_pinocchio(), prefix=prefix)
-        own = {*robot.joint_names, *robot.root_joint_names}
+        own = {prefix + j for j in (*robot.joint_names, *robot.root_joint_names)}
         named = [model.actuator(i).name for i in range(model.nu)]
-        ids = [
-            i
-            for i, name in enumerate(named)
-            if name.startswith(prefix) and name.removeprefix(prefix) in own
-        ]
+        ids = [i for i, name in enumerate(named) if name in own]
         self.actuator_ids: Indices = np.array(ids, dtype=np.int64)
         self.actuators = tuple(named[i].removeprefix(prefix) for i in ids)
         self._mass_matrix: Matrix = np.zeros((model.nv, model.nv))

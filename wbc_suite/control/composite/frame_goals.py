@@ -138,7 +138,7 @@ class FrameGoals:
         layout: Layout whose first slices are those of the frames.
         robot: The reduced robot.
         configuration: Its commanded configuration.
-        root: Index of a free root in the simulation's qpos, -1 without one.
+        root: See `GoalArrays`.
 
     Attributes:
         poses: Goal of each frame, in the reference frame.

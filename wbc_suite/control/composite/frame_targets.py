@@ -91,16 +91,9 @@ def write_targets(
 ) -> float:
     """Write the targets of frames and posture, on straight lines to their goals.
 
-    Poses and errors of the frames are written too.
-
-    Args:
-        robot: The robot at its configuration.
-        frames: Controlled frames.
-        posture: The posture.
-        dt: Step, s.
-        settling: Time constant of the end of the posture's motion, s.
-        half_speed_error: See `lower_level_rate`.
-        has_arrived: Whether level 0 has been at its goals before.
+    Poses and errors of the frames are written too. `settling` is the time constant of
+    the end of the posture's motion, s; `has_arrived` says whether level 0 has been at
+    its goals before. See `lower_level_rate` for `half_speed_error`.
 
     Returns:
         The greatest error of level 0, as a multiple of the tolerance.

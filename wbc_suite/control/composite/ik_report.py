@@ -11,10 +11,7 @@ import pinocchio as pin
 
 from wbc_suite.control.composite.backend import IkStep
 from wbc_suite.control.composite.frame_targets import ControlledFrames
-from wbc_suite.control.composite.whole_body_config import (
-    ControlledFrame,
-    WholeBodyIKConfig,
-)
+from wbc_suite.control.composite.whole_body_config import WholeBodyIKConfig
 from wbc_suite.control.reasons import (
     Contact,
     InMotion,
@@ -55,11 +52,7 @@ class Commanded(NamedTuple):
 class IkReport:
     """Compares poses with goals, and finds the reasons of remaining errors.
 
-    Args:
-        config: Controlled frames and tolerances.
-        configuration: The reduced robot, for the report's own use.
-        conversion: From the simulation to the reduced robot.
-        feet: Links whose contacts hold nothing back.
+    The configuration is for the report's own use. Contacts of feet hold nothing back.
     """
 
     def __init__(
@@ -72,11 +65,7 @@ class IkReport:
         self._config, self._configuration = config, configuration
         self._conversion, self._feet = conversion, feet
         self._frames = ControlledFrames(config, configuration)
-        names = configuration.velocity_names()
-        self._support = [
-            {names[i] for i in _support(configuration, frame)}
-            for frame in config.frames
-        ]
+        self._support = [self._joints_of(frame.frame) for frame in config.frames]
 
     def frames(
         self,
@@ -170,8 +159,11 @@ class IkReport:
             for support in self._support
         ]
 
-    def _joints_of(self, frame: str) -> set[str]:
+    def _joints_of(self, frame: str | None) -> set[str]:
+        """Return the joints that move a frame; all without one."""
         names = self._configuration.velocity_names()
+        if frame is None:
+            return set(names)
         return {names[i] for i in self._configuration.support(frame)}
 
     def _from_limits(
@@ -193,12 +185,6 @@ class IkReport:
             and other.level <= self._config.frames[k].level
             and support & self._support[i]
         ]
-
-
-def _support(configuration: Configuration, frame: ControlledFrame) -> Sequence[int]:
-    if frame.frame is None:
-        return range(configuration.nv)
-    return [int(i) for i in configuration.support(frame.frame)]
 
 
 def _pick(reasons: Callable[[], Reasons], k: int) -> list[Reason]:

@@ -32,11 +32,9 @@ class CompositeController(Protocol):
 
     def reset(self, state: RobotState) -> None:
         """Start from the robot's state; goals hold it there."""
-        ...
 
     def set_goal(self, action: Vector, period: float = 0.05) -> None:
         """Take an action that `layout` has checked; the next comes in `period` s."""
-        ...
 
     def prepare(self, state: RobotState) -> int:
         """Update the laws; return for how many physics steps that is enough."""
@@ -73,7 +71,6 @@ class TickedController(CompositeController, Protocol):
 
     def finish_tick(self) -> None:
         """Finish a tick that the loop has begun, if there is one."""
-        ...
 
 
 @runtime_checkable
@@ -87,4 +84,3 @@ class DynamicController(CompositeController, Protocol):
 
     def finish_tick(self) -> None:
         """Solve the QP if the loop has stated it and not found its active set."""
-        ...

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from wbc_suite.control.composite.reduced_robot import joint_indices
+from wbc_suite.control.composite.reduced_robot import joint_indices, planar_joints
 from wbc_suite.control.composite.whole_body_config import (
     HeldFrame,
     WholeBodyIKConfig,
@@ -92,11 +92,6 @@ def _greatest_weights(
     return {name: share * efforts[name] for name, share in shares.items()}
 
 
-def planar_joints(robot: RobotDescription) -> tuple[str, ...]:
-    """Return the joints of a planar root."""
-    return robot.root_joint_names if robot.root.kind == "planar" else ()
-
-
 def joint_accelerations(
     robot: RobotDescription, config: WholeBodyIKConfig
 ) -> dict[str, float]:
@@ -175,25 +170,17 @@ def _floor_limit(robot: RobotDescription, config: WholeBodyIKConfig) -> FloorLim
     Another contact with the floor would take load off the feet, which then slip.
     """
     spheres = collision_spheres(robot)
-    for link in _legs(robot, config):
-        spheres.pop(link, None)
+    for held in config.held:
+        link = robot.link(robot.link_of(held.frame))
+        while link.parent is not None:
+            spheres.pop(link.name, None)
+            link = robot.link(link.parent)
     return FloorLimit(
         spheres,
         height=config.limits.floor,
         nearest=config.limits.collision_pairs,
         margin=config.limits.collision_distance,
     )
-
-
-def _legs(robot: RobotDescription, config: WholeBodyIKConfig) -> set[str]:
-    """Return the links between the root and what is held."""
-    found: set[str] = set()
-    for held in config.held:
-        link = robot.link(robot.link_of(held.frame))
-        while link.parent is not None:
-            found.add(link.name)
-            link = robot.link(link.parent)
-    return found
 
 
 def _self_collision_limit(
@@ -204,10 +191,11 @@ def _self_collision_limit(
     Pairs whose capsules overlap at the posture are left out.
     """
     configuration = Configuration(robot.to_pinocchio())
+    support = configuration.support
     pairs = [
         (first, second)
         for first, second in sorted(tuple(sorted(p)) for p in collision_pairs(robot))
-        if _joints_between(configuration, first, second) > MAX_NEIGHBOUR_JOINTS
+        if len(np.setxor1d(support(first), support(second))) > MAX_NEIGHBOUR_JOINTS
     ]
     limit = SelfCollisionLimit(
         enclosing_capsules(robot),
@@ -248,9 +236,3 @@ def _rarely_overlapping(
         for a, b in {tuple(sorted((x.first, x.second))) for x in touching}:
             touches[a, b] += 1
     return [pair for pair in pairs if touches[pair] <= MAX_OVERLAP_SHARE * SAMPLES]
-
-
-def _joints_between(configuration: Configuration, first: str, second: str) -> int:
-    a = {int(i) for i in configuration.support(first)}
-    b = {int(i) for i in configuration.support(second)}
-    return len(a ^ b)

@@ -62,13 +62,10 @@ def register_composite(
 ) -> None:
     """Make a kind of composite controller known under a name, case ignored.
 
-    Args:
-        name: The name.
-        build: Makes a controller out of a config and the robot in a simulation.
-        family: Files `controllers/{robot}_{family}.toml` hold its configs.
-        default: Makes a config for a robot that has no file.
-        check: Raises ConfigError for what is wrong in a config, for a robot or for
-            none, and names the source. By default `build` does.
+    `build` makes a controller out of a config and the robot in a simulation. Configs
+    are in files `controllers/{robot}_{family}.toml`; `default` makes one for a robot
+    without a file. `check` raises ConfigError for what is wrong in a config, for a
+    robot or for none, and names the source; by default `build` does.
 
     Raises:
         ConfigError: If the name is taken.
@@ -210,21 +207,13 @@ def _named(
     except UnknownNameError:
         return kind.default(robot) | own_type, f"{name} for {robot.name}"
     config = read_toml(file) | own_type
-    if catalogue.is_ours(file) and not _fits(kind, config, robot):
-        log.warning("%s is not for this '%s': names differ.", file.name, robot.name)
-        return kind.default(robot) | own_type, f"{name} for {robot.name}"
+    if catalogue.is_ours(file):
+        try:
+            kind.check(config, robot, "")
+        except ConfigError:  # another robot of the same name
+            log.warning("%s is not for this '%s': names differ.", file.name, robot.name)
+            return kind.default(robot) | own_type, f"{name} for {robot.name}"
     return config, str(file)
-
-
-def _fits(
-    kind: CompositeKind, config: Mapping[str, Any], robot: RobotDescription
-) -> bool:
-    """Whether the robot is ours, and not another of the same name."""
-    try:
-        kind.check(config, robot, "")
-    except ConfigError:
-        return False
-    return True
 
 
 def build_composite_controller(

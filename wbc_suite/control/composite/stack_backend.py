@@ -34,11 +34,6 @@ from wbc_suite.typing import Indices, Matrix, Vector
 class StackBackend:
     """`IkBackend` over a `TaskStack`.
 
-    Args:
-        robot: The reduced robot.
-        config: Tasks, limits and contacts.
-        commanded: The commanded configuration; read, and moved by the owner.
-
     Attributes:
         stack: The stack of frames and posture.
         torque_limiter: Limits what it solves for.
@@ -67,13 +62,10 @@ class StackBackend:
             equalities.append(sideways)
         limits = make_limits(robot, config)
         self._support = [x for x in limits if isinstance(x, SupportLimit)]
-        self.stack = TaskStack(
-            commanded,
-            [*self._tasks, self._posture],
-            limits=limits,
-            equalities=equalities,
-            escape=False,
+        make_stack = partial(
+            TaskStack, commanded, limits=limits, equalities=equalities, escape=False
         )
+        self.stack = make_stack([*self._tasks, self._posture])
         self.v: Vector = np.zeros(commanded.nv)
         max_acceleration = accelerations(robot, config, commanded)
         self.torque_limiter = TorqueLimiter(robot, commanded, max_acceleration)
@@ -83,13 +75,7 @@ class StackBackend:
             max_speed=NO_SPEED_LIMIT,
             name="configuration",
         )
-        self._joint_stack = TaskStack(
-            commanded,
-            [self._joints],
-            limits=limits,
-            equalities=equalities,
-            escape=False,
-        )
+        self._joint_stack = make_stack([self._joints])
 
     def reset(self) -> None:
         """Discard the state of earlier ticks; hold feet and centre of mass."""

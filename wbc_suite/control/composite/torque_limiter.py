@@ -6,8 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.compiling import as_argument, compiled, struct
-from wbc_suite.control.composite.qp_tasks import planar_joints
-from wbc_suite.control.composite.reduced_robot import joint_indices
+from wbc_suite.control.composite.reduced_robot import joint_indices, planar_joints
 from wbc_suite.kinematics import Configuration
 from wbc_suite.kinematics.forward import RobotArrays
 from wbc_suite.kinematics.inverse_dynamics import (
@@ -66,23 +65,20 @@ def motors_suffice(
 class TorqueLimiter:
     """Reduces changes of velocity that would saturate motors.
 
-    Acceleration limits bound each joint by itself, for a worst case; together, and with
-    rows that keep links apart, they can still ask for more. A saturated joint drags the
-    others along: GR1's waist was carried 0.1 rad past its target, into its stop at
-    3.8 rad/s.
+    Acceleration limits, shape (nv,), bound each joint by itself, for a worst case;
+    together, and with rows that keep links apart, they can still ask for more. A
+    saturated joint drags the others along: GR1's waist was carried 0.1 rad past its
+    target, into its stop at 3.8 rad/s.
 
-    Torques are linear in the acceleration a,
-
-        tau = M a + h,  |tau| <= share * effort.
-
-    Saturated joints accelerate as their motors permit, with M and tau of these joints,
+    Torques are `tau = M a + h`, |tau| <= share * effort. Saturated joints accelerate as
+    their motors permit, with M and tau of these joints,
 
         M da = (tau cut to its bounds) - tau,
 
     and all others as commanded, because they may have to brake. Where a joint could
     then not stop before its end, or its motor cannot hold it, one factor reduces all
     changes of velocity. With a free root contact forces are unknown, and nothing is
-    changed. Acceleration limits have shape (nv,).
+    changed.
 
     Attributes:
         argument: The argument of kernels that stands for the motors.

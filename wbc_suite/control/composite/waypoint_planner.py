@@ -86,9 +86,7 @@ class WaypointPlanner:
 
     Args:
         robot: The reduced robot.
-        config: Controlled frames.
         configuration: The commanded configuration; read, and moved by the owner.
-        frames: Its controlled frames.
         clearance: Clearance of a configuration, m.
         distance_limits: Limits that keep links apart.
         dt: Time between solves, s.

@@ -58,8 +58,8 @@ class ControlledFrame(FrozenModel):
     Attributes:
         name: Name of the slice.
         frame: Frame or link of the robot; absent for the centre of mass.
-        kind: A registered kind: `pose`, `position`, `orientation`, `com` (the centre of
-            mass), `base` (x, y and yaw), or one's own; see `frame_kinds`.
+        kind: A registered kind: `pose`, `position`, `orientation`, `com`, `base` (x, y
+            and yaw), or one's own; see `frame_kinds`.
         position_cost: [cost]/m.
         orientation_cost: [cost]/rad.
         gain: Fraction of the error that one solve removes, (0, 1].

@@ -144,8 +144,6 @@ class VelocityLaw(Law):
     acceleration, and an arm on it would compensate for what does not happen.
 
     Args:
-        state: The robot in the simulation.
-        joints: Driven joints.
         kp: Integral gain, 1/s^2.
         kd: Proportional gain, 1/s.
         windup: Greatest distance between reference and joint, rad or m.

@@ -23,10 +23,7 @@ class Law:
     The kernel of each kind stands beside its class; `loop.inverse_dynamics` computes
     torques from the accelerations that all laws ask for.
 
-    Args:
-        kind: Selects the kernel: a `LawKind`, or what `register_law` returned.
-        state: The robot in the simulation.
-        joints: Driven joints; each has an actuator.
+    The kind selects the kernel: a `LawKind`, or what `register_law` returned.
 
     Attributes:
         record: Its `LAW` record, shape (1,).

@@ -57,12 +57,7 @@ class OscLaw(Law):
     linear and angular motion each. A goal in a moving reference body moves with it. A
     wrench f displaces the site by `(L kp)^-1 f`.
 
-    Where joints saturate, see `osc_saturation`.
-
-    Args:
-        state: The robot in the simulation.
-        joints: Joints that move the site.
-        site: The site's name in the robot.
+    Where joints saturate, see `osc_saturation`. The site's name is that in the robot.
 
     Source: Khatib (1987), "A unified approach for motion and force control of robot
     manipulators: the operational space formulation", IEEE J. Robotics and Automation.

@@ -24,12 +24,8 @@ class GripperController(PartController[ServoLaw]):
     `q* = open + (a + 1) / 2 (closed - open)`, the setpoint of the joint's servo. With
     the input `width` it is the width between the fingers of a parallel gripper.
 
-    Args:
-        name: Name of the gripper, which is the name of its action slice.
-        synergies: Its synergies.
-        state: The robot in the simulation.
-        config: Meaning of the input, and its speed.
-        grasp: Frame between the fingers; needed for widths.
+    The name is that of its action slice as well. The frame `grasp` between the fingers
+    is needed for widths.
 
     Attributes:
         goal: Present action, shape (number of synergies,).

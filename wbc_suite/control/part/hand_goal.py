@@ -57,7 +57,6 @@ class HandGoal:
     Raises ConfigError if limits have a wrong number of values, or are empty.
 
     Attributes:
-        pose: The goal.
         start: Orientation of the hand at the start, from which turns are limited.
         position_limits: Least and greatest coordinates, m, shape (2, 3).
     """

@@ -1,4 +1,7 @@
-"""JOINT_POSITION, JOINT_VELOCITY and JOINT_TORQUE: actions are values of joints."""
+"""JOINT_POSITION, JOINT_VELOCITY and JOINT_TORQUE: actions are values of joints.
+
+The controllers raise ConfigError if a number of values is wrong, or a range is empty.
+"""
 
 from collections.abc import Sequence
 from typing import Literal
@@ -97,9 +100,6 @@ class JointPositionController(PartController[JointLaw]):
 
     Attributes:
         goal: Positions to hold, shape (n,), rad or m.
-
-    Raises:
-        ConfigError: If a number of values is wrong, or a range is empty.
     """
 
     def __init__(
@@ -157,9 +157,6 @@ class JointVelocityController(PartController[VelocityLaw]):
 
     Attributes:
         goal: Commanded velocities, shape (n,), rad/s or m/s.
-
-    Raises:
-        ConfigError: If a number of values is wrong, or a range is empty.
     """
 
     def __init__(
@@ -206,9 +203,6 @@ class JointTorqueController(PartController[TorqueLaw]):
 
     Attributes:
         goal: Commanded torques, shape (n,), N m or N.
-
-    Raises:
-        ConfigError: If a number of values is wrong, or a range is empty.
     """
 
     def __init__(

@@ -136,11 +136,7 @@ class SliceInput:
     """A slice of the action, and what its values mean by the config's `input_type`.
 
     Args:
-        name: Name of the slice.
-        kind: What the values set.
-        labels: Name of each of its n values.
         units: Units of the outputs.
-        config: Settings with the range of the input.
         outputs: Outputs at `input_min` and at `input_max`.
         limits: Least and greatest outputs, shape (n,) each.
 
@@ -148,9 +144,6 @@ class SliceInput:
         action: The slice.
         scaled: Whether values are scaled; otherwise they are outputs.
         scaling: Scales them.
-
-    Raises:
-        ConfigError: See `InputScaling`.
     """
 
     def __init__(

@@ -37,11 +37,9 @@ def register_part_controller(
     imported, `make(..., controller_configs="MINE")` uses it in all arms, and
     `{"type": "MINE", ...}` in `body_parts` to one part.
 
-    Args:
-        name: Its name, in capitals.
-        controller: Class; `controller(part, config, state)` makes one.
-        config: Model of its config, with the field `type: Literal[name] = name`. Derive
-            it from `PartSettings`, or from `FrozenModel` for one without gripper.
+    The class is called by `controller(part, config, state)`. The config's model has the
+    field `type: Literal[name] = name`; derive it from `PartSettings`, or from
+    `FrozenModel` for a controller without gripper.
 
     Raises:
         ConfigError: If the name is taken or not in capitals, or the config's type is

@@ -72,8 +72,6 @@ class SplineReference:
         configuration: The robot that is solved for; `extend` moves it.
         q_index: Places of the driven joints, of one parameter each, in q.
         v_index: Their places in v.
-        period: T, s.
-        mean: n.
         width: Columns of `motion`, if there are more joints than these.
 
     Attributes:
