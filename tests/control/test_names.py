@@ -5,8 +5,11 @@ from typing import get_args
 import pytest
 
 from wbc_suite.catalogue import Catalogue
-from wbc_suite.control import composite_names, load_composite_controller_config
-from wbc_suite.control.composite import register_config_converter
+from wbc_suite.control import (
+    composite_names,
+    load_composite_controller_config,
+    register_config_converter,
+)
 from wbc_suite.control.composite.registry import _CONVERTERS, CompositeControllerName
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.typing import RobotName

@@ -79,7 +79,7 @@ def _files(catalogue: "Catalogue", kind: Kind) -> "Table":
 
     table = _table(kind.capitalize(), "name", "")
     if kind == "controllers":
-        from wbc_suite.control.composite import composite_names
+        from wbc_suite.control import composite_names
         from wbc_suite.control.part.registry import part_models
 
         for name in composite_names():

@@ -13,8 +13,8 @@ from typing import Any
 from wbc_suite.benchmark import benchmark_names
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.compat.robosuite_env import GymWrapper, RobosuiteEnv
+from wbc_suite.control import composite_names
 from wbc_suite.control import load_composite_controller_config as _load_composite
-from wbc_suite.control.composite import composite_names
 from wbc_suite.control.part.registry import (
     load_part_controller_config as _load_part,
 )

@@ -8,34 +8,36 @@ from wbc_suite.control.action import (
     SliceKind,
     Unit,
 )
-from wbc_suite.control.composite import (
-    BasicController,
-    CompositeController,
-    CompositeControllerName,
+from wbc_suite.control.composite.basic import BasicController, default_basic_config
+from wbc_suite.control.composite.frame_kinds import (
     FrameKind,
+    frame_kind_names,
+    register_frame_kind,
+)
+from wbc_suite.control.composite.protocols import (
+    CompositeController,
     SteppedController,
+)
+from wbc_suite.control.composite.registry import (
+    CompositeControllerName,
     build_composite_controller,
     composite_names,
-    default_basic_config,
     default_composite,
-    frame_kind_names,
     load_composite_controller_config,
     register_composite,
     register_config_converter,
-    register_frame_kind,
 )
 from wbc_suite.control.law.custom import register_law
 from wbc_suite.control.law.joint_laws import JointLaw, VelocityLaw
 from wbc_suite.control.law.law import Law, ServoLaw, TorqueLaw
 from wbc_suite.control.law.osc import OscLaw
-from wbc_suite.control.part import (
-    PartController,
-    PartSettings,
-    PoseInput,
+from wbc_suite.control.part.controller import PartController, PoseInput
+from wbc_suite.control.part.part_settings import PartSettings
+from wbc_suite.control.part.registry import (
+    PartControllerName,
     load_part_controller_config,
     register_part_controller,
 )
-from wbc_suite.control.part.registry import PartControllerName
 from wbc_suite.control.robot_parts import RobotPart
 from wbc_suite.control.state import RobotState
 

@@ -1,6 +1,5 @@
 """Actions: one flat vector of named slices with units and bounds."""
 
-import math
 import textwrap
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
@@ -10,7 +9,6 @@ from itertools import zip_longest
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wbc_suite.compiling import compiled
 from wbc_suite.errors import ActionError, ConfigError, UnknownNameError
 from wbc_suite.typing import Vector
 
@@ -68,20 +66,13 @@ class Unit:
 
 CELL = 40
 """Characters in a line of a printed layout's cell."""
-FLOAT64 = np.dtype(np.float64)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class ActionPart:
     """What one controller reads from the action: named values with units and bounds.
 
-    Attributes:
-        name: Name of the slice.
-        kind: What the values set.
-        labels: Name of each value: an `Axis`, a joint, or another word.
-        units: Unit of each value.
-        low: Least values.
-        high: Greatest values.
+    Labels are the names of the values: each an `Axis`, a joint, or another word.
     """
 
     name: str
@@ -110,13 +101,9 @@ class ActionSlice(ActionPart):
 
 
 class ActionLayout:
-    """Slices, names, bounds and units of an action.
+    """Slices, names, bounds and units of an action; parts are in its order.
 
-    Args:
-        parts: Parts in the order of the vector.
-
-    Raises:
-        ConfigError: If two parts have the same name.
+    Raises ConfigError if two parts have the same name.
 
     Attributes:
         slices: The parts with their places.
@@ -152,12 +139,9 @@ class ActionLayout:
     def pack(
         self, values: Mapping[str, ArrayLike], *, base: ArrayLike | None = None
     ) -> Vector:
-        """Put named values into one action.
+        """Put values by slice into one action.
 
-        Args:
-            values: Values by slice.
-            base: Action with the slices that are not in `values`, such as a
-                controller's `hold_action`.
+        Slices without a value are taken from the base, such as a `hold_action`.
 
         Raises:
             UnknownNameError: If there is no such slice.
@@ -208,9 +192,8 @@ class ActionLayout:
                 "print(env.unwrapped.action_layout) explains the values."
             )
         vector = array.astype(np.float64)
-        values = vector.tolist()
-        if not all(map(math.isfinite, values)):
-            bad = next(i for i, x in enumerate(values) if not math.isfinite(x))
+        if not np.isfinite(vector).all():
+            bad = int(np.argmin(np.isfinite(vector)))
             raise ActionError(
                 f"Action value {vector[bad]} at index {bad} "
                 f"({self.describe(bad)}) is not finite."
@@ -223,17 +206,7 @@ class ActionLayout:
         return clipped, int(np.count_nonzero(clipped != action))
 
     def take(self, action: ArrayLike) -> tuple[Vector, int]:
-        """Check and clip an action; what `clip` returns of what `check` does.
-
-        Raises:
-            ActionError: See `check`.
-        """
-        if isinstance(action, np.ndarray) and action.dtype == FLOAT64:
-            vector = action.copy()
-            if vector.shape == self.low.shape:
-                outside = _clip(vector, self.low, self.high)
-                if outside >= 0:
-                    return vector, outside
+        """Check and clip an action; see `check` and `clip`."""
         return self.clip(self.check(action))
 
     def describe(self, index: int) -> str:
@@ -246,17 +219,13 @@ class ActionLayout:
     def __str__(self) -> str:
         rows = [("slice", "kind", "index", "values", "unit", "low", "high")]
         for s in self.slices:
-            rows.append(
-                (
-                    s.name,
-                    s.kind,
-                    f"{s.start}:{s.stop}",
-                    " ".join(s.labels),
-                    " ".join(map(str, dict.fromkeys(s.units))),
-                    " ".join(f"{x:g}" for x in dict.fromkeys(s.low)),
-                    " ".join(f"{x:g}" for x in dict.fromkeys(s.high)),
-                )
+            index, labels = f"{s.start}:{s.stop}", " ".join(s.labels)
+            units = " ".join(map(str, dict.fromkeys(s.units)))
+            low, high = (
+                " ".join(f"{x:g}" for x in dict.fromkeys(bounds))
+                for bounds in (s.low, s.high)
             )
+            rows.append((s.name, s.kind, index, labels, units, low, high))
         return _table(rows)
 
 
@@ -272,20 +241,6 @@ def _table(rows: list[tuple[str, ...]]) -> str:
         for line in zip_longest(*row, fillvalue="")
     ]
     return "\n".join(lines)
-
-
-@compiled
-def _clip(values: Vector, low: Vector, high: Vector) -> int:
-    """Clip in place; return how many were outside, or -1 if one is not finite."""
-    outside = 0
-    for i in range(len(values)):
-        value = values[i]
-        if not np.isfinite(value):
-            return -1
-        if not low[i] <= value <= high[i]:
-            values[i] = min(max(value, low[i]), high[i])
-            outside += 1
-    return outside
 
 
 def _frozen(values: list[float]) -> Vector:

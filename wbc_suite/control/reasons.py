@@ -6,7 +6,8 @@ Here are those of the robot that follows its commands.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias, overload
+from functools import cache
+from typing import Any, TypeAlias
 
 from wbc_suite.qp import ActiveLimit, LimitKind
 from wbc_suite.qp.report import Reason as SolverReason
@@ -14,12 +15,9 @@ from wbc_suite.qp.report import Reason as SolverReason
 
 @dataclass(frozen=True, slots=True)
 class Contact:
-    """A link of the robot presses on an object.
+    """A link of the robot presses on a body or a geom of the world, such as `floor`.
 
-    Attributes:
-        link: The link.
-        other: Name of the body, or of the world's geom, such as `floor`.
-        force: Sum of the normal forces, N.
+    The force is the sum of the normal forces, N.
     """
 
     link: str
@@ -27,41 +25,28 @@ class Contact:
     force: float
 
     def __str__(self) -> str:
-        """Return "contact: hand - table"."""
         return f"contact: {self.link} - {self.other}"
 
 
 @dataclass(frozen=True, slots=True)
 class TrackingError:
-    """A joint does not reach its target.
-
-    Attributes:
-        joint: The joint.
-        error: Distance from the target, rad or m.
-    """
+    """A joint does not reach its target; the error is the distance, rad or m."""
 
     joint: str
     error: float
 
     def __str__(self) -> str:
-        """Return "lag: joint"."""
         return f"lag: {self.joint}"
 
 
 @dataclass(frozen=True, slots=True)
 class TorqueLimit:
-    """A joint does not reach its target, and its motor is at its limit.
-
-    Attributes:
-        joint: The joint.
-        error: Distance from the target, rad or m.
-    """
+    """A joint does not reach its target, and its motor is at its limit."""
 
     joint: str
     error: float
 
     def __str__(self) -> str:
-        """Return "motor limit: joint"."""
         return f"motor limit: {self.joint}"
 
 
@@ -70,7 +55,6 @@ class InMotion:
     """The frame is moving to its goal."""
 
     def __str__(self) -> str:
-        """Return the reason as text."""
         return "moving"
 
 
@@ -79,7 +63,6 @@ class NoSolution:
     """The solver found no solution."""
 
     def __str__(self) -> str:
-        """Return the reason as text."""
         return "no solution"
 
 
@@ -98,24 +81,13 @@ def is_transient(reason: Reason) -> bool:
 class LazyReasons(Sequence[Reason]):
     """Reasons that are computed when they are first read; copies are plain lists.
 
-    Args:
-        compute: Returns the reasons, the same at any time.
+    The function returns the same ones at any time.
     """
 
     def __init__(self, compute: Callable[[], Sequence[Reason]]) -> None:
-        self._compute = compute
-        self._found: Sequence[Reason] | None = None
+        self._reasons = cache(lambda: tuple(compute()))
 
-    def _reasons(self) -> Sequence[Reason]:
-        if self._found is None:
-            self._found = tuple(self._compute())
-        return self._found
-
-    @overload
-    def __getitem__(self, index: int) -> Reason: ...
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[Reason]: ...
-    def __getitem__(self, index: int | slice) -> Reason | Sequence[Reason]:
+    def __getitem__(self, index: Any) -> Any:
         return self._reasons()[index]
 
     def __len__(self) -> int:

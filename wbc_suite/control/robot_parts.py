@@ -19,19 +19,20 @@ _ORDER = (
     "",
     "gripper",
 )
+"""Places of groups in the action; `""` stands for any other."""
 
 
 def motors(robot: RobotDescription) -> tuple[str, ...]:
     """Return the joints that a torque motor drives; those of a planar root first."""
     given = {actuator.joint: actuator.kind for actuator in robot.actuators}
-    moving = robot.root_joint_names if robot.root.kind == "planar" else ()
+    drives = robot.root.kind == "planar" and robot.root.actuated
     driven = [
         joint.name
         for joint in robot.joints
         if given.get(joint.name) == "motor"
         or (joint.name not in given and _has_motor(joint))
     ]
-    return (*(moving if robot.root.actuated else ()), *driven)
+    return (*(robot.root_joint_names if drives else ()), *driven)
 
 
 def parts_of(robot: RobotDescription) -> dict[str, tuple[str, ...]]:
@@ -71,12 +72,10 @@ def hands_of(robot: RobotDescription) -> dict[str, str]:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class RobotPart:
-    """A part of a robot that one controller drives.
+    """A part of a robot that one controller drives; its slice has the same name.
 
-    Attributes:
-        name: Its name, which is that of its action slice as well.
-        joints: Its driven joints, from its root on.
-        hand: Frame of the hand at its end; None where it does not end in one.
+    Joints are the driven ones, from the root on; the hand is the frame of the hand at
+    the part's end, None without one.
     """
 
     name: str
@@ -85,11 +84,7 @@ class RobotPart:
 
 
 def robot_part(robot: RobotDescription, name: str) -> RobotPart:
-    """Return a part of a robot by name.
-
-    Raises:
-        ConfigError: If the robot has no such part.
-    """
+    """Return a part of a robot by name; ConfigError if there is none."""
     known = parts_of(robot)
     if name not in known:
         raise ConfigError(str(UnknownNameError("part", name, known)))

@@ -13,13 +13,8 @@ from wbc_suite.typing import Indices, Matrix, Vector
 class RobotState:
     """One robot among everything a MuJoCo simulation holds.
 
-    A live view: it owns no state, and reads MuJoCo's own arrays when asked.
-
-    Args:
-        model: Compiled scene.
-        data: Its state.
-        robot: The robot.
-        prefix: Text before the robot's names in the scene, such as `robot0_`.
+    A live view: it owns no state, and reads MuJoCo's own arrays when asked. The prefix
+    is the text before the robot's names in the scene, such as `robot0_`.
 
     Attributes:
         actuators: Names of the robot's actuators, without prefix; the order of tau.
@@ -36,13 +31,9 @@ class RobotState:
     ) -> None:
         self.model, self.data, self.robot, self.prefix = model, data, robot, prefix
         self.conversion = Conversion(model, robot.to_pinocchio(), prefix=prefix)
-        own = {*robot.joint_names, *robot.root_joint_names}
+        own = {prefix + j for j in (*robot.joint_names, *robot.root_joint_names)}
         named = [model.actuator(i).name for i in range(model.nu)]
-        ids = [
-            i
-            for i, name in enumerate(named)
-            if name.startswith(prefix) and name.removeprefix(prefix) in own
-        ]
+        ids = [i for i, name in enumerate(named) if name in own]
         self.actuator_ids: Indices = np.array(ids, dtype=np.int64)
         self.actuators = tuple(named[i].removeprefix(prefix) for i in ids)
         self._mass_matrix: Matrix = np.zeros((model.nv, model.nv))

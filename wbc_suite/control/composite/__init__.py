@@ -1,4 +1,4 @@
-"""Composite controllers, by name."""
+"""Composite controllers; those of the package are registered here."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -8,71 +8,23 @@ from wbc_suite.control.composite.basic import (
     check_basic,
     default_basic_config,
 )
-from wbc_suite.control.composite.frame_kinds import (
-    FrameKind,
-    frame_kind_names,
-    register_frame_kind,
-)
 from wbc_suite.control.composite.hybrid import HybridMobileBase, check_hybrid
-from wbc_suite.control.composite.protocols import (
-    CompositeController,
-    SteppedController,
-)
-from wbc_suite.control.composite.registry import (
-    CompositeControllerName,
-    build_composite_controller,
-    composite_names,
-    default_composite,
-    load_composite_controller_config,
-    register_composite,
-    register_config_converter,
-)
+from wbc_suite.control.composite.registry import register_composite
+from wbc_suite.control.composite.whole_body import WholeBodyIK
 from wbc_suite.control.composite.whole_body_config import (
-    check_whole_body,
     default_whole_body_config,
+    read_whole_body,
 )
+from wbc_suite.control.composite.whole_body_dynamics import WholeBodyID
 from wbc_suite.control.composite.whole_body_dynamics_config import (
     check_dynamics,
     default_dynamics_config,
 )
 from wbc_suite.control.state import RobotState
 
-__all__ = [
-    "BasicController",
-    "CompositeController",
-    "CompositeControllerName",
-    "FrameKind",
-    "SteppedController",
-    "build_composite_controller",
-    "composite_names",
-    "default_basic_config",
-    "default_composite",
-    "frame_kind_names",
-    "load_composite_controller_config",
-    "register_composite",
-    "register_config_converter",
-    "register_frame_kind",
-]
 
-
-def _whole_body_ik(config: Mapping[str, Any], state: RobotState) -> CompositeController:
-    from wbc_suite.control.composite.stack_backend import StackBackend
-    from wbc_suite.control.composite.whole_body import WholeBodyIK
-
-    return WholeBodyIK(config, state, StackBackend)
-
-
-def _whole_body_id(config: Mapping[str, Any], state: RobotState) -> CompositeController:
-    from wbc_suite.control.composite.whole_body_dynamics import WholeBodyID
-
-    return WholeBodyID(config, state)
-
-
-def _whole_body_mink_ik(
-    config: Mapping[str, Any], state: RobotState
-) -> CompositeController:
+def _whole_body_mink_ik(config: Mapping[str, Any], state: RobotState) -> WholeBodyIK:
     from wbc_suite.control.composite.mink_backend import MinkBackend
-    from wbc_suite.control.composite.whole_body import WholeBodyIK
 
     return WholeBodyIK(config, state, MinkBackend)
 
@@ -92,7 +44,7 @@ register_composite(
     check=check_hybrid,
 )
 for _name, _build in (
-    ("WHOLE_BODY_IK", _whole_body_ik),
+    ("WHOLE_BODY_IK", WholeBodyIK),
     ("WHOLE_BODY_MINK_IK", _whole_body_mink_ik),
 ):
     register_composite(
@@ -100,11 +52,11 @@ for _name, _build in (
         _build,
         family="whole_body_ik",
         default=default_whole_body_config,
-        check=check_whole_body,
+        check=read_whole_body,
     )
 register_composite(
     "WHOLE_BODY_ID",
-    _whole_body_id,
+    WholeBodyID,
     family="whole_body_id",
     default=default_dynamics_config,
     check=check_dynamics,

@@ -36,20 +36,15 @@ class IkBackend(Protocol):
 
     def reset(self) -> None:
         """Discard the state of earlier ticks; held frames stay where they are."""
-        ...
 
     def set_targets(self, targets: Matrix) -> None:
-        """Set the targets of all controlled frames.
+        """Set the targets of all controlled frames: poses, [R p] rows, shape (n, 12).
 
-        Args:
-            targets: Poses, [R p] row by row, shape (n, 12). Only the position counts
-                for the centre of mass.
+        Only the position counts for the centre of mass.
         """
-        ...
 
     def set_posture(self, q: Vector) -> None:
         """Set the posture to prefer."""
-        ...
 
     def solve(self, dt: float) -> IkStep:
         """Return the velocity towards the targets for dt seconds; never raises."""

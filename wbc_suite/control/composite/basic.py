@@ -50,11 +50,7 @@ class BasicConfig(FrozenModel):
 
 
 class BasicController:
-    """Drives parts side by side; see `CompositeController`.
-
-    Args:
-        config: Plain data of a `BasicConfig`.
-        state: The robot in the simulation.
+    """Drives parts side by side; the config is plain data of a `BasicConfig`.
 
     Attributes:
         layout: Slices of the action: parts, then grippers.

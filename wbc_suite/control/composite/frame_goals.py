@@ -8,8 +8,14 @@ import pinocchio as pin
 
 from wbc_suite.compiling import as_argument, compiled, struct
 from wbc_suite.control.action import ActionLayout
-from wbc_suite.control.composite.frame_targets import FrameArrays, write_frame_pose
-from wbc_suite.control.composite.goals_config import GoalsConfig
+from wbc_suite.control.composite.frame_targets import (
+    FrameArrays,
+    pose_of,
+    row_of,
+    write_frame_pose,
+    write_turn,
+)
+from wbc_suite.control.composite.whole_body_config import GoalsConfig
 from wbc_suite.kinematics import Configuration
 from wbc_suite.kinematics.forward import RobotArrays, compute_joint_poses
 from wbc_suite.qp.lie import exp3, log3
@@ -55,13 +61,7 @@ def place_goals(
 
     They are within the frames' ranges. With a free root they are corrected by how far
     the measured root is from the commanded one, so that hands arrive although legs
-    yield.
-
-    Args:
-        goals: Goals as they are given.
-        robot: The robot at the commanded configuration.
-        frames: Controlled frames; `goal` is written.
-        qpos: Measured positions of the simulation, as MuJoCo has them.
+    yield. `qpos` are the measured positions of the simulation.
     """
     correction, pose = np.empty(12), np.empty(12)
     if goals.follows_base:
@@ -117,14 +117,10 @@ def _bound(goal: Vector, home: Vector, limits: Vector) -> None:
     square = 0.0
     for i in range(3):
         square += (goal[4 * i + 3] - home[4 * i + 3]) ** 2
-        for j in range(3):
-            turn[i, j] = 0.0
-            for k in range(3):
-                turn[i, j] += home[4 * k + i] * goal[4 * k + j]
+    write_turn(home, goal, turn)
     share = min(1.0, limits[0] / max(np.sqrt(square), 1e-12))
     share_of_turn = min(1.0, limits[1] / max(log3(turn, vector), 1e-12))
-    for i in range(3):
-        vector[i] *= share_of_turn
+    vector *= share_of_turn
     exp3(vector[0], vector[1], vector[2], R)
     for i in range(3):
         goal[4 * i + 3] = home[4 * i + 3] + share * (goal[4 * i + 3] - home[4 * i + 3])
@@ -142,7 +138,7 @@ class FrameGoals:
         layout: Layout whose first slices are those of the frames.
         robot: The reduced robot.
         configuration: Its commanded configuration.
-        root: Index of a free root in the simulation's qpos, -1 without one.
+        root: See `GoalArrays`.
 
     Attributes:
         poses: Goal of each frame, in the reference frame.
@@ -161,18 +157,17 @@ class FrameGoals:
         count = len(config.frames)
         self._slices = [slice(part.start, part.stop) for part in layout.slices[:count]]
         self.poses: list[pin.SE3] = []
-        in_base = config.input_ref_frame == "base"
-        model = configuration.model
-        base = model.frames[configuration.frame_id(robot.links[0].name)]
-        kind, unlimited = robot.root.kind, (np.inf, np.inf)
-        ranges = [frame.range or unlimited for frame in config.frames]
+        in_base, kind = config.input_ref_frame == "base", robot.root.kind
+        base_id = configuration.frame_id(robot.links[0].name)
+        base = configuration.model.frames[base_id]
+        ranges = [frame.range or (np.inf, np.inf) for frame in config.frames]
         self._arrays = GoalArrays(
             goal=np.zeros((count, 12)),
             home=np.zeros((count, 12)),
             range=np.array(ranges, dtype=np.float64).reshape(-1, 2),
             base=np.zeros(12),
             base_joint=int(base.parentJoint),
-            base_offset=_row(base.placement),
+            base_offset=row_of(base.placement),
             is_in_base=in_base,
             follows_base=kind == "free" or (kind == "planar" and in_base),
             root=root,
@@ -187,20 +182,14 @@ class FrameGoals:
     @property
     def base(self) -> pin.SE3:
         """Pose of the robot's base, as commanded."""
-        T = self._arrays.base.reshape(3, 4)
-        return pin.SE3(T[:, :3], T[:, 3])
+        return pose_of(self._arrays.base)
 
     def reset(self, poses: Sequence[pin.SE3], base: pin.SE3) -> None:
-        """Take the present poses of the frames in the world as goals.
-
-        Args:
-            poses: Poses of the frames.
-            base: Pose of the robot's base.
-        """
+        """Take the present poses of the frames in the world as goals."""
         arrays, in_base = self._arrays, self._arrays.is_in_base
-        arrays.base[:] = _row(base)
+        arrays.base[:] = row_of(base)
         for row, pose in zip(arrays.home, poses, strict=True):
-            row[:] = _row(pose)
+            row[:] = row_of(pose)
         self.poses = [base.actInv(p) if in_base else p.copy() for p in poses]
         self._write_rows()
 
@@ -222,7 +211,7 @@ class FrameGoals:
 
     def _write_rows(self) -> None:
         for row, pose in zip(self._arrays.goal, self.poses, strict=True):
-            row[:] = _row(pose)
+            row[:] = row_of(pose)
 
     def hold(self, action: Vector) -> None:
         """Write the slices that keep the goals."""
@@ -236,8 +225,3 @@ class FrameGoals:
         """Return the goals in the world."""
         base = self.base
         return [base * p if self._arrays.is_in_base else p for p in self.poses]
-
-
-def _row(T: pin.SE3) -> Vector:
-    """Return a pose as [R p] row by row, shape (12,)."""
-    return T.homogeneous.ravel()[:12]

@@ -16,9 +16,9 @@ from wbc_suite.qp import ComTask, FrameTask
 from wbc_suite.typing import Matrix, Vector
 
 if TYPE_CHECKING:
-    from wbc_suite.control.composite.goals_config import GoalsConfig
     from wbc_suite.control.composite.whole_body_config import (
         ControlledFrame,
+        GoalsConfig,
     )
 
 MAX_POSITION = 10.0
@@ -90,19 +90,14 @@ class FrameKind:
     def pose(self, values: Vector, now: pin.SE3) -> pin.SE3:
         """Return the pose that absolute values command.
 
-        Args:
-            values: The slice.
-            now: The present goal; gives the components that are not commanded.
+        The present goal gives the components that are not commanded.
         """
         given = dict(zip(self.labels, values.tolist(), strict=True))
-        position = [
-            given.get(label, x)
-            for label, x in zip("xyz", now.translation.tolist(), strict=True)
-        ]
-        turn = _rotation_vector(given)
+        xyz = now.translation.tolist()
+        position = [given.get(label, xyz[k]) for k, label in enumerate("xyz")]
         rotates = any(label not in "xyz" for label in given)
-        rotation = pin.exp3(turn) if rotates else now.rotation.copy()
-        return pin.SE3(rotation, np.array(position))
+        turned = pin.exp3(_rotation_vector(given)) if rotates else now.rotation.copy()
+        return pin.SE3(turned, np.array(position))
 
     def moved(self, values: Vector, goal: pin.SE3, axes: Matrix) -> pin.SE3:
         """Return a goal moved by a delta slice, in the given axes, shape (3, 3)."""
@@ -111,38 +106,24 @@ class FrameKind:
         rotation = pin.exp3(axes @ _rotation_vector(given)) @ goal.rotation
         return pin.SE3(rotation, goal.translation + axes @ step)
 
-    def task(self, frame: "ControlledFrame", *, whole_error: bool = False) -> GoalTask:
-        """Return the QP task of a frame of this kind.
-
-        Args:
-            frame: The frame.
-            whole_error: Whether to ask for the whole error in one step, on level 0.
-        """
+    def task(self, frame: "ControlledFrame") -> GoalTask:
+        """Return the QP task of a frame of this kind."""
         assert frame.frame is not None
-        position, orientation = self.costs(frame, whole_error=whole_error)
+        position, orientation = self.costs(frame)
         return FrameTask(
             frame.frame,
             position_cost=position,
             orientation_cost=orientation,
-            gain=1.0 if whole_error else frame.gain,
-            level=0 if whole_error else frame.level,
+            gain=frame.gain,
+            level=frame.level,
             max_linear_speed=NO_SPEED_LIMIT,
             max_angular_speed=NO_SPEED_LIMIT,
             name=frame.name,
         )
 
-    def set_target(self, task: GoalTask, pose: pin.SE3) -> None:
-        """Set a pose in the world as the target of the kind's task."""
-        assert isinstance(task, FrameTask)
-        task.set_target(pose)
-
-    def costs(
-        self, frame: "ControlledFrame", *, whole_error: bool = False
-    ) -> tuple[Vector, Vector]:
+    def costs(self, frame: "ControlledFrame") -> tuple[Vector, Vector]:
         """Return costs of position (world axes) and orientation (the frame's axes)."""
         counted = np.array(self.counted, dtype=float)
-        if whole_error:
-            return counted[:3], counted[3:]
         return frame.position_cost * counted[:3], frame.orientation_cost * counted[3:]
 
 
@@ -185,6 +166,11 @@ def find_frame_kind(name: str) -> FrameKind:
 def frame_kind_names() -> tuple[str, ...]:
     """Return the names of all registered kinds."""
     return tuple(_KINDS)
+
+
+def set_target(task: GoalTask, row: Vector) -> None:
+    """Set a pose in the world as the target of a kind's task: [R p], shape (12,)."""
+    task.target_row.set(row if isinstance(task, FrameTask) else row[3::4])
 
 
 @register_frame_kind
@@ -231,17 +217,12 @@ class CentreOfMass(FrameKind):
     slice_kind = SliceKind.POSITION
     needs_frame = False
 
-    def task(self, frame: "ControlledFrame", *, whole_error: bool = False) -> GoalTask:
+    def task(self, frame: "ControlledFrame") -> GoalTask:
         """Return the QP task of the centre of mass."""
         return ComTask(
-            1.0 if whole_error else frame.position_cost,
-            gain=1.0 if whole_error else frame.gain,
-            level=0 if whole_error else frame.level,
+            frame.position_cost,
+            gain=frame.gain,
+            level=frame.level,
             max_speed=NO_SPEED_LIMIT,
             name=frame.name,
         )
-
-    def set_target(self, task: GoalTask, pose: pin.SE3) -> None:
-        """Set the position of a pose in the world as the target."""
-        assert isinstance(task, ComTask)
-        task.set_target(pose.translation)

@@ -1,16 +1,19 @@
-"""The targets of one tick of whole-body control: compiled functions on arrays.
+"""Controlled frames and the posture: from goals to the targets of one tick.
 
-A tick takes the goals of the controlled frames and the preferred posture, and writes
-targets near enough that the robot can brake for them. The QP then solves for the
-targets. Poses are rows [R p] of 3 by 4 numbers, shape (12,).
+Targets are near enough that the robot can brake for them; the QP solves for them. Poses
+are rows [R p] of 3 by 4 numbers, shape (12,).
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
-from wbc_suite.compiling import compiled, struct
+from wbc_suite.compiling import as_argument, compiled, struct
+from wbc_suite.control.composite.whole_body_config import WholeBodyIKConfig
 from wbc_suite.control.part.approach import approach_speed, step_share
+from wbc_suite.kinematics import Configuration
 from wbc_suite.kinematics.forward import (
     JointKind,
     RobotArrays,
@@ -88,14 +91,9 @@ def write_targets(
 ) -> float:
     """Write the targets of frames and posture, on straight lines to their goals.
 
-    Args:
-        robot: The robot at its configuration.
-        frames: Controlled frames; targets, poses and errors are written.
-        posture: The posture; its target is written.
-        dt: Step, s.
-        settling: Time constant of the end of the posture's motion, s.
-        half_speed_error: See `lower_level_rate`.
-        has_arrived: Whether level 0 has been at its goals before.
+    Poses and errors of the frames are written too. `settling` is the time constant of
+    the end of the posture's motion, s; `has_arrived` says whether level 0 has been at
+    its goals before. See `lower_level_rate` for `half_speed_error`.
 
     Returns:
         The greatest error of level 0, as a multiple of the tolerance.
@@ -113,9 +111,8 @@ def write_targets(
 def lower_level_rate(error: float, half_speed_error: float) -> float:
     """Return the fraction of its speed that a lower level may use, 0 to 1.
 
-    Args:
-        error: Greatest error of level 0, as a multiple of the tolerance.
-        half_speed_error: Error at which it is a half; 0: always all.
+    It is a half where the greatest error of level 0, as a multiple of the tolerance, is
+    `half_speed_error`; where that is 0, it is always 1.
     """
     if half_speed_error <= 0.0:
         return 1.0
@@ -131,14 +128,12 @@ def measure_frames(robot: RobotArrays, frames: FrameArrays) -> float:
         pose, goal, error = frames.pose[k], frames.goal[k], frames.error[k]
         if frames.joint[k] == CENTRE_OF_MASS:
             compute_com(robot)
-            _write_com(robot.com, pose)
+            pose[3::4] = robot.com
         else:
             write_frame_pose(robot.pose[frames.joint[k]], frames.offset[k], pose)
         for i in range(3):
             error[i] = goal[4 * i + 3] - pose[4 * i + 3]
-            for j in range(3):
-                turn[i, j] = pose[i] * goal[j]
-                turn[i, j] += pose[4 + i] * goal[4 + j] + pose[8 + i] * goal[8 + j]
+        write_turn(pose, goal, turn)
         log3(turn, error[3:])
         for part in range(2):
             square = 0.0
@@ -151,11 +146,12 @@ def measure_frames(robot: RobotArrays, frames: FrameArrays) -> float:
 
 
 @compiled
-def _write_com(com: Vector, pose: Vector) -> None:
+def write_turn(start: Vector, end: Vector, turn: Matrix) -> None:
+    """Write the rotation from a pose to another in the axes of the first, (3, 3)."""
     for i in range(3):
         for j in range(3):
-            pose[4 * i + j] = 1.0 if i == j else 0.0
-        pose[4 * i + 3] = com[i]
+            turn[i, j] = start[i] * end[j]
+            turn[i, j] += start[4 + i] * end[4 + j] + start[8 + i] * end[8 + j]
 
 
 @compiled
@@ -172,10 +168,7 @@ def write_frame_pose(joint: Vector, offset: Vector, pose: Vector) -> None:
 def _write_frame_targets(frames: FrameArrays, dt: float, rate: float) -> None:
     """Write targets: position on a straight line, orientation about one axis.
 
-    Args:
-        frames: Controlled frames, measured.
-        dt: Step, s.
-        rate: Fraction of its speed that a frame below level 0 may use.
+    The rate is the fraction of its speed that a frame below level 0 may use.
     """
     turn = np.empty((3, 3))
     for k in range(frames.joint.shape[0]):
@@ -202,25 +195,103 @@ def _write_posture_target(
         if robot.kind[j] == JointKind.FREE:
             continue
         q, v = robot.q_start[j], robot.v_start[j]
-        posture.target[q] += posture_step(
-            float(posture.goal[q] - robot.q[q]),
-            settling,
-            float(rate * posture.max_speed[v]),
-            float(posture.braking[v]),
-        )
+        difference = float(posture.goal[q] - robot.q[q])
+        max_speed = float(rate * posture.max_speed[v])
+        braking = float(posture.braking[v])
+        posture.target[q] += posture_step(difference, settling, max_speed, braking)
 
 
 @compiled
 def posture_step(
     difference: float, settling: float, max_speed: float, braking: float
 ) -> float:
-    """Return the step of one joint in a time constant towards its goal.
+    """Return the step of one joint towards its goal, rad or m.
 
-    Args:
-        difference: From here to there, rad or m.
-        settling: Step, and time constant of the end of the motion, s.
-        max_speed: Greatest speed.
-        braking: Deceleration.
+    It is that of `settling` seconds, the time constant of the end of the motion.
     """
     speed = min(approach_speed(abs(difference), settling, braking), max_speed)
     return settling * speed if difference > 0.0 else -settling * speed
+
+
+class ControlledFrames:
+    """Owner of the arrays of controlled frames on one configuration, which it reads.
+
+    Acceleration limits have shape (nv,).
+
+    Attributes:
+        arrays: Arrays of the frames.
+        posture: Arrays of the preferred posture.
+        argument: The argument of kernels that stands for `arrays`.
+        posture_argument: That for `posture`.
+    """
+
+    def __init__(
+        self,
+        config: WholeBodyIKConfig,
+        configuration: Configuration,
+        accelerations: Vector | None = None,
+    ) -> None:
+        self._configuration = configuration
+        self.arrays = _frame_arrays(config, configuration)
+        braking = np.ones(configuration.nv) if accelerations is None else accelerations
+        self.posture = PostureArrays(
+            goal=configuration.q.copy(),
+            target=configuration.q.copy(),
+            max_speed=np.full(configuration.nv, config.posture.speed),
+            braking=config.posture.braking * braking,
+        )
+        self.argument = as_argument(self.arrays)
+        self.posture_argument = as_argument(self.posture)
+
+    def pose(self, k: int) -> pin.SE3:
+        """Return the present pose of a frame."""
+        measure_frames(self._configuration.robot, self.argument)
+        return pose_of(self.arrays.pose[k])
+
+    def measure(self, goals: Sequence[pin.SE3]) -> Matrix:
+        """Set the goals in the world, and return distances from them.
+
+        They are those that count for each frame's kind, m and rad, shape (n, 2): a
+        buffer.
+        """
+        self.arrays.goal[:] = [row_of(goal) for goal in goals]
+        measure_frames(self._configuration.robot, self.argument)
+        return self.arrays.distance
+
+
+def _frame_arrays(
+    config: WholeBodyIKConfig, configuration: Configuration
+) -> FrameArrays:
+    frames, n = config.frames, len(config.frames)
+    joint = np.full(n, CENTRE_OF_MASS, dtype=np.int64)
+    offset = np.tile(row_of(pin.SE3.Identity()), (n, 1))
+    for k, frame in enumerate(frames):
+        if frame.frame is not None:
+            found = configuration.model.frames[configuration.frame_id(frame.frame)]
+            joint[k], offset[k] = found.parentJoint, row_of(found.placement)
+    return FrameArrays(
+        joint=joint,
+        offset=offset,
+        counted=np.array([f.behaviour.counted for f in frames], dtype=float),
+        gain=np.array([f.gain for f in frames]),
+        max_speed=np.array([(f.max_linear_speed, f.max_angular_speed) for f in frames]),
+        braking=np.array([(f.linear_braking, f.angular_braking) for f in frames]),
+        level=np.array([f.level for f in frames], dtype=np.int64),
+        tolerance=np.array(config.tolerance, dtype=float),
+        pose=offset.copy(),
+        goal=np.zeros((n, 12)),
+        target=np.zeros((n, 12)),
+        error=np.zeros((n, 6)),
+        distance=np.zeros((n, 2)),
+    )
+
+
+def row_of(T: pin.SE3) -> Vector:
+    """Return a pose as [R p] row by row, shape (12,)."""
+    return T.homogeneous.ravel()[:12]
+
+
+def pose_of(row: Vector) -> pin.SE3:
+    """Return the pose of a row [R p], shape (12,)."""
+    T = row.reshape(3, 4)
+    return pin.SE3(T[:, :3], T[:, 3])

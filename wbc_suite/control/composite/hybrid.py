@@ -34,10 +34,6 @@ class HybridMobileBase(BasicController):
     BASIC with `input_ref_frame = "base"`; above 0 they stay in the world while the base
     drives. A change of the mode does not move a goal, nor change the meaning of the
     input (`input_ref_frame`).
-
-    Args:
-        config: Plain data of a `BasicConfig`.
-        state: The robot in the simulation.
     """
 
     def __init__(self, config: Mapping[str, Any], state: RobotState) -> None:

@@ -1,21 +1,17 @@
 """Reports of a whole-body controller: errors of its frames, and why they remain."""
 
 from collections import defaultdict
-from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cache, partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 import pinocchio as pin
 
 from wbc_suite.control.composite.backend import IkStep
-from wbc_suite.control.composite.controlled_frames import ControlledFrames
-from wbc_suite.control.composite.whole_body_config import (
-    ControlledFrame,
-    WholeBodyIKConfig,
-)
+from wbc_suite.control.composite.frame_targets import ControlledFrames
+from wbc_suite.control.composite.whole_body_config import WholeBodyIKConfig
 from wbc_suite.control.reasons import (
     Contact,
     InMotion,
@@ -25,7 +21,7 @@ from wbc_suite.control.reasons import (
     TrackingError,
 )
 from wbc_suite.control.state import RobotState
-from wbc_suite.kinematics import Configuration
+from wbc_suite.kinematics import Configuration, Conversion
 from wbc_suite.qp import ActiveLimit, Conflict, OutOfReach
 from wbc_suite.typing import Vector
 
@@ -45,59 +41,48 @@ Reasons = Sequence[Sequence[Reason]]
 """Reasons of each controlled frame."""
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Body:
-    """How a robot follows its commands.
+class Commanded(NamedTuple):
+    """What a robot follows: configuration, goals in its world, targets of joints."""
 
-    Attributes:
-        commanded: Commanded configuration.
-        goals: Goals in the world of the commanded robot.
-        speed: Returns the present speed of the fastest joint, rad/s or m/s.
-        contacts: Returns what the robot presses on now.
-        lagging: Returns which joint is farthest from its command now.
-    """
-
-    commanded: Vector
+    q: Vector
     goals: Sequence[pin.SE3]
-    speed: Callable[[], float]
-    contacts: Callable[[], Sequence[Contact]]
-    lagging: Callable[[], Reason]
+    joints: Mapping[str, float]
 
 
 class IkReport:
     """Compares poses with goals, and finds the reasons of remaining errors.
 
-    Args:
-        config: Controlled frames and tolerances.
-        configuration: The reduced robot, for the report's own use.
+    The configuration is for the report's own use. Contacts of feet hold nothing back.
     """
 
-    def __init__(self, config: WholeBodyIKConfig, configuration: Configuration) -> None:
+    def __init__(
+        self,
+        config: WholeBodyIKConfig,
+        configuration: Configuration,
+        conversion: Conversion,
+        feet: Collection[str],
+    ) -> None:
         self._config, self._configuration = config, configuration
+        self._conversion, self._feet = conversion, feet
         self._frames = ControlledFrames(config, configuration)
-        names = configuration.velocity_names()
-        self._support = [
-            {names[i] for i in _support(configuration, frame)}
-            for frame in config.frames
-        ]
+        self._support = [self._joints_of(frame.frame) for frame in config.frames]
 
     def frames(
-        self, q: Vector, goals: Sequence[pin.SE3], answer: IkStep, body: Body
+        self,
+        state: RobotState,
+        goals: Sequence[pin.SE3],
+        answer: IkStep,
+        commanded: Commanded,
     ) -> dict[str, dict[str, Any]]:
-        """Return what `info["ik"]["frames"]` holds.
+        """Return what `info["ik"]["frames"]` holds; goals are poses in the world.
 
         Reasons are those of this moment, and are computed when they are read.
-
-        Args:
-            q: Measured configuration.
-            goals: Goals in the world.
-            answer: The last solve.
-            body: How the robot follows.
         """
+        q = self._conversion.q_to_pinocchio(state.data.qpos)
         errors, reached = self._compare(q, goals)
         reasons: Callable[[], Reasons] = tuple
         if not all(reached):
-            reasons = cache(self._reasons(reached, answer, body))
+            reasons = cache(self._reasons(state, reached, answer, commanded))
         return {
             frame.name: {
                 "reached": is_reached,
@@ -122,7 +107,11 @@ class IkReport:
         return errors, [p <= linear and r <= angular for p, r in errors]
 
     def _reasons(
-        self, reached: Sequence[bool], answer: IkStep, body: Body
+        self,
+        state: RobotState,
+        reached: Sequence[bool],
+        answer: IkStep,
+        commanded: Commanded,
     ) -> Callable[[], Reasons]:
         """Return a function that finds each frame's reasons, now or later.
 
@@ -132,41 +121,49 @@ class IkReport:
         standing = float(np.abs(answer.v).max(initial=0.0)) < COMMAND_STANDSTILL
         explain = answer.record() if answer.record is not None else dict
         held_back: Reasons = [()] * len(reached)
-        compare = cache(partial(self._compare, body.commanded, body.goals))
+        compare = cache(partial(self._compare, commanded.q, commanded.goals))
         if standing and any(compare()[1]):
-            held_back = self._held_back(body)
+            held_back = self._held_back(state, commanded.joints)
 
         def find() -> Reasons:
-            solver, commanded = explain(), compare()[1]
+            solver, arrived = explain(), compare()[1]
             found: list[Sequence[Reason]] = []
             for k, frame in enumerate(self._config.frames):
-                if commanded[k]:
+                if arrived[k]:
                     why: Sequence[Reason] = held_back[k]
                 elif frame.name in solver:
                     why = solver[frame.name]
                 else:
                     why = self._from_limits(k, reached, answer)
-                if not why and standing and not commanded[k]:
+                if not why and standing and not arrived[k]:
                     why = [OutOfReach()]
                 found.append(why or [InMotion()])
             return found
 
         return find
 
-    def _held_back(self, body: Body) -> Reasons:
+    def _held_back(self, state: RobotState, targets: Mapping[str, float]) -> Reasons:
         """Return what each frame's limb presses on, or else the joint that lags."""
-        speed = body.speed()
+        v = self._conversion.v_to_pinocchio(state.data.qpos, state.data.qvel)
+        speed = float(np.abs(v).max(initial=0.0))
         if speed > CONTACT_SPEED:
             return [()] * len(self._support)
-        contacts = [(self._joints_of(x.link), x) for x in body.contacts()]
-        lagging = [body.lagging()] if speed < BODY_STANDSTILL else []
+        found = contacts_of(state, except_links=self._feet)
+        contacts = [(self._joints_of(x.link), x) for x in found]
+        lagging: list[Reason] = []
+        if speed < BODY_STANDSTILL:
+            aims = np.fromiter(targets.values(), float)
+            lagging.append(lagging_joint(state, tuple(targets), aims))
         return [
             [contact for joints, contact in contacts if support & joints] or lagging
             for support in self._support
         ]
 
-    def _joints_of(self, frame: str) -> set[str]:
+    def _joints_of(self, frame: str | None) -> set[str]:
+        """Return the joints that move a frame; all without one."""
         names = self._configuration.velocity_names()
+        if frame is None:
+            return set(names)
         return {names[i] for i in self._configuration.support(frame)}
 
     def _from_limits(
@@ -190,12 +187,6 @@ class IkReport:
         ]
 
 
-def _support(configuration: Configuration, frame: ControlledFrame) -> Sequence[int]:
-    if frame.frame is None:
-        return range(configuration.nv)
-    return [int(i) for i in configuration.support(frame.frame)]
-
-
 def _pick(reasons: Callable[[], Reasons], k: int) -> list[Reason]:
     """Return the k-th reasons, each once."""
     return list(dict.fromkeys(reasons()[k]))
@@ -204,12 +195,7 @@ def _pick(reasons: Callable[[], Reasons], k: int) -> list[Reason]:
 def contacts_of(
     state: RobotState, *, except_links: Collection[str] = ()
 ) -> list[Contact]:
-    """Return what the robot presses on, the greatest force first.
-
-    Args:
-        state: The robot in the simulation.
-        except_links: Links whose contacts are left out, such as feet.
-    """
+    """Return what the robot presses on but for some links, greatest force first."""
     forces: dict[tuple[str, str], float] = defaultdict(float)
     wrench = np.zeros(6)
     for i, geoms in enumerate(state.data.contact.geom):

@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 
 from wbc_suite.control.composite.backend import IkStep
+from wbc_suite.control.composite.frame_targets import pose_of
 from wbc_suite.control.composite.qp_tasks import TRACKING_COST, travel_costs
 from wbc_suite.control.composite.whole_body_config import (
     ControlledFrame,
@@ -28,11 +29,7 @@ POSTURE_FACTOR = 0.1
 class MinkBackend:
     """`IkBackend` over mink's weighted tasks and limits, solved by daqp.
 
-    Args:
-        robot: The reduced robot.
-        config: Tasks, limits and contacts; levels become weights, and there is no
-            acceleration limit.
-        commanded: The commanded configuration; read, and moved by the owner.
+    Levels become weights, and there is no acceleration limit.
     """
 
     def __init__(
@@ -62,15 +59,11 @@ class MinkBackend:
 
     def set_targets(self, targets: Matrix) -> None:
         """Set the targets of all controlled frames."""
-        for task, (rotation, position) in zip(
-            self._tasks, map(_split, targets), strict=True
-        ):
+        for task, pose in zip(self._tasks, map(pose_of, targets), strict=True):
             if isinstance(task, mink.ComTask):
-                task.set_target(position)
+                task.set_target(pose.translation)
             else:
-                turn = mink.SO3.from_matrix(rotation)
-                pose = mink.SE3.from_rotation_and_translation(turn, position)
-                task.set_target(pose)
+                task.set_target(mink.SE3.from_matrix(pose.homogeneous))
 
     def set_posture(self, q: Vector) -> None:
         """Set the posture to prefer."""
@@ -105,7 +98,7 @@ class MinkBackend:
             v = np.full(self._model.nv, np.nan)
         if not np.isfinite(v).all():
             still = np.zeros(len(self._conversion.v_index))
-            return IkStep(v=still, limits=_unsolved, ok=False)
+            return IkStep(v=still, limits=lambda: (NoSolution(),), ok=False)
         qpos = self._configuration.q
         return IkStep(
             v=self._conversion.v_to_pinocchio(qpos, v),
@@ -159,11 +152,8 @@ class MinkBackend:
 
     def _make_limits(self, robot: RobotDescription) -> list[mink.Limit]:
         limits = self._config.limits
-        speeds = {
-            joint.name: joint.velocity * limits.velocity_scale
-            for joint in robot.joints
-            if joint.velocity is not None
-        }
+        known = {j.name: j.velocity for j in robot.joints if j.velocity is not None}
+        speeds = {name: limits.velocity_scale * v for name, v in known.items()}
         linear, angular = robot.root.velocity
         if robot.root.kind == "planar":
             speeds |= {"root_x": linear, "root_y": linear, "root_yaw": angular}
@@ -176,9 +166,7 @@ class MinkBackend:
         """Return joints that the step brings to a position limit."""
         found: list[Reason] = []
         margin = self._config.limits.position_margin + 1e-6
-        for k in range(self._model.njnt):
-            if not self._model.jnt_limited[k]:
-                continue
+        for k in np.flatnonzero(self._model.jnt_limited).tolist():
             dof, place = self._model.jnt_dofadr[k], self._model.jnt_qposadr[k]
             reached = q[place] + dt * v[dof]
             low, high = self._model.jnt_range[k]
@@ -195,12 +183,3 @@ class MinkBackend:
             )
             found.append(limit)
         return tuple(found)
-
-
-def _split(target: Vector) -> tuple[Matrix, Vector]:
-    T = target.reshape(3, 4)
-    return T[:, :3], T[:, 3]
-
-
-def _unsolved() -> tuple[Reason, ...]:
-    return (NoSolution(),)

@@ -6,7 +6,7 @@ Python.
 
 from collections.abc import Sequence
 from enum import IntEnum
-from typing import NamedTuple, overload
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -96,17 +96,11 @@ class ProgressArrays(NamedTuple):
 def progress_arrays(
     config: WholeBodyIKConfig, nq: int, nv: int, dt: float
 ) -> ProgressArrays:
-    """Return the arrays of a controller.
+    """Return the arrays of a controller that solves every dt seconds.
 
     Once frames of level 0 have arrived, motion below must not move them off again where
     joints cannot follow it. A robot on its feet balances by that motion, which is then
     not slowed.
-
-    Args:
-        config: Its config.
-        nq: Number of positions.
-        nv: Number of velocities.
-        dt: Time between solves, s.
     """
     return ProgressArrays(
         state=readable(np.zeros(1, PROGRESS)),
@@ -126,13 +120,9 @@ def progress_arrays(
 def watch_progress(
     progress: ProgressArrays, robot: RobotArrays, frames: FrameArrays, v: Vector
 ) -> int:
-    """Return the `Event` at the begin of a solve.
+    """Return the `Event` at the begin of a solve; goals of the frames are set.
 
-    Args:
-        progress: Progress so far.
-        robot: The robot at its commanded configuration.
-        frames: Controlled frames; their goals are set.
-        v: Velocity of the last solve, shape (nv,).
+    The velocity v, shape (nv,), is that of the last solve.
     """
     if not progress.may_plan:
         return Event.NONE.value
@@ -234,20 +224,11 @@ class Trail(Sequence[TimedState]):
         """Return how many states are kept."""
         return min(int(self._progress.state["recorded"][0]), TRAIL)
 
-    @overload
-    def __getitem__(self, k: int) -> TimedState: ...
-    @overload
-    def __getitem__(self, k: slice) -> Sequence[TimedState]: ...
-    def __getitem__(self, k: int | slice) -> TimedState | Sequence[TimedState]:
+    def __getitem__(self, k: Any) -> Any:
         """Return the state k states before the latest."""
-        if isinstance(k, slice):
-            return [self[i] for i in range(*k.indices(len(self)))]
         if not 0 <= k < len(self):
             raise IndexError(k)
         kept = self._progress
         row = (int(kept.state["recorded"][0]) - 1 - k) % TRAIL
-        return TimedState(
-            float(kept.trail_time[row]),
-            kept.trail_q[row].copy(),
-            kept.trail_v[row].copy(),
-        )
+        q, v = kept.trail_q[row].copy(), kept.trail_v[row].copy()
+        return TimedState(float(kept.trail_time[row]), q, v)

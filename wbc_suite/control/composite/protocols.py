@@ -17,10 +17,6 @@ class CompositeController(Protocol):
     The order of calls is `reset`, then `set_goal` once per action, then `prepare`
     before the first physics step and whenever its answer has expired. The laws act
     between `mj_step1` and `mj_step2` of every step, in the compiled loop.
-
-    Attributes:
-        layout: Slices of the action.
-        laws: Laws of the control loop.
     """
 
     layout: ActionLayout
@@ -37,16 +33,9 @@ class CompositeController(Protocol):
 
     def reset(self, state: RobotState) -> None:
         """Start from the robot's state; goals hold it there."""
-        ...
 
     def set_goal(self, action: Vector, period: float = 0.05) -> None:
-        """Take an action that `layout` has checked and clipped.
-
-        Args:
-            action: Shape (layout.size,).
-            period: Time until the next one, s.
-        """
-        ...
+        """Take an action that `layout` has checked; the next comes in `period` s."""
 
     def prepare(self, state: RobotState) -> int:
         """Update the laws; return for how many physics steps that is enough."""
@@ -83,16 +72,14 @@ class TickedController(CompositeController, Protocol):
 
     def finish_tick(self) -> None:
         """Finish a tick that the loop has begun, if there is one."""
-        ...
 
 
 @runtime_checkable
 class DynamicController(CompositeController, Protocol):
     """A composite controller whose accelerations are those of one QP for all joints.
 
-    Attributes:
-        dynamics: What the QP's kernels read and write, see `solve_whole_body`.
-        sensors: Where the state of the robot comes from.
+    Its kernels read and write `dynamics`, see `solve_whole_body`; `sensors` says where
+    the state of the robot comes from.
     """
 
     dynamics: WholeBodyDynamics
@@ -100,4 +87,3 @@ class DynamicController(CompositeController, Protocol):
 
     def finish_tick(self) -> None:
         """Solve the QP if the loop has stated it and not found its active set."""
-        ...

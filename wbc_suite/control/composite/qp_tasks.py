@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from wbc_suite.control.composite.distance_limits import distance_limits
+from wbc_suite.control.composite.reduced_robot import joint_indices, planar_joints
 from wbc_suite.control.composite.whole_body_config import (
     HeldFrame,
     WholeBodyIKConfig,
@@ -16,20 +16,36 @@ from wbc_suite.control.part.feasible_acceleration import (
 from wbc_suite.control.part.stance_controller import soles_of
 from wbc_suite.errors import UnknownNameError
 from wbc_suite.kinematics import Configuration
+from wbc_suite.kinematics.configuration import random_configuration
 from wbc_suite.qp import (
     AccelerationLimit,
+    FloorLimit,
     FrameEquality,
     Limit,
     PositionLimit,
+    SelfCollisionLimit,
     SupportLimit,
     VelocityLimit,
     WeightLimit,
 )
 from wbc_suite.robot import RobotDescription
+from wbc_suite.robot.collision_capsules import (
+    collision_pairs,
+    collision_spheres,
+    enclosing_capsules,
+)
 from wbc_suite.typing import Vector
 
 TRACKING_COST = 10.0
 """[cost]/s of tracking a joint-space motion; far above the solver's damping."""
+
+
+MAX_NEIGHBOUR_JOINTS = 1
+"""Links with at most this many joints between them are kept apart by joint limits."""
+
+SAMPLES = 100
+MAX_OVERLAP_SHARE = 0.4
+"""Pairs that overlap in a greater share of random configurations are left out."""
 
 
 def held_equality(held: HeldFrame) -> FrameEquality:
@@ -76,11 +92,6 @@ def _greatest_weights(
     return {name: share * efforts[name] for name, share in shares.items()}
 
 
-def planar_joints(robot: RobotDescription) -> tuple[str, ...]:
-    """Return the joints of a planar root."""
-    return robot.root_joint_names if robot.root.kind == "planar" else ()
-
-
 def joint_accelerations(
     robot: RobotDescription, config: WholeBodyIKConfig
 ) -> dict[str, float]:
@@ -116,18 +127,14 @@ def accelerations(
     linear, angular = base_accelerations(robot, config)
     limits[configuration.root_linear] = linear
     limits[configuration.root_angular] = angular
-    for name, value in joint_accelerations(robot, config).items():
-        limits[configuration.model.joints[configuration.joint_id(name)].idx_v] = value
+    joints = joint_accelerations(robot, config)
+    _, v = joint_indices(configuration.model, tuple(joints))
+    limits[v] = list(joints.values())
     return limits
 
 
 def travel_costs(robot: RobotDescription, cost: float) -> dict[str, float]:
-    """Return costs that measure joint distances in seconds at full speed.
-
-    Args:
-        robot: The reduced robot.
-        cost: [cost]/s.
-    """
+    """Return costs that measure joint distances in seconds at full speed, [cost]/s."""
     costs = {j.name: cost / (j.velocity or 10.0) for j in robot.joints}
     linear, angular = robot.root.velocity
     speeds = (linear, linear, angular)
@@ -143,3 +150,89 @@ def joint_speeds(robot: RobotDescription, configuration: Configuration) -> Vecto
     speeds[configuration.root_linear] = robot.root.velocity[0]
     speeds[configuration.root_angular] = robot.root.velocity[1]
     return speeds
+
+
+def distance_limits(
+    robot: RobotDescription, config: WholeBodyIKConfig
+) -> list[SelfCollisionLimit | FloorLimit]:
+    """Return the limits that keep a robot's links apart and off the floor."""
+    limits: list[SelfCollisionLimit | FloorLimit] = []
+    if config.limits.self_collision:
+        limits.append(_self_collision_limit(robot, config))
+    if config.held:
+        limits.append(_floor_limit(robot, config))
+    return limits
+
+
+def _floor_limit(robot: RobotDescription, config: WholeBodyIKConfig) -> FloorLimit:
+    """Return the limit that keeps all links but the legs off the floor.
+
+    Another contact with the floor would take load off the feet, which then slip.
+    """
+    spheres = collision_spheres(robot)
+    for held in config.held:
+        link = robot.link(robot.link_of(held.frame))
+        while link.parent is not None:
+            spheres.pop(link.name, None)
+            link = robot.link(link.parent)
+    return FloorLimit(
+        spheres,
+        height=config.limits.floor,
+        nearest=config.limits.collision_pairs,
+        margin=config.limits.collision_distance,
+    )
+
+
+def _self_collision_limit(
+    robot: RobotDescription, config: WholeBodyIKConfig
+) -> SelfCollisionLimit:
+    """Return the limit that keeps a robot's links apart.
+
+    Pairs whose capsules overlap at the posture are left out.
+    """
+    configuration = Configuration(robot.to_pinocchio())
+    support = configuration.support
+    pairs = [
+        (first, second)
+        for first, second in sorted(tuple(sorted(p)) for p in collision_pairs(robot))
+        if len(np.setxor1d(support(first), support(second))) > MAX_NEIGHBOUR_JOINTS
+    ]
+    limit = SelfCollisionLimit(
+        enclosing_capsules(robot),
+        _rarely_overlapping(robot, pairs, configuration),
+        nearest=config.limits.collision_pairs,
+        margin=config.limits.collision_distance,
+    )
+    limit.bind(configuration)
+    name = config.posture.keyframe
+    if name in robot.keyframes:
+        configuration.update(configuration.model.referenceConfigurations[name])
+    limit.drop_touching(configuration)
+    return limit
+
+
+def _rarely_overlapping(
+    robot: RobotDescription,
+    pairs: list[tuple[str, str]],
+    configuration: Configuration,
+) -> list[tuple[str, str]]:
+    """Return the pairs whose capsules overlap in few random configurations."""
+    if not pairs:
+        return pairs
+    nearest = 4 * len(pairs)
+    limit = SelfCollisionLimit(
+        enclosing_capsules(robot), pairs, nearest=nearest, margin=0.0, influence=1e-4
+    )
+    limit.bind(configuration)
+    G, h = np.zeros((nearest, configuration.nv)), np.zeros(nearest)
+    touches = dict.fromkeys(pairs, 0)
+    rng = np.random.default_rng(0)
+    for _ in range(SAMPLES):
+        q = random_configuration(configuration.model, configuration.q, rng)
+        configuration.update(q)
+        limit.rows(configuration, 1.0, G, h)
+        rows = np.flatnonzero(limit.distances < 0.0).tolist()
+        touching = {limit.subject(row) for row in rows}
+        for a, b in {tuple(sorted((x.first, x.second))) for x in touching}:
+            touches[a, b] += 1
+    return [pair for pair in pairs if touches[pair] <= MAX_OVERLAP_SHARE * SAMPLES]

@@ -1,7 +1,6 @@
 """The robot that inverse kinematics sees: grippers and locked groups are rigid."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -17,16 +16,11 @@ def lock_groups(robot: RobotDescription, groups: Sequence[str]) -> RobotDescript
     """Return the robot with some groups, and all its grippers, fixed at `ready`.
 
     Fewer joints make every solve cheaper, and the same description feeds both IK
-    backends.
-
-    Raises:
-        UnknownNameError: If the robot has no such group.
+    backends. UnknownNameError if the robot has no such group.
     """
     fixed = tuple(dict.fromkeys((*groups, *gripper_groups(robot))))
-    fields: dict[str, Any] = {
-        key: getattr(robot, key) for key in type(robot).model_fields
-    }
-    fields = locked(fields, fixed) | {"connects": (), "sensors": ()}
+    given = {key: getattr(robot, key) for key in RobotDescription.model_fields}
+    fields = locked(given, fixed) | {"connects": (), "sensors": ()}
     return RobotDescription.model_validate(fields)
 
 
@@ -41,10 +35,13 @@ def gripper_groups(robot: RobotDescription) -> list[str]:
 
 def moved_joints(robot: RobotDescription, state: RobotState) -> tuple[str, ...]:
     """Return the joints that the IK moves and a motor drives."""
-    candidates = robot.joint_names
-    if robot.root.kind == "planar":
-        candidates = (*robot.root_joint_names, *candidates)
+    candidates = (*planar_joints(robot), *robot.joint_names)
     return tuple(name for name in candidates if name in state.actuators)
+
+
+def planar_joints(robot: RobotDescription) -> tuple[str, ...]:
+    """Return the joints of a planar root."""
+    return robot.root_joint_names if robot.root.kind == "planar" else ()
 
 
 def joint_indices(model: pin.Model, joints: tuple[str, ...]) -> tuple[Indices, Indices]:

@@ -4,7 +4,7 @@ import importlib
 import logging
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.control.composite.protocols import CompositeController
@@ -37,22 +37,13 @@ Check = Callable[[Mapping[str, Any], RobotDescription | None, str], object]
 DefaultConfig = Callable[[RobotDescription], dict[str, Any]]
 
 
-class CompositeKind:
-    """A registered kind of composite controller.
+class CompositeKind(NamedTuple):
+    """A registered kind of composite controller; see `register_composite`."""
 
-    Args:
-        build: Makes a controller out of a config and the robot in a simulation.
-        family: Files `controllers/{robot}_{family}.toml` hold its configs.
-        default: Makes a config for a robot that has no file.
-        check: Raises ConfigError for what is wrong in a config, for a robot or for
-            none, and names the source.
-    """
-
-    def __init__(
-        self, build: Builder, family: str, default: DefaultConfig, check: Check
-    ) -> None:
-        self.build, self.family, self.default = build, family, default
-        self.check = check
+    build: Builder
+    family: str
+    default: DefaultConfig
+    check: Check
 
 
 _KINDS: dict[str, CompositeKind] = {}
@@ -61,21 +52,20 @@ _CONVERTERS = ["wbc_suite.compat.robosuite_json:convert"]
 """Functions that read configs in other projects' layouts, imported when needed."""
 
 
-def _accept(
-    config: Mapping[str, Any], robot: RobotDescription | None, source: str
-) -> None:
-    """Check nothing: `build` will."""
-
-
 def register_composite(
     name: str,
     build: Builder,
     *,
     family: str,
     default: DefaultConfig,
-    check: Check = _accept,
+    check: Check = lambda config, robot, source: None,
 ) -> None:
     """Make a kind of composite controller known under a name, case ignored.
+
+    `build` makes a controller out of a config and the robot in a simulation. Configs
+    are in files `controllers/{robot}_{family}.toml`; `default` makes one for a robot
+    without a file. `check` raises ConfigError for what is wrong in a config, for a
+    robot or for none, and names the source; by default `build` does.
 
     Raises:
         ConfigError: If the name is taken.
@@ -119,8 +109,7 @@ def load_composite_controller_config(
             such as `OSC_POSE` (BASIC with that in all arms), a path to a TOML file or
             to a JSON file of robosuite, or a config, which is returned as a copy.
             None: that of `default_composite`.
-        robot: The robot; needed with a name. Names in the config are checked against
-            it.
+        robot: Needed with a name. Names in the config are checked against it.
         catalogue: Where to look for the robot's file; ours by default.
 
     Raises:
@@ -148,7 +137,7 @@ def _read(
     if name.endswith(".json"):
         return _converted(read_json(Path(name)), name, robot, catalogue), name
     if is_part_controller(name.upper()):
-        return _of_arms({"type": name.upper()}, name, robot, catalogue), name
+        return _of_arms(name, robot, catalogue), name
     if name.endswith(".toml"):
         config = read_toml(Path(name))
         return {"type": _kind_in(config)} | config, name
@@ -182,16 +171,13 @@ def _converted(
 
 
 def _of_arms(
-    part: dict[str, Any],
-    source: str,
-    robot: RobotDescription | None,
-    catalogue: Catalogue,
+    part: str, robot: RobotDescription | None, catalogue: Catalogue
 ) -> dict[str, Any]:
-    """Return BASIC with a part's controller in every arm."""
+    """Return BASIC with a part controller in every arm."""
     if robot is None:
-        raise ConfigError(f"{source}: name the robot: parts depend on it.")
+        raise ConfigError(f"{part}: name the robot: parts depend on it.")
     basic, _ = _named("BASIC", robot, catalogue)
-    arms = {name: dict(part) for name in hands_of(robot)}
+    arms = {name: {"type": part.upper()} for name in hands_of(robot)}
     return basic | {"body_parts": basic["body_parts"] | arms}
 
 
@@ -216,27 +202,18 @@ def _named(
         raise ConfigError(f"Controller '{name}' needs a robot to be configured for.")
     own_type = {"type": name.upper()}
     try:
-        file = catalogue.find(
-            "controllers", f"{robot.name}_{kind.family}", kind="controller file"
-        )
+        stem = f"{robot.name}_{kind.family}"
+        file = catalogue.find("controllers", stem, kind="controller file")
     except UnknownNameError:
         return kind.default(robot) | own_type, f"{name} for {robot.name}"
     config = read_toml(file) | own_type
-    if catalogue.is_ours(file) and not _fits(kind, config, robot):
-        log.warning("%s is not for this '%s': names differ.", file.name, robot.name)
-        return kind.default(robot) | own_type, f"{name} for {robot.name}"
+    if catalogue.is_ours(file):
+        try:
+            kind.check(config, robot, "")
+        except ConfigError:  # another robot of the same name
+            log.warning("%s is not for this '%s': names differ.", file.name, robot.name)
+            return kind.default(robot) | own_type, f"{name} for {robot.name}"
     return config, str(file)
-
-
-def _fits(
-    kind: CompositeKind, config: Mapping[str, Any], robot: RobotDescription
-) -> bool:
-    """Whether the robot is ours, and not another of the same name."""
-    try:
-        kind.check(config, robot, "")
-    except ConfigError:
-        return False
-    return True
 
 
 def build_composite_controller(

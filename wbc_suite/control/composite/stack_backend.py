@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 
 from wbc_suite.control.composite.backend import IkStep
-from wbc_suite.control.composite.frame_kinds import NO_SPEED_LIMIT
+from wbc_suite.control.composite.frame_kinds import NO_SPEED_LIMIT, set_target
 from wbc_suite.control.composite.qp_tasks import (
     TRACKING_COST,
     accelerations,
@@ -21,7 +21,6 @@ from wbc_suite.qp import (
     Conflict,
     Equality,
     FrameEquality,
-    FrameTask,
     PostureTask,
     Solution,
     SupportLimit,
@@ -34,11 +33,6 @@ from wbc_suite.typing import Indices, Matrix, Vector
 
 class StackBackend:
     """`IkBackend` over a `TaskStack`.
-
-    Args:
-        robot: The reduced robot.
-        config: Tasks, limits and contacts.
-        commanded: The commanded configuration; read, and moved by the owner.
 
     Attributes:
         stack: The stack of frames and posture.
@@ -68,13 +62,10 @@ class StackBackend:
             equalities.append(sideways)
         limits = make_limits(robot, config)
         self._support = [x for x in limits if isinstance(x, SupportLimit)]
-        self.stack = TaskStack(
-            commanded,
-            [*self._tasks, self._posture],
-            limits=limits,
-            equalities=equalities,
-            escape=False,
+        make_stack = partial(
+            TaskStack, commanded, limits=limits, equalities=equalities, escape=False
         )
+        self.stack = make_stack([*self._tasks, self._posture])
         self.v: Vector = np.zeros(commanded.nv)
         max_acceleration = accelerations(robot, config, commanded)
         self.torque_limiter = TorqueLimiter(robot, commanded, max_acceleration)
@@ -84,13 +75,7 @@ class StackBackend:
             max_speed=NO_SPEED_LIMIT,
             name="configuration",
         )
-        self._joint_stack = TaskStack(
-            commanded,
-            [self._joints],
-            limits=limits,
-            equalities=equalities,
-            escape=False,
-        )
+        self._joint_stack = make_stack([self._joints])
 
     def reset(self) -> None:
         """Discard the state of earlier ticks; hold feet and centre of mass."""
@@ -105,7 +90,7 @@ class StackBackend:
     def set_targets(self, targets: Matrix) -> None:
         """Set the targets of all controlled frames."""
         for task, row in zip(self._tasks, targets, strict=True):
-            task.target_row.set(row if isinstance(task, FrameTask) else row[3::4])
+            set_target(task, row)
 
     def set_posture(self, q: Vector) -> None:
         """Set the posture to prefer."""
@@ -123,13 +108,7 @@ class StackBackend:
         return self._step(self._joint_stack, self._joint_stack.solve(dt), dt)
 
     def finish(self, dt: float, status: int, level: int) -> IkStep:
-        """Finish a tick of the stack that `solve_tick` has begun.
-
-        Args:
-            dt: Step, s.
-            status: The `TickStatus` that it returned.
-            level: Level at which it ended.
-        """
+        """Finish a tick that `solve_tick` has left with a `TickStatus` at a level."""
         return self._step(self.stack, self.stack.complete(dt, status, level), dt)
 
     def last_step(self) -> IkStep:

@@ -73,15 +73,10 @@ class WholeBodyArrays(NamedTuple):
 
     Attributes:
         state: `TICK` record, shape (1,).
-        goals: Goals as they are given.
-        frames: Controlled frames.
-        posture: The preferred posture.
-        progress: Progress towards the goals.
         qp: The stack of tasks; its robot is at the commanded configuration.
         task_level: Strict level of the task of each frame, shape (n,).
         task_row: Place of the task on its level, shape (n,).
         posture_level: Strict level of the posture.
-        motors: The motors.
         spline: References until the next tick.
         v: Velocity of the last tick, shape (nv,).
         joint_law: Index of the law of joints in the loop's table.
@@ -115,16 +110,10 @@ without any, which leaves them out of the machine code."""
 def run_tick(
     tick: WholeBodyArrays, qpos: Vector, laws: CompiledRecords, drives: CompiledRecords
 ) -> bool:
-    """Run a tick as far as it needs no Python.
+    """Run a tick as far as it needs no Python; return whether it is done.
 
-    Args:
-        tick: The tick.
-        qpos: Measured positions of the simulation.
-        laws: `LAW` records of the loop.
-        drives: `DRIVE` records of the loop.
-
-    Returns:
-        Whether it is done; see `Stage` where it is not.
+    See `Stage` where it is not. `qpos` are measured positions of the simulation, laws
+    and drives the records of the loop.
     """
     state, qp, robot = tick.state[0], tick.qp, tick.qp.robot
     place_goals(tick.goals, robot, tick.frames, qpos)
@@ -155,19 +144,15 @@ def _write_task_targets(tick: WholeBodyArrays) -> None:
     """Write the targets of frames and posture into the tasks of the stack."""
     frames, levels = tick.frames, tick.qp.levels
     for k in range(frames.joint.shape[0]):
-        target, found = (
-            levels[tick.task_level[k]].tasks.target[tick.task_row[k]],
-            frames.target[k],
-        )
+        found = frames.target[k]
+        target = levels[tick.task_level[k]].tasks.target[tick.task_row[k]]
         if frames.joint[k] == CENTRE_OF_MASS:
             for i in range(3):
                 target[i] = found[4 * i + 3]
         else:
-            for i in range(12):
-                target[i] = found[i]
+            target[:12] = found
     posture = levels[tick.posture_level].tasks.joint_target[0]
-    for i in range(posture.shape[0]):
-        posture[i] = tick.posture.target[i]
+    posture[:] = tick.posture.target[: posture.shape[0]]
 
 
 @compiled

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.compiling import as_argument, compiled, struct
-from wbc_suite.control.composite.qp_tasks import planar_joints
+from wbc_suite.control.composite.reduced_robot import joint_indices, planar_joints
 from wbc_suite.kinematics import Configuration
 from wbc_suite.kinematics.forward import RobotArrays
 from wbc_suite.kinematics.inverse_dynamics import (
@@ -25,13 +25,13 @@ SLACK = 1e-9  # N m or N
 
 @struct
 class TorqueArrays(NamedTuple):
-    """Motors of a robot, with scratch for `motors_suffice`.
+    """Motors of a robot, with scratch for `motors_suffice`; vectors have shape (nv,).
 
     Attributes:
         inertias: Inertia of the links.
-        max_torque: Greatest torque or force of each motor, shape (nv,).
-        torque: What a motion needs, shape (nv,).
-        acceleration: Its acceleration, shape (nv,).
+        max_torque: Greatest torque or force of each motor.
+        torque: What a motion needs.
+        acceleration: Its acceleration.
         is_grounded: Whether no contact forces are needed to move.
     """
 
@@ -46,14 +46,9 @@ class TorqueArrays(NamedTuple):
 def motors_suffice(
     motors: TorqueArrays, robot: RobotArrays, before: Vector, v: Vector, dt: float
 ) -> bool:
-    """Return whether no motor saturates when velocities change within dt.
+    """Return whether no motor saturates when a velocity becomes v within dt.
 
-    Args:
-        motors: The motors; the torques are written.
-        robot: The robot.
-        before: Velocity of the last step, shape (nv,).
-        v: Velocity of the next step, shape (nv,).
-        dt: Step, s.
+    The torques that this needs are written.
     """
     if not motors.is_grounded:
         return True
@@ -70,16 +65,13 @@ def motors_suffice(
 class TorqueLimiter:
     """Reduces changes of velocity that would saturate motors.
 
-    Acceleration limits bound each joint by itself, for a worst case; together, and with
-    rows that keep links apart, they can still ask for more. A saturated joint drags the
-    others along: GR1's waist was carried 0.1 rad past its target, into its stop at
-    3.8 rad/s.
+    Acceleration limits, shape (nv,), bound each joint by itself, for a worst case;
+    together, and with rows that keep links apart, they can still ask for more. A
+    saturated joint drags the others along: GR1's waist was carried 0.1 rad past its
+    target, into its stop at 3.8 rad/s.
 
-    Torques are linear in the acceleration a,
-
-        tau = M a + h,  |tau| <= share * effort.
-
-    Saturated joints accelerate as their motors permit, with M and tau of these joints,
+    Torques are `tau = M a + h`, |tau| <= share * effort. Saturated joints accelerate as
+    their motors permit, with M and tau of these joints,
 
         M da = (tau cut to its bounds) - tau,
 
@@ -87,11 +79,6 @@ class TorqueLimiter:
     then not stop before its end, or its motor cannot hold it, one factor reduces all
     changes of velocity. With a free root contact forces are unknown, and nothing is
     changed.
-
-    Args:
-        robot: The reduced robot.
-        configuration: Its configuration; read.
-        accelerations: Acceleration limits, shape (nv,).
 
     Attributes:
         argument: The argument of kernels that stands for the motors.
@@ -122,12 +109,9 @@ class TorqueLimiter:
         self._high = np.where(low < high, high, np.inf)
 
     def apply(self, before: Vector, v: Vector, dt: float) -> Vector:
-        """Return a velocity that the motors can reach, near the one asked for.
+        """Return a velocity that motors can reach within dt seconds, near v.
 
-        Args:
-            before: Velocity of the last step, shape (nv,).
-            v: Velocity asked for, shape (nv,).
-            dt: Step, s.
+        The velocity before has shape (nv,) as well.
         """
         if motors_suffice(self.argument, self._configuration.robot, before, v, dt):
             return v
@@ -183,16 +167,11 @@ class TorqueLimiter:
 
 def _efforts(robot: RobotDescription, configuration: Configuration) -> Vector:
     """Return the effort of the motor of each velocity; inf where it is unknown."""
-    efforts = np.full(configuration.nv, np.inf)
-    model = configuration.model
-    for joint in robot.joints:
-        if joint.effort:
-            v = model.joints[configuration.joint_id(joint.name)].idx_v
-            efforts[v] = joint.effort
+    known = {joint.name: joint.effort for joint in robot.joints if joint.effort}
     if robot.root.actuated:
         force, torque = robot.root.effort
-        for name, effort in zip(
-            planar_joints(robot), (force, force, torque), strict=False
-        ):
-            efforts[model.joints[configuration.joint_id(name)].idx_v] = effort
+        known |= dict(zip(planar_joints(robot), (force, force, torque), strict=False))
+    _, v = joint_indices(configuration.model, tuple(known))
+    efforts = np.full(configuration.nv, np.inf)
+    efforts[v] = list(known.values())
     return efforts

@@ -6,8 +6,12 @@ from typing import NamedTuple
 import numpy as np
 
 from wbc_suite.compiling import as_argument
-from wbc_suite.control.composite.controlled_frames import ControlledFrames
-from wbc_suite.control.composite.frame_kinds import NO_SPEED_LIMIT, GoalTask
+from wbc_suite.control.composite.frame_kinds import (
+    NO_SPEED_LIMIT,
+    GoalTask,
+    set_target,
+)
+from wbc_suite.control.composite.frame_targets import ControlledFrames
 from wbc_suite.control.composite.progress import (
     STUCK_AFTER,
     Event,
@@ -53,6 +57,7 @@ MIN_CLOCK_RATE = 0.2
 STANDSTILL_FACTOR = 2  # on the search iterations, while the robot stands
 ARRIVED = 5e-3  # rad or m; from here on goals are approached straight
 
+WHOLE_ERROR = {"position_cost": 1.0, "orientation_cost": 1.0, "gain": 1.0}
 START_COST = 0.05  # [cost]/s of distance from the start
 BALANCE_MARGIN = 2e-3  # m; how much farther from the soles' edges than the controller
 
@@ -81,9 +86,7 @@ class WaypointPlanner:
 
     Args:
         robot: The reduced robot.
-        config: Controlled frames.
         configuration: The commanded configuration; read, and moved by the owner.
-        frames: Its controlled frames.
         clearance: Clearance of a configuration, m.
         distance_limits: Limits that keep links apart.
         dt: Time between solves, s.
@@ -105,15 +108,15 @@ class WaypointPlanner:
     ) -> None:
         self._config, self._dt = config, dt
         self._configuration, self._frames = configuration, frames
-        self._first = np.flatnonzero([f.level == 0 for f in config.frames])
         limits = accelerations(robot, config, configuration)
         self._accelerations = limits
-        self._goal_tasks = [
-            frame.behaviour.task(frame, whole_error=True)
-            for frame in config.frames
+        self._goal_tasks = {
+            k: frame.behaviour.task(frame.model_copy(update=WHOLE_ERROR))
+            for k, frame in enumerate(config.frames)
             if frame.level == 0
-        ]
-        problem = _goal_problem(robot, config, self._goal_tasks, distance_limits)
+        }
+        tasks = list(self._goal_tasks.values())
+        problem = _goal_problem(robot, config, tasks, distance_limits)
         self._planner = MotionPlanner(
             configuration.model,
             clearance,
@@ -127,11 +130,7 @@ class WaypointPlanner:
         self.reset(configuration.q)
 
     def reset(self, posture: Vector) -> None:
-        """Drop all plans.
-
-        Args:
-            posture: Configuration to prefer, until a search has found another.
-        """
+        """Drop all plans; prefer a posture, until a search has found another."""
         self._posture = posture
         self._frames.posture.goal[:] = posture
         self._motion: Motion | None = None
@@ -144,21 +143,12 @@ class WaypointPlanner:
         self._state["goals_changed"] = 1
 
     def next(self, v: Vector) -> Waypoint:
-        """Return what to ask for now; the goals of the frames are set.
-
-        Args:
-            v: Velocity of the last solve, shape (nv,).
-        """
+        """Return what to ask for now, where the last solve had the velocity v."""
         robot, frames = self._configuration.robot, self._frames.argument
         return self.respond(watch_progress(self.argument, robot, frames, v), v)
 
     def respond(self, event: int, v: Vector) -> Waypoint:
-        """Return what to ask for after an event.
-
-        Args:
-            event: The `Event` of this solve.
-            v: Velocity of the last solve, shape (nv,).
-        """
+        """Return what to ask for after the `Event` of this solve; see `next`."""
         standstill = float(self._state["standstill"][0])
         if event in (Event.NEW_GOALS, Event.FAR_GOALS):
             self._motion = None
@@ -188,8 +178,8 @@ class WaypointPlanner:
         """Begin a search for the present goals."""
         self._state["has_searched"] = 1
         q = self._configuration.q
-        for task, k in zip(self._goal_tasks, self._first.tolist(), strict=True):
-            self._config.frames[k].behaviour.set_target(task, self._frames.goal(k))
+        for k, task in self._goal_tasks.items():
+            set_target(task, self._frames.arrays.goal[k])
         self._search.start([q, self._posture], q, self._trail)
 
     def _along(self, motion: Motion, now: TimedState, standstill: float) -> Waypoint:
@@ -241,23 +231,16 @@ def _goal_problem(
     tasks: Sequence[GoalTask],
     distance_limits: Sequence[Limit],
 ) -> GoalProblem:
-    """Return the problem of meeting all frames of level 0.
+    """Return the problem of meeting all frames of level 0, which have these tasks.
 
     Joint limits, balance and held frames are kept.
-
-    Args:
-        robot: The reduced robot.
-        config: Controlled and held frames.
-        tasks: Tasks of the frames of level 0.
-        distance_limits: Limits that keep links apart.
     """
     configuration = Configuration(robot.to_pinocchio())
     frames = [frame for frame in config.frames if frame.level == 0]
     linear, angular = robot.root.velocity
     limits: list[Limit] = [
         PositionLimit(
-            margin=2.0 * config.limits.position_margin,
-            joints=config.limits.positions,
+            margin=2.0 * config.limits.position_margin, joints=config.limits.positions
         ),
         VelocityLimit(base_linear=linear, base_angular=angular),
     ]

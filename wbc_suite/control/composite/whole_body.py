@@ -10,16 +10,10 @@ import pinocchio as pin
 from wbc_suite.compiling import as_argument
 from wbc_suite.control.action import ActionLayout
 from wbc_suite.control.composite.backend import IkBackend, IkStep
-from wbc_suite.control.composite.controlled_frames import ControlledFrames
-from wbc_suite.control.composite.distance_limits import distance_limits
 from wbc_suite.control.composite.frame_goals import FrameGoals, place_goals
-from wbc_suite.control.composite.ik_report import (
-    Body,
-    IkReport,
-    contacts_of,
-    lagging_joint,
-)
-from wbc_suite.control.composite.qp_tasks import accelerations
+from wbc_suite.control.composite.frame_targets import ControlledFrames
+from wbc_suite.control.composite.ik_report import Commanded, IkReport
+from wbc_suite.control.composite.qp_tasks import accelerations, distance_limits
 from wbc_suite.control.composite.reduced_robot import (
     joint_indices,
     keyframe_posture,
@@ -67,12 +61,7 @@ class WholeBodyIK:
     Solves at `solve_hz` on the commanded configuration, which it integrates; the joint
     law tracks it, interpolated to the physics step. A free root is commanded too.
     The control loop runs ticks itself, see `loop_tick`; what has no kernel is evaluated
-    in Python in between.
-
-    Args:
-        config: Plain data of a `WholeBodyIKConfig`.
-        state: The robot in the simulation.
-        backend: Makes the solver.
+    in Python in between. The config is plain data of a `WholeBodyIKConfig`.
 
     Attributes:
         layout: Slices of the action: controlled frames, then grippers.
@@ -81,7 +70,10 @@ class WholeBodyIK:
     """
 
     def __init__(
-        self, config: Mapping[str, Any], state: RobotState, backend: BackendFactory
+        self,
+        config: Mapping[str, Any],
+        state: RobotState,
+        backend: BackendFactory = StackBackend,
     ) -> None:
         self.config = read_whole_body(config, state.robot, str(config.get("type")))
         self.robot = lock_groups(state.robot, self.config.locked)
@@ -110,8 +102,10 @@ class WholeBodyIK:
         )
         self._make_laws(state, float(limits.max()))
         self._state = readable(np.zeros(1, TICK))
-        self._feet = {self.robot.link_of(held.frame) for held in self.config.held}
-        self._report = IkReport(self.config, Configuration(model))
+        feet = {self.robot.link_of(held.frame) for held in self.config.held}
+        self._report = IkReport(
+            self.config, Configuration(model), self._conversion, feet
+        )
         self.reset(state)
 
     def _make_planner(self, state: RobotState) -> WaypointPlanner:
@@ -129,11 +123,7 @@ class WholeBodyIK:
         )
 
     def _make_laws(self, state: RobotState, max_acceleration: float) -> None:
-        """Make the laws of all joints with a motor.
-
-        The solver moves some of them, grippers have laws of their own, and the others
-        are held where they are.
-        """
+        """Make laws of all joints with a motor; those not solved for are held."""
         model = self._configuration.model
         moved = moved_joints(self.robot, state)
         driven = {*moved, *(j for g in self._grippers for j in g.law.joints)}
@@ -199,10 +189,7 @@ class WholeBodyIK:
         return self._steps_per_solve
 
     def loop_tick(self) -> WholeBodyArrays | None:
-        """Return the tick for the control loop, or None where mink solves it.
-
-        The laws are in the loop's table.
-        """
+        """Return the tick for the control loop, or None where mink solves it."""
         backend = self._backend
         if not isinstance(backend, StackBackend):
             return None
@@ -256,9 +243,9 @@ class WholeBodyIK:
         """Move the commanded robot, and hand the spline to the laws."""
         self._answer = answer
         self._reference.extend(answer.v)
-        self._law.follow(self._reference.motion)
+        self._law.aim(*self._reference.motion)
         if self._stance is not None:
-            self._stance.follow(self._reference.motion)
+            self._stance.aim(*self._reference.motion)
             lead_root(self._reference.argument, self._stance.record)
         self._state["stage"] = Stage.DONE_IN_PYTHON
 
@@ -287,33 +274,15 @@ class WholeBodyIK:
 
     def info(self, state: RobotState) -> dict[str, Any]:
         """Return `{"ik": ...}`: what is reached, by how much it is missed, and why."""
-        q = self._conversion.q_to_pinocchio(state.data.qpos)
-        goals = list(self.goals_in_world.values())
-        body = Body(
-            commanded=self.q,
-            goals=self._corrected(goals, state),
-            speed=lambda: self._speed(state),
-            contacts=lambda: contacts_of(state, except_links=self._feet),
-            lagging=lambda: lagging_joint(
-                state, self._law.joints, np.fromiter(self.joint_targets.values(), float)
-            ),
-        )
-        answer = self._answer
+        goals, answer = self._goals.in_world(), self._answer
+        corrected = self._corrected(goals, state)
+        commanded = Commanded(self.q, corrected, self.joint_targets)
         if self._state["stage"][0] == Stage.DONE:
             assert isinstance(self._backend, StackBackend)
             answer = self._backend.last_step()
-        frames = self._report.frames(q, goals, answer, body)
-        return {
-            "ik": {
-                "reached": all(report["reached"] for report in frames.values()),
-                "frames": frames,
-            }
-        }
-
-    def _speed(self, state: RobotState) -> float:
-        """Return the speed of the fastest joint, rad/s or m/s."""
-        v = self._conversion.v_to_pinocchio(state.data.qpos, state.data.qvel)
-        return float(np.abs(v).max(initial=0.0))
+        frames = self._report.frames(state, goals, answer, commanded)
+        reached = all(report["reached"] for report in frames.values())
+        return {"ik": {"reached": reached, "frames": frames}}
 
     def _corrected(self, goals: list[pin.SE3], state: RobotState) -> list[pin.SE3]:
         """Return poses in the world of the commanded root."""

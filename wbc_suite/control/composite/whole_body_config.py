@@ -1,7 +1,7 @@
 """Config of the whole-body composites: `controllers/{robot}_whole_body_ik.toml`."""
 
 from collections.abc import Collection, Iterator, Mapping
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, Union
 
 from pydantic import (
     AfterValidator,
@@ -12,9 +12,9 @@ from pydantic import (
 )
 
 from wbc_suite.control.composite.frame_kinds import FrameKind, find_frame_kind
-from wbc_suite.control.composite.goals_config import check_goals
 from wbc_suite.control.composite.reduced_robot import gripper_groups
 from wbc_suite.control.law.joint_laws import JointLawConfig
+from wbc_suite.control.part.part_settings import InputFrame, InputType, check_axes
 from wbc_suite.control.part.stance_controller import HeldFrame
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.robot import RobotDescription
@@ -24,19 +24,25 @@ from wbc_suite.tomlfile import FrozenModel, parse_model
 
 __all__ = [
     "ControlledFrame",
+    "GoalsConfig",
     "HeldFrame",
     "InputFrame",
     "InputType",
     "LimitsConfig",
     "PostureConfig",
     "WholeBodyIKConfig",
-    "check_whole_body",
+    "check_goals",
     "default_whole_body_config",
     "read_whole_body",
 ]
 
-InputType = Literal["absolute", "delta"]
-InputFrame = Literal["world", "base", "eef"]
+if TYPE_CHECKING:
+    from wbc_suite.control.composite.whole_body_dynamics_config import (
+        WholeBodyIDConfig,
+    )
+
+GoalsConfig: TypeAlias = Union["WholeBodyIKConfig", "WholeBodyIDConfig"]
+"""Configs with controlled frames, and how an action moves their goals."""
 
 
 def _registered(kind: str) -> str:
@@ -52,8 +58,8 @@ class ControlledFrame(FrozenModel):
     Attributes:
         name: Name of the slice.
         frame: Frame or link of the robot; absent for the centre of mass.
-        kind: A registered kind: `pose`, `position`, `orientation`, `com` (the centre of
-            mass), `base` (x, y and yaw), or one's own; see `frame_kinds`.
+        kind: A registered kind: `pose`, `position`, `orientation`, `com`, `base` (x, y
+            and yaw), or one's own; see `frame_kinds`.
         position_cost: [cost]/m.
         orientation_cost: [cost]/rad.
         gain: Fraction of the error that one solve removes, (0, 1].
@@ -162,10 +168,11 @@ class WholeBodyIKConfig(FrozenModel):
         locked: Groups of joints that are kept at the posture.
         posture: Pull to a posture.
         limits: Limits of the command.
-        input_type: See `GoalsConfig`.
-        input_ref_frame: See `GoalsConfig`.
-        delta_position: See `GoalsConfig`.
-        delta_rotation: See `GoalsConfig`.
+        input_type: `absolute` targets, or `delta` steps from the last target.
+        input_ref_frame: Axes of targets and steps: `world`, the robot's `base`, or the
+            controlled frame's own (`eef`, deltas only).
+        delta_position: Largest step of a delta action, m.
+        delta_rotation: Largest step of a delta action, rad.
         solve_hz: Solves per second.
         joint_law: Gains of the joint-position law.
         planning: Whether to plan motions around obstacles and local minima; else all
@@ -201,6 +208,14 @@ class WholeBodyIKConfig(FrozenModel):
         return self
 
 
+def check_goals(config: GoalsConfig) -> None:
+    """Raise ValueError where frames share a name, or axes do not fit the input."""
+    names = [frame.name for frame in config.frames]
+    if len(set(names)) != len(names):
+        raise ValueError(f"controlled frames share a name: {names}")
+    check_axes(config.input_type, config.input_ref_frame)
+
+
 def default_whole_body_config(robot: RobotDescription) -> dict[str, Any]:
     """Return a config for a robot without a file: hands as poses, feet held.
 
@@ -216,7 +231,6 @@ def default_whole_body_config(robot: RobotDescription) -> dict[str, Any]:
     frames = frames or [{"name": name, "frame": name} for name in [_foremost(robot)]]
     feet = [f.name for f in robot.frames if f.role == "foot"]
     held = feet if robot.root.kind == "free" else []
-    keyframe = "ready" if "ready" in robot.keyframes else ""
     config: dict[str, Any] = {"format": 1, "frame": frames}
     contact = "surface" if len(held) < 3 else "point"  # a biped balances on its soles
     config["held"] = [{"frame": name, "contact": contact} for name in held]
@@ -224,8 +238,8 @@ def default_whole_body_config(robot: RobotDescription) -> dict[str, Any]:
         config["limits"] = {"acceleration": 12.0, "base_acceleration": (1.0, 2.0)}
         for frame in frames:
             frame |= {"linear_braking": 1.0, "angular_braking": 2.0}
-    if keyframe:
-        config["posture"] = {"keyframe": keyframe}
+    if "ready" in robot.keyframes:
+        config["posture"] = {"keyframe": "ready"}
     return config
 
 
@@ -268,26 +282,19 @@ def _foremost(robot: RobotDescription) -> str:
     return next((frames[r] for r in roles if r in frames), last)
 
 
-def check_whole_body(
-    config: Mapping[str, Any], robot: RobotDescription | None, source: str
-) -> None:
-    """Raise what `read_whole_body` raises; without a robot only the format's rules."""
-    if robot is None:
-        parse_model(WholeBodyIKConfig, config, source=source)
-    else:
-        read_whole_body(config, robot, source)
-
-
 def read_whole_body(
-    config: Mapping[str, Any], robot: RobotDescription, source: str
+    config: Mapping[str, Any], robot: RobotDescription | None, source: str
 ) -> WholeBodyIKConfig:
     """Return the config as a model.
 
     Raises:
-        ConfigError: If it breaks a rule of the format, or names what the robot does
-            not have. It names the source, the key, the value and the nearest name.
+        ConfigError: If it breaks a rule of the format, or names what the robot, if one
+            is given, does not have. It names the source, the key, the value and the
+            nearest name.
     """
     read = parse_model(WholeBodyIKConfig, config, source=source)
+    if robot is None:
+        return read
     for key, kind, name, known in _names(read, robot):
         if name not in known:
             unknown = UnknownNameError(kind, name, known)

@@ -5,11 +5,11 @@ from typing import Any, Literal
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
-from wbc_suite.control.composite.goals_config import check_goals
 from wbc_suite.control.composite.whole_body_config import (
     ControlledFrame,
     InputFrame,
     InputType,
+    check_goals,
     default_whole_body_config,
 )
 from wbc_suite.control.dynamics.state_source import StateSourceConfig

@@ -30,30 +30,27 @@ def register_law(kernel: Any) -> int:
 
 def custom_kernel(kinds: Indices) -> Any:
     """Return one kernel for all registered laws among these kinds, None without any."""
-    run: Any = None
-    for kind in np.unique(kinds[kinds >= int(LawKind.CUSTOM)]).tolist():
+    own = np.unique(kinds[kinds >= int(LawKind.CUSTOM)]).tolist()
+    run: Any = _no_law if own else None
+    for kind in own:
         run = _linked(kind, _KERNELS[kind - int(LawKind.CUSTOM)], run)
     return run
 
 
+@numba.njit
+def _no_law(physics: Any, law: CompiledRecords, drives: CompiledRecords) -> None:
+    """Do nothing: the law is of no registered kind."""
+
+
 def _linked(kind: int, kernel: Any, others: Any) -> Any:
     """Return a kernel that computes laws of one kind, and others by another kernel."""
-    if others is None:
-
-        @numba.njit
-        def run(physics: Any, law: CompiledRecords, drives: CompiledRecords) -> None:
-            if law.kind == kind:
-                kernel(physics, law, drives)
-                limit_accelerations(physics, law, drives)
-
-        return run
 
     @numba.njit
-    def run_either(physics: Any, law: CompiledRecords, drives: CompiledRecords) -> None:
+    def run(physics: Any, law: CompiledRecords, drives: CompiledRecords) -> None:
         if law.kind == kind:
             kernel(physics, law, drives)
             limit_accelerations(physics, law, drives)
         else:
             others(physics, law, drives)
 
-    return run_either
+    return run

@@ -107,11 +107,7 @@ class JointLaw(Law):
     It is the minimiser of `|| M^-1 (tau - h) - (a* + kp e + kd e') ||^2`; errors decay
     alike, whatever the inertia, as long as no torque saturates.
 
-    Args:
-        state: The robot in the simulation.
-        joints: Driven joints.
-        kp: Stiffness of the error dynamics, 1/s^2, for all or each.
-        kd: Their damping, 1/s.
+    Stiffness kp, 1/s^2, and damping kd, 1/s, are those of all joints or of each.
 
     Source: Siciliano et al. (2009), "Robotics", section 8.5.2.
     """
@@ -148,8 +144,6 @@ class VelocityLaw(Law):
     acceleration, and an arm on it would compensate for what does not happen.
 
     Args:
-        state: The robot in the simulation.
-        joints: Driven joints.
         kp: Integral gain, 1/s^2.
         kd: Proportional gain, 1/s.
         windup: Greatest distance between reference and joint, rad or m.
@@ -187,7 +181,7 @@ class VelocityLaw(Law):
 
         Args:
             speed: Shape (n,), rad/s or m/s.
-            duration: Time of the change, s.
+            duration: Time of the change, s; 0 is at once.
         """
         now, _ = self.commanded()
         drives = self.drives

@@ -4,11 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wbc_suite.control.law.reference import hold_reference, set_reference
 from wbc_suite.control.loop.records import DRIVE, LAW, LawKind, Records, new_records
 from wbc_suite.control.state import RobotState
 from wbc_suite.errors import ConfigError
-from wbc_suite.typing import Indices, Matrix, Vector
+from wbc_suite.typing import Indices, Vector
 
 DECELERATION = 10.0
 """rad/s^2 or m/s^2; joints stop at their limits with it unless the robot's description
@@ -24,13 +23,9 @@ class Law:
     The kernel of each kind stands beside its class; `loop.inverse_dynamics` computes
     torques from the accelerations that all laws ask for.
 
-    Args:
-        kind: Selects the kernel: a `LawKind`, or what `register_law` returned.
-        state: The robot in the simulation.
-        joints: Driven joints; each has an actuator.
+    The kind selects the kernel: a `LawKind`, or what `register_law` returned.
 
     Attributes:
-        joints: The driven joints.
         record: Its `LAW` record, shape (1,).
         drives: Its `DRIVE` records, shape (n,).
         index: Its place in the table of a simulation.
@@ -83,13 +78,7 @@ class Law:
             drive["deceleration"] = joint.acceleration or DECELERATION
 
     def adopt(self, record: Records, drives: Records, index: int = 0) -> None:
-        """Use these records, which hold the same values: those of a simulation.
-
-        Args:
-            record: Shape (1,).
-            drives: Shape (n,).
-            index: Place of the law in the simulation's table.
-        """
+        """Use records that hold the same values: those of a simulation's table."""
         self.record, self.drives, self.index = record, drives, index
 
     def aim(
@@ -101,59 +90,27 @@ class Law:
         *,
         duration: float = FOREVER,
     ) -> None:
-        """Set the reference from now on.
+        """Set the reference from now on, rad or m (N m or N of a torque law).
 
             position + velocity s + acceleration s^2 / 2 + jerk s^3 / 6
 
-        Args:
-            position: Shape (n,), rad or m (N m or N of a torque law).
-            velocity: Shape (n,).
-            acceleration: Shape (n,).
-            jerk: Shape (n,).
-            duration: The reference stands still after so many seconds.
+        All have shape (n,). It stands still after `duration` seconds.
         """
         drives = self.drives
         drives["position"], drives["velocity"] = position, velocity
         drives["acceleration"], drives["jerk"] = acceleration, jerk
         self.record["since"], self.record["duration"] = 0.0, duration
 
-    def rest_at(self, position: Vector) -> None:
-        """Set a constant reference: `aim` in one compiled call.
-
-        Args:
-            position: Shape (n,), contiguous.
-        """
-        assert len(position) == len(self.drives), "one position for each drive"
-        hold_reference(self.record, self.drives, position)
-
-    def follow(self, motion: Matrix) -> None:
-        """Set a moving reference: `aim` in one compiled call.
-
-        Args:
-            motion: Positions, velocities, accelerations and jerks, shape (4, n),
-                contiguous.
-        """
-        assert motion.shape == (4, len(self.drives)), "one column for each drive"
-        set_reference(self.record, self.drives, motion)
-
     def move(self, position: Vector, duration: float) -> None:
-        """Move the reference to a position at constant velocity.
+        """Move the reference to a position, shape (n,), at constant velocity.
 
-        Args:
-            position: Shape (n,).
-            duration: Time of the motion, s; at 0 the reference jumps.
+        At a duration of 0 s it jumps.
         """
         if duration > 0.0:
             now, _, _ = self.target()
             self.aim(now, (position - now) / duration, duration=duration)
         else:
-            self.rest_at(position)
-
-    def narrow(self, low: Vector | float, high: Vector | float) -> None:
-        """Keep commands within these limits as well as the actuators', N m or N."""
-        drives = self.drives
-        drives["command_min"] = np.maximum(drives["command_min"], low)
-        drives["command_max"] = np.minimum(drives["command_max"], high)
+            self.aim(position)
 
     def target(self) -> tuple[Vector, Vector, Vector]:
         """Return position, velocity and acceleration of the reference, (n,) each."""

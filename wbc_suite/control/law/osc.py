@@ -57,12 +57,7 @@ class OscLaw(Law):
     linear and angular motion each. A goal in a moving reference body moves with it. A
     wrench f displaces the site by `(L kp)^-1 f`.
 
-    Where joints saturate, see `osc_saturation`.
-
-    Args:
-        state: The robot in the simulation.
-        joints: Joints that move the site.
-        site: The site's name in the robot.
+    Where joints saturate, see `osc_saturation`. The site's name is that in the robot.
 
     Source: Khatib (1987), "A unified approach for motion and force control of robot
     manipulators: the operational space formulation", IEEE J. Robotics and Automation.
@@ -78,34 +73,23 @@ class OscLaw(Law):
     ) -> None:
         """Set the goal in the axes of the reference body.
 
-        Args:
-            goal: Final pose.
-            start: Pose of the reference now; the goal when absent.
-            duration: Time of the motion from there, s, at constant velocities.
+        The reference moves there from `start`, by default the goal itself, at constant
+        velocities in `duration` seconds.
         """
-        start = goal if start is None else start
-        record = self.record
-        record["start"][0] = (*start.rotation.ravel(), *start.translation)
-        record["shift"][0] = goal.translation - start.translation
-        record["turn"][0] = pin.log3(start.rotation.T @ goal.rotation)
+        record, origin = self.record, goal if start is None else start
+        record["start"][0] = (*origin.rotation.ravel(), *origin.translation)
+        record["shift"], record["turn"] = 0.0, 0.0
+        if start is not None:
+            record["shift"] = goal.translation - start.translation
+            record["turn"] = pin.log3(start.rotation.T @ goal.rotation)
         record["since"], record["duration"] = 0.0, duration
 
-    def jump(self, goal: Vector) -> None:
-        """Set the goal at once: rotation row by row, and position, shape (12,)."""
-        record = self.record
-        record["start"][0], record["shift"], record["turn"] = goal, 0.0, 0.0
-        record["since"] = record["duration"] = 0.0
-
-    def frames(self, state: RobotState) -> tuple[Vector, Vector, Vector, Vector]:
+    def frames(self, state: RobotState) -> tuple[Matrix, Vector, Matrix, Vector]:
         """Return views of rotation and position of the reference, then of the site."""
         body, site = int(self.record["reference"][0]), int(self.record["site"][0])
         data = state.data
-        return (
-            data.xmat[body],
-            data.xpos[body],
-            data.site_xmat[site],
-            data.site_xpos[site],
-        )
+        R_wb, R_ws = data.xmat[body].reshape(3, 3), data.site_xmat[site].reshape(3, 3)
+        return R_wb, data.xpos[body], R_ws, data.site_xpos[site]
 
     def target_pose(self) -> tuple[pin.SE3, Vector]:
         """Return pose and twist of the reference, in the reference body's axes."""
@@ -114,17 +98,14 @@ class OscLaw(Law):
         phase = min(1.0, float(record["since"]) / duration) if duration > 0.0 else 1.0
         moving = 1.0 / duration if 0.0 < duration >= record["since"] else 0.0
         start, turn = record["start"][:9].reshape(3, 3), record["turn"]
-        pose = pin.SE3(
-            start @ pin.exp3(phase * turn),
-            record["start"][9:] + phase * record["shift"],
-        )
+        position = record["start"][9:] + phase * record["shift"]
+        pose = pin.SE3(start @ pin.exp3(phase * turn), position)
         return pose, moving * np.concatenate([record["shift"], start @ turn])
 
     def site_pose(self, state: RobotState) -> pin.SE3:
         """Return the site's pose in the axes of the reference body."""
         R_wb, p_wb, R_ws, p_ws = self.frames(state)
-        T_wb = pin.SE3(R_wb.reshape(3, 3), p_wb)
-        return T_wb.actInv(pin.SE3(R_ws.reshape(3, 3), p_ws))
+        return pin.SE3(R_wb, p_wb).actInv(pin.SE3(R_ws, p_ws))
 
 
 @compiled
@@ -224,60 +205,56 @@ def _write_task_acceleration(physics: Physics, law: CompiledRecords) -> None:
         rate = 1.0 / law.duration if law.since <= law.duration else 0.0
     p_ws, R_ws = physics.site_xpos[law.site], rotation(physics.site_xmat, law.site)
     p_wb, R_wb = physics.xpos[law.reference], rotation(physics.xmat, law.reference)
-    error, twist, p_goal = work.error, work.twist, work.p_goal
-    _write_goal_rotation(R_wb, law, phase, work)
-    matrix_product(work.R_goal, R_ws.T, work.R_error)
-    log3(work.R_error, error[3:])
+    R_start, R_turned = np.empty((3, 3)), np.empty((3, 3))
+    R_goal, R_error = np.empty((3, 3)), np.empty((3, 3))
+    matrix_product(R_wb, law.start[:9].reshape((3, 3)), R_start)
+    exp3(phase * law.turn[0], phase * law.turn[1], phase * law.turn[2], R_turned)
+    matrix_product(R_start, R_turned, R_goal)
+    matrix_product(R_goal, R_ws.T, R_error)
+    p_goal, error, twist = p_wb.copy(), np.empty(6), np.zeros(6)
+    log3(R_error, error[3:])
     for i in range(3):
-        p_goal[i] = p_wb[i]
-        twist[i] = twist[3 + i] = 0.0
         for k in range(3):
             p_goal[i] += R_wb[i, k] * (law.start[9 + k] + phase * law.shift[k])
             twist[i] += rate * R_wb[i, k] * law.shift[k]
-            twist[3 + i] += rate * work.R_start[i, k] * law.turn[k]
+            twist[3 + i] += rate * R_start[i, k] * law.turn[k]
         error[i] = p_goal[i] - p_ws[i]
-    body, site_body = law.reference, int(physics.site_bodyid[law.site])
-    point_velocity_and_drift(physics, body, p_goal, work.velocity, work.wanted)
-    point_velocity_and_drift(physics, site_body, p_ws, work.column, work.drift)
+    body, velocity, drift = int(physics.site_bodyid[law.site]), np.empty(6), np.empty(6)
+    point_velocity_and_drift(physics, law.reference, p_goal, velocity, work.wanted)
+    point_velocity_and_drift(physics, body, p_ws, work.column, drift)
     for i in range(6):
-        work.velocity[i] -= work.column[i]
-        work.wanted[i] -= work.drift[i]
-    _add_feedback(law, R_wb, work)
+        velocity[i] -= work.column[i]
+        work.wanted[i] -= drift[i]
+    _add_feedback(law, R_wb, error, twist, velocity, work)
 
 
 @compiled
-def _write_goal_rotation(
-    R_wb: Matrix, law: CompiledRecords, phase: float, work: OscWork
+def _add_feedback(
+    law: CompiledRecords,
+    R_wb: Matrix,
+    error: Vector,
+    twist: Vector,
+    velocity: Vector,
+    work: OscWork,
 ) -> None:
-    """Write the rotation of the reference, at its start and now, world axes."""
-    R_turned, R_start = work.R_error, work.R_goal
-    for i in range(3):
-        for k in range(3):
-            R_start[i, k] = law.start[3 * i + k]
-    matrix_product(R_wb, R_start, work.R_start)
-    exp3(phase * law.turn[0], phase * law.turn[1], phase * law.turn[2], R_turned)
-    matrix_product(work.R_start, R_turned, work.R_goal)
-
-
-@compiled
-def _add_feedback(law: CompiledRecords, R_wb: Matrix, work: OscWork) -> None:
     """Write `pull = kd u`; add `kd (u + v)` to wanted. Gains are in the axes R_wb.
 
-    v is the velocity of the goal by the reference body, less that of the site.
+    The twist is that of the reference in the reference body; v the velocity of the goal
+    by that body, less that of the site.
     """
-    u, pull, wanted = work.u, work.pull, work.wanted
+    u, pull, wanted = np.empty(3), work.pull, work.wanted
     for half in range(2):
         f = 3 * half
         for k in range(3):
             rate = law.kp[f + k] / max(law.kd[f + k], LEAST_DAMPING)
             u[k] = pull[f + k] = 0.0
             for i in range(3):
-                u[k] += R_wb[i, k] * (rate * work.error[f + i] + work.twist[f + i])
+                u[k] += R_wb[i, k] * (rate * error[f + i] + twist[f + i])
         saturate(u, law.speed[half])
         for k in range(3):
             kd, v = max(law.kd[f + k], LEAST_DAMPING), 0.0
             for i in range(3):
-                v += R_wb[i, k] * work.velocity[f + i]
+                v += R_wb[i, k] * velocity[f + i]
             for i in range(3):
                 pull[f + i] += R_wb[i, k] * kd * u[k]
                 wanted[f + i] += R_wb[i, k] * kd * (u[k] + v)

@@ -41,13 +41,8 @@ def keep_direction(
     inertia L at the hand as norm. Nothing changes when a and tau are within their
     limits, nor when these contradict each other. In the variable `y = (C^T b, h)` the
     norms are `|| J b ||_L = || Q y_b ||`, `|| x ||_L = || L^-1 x ||`, `b^T M b = y_b^T
-    y_b`; with the cost's factor R, `R^T y` is the least change within bounds.
-
-    Args:
-        physics: The simulation, with the law's accelerations and the factors C, L and Q
-            of `osc_law`.
-        law: The law.
-        drives: All drives.
+    y_b`; with the cost's factor R, `R^T y` is the least change within bounds. The
+    factors C, L and Q are those of `osc_law`.
     """
     n, work = law.last - law.first, physics.osc
     size, C, x = n + 2, work.C, work.z
@@ -56,9 +51,8 @@ def keep_direction(
         return
     R = _cost_factor(work.Q, n, work.L, work.pull, high)
     rows = _bounded_rows(C, n, R, low, high)
-    bounds = low[: 2 * size - 2], high[: 2 * size - 2]
-    scratch = np.empty((2 * size + 3, size))
-    if least_change(rows, bounds[0], bounds[1], x[:size], scratch):
+    count, scratch = rows.shape[0], np.empty((2 * size + 3, size))
+    if least_change(rows, low[:count], high[:count], x[:size], scratch):
         solve_upper(R, x, size)
         solve_upper(C, x, n)
         for j in range(n):

@@ -4,7 +4,7 @@ import numpy as np
 
 from wbc_suite.compiling import compiled
 from wbc_suite.control.loop.records import CompiledRecords
-from wbc_suite.typing import Matrix, Vector
+from wbc_suite.typing import Matrix
 
 
 @compiled
@@ -24,27 +24,12 @@ def reference_at(
 def set_reference(
     record: CompiledRecords, drives: CompiledRecords, motion: Matrix
 ) -> None:
-    """Set a law's reference from now on; see `Law.aim`.
+    """Set the reference of a law's record, shape (1,), and drives; see `Law.aim`.
 
-    Args:
-        record: The law's, shape (1,).
-        drives: Its drives, shape (n,).
-        motion: Positions, velocities, accelerations and jerks, shape (4, n).
+    The motion has positions, velocities, accelerations and jerks, shape (4, n).
     """
     for j in range(drives.shape[0]):
         drive = drives[j]
         drive.position, drive.velocity = motion[0, j], motion[1, j]
         drive.acceleration, drive.jerk = motion[2, j], motion[3, j]
-    record[0].since, record[0].duration = 0.0, np.inf
-
-
-@compiled
-def hold_reference(
-    record: CompiledRecords, drives: CompiledRecords, position: Vector
-) -> None:
-    """Set a constant reference, shape (n,); see `Law.aim`."""
-    for j in range(drives.shape[0]):
-        drive = drives[j]
-        drive.position, drive.velocity = position[j], 0.0
-        drive.acceleration, drive.jerk = 0.0, 0.0
     record[0].since, record[0].duration = 0.0, np.inf

@@ -59,8 +59,8 @@ def _write_deviation(
         root = law.stance
         for i in range(6):
             change = physics.qvel[root.dof + i] - root.last_velocity[i]
-            acceleration = change / physics.timestep
-            physics.acceleration[root.dof + i] = acceleration - root.desired[i]
+            rate = change / physics.timestep
+            physics.acceleration[root.dof + i] = rate - root.desired[i]
     elif law.kind != _TORQUE and law.kind != _SERVO:
         for j in range(law.first, law.last):
             drive = drives[j]

@@ -16,18 +16,9 @@ class OscWork(NamedTuple):
     Attributes:
         dofs: Degrees of freedom of the law's joints.
         posture: Accelerations a0 that hold the posture.
-        wanted: `x'' - J' v`, then what of it other joints leave.
+        wanted: `x'' - J' v`, then what of it other joints leave; linear, then angular.
         pull: Its part `kd u` towards the goal.
-        error: Error of pose; linear, then angular, as all vectors of size 6.
-        twist: Twist of the reference in the reference body, world axes.
-        velocity: Velocity of the goal by the reference body, less that of the site.
-        drift: `J' v` of the site.
         column: A column of a Jacobian, or other scratch of size 6.
-        u: Velocity towards the goal, linear or angular.
-        p_goal: Position of the goal.
-        R_start: Orientation at which the reference started, world axes.
-        R_goal: Orientation of the goal, world axes.
-        R_error: Rotation from the site to the goal, world axes.
         J: Jacobian of the site, shape (6, n), then `J C^-T`.
         C: Cholesky factor of the joints' inertia, shape (n, n).
         L: Lower factor of the damped `J C^-T = L Q`, shape (6, 6).
@@ -41,16 +32,7 @@ class OscWork(NamedTuple):
     posture: Vector
     wanted: Vector
     pull: Vector
-    error: Vector
-    twist: Vector
-    velocity: Vector
-    drift: Vector
     column: Vector
-    u: Vector
-    p_goal: Vector
-    R_start: Matrix
-    R_goal: Matrix
-    R_error: Matrix
     J: Matrix
     C: Matrix
     L: Matrix
@@ -100,14 +82,12 @@ class Physics(NamedTuple):
 
 
 def _osc_work(nv: int) -> OscWork:
-    vectors = ("wanted", "pull", "error", "twist", "velocity", "drift", "column")
     return OscWork(
         dofs=np.zeros(nv, dtype=np.int64),
         posture=np.zeros(nv),
-        **{name: np.zeros(6) for name in vectors},
-        u=np.zeros(3),
-        p_goal=np.zeros(3),
-        **{name: np.zeros((3, 3)) for name in ("R_start", "R_goal", "R_error")},
+        wanted=np.zeros(6),
+        pull=np.zeros(6),
+        column=np.zeros(6),
         J=np.zeros((6, nv)),
         C=np.zeros((nv, nv)),
         L=np.zeros((6, 6)),

@@ -36,12 +36,7 @@ def point_jacobian_column(
 ) -> None:
     """Write the velocity of a point of a body per unit velocity of one dof.
 
-    Args:
-        physics: The simulation.
-        dof: Degree of freedom that moves the body.
-        body: The body.
-        p: The point's position, world axes, m, shape (3,).
-        column: Output: linear, then angular, world axes, shape (6,).
+    The column, shape (6,), is linear, then angular; it and p are in world axes.
     """
     root = physics.body_rootid[body]
     axis = physics.cdof[dof]  # angular, then linear at the centre of mass of the tree

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from wbc_suite.compiling import compiled, struct
-from wbc_suite.typing import Indices, Matrix, Vector
+from wbc_suite.typing import Indices, Vector
 
 LARGEST = float(mujoco.mjMAXVAL)
 """MuJoCo calls larger numbers bad, as it does NaN."""
@@ -19,7 +19,7 @@ class CheckedState(NamedTuple):
     qpos: Vector
     qvel: Vector
     qfrc_applied: Vector
-    xfrc_applied: Matrix
+    xfrc_applied: Vector
     warnings: Indices
     """How often each warning was raised."""
     warnings_before: Indices
@@ -33,7 +33,7 @@ def checked_state(data: mujoco.MjData) -> CheckedState:
         qpos=data.qpos,
         qvel=data.qvel,
         qfrc_applied=data.qfrc_applied,
-        xfrc_applied=data.xfrc_applied,
+        xfrc_applied=data.xfrc_applied.reshape(-1),
         warnings=warnings,
         warnings_before=np.array(warnings),
     )
@@ -42,8 +42,7 @@ def checked_state(data: mujoco.MjData) -> CheckedState:
 @compiled
 def check_before(state: CheckedState) -> bool:
     """Note the warnings so far; return whether all numbers are usable."""
-    for k in range(state.warnings.shape[0]):
-        state.warnings_before[k] = state.warnings[k]
+    state.warnings_before[:] = state.warnings
     return _all_usable(state)
 
 
@@ -58,14 +57,9 @@ def check_after(state: CheckedState) -> bool:
 
 @compiled
 def _all_usable(state: CheckedState) -> bool:
-    if not is_usable(state.qpos) or not is_usable(state.qvel):
+    if not (is_usable(state.qpos) and is_usable(state.qvel)):
         return False
-    if not is_usable(state.qfrc_applied):
-        return False
-    for body in range(state.xfrc_applied.shape[0]):
-        if not is_usable(state.xfrc_applied[body]):
-            return False
-    return True
+    return is_usable(state.qfrc_applied) and is_usable(state.xfrc_applied)
 
 
 @compiled

@@ -1,38 +1,21 @@
-"""Controllers of single parts of a robot, by name."""
+"""Controllers of single parts of a robot; those of the package are registered here."""
 
 from wbc_suite.control.part.base_velocity import (
     BaseVelocityConfig,
     BaseVelocityController,
 )
-from wbc_suite.control.part.controller import PartController, PoseInput
 from wbc_suite.control.part.ik_pose import IkPoseConfig, IkPoseController
-from wbc_suite.control.part.joint_position import (
+from wbc_suite.control.part.joint_controllers import (
     JointPositionConfig,
     JointPositionController,
-)
-from wbc_suite.control.part.joint_torque import (
     JointTorqueConfig,
     JointTorqueController,
-)
-from wbc_suite.control.part.joint_velocity import (
     JointVelocityConfig,
     JointVelocityController,
 )
 from wbc_suite.control.part.osc_controller import OscConfig, OscController
-from wbc_suite.control.part.part_settings import PartSettings
-from wbc_suite.control.part.registry import (
-    load_part_controller_config,
-    register_part_controller,
-)
+from wbc_suite.control.part.registry import register_part_controller
 from wbc_suite.control.part.stance_controller import StanceConfig, StanceController
-
-__all__ = [
-    "PartController",
-    "PartSettings",
-    "PoseInput",
-    "load_part_controller_config",
-    "register_part_controller",
-]
 
 register_part_controller("OSC_POSE", OscController, OscConfig)
 register_part_controller("OSC_POSITION", OscController, OscConfig)

@@ -36,12 +36,7 @@ def step_share(
 ) -> float:
     """Return the share of an error, shape (3,), that a target may ask for.
 
-    Args:
-        error: Linear or angular error.
-        dt: Step, s.
-        gain: Share of the target that one step covers.
-        max_speed: Greatest speed.
-        braking: Deceleration.
+    The gain is the share of the target that one step of dt seconds covers.
     """
     distance = np.sqrt(error[0] ** 2 + error[1] ** 2 + error[2] ** 2)
     if not distance > 0.0:
@@ -61,15 +56,8 @@ def approach_pose(
 ) -> pin.SE3:
     """Return a nearer goal, such that a step of `gain` times its error brakes in time.
 
-    Position moves along a straight line, orientation about one axis.
-
-    Args:
-        now: Present pose.
-        goal: Pose to arrive at.
-        dt: Step, s.
-        gain: Share of the error that the step removes.
-        speed: Greatest speeds, m/s and rad/s.
-        acceleration: Decelerations, m/s^2 and rad/s^2.
+    Position moves along a straight line, orientation about one axis. Greatest speeds
+    and decelerations are those of linear, then of angular motion, m and rad.
     """
     offset = goal.translation - now.translation
     turn = pin.log3(now.rotation.T @ goal.rotation)

@@ -5,14 +5,13 @@ from typing import Literal
 import numpy as np
 from pydantic import Field, PositiveFloat
 
-from wbc_suite.control.action import ActionPart, Axis, SliceKind, Unit
+from wbc_suite.control.action import Axis, SliceKind, Unit
 from wbc_suite.control.law.joint_laws import VelocityLaw
 from wbc_suite.control.loop.records import LawKind
 from wbc_suite.control.part.controller import PartController
 from wbc_suite.control.part.part_settings import (
-    InputScaling,
-    InputType,
     PartSettings,
+    SliceInput,
     apply_torque_settings,
     damping_of,
 )
@@ -40,7 +39,6 @@ class BaseVelocityConfig(PartSettings):
 
     type: Literal["BASE_VELOCITY"] = "BASE_VELOCITY"
     kp: PositiveFloat = 400.0
-    input_type: InputType = "delta"
     velocity_scale: float = Field(default=1.0, gt=0.0, le=1.0)
     acceleration: PositiveFloat = 1.0
     turning_acceleration: PositiveFloat = 2.0
@@ -55,11 +53,6 @@ class BaseVelocityController(PartController[VelocityLaw]):
     time, which the slowest of them needs. The integral of the velocities is tracked, so
     a base at zero velocity holds its position.
 
-    Args:
-        part: The part `base`.
-        config: Limits and meaning of the input.
-        state: The robot in the simulation.
-
     Attributes:
         goal: Commanded velocities, shape (3,): forward and sideways, m/s; turn, rad/s.
 
@@ -73,7 +66,7 @@ class BaseVelocityController(PartController[VelocityLaw]):
         self, part: RobotPart, config: BaseVelocityConfig, state: RobotState
     ) -> None:
         robot, root = state.robot, state.robot.root
-        if robot.root.kind != "planar" or not root.actuated:
+        if root.kind != "planar" or not root.actuated:
             raise ConfigError(
                 f"{robot.name}: part '{part.name}': it has no driven base."
             )
@@ -93,14 +86,18 @@ class BaseVelocityController(PartController[VelocityLaw]):
         holonomic = root.drive == "holonomic"
         self._axes: Indices = np.array([0, 1, 2] if holonomic else [0, 2])
         linear, angular = root.velocity
-        self._velocities: Vector = config.velocity_scale * np.array(
-            [linear, linear, angular]
+        velocities = config.velocity_scale * np.array([linear, linear, angular])
+        own = velocities[self._axes]
+        self._input = SliceInput(
+            part.name,
+            SliceKind.BASE,
+            labels=tuple(AXES[i] for i in self._axes),
+            units=tuple(UNITS[i] for i in self._axes),
+            config=config,
+            outputs=(tuple((-own).tolist()), tuple(own.tolist())),
+            limits=(-own, own),
         )
-        own = self._velocities[self._axes]
-        self._scaling = InputScaling(
-            len(own), config, tuple((-own).tolist()), tuple(own.tolist())
-        )
-        self.slices = (self._action(part.name, own),)
+        self.slices = (self._input.action,)
         self.goal: Vector = np.zeros(3)
 
     def reset(self, state: RobotState) -> None:
@@ -110,11 +107,8 @@ class BaseVelocityController(PartController[VelocityLaw]):
 
     def set_goal(self, values: Vector, period: float) -> None:
         """Take velocities, shape (3,), or (2,) without sideways."""
-        if self.config.input_type == "delta":
-            values = self._scaling(values)
         self.goal = np.zeros(3)
-        self.goal[self._axes] = values
-        self.goal = np.clip(self.goal, -self._velocities, self._velocities)
+        self.goal[self._axes] = self._input(values)
         now, _ = self.law.commanded()
         duration = float((np.abs(self.goal - now) / self._accelerations).max())
         self.law.set_speed(self.goal, duration=duration)
@@ -122,21 +116,4 @@ class BaseVelocityController(PartController[VelocityLaw]):
     @property
     def hold_action(self) -> Vector:
         """The action of zero velocity."""
-        if self.config.input_type == "delta":
-            return self._scaling.neutral
-        return np.zeros(len(self._axes))
-
-    def _action(self, name: str, velocities: Vector) -> ActionPart:
-        """Return the action slice; the greatest velocities have shape (3,) or (2,)."""
-        units, low, high = tuple(UNITS[i] for i in self._axes), -velocities, velocities
-        if self.config.input_type == "delta":
-            low, high = self._scaling.low, self._scaling.high
-            units = self._scaling.units(units)
-        return ActionPart(
-            name=name,
-            kind=SliceKind.BASE,
-            labels=tuple(AXES[i] for i in self._axes),
-            units=units,
-            low=tuple(low.tolist()),
-            high=tuple(high.tolist()),
-        )
+        return self._input.neutral

@@ -27,8 +27,8 @@ class PoseInput:
         body: Body of the simulation that the frame is fixed to.
         measure: Returns the frame's pose in the world.
         encode: Returns the values of the slice for a target in the world.
-        reference: Returns the pose of the body that goals move with, such as a base;
-            None where they stay in the world.
+        reference: Returns the pose of the body that goals move with; None where they
+            stay in the world.
     """
 
     action: ActionPart
@@ -45,14 +45,13 @@ class PartController(ABC, Generic[LawType]):
     """Turns its slices of the action into the references of a law.
 
     A subclass is made by `Controller(part, config, state)` and registered by
-    `register_part_controller`. Its constructor sets `slices` and `law`.
+    `register_part_controller`. Its constructor sets `slices`, what it reads from the
+    action, and `law`, which computes accelerations or commands of joints at every step.
 
     Attributes:
         needs_hand: Whether the part must end in a hand.
         drives_base: Whether it drives a base on wheels, which no other may.
         holds_root: Whether it keeps a robot with a free root from falling.
-        slices: What it reads from the action, in order.
-        law: Computes the joints' accelerations, or their commands, at every step.
     """
 
     needs_hand: ClassVar[bool] = False

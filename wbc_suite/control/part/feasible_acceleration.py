@@ -20,19 +20,12 @@ def feasible_accelerations(
     The least of a common limit, the robot's own, and a share of the motor's effort,
     less the greatest gravity torque, over the greatest inertia M_ii of random
     configurations. It is at least `LEAST_ACCELERATION`.
-
-    Args:
-        robot: The robot.
-        most: Limit of all joints.
-        effort_share: Share of the effort that acceleration may take.
     """
     model = robot.to_pinocchio()
     inertia, weight = greatest_loads(model)
     found: dict[str, float] = {}
     for joint in robot.joints:
-        limit = most
-        if joint.acceleration is not None:
-            limit = min(limit, joint.acceleration)
+        limit = most if joint.acceleration is None else min(most, joint.acceleration)
         if joint.effort is not None:
             v = model.joints[model.getJointId(joint.name)].idx_v
             left = max(joint.effort - float(weight[v]), 0.2 * joint.effort)

@@ -24,16 +24,10 @@ class GripperController(PartController[ServoLaw]):
     `q* = open + (a + 1) / 2 (closed - open)`, the setpoint of the joint's servo. With
     the input `width` it is the width between the fingers of a parallel gripper.
 
-    Args:
-        name: Name of the gripper, which is the name of its action slice.
-        synergies: Its synergies.
-        state: The robot in the simulation.
-        config: Meaning of the input, and its speed.
-        grasp: Frame between the fingers; needed for widths.
+    The name is that of its action slice as well. The frame `grasp` between the fingers
+    is needed for widths.
 
     Attributes:
-        slices: The action slice.
-        law: The servos' setpoints.
         goal: Present action, shape (number of synergies,).
 
     Raises:
@@ -49,8 +43,8 @@ class GripperController(PartController[ServoLaw]):
         config: GripConfig | None = None,
         grasp: str | None = None,
     ) -> None:
-        self.name, self.config = name, config or GripConfig()
-        count = len(synergies)
+        self.config = config or GripConfig()
+        self.name, count = name, len(synergies)
         self._table: OpeningTable | None = None
         if self.config.input == "width":
             if count != 1 or grasp is None:
@@ -77,11 +71,8 @@ class GripperController(PartController[ServoLaw]):
 
     def reset(self, state: RobotState) -> None:
         """Take the present opening as the goal."""
-        lead = self._leading
-        q = state.data.qpos[self.law.drives["qpos"][lead]]
-        span = np.where(self._span[lead] == 0.0, np.inf, self._span[lead])
-        closed = (q - self._open[lead]) / span
-        command = np.clip(2.0 * closed - 1.0, -1.0, 1.0)
+        positions = state.data.qpos[self.law.drives["qpos"]]
+        command = np.clip(self._commands(positions), -1.0, 1.0)
         if self._table is not None:
             self.goal[:] = self._table.width(float(command[0]))
         else:
@@ -91,14 +82,12 @@ class GripperController(PartController[ServoLaw]):
     def set_goal(self, values: Vector, period: float) -> None:
         """Take the slice's values, shape (number of synergies,)."""
         self.goal[:] = values
-        command = self.goal
+        command, duration = self.goal, 0.0
         if self._table is not None:
             command = np.array([self._table.command(float(values[0]))])
-        if self.config.speed is None:
-            self.law.rest_at(self._setpoints(command))
-        else:
-            duration = self._duration(command, self.config.speed)
-            self.law.move(self._setpoints(command), duration)
+        if self.config.speed is not None:
+            duration = self._distance(command) / self.config.speed
+        self.law.move(self._setpoints(command), duration)
 
     @property
     def hold_action(self) -> Vector:
@@ -110,17 +99,19 @@ class GripperController(PartController[ServoLaw]):
         closed = 0.5 * (command[self._synergy] + 1.0)
         return self._open + closed * self._span
 
-    def _duration(self, command: Vector, speed: float) -> float:
-        """Return how long the setpoints take from their present place, s."""
-        now = (self.law.target()[0] - self._open) / np.where(
-            self._span == 0.0, np.inf, self._span
-        )
-        before = 2.0 * now[self._leading] - 1.0
-        distance = float(np.abs(command - before).max())
+    def _commands(self, positions: Vector) -> Vector:
+        """Return the commands of the synergies whose setpoints are these."""
+        lead = self._leading
+        span = np.where(self._span[lead] == 0.0, np.inf, self._span[lead])
+        return 2.0 * (positions[lead] - self._open[lead]) / span - 1.0
+
+    def _distance(self, command: Vector) -> float:
+        """Return how far commands are from the present setpoints, in values or m."""
+        before = self._commands(self.law.target()[0])
         if self._table is not None:
             width = self._table.width
-            distance = abs(width(float(command[0])) - width(float(before[0])))
-        return distance / speed
+            return abs(width(float(command[0])) - width(float(before[0])))
+        return float(np.abs(command - before).max())
 
     def _part(self, synergies: Sequence[Synergy]) -> ActionPart:
         count = len(synergies)
@@ -145,12 +136,8 @@ class OpeningTable:
 
     The width is measured along the y axis of the grasp frame, from its origin to the
     fingers on both sides, by their collision shapes; linkages follow their drives by
-    the ratios of the description. Between samples it is interpolated linearly.
-
-    Args:
-        synergy: Moves the fingers.
-        grasp: Frame between them.
-        state: The robot in the simulation; its state is not changed.
+    the ratios of the description. Between samples it is interpolated linearly. The
+    state of the simulation is not changed.
 
     Attributes:
         least: Width when closed, m.
@@ -164,7 +151,7 @@ class OpeningTable:
         self._state, self._grasp = state, state.prefix + grasp
         self._data = mujoco.MjData(state.model)
         self._commands = np.linspace(-1.0, 1.0, SAMPLES)
-        self._moving = self._moving_shapes(_followers(synergy, state))
+        self._moving = self._moving_shapes(_joint_values(synergy, -1.0, state))
         sides = self._hits(synergy, -1.0)
         if None in [body for _, body in sides]:
             raise ConfigError(
@@ -172,17 +159,17 @@ class OpeningTable:
                 f"each other at frame '{grasp}', so it has no width. Use "
                 "'synergy'."
             )
-        widths = []
-        for command in self._commands:
-            now = self._hits(synergy, float(command))
-            # Fingers that overlap when closed would meet each other's inside.
-            widths.append(
-                sum(
-                    distance
-                    for (distance, body), (_, own) in zip(now, sides, strict=True)
-                    if body == own
+        # Fingers that overlap when closed would meet each other's inside.
+        widths = [
+            sum(
+                distance
+                for (distance, body), (_, own) in zip(
+                    self._hits(synergy, float(command)), sides, strict=True
                 )
+                if body == own
             )
+            for command in self._commands
+        ]
         self._widths: Vector = np.minimum.accumulate(widths)
         self.greatest, self.least = float(self._widths[0]), float(self._widths[-1])
 
@@ -247,20 +234,8 @@ def _joint_values(
         joint: (1.0 - closed) * value + closed * synergy.closed[joint]
         for joint, value in synergy.open.items()
     }
-    followers = {j.name: j.mimic for j in state.robot.joints if j.mimic is not None}
-    for name in _followers(synergy, state):  # a leader comes before its followers
-        if name in followers:
-            mimic = followers[name]
-            values[name] = mimic.ratio * values[mimic.joint] + mimic.offset
+    for joint in state.robot.joints:
+        mimic = joint.mimic
+        if mimic is not None and mimic.joint in values:
+            values[joint.name] = mimic.ratio * values[mimic.joint] + mimic.offset
     return values
-
-
-def _followers(synergy: Synergy, state: RobotState) -> dict[str, None]:
-    """Return the synergy's joints and all that follow them, leaders first."""
-    found = dict.fromkeys(synergy.open)
-    mimics = [(j.name, j.mimic.joint) for j in state.robot.joints if j.mimic]
-    while True:
-        more = [a for a, leader in mimics if leader in found and a not in found]
-        if not more:
-            return found
-        found |= dict.fromkeys(more)

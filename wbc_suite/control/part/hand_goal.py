@@ -1,39 +1,49 @@
 """Goals of a hand: absolute poses, or steps from the hand or the last goal."""
 
-from typing import Literal, Protocol
+from typing import Self
 
 import numpy as np
 import pinocchio as pin
+from pydantic import BaseModel, model_validator
 
-from wbc_suite.compiling import compiled
-from wbc_suite.control.loop.rigid_body import matrix_product
-from wbc_suite.control.part.part_settings import ROUNDING, InputFrame, Range, limits_of
-from wbc_suite.qp.lie import exp3, log3
+from wbc_suite.control.part.part_settings import (
+    ROUNDING,
+    GoalUpdate,
+    InputFrame,
+    InputType,
+    Range,
+    check_axes,
+    limits_of,
+)
+from wbc_suite.tomlfile import FROZEN
 from wbc_suite.typing import Matrix, Vector
 
 
-class GoalSettings(Protocol):
-    """Settings of a controller that moves the goal of a hand."""
+class HandSettings(BaseModel):
+    """Settings of controllers that move the goal of a hand, beside `PartSettings`.
 
-    @property
-    def input_ref_frame(self) -> InputFrame:
-        """Axes of the goal's steps."""
-        ...
+    Attributes:
+        input_type: `delta` steps, see `goal_update_mode`, or `absolute` goals.
+        input_ref_frame: Axes of the input: those of the world; of the robot's first
+            link, with which goals move; or of the hand's goal, for deltas only.
+        goal_update_mode: See `PartSettings`.
+        position_limits: Least and greatest coordinates of goals in the reference, m.
+        orientation_limits: Least and greatest components of the rotation vector from
+            the orientation at the start to a goal's, axes of the reference, rad.
+    """
 
-    @property
-    def goal_update_mode(self) -> Literal["achieved", "desired"]:
-        """What a step is added to."""
-        ...
+    model_config = FROZEN
 
-    @property
-    def position_limits(self) -> Range | None:
-        """Range of the goal's position, m."""
-        ...
+    input_type: InputType = "delta"
+    input_ref_frame: InputFrame = "base"
+    goal_update_mode: GoalUpdate = "achieved"
+    position_limits: Range | None = None
+    orientation_limits: Range | None = None
 
-    @property
-    def orientation_limits(self) -> Range | None:
-        """Range of the goal's orientation, rad."""
-        ...
+    @model_validator(mode="after")
+    def _axes_fit(self) -> Self:
+        check_axes(self.input_type, self.input_ref_frame)
+        return self
 
 
 class HandGoal:
@@ -44,127 +54,67 @@ class HandGoal:
     others keep their goal, since a hand that sags under a load would creep down at
     every step to the side. A step of zero keeps the goal.
 
-    Args:
-        settings: Meaning of steps, and limits.
+    Raises ConfigError if limits have a wrong number of values, or are empty.
 
     Attributes:
-        flat: Rotation, row by row, and position, shape (12,). A buffer.
+        start: Orientation of the hand at the start, from which turns are limited.
         position_limits: Least and greatest coordinates, m, shape (2, 3).
-
-    Raises:
-        ConfigError: If limits have a wrong number of values, or are empty.
     """
 
-    def __init__(self, settings: GoalSettings) -> None:
+    def __init__(self, settings: HandSettings) -> None:
         self._in_hand = settings.input_ref_frame == "eef"
         self._from_hand = settings.goal_update_mode == "achieved"
         self.position_limits = _limits(settings.position_limits, "position_limits")
         self._turn_limits = _limits(settings.orientation_limits, "orientation_limits")
-        self.flat: Vector = np.concatenate([np.eye(3).ravel(), np.zeros(3)])
-        self._rotation, self._position = self.flat[:9].reshape(3, 3), self.flat[9:]
-        self.start: Matrix = np.eye(3)
+        self.pose, self.start = pin.SE3.Identity(), np.eye(3)
 
-    @property
-    def pose(self) -> pin.SE3:
-        """The goal."""
-        return pin.SE3(self._rotation, self._position)
+    def reset(self, hand: pin.SE3) -> None:
+        """Take the hand's pose as the goal."""
+        self.pose, self.start = hand.copy(), hand.rotation.copy()
 
-    @pose.setter
-    def pose(self, pose: pin.SE3) -> None:
-        self._rotation[:], self._position[:] = pose.rotation, pose.translation
+    def set(self, pose: pin.SE3) -> None:
+        """Set an absolute goal, moved into the limits component by component."""
+        position = np.clip(pose.translation, *self.position_limits)
+        rotation = pose.rotation
+        if np.isfinite(self._turn_limits).any():
+            turn = pin.log3(rotation @ self.start.T)
+            bounded = np.clip(turn, *self._turn_limits)
+            if (bounded != turn).any():
+                rotation = pin.exp3(bounded) @ self.start
+        self.pose = pin.SE3(rotation, position)
 
-    def reset(self, rotation: Matrix, position: Vector) -> None:
-        """Take the hand's pose as the goal; turns are limited from its orientation."""
-        self._rotation[:], self._position[:] = rotation, position
-        self.start = self._rotation.copy()
-
-    def set(self, rotation: Matrix, position: Vector) -> None:
-        """Set an absolute goal; limits apply."""
-        self._rotation[:], self._position[:] = rotation, position
-        self._limit()
-
-    def step(self, step: Vector, rotation: Matrix, position: Vector) -> None:
-        """Move the goal by a step; limits apply.
-
-        Args:
-            step: Linear, m, then a rotation vector, rad, shape (6,).
-            rotation: The hand's, shape (3, 3).
-            position: The hand's, shape (3,).
-        """
-        if not np.abs(step).max() > ROUNDING:
+    def step(self, step: Vector, hand: pin.SE3) -> None:
+        """Move the goal by a step, shape (6,): linear, m, then a rotation vector."""
+        moves = np.abs(step) > ROUNDING
+        if not moves.any():
             return
-        axes = self._rotation.copy() if self._in_hand else np.eye(3)
-        R, p, R_hand = self._rotation, self._position, np.ascontiguousarray(rotation)
-        move_goal(R, p, step, axes, R_hand, position, self._from_hand)
-        self._limit()
+        start, axes = self.pose, self._axes()
+        if self._from_hand:
+            to_hand = _step_between(start, hand, axes)
+            start = _moved(start, np.where(moves, to_hand, 0.0), axes)
+        self.set(_moved(start, step, axes))
 
     def step_to(self, target: pin.SE3, hand: pin.SE3) -> Vector:
         """Return the step that moves the goal to a target, shape (6,)."""
-        start = hand if self._from_hand else self.pose
-        axes = self._rotation if self._in_hand else np.eye(3)
-        shift = axes.T @ (target.translation - start.translation)
-        turn = axes.T @ pin.log3(target.rotation @ start.rotation.T)
-        return np.concatenate([shift, turn])
+        return _step_between(
+            hand if self._from_hand else self.pose, target, self._axes()
+        )
 
-    def _limit(self) -> None:
-        """Move the goal into its limits, component by component."""
-        low, high = self.position_limits
-        self._position[:] = np.minimum(np.maximum(self._position, low), high)
-        if np.isinf(self._turn_limits).all():
-            return
-        turn = pin.log3(self._rotation @ self.start.T)
-        bounded = np.clip(turn, *self._turn_limits)
-        if (bounded != turn).any():
-            self._rotation[:] = pin.exp3(bounded) @ self.start
+    def _axes(self) -> Matrix:
+        return self.pose.rotation if self._in_hand else np.eye(3)
 
 
-@compiled
-def move_goal(
-    R: Matrix,
-    p: Vector,
-    step: Vector,
-    axes: Matrix,
-    R_hand: Matrix,
-    p_hand: Vector,
-    from_hand: bool,
-) -> None:
-    """Move a goal by a step along axes, in place.
-
-    Args:
-        R: Its rotation, shape (3, 3).
-        p: Its position, shape (3,).
-        step: Linear, then a rotation vector, shape (6,).
-        axes: Axes of the step, shape (3, 3).
-        R_hand: The hand's rotation, shape (3, 3).
-        p_hand: The hand's position, shape (3,).
-        from_hand: Whether components that the step moves count from the hand.
-    """
-    if from_hand:
-        offset, turned = np.zeros(6), np.empty((3, 3))
-        matrix_product(R_hand, R.T, turned)
-        log3(turned, offset[3:])
-        offset[:3] = p_hand - p
-        origin = np.zeros(6)
-        for i in range(6):
-            if abs(step[i]) > ROUNDING:
-                half = i - i % 3
-                for j in range(3):
-                    origin[i] += axes[j, i % 3] * offset[half + j]
-        _move(R, p, origin, axes)
-    _move(R, p, step, axes)
+def _step_between(start: pin.SE3, target: pin.SE3, axes: Matrix) -> Vector:
+    """Return the step along axes, shape (6,), that takes a pose to another."""
+    shift = axes.T @ (target.translation - start.translation)
+    turn = axes.T @ pin.log3(target.rotation @ start.rotation.T)
+    return np.concatenate([shift, turn])
 
 
-@compiled
-def _move(R: Matrix, p: Vector, step: Vector, axes: Matrix) -> None:
-    """Turn and shift a pose in place, by a step along axes."""
-    shift, turn, rotation = np.zeros(3), np.zeros(3), np.empty((3, 3))
-    for i in range(3):
-        for j in range(3):
-            shift[i] += axes[i, j] * step[j]
-            turn[i] += axes[i, j] * step[3 + j]
-    exp3(turn[0], turn[1], turn[2], rotation)
-    matrix_product(rotation, R.copy(), R)
-    p += shift
+def _moved(pose: pin.SE3, step: Vector, axes: Matrix) -> pin.SE3:
+    """Return a pose moved by a step along axes."""
+    rotation = pin.exp3(axes @ step[3:]) @ pose.rotation
+    return pin.SE3(rotation, pose.translation + axes @ step[:3])
 
 
 def _limits(given: Range | None, key: str) -> Matrix:

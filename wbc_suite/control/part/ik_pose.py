@@ -1,47 +1,81 @@
 """IK_POSE: actions are poses of the hand; inverse kinematics gives joint references."""
 
+from functools import partial
 from typing import Annotated, Any, Literal
 
 import numpy as np
 import pinocchio as pin
-from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
+from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from wbc_suite.control.action import ActionPart, Axis, SliceKind, Unit
 from wbc_suite.control.law.joint_laws import JointLaw
+from wbc_suite.control.part.approach import approach_pose
 from wbc_suite.control.part.controller import PartController
-from wbc_suite.control.part.hand_goal import HandGoal
-from wbc_suite.control.part.part_ik import IkMotion, PartIk
+from wbc_suite.control.part.feasible_acceleration import feasible_accelerations
+from wbc_suite.control.part.hand_goal import HandGoal, HandSettings
 from wbc_suite.control.part.part_settings import (
     REACH,
     ROUNDING,
-    InputFrame,
     InputScaling,
-    InputType,
     Numbers,
     PartSettings,
-    Range,
     apply_torque_settings,
     damping_of,
 )
+from wbc_suite.control.part.spline_reference import SplineReference, window_length
+from wbc_suite.control.reasons import LazyReasons, Reason
 from wbc_suite.control.robot_parts import RobotPart
 from wbc_suite.control.state import RobotState
-from wbc_suite.typing import Vector
+from wbc_suite.kinematics import Configuration
+from wbc_suite.qp import (
+    AccelerationLimit,
+    FrameTask,
+    PositionLimit,
+    PostureTask,
+    TaskStack,
+    TickRecord,
+    VelocityLimit,
+)
+from wbc_suite.tomlfile import FrozenModel
+from wbc_suite.typing import Matrix, Vector
 
 AXES = (Axis.X, Axis.Y, Axis.Z, Axis.QX, Axis.QY, Axis.QZ, Axis.QW)
 
+UNLIMITED = 1e3
+"""m/s and rad/s; velocities are limited by `approach_pose`."""
 
-class IkPoseConfig(PartSettings):
+
+class IkMotion(FrozenModel):
+    """Motion of a hand to its goal.
+
+    Attributes:
+        gain: Part of the error that one solve removes, (0, 1].
+        speed: Greatest speeds, m/s and rad/s.
+        braking: Decelerations towards the goal, m/s^2 and rad/s^2.
+        acceleration: Greatest acceleration of a joint, rad/s^2 or m/s^2.
+        jerk: Greatest jerk of a joint's target, rad/s^3 or m/s^3.
+        effort_share: Part of a motor's effort that acceleration may take.
+        posture_cost: Pull to the posture at reset, [cost]/rad, after the hand.
+        posture_gain: Part of the difference that one solve removes.
+    """
+
+    gain: float = Field(default=0.5, gt=0.0, le=1.0)
+    speed: tuple[PositiveFloat, PositiveFloat] = (1.0, 3.0)
+    braking: tuple[PositiveFloat, PositiveFloat] = (4.0, 12.0)
+    acceleration: PositiveFloat = 50.0
+    jerk: float = Field(default=5000.0, ge=100.0)
+    effort_share: float = Field(default=0.6, gt=0.0, le=1.0)
+    posture_cost: NonNegativeFloat = 0.1
+    posture_gain: float = Field(default=0.05, gt=0.0, le=1.0)
+
+
+class IkPoseConfig(HandSettings, PartSettings):
     """Joints follow the inverse kinematics of poses of the hand.
 
     Attributes:
-        input_type: `delta` steps, see `goal_update_mode`, or `absolute` poses.
-        input_ref_frame: Axes of the input.
         output_min: Step at `input_min`, m.
         output_max: Step at `input_max`, m.
         turn_limit: Greatest turn of a step, rad.
-        position_limits: Least and greatest coordinates of goals in the reference, m.
-        orientation_limits: Least and greatest components of the rotation vector from
-            the orientation at the start to a goal's, axes of the reference, rad.
         solve_hz: Solves per second.
         motion: How the hand goes to its goal.
         kp: Stiffness of the joints, 1/s^2.
@@ -50,42 +84,22 @@ class IkPoseConfig(PartSettings):
     """
 
     type: Literal["IK_POSE"] = "IK_POSE"
-    input_type: InputType = "delta"
-    input_ref_frame: InputFrame = "base"
     output_min: Numbers = -0.05
     output_max: Numbers = 0.05
     turn_limit: PositiveFloat = 0.5
-    position_limits: Range | None = None
-    orientation_limits: Range | None = None
     solve_hz: Annotated[float, Field(ge=10.0, le=1000.0)] = 100.0
     motion: IkMotion = IkMotion()
     kp: PositiveFloat = 900.0
     damping_ratio: NonNegativeFloat = 1.0
     tolerance: tuple[PositiveFloat, PositiveFloat] = (1e-3, 3.5e-3)
 
-    @model_validator(mode="after")
-    def _consistent(self) -> "IkPoseConfig":
-        if self.input_type == "absolute" and self.input_ref_frame == "eef":
-            raise ValueError(
-                "input_ref_frame 'eef' needs input_type 'delta': a hand is always at "
-                "the origin of its own axes"
-            )
-        return self
-
 
 class IkPoseController(PartController[JointLaw]):
     """Moves a hand's goal by actions of a position and a quaternion, x y z w.
 
     The quaternion is the pose's, or in delta mode that of the turn; it is normalised,
-    and one of length 0 is no turn.
-
-    Args:
-        part: The arm.
-        config: Gains and meaning of the input.
-        state: The robot in the simulation.
-
-    Attributes:
-        law: Tracks the joints' references, which are smooth between two solves.
+    and one of length 0 is no turn. The law tracks joint references that are smooth
+    between two solves.
     """
 
     needs_hand = True
@@ -101,10 +115,7 @@ class IkPoseController(PartController[JointLaw]):
         self.law.keep_limits(state)
         step = float(state.model.opt.timestep)
         self._steps = max(1, round(1.0 / (config.solve_hz * step)))
-        period = self._steps * step
-        self._ik = PartIk(
-            state, part.joints, part.hand, motion=config.motion, period=period
-        )
+        self._ik = _PartIk(state, part, config.motion, self._steps * step)
         self._base = state.model.body(state.prefix + state.robot.links[0].name).id
         if config.input_ref_frame == "world":
             self._base = 0
@@ -121,8 +132,7 @@ class IkPoseController(PartController[JointLaw]):
     def reset(self, state: RobotState) -> None:
         """Hold the hand where it is, and the posture that it has."""
         self._ik.reset(state)
-        hand = self._hand()
-        self._goal.reset(hand.rotation, hand.translation)
+        self._goal.reset(self._hand())
         self.law.aim(state.data.qpos[self.law.drives["qpos"]])
         self._due = state.time
 
@@ -133,13 +143,13 @@ class IkPoseController(PartController[JointLaw]):
             turn = pin.Quaternion(*values[[6, 3, 4, 5]]).normalized().matrix()
         if self.config.input_type == "absolute":
             rotation = self.goal.rotation if turn is None else turn
-            self._goal.set(rotation, values[:3])
+            self._goal.set(pin.SE3(rotation, values[:3]))
             return
         rotation = np.zeros(3) if turn is None else pin.log3(turn)
         angle = float(np.linalg.norm(rotation))
         rotation = rotation * min(1.0, self.config.turn_limit / max(angle, ROUNDING))
-        step, hand = np.concatenate([self._scaling(values[:3]), rotation]), self._hand()
-        self._goal.step(step, hand.rotation, hand.translation)
+        step = np.concatenate([self._scaling(values[:3]), rotation])
+        self._goal.step(step, self._hand())
 
     def prepare(self, state: RobotState) -> int:
         """Solve when it is time to; return how many physics steps are left."""
@@ -148,7 +158,7 @@ class IkPoseController(PartController[JointLaw]):
         if left > 0:
             return left
         self._due = state.time + self._steps * step
-        self.law.follow(self._ik.solve(state, self._reference() * self.goal))
+        self.law.aim(*self._ik.solve(state, self._reference() * self.goal))
         return self._steps
 
     @property
@@ -166,9 +176,8 @@ class IkPoseController(PartController[JointLaw]):
         goal, hand = self._reference() * self.goal, self._ik.measured(state)
         position = float(np.linalg.norm(goal.translation - hand.translation))
         angle = float(np.linalg.norm(pin.log3(hand.rotation.T @ goal.rotation)))
-        near = (
-            position <= self.config.tolerance[0] and angle <= self.config.tolerance[1]
-        )
+        linear, angular = self.config.tolerance
+        near = position <= linear and angle <= angular
         return {
             "name": self.slices[0].name,
             "position_error": position,
@@ -202,3 +211,106 @@ def _pose_part(name: str, config: IkPoseConfig, scaling: InputScaling) -> Action
         low=(*low.tolist(), *(-1.0,) * 4),
         high=(*high.tolist(), *(1.0,) * 4),
     )
+
+
+class _PartIk:
+    """Moves the joint references of a part so that its hand goes to a pose.
+
+    A task stack over these joints alone; all others enter by the measured pose of the
+    link that carries the part:
+
+        minimise    || J dq - gain e ||^2,  then  || q + dq - q_rest ||^2
+        subject to  limits of position, velocity and acceleration
+
+    The period is the time between two solves, s.
+    """
+
+    def __init__(
+        self, state: RobotState, part: RobotPart, motion: IkMotion, period: float
+    ) -> None:
+        self._hand, self._motion, self._period = str(part.hand), motion, period
+        self._site = state.model.site(state.prefix + self._hand).id
+        joints, whole = part.joints, state.robot.to_pinocchio()
+        others = [i for i, name in enumerate(whole.names) if i and name not in joints]
+        model = pin.buildReducedModel(whole, others, pin.neutral(whole))
+        self._configuration = Configuration(model)
+        found = [model.joints[self._configuration.joint_id(name)] for name in joints]
+        self._places = np.array([joint.idx_q for joint in found], dtype=np.int64)
+        speeds = np.array([joint.idx_v for joint in found], dtype=np.int64)
+        self._addresses = state.joint_addresses(joints)[0]
+        carrier = next(
+            link.parent
+            for link in state.robot.links
+            if link.joint is not None and link.joint.name == joints[0]
+        )
+        self._carrier = state.model.body(f"{state.prefix}{carrier}").id
+        self._T_oc = self._configuration.frame_pose(str(carrier))
+        feasible = feasible_accelerations(
+            state.robot, most=motion.acceleration, effort_share=motion.effort_share
+        )
+        own = {joint: feasible[joint] for joint in joints}
+        self._task = FrameTask(
+            self._hand,
+            gain=motion.gain,
+            max_linear_speed=UNLIMITED,
+            max_angular_speed=UNLIMITED,
+        )
+        self._posture = PostureTask(
+            motion.posture_cost, gain=motion.posture_gain, level=1
+        )
+        self._stack = TaskStack(
+            self._configuration,
+            [self._task, self._posture],
+            limits=[
+                PositionLimit(margin=1e-3),
+                VelocityLimit(),
+                AccelerationLimit(motion.acceleration, joints=own),
+            ],
+            escape=False,
+        )
+        mean = window_length(max(own.values()), motion.jerk, period)
+        self._spline = SplineReference(
+            self._configuration, self._places, speeds, period, mean=mean
+        )
+
+    def reset(self, state: RobotState) -> None:
+        """Start from rest; the present posture becomes the preferred one."""
+        self._configuration.q[self._places] = state.data.qpos[self._addresses]
+        self._configuration.refresh()
+        self._stack.reset()
+        self._posture.set_target(self._configuration.q)
+        self._spline.reset()
+
+    def solve(self, state: RobotState, goal: pin.SE3) -> Matrix:
+        """Plan the next period towards a pose in the world; return the spline's motion.
+
+        It is a buffer.
+        """
+        R = state.data.xmat[self._carrier].reshape(3, 3)
+        T_wc = pin.SE3(R, state.data.xpos[self._carrier])
+        target = approach_pose(
+            self._configuration.frame_pose(self._hand),
+            self._T_oc * T_wc.actInv(goal),
+            dt=self._period,
+            gain=self._motion.gain,
+            speed=self._motion.speed,
+            acceleration=self._motion.braking,
+        )
+        self._task.set_target(target)
+        self._spline.extend(self._stack.solve(self._period).v)
+        return self._spline.motion
+
+    def measured(self, state: RobotState) -> pin.SE3:
+        """Return the pose of the hand in the world."""
+        data = state.data
+        R = data.site_xmat[self._site].reshape(3, 3)
+        return pin.SE3(R.copy(), data.site_xpos[self._site].copy())
+
+    def reasons(self) -> LazyReasons:
+        """Return why the hand is not at its goal; computed when first read."""
+        return LazyReasons(partial(_reasons, self._stack.record(), self._hand))
+
+
+def _reasons(record: TickRecord, hand: str) -> tuple[Reason, ...]:
+    reports = record.explain(position_tolerance=0.0, orientation_tolerance=0.0)
+    return reports[hand].reasons if hand in reports else ()

@@ -6,11 +6,7 @@ import numpy as np
 from pydantic import BaseModel, NonNegativeFloat
 
 from wbc_suite.control.action import ActionPart, SliceKind, Unit
-from wbc_suite.control.part.part_settings import (
-    damping_of,
-    limits_of,
-    spread,
-)
+from wbc_suite.control.part.part_settings import damping_of, limits_of, spread
 from wbc_suite.tomlfile import FROZEN
 from wbc_suite.typing import Vector
 
@@ -43,61 +39,39 @@ class ImpedanceSettings(BaseModel):
 
 
 class Impedance:
-    """Gains of a part, and the slices of the action that set them.
+    """Gains of the axes or joints of a part, and slices of the action that set them.
 
-    Args:
-        name: The part.
-        labels: One word per axis or joint.
-        config: Gains, their limits, and which of them the action sets.
+    Raises ConfigError if a number of values is wrong, or a range is empty.
 
     Attributes:
         slices: Slices after those of the motion: none, kp, or kp and kd.
         kp: Present stiffness, 1/s^2, shape (n,).
         kd: Present damping, 1/s, shape (n,).
-
-    Raises:
-        ConfigError: If a number of values is wrong, or a range is empty.
     """
 
     def __init__(
         self, name: str, labels: tuple[str, ...], config: ImpedanceSettings
     ) -> None:
         size = len(labels)
-        low, high = limits_of(config.kp_limits, size, "kp_limits")
-        kd_low, kd_high = limits_of(config.kd_limits, size, "kd_limits")
+        kp_limits = limits_of(config.kp_limits, size, "kp_limits")
+        kd_limits = limits_of(config.kd_limits, size, "kd_limits")
+        ratio = spread(config.damping_ratio, size, "damping_ratio")
         self._mode = config.impedance_mode
         self.kp = spread(config.kp, size, "kp")
-        ratio = spread(config.damping_ratio, size, "damping_ratio")
         self.kd: Vector = damping_of(self.kp, ratio)
         if config.kd is not None:
             self.kd = spread(config.kd, size, "kd")
+        stiffness = _slice(f"{name}_kp", SliceKind.STIFFNESS, labels, kp_limits)
+        damping = _slice(f"{name}_kd", SliceKind.DAMPING, labels, kd_limits)
         self.slices: tuple[ActionPart, ...] = ()
         if self._mode != "fixed":
-            self.kp = np.clip(self.kp, low, high)
-            self.slices = (
-                ActionPart(
-                    name=f"{name}_kp",
-                    kind=SliceKind.STIFFNESS,
-                    labels=labels,
-                    units=(Unit("1/s^2"),) * size,
-                    low=tuple(low.tolist()),
-                    high=tuple(high.tolist()),
-                ),
-            )
+            self.kp = np.clip(self.kp, *kp_limits)
+            self.slices = (stiffness,)
         if self._mode == "variable_kp":
             self.kd = damping_of(self.kp, 1.0)
         if self._mode == "variable":
-            self.kd = np.clip(self.kd, kd_low, kd_high)
-            self.slices += (
-                ActionPart(
-                    name=f"{name}_kd",
-                    kind=SliceKind.DAMPING,
-                    labels=labels,
-                    units=(Unit("1/s"),) * size,
-                    low=tuple(kd_low.tolist()),
-                    high=tuple(kd_high.tolist()),
-                ),
-            )
+            self.kd = np.clip(self.kd, *kd_limits)
+            self.slices = (stiffness, damping)
 
     def take(self, values: Vector) -> None:
         """Take the values of `slices`, one after another."""
@@ -114,3 +88,17 @@ class Impedance:
         """Values that keep the present gains."""
         gains = [self.kp, self.kd][: len(self.slices)]
         return np.concatenate([*gains, np.zeros(0)])
+
+
+def _slice(
+    name: str,
+    kind: SliceKind,
+    labels: tuple[str, ...],
+    limits: tuple[Vector, Vector],
+) -> ActionPart:
+    unit = Unit("1/s^2" if kind is SliceKind.STIFFNESS else "1/s")
+    low, high = (tuple(limit.tolist()) for limit in limits)
+    units = (unit,) * len(labels)
+    return ActionPart(
+        name=name, kind=kind, labels=labels, units=units, low=low, high=high
+    )

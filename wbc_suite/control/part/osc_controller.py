@@ -4,21 +4,18 @@ from typing import Literal
 
 import numpy as np
 import pinocchio as pin
-from pydantic import NonNegativeFloat, PositiveFloat, model_validator
+from pydantic import NonNegativeFloat, PositiveFloat
 
-from wbc_suite.control.action import ActionPart, Axis, SliceKind, Unit
+from wbc_suite.control.action import Axis, SliceKind, Unit
 from wbc_suite.control.law.osc import OscLaw
 from wbc_suite.control.part.controller import PartController, PoseInput
-from wbc_suite.control.part.hand_goal import HandGoal
+from wbc_suite.control.part.hand_goal import HandGoal, HandSettings
 from wbc_suite.control.part.impedance import Gains, Impedance, ImpedanceSettings
 from wbc_suite.control.part.part_settings import (
     REACH,
-    InputFrame,
-    InputScaling,
-    InputType,
     Numbers,
     PartSettings,
-    Range,
+    SliceInput,
     apply_torque_settings,
     damping_of,
 )
@@ -34,7 +31,7 @@ STEP = (0.05, 0.05, 0.05, 0.5, 0.5, 0.5)
 """m and rad; steps of a full action, which are those of this field's data sets."""
 
 
-class OscConfig(ImpedanceSettings, PartSettings):
+class OscConfig(ImpedanceSettings, HandSettings, PartSettings):
     """The hand follows poses in operational space; see `OscLaw`.
 
     Critically damped, a step is within 2 % of its end after `5.83 / sqrt(kp)` seconds:
@@ -44,14 +41,8 @@ class OscConfig(ImpedanceSettings, PartSettings):
         type: `OSC_POSE`, or `OSC_POSITION`, which holds the orientation that the hand
             has at the start.
         kp: Stiffness, 1/s^2, for all axes or each: linear then angular, in both types.
-        input_type: `delta` steps, see `goal_update_mode`, or `absolute` goals.
-        input_ref_frame: Axes of the input: those of the world; of the robot's first
-            link, with which goals move; or of the hand's goal, for deltas only.
         output_min: Step at `input_min`, m and rad.
         output_max: Step at `input_max`, m and rad.
-        position_limits: Least and greatest coordinates of goals in the reference, m.
-        orientation_limits: Least and greatest components of the rotation vector from
-            the orientation at the start to a goal's, axes of the reference, rad.
         velocity_limits: Greatest velocities of the hand, m/s and rad/s.
         saturation: Where joints saturate in torque or velocity: each is clipped
             (`clip`), or the hand's acceleration is scaled down and keeps its direction
@@ -64,25 +55,12 @@ class OscConfig(ImpedanceSettings, PartSettings):
     type: Literal["OSC_POSE", "OSC_POSITION"] = "OSC_POSE"
     kp: Gains = 400.0
     kp_limits: tuple[Gains, Gains] = (0.0, 500.0)
-    input_type: InputType = "delta"
-    input_ref_frame: InputFrame = "base"
     output_min: Numbers = tuple(-x for x in STEP)
     output_max: Numbers = STEP
-    position_limits: Range | None = None
-    orientation_limits: Range | None = None
     velocity_limits: tuple[PositiveFloat, PositiveFloat] | None = None
     saturation: Literal["clip", "qp"] = "qp"
     posture: dict[str, float] = {}
     posture_kp: NonNegativeFloat = 10.0
-
-    @model_validator(mode="after")
-    def _check(self) -> "OscConfig":
-        if self.input_type == "absolute" and self.input_ref_frame == "eef":
-            raise ValueError(
-                "input_ref_frame 'eef' is for input_type 'delta': a goal that is given "
-                "in the hand's own axes would move with the hand. Use 'base' or 'world'"
-            )
-        return self
 
     @property
     def size(self) -> int:
@@ -98,12 +76,7 @@ class OscConfig(ImpedanceSettings, PartSettings):
 
 
 class OscController(PartController[OscLaw]):
-    """Moves a hand's goal by actions.
-
-    Args:
-        part: The arm; gains have slices of their own.
-        config: Gains and meaning of the input.
-        state: The robot in the simulation.
+    """Moves a hand's goal by actions; gains have slices of their own.
 
     Raises:
         ConfigError: If a number of values is wrong, or a range is empty.
@@ -114,108 +87,30 @@ class OscController(PartController[OscLaw]):
 
     def __init__(self, part: RobotPart, config: OscConfig, state: RobotState) -> None:
         assert part.hand is not None
-        self.config, self._state = config, state
+        self.config, self._state, size = config, state, config.size
         self._impedance = Impedance(part.name, AXES, config)
-        self._scaling = InputScaling(config.size, config, *config.outputs())
         self._goal, self._step = HandGoal(config), np.zeros(6)
+        low, high = self._goal.position_limits
+        turn = np.full(3, np.pi)
+        least = np.concatenate([np.maximum(low, -REACH), -turn])[:size]
+        greatest = np.concatenate([np.minimum(high, REACH), turn])[:size]
+        self._input = SliceInput(
+            part.name,
+            SliceKind.POSE if size == 6 else SliceKind.POSITION,
+            labels=AXES[:size],
+            units=UNITS[:size],
+            config=config,
+            outputs=config.outputs(),
+            limits=(least, greatest),
+        )
+        self.slices = (self._input.action, *self._impedance.slices)
         for joint in config.posture:
             if joint not in part.joints:
                 raise UnknownNameError(f"joint of '{part.name}'", joint, part.joints)
         self.law = self._make_law(part.joints, part.hand)
-        self.slices = (self._action(part.name), *self._impedance.slices)
-        self._R_body, self._p_body, self._R_site, self._p_site = self._frames()
+        self._R_body, self._p_body, self._R_site, self._p_site = self.law.frames(state)
         self._write_gains()
         self.reset(state)
-
-    def reset(self, state: RobotState) -> None:
-        """Hold the hand where it is, and the posture that it has."""
-        posture = state.data.qpos[self.law.drives["qpos"]]
-        for k, joint in enumerate(self.law.joints):
-            posture[k] = self.config.posture.get(joint, posture[k])
-        self.law.drives["position"] = posture
-        self._goal.reset(*self._hand())
-        self.law.jump(self._goal.flat)
-
-    def set_goal(self, values: Vector, period: float) -> None:
-        """Take a step or a goal, shape (6,) or (3,), and gains as the mode has them."""
-        size, ramp = self.config.size, self.config.ramp(period)
-        if self._impedance.slices:
-            self._impedance.take(values[size:])
-            self._write_gains()
-        start = self.law.target_pose()[0] if ramp > 0.0 else None
-        if self.config.input_type == "absolute":
-            turn = pin.exp3(values[3:6]) if size == 6 else self._goal.start
-            self._goal.set(turn, values[:3])
-        else:
-            self._step[:size] = self._scaling(values[:size])
-            self._goal.step(self._step, *self._hand())
-        if start is None:
-            self.law.jump(self._goal.flat)
-        else:
-            self.law.set_goal(self.goal, start=start, duration=ramp)
-
-    @property
-    def goal(self) -> pin.SE3:
-        """Pose to hold, in the reference's axes."""
-        return self._goal.pose
-
-    @goal.setter
-    def goal(self, pose: pin.SE3) -> None:
-        self._goal.pose = pose
-
-    @property
-    def hold_action(self) -> Vector:
-        """The action that keeps the goal."""
-        motion = self._scaling.neutral
-        if self.config.input_type == "absolute":
-            pose = [self.goal.translation, pin.log3(self.goal.rotation)]
-            motion = np.concatenate(pose)[: self.config.size]
-        return np.concatenate([motion, self._impedance.hold_action])
-
-    def pose_input(self) -> PoseInput:
-        """Return how to send the hand to a pose in the world.
-
-        Steps are counted as `set_goal` counts them, so the goal becomes the target
-        wherever that is within a full step.
-        """
-        action, site = self.slices[0], int(self.law.record["site"][0])
-
-        def reference() -> pin.SE3:
-            return pin.SE3(self._R_body.copy(), self._p_body.copy())
-
-        def measure() -> pin.SE3:
-            return pin.SE3(self._R_site.copy(), self._p_site.copy())
-
-        def encode(target: pin.SE3) -> Vector:
-            goal = reference().actInv(target)
-            if self.config.input_type == "absolute":
-                values = np.concatenate([goal.translation, pin.log3(goal.rotation)])
-            else:
-                hand = reference().actInv(measure())
-                values = self._goal.step_to(goal, hand)
-            values = values[: self.config.size]
-            if self.config.input_type == "delta":
-                values = self._scaling.inverse(values)
-            return np.clip(values, action.low, action.high)
-
-        fixed = self._state.robot.root.kind == "fixed"
-        return PoseInput(
-            action=action,
-            body=int(self._state.model.site_bodyid[site]),
-            measure=measure,
-            encode=encode,
-            reference=None if fixed else reference,
-        )
-
-    def _hand(self) -> tuple[Vector, Vector]:
-        """Return rotation, (3, 3), and position of the hand in the reference."""
-        R_bw = self._R_body.T
-        return R_bw @ self._R_site, R_bw @ (self._p_site - self._p_body)
-
-    def _frames(self) -> tuple[Vector, Vector, Vector, Vector]:
-        """Return views of rotation and position of the reference, then of the hand."""
-        R_body, p_body, R_site, p_site = self.law.frames(self._state)
-        return R_body.reshape(3, 3), p_body, R_site.reshape(3, 3), p_site
 
     def _make_law(self, joints: tuple[str, ...], site: str) -> OscLaw:
         config, state = self.config, self._state
@@ -235,25 +130,84 @@ class OscController(PartController[OscLaw]):
         self.law.record["kp"] = self._impedance.kp
         self.law.record["kd"] = self._impedance.kd
 
-    def _action(self, name: str) -> ActionPart:
-        """Return the slice that moves the goal."""
-        size = self.config.size
-        units, (low, high) = UNITS[:size], self._bounds()
-        if self.config.input_type == "delta":
-            low, high = self._scaling.low, self._scaling.high
-            units = self._scaling.units(units)
-        return ActionPart(
-            name=name,
-            kind=SliceKind.POSE if size == 6 else SliceKind.POSITION,
-            labels=AXES[:size],
-            units=units,
-            low=tuple(low.tolist()),
-            high=tuple(high.tolist()),
+    def reset(self, state: RobotState) -> None:
+        """Hold the hand where it is, and the posture that it has."""
+        posture = state.data.qpos[self.law.drives["qpos"]]
+        for k, joint in enumerate(self.law.joints):
+            posture[k] = self.config.posture.get(joint, posture[k])
+        self.law.drives["position"] = posture
+        self._goal.reset(self._hand())
+        self.law.set_goal(self.goal)
+
+    def set_goal(self, values: Vector, period: float) -> None:
+        """Take a step or a goal, shape (6,) or (3,), and gains as the mode has them."""
+        size, ramp = self.config.size, self.config.ramp(period)
+        if self._impedance.slices:
+            self._impedance.take(values[size:])
+            self._write_gains()
+        start = self.law.target_pose()[0] if ramp > 0.0 else None
+        if self._input.scaled:
+            self._step[:size] = self._input.scaling(values[:size])
+            self._goal.step(self._step, self._hand())
+        else:
+            turn = pin.exp3(values[3:6]) if size == 6 else self._goal.start
+            self._goal.set(pin.SE3(turn, values[:3]))
+        self.law.set_goal(self.goal, start=start, duration=ramp)
+
+    @property
+    def goal(self) -> pin.SE3:
+        """Pose to hold, in the reference's axes."""
+        return self._goal.pose
+
+    @goal.setter
+    def goal(self, pose: pin.SE3) -> None:
+        self._goal.pose = pose
+
+    @property
+    def hold_action(self) -> Vector:
+        """The action that keeps the goal."""
+        scaled = self._input.scaled
+        motion = self._input.neutral if scaled else self._absolute(self.goal)
+        return np.concatenate([motion, self._impedance.hold_action])
+
+    def pose_input(self) -> PoseInput:
+        """Return how to send the hand to a pose in the world.
+
+        Steps are counted as `set_goal` counts them, so the goal becomes the target
+        wherever that is within a full step.
+        """
+        action, site = self._input.action, int(self.law.record["site"][0])
+
+        def reference() -> pin.SE3:
+            return pin.SE3(self._R_body.copy(), self._p_body.copy())
+
+        def measure() -> pin.SE3:
+            return pin.SE3(self._R_site.copy(), self._p_site.copy())
+
+        def encode(target: pin.SE3) -> Vector:
+            goal = reference().actInv(target)
+            if self._input.scaled:
+                step = self._goal.step_to(goal, self._hand())
+                values = self._input.scaling.inverse(step[: self.config.size])
+            else:
+                values = self._absolute(goal)
+            return np.clip(values, action.low, action.high)
+
+        fixed = self._state.robot.root.kind == "fixed"
+        return PoseInput(
+            action=action,
+            body=int(self._state.model.site_bodyid[site]),
+            measure=measure,
+            encode=encode,
+            reference=None if fixed else reference,
         )
 
-    def _bounds(self) -> tuple[Vector, Vector]:
-        """Return least and greatest absolute goals."""
-        turn, (low, high) = np.full(3, np.pi), self._goal.position_limits
-        low = np.concatenate([np.maximum(low, -REACH), -turn])
-        high = np.concatenate([np.minimum(high, REACH), turn])
-        return low[: self.config.size], high[: self.config.size]
+    def _absolute(self, pose: pin.SE3) -> Vector:
+        """Return the absolute values that command a pose."""
+        values = np.concatenate([pose.translation, pin.log3(pose.rotation)])
+        return values[: self.config.size]
+
+    def _hand(self) -> pin.SE3:
+        """Return the pose of the hand in the reference."""
+        R_bw = self._R_body.T
+        return pin.SE3(R_bw @ self._R_site, R_bw @ (self._p_site - self._p_body))

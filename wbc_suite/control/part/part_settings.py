@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 import numpy as np
 from pydantic import BaseModel, Field, NonNegativeFloat
 
-from wbc_suite.control.action import Unit
+from wbc_suite.control.action import ActionPart, SliceKind, Unit
 from wbc_suite.control.law.law import Law
 from wbc_suite.errors import ConfigError
 from wbc_suite.tomlfile import FROZEN, FrozenModel
@@ -14,6 +14,7 @@ from wbc_suite.typing import Vector
 
 InputType = Literal["delta", "absolute"]
 InputFrame = Literal["world", "base", "eef"]
+GoalUpdate = Literal["achieved", "desired"]
 Numbers: TypeAlias = float | tuple[float, ...]
 """One number for all axes or joints, or one for each."""
 
@@ -46,6 +47,7 @@ class PartSettings(BaseModel):
     """Settings of every part controller that reads the action.
 
     Attributes:
+        input_type: `delta`: values are scaled. `absolute`: they are goals as they are.
         input_min: Values of the action that mean `output_min`.
         input_max: Values of the action that mean `output_max`.
         interpolation: `linear`: the reference moves to a new goal at constant velocity.
@@ -64,11 +66,12 @@ class PartSettings(BaseModel):
 
     model_config = FROZEN
 
+    input_type: InputType = "delta"
     input_min: Numbers = -1.0
     input_max: Numbers = 1.0
     interpolation: Literal["linear"] | None = None
     ramp_ratio: Annotated[float, Field(gt=0.0, le=1.0)] = 0.2
-    goal_update_mode: Literal["achieved", "desired"] = "achieved"
+    goal_update_mode: GoalUpdate = "achieved"
     torque_limits: Range | None = None
     disturbance_observer: NonNegativeFloat = 0.0
     use_torque_compensation: bool = True
@@ -80,22 +83,15 @@ class PartSettings(BaseModel):
 
 
 class InputScaling:
-    """Maps values of an action linearly onto outputs.
+    """Maps `size` values of an action linearly onto outputs.
 
-    Args:
-        size: Number of values.
-        settings: Settings with the range of the input.
-        output_min: Outputs at `input_min`, their units.
-        output_max: Outputs at `input_max`.
+    Raises ConfigError if a number of values is wrong, or an input range is empty.
 
     Attributes:
         low: Least inputs, shape (size,).
         high: Greatest inputs, shape (size,).
         gain: Output per input, shape (size,).
         offset: Output of the input 0, shape (size,).
-
-    Raises:
-        ConfigError: If a number of values is wrong, or an input range is empty.
     """
 
     def __init__(
@@ -105,21 +101,15 @@ class InputScaling:
         output_min: Numbers,
         output_max: Numbers,
     ) -> None:
-        low, high, out_low, out_high = (
-            spread(x, size, key)
-            for x, key in (
-                (settings.input_min, "input_min"),
-                (settings.input_max, "input_max"),
-                (output_min, "output_min"),
-                (output_max, "output_max"),
-            )
-        )
-        if not (low < high).all():
+        self.low = spread(settings.input_min, size, "input_min")
+        self.high = spread(settings.input_max, size, "input_max")
+        least = spread(output_min, size, "output_min")
+        greatest = spread(output_max, size, "output_max")
+        if not (self.low < self.high).all():
             raise ConfigError("'input_min' must be below 'input_max' in every value.")
-        self.low, self.high = low, high
-        self.gain: Vector = (out_high - out_low) / (high - low)
-        middle = 0.5 * (out_high + out_low)
-        self.offset: Vector = middle - 0.5 * self.gain * (high + low)
+        self.gain: Vector = (greatest - least) / (self.high - self.low)
+        middle = 0.5 * (greatest + least)
+        self.offset: Vector = middle - 0.5 * self.gain * (self.high + self.low)
 
     def __call__(self, values: Vector) -> Vector:
         """Return the outputs, shape (size,)."""
@@ -140,6 +130,58 @@ class InputScaling:
         """The inputs whose outputs are zero, or nearest to it."""
         inputs = self.inverse(np.zeros_like(self.gain))
         return np.clip(inputs, self.low, self.high)
+
+
+class SliceInput:
+    """A slice of the action, and what its values mean by the config's `input_type`.
+
+    Args:
+        units: Units of the outputs.
+        outputs: Outputs at `input_min` and at `input_max`.
+        limits: Least and greatest outputs, shape (n,) each.
+
+    Attributes:
+        action: The slice.
+        scaled: Whether values are scaled; otherwise they are outputs.
+        scaling: Scales them.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        kind: SliceKind,
+        *,
+        labels: tuple[str, ...],
+        units: tuple[Unit, ...],
+        config: PartSettings,
+        outputs: tuple[Numbers, Numbers],
+        limits: tuple[Vector, Vector],
+    ) -> None:
+        self.scaling = InputScaling(len(labels), config, *outputs)
+        self.scaled = config.input_type == "delta"
+        self._limits = limits
+        if self.scaled:
+            limits = self.scaling.low, self.scaling.high
+            units = self.scaling.units(units)
+        low, high = (tuple(limit.tolist()) for limit in limits)
+        self.action = ActionPart(
+            name=name, kind=kind, labels=labels, units=units, low=low, high=high
+        )
+
+    def __call__(self, values: Vector) -> Vector:
+        """Return the outputs within their limits, shape (n,)."""
+        return self.clip(self.scaling(values) if self.scaled else values)
+
+    def clip(self, outputs: Vector) -> Vector:
+        """Return outputs within their limits, shape (n,)."""
+        low, high = self._limits
+        return np.minimum(np.maximum(outputs, low), high)
+
+    @property
+    def neutral(self) -> Vector:
+        """The values whose outputs are zero, or nearest to it, shape (n,)."""
+        zero = np.zeros_like(self.scaling.gain)
+        return self.scaling.neutral if self.scaled else self.clip(zero)
 
 
 def spread(values: Numbers, size: int, key: str) -> Vector:
@@ -168,13 +210,24 @@ def limits_of(given: Range, size: int, key: str) -> tuple[Vector, Vector]:
     return low, high
 
 
+def check_axes(input_type: InputType, input_ref_frame: InputFrame) -> None:
+    """Raise ValueError for absolute goals in axes that move with the goal."""
+    if input_type == "absolute" and input_ref_frame == "eef":
+        raise ValueError(
+            "input_ref_frame 'eef' needs input_type 'delta': 'eef' is for steps, since "
+            "a goal in the frame's own axes would move with it. Use 'base' or 'world'"
+        )
+
+
 def apply_torque_settings(law: Law, settings: PartSettings) -> None:
     """Set a law's torque limits, compensation and disturbance observer."""
     law.record["observer"] = settings.disturbance_observer
     law.record["compensation"] = float(settings.use_torque_compensation)
     if settings.torque_limits is not None:
-        limits = limits_of(settings.torque_limits, len(law.joints), "torque_limits")
-        law.narrow(*limits)
+        low, high = limits_of(settings.torque_limits, len(law.joints), "torque_limits")
+        drives = law.drives
+        drives["command_min"] = np.maximum(drives["command_min"], low)
+        drives["command_max"] = np.minimum(drives["command_max"], high)
 
 
 def damping_of(kp: Any, ratio: Any) -> Any:

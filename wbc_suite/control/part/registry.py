@@ -1,13 +1,12 @@
 """Part controllers by name: their classes and the models of their configs."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Any, Literal, TypeAlias, get_args
 
 from pydantic import BaseModel
 
 from wbc_suite.control.part.controller import PartController
-from wbc_suite.control.robot_parts import RobotPart, hands_of, robot_part
+from wbc_suite.control.robot_parts import hands_of, robot_part
 from wbc_suite.control.state import RobotState
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.robot import RobotDescription
@@ -25,17 +24,8 @@ PartControllerName: TypeAlias = Literal[
 ]
 """Names of the built-in part controllers."""
 
-Builder: TypeAlias = Callable[[RobotPart, Any, RobotState], PartController]
-
-
-@dataclass(frozen=True, slots=True)
-class _Kind:
-    controller: type[PartController]
-    build: Builder  # the class, by the arguments of its constructor
-    model: type[BaseModel]
-
-
-_KINDS: dict[str, _Kind] = {}
+_KINDS: dict[str, tuple[type[PartController], type[BaseModel]]] = {}
+"""Class of each controller, and the model of its config."""
 
 
 def register_part_controller(
@@ -47,11 +37,9 @@ def register_part_controller(
     imported, `make(..., controller_configs="MINE")` uses it in all arms, and
     `{"type": "MINE", ...}` in `body_parts` to one part.
 
-    Args:
-        name: Its name, in capitals.
-        controller: Class; `controller(part, config, state)` makes one.
-        config: Model of its config, with the field `type: Literal[name] = name`. Derive
-            it from `PartSettings`, or from `FrozenModel` for one without gripper.
+    The class is called by `controller(part, config, state)`. The config's model has the
+    field `type: Literal[name] = name`; derive it from `PartSettings`, or from
+    `FrozenModel` for a controller without gripper.
 
     Raises:
         ConfigError: If the name is taken or not in capitals, or the config's type is
@@ -66,7 +54,7 @@ def register_part_controller(
             f"{config.__name__}: part controller '{name}' needs the field "
             f"type: Literal['{name}'] = '{name}'."
         )
-    _KINDS[name] = _Kind(controller, controller, config)
+    _KINDS[name] = controller, config
 
 
 def is_part_controller(name: object) -> bool:
@@ -76,12 +64,12 @@ def is_part_controller(name: object) -> bool:
 
 def part_models() -> dict[str, type[BaseModel]]:
     """Return the config model of each part controller by name."""
-    return {name: kind.model for name, kind in _KINDS.items()}
+    return {name: model for name, (_, model) in _KINDS.items()}
 
 
 def part_controller(config: Any) -> type[PartController]:
     """Return the class of the part controller that a config is for."""
-    return _kind(config.type).controller
+    return _find(config.type)[0]
 
 
 def load_part_controller_config(controller: PartControllerName | str) -> dict[str, Any]:
@@ -90,20 +78,17 @@ def load_part_controller_config(controller: PartControllerName | str) -> dict[st
     Raises:
         UnknownNameError: If there is none of this name.
     """
-    config = _kind(controller).model.model_validate({"type": controller})
+    _, model = _find(controller)
+    config = model.model_validate({"type": controller})
     return config.model_dump(mode="json", exclude_none=True)
 
 
 def parse_part(name: str, given: object, source: str) -> BaseModel:
-    """Return the config of a part as a model.
-
-    Args:
-        name: The part.
-        given: Plain data, or a model.
-        source: The config's name in messages.
+    """Return the config of a part, plain data or a model, as a model.
 
     Raises:
-        ConfigError: If the type is unknown, or a key or a value is wrong.
+        ConfigError: If the type is unknown, or a key or a value is wrong; it names the
+            source.
     """
     key = f"body_parts.{name}"
     if isinstance(given, BaseModel):
@@ -113,7 +98,7 @@ def parse_part(name: str, given: object, source: str) -> BaseModel:
     if "type" not in given:
         raise ConfigError(f"{source}: missing key '{key}.type'")
     try:
-        model = _kind(given["type"]).model
+        _, model = _find(given["type"])
     except UnknownNameError as error:
         raise ConfigError(f"{source}: key '{key}.type': {error}") from error
     return parse_model(model, given, source=source, within=key)
@@ -135,7 +120,7 @@ def check_part(name: str, config: Any, robot: RobotDescription) -> None:
     if controller.drives_base and name != "base":
         raise ConfigError(f"{config.type} drives the part 'base', not '{name}'.")
     if is_base and not controller.drives_base:
-        of_bases = [k for k, kind in _KINDS.items() if kind.controller.drives_base]
+        of_bases = [k for k, (kind, _) in _KINDS.items() if kind.drives_base]
         raise ConfigError(
             f"a base is driven by {' or '.join(of_bases)}, not by {config.type}."
         )
@@ -144,10 +129,11 @@ def check_part(name: str, config: Any, robot: RobotDescription) -> None:
 
 def make_part(name: str, config: Any, state: RobotState) -> PartController:
     """Make the controller of a part that `check_part` has accepted."""
-    return _kind(config.type).build(robot_part(state.robot, name), config, state)
+    build: Any = part_controller(config)  # each class has arguments of its own types
+    return build(robot_part(state.robot, name), config, state)
 
 
-def _kind(name: object) -> _Kind:
+def _find(name: object) -> tuple[type[PartController], type[BaseModel]]:
     if not isinstance(name, str) or name not in _KINDS:
         raise UnknownNameError("part controller", name, _KINDS)
     return _KINDS[name]

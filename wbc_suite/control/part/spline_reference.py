@@ -22,13 +22,8 @@ ROUNDING = 1e-9
 def window_length(acceleration: float, jerk: float, period: float) -> int:
     """Return over how many solves to take the mean, so that a jerk limit is kept.
 
-    A mean over n solves changes its acceleration by `2 acceleration / n` at most from
-    one solve to the next.
-
-    Args:
-        acceleration: Limit of what is solved, rad/s^2 or m/s^2.
-        jerk: Limit to keep, rad/s^3 or m/s^3.
-        period: Time between solves, s.
+    A mean over n solves, which are `period` seconds apart and keep an acceleration
+    limit, changes its acceleration by `2 acceleration / n` at most between two.
     """
     return max(1, ceil(2.0 * acceleration / (jerk * period) - ROUNDING))
 
@@ -62,10 +57,9 @@ class SplineArrays(NamedTuple):
 class SplineReference:
     """A cubic B-spline through means of the solved configurations.
 
-    The points are the means of the last n solved configurations, taken in the tangent
-    space, with `n = window_length(...)`. Between two solves,
-    with v_1, v_2, v_3 the velocities of the last three steps of the points, and p the
-    point before the last two of them,
+    The points are the means of the last n = `mean` solved configurations, taken in the
+    tangent space. Between two solves, with v_1, v_2, v_3 the velocities of the last
+    three steps of the points, and p the point before the last two of them,
 
         q(s) = p + T (v_2 - v_1) / 6 + (v_1 + v_2) / 2 s + a s^2 / 2 + j s^3 / 6
         a = (v_2 - v_1) / T,    j = (v_3 - 2 v_2 + v_1) / T^2,
@@ -76,18 +70,14 @@ class SplineReference:
 
     Args:
         configuration: The robot that is solved for; `extend` moves it.
-        q_index: Places of the driven joints in q.
+        q_index: Places of the driven joints, of one parameter each, in q.
         v_index: Their places in v.
-        period: T, s.
-        mean: n.
         width: Columns of `motion`, if there are more joints than these.
 
     Attributes:
-        arrays: Its arrays.
-        argument: The argument of kernels that stands for them.
+        argument: The argument of kernels that stands for its arrays.
         motion: p, v, a and j of the driven joints after a solve: they are at
-            `p + v s + a s^2 / 2 + j s^3 / 6`, s counted from that solve up to the
-            period. For joints of one parameter.
+            `p + v s + a s^2 / 2 + j s^3 / 6`, s counted from that solve up to T.
     """
 
     def __init__(
@@ -102,7 +92,7 @@ class SplineReference:
     ) -> None:
         nq, nv = configuration.nq, configuration.nv
         self._configuration = configuration
-        self.arrays = SplineArrays(
+        self._arrays = SplineArrays(
             robot=configuration.robot,
             q_index=q_index,
             v_index=v_index,
@@ -112,13 +102,13 @@ class SplineReference:
             motion=np.zeros((4, max(width, len(q_index)))),
             period=float(period),
         )
-        self.argument = as_argument(self.arrays)
-        self.motion: Matrix = self.arrays.motion
+        self.argument = as_argument(self._arrays)
+        self.motion: Matrix = self._arrays.motion
         self.reset()
 
     def reset(self) -> None:
         """Stand still where the robot is."""
-        arrays, q = self.arrays, self._configuration.q
+        arrays, q = self._arrays, self._configuration.q
         arrays.window[:], arrays.points[:], arrays.rates[:] = q, q, 0.0
         joints = slice(len(arrays.q_index))
         arrays.motion[:, joints] = 0.0
@@ -130,7 +120,7 @@ class SplineReference:
 
     def targets(self) -> Vector:
         """Return where the driven joints are to be when the next solve is due, (m,)."""
-        arrays = self.arrays
+        arrays = self._arrays
         change = arrays.rates[2] - arrays.rates[1]
         lead = arrays.period / 6.0 * change[arrays.v_index]
         return arrays.points[1][arrays.q_index] + lead
@@ -138,43 +128,42 @@ class SplineReference:
 
 @compiled
 def extend_spline(spline: SplineArrays, v: Vector) -> None:
-    """Move the robot by v over one period, and write the motion until the next solve.
-
-    Args:
-        spline: The spline.
-        v: Velocity, shape (nv,).
-    """
-    robot, window, points, rates = (
-        spline.robot,
-        spline.window,
-        spline.points,
-        spline.rates,
-    )
-    step = np.empty(v.shape[0])
-    for i in range(v.shape[0]):
-        step[i] = spline.period * v[i]
-    integrate_joints(robot, step)
+    """Move the robot by v over a period, and write the motion until the next solve."""
+    robot, window = spline.robot, spline.window
+    points, rates, period = spline.points, spline.rates, spline.period
+    integrate_joints(robot, period * v)
     _append(window, robot.q)
     _append(points, robot.q)
     _append(rates, v)
     if window.shape[0] > 1:
         _write_mean(robot, window, points[2])
         difference(robot, points[1], points[2], rates[2])
-        for i in range(v.shape[0]):
-            rates[2, i] /= spline.period
-    _write_motion(
-        points[0], rates, spline.q_index, spline.v_index, spline.period, spline.motion
+        rates[2] /= period
+    for j in range(spline.q_index.shape[0]):
+        q, i = points[0, spline.q_index[j]], spline.v_index[j]
+        lead, v_now, a, jerk = _cubic(rates[0, i], rates[1, i], rates[2, i], period)
+        spline.motion[0, j], spline.motion[1, j] = q + lead, v_now
+        spline.motion[2, j], spline.motion[3, j] = a, jerk
+
+
+@compiled
+def _cubic(
+    v_1: float, v_2: float, v_3: float, period: float
+) -> tuple[float, float, float, float]:
+    """Return offset, velocity, acceleration and jerk; see `SplineReference`."""
+    return (
+        period / 6.0 * (v_2 - v_1),
+        0.5 * (v_1 + v_2),
+        (v_2 - v_1) / period,
+        (v_3 - 2.0 * v_2 + v_1) / period**2,
     )
 
 
 @compiled
 def _append(rows: Matrix, new: Vector) -> None:
     """Drop the first row, and put a new one after the last."""
-    last = rows.shape[0] - 1
-    for i in range(new.shape[0]):
-        for row in range(last):
-            rows[row, i] = rows[row + 1, i]
-        rows[last, i] = new[i]
+    rows[:-1] = rows[1:]
+    rows[-1] = new
 
 
 @compiled
@@ -186,18 +175,15 @@ def _write_mean(robot: RobotArrays, window: Matrix, out: Vector) -> None:
         difference(robot, window[0], window[row], step)
         for i in range(total.shape[0]):
             total[i] += step[i] / count
-    for i in range(out.shape[0]):
-        out[i] = window[0, i]
+    out[:] = window[0]
     integrate(robot, out, total)
 
 
 @compiled
 def lead_root(spline: SplineArrays, record: CompiledRecords) -> None:
-    """Set the reference of a free root, which comes first in v.
+    """Set the reference of a free root, which comes first in v; see `StanceLaw.lead`.
 
-    Args:
-        spline: The spline.
-        record: Record of a law of feet, shape (1,); see `StanceLaw.lead`.
+    The record is that of a law of feet, shape (1,).
     """
     law, period = record[0], spline.period
     q, rates = spline.points[0], spline.rates
@@ -209,40 +195,9 @@ def lead_root(spline: SplineArrays, record: CompiledRecords) -> None:
     start[1], start[3] = 2.0 * (x * y - w * z), 2.0 * (x * y + w * z)
     start[2], start[6] = 2.0 * (x * z + w * y), 2.0 * (x * z - w * y)
     start[5], start[7] = 2.0 * (y * z - w * x), 2.0 * (y * z + w * x)
-    for i in range(3):
-        start[9 + i] = q[i]
+    start[9:] = q[:3]
     for i in range(6):
-        first, second, third = rates[0, i], rates[1, i], rates[2, i]
-        law.stance.behind[i] = period / 6.0 * (second - first)
-        law.stance.twist[i] = 0.5 * (first + second)
-        law.stance.curve[i] = (second - first) / period
-        law.stance.bend[i] = (third - 2.0 * second + first) / period**2
+        lead, v, a, jerk = _cubic(rates[0, i], rates[1, i], rates[2, i], period)
+        law.stance.behind[i], law.stance.twist[i] = lead, v
+        law.stance.curve[i], law.stance.bend[i] = a, jerk
     law.since = 0.0
-
-
-@compiled
-def _write_motion(
-    q: Vector,
-    rates: Matrix,
-    q_index: Indices,
-    v_index: Indices,
-    period: float,
-    motion: Matrix,
-) -> None:
-    """Write position, velocity, acceleration and jerk of the spline, as rows.
-
-    Args:
-        q: The point before the last two steps, shape (nq,).
-        rates: Velocities of the last three steps, newest last, shape (3, nv).
-        q_index: Places of the n driven joints in q.
-        v_index: Their places in v.
-        period: Time between solves, s.
-        motion: Output in its first n columns, shape (4, n or more).
-    """
-    for j in range(q_index.shape[0]):
-        i = v_index[j]
-        first, second, third = rates[0, i], rates[1, i], rates[2, i]
-        motion[0, j] = q[q_index[j]] + period / 6.0 * (second - first)
-        motion[1, j] = 0.5 * (first + second)
-        motion[2, j] = (second - first) / period
-        motion[3, j] = (third - 2.0 * second + first) / period**2
