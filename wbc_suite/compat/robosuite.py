@@ -15,10 +15,7 @@ from wbc_suite.catalogue import Catalogue
 from wbc_suite.compat.robosuite_env import GymWrapper, RobosuiteEnv
 from wbc_suite.control import load_composite_controller_config as _load_composite
 from wbc_suite.control.composite import composite_names
-from wbc_suite.control.part.registry import (
-    load_part_controller_config as _load_part,
-)
-from wbc_suite.control.part.registry import part_models
+from wbc_suite.control.part import registry
 from wbc_suite.errors import ConfigError, DatasetError
 
 __all__ = [
@@ -55,7 +52,7 @@ _RENAMED = {"damping": "damping_ratio", "damping_limits": "damping_ratio_limits"
 
 ALL_ENVIRONMENTS = benchmark_names()
 ALL_COMPOSITE_CONTROLLERS = composite_names()
-ALL_PART_CONTROLLERS = tuple(part_models())
+ALL_PART_CONTROLLERS = tuple(registry.part_models())
 
 
 def __getattr__(name: str) -> Any:
@@ -101,7 +98,7 @@ def load_part_controller_config(
         UnknownNameError: If there is no such type.
     """
     if default_controller is not None:
-        return _load_part(default_controller)
+        return registry.load_part_controller_config(default_controller)
     if custom_fpath is None:
         raise ConfigError("load_part_controller_config: name a file or a type.")
     try:
@@ -127,12 +124,10 @@ def make_from_env_args(env_args: str | dict[str, Any]) -> RobosuiteEnv:
     Raises:
         DatasetError: If there is no `env_name` in it.
     """
-    data = json.loads(env_args) if isinstance(env_args, str) else dict(env_args)
+    data = json.loads(env_args) if isinstance(env_args, str) else env_args
     if "env_name" not in data:
         raise DatasetError("env_args has no 'env_name'.")
-    given = dict(data.get("env_kwargs", {}))
-    given.pop("env_name", None)
-    return make(data["env_name"], **given)
+    return make(**{**data.get("env_kwargs", {}), "env_name": data["env_name"]})
 
 
 def make_from_dataset(path: str | Path) -> RobosuiteEnv:
@@ -180,7 +175,9 @@ def _updated(config: dict[str, Any]) -> dict[str, Any]:
 
     Those are configs of one arm, with goals in the world's axes.
     """
-    if config.get("type") not in part_models() or "control_delta" not in config:
+    if not registry.is_part_controller(config.get("type")):
+        return config
+    if "control_delta" not in config:
         return config
     new = {_RENAMED.get(key, key): value for key, value in config.items()}
     new["input_type"] = "delta" if new.pop("control_delta") else "absolute"

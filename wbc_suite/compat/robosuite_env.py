@@ -6,7 +6,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from wbc_suite.compat.robosuite_sim import Model, RobotView, Sim
+from wbc_suite.compat.robosuite_sim import RobotView, Sim
 from wbc_suite.envs import RobotEnv
 from wbc_suite.errors import ConfigError, DatasetError
 
@@ -24,10 +24,16 @@ class RobosuiteEnv:
 
     Attributes:
         env: Our environment.
-        sim: Model and state, under robosuite's names.
+        sim: Model and state, under robosuite's names; `model` is its model.
         robots: The robots, likewise.
         viewer: Stand-in for robosuite's window; does nothing.
         name: Name of the benchmark.
+        action_dim: Length of an action.
+        horizon: Number of actions in an episode.
+        control_freq: Actions per second, Hz.
+        model_timestep: Duration of a physics step, s.
+        render: Shows the scene on a page, if `has_renderer` was set.
+        close: Closes renderers and page.
     """
 
     def __init__(
@@ -42,7 +48,12 @@ class RobosuiteEnv:
         self.env = RobotEnv(env_name, **kwargs)
         self.name = env_name
         self.sim, self.viewer = Sim(self.env), Viewer()
+        self.model = self.sim.model
         self.robots = tuple(RobotView(*pair) for pair in self.env.simulation.pairs)
+        self.action_dim = self.env.action_layout.size
+        self.horizon, self.control_freq = self.env.horizon, self.env.config.control_freq
+        self.model_timestep = self.env.simulation.timestep
+        self.render, self.close = self.env.render, self.env.close
         self.timestep, self.done = 0, False
         self._ep_meta: dict[str, Any] = {}
 
@@ -72,14 +83,6 @@ class RobosuiteEnv:
         given = self.env.benchmark.reward(shaped=config.reward_shaping)
         return given * config.reward_scale
 
-    def render(self) -> None:
-        """Show the scene on a page, if `has_renderer` was set."""
-        self.env.render()
-
-    def close(self) -> None:
-        """Close renderers and page."""
-        self.env.close()
-
     def seed(self, seed: int) -> None:
         """Seed the next episode."""
         self._seed = seed
@@ -91,34 +94,9 @@ class RobosuiteEnv:
         return layout.low.copy(), layout.high.copy()
 
     @property
-    def action_dim(self) -> int:
-        """Length of an action."""
-        return int(self.action_spec[0].size)
-
-    @property
     def unwrapped(self) -> "RobosuiteEnv":
         """This environment."""
         return self
-
-    @property
-    def model(self) -> Model:
-        """The scene."""
-        return self.sim.model
-
-    @property
-    def model_timestep(self) -> float:
-        """Duration of a physics step, s."""
-        return self.env.simulation.timestep
-
-    @property
-    def horizon(self) -> int:
-        """Actions in an episode."""
-        return self.env.horizon
-
-    @property
-    def control_freq(self) -> float:
-        """Actions a second."""
-        return self.env.config.control_freq
 
     @property
     def observation_names(self) -> set[str]:
@@ -207,7 +185,7 @@ class GymWrapper(gymnasium.Env[Any, Any]):
     Args:
         env: The environment.
         keys: Observed keys; by default objects, pictures and robots, in this order.
-        flatten_obs: Whether they are one vector; otherwise a dictionary.
+        flatten_obs: Whether they are one vector, not a dictionary.
     """
 
     metadata: dict[str, Any] = {"render_modes": []}
@@ -221,20 +199,18 @@ class GymWrapper(gymnasium.Env[Any, Any]):
         self.env, self.flatten_obs = env, flatten_obs
         example = env.observation_spec()
         if keys is None:
-            keys = [key for key in ("object-state",) if key in example]
-            keys += [key for key in example if key.endswith("_image")]
-            keys += [key for key in example if key.endswith("proprio-state")]
+            kinds = "object-state", "_image", "proprio-state"
+            keys = [key for kind in kinds for key in example if key.endswith(kind)]
         self.keys = list(keys)
         first = self._chosen(example)
-        self.observation_space = (
-            _box(first)
-            if flatten_obs
-            else gymnasium.spaces.Dict({k: _box(v) for k, v in first.items()})
-        )
-        low, high = env.action_spec
-        self.action_space = gymnasium.spaces.Box(
-            np.float32(low), np.float32(high), dtype=np.float32
-        )
+        if flatten_obs:
+            self.observation_space = _box(first)
+        else:
+            self.observation_space = gymnasium.spaces.Dict(
+                {key: _box(values) for key, values in first.items()}
+            )
+        low, high = (limit.astype(np.float32) for limit in env.action_spec)
+        self.action_space = gymnasium.spaces.Box(low, high, dtype=np.float32)
         self.name = f"{'_'.join(r.name for r in env.robots)}_{env.name}"
 
     def reset(
