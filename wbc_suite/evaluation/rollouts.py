@@ -1,7 +1,5 @@
 """Episodes of policies in environments, as work items of an executor."""
 
-import hashlib
-import json
 import re
 import shutil
 import time
@@ -25,9 +23,8 @@ class Case:
     """An environment and the policy that acts in it.
 
     Attributes:
-        benchmark: Its name, or a file.
-        robots: Their names.
-        controller: A name or a file; None for each robot's own.
+        benchmark: Name or file.
+        controller: Name or file; None for each robot's own.
         policy: See `make_policy`.
         record: Whether episodes are recorded.
         arguments: Further arguments of `wbc_suite.make`, plain JSON data, sorted.
@@ -58,20 +55,15 @@ def plan_rollouts(cases: Iterable[Case], *, seeds: range, chunk: int) -> list[Wo
     """
     if len(seeds) == 0 or seeds.start < 0 or seeds.step != 1 or chunk < 1:
         raise ConfigError(f"Seeds {seeds} in chunks of {chunk}: at least one of each.")
-    starts = range(seeds.start, seeds.stop, chunk)
-    return [
-        _item(case, start, min(start + chunk, seeds.stop))
-        for case in cases
-        for start in starts
-    ]
-
-
-def _item(case: Case, start: int, stop: int) -> WorkItem:
-    payload = asdict(case) | {"arguments": dict(case.arguments), "seeds": [start, stop]}
-    text = json.dumps(payload, sort_keys=True)
-    digest = hashlib.sha256(text.encode()).hexdigest()[:8]
-    title = re.sub(r"[^A-Za-z0-9]+", "-", case.title).strip("-")[:90]
-    return WorkItem(name=f"{title}-{start:06d}-{digest}", payload=payload)
+    items = []
+    for case in cases:
+        title = re.sub(r"[^A-Za-z0-9]+", "-", case.title).strip("-")[:90]
+        payload = asdict(case) | {"arguments": dict(case.arguments)}
+        for start in range(seeds.start, seeds.stop, chunk):
+            mine = {"seeds": [start, min(start + chunk, seeds.stop)]}
+            label = f"{title}-{start:06d}"
+            items.append(WorkItem.with_digest(label, payload | mine))
+    return items
 
 
 def run_rollouts(item: WorkItem, folder: Path) -> dict[str, Any]:
@@ -81,9 +73,7 @@ def run_rollouts(item: WorkItem, folder: Path) -> dict[str, Any]:
     (`succeeded`), or at the last step (`success`). A physics error ends it as a
     failure.
 
-    Args:
-        item: See `plan_rollouts`.
-        folder: Folder of the results; recordings go to `episodes`, one file per item.
+    Recordings go to `episodes` in the folder, one file per item.
 
     Returns:
         `episodes`: one dictionary per episode.

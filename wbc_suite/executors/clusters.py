@@ -37,7 +37,7 @@ class RayCluster:
     def run(
         self, work: Work, items: Sequence[WorkItem], folder: Path
     ) -> Iterator[Outcome]:
-        """Run all items; see `Executor`. All machines must share the folder."""
+        """See `Executor`; all machines must share the folder."""
         remote = self._ray.remote(num_cpus=1, max_retries=self._attempts - 1)(run_item)
         waiting = list(reversed(items))
         busy = {}
@@ -54,17 +54,12 @@ class RayCluster:
             return self._ray.get(reference)
         except self._ray.exceptions.RayTaskError as error:
             # `run_item` raises nothing: the worker could not load the work.
-            reason = str(error).strip().splitlines()[-1]
-            return Outcome(
-                name=item.name,
-                error=f"{reason}. All machines need wbc_suite and the work's module.",
-            )
+            last = str(error).strip().splitlines()[-1]
+            reason = f"{last}. All machines need wbc_suite and the work's module."
         except self._ray.exceptions.RayError as error:
-            return Outcome(
-                name=item.name,
-                error=f"Its worker was lost {self._attempts} times: "
-                f"{type(error).__name__}.",
-            )
+            kind = type(error).__name__
+            reason = f"Its worker was lost {self._attempts} times: {kind}."
+        return Outcome(name=item.name, error=reason)
 
 
 class Slurm:
@@ -89,14 +84,13 @@ class Slurm:
         parameters: dict[str, object] | None = None,
     ) -> None:
         self._submitit = _import("submitit", extra="slurm")
-        self._cluster = cluster
-        self._attempts = attempts
+        self._cluster, self._attempts = cluster, attempts
         self._parameters = {"timeout_min": 240, **(parameters or {})}
 
     def run(
         self, work: Work, items: Sequence[WorkItem], folder: Path
     ) -> Iterator[Outcome]:
-        """Run all items; see `Executor`. All machines must share the folder."""
+        """See `Executor`; all machines must share the folder."""
         executor = self._submitit.AutoExecutor(folder / "jobs", cluster=self._cluster)
         executor.update_parameters(**self._parameters)
         jobs = {executor.submit(run_item, work, item, folder): item for item in items}

@@ -14,19 +14,15 @@ MAX_BYTES = 64 << 20
 
 
 class ResultFolder:
-    """One JSON file per finished item, in the subfolder `results`.
+    """One JSON file per finished item, in the subfolder `results` of a folder.
 
     A file is complete or absent: it is written under another name and renamed.
 
-    Args:
-        folder: Folder of the whole work; made when it is missing.
-
     Raises:
-        DatasetError: If the folder cannot be written to.
+        DatasetError: If the folder, which is made if missing, cannot be written to.
     """
 
     def __init__(self, folder: Path) -> None:
-        self.folder = folder
         self._results = folder / "results"
         try:
             self._results.mkdir(parents=True, exist_ok=True)
@@ -35,12 +31,8 @@ class ResultFolder:
 
     def write(self, item: WorkItem, outcome: Outcome) -> None:
         """Write an item's outcome, in place of an earlier one."""
-        record = {
-            "item": item.name,
-            "payload": item.payload,
-            "error": outcome.error,
-            "result": outcome.result,
-        }
+        record = {"item": item.name, "payload": item.payload}
+        record |= {"error": outcome.error, "result": outcome.result}
         path = self._path(item)
         temporary = path.with_suffix(f".{os.getpid()}.tmp")
         text = json.dumps(record, indent=1, sort_keys=True)
@@ -77,10 +69,10 @@ def run_items(
     executor: Executor,
     on_outcome: Callable[[WorkItem, Outcome], None] | None = None,
 ) -> list[Outcome]:
-    """Run the items that have no result yet, and write each outcome as it ends.
+    """Run items that have no result yet; return all outcomes, in order of the items.
 
-    The call can be stopped at any time and repeated: finished items do not run again,
-    failed ones do.
+    Each outcome is written as it ends. The call can be stopped and repeated: finished
+    items do not run again, failed ones do.
 
     Args:
         work: Function of an importable module; see `Work`.
@@ -89,9 +81,6 @@ def run_items(
         executor: Runs the items.
         on_outcome: Called with every item and its outcome; at once for items that
             finished in an earlier call.
-
-    Returns:
-        All outcomes, in the order of the items.
 
     Raises:
         DatasetError: If two items have one name, or the folder cannot be written to.

@@ -47,16 +47,14 @@ def new_folder(folder: Path, content: str) -> None:
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """Write a file; it is complete or absent, also after a power failure.
-
-    Raises:
-        DatasetError: If it cannot be written; an old file stays as it was.
-    """
+    """Write a file; see `replace_file`."""
     replace_file(path, lambda temporary: temporary.write_bytes(content))
 
 
 def replace_file(path: Path, write: Callable[[Path], object]) -> None:
-    """Let `write` write a temporary file, and rename it to `path`.
+    """Let `write` write a temporary file, sync it, and rename it to `path`.
+
+    The file is complete or absent, also after a power failure.
 
     Raises:
         DatasetError: If it cannot be written; an old file stays as it was.

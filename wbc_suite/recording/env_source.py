@@ -42,11 +42,7 @@ class EnvSource:
 
     @classmethod
     def of(cls, env: Any) -> "EnvSource":
-        """Describe an environment.
-
-        Raises:
-            DatasetError: If it is not an environment of this package.
-        """
+        """Describe an environment; raise DatasetError if it is not of this package."""
         inner = env.unwrapped
         if not isinstance(inner, RobotEnv):
             raise DatasetError(
@@ -63,11 +59,7 @@ class EnvSource:
 
     @classmethod
     def parse(cls, env_args: str | None) -> "EnvSource":
-        """Parse `env_args` of a dataset.
-
-        Raises:
-            DatasetError: If it is missing or is no description of an environment.
-        """
+        """Parse `env_args` of a dataset; raise DatasetError if they are none."""
         if not env_args:
             raise DatasetError("The dataset does not name its environment.")
         fields = _parse_json(env_args)
@@ -100,9 +92,8 @@ class EnvSource:
     def build(self, *, trust_files: bool = False, **changes: Any) -> RobotEnv:
         """Make the environment for replay; rendering arguments are left out.
 
-        Args:
-            trust_files: Whether names in the dataset may be paths of files here.
-            changes: Arguments that replace recorded ones.
+        With `trust_files`, names in the dataset may be paths of files here. `changes`
+        replace recorded arguments.
 
         Raises:
             DatasetError: If it cannot be made from the description.
@@ -130,16 +121,14 @@ def header_of(env: Any) -> dict[str, Fact]:
     """Return the attributes of `data`, common to all episodes of an environment."""
     inner = env.unwrapped
     versions = {name: _version(name) for name in PACKAGES}
-    versions |= {
-        "wbc-suite": __version__,
-        "python": platform.python_version(),
-        "system": platform.system(),
-    }
+    versions |= {"wbc-suite": __version__, "python": platform.python_version()}
+    versions["system"] = platform.system()
     source = EnvSource.of(env)
     controllers = [
         load_composite_controller_config(given, robot)
         for given, robot in zip(inner.config.controller_list, inner.robots, strict=True)
     ]
+    space = inner.action_space
     layout = [
         {"name": s.name, "kind": str(s.kind), "labels": list(s.labels)}
         for s in inner.action_layout.slices
@@ -152,9 +141,7 @@ def header_of(env: Any) -> dict[str, Fact]:
         "versions": json.dumps(versions),
         "controller_config": json.dumps(controllers, default=_plain),
         "action_layout": json.dumps(layout),
-        "action_bounds": json.dumps(
-            [inner.action_space.low.tolist(), inner.action_space.high.tolist()]
-        ),
+        "action_bounds": json.dumps([space.low, space.high], default=_plain),
     }
 
 

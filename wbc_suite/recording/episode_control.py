@@ -29,12 +29,9 @@ class EpisodeCommand(StrEnum):
 class RecordingPlan:
     """Episodes that begin by themselves until a number of them is kept.
 
-    A solved episode is kept and the next one begins. Commands remain possible.
-
-    Attributes:
-        episodes: Number of episodes to keep.
-        horizon: Maximum number of actions in an episode; None for no limit.
-        only_success: Whether episodes that are not solved are discarded.
+    A solved episode is kept and the next one begins. `horizon` is the maximum number of
+    actions in an episode; with `only_success`, those that are not solved are discarded.
+    Commands remain possible.
     """
 
     episodes: int
@@ -46,11 +43,8 @@ class RecordingPlan:
 class EpisodeStatus:
     """State of the recording.
 
-    Attributes:
-        recording: Whether an episode is in progress.
-        length: Its actions.
-        kept: Episodes in the file.
-        message: Result of the last command.
+    `length` is the number of actions of the episode in progress, `kept` the number of
+    episodes in the file, `message` the result of the last command.
     """
 
     recording: bool
@@ -88,11 +82,10 @@ class EpisodeControl:
     @property
     def status(self) -> EpisodeStatus:
         """State of the recording; the loop's thread only."""
-        recorder = self._recorder
         return EpisodeStatus(
-            recording=recorder.recording,
-            length=recorder.length,
-            kept=recorder.kept,
+            recording=self._recorder.recording,
+            length=self._recorder.length,
+            kept=self._recorder.kept,
             message=self._message,
         )
 
@@ -117,7 +110,7 @@ class EpisodeControl:
         return self._recorder.kept - self._kept_before
 
     def update(self, reset: Callable[[int], None]) -> None:
-        """Apply the commands between two steps; `reset` is given a seed."""
+        """Apply the commands between two steps; `reset` is called with a seed."""
         with self._lock:
             commands, self._commands = self._commands, []
         if self._was_recording and not self._recorder.recording:
@@ -184,10 +177,9 @@ class EpisodeControl:
         name = recorder.keep(success=success)
         if name is None:
             return "Nothing to keep yet."
-        text = f"Kept as {name}: {length} actions, {result}"
-        if self._plan is None:
-            return f"{text}."
-        return f"{text} ({self._planned_kept} of {self._plan.episodes})."
+        plan, count = self._plan, self._planned_kept
+        progress = "" if plan is None else f" ({count} of {plan.episodes})"
+        return f"Kept as {name}: {length} actions, {result}{progress}."
 
     def _begin(self, reset: Callable[[int], None]) -> str:
         seed, self._seed = self._seed, self._seed + 1

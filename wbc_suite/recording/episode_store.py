@@ -34,9 +34,6 @@ class Store:
     Raises:
         DatasetError: If the folder cannot be written to, the disk is nearly full, the
             file is another environment's, or another process records into it.
-
-    Attributes:
-        path: The file.
     """
 
     def __init__(self, path: str | Path, header: Mapping[str, Fact]) -> None:
@@ -81,10 +78,7 @@ class Store:
         return name
 
     def undo(self) -> str | None:
-        """Delete the last episode that was added; return its name, or None.
-
-        Episodes of earlier sessions stay.
-        """
+        """Delete the last episode of this session; return its name, or None."""
         if not self._own:
             return None
         self._own.pop().unlink(missing_ok=True)
@@ -141,11 +135,7 @@ class Store:
 
 @contextmanager
 def locked(path: Path) -> Iterator[None]:
-    """Lock a file against recording by other processes.
-
-    Raises:
-        DatasetError: If another process records into it.
-    """
+    """Lock a file; raise DatasetError if another process records into it."""
     folder = parts_folder(path)
     check_folder(folder)
     with _lock(folder / "lock"):

@@ -33,7 +33,7 @@ def extract(
     on_progress: Callable[[int], None] = lambda _: None,
     **changes: Any,
 ) -> int:
-    """Restore every recorded state, and store its observations and rewards.
+    """Restore recorded states, and store observations and rewards; count episodes.
 
     Finished parts wait in `OUT.work`: a stopped extraction continues when called again.
 
@@ -41,14 +41,11 @@ def extract(
         path: A recording whose states fit the environment.
         out: File to write; it may be the same.
         trust_files: See `EnvSource.build`.
-        executor: Runs the parts; this process when left out.
+        executor: Runs the parts; None for this process.
         workers: Number of workers that the episodes are split among.
         on_progress: Called with the number of episodes of each finished piece.
         changes: Arguments of the environment, such as `use_camera_obs`,
             `camera_names`, `reward_shaping`.
-
-    Returns:
-        The number of episodes.
 
     Raises:
         DatasetError: If the environment cannot be made, or states do not fit.

@@ -40,11 +40,7 @@ COMMAND = "from wbc_suite.recording.hdf5_check import read_files; read_files()"
 
 
 def open_safely(path: Path, *, checked: bool = False) -> h5py.File:
-    """Open a file for reading.
-
-    Args:
-        path: The file.
-        checked: Whether `check_files` has read it before; it is called if not.
+    """Open a file for reading, after `check_files` unless it was `checked` before.
 
     Raises:
         DatasetError: If it is missing, no HDF5 file or too damaged to be read.
@@ -113,8 +109,7 @@ def _reason(code: int, seconds: int, messages: bytes) -> str:
 def read_files() -> None:
     """Read the files that standard input names; the child's main function.
 
-    A line is written for each file when it is done. Errors that h5py reports are left
-    to the parent, which finds them where they matter.
+    A line is written for each file when it is done.
     """
     seconds = int(sys.argv[1])
     resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))

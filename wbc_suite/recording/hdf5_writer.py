@@ -52,30 +52,19 @@ def write_dataset(
 
     def write(temporary: Path) -> None:
         with open_late_errors(temporary) as disk, h5py.File(disk, "w") as file:
-            _write(file, episodes, header, masks or {})
+            data, total = file.create_group("data"), 0
+            data.attrs.update(header)
+            data.attrs["schema_version"] = SCHEMA_VERSION
+            for episode in episodes:
+                if episode.name in data:
+                    raise DatasetError(f"There are two episodes '{episode.name}'.")
+                total += episode.length
+                _write_episode(data.create_group(episode.name), episode)
+            data.attrs["total"] = total
+            for key, names in (masks or {}).items():
+                file.create_dataset(f"mask/{key}", data=np.array(names, dtype="S"))
 
     replace_file(path, write)
-
-
-def _write(
-    file: h5py.File,
-    episodes: Iterable[Episode],
-    header: Mapping[str, Fact],
-    masks: Mapping[str, Sequence[str]],
-) -> None:
-    data = file.create_group("data")
-    for name, value in header.items():
-        data.attrs[name] = value
-    data.attrs["schema_version"] = SCHEMA_VERSION
-    total = 0
-    for episode in episodes:
-        if episode.name in data:
-            raise DatasetError(f"There are two episodes '{episode.name}'.")
-        total += episode.length
-        _write_episode(data.create_group(episode.name), episode)
-    data.attrs["total"] = total
-    for key, names in masks.items():
-        file.create_dataset(f"mask/{key}", data=np.array(names, dtype="S"))
 
 
 def _write_episode(group: h5py.Group, episode: Episode) -> None:
@@ -87,8 +76,7 @@ def _write_episode(group: h5py.Group, episode: Episode) -> None:
             stored[begin : begin + len(piece)] = piece
     if episode.final_state is not None:
         group.create_dataset("final_state", data=episode.final_state)
-    for name, fact in episode.facts.items():
-        group.attrs[name] = fact
+    group.attrs.update(episode.facts)
     group.attrs["num_samples"] = episode.length
     group.attrs["sha256"] = fingerprint(episode.columns, episode.final_state)
 

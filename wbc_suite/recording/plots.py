@@ -33,9 +33,8 @@ def write_plots(dataset: Dataset, path: Path) -> None:
     _bars(pen, 0, "Actions per episode (green: success)", lengths, colours)
     spread = actions.std(axis=0)
     _bars(pen, 1, "Spread of each action", spread, [CURVE] * len(spread))
-    sizes = [float(np.linalg.norm(a)) for a in actions[:: len(actions) // MOST + 1]]
-    values = np.array(sizes)
-    _bars(pen, 2, "Size of the action over time", values, [CURVE] * len(values))
+    sizes = np.linalg.norm(actions[:: len(actions) // MOST + 1], axis=1)
+    _bars(pen, 2, "Size of the action over time", sizes, [CURVE] * len(sizes))
     save_picture(sheet, path)
 
 

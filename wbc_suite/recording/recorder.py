@@ -30,20 +30,19 @@ class Recorder:
         DatasetError: If it is another environment, or see `Store`.
 
     Attributes:
-        path: The file.
+        succeeded: Whether the benchmark counts as solved at the last action.
     """
 
     def __init__(self, env: Any, path: str | Path, *, next_obs: bool = False) -> None:
         self._inner, self._next_obs = env.unwrapped, next_obs
-        self.path = Path(path)
         self._model_file = self._inner.scene_xml
         digest = hashlib.sha256(self._model_file.encode()).hexdigest()
         date = datetime.now(UTC).isoformat(timespec="seconds")
         header = header_of(env) | {"model_hash": digest, "date": date}
-        self._store = Store(self.path, header)
-        self._rows = StepBuffer(env, self.path.parent)
+        self._store = Store(path, header)
+        self._rows = StepBuffer(env, self._store.path.parent)
         self._facts: dict[str, Fact] | None = None
-        self._clipped, self._succeeded = 0, False
+        self._clipped, self.succeeded = 0, False
 
     @property
     def kept(self) -> int:
@@ -60,11 +59,6 @@ class Recorder:
         """Actions of the episode in progress."""
         return len(self._rows)
 
-    @property
-    def succeeded(self) -> bool:
-        """Whether the benchmark counts as solved at the last action."""
-        return self._succeeded
-
     def begin(self) -> None:
         """Begin an episode, right after the environment's reset."""
         self.discard()
@@ -80,7 +74,7 @@ class Recorder:
             self._facts["seed"] = int(seed)
         if placed is not None:
             self._facts["placed"] = json.dumps(placed.tolist())
-        self._clipped, self._succeeded, self._began = 0, False, time.monotonic()
+        self._clipped, self.succeeded, self._began = 0, False, time.monotonic()
         self._rows.begin()
 
     def add(
@@ -108,7 +102,7 @@ class Recorder:
             self.discard()
             raise
         self._clipped += clipped > 0
-        self._succeeded = success
+        self.succeeded = success
 
     def keep(self, success: bool | None = None) -> str | None:
         """End the episode and store it; return its name, or None if it has no steps.
@@ -127,7 +121,7 @@ class Recorder:
         dones = np.concatenate([piece for _, piece in pieces(columns["dones"])])
         dones[-1] = 1
         facts = self._facts | {
-            "success": self._succeeded if success is None else bool(success),
+            "success": self.succeeded if success is None else bool(success),
             "clipped_steps": self._clipped,
         }
         columns |= {"dones": dones}

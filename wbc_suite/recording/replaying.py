@@ -26,7 +26,7 @@ class Divergence:
     """Difference of a replay by actions from the recording.
 
     Attributes:
-        steps: Actions played.
+        steps: Number of actions played.
         largest: Largest difference of any number of the state (m, rad, m/s, rad/s).
         first: Action with the first difference after it; None without any.
         success: Whether the benchmark is solved at the end of the replay.
@@ -77,17 +77,11 @@ def start_as(env: RobotEnv, episode: Episode) -> None:
 
 
 def play_states(env: RobotEnv, episode: Episode) -> Iterator[int]:
-    """Set the simulation to every recorded state, one after the other.
-
-    Yields:
-        The number of the action taken in the state; at last the number of actions.
-    """
+    """Set the simulation to every recorded state; yield the number of each."""
     start_as(env, episode)
     simulation = env.simulation
-    states = list(episode.columns["states"])
-    if episode.final_state is not None:
-        states.append(episode.final_state)
-    for k, state in enumerate(states):
+    last = () if episode.final_state is None else (episode.final_state,)
+    for k, state in enumerate((*episode.columns["states"], *last)):
         write_physics(simulation.model, simulation.data, state)
         simulation.forward()
         env.benchmark.after_step()
@@ -105,14 +99,14 @@ def play_actions(
         (zero if that is missing), and `info`.
     """
     start_as(env, episode)
-    if episode.columns["actions"].shape[1] != env.action_layout.size:
+    states, actions = episode.columns["states"], episode.columns["actions"]
+    if actions.shape[1] != env.action_layout.size:
         raise DatasetError(
-            f"'{episode.name}' has actions of {episode.columns['actions'].shape[1]} "
-            f"numbers, and this environment's have {env.action_layout.size}: it can "
-            "be replayed by states only."
+            f"'{episode.name}' has actions of {actions.shape[1]} numbers, and this "
+            f"environment's have {env.action_layout.size}: it can be replayed by "
+            "states only."
         )
-    states = episode.columns["states"]
-    for k, action in enumerate(episode.columns["actions"]):
+    for k, action in enumerate(actions):
         *_, info = env.advance(action)
         after = states[k + 1] if k + 1 < len(states) else episode.final_state
         now = env.physics_state
@@ -135,7 +129,9 @@ def divergence(env: RobotEnv, episode: Episode) -> Divergence:
 
 def _check_joints(env: RobotEnv, episode: Episode) -> None:
     """Refuse states of another robot with the same number of joints."""
-    recorded = _joints_named(str(episode.facts.get("model_file", "")))
+    mjcf = str(episode.facts.get("model_file", ""))  # untrusted, and not parsed
+    world = mjcf[mjcf.find("<worldbody") : mjcf.rfind("</worldbody>") + 1]
+    recorded = _JOINT.findall(world)
     model = env.simulation.model
     here = [model.joint(number).name for number in range(model.njnt)]
     if not recorded or recorded == here:
@@ -149,12 +145,6 @@ def _check_joints(env: RobotEnv, episode: Episode) -> None:
             f"have as many numbers; {words}."
         )
     log.warning("'%s': %s; states are taken in order", episode.name, words)
-
-
-def _joints_named(mjcf: str) -> list[str]:
-    """Return the names of a scene's joints, without parsing the untrusted MJCF."""
-    world = mjcf[mjcf.find("<worldbody") : mjcf.rfind("</worldbody>") + 1]
-    return _JOINT.findall(world)
 
 
 def _generator_state(text: str) -> dict[str, Any]:

@@ -18,24 +18,17 @@ from wbc_suite.recording.episode import Column
 BLOCK_BYTES = 1 << 16
 """Rows are written to disk in blocks of so many bytes."""
 
-OUTCOME = (
-    ("rewards", "f8"),
-    ("dones", "i8"),
-    ("clipped", "i8"),
-    ("step_time", "f8"),
-    ("stamp", "f8"),
-)
-"""Columns of numbers that a step returns."""
+OUTCOME = {"rewards": "f8", "dones": "i8", "clipped": "i8"}
+OUTCOME |= {"step_time": "f8", "stamp": "f8"}
+"""Columns of numbers that a step returns, and their types."""
 
 
 class RowBuffer:
-    """Rows of one structured type, in a file without a name.
+    """Rows of one structured type, in a file without a name in a folder.
 
     Two rows are in memory: the one in progress and the next one, which may be begun
-    too. `advance` completes the first, and the places change their roles.
-
-    Args:
-        folder: Folder of the file. Nothing is left in it, also after a crash.
+    too. `advance` completes the first, and the places change their roles. Nothing is
+    left in the folder, also after a crash.
 
     Attributes:
         pair: The two rows, shape (2,); another array after each `begin`.
@@ -57,11 +50,7 @@ class RowBuffer:
         self.pair = np.zeros(2, dtype=kind)
 
     def advance(self) -> None:
-        """Complete the row in progress; the next one begins.
-
-        Raises:
-            DatasetError: If the disk is full.
-        """
+        """Complete the row in progress; raise DatasetError if the disk is full."""
         self._write()
         self._count += 1
         self.at = 1 - self.at
@@ -70,10 +59,7 @@ class RowBuffer:
         """Return all complete rows and the one in progress, read-only.
 
         They are read from disk when they are used. Later rows do not change them, but
-        for the last.
-
-        Raises:
-            DatasetError: If the disk is full.
+        for the last. Raises DatasetError if the disk is full.
         """
         self._write(in_progress=True)
         held = mmap.mmap(self._file.fileno(), 0, access=mmap.ACCESS_READ)
@@ -106,12 +92,7 @@ class RowBuffer:
 
 
 class StepBuffer:
-    """Steps of the episode in progress: state and observation, action, outcome.
-
-    Args:
-        env: An environment of this package, wrapped or not.
-        folder: See `RowBuffer`.
-    """
+    """Steps of an environment's episode in progress, in a `RowBuffer` in a folder."""
 
     def __init__(self, env: Any, folder: Path) -> None:
         self._env: RobotEnv = env.unwrapped
@@ -135,12 +116,12 @@ class StepBuffer:
         fields = [("states", "f8", env.physics_state.shape), ("vectors", "f8", (size,))]
         fields += [(f"obs/{key}", a.dtype, a.shape) for key, a in apart.items()]
         fields += [("actions", "f8", (env.action_layout.size,))]
-        fields += [(name, kind, ()) for name, kind in OUTCOME]
+        fields += [(name, kind, ()) for name, kind in OUTCOME.items()]
         self._rows.begin(np.dtype(fields, align=True))
         pair = self._rows.pair
         self._states, self._vectors = pair["states"], pair["vectors"]
         self._actions = pair["actions"]
-        self._outcome = [pair[name] for name, _ in OUTCOME]
+        self._outcome = [pair[name] for name in OUTCOME]
         self._apart = [(key, pair[f"obs/{key}"]) for key in apart]
         self._write_state(0, observation)
 
@@ -150,12 +131,9 @@ class StepBuffer:
         observation: Mapping[str, Any],
         outcome: tuple[float, int, int, float, float],
     ) -> None:
-        """Complete a step, and begin the next one.
+        """Complete a step, and begin the next one with the observation after it.
 
-        Args:
-            action: The action that was taken.
-            observation: Observation after it.
-            outcome: Values of `OUTCOME`.
+        `outcome` has the values of `OUTCOME`.
 
         Raises:
             DatasetError: If shapes or keys differ from the first step's, or the disk
@@ -180,15 +158,12 @@ class StepBuffer:
     def columns(self, *, next_obs: bool = False) -> tuple[dict[str, Column], Column]:
         """Return columns by name, read-only, and the state after the last action.
 
-        Observations after each action are included with `next_obs`.
-
-        Raises:
-            DatasetError: If the disk is full.
+        Observations after each action are included with `next_obs`. Raises DatasetError
+        if the disk is full.
         """
         rows = self._rows.rows()
         before, after = rows[:-1], rows[1:]
-        names = "states", "actions", *(name for name, _ in OUTCOME)
-        columns = {name: before[name] for name in names}
+        columns = {name: before[name] for name in ("states", "actions", *OUTCOME)}
         for group, some in (("obs", before), ("next_obs", after))[: 1 + next_obs]:
             columns |= {f"{group}/{key}": self._column(some, key) for key in self._keys}
         return columns, rows["states"][-1].copy()

@@ -45,13 +45,10 @@ def check_video(path: Path) -> None:
 def episode_pictures(
     env: RobotEnv, episode: Episode, *, by_states: bool, every: int = 1
 ) -> Iterator[Picture]:
-    """Play an episode, and draw it as `env.render` does.
+    """Play an episode, and draw every so many actions as `env.render` does.
 
-    Args:
-        env: Made with `render_mode="rgb_array"`.
-        episode: What is played.
-        by_states: Whether states are shown as recorded; else actions are taken.
-        every: Draw every so many actions.
+    The environment is made with `render_mode="rgb_array"`. Recorded states are shown if
+    `by_states`; else actions are taken.
     """
     play: Callable[..., Iterator[Any]] = play_states if by_states else play_actions
     for k, _ in enumerate(play(env, episode)):
@@ -91,11 +88,16 @@ def write_sheet(dataset: Dataset, path: Path, *, camera: str = "agentview") -> N
     if not names:
         raise DatasetError(f"'{dataset.path}' has no episodes to draw.")
     env: RobotEnv | None = None
-    rows = []
-    for name in names:
-        episode = dataset.episode(name)
-        pictures = episode.columns.get(f"obs/{camera}_image")
+    height = SHEET_SIZE + LABEL
+    size = SHEET_COLUMNS * SHEET_SIZE, len(names) * height
+    sheet = Image.new("RGB", size, "white")
+    pen = ImageDraw.Draw(sheet)
+    for row, episode in enumerate(map(dataset.episode, names)):
+        word = {None: "", True: ", success", False: ", no success"}[episode.success]
+        caption = f"{episode.name}: {episode.length} actions{word}"
+        pen.text((4, row * height + 1), caption, fill="black")
         at = np.linspace(0, episode.length - 1, SHEET_COLUMNS).round().astype(int)
+        pictures: Any = episode.columns.get(f"obs/{camera}_image")
         if pictures is None:
             env = env or rebuild(
                 dataset,
@@ -104,37 +106,14 @@ def write_sheet(dataset: Dataset, path: Path, *, camera: str = "agentview") -> N
                 render_size=(SHEET_SIZE, SHEET_SIZE),
                 use_camera_obs=False,
             )
-            wanted = set(at.tolist())
-            drawn = {
-                k: np.asarray(env.render())
-                for k in play_states(env, episode)
-                if k in wanted
-            }
-            row = [drawn[k] for k in at.tolist()]
-        else:
-            row = [pictures[k] for k in at.tolist()]
-        rows.append((_caption(episode), row))
+            states = play_states(env, episode)
+            pictures = {k: np.asarray(env.render()) for k in states if k in at}
+        for column, k in enumerate(at.tolist()):
+            image = Image.fromarray(pictures[k]).resize((SHEET_SIZE, SHEET_SIZE))
+            sheet.paste(image, (column * SHEET_SIZE, row * height + LABEL))
     if env is not None:
         env.close()
-    save_picture(_tile(rows), path)
-
-
-def _caption(episode: Episode) -> str:
-    word = {None: "", True: ", success", False: ", no success"}[episode.success]
-    return f"{episode.name}: {episode.length} actions{word}"
-
-
-def _tile(rows: list[tuple[str, list[Picture]]]) -> Image.Image:
-    """Put pictures beside each other, each row under its words."""
-    height = SHEET_SIZE + LABEL
-    sheet = Image.new("RGB", (SHEET_COLUMNS * SHEET_SIZE, len(rows) * height), "white")
-    pen = ImageDraw.Draw(sheet)
-    for k, (caption, pictures) in enumerate(rows):
-        pen.text((4, k * height + 1), caption, fill="black")
-        for j, picture in enumerate(pictures):
-            image = Image.fromarray(picture).resize((SHEET_SIZE, SHEET_SIZE))
-            sheet.paste(image, (j * SHEET_SIZE, k * height + LABEL))
-    return sheet
+    save_picture(sheet, path)
 
 
 def _write_animation(pictures: Iterable[Picture], path: Path, rate: float) -> None:
