@@ -33,13 +33,9 @@ def demo(
     import wbc_suite
 
     seconds = figures * PERIOD + REST
-    env = wbc_suite.make(
-        "Lift",
-        robots="GR1",
-        controller_configs=controller,
-        control_freq=RATE,
-        horizon=round(seconds * RATE) + 1,
-    )
+    horizon = round(seconds * RATE) + 1
+    made = {"controller_configs": controller, "control_freq": RATE, "horizon": horizon}
+    env = wbc_suite.make("Lift", robots="GR1", **made)
     errors, step_times, pictures = _reach(env.unwrapped, seconds)
     _report(controller, errors, step_times)
     _write(output, pictures)

@@ -3,7 +3,7 @@
 import importlib
 import platform
 import sys
-import time
+import timeit
 from collections.abc import Iterator
 from dataclasses import KW_ONLY, dataclass
 from importlib import metadata
@@ -20,7 +20,6 @@ EXTRA_SOLVERS = ("piqp", "clarabel", "quadprog")
 MUJOCO_PARTS = ("mujoco", "mujoco-core", "mujoco-studio")
 """MuJoCo 4 is three distributions of one version."""
 REPAIR_MUJOCO = "pip install --force-reinstall --no-deps " + " ".join(MUJOCO_PARTS)
-
 
 _MARKS = {"fine": "ok  ", "optional": "note", "broken": "BAD "}
 
@@ -44,14 +43,7 @@ def doctor() -> None:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One property of this machine.
-
-    Attributes:
-        topic: What was checked.
-        text: Result of the check.
-        state: Severity.
-        cure: The command that repairs it; empty if nothing is wrong.
-    """
+    """The result of one check; `cure` is the command that repairs what is wrong."""
 
     topic: str
     text: str
@@ -70,8 +62,7 @@ def _system() -> Iterator[Finding]:
     name = platform.freedesktop_os_release() if sys.platform == "linux" else {}
     system = name.get("PRETTY_NAME", platform.platform())
     yield Finding("system", f"{system}, {platform.machine()}")
-    version = platform.python_version()
-    yield Finding("python", f"{version} at {sys.executable}")
+    yield Finding("python", f"{platform.python_version()} at {sys.executable}")
 
 
 def _packages() -> Iterator[Finding]:
@@ -172,11 +163,10 @@ def _frame_seconds() -> float:
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     fast = RenderPreset.FAST
-    best = float("inf")
     with make_renderer(model, width=256, height=256, preset=fast) as renderer:
-        for _ in range(20):
-            start = time.perf_counter()
+
+        def draw() -> None:
             renderer.update_scene(data)
             renderer.render()
-            best = min(best, time.perf_counter() - start)
-    return best
+
+        return min(timeit.repeat(draw, number=1, repeat=20))

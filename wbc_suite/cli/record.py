@@ -7,22 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from wbc_suite.cli.options import (
-    BaseOption,
-    CamerasOption,
-    CatalogueOption,
-    ControllerOption,
-    DeviceOptions,
-    GripperOption,
-    HostOption,
-    MirrorOption,
-    PictureSizeOption,
-    PortOption,
-    RobotsOption,
-    ScaleOption,
-    camera_arguments,
-    environment_arguments,
-)
+from wbc_suite.cli import options
 from wbc_suite.cli.teleop import ONE_DAY, device_maker, drive, stages_of
 
 if TYPE_CHECKING:
@@ -63,26 +48,26 @@ def record(
     benchmark: Annotated[str, typer.Argument(help="Benchmark to record.")] = "Lift",
     *,
     out: OutOption,
-    robots: RobotsOption = None,
+    robots: options.RobotsOption = None,
     device: PolicyOption = "scripted",
     episodes: Annotated[int, typer.Option(min=1, help="How many to keep.")] = 10,
-    controller: ControllerOption = None,
+    controller: options.ControllerOption = None,
     horizon: HorizonOption = None,
     rate: RateOption = None,
     seed: Annotated[int, typer.Option(min=0, help="Of the first episode.")] = 0,
     only_success: OnlySuccessOption = False,
     next_obs: NextObsOption = False,
-    camera: CamerasOption = None,
-    size: PictureSizeOption = 84,
-    device_option: DeviceOptions = None,
-    scale: ScaleOption = 1.0,
-    mirror: MirrorOption = False,
-    host: HostOption = "127.0.0.1",
-    port: PortOption = None,
+    camera: options.CamerasOption = None,
+    size: options.PictureSizeOption = 84,
+    device_option: options.DeviceOptions = None,
+    scale: options.ScaleOption = 1.0,
+    mirror: options.MirrorOption = False,
+    host: options.HostOption = "127.0.0.1",
+    port: options.PortOption = None,
     page: PageOption = True,
-    gripper: GripperOption = None,
-    base: BaseOption = None,
-    catalogue: CatalogueOption = None,
+    gripper: options.GripperOption = None,
+    base: options.BaseOption = None,
+    catalogue: options.CatalogueOption = None,
 ) -> None:
     """Record episodes in robomimic's HDF5 layout; each is safe once it is kept."""
     import wbc_suite
@@ -93,10 +78,10 @@ def record(
     by_hand = is_device(device)
     rate = rate or (BY_HAND if by_hand else BY_POLICY)
     controller = controller or ("WHOLE_BODY_IK" if by_hand else None)
-    arguments = environment_arguments(
+    arguments = options.environment_arguments(
         robots=robots, controller=controller, gripper=gripper, base=base
     )
-    arguments |= camera_arguments(camera, size) | {"control_freq": rate}
+    arguments |= options.camera_arguments(camera, size) | {"control_freq": rate}
     if horizon or by_hand:
         arguments["horizon"] = round(ONE_DAY * rate) if by_hand else horizon
     make = device_maker(device, device_option) if by_hand else None
