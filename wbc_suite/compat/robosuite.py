@@ -119,11 +119,7 @@ def make(env_name: str, robots: Any = None, **kwargs: Any) -> RobosuiteEnv:
 
 
 def make_from_env_args(env_args: str | dict[str, Any]) -> RobosuiteEnv:
-    """Make the environment of a dataset's `env_args`, JSON text or a dictionary.
-
-    Raises:
-        DatasetError: If there is no `env_name` in it.
-    """
+    """Make the environment of a dataset's `env_args`, JSON text or a dictionary."""
     data = json.loads(env_args) if isinstance(env_args, str) else env_args
     if "env_name" not in data:
         raise DatasetError("env_args has no 'env_name'.")
@@ -131,11 +127,7 @@ def make_from_env_args(env_args: str | dict[str, Any]) -> RobosuiteEnv:
 
 
 def make_from_dataset(path: str | Path) -> RobosuiteEnv:
-    """Make the environment of an HDF5 dataset, by its attribute `env_args`.
-
-    Raises:
-        DatasetError: If the file cannot be read or has no such attribute.
-    """
+    """Make the environment of an HDF5 dataset, by its attribute `env_args`."""
     import h5py
 
     from wbc_suite.recording import hdf5_reader

@@ -23,17 +23,12 @@ class RobosuiteEnv:
         kwargs: Our arguments.
 
     Attributes:
-        env: Our environment.
+        env: Our environment; `render`, `close` and `horizon` are its.
         sim: Model and state, under robosuite's names; `model` is its model.
         robots: The robots, likewise.
         viewer: Stand-in for robosuite's window; does nothing.
-        name: Name of the benchmark.
-        action_dim: Length of an action.
-        horizon: Number of actions in an episode.
         control_freq: Actions per second, Hz.
         model_timestep: Duration of a physics step, s.
-        render: Shows the scene on a page, if `has_renderer` was set.
-        close: Closes renderers and page.
     """
 
     def __init__(
@@ -139,11 +134,7 @@ class RobosuiteEnv:
         return xml
 
     def reset_from_xml_string(self, xml: str) -> None:
-        """Start an episode in the scene of a recording, which must be this one.
-
-        Raises:
-            DatasetError: If the text is another scene's, such as robosuite's own.
-        """
+        """Start an episode in a recording's scene; raise DatasetError for others."""
         if xml != self.sim.model.get_xml():
             raise DatasetError(
                 "The recording's scene is not this environment's: states of other "

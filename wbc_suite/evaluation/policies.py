@@ -33,10 +33,8 @@ def random(env: RobotEnv, rng: np.random.Generator) -> Policy:
 def scripted(env: RobotEnv, rng: np.random.Generator) -> Policy:
     """Make a policy that picks up the cube of Lift: above it, down, close, up.
 
-    It commands differences of position, as `OSC_POSE` takes them, for one arm.
-
-    Raises:
-        ConfigError: If the environment is another one.
+    It commands differences of position, as `OSC_POSE` takes them, for one arm. Raises
+    ConfigError in other environments.
     """
     names = [part.name for part in env.action_layout.slices]
     if env.benchmark.name != "Lift" or names != ["right", "right_gripper"]:
@@ -82,8 +80,7 @@ def make_policy(name: str, env: RobotEnv, seed: int) -> Policy:
 
     Raises:
         UnknownNameError: If there is no such policy.
-        ConfigError: If its module or its function cannot be found, or it cannot drive
-            this environment.
+        ConfigError: If its function cannot be found, or it cannot drive this one.
     """
     rng = np.random.default_rng([seed, 1])
     if ":" not in name:

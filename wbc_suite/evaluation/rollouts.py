@@ -67,16 +67,11 @@ def plan_rollouts(cases: Iterable[Case], *, seeds: range, chunk: int) -> list[Wo
 
 
 def run_rollouts(item: WorkItem, folder: Path) -> dict[str, Any]:
-    """Run the episodes of an item; the work of `run_items`.
+    """Run an item; return `episodes`, one dictionary per episode.
 
-    An episode counts as a success if the benchmark is solved at any step
-    (`succeeded`), or at the last step (`success`). A physics error ends it as a
-    failure.
-
-    Recordings go to `episodes` in the folder, one file per item.
-
-    Returns:
-        `episodes`: one dictionary per episode.
+    An episode counts as a success if the benchmark is solved at any step (`succeeded`),
+    or at the last step (`success`). A physics error ends it as a failure. Recordings go
+    to `episodes` in the folder, one file per item.
     """
     payload = item.payload
     env = inner = make(

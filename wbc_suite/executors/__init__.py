@@ -22,11 +22,9 @@ EXECUTORS = ("process", "serial", "ray", "slurm")
 
 
 def make_executor(name: str, *, workers: int | None = None) -> Executor:
-    """Make an executor by name.
+    """Make an executor by name, one of `EXECUTORS`.
 
-    Args:
-        name: One of `EXECUTORS`.
-        workers: Number of items that run at once; None for one per processor.
+    `workers` is the number of items that run at once; None for one per processor.
 
     Raises:
         UnknownNameError: If there is no such executor.

@@ -15,14 +15,12 @@ POLL_SECONDS = 0.5
 class RayCluster:
     """Runs items as Ray tasks; Ray runs those of dead workers again, elsewhere.
 
-    The cluster is that of `RAY_ADDRESS`, or else one on this machine.
+    The cluster is that of `RAY_ADDRESS`, or else one on this machine. Needs the extra
+    `ray`, or raises ConfigError.
 
     Args:
         workers: Number of items that run at once; None for one per processor.
         attempts: How often an item may lose its worker before it fails.
-
-    Raises:
-        ConfigError: If Ray is not installed (`pip install 'wbc-suite[ray]'`).
 
     Source: https://docs.ray.io/en/latest/ray-core/fault_tolerance/tasks.html
     """
@@ -65,13 +63,12 @@ class RayCluster:
 class Slurm:
     """Runs every item as a job of its own; logs are in the folder's `jobs`.
 
+    Needs the extra `slurm`, or raises ConfigError.
+
     Args:
         cluster: "slurm", "local" for processes of this machine, None to detect it.
         attempts: How often a job is submitted before its item fails.
         parameters: Parameters of submitit, such as `timeout_min`, `slurm_partition`.
-
-    Raises:
-        ConfigError: If submitit is not installed (`pip install 'wbc-suite[slurm]'`).
 
     Source: https://github.com/facebookincubator/submitit
     """

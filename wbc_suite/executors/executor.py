@@ -43,13 +43,7 @@ class WorkItem:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Outcome:
-    """Result or error of an item.
-
-    Attributes:
-        name: The item's name.
-        result: What the work returned, plain JSON data; empty after an error.
-        error: Error message, or None.
-    """
+    """Result of an item, plain JSON data, or its error message."""
 
     name: str
     result: Mapping[str, Any] = field(default_factory=dict)

@@ -16,10 +16,8 @@ MAX_BYTES = 64 << 20
 class ResultFolder:
     """One JSON file per finished item, in the subfolder `results` of a folder.
 
-    A file is complete or absent: it is written under another name and renamed.
-
-    Raises:
-        DatasetError: If the folder, which is made if missing, cannot be written to.
+    A file is complete or absent: it is written under another name and renamed. Raises
+    DatasetError if the folder, which is made if missing, cannot be written to.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -75,8 +73,8 @@ def run_items(
     items do not run again, failed ones do.
 
     Args:
-        work: Function of an importable module; see `Work`.
-        items: All items, finished or not; their names must differ.
+        work: See `Work`.
+        items: All items, finished or not.
         folder: Folder of the results, and of what the work writes.
         executor: Runs the items.
         on_outcome: Called with every item and its outcome; at once for items that

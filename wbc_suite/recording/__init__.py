@@ -1,6 +1,7 @@
 """Demonstrations: recording, storage, replay and conversion.
 
-Modules that need robots are loaded when they are first used.
+What cannot be read, written or replayed is a DatasetError. Modules that need robots are
+loaded when they are first used.
 """
 
 import importlib

@@ -12,11 +12,7 @@ RESERVE = 1 << 20
 
 
 def check_folder(folder: Path, needed: int = 0) -> None:
-    """Make a folder if it is missing, and check that `needed` bytes fit into it.
-
-    Raises:
-        DatasetError: If it cannot be made, is read-only, or has less space.
-    """
+    """Make a folder if missing; raise DatasetError if `needed` bytes do not fit."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         probe = folder / f".wbc-suite-{os.getpid()}"
@@ -36,11 +32,7 @@ def check_folder(folder: Path, needed: int = 0) -> None:
 
 
 def new_folder(folder: Path, content: str) -> None:
-    """Make an empty folder for `content`, which the message names.
-
-    Raises:
-        DatasetError: If it is not empty, or see `check_folder`.
-    """
+    """Make a folder for `content`; raise DatasetError if it exists and is not empty."""
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise DatasetError(f"'{folder}' is not empty; {content} needs a new folder.")
     check_folder(folder)

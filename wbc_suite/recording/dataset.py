@@ -110,11 +110,7 @@ class Dataset:
             return _dataset(group, "actions").shape[0]
 
     def column(self, name: str, key: str) -> Column:
-        """Return one column of an episode.
-
-        Raises:
-            UnknownNameError: If there is no such column.
-        """
+        """Return one column of an episode, or raise UnknownNameError."""
         path, group = self._find(name)
         with hdf5_reader.reading(path):
             columns = _columns(group)

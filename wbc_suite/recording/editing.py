@@ -29,9 +29,7 @@ from wbc_suite.recording.hdf5_writer import write_dataset
 class Finding:
     """Result of reading an episode, or a file that cannot be opened.
 
-    Attributes:
-        place: File, and name of the episode.
-        problem: Description of the damage; None if there is none.
+    `place` is the file and the name of the episode; `problem` is None without damage.
     """
 
     place: str
@@ -111,10 +109,8 @@ def split(
 ) -> Mapping[str, Sequence[str]]:
     """Write the masks `train` and `valid` into a file, as robomimic reads them.
 
-    `valid` is the share of the episodes for validation, drawn with the seed.
-
-    Raises:
-        DatasetError: If either mask would be empty.
+    `valid` is the share of the episodes for validation, drawn with the seed. Raises
+    DatasetError if either mask would be empty.
     """
     path = Path(path)
     with Dataset(path) as dataset:
@@ -139,10 +135,8 @@ def filter_dataset(
 ) -> int:
     """Write the episodes for which `keep(dataset, name)` is true; return their number.
 
-    They keep their names; masks keep the names that remain.
-
-    Raises:
-        DatasetError: If none remains.
+    They keep their names; masks keep the names that remain. Raises DatasetError if none
+    remains.
     """
     with Dataset(path) as dataset:
         names = [name for name in dataset.names if keep(dataset, name)]

@@ -70,8 +70,7 @@ def fingerprint(columns: Mapping[str, Column], final_state: Column | None) -> st
 def pieces(column: Column) -> Iterator[tuple[int, Column]]:
     """Yield contiguous pieces of at most a megabyte, with the number of the first row.
 
-    Pages of a mapped file are released after use; they would count as memory of this
-    process.
+    Pages of a mapped file are released after use, or they would count as memory.
     """
     if not column.ndim:
         column = np.reshape(column, 1)

@@ -28,8 +28,7 @@ class Store:
 
     Args:
         path: The file; episodes are added to those in it.
-        header: Attributes of `data`; those of a file that exists must be for the same
-            environment.
+        header: Attributes of `data`; a file that exists must be of the same `env_args`.
 
     Raises:
         DatasetError: If the folder cannot be written to, the disk is nearly full, the
@@ -64,11 +63,7 @@ class Store:
             self._lock.close()
 
     def add(self, episode: Episode) -> str:
-        """Write an episode to disk; return its name.
-
-        Raises:
-            DatasetError: If it cannot be written; those before it are safe.
-        """
+        """Write an episode to disk; return its name. Those before it are safe."""
         name = f"demo_{self._next}"
         named = replace(episode, name=name)
         file = self._parts / f"episode_{self._next:09d}.hdf5"
@@ -88,9 +83,8 @@ class Store:
     def close(self) -> None:
         """Merge all episodes into the file, and delete the files beside it.
 
-        Raises:
-            DatasetError: If it cannot be written; then episodes stay beside the file,
-                where `Dataset` reads them, and `repair` can merge them.
+        After an error, episodes stay beside the file, where `Dataset` reads them, and
+        `repair` can merge them.
         """
         if self._lock.closed:
             return

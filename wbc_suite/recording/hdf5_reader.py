@@ -68,12 +68,7 @@ def child_names(group: h5py.Group) -> list[str]:
 
 
 def child(group: h5py.Group, name: str, kind: type[Node]) -> Node | None:
-    """Return a member of a group, or None when there is none of that name.
-
-    Raises:
-        DatasetError: If the name is not allowed, or is a link, or the member is of
-            another kind.
-    """
+    """Return a member of a group, or None; raise DatasetError for links."""
     if len(name) > MAX_NAME or not _PLAIN.match(name) or name in (".", ".."):
         raise DatasetError(f"'{name:.40}' is no name for a part of a dataset.")
     link = group.get(name, getlink=True)
@@ -102,11 +97,7 @@ def attribute_names(node: h5py.Group | h5py.Dataset) -> list[str]:
 def attribute(
     node: h5py.Group | h5py.Dataset, name: str
 ) -> str | int | float | bool | None:
-    """Return a single text or number, or None when there is no such attribute.
-
-    Raises:
-        DatasetError: If it is something else, or too long.
-    """
+    """Return a text or number, or None if missing; raise DatasetError for others."""
     if name not in node.attrs:
         return None
     held = node.attrs.get_id(name)

@@ -93,10 +93,7 @@ def open_late_errors(path: Path) -> Iterator[Any]:
     """Open a new file for h5py that reports write errors when it is closed.
 
     HDF5 crashes if a write fails on a full disk. Here nothing more is written after
-    the first error; it is raised at the end, and the file must not be used.
-
-    Raises:
-        OSError: If something could not be written.
+    the first OSError; it is raised at the end, and the file must not be used.
     """
     file = _LateErrorFile(os.open(path, os.O_RDWR | os.O_CREAT | os.O_TRUNC, 0o666))
     try:

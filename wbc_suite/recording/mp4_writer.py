@@ -15,12 +15,8 @@ class Mp4Writer:
     Args:
         path: File to write.
         rate: Pictures per second.
-        extra: The extra that an error names if `av` is missing.
+        extra: The extra that a DatasetError names if `av` is missing.
         options: Options of the encoder libx264.
-
-    Raises:
-        DatasetError: If `av` is not installed.
-        OSError: If the file cannot be written.
     """
 
     def __init__(

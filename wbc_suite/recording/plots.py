@@ -16,11 +16,7 @@ MOST = 400
 
 
 def write_plots(dataset: Dataset, path: Path) -> None:
-    """Draw lengths by episode, and how actions and rewards spread.
-
-    Raises:
-        DatasetError: If there are no episodes, or the file cannot be written.
-    """
+    """Draw lengths by episode, and how actions and rewards spread."""
     names = dataset.names[:MOST]
     if not names:
         raise DatasetError(f"'{dataset.path}' has no episodes to plot.")
@@ -39,11 +35,7 @@ def write_plots(dataset: Dataset, path: Path) -> None:
 
 
 def save_picture(picture: Image.Image, path: Path) -> None:
-    """Write a picture in the format of the path's suffix; make its folder.
-
-    Raises:
-        DatasetError: If it cannot be written.
-    """
+    """Write a picture in the format of the path's suffix, or raise DatasetError."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         picture.save(path)

@@ -23,11 +23,8 @@ class Recorder:
 
     Args:
         env: An environment of this package, wrapped or not.
-        path: The file; episodes are added to those in it.
+        path: The file; see `Store`.
         next_obs: Whether observations after each action are stored too.
-
-    Raises:
-        DatasetError: If it is another environment, or see `Store`.
 
     Attributes:
         succeeded: Whether the benchmark counts as solved at the last action.
@@ -87,11 +84,7 @@ class Recorder:
         info: Mapping[str, Any],
         step_time: float,
     ) -> None:
-        """Record a step that the environment has just taken.
-
-        Raises:
-            DatasetError: If the disk is full; then the episode is lost.
-        """
+        """Record a step that was taken; if the disk is full, the episode is lost."""
         success = bool(info.get("success", False))
         clipped = int(info.get("clipped", 0))
         stamp = time.monotonic() - self._began
@@ -107,12 +100,8 @@ class Recorder:
     def keep(self, success: bool | None = None) -> str | None:
         """End the episode and store it; return its name, or None if it has no steps.
 
-        Args:
-            success: Success by an operator's judgement; None for the benchmark's.
-
-        Raises:
-            DatasetError: If it cannot be stored; it stays in progress, and `keep` may
-                be called again.
+        `success` is an operator's judgement; None for the benchmark's. An episode that
+        cannot be stored stays in progress, and `keep` may be called again.
         """
         if self._facts is None or not len(self._rows):
             self.discard()

@@ -133,11 +133,8 @@ class StepBuffer:
     ) -> None:
         """Complete a step, and begin the next one with the observation after it.
 
-        `outcome` has the values of `OUTCOME`.
-
-        Raises:
-            DatasetError: If shapes or keys differ from the first step's, or the disk
-                is full.
+        `outcome` has the values of `OUTCOME`. Raises DatasetError if shapes or keys
+        differ from the first step's, or the disk is full.
         """
         at = self._rows.at
         try:

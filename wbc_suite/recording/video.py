@@ -28,11 +28,7 @@ LABEL = 14  # pixels
 
 
 def check_video(path: Path) -> None:
-    """Check that a video can be written, before anything is drawn.
-
-    Raises:
-        DatasetError: If the format is unknown, or its package is not installed.
-    """
+    """Raise DatasetError for an unknown format, or a package that is missing."""
     suffix = path.suffix.lower()
     if suffix == ".mp4":
         import_extra("av", "video")
@@ -57,11 +53,7 @@ def episode_pictures(
 
 
 def write_video(pictures: Iterable[Picture], path: Path, *, rate: float) -> None:
-    """Write pictures as .mp4 (H.264, needs `av`), .webp or .gif.
-
-    Raises:
-        DatasetError: If it cannot be written.
-    """
+    """Write pictures as .mp4 (H.264, needs `av`), .webp or .gif."""
     check_video(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -80,9 +72,6 @@ def write_sheet(dataset: Dataset, path: Path, *, camera: str = "agentview") -> N
 
     Recorded pictures of the camera are used if there are any; otherwise recorded
     states are rendered.
-
-    Raises:
-        DatasetError: If there is nothing to draw, or the file cannot be written.
     """
     names = dataset.names[:SHEET_ROWS]
     if not names:

@@ -14,11 +14,7 @@ from wbc_suite.errors import ConfigError
 class Indicators(gymnasium.Wrapper[Any, Any, Any, Any]):
     """Draws a disc into `render`'s pictures at each hand and at chosen places.
 
-    Observed pictures have no marks.
-
-    Args:
-        env: One of our environments with `render_mode="rgb_array"`.
-        radius: Radius of a disc, m.
+    Observed pictures have no marks. The environment has `render_mode="rgb_array"`.
 
     Attributes:
         places: Places in the world and colours, by name; may be changed.

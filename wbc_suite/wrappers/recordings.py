@@ -26,9 +26,6 @@ class DataCollection(gymnasium.Wrapper[Any, Any, Any, Any]):
         automatic: Whether each episode is recorded from its reset on, and kept when it
             ends or the next one begins. Otherwise call `recorder.begin` and `keep`.
         next_obs: See `Recorder`.
-
-    Attributes:
-        recorder: The recorder of episodes.
     """
 
     def __init__(
