@@ -222,8 +222,7 @@ def extract(
     size: options.PictureSizeOption = 84,
     depth: Annotated[bool, typer.Option("--depth", help="See depth too.")] = False,
     shaped: Annotated[
-        bool,
-        typer.Option("--shaped", help="Reward progress, not success alone."),
+        bool, typer.Option("--shaped", help="Reward progress, not success alone.")
     ] = False,
     executor: options.ExecutorOption = "process",
     workers: Annotated[

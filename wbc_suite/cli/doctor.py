@@ -15,10 +15,8 @@ from wbc_suite.errors import WbcError
 
 BASE_SOLVERS = ("daqp", "proxqp", "osqp")
 """QP solvers that come with the package, by the names `qpsolvers` gives them."""
-EXTRA_SOLVERS = ("piqp", "clarabel", "quadprog")
-"""QP solvers that come with the extra `solvers`."""
-MUJOCO_PARTS = ("mujoco", "mujoco-core", "mujoco-studio")
-"""MuJoCo 4 is three distributions of one version."""
+EXTRA_SOLVERS = ("piqp", "clarabel", "quadprog")  # of the extra `solvers`
+MUJOCO_PARTS = ("mujoco", "mujoco-core", "mujoco-studio")  # of one version
 REPAIR_MUJOCO = "pip install --force-reinstall --no-deps " + " ".join(MUJOCO_PARTS)
 
 _MARKS = {"fine": "ok  ", "optional": "note", "broken": "BAD "}

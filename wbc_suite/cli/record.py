@@ -13,8 +13,7 @@ from wbc_suite.cli.teleop import ONE_DAY, device_maker, drive, stages_of
 if TYPE_CHECKING:
     from wbc_suite.wrappers import DataCollection
 
-BY_POLICY, BY_HAND = 20.0, 100.0
-"""Hz; at 20 Hz an operator notices the latency of 50 ms."""
+BY_POLICY, BY_HAND = 20.0, 100.0  # Hz; an operator notices a latency of 50 ms
 
 
 OutOption = Annotated[
@@ -101,14 +100,13 @@ def record(
                 device=make(env),
                 stages=stages_of(device=True, scale=scale, mirror=mirror),
                 episode_control=EpisodeControl(
-                    collected.recorder, seed=seed, plan=plan, report=_print_message
+                    collected.recorder,
+                    seed=seed,
+                    plan=plan,
+                    report=lambda message: print(f"  {message}", flush=True),
                 ),
             )
     print(f"{out}: {collected.recorder.kept} episodes.")
-
-
-def _print_message(message: str) -> None:
-    print(f"  {message}", flush=True)
 
 
 def _collect(

@@ -78,8 +78,7 @@ def export_robot(
         typer.Option("--output", "-o", help="File to write; otherwise it is printed."),
     ] = None,
     mend_inertias: Annotated[
-        bool,
-        typer.Option(help="Replace inertias that no body has (of a URDF file)."),
+        bool, typer.Option(help="Replace inertias that no body has (of a URDF file).")
     ] = False,
     gripper: options.GripperOption = None,
     base: options.BaseOption = None,

@@ -33,8 +33,7 @@ __all__ = [
     "make_from_env_args",
 ]
 
-__version__ = "1.5.2"
-"""The robosuite version of this interface."""
+__version__ = "1.5.2"  # the robosuite version of this interface
 
 _IGNORED = frozenset(
     {

@@ -9,8 +9,7 @@ from typing import Any
 from wbc_suite.errors import DatasetError
 from wbc_suite.executors.executor import Executor, Outcome, Work, WorkItem
 
-MAX_BYTES = 64 << 20
-"""Larger result files are not read."""
+MAX_BYTES = 64 << 20  # larger result files are not read
 
 
 class ResultFolder:

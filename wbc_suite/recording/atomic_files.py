@@ -7,8 +7,7 @@ from pathlib import Path
 
 from wbc_suite.errors import DatasetError
 
-RESERVE = 1 << 20
-"""Bytes that must be left on the disk after a file is written."""
+RESERVE = 1 << 20  # bytes that must be left on the disk after a file is written
 
 
 def check_folder(folder: Path, needed: int = 0) -> None:

@@ -2,6 +2,7 @@
 
 import json
 import platform
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
@@ -15,12 +16,12 @@ from wbc_suite.errors import DatasetError, WbcError
 from wbc_suite.recording.dataset import Dataset
 from wbc_suite.recording.episode import Fact
 
-GYM_TYPE = 2
-"""Type of Gymnasium environments in robomimic's `env_args`."""
+GYM_TYPE = 2  # type of Gymnasium environments in robomimic's `env_args`
 PACKAGES = ("mujoco", "pin", "numpy", "gymnasium", "h5py", "daqp")
 MAX_TEXT = 1_000_000  # characters of env_args
 _SHOWN = {"render_mode", "render_camera", "render_size", "render_preset", "skin"}
 """Arguments of rendering, which do not change an episode."""
+_PATH = re.compile(r"[/\\]|\.(toml|json|xml|urdf|py)\Z", re.IGNORECASE)
 _NAMES = ("robots", "controller_configs", "gripper_types", "base_types")
 
 
@@ -196,13 +197,8 @@ def _refuse_paths(values: list[Any]) -> None:
             _refuse_paths(list(value.values()))
         elif isinstance(value, list):
             _refuse_paths(value)
-        elif isinstance(value, str) and _looks_like_path(value):
+        elif isinstance(value, str) and _PATH.search(value):
             raise DatasetError(
                 f"The dataset names a file, '{value[:80]}'. If you trust it, use "
                 "--trust-files."
             )
-
-
-def _looks_like_path(text: str) -> bool:
-    ends = (".toml", ".json", ".xml", ".urdf", ".py")
-    return "/" in text or "\\" in text or text.lower().endswith(ends)

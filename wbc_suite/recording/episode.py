@@ -9,13 +9,10 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-Column: TypeAlias = NDArray[Any]
-"""One row per action."""
-Fact: TypeAlias = str | int | float | bool
-"""A value about a whole episode."""
+Column: TypeAlias = NDArray[Any]  # one row per action
+Fact: TypeAlias = str | int | float | bool  # a value about a whole episode
 
-PIECE = 1 << 20
-"""Bytes that are read at once while a column is written."""
+PIECE = 1 << 20  # bytes that are read at once while a column is written
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -19,8 +19,7 @@ from wbc_suite.recording.dataset import Dataset, part_files, parts_folder
 from wbc_suite.recording.episode import Episode, Fact
 from wbc_suite.recording.hdf5_writer import uncompressed_bytes, write_dataset
 
-ENOUGH = 20 << 20
-"""Bytes that must be free when recording begins."""
+ENOUGH = 20 << 20  # bytes that must be free when recording begins
 
 
 class Store:

@@ -19,8 +19,7 @@ from wbc_suite.recording.hdf5_writer import write_dataset
 from wbc_suite.recording.replaying import play_states
 from wbc_suite.recording.resumable_work import run_pieces, work_folder
 
-PART = 10
-"""Maximum number of episodes of a work item; each item makes an environment."""
+PART = 10  # maximum number of episodes of a work item; each item makes an environment
 
 
 def extract(

@@ -21,18 +21,12 @@ import wbc_suite
 from wbc_suite.errors import DatasetError
 from wbc_suite.recording import hdf5_reader
 
-CPU_SECONDS = 10
-"""Processor time for the start and for small files, s."""
-BYTES_PER_SECOND = 10_000_000
-"""Larger files get one second more for so many bytes."""
-MEMORY_BYTES = 4 << 30
-"""Address space of the child."""
-WALL_FACTOR = 10
-"""Wall time over processor time, for a busy machine or a slow disk."""
-SPARSE_FROM, SPARSE = 1 << 30, 20
-"""A file this large, with less than one in so many bytes on disk, is a bomb."""
-OUT_OF_MEMORY = 3
-"""Exit code of the child."""
+CPU_SECONDS = 10  # processor time for the start and for small files, s
+BYTES_PER_SECOND = 10_000_000  # larger files get one second more for so many bytes
+MEMORY_BYTES = 4 << 30  # address space of the child
+WALL_FACTOR = 10  # wall time over processor time, for a busy machine or a slow disk
+SPARSE_FROM, SPARSE = 1 << 30, 20  # larger files with less than 1/20 on disk: bombs
+OUT_OF_MEMORY = 3  # exit code of the child
 TOLERATED = (*hdf5_reader.ERRORS, DatasetError)
 """Errors that the child leaves to the parent, which meets them where they matter."""
 T = TypeVar("T")

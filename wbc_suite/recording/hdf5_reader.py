@@ -22,12 +22,10 @@ MAX_ATTRIBUTES = 1000  # of a group or dataset
 MAX_NAME = 200  # characters
 MAX_BYTES = 1 << 32  # of one column
 MAX_TEXT = 1 << 26  # characters of an attribute
-MAX_RATIO = 1100
-"""Bytes that one stored byte can stand for; deflate's limit is 1032."""
+MAX_RATIO = 1100  # bytes that one stored byte can stand for; deflate's limit is 1032
 FILTERS = {1: "gzip", 2: "shuffle", 3: "fletcher32", 32000: "lzf"}
 """By HDF5's numbers; others load libraries from a search path."""
-HIGHEST_CHUNK = 1 << 20
-"""Bytes of rows; larger chunks would be unpacked again for each slice."""
+HIGHEST_CHUNK = 1 << 20  # bytes; larger ones are unpacked for each slice
 ERRORS = (
     *(OSError, ValueError, LookupError, TypeError, RuntimeError),
     *(AttributeError, OverflowError),

@@ -18,8 +18,7 @@ from wbc_suite.recording.atomic_files import check_folder, replace_file
 from wbc_suite.recording.episode import Column, Episode, Fact, fingerprint, pieces
 
 SCHEMA_VERSION = 1
-PICTURE_BYTES = 10_000
-"""Rows of bytes of at least this size are pictures, and are compressed."""
+PICTURE_BYTES = 10_000  # rows of at least so many are pictures, and are compressed
 
 
 def uncompressed_bytes(episode: Episode) -> int:

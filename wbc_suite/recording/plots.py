@@ -11,8 +11,7 @@ from wbc_suite.typing import Vector
 
 WIDTH, HEIGHT, MARGIN = 720, 150, 28  # pixels of one plot
 INK, CURVE, GOOD, BAD = "#333333", "#4a6fa5", "#3f8f5b", "#c8553d"
-MOST = 400
-"""Episodes and points that are drawn at most."""
+MOST = 400  # episodes and points that are drawn at most
 
 
 def write_plots(dataset: Dataset, path: Path) -> None:

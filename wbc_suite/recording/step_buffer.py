@@ -15,8 +15,7 @@ from wbc_suite.envs import RobotEnv
 from wbc_suite.errors import DatasetError
 from wbc_suite.recording.episode import Column
 
-BLOCK_BYTES = 1 << 16
-"""Rows are written to disk in blocks of so many bytes."""
+BLOCK_BYTES = 1 << 16  # rows are written to disk in blocks of so many bytes
 
 OUTCOME = {"rewards": "f8", "dones": "i8", "clipped": "i8"}
 OUTCOME |= {"step_time": "f8", "stamp": "f8"}

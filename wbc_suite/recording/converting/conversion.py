@@ -4,7 +4,6 @@ import shutil
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 from wbc_suite.errors import DatasetError, UnknownNameError
@@ -25,15 +24,13 @@ from wbc_suite.recording.converting.robomimic import ROBOMIMIC
 from wbc_suite.recording.dataset import Dataset
 from wbc_suite.recording.resumable_work import run_pieces, work_folder
 
-LAYOUTS: Mapping[str, Layout] = MappingProxyType(
-    {
-        "robomimic": ROBOMIMIC,
-        "npz": NPZ,
-        "lerobot": LEROBOT,
-        "minari": MINARI,
-        "mcap": MCAP,
-    }
-)
+LAYOUTS: Mapping[str, Layout] = {
+    "robomimic": ROBOMIMIC,
+    "npz": NPZ,
+    "lerobot": LEROBOT,
+    "minari": MINARI,
+    "mcap": MCAP,
+}
 
 
 def convert(
@@ -55,13 +52,12 @@ def convert(
         out: File or folder to write.
         layout: One of `LAYOUTS`.
         on_progress: Called with the number of episodes since the last call.
-        executor: Runs the pieces; this process, in one piece, when left out.
+        executor: Runs the pieces; None for this process and one piece.
         workers: Number of workers that the episodes are split among.
 
     Raises:
         UnknownNameError: If there is no such layout.
-        DatasetError: If the recording cannot be read, a package is missing, or the
-            path cannot be written.
+        DatasetError: If a package is missing, or see `Dataset`.
     """
     source, out = Path(source), Path(out)
     if layout not in LAYOUTS:
@@ -71,27 +67,23 @@ def convert(
         if not len(dataset):
             raise DatasetError(f"'{source}' has no episodes.")
         chosen.begin(out)
-        if executor is None:
-            whole = whole_dataset(dataset)
-            results = [chosen.write(dataset, whole, out, on_progress) or {}]
-            chosen.finish(dataset, out, results)
-            return out
         pieces = [whole_dataset(dataset)]
+        if executor is None:
+            result = chosen.write(dataset, pieces[0], out, on_progress)
+            chosen.finish(dataset, out, [result or {}])
+            return out
         if chosen.in_pieces:
             pieces = split_dataset(dataset, workers)
-        payloads = [
-            {"layout": layout, "out": out.name, "piece": asdict(piece)}
-            for piece in pieces
-        ]
+        common = {"layout": layout, "out": out.name}
         done = run_pieces(
             convert_piece,
-            payloads,
+            [common | {"piece": asdict(piece)} for piece in pieces],
             source=source,
             out=out,
             executor=executor,
             on_piece=lambda item: on_progress(len(item.payload["piece"]["names"])),
         )
-        written = _written(work_folder(out), out.name)
+        written = work_folder(out) / "written" / out.name
         chosen.finish(dataset, written, [result for _, result in done])
     delete_temporaries(written)
     _move(written, out)
@@ -100,20 +92,18 @@ def convert(
 
 
 def convert_piece(item: WorkItem, folder: Path) -> Mapping[str, Any]:
-    """Write one piece into the work folder, in place of what a dead worker left."""
+    """Write one piece in the work folder, in place of what a dead worker left.
+
+    The file or folder has its final name, which layouts may use.
+    """
     payload = item.payload
     layout, piece = LAYOUTS[payload["layout"]], Piece(**payload["piece"])
-    written = _written(folder, payload["out"])
+    written = folder / "written" / payload["out"]
     if not layout.in_pieces:
         shutil.rmtree(written, ignore_errors=True)
     written.parent.mkdir(parents=True, exist_ok=True)
     with Dataset(payload["source"]) as dataset:
         return layout.write(dataset, piece, written, lambda _: None) or {}
-
-
-def _written(folder: Path, name: str) -> Path:
-    """Return where pieces are written, under the final name, which layouts may use."""
-    return folder / "written" / name
 
 
 def _move(written: Path, out: Path) -> None:

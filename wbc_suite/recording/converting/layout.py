@@ -8,8 +8,7 @@ from typing import Any, TypeAlias
 
 from wbc_suite.recording.dataset import Dataset
 
-MAX_EPISODES = 50
-"""Episodes of a piece, which are lost with a killed worker."""
+MAX_EPISODES = 50  # episodes of a piece, which are lost with a killed worker
 
 Progress: TypeAlias = Callable[[int], None]
 """Called with the number of episodes that were written since the last call."""

@@ -34,10 +34,8 @@ CHUNK = 1000  # files in a folder
 MOMENTS = ("min", "max", "mean", "std")
 QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
 SHAPE = ("height", "width", "channels")
-PICTURE = "_image"
-"""How keys of pictures end."""
-PICTURES_IN_STATS = 20
-"""Of an episode, evenly spread; all of them would take minutes."""
+PICTURE = "_image"  # how keys of pictures end
+PICTURES_IN_STATS = 20  # of an episode, evenly spread; all of them would take minutes
 
 Stats = dict[str, Any]
 

@@ -108,9 +108,8 @@ class _EpisodeWriter:
         self, topic: str, schema: str, time: int, message: Any, metadata: dict[str, str]
     ) -> None:
         if schema not in self._schemas:
-            described = {"title": schema, "type": "object"}
-            described["properties"] = SCHEMAS[schema]
-            text = json.dumps(described).encode()
+            table = {"title": schema, "type": "object", "properties": SCHEMAS[schema]}
+            text = json.dumps(table).encode()
             number = self._log.register_schema(schema, "jsonschema", text)
             self._schemas[schema] = number
         if topic not in self._channels:
