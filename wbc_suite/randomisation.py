@@ -240,10 +240,7 @@ def _gains(model: Any, share: float, rng: np.random.Generator) -> None:
 def _scale_simple_inertia(
     model: Any, factors: Array, *, rotation_only: bool = False
 ) -> None:
-    """Scale the mass matrix of simple bodies, which MuJoCo takes from `dof_M0`.
-
-    `factors` has shape (nbody,).
-    """
+    """Scale the mass matrix of simple bodies, which MuJoCo takes from `dof_M0`."""
     scaled = model.dof_simplenum > 0
     if rotation_only:
         joint = model.dof_jntid

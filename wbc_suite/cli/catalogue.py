@@ -93,7 +93,6 @@ _LISTS = {
 
 
 def _controlled(content: dict[str, Any]) -> str:
-    """Return what a controller's file controls."""
     if "body_parts" in content:
         parts = content["body_parts"].items()
         return ", ".join(f"{name}: {part['type']}" for name, part in parts)
@@ -122,13 +121,26 @@ def check_file(
     content = read_toml(file) if file.suffix == ".toml" else {"component": None}
     controls = not content.keys().isdisjoint(("body_parts", "frame", "gait"))
     if "name" in content:
-        print(f"{file}: fine. {_benchmark(file)}")
+        from wbc_suite.benchmark import load_benchmark
+
+        benchmark = load_benchmark(file)
+        found = f"Benchmark '{benchmark.name}': {benchmark.horizon} actions an episode."
     elif file.suffix == ".json" or (controls and "component" not in content):
-        print(f"{file}: fine. {_controller(file, robot)}")
+        from wbc_suite.control import load_composite_controller_config
+
+        config = load_composite_controller_config(file, robot)
+        found = f"{config['type']} of {_controlled(config)}."
     elif "provider" in content:
-        print(f"{file}: fine. {_skin(file)}")
+        from wbc_suite.robot.skins import read_skin
+
+        skin = read_skin(file)
+        meshes = sum(len(pieces) for pieces in skin.link.values())
+        found = (
+            f"Skin of {len(skin.link)} links with {meshes} meshes of {skin.provider}."
+        )
     else:
-        print(f"{file}: fine. {_robot(file)}")
+        found = _robot(file)
+    print(f"{file}: fine. {found}")
 
 
 def _robot(file: Path) -> str:
@@ -142,28 +154,6 @@ def _robot(file: Path) -> str:
         f"{robot.mass:.1f} kg, {robot.root.kind} root; MuJoCo and Pinocchio models "
         f"with nv = {simulated.nv} and {computed.nv}."
     )
-
-
-def _skin(file: Path) -> str:
-    from wbc_suite.robot.skins import read_skin
-
-    table = read_skin(file)
-    meshes = sum(len(pieces) for pieces in table.link.values())
-    return f"Skin of {len(table.link)} links with {meshes} meshes of {table.provider}."
-
-
-def _benchmark(file: Path) -> str:
-    from wbc_suite.benchmark import load_benchmark
-
-    benchmark = load_benchmark(file)
-    return f"Benchmark '{benchmark.name}': {benchmark.horizon} actions an episode."
-
-
-def _controller(file: Path, robot: str | None) -> str:
-    from wbc_suite.control import load_composite_controller_config
-
-    config = load_composite_controller_config(file, robot)
-    return f"{config['type']} of {_controlled(config)}."
 
 
 def print_schema(

@@ -37,20 +37,21 @@ def inspect(
 ) -> None:
     """Show lengths, success and origin of episodes; write plots, a contact sheet."""
     from wbc_suite.recording import Dataset
+    from wbc_suite.recording.plots import write_plots
+    from wbc_suite.recording.video import write_sheet
 
     with Dataset(file) as dataset:
         _print_origin(dataset)
         _print_episodes(dataset, len(dataset) if every else SHOWN)
         if columns and len(dataset):
-            _print_columns(dataset)
+            episode = dataset.episode(dataset.names[0])
+            print(f"  {episode.name} holds:")
+            for name, column in sorted(episode.columns.items()):
+                print(f"    {name:<36} {column.dtype!s:<8} {column.shape}")
         if plots is not None:
-            from wbc_suite.recording.plots import write_plots
-
             write_plots(dataset, plots)
             print(f"Wrote {plots}.")
         if sheet is not None:
-            from wbc_suite.recording.video import write_sheet
-
             write_sheet(dataset, sheet, camera=camera)
             print(f"Wrote {sheet}.")
 
@@ -93,19 +94,11 @@ def _print_episodes(dataset: "Dataset", most: int) -> None:
         print(f"    ... and {len(lengths) - most} more (--all)")
 
 
-def _print_columns(dataset: "Dataset") -> None:
-    episode = dataset.episode(dataset.names[0])
-    print(f"  {episode.name} holds:")
-    for name, column in sorted(episode.columns.items()):
-        print(f"    {name:<36} {column.dtype!s:<8} {column.shape}")
-
-
 def verify(file: options.RecordingArgument) -> None:
     """Read every episode and compare it with the checksum it was written with."""
     from wbc_suite.recording import editing
 
-    bad = _report(editing.verify(file))
-    raise typer.Exit(1 if bad else 0)
+    raise typer.Exit(1 if _report(editing.verify(file)) else 0)
 
 
 def repair(file: options.RecordingArgument) -> None:

@@ -64,7 +64,6 @@ def _system() -> Iterator[Finding]:
 
 
 def _packages() -> Iterator[Finding]:
-    """Check that all required packages are installed."""
     versions = {name: _version(name) for name in _required()}
     for name, version in versions.items():
         if version is None:
@@ -106,16 +105,14 @@ def _mujoco() -> Iterator[Finding]:
 
 
 def _solvers() -> Iterator[Finding]:
-    known = importlib.import_module("qpsolvers").available_solvers
-    yield Finding("QP solvers", ", ".join(sorted(known)))
-    broken = ", ".join(name for name in BASE_SOLVERS if name not in known)
-    if broken:
+    topic, known = "QP solvers", importlib.import_module("qpsolvers").available_solvers
+    yield Finding(topic, ", ".join(sorted(known)))
+    if broken := ", ".join(name for name in BASE_SOLVERS if name not in known):
         cure = "pip install --force-reinstall daqp proxsuite osqp"
-        yield Finding("QP solvers", f"missing: {broken}", state="broken", cure=cure)
-    absent = ", ".join(name for name in EXTRA_SOLVERS if name not in known)
-    if absent:
+        yield Finding(topic, f"missing: {broken}", state="broken", cure=cure)
+    if absent := ", ".join(name for name in EXTRA_SOLVERS if name not in known):
         text, cure = f"not installed: {absent}", 'pip install "wbc-suite[solvers]"'
-        yield Finding("QP solvers", text, state="optional", cure=cure)
+        yield Finding(topic, text, state="optional", cure=cure)
 
 
 def _catalogue() -> Iterator[Finding]:

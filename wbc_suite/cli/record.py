@@ -114,25 +114,18 @@ def _collect(
 ) -> None:
     """Drive episodes until so many are kept, or twenty times as many were tried."""
     from wbc_suite.envs import RobotEnv
-    from wbc_suite.evaluation import make_policy
+    from wbc_suite.evaluation.rollouts import run_episode
 
-    inner = env.unwrapped
+    inner, recorder, kept = env.unwrapped, env.recorder, 0
     assert isinstance(inner, RobotEnv), "`make` made it"
-    kept = 0
-    for tried in range(20 * episodes):
-        policy = make_policy(device, inner, seed + tried)
-        observation, _ = env.reset(seed=seed + tried)
-        env.recorder.begin()
-        ended, info = False, {}
-        while not ended:
-            observation, _, terminated, truncated, info = env.step(policy(observation))
-            ended = terminated or truncated
-        length, success = env.recorder.length, bool(info.get("success"))
+    for each in range(seed, seed + 20 * episodes):
+        played = run_episode(env, inner, each, device, begin=recorder.begin)
+        length, success = played["steps"], played["success"]
         if only_success and not success:
-            env.recorder.discard()
-            print(f"  seed {seed + tried}: discarded, no success in {length} actions")
+            recorder.discard()
+            print(f"  seed {each}: discarded, no success in {length} actions")
             continue
-        name, kept = env.recorder.keep(), kept + 1
+        name, kept = recorder.keep(), kept + 1
         result = "success" if success else "no success"
         print(f"  {name}: {length} actions, {result} ({kept} of {episodes})")
         if kept == episodes:

@@ -81,7 +81,6 @@ def rollout(
 def _finish(
     item: "WorkItem", outcome: "Outcome", advance: Callable[[int], None]
 ) -> None:
-    """Print an item's error, and advance the bar."""
     if outcome.error is not None:
         print(f"{item.name}: {outcome.error}")
     advance(1)

@@ -35,16 +35,12 @@ __all__ = [
 
 __version__ = "1.5.2"  # the robosuite version of this interface
 
-_IGNORED = frozenset(
-    {
-        *("has_offscreen_renderer", "render_collision_mesh", "render_visual_mesh"),
-        *("render_gpu_device_id", "hard_reset", "renderer", "renderer_config"),
-        *("render_camera_size", "reward_normalised", "camera_renderer"),
-    }
+_IGNORED = (
+    *("has_offscreen_renderer", "render_collision_mesh", "render_visual_mesh"),
+    *("render_gpu_device_id", "hard_reset", "renderer", "renderer_config"),
+    *("render_camera_size", "reward_normalised", "camera_renderer"),
 )
 """Arguments without a meaning here."""
-
-RENDER_CAMERA = "frontview"
 
 _RENAMED = {"damping": "damping_ratio", "damping_limits": "damping_ratio_limits"}
 """Keys of controllers that robosuite 1.5 renamed."""
@@ -147,7 +143,7 @@ def _ours(kwargs: dict[str, Any]) -> dict[str, Any]:
     }
     if given.pop("has_renderer", False):
         given["render_mode"] = "human"
-    given.setdefault("render_camera", RENDER_CAMERA)
+    given.setdefault("render_camera", "frontview")
     for key in ("env_name", "type", "env_version"):
         given.pop(key, None)
     for key in ("robots", "gripper_types", "base_types", "controller_configs"):

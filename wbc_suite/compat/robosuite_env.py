@@ -14,7 +14,7 @@ Observation = dict[str, Any]
 
 
 class RobosuiteEnv:
-    """An environment with robosuite's calls.
+    """An environment with robosuite's calls; `kwargs` are our arguments.
 
     Args:
         env_name: Name of the benchmark.
@@ -23,10 +23,9 @@ class RobosuiteEnv:
         kwargs: Our arguments.
 
     Attributes:
-        env: Our environment; `render`, `close` and `horizon` are its.
+        env: Our environment; `render`, `close` and `horizon` are its own.
         sim: Model and state, under robosuite's names; `model` is its model.
         robots: The robots, likewise.
-        viewer: Stand-in for robosuite's window; does nothing.
         control_freq: Actions per second, Hz.
         model_timestep: Duration of a physics step, s.
     """
@@ -106,13 +105,12 @@ class RobosuiteEnv:
         self, observable_name: str, attribute: str, modifier: Any
     ) -> None:
         """Change an observation; `corrupter` and `delayer` as in robosuite."""
-        renamed = {
-            "corrupter": ("noise", lambda values, rng: modifier(values)),
-            "delayer": ("delay", lambda rng: modifier()),
-        }
-        name, change = renamed.get(attribute, (attribute, modifier))
-        change = None if modifier is None else change
-        self.env.observables.modify(observable_name, **{name: change})
+        change = {attribute: modifier}
+        if attribute == "corrupter":
+            change = {"noise": modifier and (lambda values, rng: modifier(values))}
+        elif attribute == "delayer":
+            change = {"delay": modifier and (lambda rng: modifier())}
+        self.env.observables.modify(observable_name, **change)
 
     def get_ep_meta(self) -> dict[str, Any]:
         """Return the value of `set_ep_meta`."""
@@ -143,11 +141,10 @@ class RobosuiteEnv:
         self.reset()
 
     def _get_observations(self, force_update: bool = False) -> Observation:
-        """Return the present observation."""
-        return self._in_their_form(self.sim.observe())
+        self.env.observables.update()
+        return self._in_their_form(self.env.observation())
 
     def _check_success(self) -> bool:
-        """Whether the benchmark is solved now."""
         return self.env.benchmark.success()
 
     def _in_their_form(self, observation: Observation) -> Observation:
@@ -171,12 +168,10 @@ class Viewer:
 
 
 class GymWrapper(gymnasium.Env[Any, Any]):
-    """Gymnasium's five-tuple around `RobosuiteEnv`; observations in one vector.
+    """Gymnasium's five-tuple around `RobosuiteEnv`.
 
-    Args:
-        env: The environment.
-        keys: Observed keys; by default objects, pictures and robots, in this order.
-        flatten_obs: Whether they are one vector, not a dictionary.
+    Observed are objects, pictures and robots, or the given keys, in this order: in one
+    vector with `flatten_obs`, else in a dictionary.
     """
 
     metadata: dict[str, Any] = {"render_modes": []}

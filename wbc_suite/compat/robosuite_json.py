@@ -71,13 +71,8 @@ def convert(
 ) -> dict[str, Any] | None:
     """Return the equivalent config in our layout, or None for one in our layout.
 
-    One warning lists the ignored keys.
-
-    Args:
-        config: Any config.
-        robot: The robot that it is for.
-        source: The config's name in messages.
-        named: Returns our own config of a composite of that name for the robot.
+    One warning lists the ignored keys. `source` is the config's name in messages;
+    `named` returns our own config of a composite of that name for the robot.
 
     Raises:
         ConfigError: If a key is neither robosuite's nor ours, or a value is wrong.
@@ -121,7 +116,6 @@ class _Conversion:
         return self._parts(config) | {"type": kind}
 
     def _parts(self, config: Config) -> dict[str, Any]:
-        """Return BASIC with the parts that the robot has."""
         known, parts = parts_of(self.robot), {}
         for key, name, given in self._listed(config):
             if name not in known and name not in PARTS:
@@ -271,7 +265,6 @@ class _Conversion:
         ignored: Collection[str],
         where: str = "",
     ) -> None:
-        """Raise ConfigError for an unknown key."""
         for key in given:
             if key not in converted and key not in ignored:
                 hint = did_you_mean(key, {*converted, *ignored})

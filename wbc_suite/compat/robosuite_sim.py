@@ -96,11 +96,6 @@ class Sim:
     def reset(self) -> None:
         """Do nothing: scripts write a state after it."""
 
-    def observe(self) -> dict[str, Any]:
-        """Return the observation of the present state."""
-        self._env.observables.update()
-        return self._env.observation()
-
     def render(
         self,
         width: int | None = 256,
@@ -144,7 +139,6 @@ class RobotView:
     """One robot; other attributes are those of its description.
 
     Attributes:
-        name: Name of the robot.
         robot_model: Its `name`, and `naming_prefix` of its names in the scene.
         composite_controller: Its controller.
         arms: `right`, `left`, or the names of its hands.

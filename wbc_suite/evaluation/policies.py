@@ -72,11 +72,9 @@ POLICIES: Mapping[str, Callable[[RobotEnv, np.random.Generator], Policy]] = {
 def make_policy(name: str, env: RobotEnv, seed: int) -> Policy:
     """Make a policy for one episode of an environment that was reset.
 
-    Args:
-        name: One of `POLICIES`, or `package.module:function` of your own, where the
-            function takes the environment and a generator and returns the policy.
-        env: The environment.
-        seed: Seed of the episode; the policy's own randomness follows from it.
+    The name is one of `POLICIES`, or `package.module:function` of your own, where the
+    function takes the environment and a generator, which follows from the seed of the
+    episode, and returns the policy.
 
     Raises:
         UnknownNameError: If there is no such policy.

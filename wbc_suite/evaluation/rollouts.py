@@ -3,7 +3,7 @@
 import re
 import shutil
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -22,12 +22,8 @@ from wbc_suite.wrappers import DataCollection
 class Case:
     """An environment and the policy that acts in it.
 
-    Attributes:
-        benchmark: Name or file.
-        controller: Name or file; None for each robot's own.
-        policy: See `make_policy`.
-        record: Whether episodes are recorded.
-        arguments: Further arguments of `wbc_suite.make`, plain JSON data, sorted.
+    Benchmark and controller are names or files. `arguments` are further ones of
+    `wbc_suite.make`, plain JSON data, sorted.
     """
 
     benchmark: str
@@ -48,10 +44,7 @@ def plan_rollouts(cases: Iterable[Case], *, seeds: range, chunk: int) -> list[Wo
     """Split the episodes of all cases into items of `chunk` seeds each.
 
     An item depends on its own case and seeds only, so that results are found again
-    when other cases are added.
-
-    Raises:
-        ConfigError: If there are no seeds, or the chunk is empty.
+    when other cases are added. Raises ConfigError if there are no seeds.
     """
     if len(seeds) == 0 or seeds.start < 0 or seeds.step != 1 or chunk < 1:
         raise ConfigError(f"Seeds {seeds} in chunks of {chunk}: at least one of each.")
@@ -87,16 +80,23 @@ def run_rollouts(item: WorkItem, folder: Path) -> dict[str, Any]:
         env = DataCollection(inner, path)
     try:
         seeds = range(*payload["seeds"])
-        episodes = [_run_episode(env, inner, s, payload["policy"]) for s in seeds]
+        episodes = [run_episode(env, inner, s, payload["policy"]) for s in seeds]
     finally:
         env.close()
     return {"episodes": episodes}
 
 
-def _run_episode(
-    env: gymnasium.Env[Any, Any], inner: RobotEnv, seed: int, name: str
+def run_episode(
+    env: gymnasium.Env[Any, Any],
+    inner: RobotEnv,
+    seed: int,
+    name: str,
+    *,
+    begin: Callable[[], None] = lambda: None,
 ) -> dict[str, Any]:
+    """Run an episode of a policy; `begin` is called after the reset."""
     observation, info = env.reset(seed=seed)
+    begin()
     policy = make_policy(name, inner, seed)
     start, steps, total, succeeded, over = time.perf_counter(), 0, 0.0, False, False
     while not over:

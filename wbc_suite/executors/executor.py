@@ -18,9 +18,8 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,150}")
 class WorkItem:
     """A unit of work that can run alone, again, and on another machine.
 
-    Attributes:
-        name: Names its result file; letters, digits, dots, dashes and underscores.
-        payload: Arguments of the work, plain JSON data.
+    The name, of letters, digits, dots, dashes and underscores, names its result file;
+    the payload has the arguments of the work, plain JSON data.
     """
 
     name: str

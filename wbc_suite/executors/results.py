@@ -69,15 +69,8 @@ def run_items(
     """Run items that have no result yet; return all outcomes, in order of the items.
 
     Each outcome is written as it ends. The call can be stopped and repeated: finished
-    items do not run again, failed ones do.
-
-    Args:
-        work: See `Work`.
-        items: All items, finished or not.
-        folder: Folder of the results, and of what the work writes.
-        executor: Runs the items.
-        on_outcome: Called with every item and its outcome; at once for items that
-            finished in an earlier call.
+    items do not run again, failed ones do. `on_outcome` is called with every item and
+    its outcome; at once for items that finished in an earlier call.
 
     Raises:
         DatasetError: If two items have one name, or the folder cannot be written to.

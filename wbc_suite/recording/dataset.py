@@ -53,7 +53,7 @@ class Dataset:
 
     Attributes:
         header: Attributes of `data`: `env_args`, `schema_version`, ...
-        names: Of the episodes, in their order.
+        names: Names of the episodes, in their order.
         masks: Names of episodes by filter key.
     """
 
@@ -78,19 +78,15 @@ class Dataset:
         self.names = tuple(sorted(self._groups, key=_number))
 
     def __enter__(self) -> Self:
-        """Return the dataset."""
         return self
 
     def __exit__(self, *error: object) -> None:
-        """Close it."""
         self.close()
 
     def __len__(self) -> int:
-        """Return the number of episodes."""
         return len(self.names)
 
     def __iter__(self) -> Iterator[Episode]:
-        """Read episodes one by one."""
         return (self.episode(name) for name in self.names)
 
     def close(self) -> None:
@@ -126,11 +122,7 @@ class Dataset:
         return (self.episode(name, later=True) for name in self.names)
 
     def episode(self, name: str, *, later: bool = False) -> Episode:
-        """Read an episode.
-
-        Args:
-            name: Its name.
-            later: Whether columns are read when they are used; see `streamed`.
+        """Read an episode; with `later`, columns are read when they are used.
 
         Raises:
             DatasetError: If columns differ in length, or numbers are not those written.
@@ -190,8 +182,7 @@ def free_name(name: str, taken: Container[str]) -> str:
 
 
 def _number(name: str) -> int:
-    match = _DEMO.match(name)
-    return int(match[1]) if match else 0
+    return int(name.removeprefix("demo").removeprefix("_"))
 
 
 def _facts(group: h5py.Group) -> dict[str, Fact]:

@@ -29,11 +29,8 @@ _NAMES = ("robots", "controller_configs", "gripper_types", "base_types")
 class EnvSource:
     """Name and arguments of an environment.
 
-    Attributes:
-        benchmark: Its name.
-        arguments: Plain data.
-        package: Package of the environment: `wbc_suite`, or another one.
-        missing: Arguments that are not plain data, such as a user's sampler.
+    `arguments` are plain data; `missing` names those that are not, such as a user's
+    sampler. `package` is `wbc_suite`, or another one.
     """
 
     benchmark: str

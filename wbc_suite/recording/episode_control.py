@@ -57,8 +57,7 @@ class EpisodeControl:
     """Takes commands from any thread, and applies them in the loop's thread.
 
     Args:
-        recorder: Records the environment of the loop; its wrapper must not be
-            automatic.
+        recorder: Records the environment of the loop; its wrapper is not automatic.
         seed: Seed of the first episode; each further one takes the next seed.
         plan: Episodes that begin and end by themselves; None for commands only.
         report: Called with each new message, in the loop's thread.

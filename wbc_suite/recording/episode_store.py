@@ -51,7 +51,6 @@ class Store:
         return self._closed + len(self._own)
 
     def __enter__(self) -> Self:
-        """Return the store."""
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *error: object) -> None:

@@ -34,17 +34,11 @@ def extract(
 ) -> int:
     """Restore recorded states, and store observations and rewards; count episodes.
 
-    Finished parts wait in `OUT.work`: a stopped extraction continues when called again.
-
-    Args:
-        path: A recording whose states fit the environment.
-        out: File to write; it may be the same.
-        trust_files: See `EnvSource.build`.
-        executor: Runs the parts; None for this process.
-        workers: Number of workers that the episodes are split among.
-        on_progress: Called with the number of episodes of each finished piece.
-        changes: Arguments of the environment, such as `use_camera_obs`,
-            `camera_names`, `reward_shaping`.
+    The file `out` may be the same. Episodes are split among `workers` of the executor,
+    or run in this process. Finished parts wait in `OUT.work`: a stopped extraction
+    continues when called again. `on_progress` is called with the number of episodes of
+    each part. `changes` are arguments of the environment, such as `use_camera_obs`,
+    `camera_names`, `reward_shaping`; for `trust_files` see `EnvSource.build`.
 
     Raises:
         DatasetError: If the environment cannot be made, or states do not fit.

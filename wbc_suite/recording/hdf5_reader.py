@@ -140,11 +140,9 @@ class StoredColumn:
         self.sliced = row > 0 and (high == 1 or high * row <= HIGHEST_CHUNK)
 
     def __len__(self) -> int:
-        """Return the number of rows."""
         return self.shape[0]
 
     def __getitem__(self, rows: slice) -> NDArray[Any]:
-        """Read some rows."""
         with reading(self._path):
             return np.asarray(self._dataset[rows])
 

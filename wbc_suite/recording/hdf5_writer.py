@@ -35,17 +35,14 @@ def write_dataset(
     masks: Mapping[str, Sequence[str]] | None = None,
     needed: int = 0,
 ) -> None:
-    """Write a dataset; it replaces an old file atomically.
+    """Write a dataset; it replaces an old file atomically, or stays as it was.
 
-    Args:
-        path: File to write.
-        episodes: Read one by one; a piece of a column is in memory at a time.
-        header: Attributes of `data`, such as `env_args`.
-        masks: Names of episodes by filter key.
-        needed: Bytes that it will take, if known.
+    Episodes are read one by one, with a piece of a column in memory at a time. `header`
+    has the attributes of `data`, `masks` the names of episodes by filter key. `needed`
+    bytes must fit on the disk.
 
     Raises:
-        DatasetError: If it cannot be written; an old file stays as it was.
+        DatasetError: If it cannot be written.
     """
     check_folder(path.parent, needed)
 

@@ -50,8 +50,7 @@ def start_as(env: RobotEnv, episode: Episode) -> None:
     of objects included. Without it, the physics state is set.
 
     Raises:
-        DatasetError: If the recorded state does not fit the environment, or the joints
-            of a recording of this package have other names.
+        DatasetError: If the state, or the names of joints, do not fit the environment.
     """
     if "states" not in episode.columns or not episode.length:
         raise DatasetError(f"'{episode.name}' has no states to start from.")

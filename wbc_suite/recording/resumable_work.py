@@ -26,13 +26,8 @@ def run_pieces(
 ) -> list[tuple[WorkItem, Mapping[str, Any]]]:
     """Run the pieces that are not finished; return all, in order, with their results.
 
-    Args:
-        work: See `Work`; its payload contains the `source` too.
-        payloads: Arguments of each piece.
-        source: The recording; results of another or a changed one are not used.
-        out: File or folder that is being written.
-        executor: Runs the pieces; None for this process.
-        on_piece: Called with every finished piece.
+    Results of another source, or of one that changed, are not used. The source is in
+    every payload. `on_piece` is called with every finished piece.
 
     Raises:
         DatasetError: If a piece fails; results of the others are kept.

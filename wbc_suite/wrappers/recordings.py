@@ -18,14 +18,11 @@ from wbc_suite.typing import Matrix
 
 
 class DataCollection(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """Records every episode, or chosen ones.
+    """Records every episode of one of our environments, or chosen ones.
 
-    Args:
-        env: One of our environments, wrapped or not.
-        path: The file; episodes are appended.
-        automatic: Whether each episode is recorded from its reset on, and kept when it
-            ends or the next one begins. Otherwise call `recorder.begin` and `keep`.
-        next_obs: See `Recorder`.
+    With `automatic`, each episode is recorded from its reset on, and kept when it ends
+    or the next one begins. Otherwise call `recorder.begin` and `keep`. For `path` and
+    `next_obs` see `Recorder`.
     """
 
     def __init__(
@@ -79,11 +76,9 @@ class DataCollection(gymnasium.Wrapper[Any, Any, Any, Any]):
 
 
 class Playback(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """Replaces the given actions by recorded ones, episode after episode.
+    """Replaces the given actions by recorded ones, episode after episode, cyclically.
 
-    Args:
-        env: One of our environments, made with the arguments of the recording.
-        dataset: The recording; its first episode follows its last.
+    The environment is made with the arguments of the recording.
 
     Raises:
         DatasetError: If the recording has no episodes, or is of another environment.
@@ -132,16 +127,14 @@ class Playback(gymnasium.Wrapper[Any, Any, Any, Any]):
 class DemoStart(gymnasium.Wrapper[Any, Any, Any, Any]):
     """Starts episodes at states of demonstrations.
 
-    With `window`, they start near the ends of the demonstrations at first, and the
-    window grows towards their beginnings: a curriculum.
-
     Args:
         env: One of our environments, unwrapped or wrapped.
         demonstrations: Physics states of each demonstration, shape (n, 1 + nq + nv):
             time, qpos, qvel, as in datasets.
         share: Share of episodes that start there; the others start as usual.
         window: Number of last states to draw from at first; None for all.
-        growth: Number of states that the window grows by with each episode.
+        growth: Number of states that the window grows by with each episode, towards the
+            beginnings of demonstrations: a curriculum.
 
     Raises:
         ConfigError: If there is no state, or one has a wrong size.

@@ -9,6 +9,7 @@ from typing import Any
 from wbc_suite.errors import DatasetError, UnknownNameError
 from wbc_suite.executors import Executor, WorkItem
 from wbc_suite.recording.atomic_files import delete_temporaries
+from wbc_suite.recording.converting import lerobot, mcap, minari, npz, robomimic
 from wbc_suite.recording.converting.layout import (
     Layout,
     Piece,
@@ -16,20 +17,15 @@ from wbc_suite.recording.converting.layout import (
     split_dataset,
     whole_dataset,
 )
-from wbc_suite.recording.converting.lerobot import LEROBOT
-from wbc_suite.recording.converting.mcap import MCAP
-from wbc_suite.recording.converting.minari import MINARI
-from wbc_suite.recording.converting.npz import NPZ
-from wbc_suite.recording.converting.robomimic import ROBOMIMIC
 from wbc_suite.recording.dataset import Dataset
 from wbc_suite.recording.resumable_work import run_pieces, work_folder
 
 LAYOUTS: Mapping[str, Layout] = {
-    "robomimic": ROBOMIMIC,
-    "npz": NPZ,
-    "lerobot": LEROBOT,
-    "minari": MINARI,
-    "mcap": MCAP,
+    "robomimic": robomimic.LAYOUT,
+    "npz": npz.LAYOUT,
+    "lerobot": lerobot.LAYOUT,
+    "minari": minari.LAYOUT,
+    "mcap": mcap.LAYOUT,
 }
 
 
@@ -42,18 +38,12 @@ def convert(
     executor: Executor | None = None,
     workers: int = 1,
 ) -> Path:
-    """Write a recording in another layout; return the path that was written.
+    """Write a recording in one of `LAYOUTS`; return the path that was written.
 
-    With an executor, finished pieces wait in `OUT.work` until all are finished: a
+    Without an executor, this process writes one piece. With one, episodes are split
+    among `workers`, and finished pieces wait in `OUT.work` until all are finished: a
     stopped conversion continues when called again. Layouts of one file are one piece.
-
-    Args:
-        source: The recording.
-        out: File or folder to write.
-        layout: One of `LAYOUTS`.
-        on_progress: Called with the number of episodes since the last call.
-        executor: Runs the pieces; None for this process and one piece.
-        workers: Number of workers that the episodes are split among.
+    `on_progress` is called with the number of episodes since the last call.
 
     Raises:
         UnknownNameError: If there is no such layout.

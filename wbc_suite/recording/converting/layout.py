@@ -23,8 +23,8 @@ class Piece:
     Attributes:
         number: Number of the piece.
         names: Names of its episodes.
-        start: Actions of the dataset before its first episode.
-        before: Episodes of the dataset before its first one.
+        start: Number of actions of the dataset before its first episode.
+        before: Number of episodes of the dataset before it.
     """
 
     number: int
@@ -37,12 +37,9 @@ class Piece:
 class Layout:
     """How recordings are written in a format of another project.
 
-    Attributes:
-        begin: Checks that packages are installed and the path can be written.
-        write: Writes the episodes of a piece; returns what `finish` needs of it, if
-            anything.
-        finish: Writes files about all pieces.
-        in_pieces: Whether several workers may each write a piece.
+    `begin` checks that packages are installed and the path can be written. `write`
+    writes a piece, and returns what `finish` needs of it to write files about all. With
+    `in_pieces`, several workers may each write a piece.
     """
 
     begin: Callable[[Path], None]

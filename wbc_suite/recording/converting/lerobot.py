@@ -156,7 +156,6 @@ def _vectors(episode: Episode) -> dict[str, NDArray[np.float32]]:
 def _frames(
     arrow: Any, columns: Mapping[str, Any], number: int, start: int, rate: int
 ) -> Any:
-    """Return the rows of one episode."""
     table = {
         name: arrow.FixedSizeListArray.from_arrays(column.ravel(), column.shape[1])
         for name, column in columns.items()
@@ -289,4 +288,4 @@ def _open_video(path: Path, rate: int) -> Mp4Writer:
     return Mp4Writer(path, rate=rate, extra="lerobot", options={"g": "2", "crf": "23"})
 
 
-LEROBOT = Layout(begin=_begin, write=_write, finish=_finish, in_pieces=True)
+LAYOUT = Layout(begin=_begin, write=_write, finish=_finish, in_pieces=True)

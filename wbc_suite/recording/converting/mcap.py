@@ -59,7 +59,6 @@ def _begin(out: Path) -> None:
 
 
 def _write(dataset: Dataset, piece: Piece, out: Path, on_progress: Progress) -> None:
-    """Write the episodes as one log."""
     writer = import_extra("mcap.writer", "mcap")
 
     def write(temporary: Path) -> None:
@@ -162,4 +161,4 @@ def _picture(pixels: NDArray[np.uint8], time: int, frame: str) -> dict[str, Any]
     }
 
 
-MCAP = Layout(begin=_begin, write=_write)
+LAYOUT = Layout(begin=_begin, write=_write)

@@ -157,4 +157,4 @@ def _dataset_id(dataset: Dataset, out: Path) -> str:
     return f"{word.strip('-').lower() or 'demonstrations'}-v0"
 
 
-MINARI = Layout(begin=lambda out: new_folder(out, "a Minari dataset"), write=_write)
+LAYOUT = Layout(begin=lambda out: new_folder(out, "a Minari dataset"), write=_write)

@@ -34,4 +34,4 @@ def _save(path: Path, *, arrays: dict[str, Any]) -> None:
         np.savez_compressed(file, **arrays)
 
 
-NPZ = Layout(begin=check_folder, write=_write, in_pieces=True)
+LAYOUT = Layout(begin=check_folder, write=_write, in_pieces=True)

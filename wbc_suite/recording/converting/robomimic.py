@@ -44,4 +44,4 @@ def _own_columns(episode: Episode, name: str) -> Episode:
     return replace(episode, name=name, columns=columns, facts=facts, final_state=None)
 
 
-ROBOMIMIC = Layout(begin=lambda out: check_folder(out.parent), write=_write)
+LAYOUT = Layout(begin=lambda out: check_folder(out.parent), write=_write)
