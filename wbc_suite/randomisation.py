@@ -155,10 +155,7 @@ def _texture(model: Any, _: bool, rng: np.random.Generator) -> None:
 def draw_pattern(
     height: int, width: int, rng: np.random.Generator
 ) -> NDArray[np.uint8]:
-    """Return a random pattern of two colours, shape (height, width, 3).
-
-    It is plain, chequered, a sine grating or blocky noise.
-    """
+    """Return a random pattern of two colours, shape (height, width, 3)."""
     first, second = rng.uniform(0.0, 255.0, (2, 3))
     y, x = np.mgrid[0.0 : 1.0 : height * 1j, 0.0 : 1.0 : width * 1j]
     kind = rng.integers(4)

@@ -47,28 +47,22 @@ SkinOption = Annotated[
 RobotsOption = Annotated[
     list[str] | None, typer.Option(help="Robot; repeat it for several.")
 ]
-
 ControllerOption = Annotated[
     str | None, typer.Option(help="Controller, by name or file.")
 ]
-
 CamerasOption = Annotated[
     list[str] | None, typer.Option("--camera", help="Camera; may be repeated.")
 ]
-
 PictureSizeOption = Annotated[
     int, typer.Option(min=8, max=2048, help="Of camera pictures, pixels.")
 ]
-
 RecordingArgument = Annotated[Path, typer.Argument(help="Recording.")]
-
 TrustFilesOption = Annotated[
     bool,
     typer.Option(
         "--trust-files", help="Let the recording name files to read robots from."
     ),
 ]
-
 DeviceOptions = Annotated[
     list[str] | None,
     typer.Option(
@@ -161,10 +155,7 @@ def camera_arguments(cameras: list[str] | None, size: int) -> dict[str, Any]:
 
 
 def device_options(pairs: list[str] | None) -> dict[str, object]:
-    """Return the options of `--device-option NAME=VALUE`.
-
-    Values are read as TOML (`8091`, `true`, `["right", "left"]`), else they are text.
-    """
+    """Return the options of `--device-option NAME=VALUE`, TOML values or texts."""
     options: dict[str, object] = {}
     for pair in pairs or []:
         name, equals, value = pair.partition("=")

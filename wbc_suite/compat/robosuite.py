@@ -61,10 +61,7 @@ def __getattr__(name: str) -> Any:
 def load_composite_controller_config(
     controller: str | Path | None = None, robot: str | None = None
 ) -> dict[str, Any]:
-    """Return a composite controller's config; see `wbc_suite.control`'s.
-
-    BASIC without a robot has all parts; `make` leaves out those that a robot lacks.
-    """
+    """Return a composite's config; BASIC without a robot has all parts there are."""
     if robot is not None or str(controller).upper() != "BASIC":
         return _load_composite(controller, robot)
     arm = load_part_controller_config(default_controller="OSC_POSE")
@@ -158,10 +155,7 @@ def _ours(kwargs: dict[str, Any]) -> dict[str, Any]:
 
 
 def _updated(config: dict[str, Any]) -> dict[str, Any]:
-    """Return a config of robosuite 1.2 to 1.4 in the form of 1.5; others unchanged.
-
-    Those are configs of one arm, with goals in the world's axes.
-    """
+    """Return a config of robosuite 1.2 to 1.4, of one arm, in the form of 1.5."""
     if not registry.is_part_controller(config.get("type")):
         return config
     if "control_delta" not in config:

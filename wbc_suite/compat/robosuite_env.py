@@ -1,6 +1,7 @@
 """robosuite's environment and `GymWrapper` around ours."""
 
 from collections.abc import Sequence
+from types import SimpleNamespace
 from typing import Any
 
 import gymnasium
@@ -40,8 +41,9 @@ class RobosuiteEnv:
     ) -> None:
         self.ignore_done, self._seed = bool(ignore_done), seed
         self.env = RobotEnv(env_name, **kwargs)
-        self.name = env_name
-        self.sim, self.viewer = Sim(self.env), Viewer()
+        self.name, self.unwrapped = env_name, self
+        self.sim = Sim(self.env)
+        self.viewer = SimpleNamespace(set_camera=lambda _: None, update=lambda: None)
         self.model = self.sim.model
         self.robots = tuple(RobotView(*pair) for pair in self.env.simulation.pairs)
         self.action_dim = self.env.action_layout.size
@@ -59,11 +61,7 @@ class RobosuiteEnv:
         return self._in_their_form(observation)
 
     def step(self, action: Any) -> tuple[Observation, float, bool, dict[str, Any]]:
-        """Advance one control period.
-
-        Raises:
-            ValueError: If the episode is over and `ignore_done` is not set.
-        """
+        """Advance one control period; raise ValueError if the episode is over."""
         if self.done:
             raise ValueError("executing action in terminated episode")
         observation, reward, terminated, truncated, info = self.env.step(action)
@@ -86,11 +84,6 @@ class RobosuiteEnv:
         """Least and greatest actions."""
         layout = self.env.action_layout
         return layout.low.copy(), layout.high.copy()
-
-    @property
-    def unwrapped(self) -> "RobosuiteEnv":
-        """This environment."""
-        return self
 
     @property
     def observation_names(self) -> set[str]:
@@ -155,16 +148,6 @@ class RobosuiteEnv:
                 picture = self.sim.opengl_depth(picture).astype(np.float32)
             observation[key] = np.ascontiguousarray(picture)
         return observation
-
-
-class Viewer:
-    """Stand-in for robosuite's window."""
-
-    def set_camera(self, camera_id: int) -> None:
-        """Do nothing."""
-
-    def update(self) -> None:
-        """Do nothing: a page follows every step."""
 
 
 class GymWrapper(gymnasium.Env[Any, Any]):

@@ -183,12 +183,7 @@ class RobotView:
         return np.array(places, dtype=np.int64)
 
     def create_action_vector(self, parts: Mapping[str, ArrayLike]) -> Vector:
-        """Return an action from values of parts; other parts get zeros.
-
-        Raises:
-            UnknownNameError: If there is no such part.
-            ActionError: If a part has a wrong size.
-        """
+        """Return an action from values of parts, and zeros for the others."""
         zeros = {name: np.zeros(self._size(name)) for name in self._slices}
         return self.composite_controller.layout.pack(
             zeros | {name: np.atleast_1d(values) for name, values in parts.items()}

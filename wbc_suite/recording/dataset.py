@@ -115,10 +115,7 @@ class Dataset:
             return hdf5_reader.StoredColumn(columns[key], path)[:]
 
     def streamed(self) -> Iterator[Episode]:
-        """Read episodes one by one; their columns are read slice by slice when used.
-
-        Columns have length, shape, type and slices, while the dataset is open.
-        """
+        """Read episodes one by one, and slices of columns when they are used."""
         return (self.episode(name, later=True) for name in self.names)
 
     def episode(self, name: str, *, later: bool = False) -> Episode:

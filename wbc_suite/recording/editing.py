@@ -1,7 +1,4 @@
-"""Datasets verified, repaired, merged, split and filtered.
-
-Every result replaces the old file atomically.
-"""
+"""Datasets verified, repaired, merged, split and filtered, each file atomically."""
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
@@ -27,10 +24,7 @@ from wbc_suite.recording.hdf5_writer import write_dataset
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Finding:
-    """Result of reading an episode, or a file that cannot be opened.
-
-    `place` is the file and the name of the episode; `problem` is None without damage.
-    """
+    """Result of reading an episode or a file; `problem` is None without damage."""
 
     place: str
     problem: str | None = None

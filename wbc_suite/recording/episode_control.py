@@ -15,14 +15,10 @@ SUCCESS_STEPS = 10
 class EpisodeCommand(StrEnum):
     """A command, sent by one key or button."""
 
-    RECORD = "keep"
-    """Begin an episode, or keep the one in progress."""
-    SUCCESS = "success"
-    """Keep the episode in progress as a success, whatever the benchmark reports."""
-    DISCARD = "discard"
-    """Discard the episode in progress."""
-    UNDO = "undo"
-    """Delete the episode that was kept last."""
+    RECORD = "keep"  # begin an episode, or keep the one in progress
+    SUCCESS = "success"  # keep it as a success, whatever the benchmark reports
+    DISCARD = "discard"  # discard it
+    UNDO = "undo"  # delete the episode that was kept last
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -41,11 +37,7 @@ class RecordingPlan:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class EpisodeStatus:
-    """State of the recording.
-
-    `length` is the number of actions of the episode in progress, `kept` the number of
-    episodes in the file, `message` the result of the last command.
-    """
+    """State of the recording; `kept` counts the episodes in the file."""
 
     recording: bool
     length: int

@@ -101,10 +101,7 @@ def _reason(code: int, seconds: int, messages: bytes) -> str:
 
 
 def read_files() -> None:
-    """Read the files that standard input names; the child's main function.
-
-    A line is written for each file when it is done.
-    """
+    """Read the files named by standard input, in the child; write a line for each."""
     seconds = int(sys.argv[1])
     resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))

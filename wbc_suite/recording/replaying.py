@@ -68,7 +68,10 @@ def start_as(env: RobotEnv, episode: Episode) -> None:
             env.reset_to(state)
         else:
             placed = json.loads(str(episode.facts.get("placed", "null")))
-            env.begin_at(_generator_state(str(generator)), placed)
+            drawn = json.loads(str(generator)[:2000])
+            if not isinstance(drawn, dict) or drawn.get("bit_generator") != "PCG64":
+                raise ValueError("its random generator is not the one used here")
+            env.begin_at(drawn, placed)
     except (ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
         raise DatasetError(f"'{episode.name}' has no usable start: {error}") from error
     except WbcError as error:
@@ -91,12 +94,7 @@ def play_states(env: RobotEnv, episode: Episode) -> Iterator[int]:
 def play_actions(
     env: RobotEnv, episode: Episode
 ) -> Iterator[tuple[int, Vector, dict[str, Any]]]:
-    """Apply the recorded actions, open loop.
-
-    Yields:
-        Number of the action, difference of the state after it from the recorded one
-        (zero if that is missing), and `info`.
-    """
+    """Apply the actions; yield number, difference of the state after it, and `info`."""
     start_as(env, episode)
     states, actions = episode.columns["states"], episode.columns["actions"]
     if actions.shape[1] != env.action_layout.size:
@@ -144,10 +142,3 @@ def _check_joints(env: RobotEnv, episode: Episode) -> None:
             f"have as many numbers; {words}."
         )
     log.warning("'%s': %s; states are taken in order", episode.name, words)
-
-
-def _generator_state(text: str) -> dict[str, Any]:
-    state = json.loads(text[:2000])
-    if not isinstance(state, dict) or state.get("bit_generator") != "PCG64":
-        raise ValueError("its random generator is not the one used here")
-    return state

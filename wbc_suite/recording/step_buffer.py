@@ -130,11 +130,7 @@ class StepBuffer:
         observation: Mapping[str, Any],
         outcome: tuple[float, int, int, float, float],
     ) -> None:
-        """Complete a step, and begin the next one with the observation after it.
-
-        `outcome` has the values of `OUTCOME`. Raises DatasetError if shapes or keys
-        differ from the first step's, or the disk is full.
-        """
+        """Complete a step with the values of `OUTCOME`, and begin the next one."""
         at = self._rows.at
         try:
             self._actions[at] = action
@@ -152,11 +148,7 @@ class StepBuffer:
         self._rows.advance()
 
     def columns(self, *, next_obs: bool = False) -> tuple[dict[str, Column], Column]:
-        """Return columns by name, read-only, and the state after the last action.
-
-        Observations after each action are included with `next_obs`. Raises DatasetError
-        if the disk is full.
-        """
+        """Return columns by name, read-only, and the state after the last action."""
         rows = self._rows.rows()
         before, after = rows[:-1], rows[1:]
         columns = {name: before[name] for name in ("states", "actions", *OUTCOME)}

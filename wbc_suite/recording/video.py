@@ -41,11 +41,7 @@ def check_video(path: Path) -> None:
 def episode_pictures(
     env: RobotEnv, episode: Episode, *, by_states: bool, every: int = 1
 ) -> Iterator[Picture]:
-    """Play an episode, and draw every so many actions as `env.render` does.
-
-    The environment is made with `render_mode="rgb_array"`. Recorded states are shown if
-    `by_states`; else actions are taken.
-    """
+    """Play an episode, and draw every so many states as `env.render` does."""
     play: Callable[..., Iterator[Any]] = play_states if by_states else play_actions
     for k, _ in enumerate(play(env, episode)):
         if k % every == 0:
@@ -68,11 +64,7 @@ def write_video(pictures: Iterable[Picture], path: Path, *, rate: float) -> None
 
 
 def write_sheet(dataset: Dataset, path: Path, *, camera: str = "agentview") -> None:
-    """Draw episodes, one per row, from their beginning to their end.
-
-    Recorded pictures of the camera are used if there are any; otherwise recorded
-    states are rendered.
-    """
+    """Draw episodes, one per row, by their pictures of the camera or their states."""
     names = dataset.names[:SHEET_ROWS]
     if not names:
         raise DatasetError(f"'{dataset.path}' has no episodes to draw.")

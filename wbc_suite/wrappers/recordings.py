@@ -41,13 +41,12 @@ class DataCollection(gymnasium.Wrapper[Any, Any, Any, Any]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         """Start an episode; one that was in progress is kept if `automatic`."""
-        if self.automatic:
-            self.recorder.keep()
-        else:
+        if not self.automatic:
             self.recorder.discard()
+            return self.env.reset(seed=seed, options=options)
+        self.recorder.keep()
         result = self.env.reset(seed=seed, options=options)
-        if self.automatic:
-            self.recorder.begin()
+        self.recorder.begin()
         return result
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
@@ -112,9 +111,8 @@ class Playback(gymnasium.Wrapper[Any, Any, Any, Any]):
         k, columns = self._taken, self._episode.columns
         if k >= self._episode.length:
             raise DatasetError(f"'{self._episode.name}' is over: call reset first.")
-        observation, reward, terminated, truncated, info = self.env.step(
-            columns["actions"][k]
-        )
+        action = columns["actions"][k]
+        observation, reward, terminated, truncated, info = self.env.step(action)
         self._taken += 1
         over = self._taken == self._episode.length
         after = self._episode.final_state if over else columns["states"][k + 1]

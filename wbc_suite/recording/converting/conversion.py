@@ -82,15 +82,12 @@ def convert(
 
 
 def convert_piece(item: WorkItem, folder: Path) -> Mapping[str, Any]:
-    """Write one piece in the work folder, in place of what a dead worker left.
-
-    The file or folder has its final name, which layouts may use.
-    """
+    """Write one piece, under its final name, into the work folder."""
     payload = item.payload
     layout, piece = LAYOUTS[payload["layout"]], Piece(**payload["piece"])
     written = folder / "written" / payload["out"]
     if not layout.in_pieces:
-        shutil.rmtree(written, ignore_errors=True)
+        shutil.rmtree(written, ignore_errors=True)  # of a worker that died
     written.parent.mkdir(parents=True, exist_ok=True)
     with Dataset(payload["source"]) as dataset:
         return layout.write(dataset, piece, written, lambda _: None) or {}

@@ -239,7 +239,7 @@ def _info(dataset: Dataset, first: Episode, frames: int) -> dict[str, Any]:
     place = "chunk-{chunk_index:03d}/file-{file_index:03d}"
     return {
         "codebase_version": "v3.0",
-        "robot_type": robots if isinstance(robots, str) else " ".join(robots),
+        "robot_type": " ".join(robots) if isinstance(robots, list) else str(robots),
         "total_episodes": len(dataset),
         "total_frames": frames,
         "total_tasks": 1,
@@ -269,10 +269,8 @@ def _all_stats(table: Any, rows: list[dict[str, Any]]) -> dict[str, Stats]:
         all_frames = {q: held[q].mean(axis=0) for q in ("mean", *QUANTILES)}
         spread = held["std"] ** 2 + (held["mean"] - all_frames["mean"]) ** 2
         all_frames["std"] = np.sqrt(spread.mean(axis=0))
-        all_frames |= {
-            name: getattr(held[name], name)(axis=0) for name in ("min", "max")
-        }
-        all_frames["count"] = held["count"].sum(axis=0)
+        for name, reduce in (("min", np.min), ("max", np.max), ("count", np.sum)):
+            all_frames[name] = reduce(held[name], axis=0)
         found[key] = {name: value.tolist() for name, value in all_frames.items()}
     return found
 

@@ -32,11 +32,7 @@ _NAME = re.compile(r"[-\w]+?-v\d+\Z")
 
 
 def _write(dataset: Dataset, piece: Piece, out: Path, on_progress: Progress) -> None:
-    """Write the episodes into a folder.
-
-    The observation after the last action repeats the one before it where `next_obs`
-    was not recorded. Pictures are stored uncompressed, not as JPEG.
-    """
+    """Write the episodes into a folder; pictures are not compressed as JPEG."""
     first = dataset.episode(piece.names[0])
     steps = 0
 
