@@ -193,9 +193,8 @@ def _camera_position(model: Any, size: float, rng: np.random.Generator) -> None:
 
 
 def _camera_rotation(model: Any, size: float, rng: np.random.Generator) -> None:
-    for quat, turn in zip(
-        model.cam_quat, rng.uniform(-size, size, (model.ncam, 3)), strict=True
-    ):
+    turns = rng.uniform(-size, size, (model.ncam, 3))
+    for quat, turn in zip(model.cam_quat, turns, strict=True):
         mujoco.mju_quatIntegrate(quat, turn, 1.0)
 
 

@@ -8,7 +8,6 @@ right after it is imported, by a finder of Python's import system that removes i
 
 import importlib.util
 import sys
-from collections.abc import Sequence
 from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec
 from types import ModuleType
@@ -52,10 +51,7 @@ class _GymnasiumFinder(MetaPathFinder):
     """Finds Gymnasium as usual, once, and lets its loader register when it is done."""
 
     def find_spec(
-        self,
-        fullname: str,
-        path: Sequence[str] | None,
-        target: ModuleType | None = None,
+        self, fullname: str, path: object, target: object = None
     ) -> ModuleSpec | None:
         if fullname != "gymnasium":
             return None

@@ -81,14 +81,13 @@ def _times(env: "RobotEnv", actions: int) -> "dict[str, Vector]":
         env.reset(seed=k)
         count, hold = actions // BLOCKS, env.hold_action
         drawn = rng.uniform(layout.low, layout.high, (count, hold.size))
-        block = time_block(
-            env.step,
-            list(hold + SHARE * (drawn - hold)),
-            model=simulation.model,
-            data=simulation.data,
-            substeps=substeps,
+        actions_taken = list(hold + SHARE * (drawn - hold))
+        model, data = simulation.model, simulation.data
+        found.extend(
+            time_block(
+                env.step, actions_taken, model=model, data=data, substeps=substeps
+            )
         )
-        found.extend(block)
     return {
         "step": np.array(found.step),
         f"raw physics, {substeps} steps of it": np.array(found.raw),

@@ -13,8 +13,7 @@ import typer
 
 from wbc_suite.errors import WbcError
 
-BASE_SOLVERS = ("daqp", "proxqp", "osqp")
-"""QP solvers that come with the package, by the names `qpsolvers` gives them."""
+BASE_SOLVERS = ("daqp", "proxqp", "osqp")  # of the package; names of `qpsolvers`
 EXTRA_SOLVERS = ("piqp", "clarabel", "quadprog")  # of the extra `solvers`
 MUJOCO_PARTS = ("mujoco", "mujoco-core", "mujoco-studio")  # of one version
 REPAIR_MUJOCO = "pip install --force-reinstall --no-deps " + " ".join(MUJOCO_PARTS)

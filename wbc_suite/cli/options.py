@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from wbc_suite.viewers.page_process import PageProcess
     from wbc_suite.viewers.page_server import PageServer
 
+T = TypeVar("T")
+
 RobotArgument = Annotated[
     str,
     typer.Argument(
@@ -92,9 +94,6 @@ PortOption = Annotated[
         max=65535,
     ),
 ]
-
-
-T = TypeVar("T")
 
 
 def _add_to_catalogue(folders: list[Path] | None) -> list[Path]:

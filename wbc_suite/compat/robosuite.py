@@ -83,8 +83,6 @@ def load_part_controller_config(
 ) -> dict[str, Any]:
     """Return the config of a part controller: a JSON file's, or a type's defaults.
 
-    It goes into `body_parts` of a composite config.
-
     Raises:
         ConfigError: If neither is given, or the file cannot be read.
         UnknownNameError: If there is no such type.

@@ -15,13 +15,10 @@ Observation = dict[str, Any]
 
 
 class RobosuiteEnv:
-    """An environment with robosuite's calls; `kwargs` are our arguments.
+    """An environment with robosuite's calls.
 
-    Args:
-        env_name: Name of the benchmark.
-        ignore_done: Whether steps after the end of an episode are allowed.
-        seed: Seed of the first episode.
-        kwargs: Our arguments.
+    `seed` is that of the first episode; with `ignore_done`, steps after the end of an
+    episode are allowed. `kwargs` are arguments of our environment.
 
     Attributes:
         env: Our environment; `render`, `close` and `horizon` are its own.

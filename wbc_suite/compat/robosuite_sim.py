@@ -149,14 +149,16 @@ class RobotView:
 
     def __init__(self, state: RobotState, controller: CompositeController) -> None:
         robot, layout = state.robot, controller.layout
-        self._state, self._slices = state, {s.name: s for s in layout.slices}
+        self._state = state
         self.name = robot.name
         self.robot_model = SimpleNamespace(name=robot.name, naming_prefix=state.prefix)
         self.composite_controller, self.action_dim = controller, layout.size
         self.is_mobile = robot.root.kind != "fixed"
         self.arms = tuple(robot.hands)
+        sizes = {part.name: part.stop - part.start for part in layout.slices}
         self.gripper = {
-            arm: SimpleNamespace(dof=self._size(f"{arm}_gripper")) for arm in self.arms
+            arm: SimpleNamespace(dof=sizes.get(f"{arm}_gripper", 0))
+            for arm in self.arms
         }
 
     def __getattr__(self, name: str) -> Any:
@@ -171,7 +173,8 @@ class RobotView:
     @property
     def _action_split_indexes(self) -> dict[str, tuple[int, int]]:
         """Begin and end of each part of the action."""
-        return {name: (part.start, part.stop) for name, part in self._slices.items()}
+        slices = self.composite_controller.layout.slices
+        return {part.name: (part.start, part.stop) for part in slices}
 
     @property
     def _ref_joint_pos_indexes(self) -> Indices:
@@ -184,11 +187,5 @@ class RobotView:
 
     def create_action_vector(self, parts: Mapping[str, ArrayLike]) -> Vector:
         """Return an action from values of parts, and zeros for the others."""
-        zeros = {name: np.zeros(self._size(name)) for name in self._slices}
-        return self.composite_controller.layout.pack(
-            zeros | {name: np.atleast_1d(values) for name, values in parts.items()}
-        )
-
-    def _size(self, part: str) -> int:
-        found = self._slices.get(part)
-        return 0 if found is None else found.stop - found.start
+        layout = self.composite_controller.layout
+        return layout.pack(parts, base=np.zeros(layout.size))

@@ -11,24 +11,15 @@ from wbc_suite.executors import Outcome
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Summary:
-    """Statistics of a set of episodes.
-
-    Attributes:
-        success: Share of episodes that succeeded at some step.
-        interval: 95 % confidence interval of that share (Wilson).
-        mean_return: Mean sum of rewards.
-        mean_steps: Mean number of actions.
-        physics_errors: Number of episodes that a physics error ended.
-        steps_per_second: Actions per second of wall time and worker, policy included.
-    """
+    """Statistics of a set of episodes."""
 
     episodes: int
-    success: float
-    interval: tuple[float, float]
-    mean_return: float
+    success: float  # share of episodes that succeeded at some step
+    interval: tuple[float, float]  # of that share, 95 % confidence (Wilson)
+    mean_return: float  # of the sums of rewards
     mean_steps: float
-    physics_errors: int
-    steps_per_second: float
+    physics_errors: int  # episodes that one ended
+    steps_per_second: float  # of wall time and worker, policy included
 
 
 def episodes_of(outcomes: Iterable[Outcome]) -> list[dict[str, Any]]:

@@ -22,9 +22,7 @@ EXECUTORS = ("process", "serial", "ray", "slurm")
 
 
 def make_executor(name: str, *, workers: int | None = None) -> Executor:
-    """Make an executor by name, one of `EXECUTORS`.
-
-    `workers` is the number of items that run at once; None for one per processor.
+    """Make one of `EXECUTORS` for so many items at once; None for one per processor.
 
     Raises:
         UnknownNameError: If there is no such executor.

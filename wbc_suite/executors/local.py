@@ -29,9 +29,9 @@ class Processes:
     """Runs items in newly started processes, by default one per processor.
 
     When a worker dies (killed, out of memory, a crash in C), the pool is started
-    again. The items that were running are suspects: each runs again alone, so that the
-    one which kills its worker is identified and no other item fails with it. An item
-    fails when it killed its worker `attempts` times, running alone.
+    again. Each item that was running then runs alone, so that the one which kills its
+    worker is identified and no other item fails with it. It fails after so many
+    attempts alone.
     """
 
     def __init__(self, workers: int | None = None, *, attempts: int = 3) -> None:

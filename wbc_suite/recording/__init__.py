@@ -1,7 +1,7 @@
 """Demonstrations: recording, storage, replay and conversion.
 
-What cannot be read, written or replayed is a DatasetError. Modules that need robots are
-loaded when they are first used.
+Functions raise DatasetError for what cannot be read, written or replayed. Modules that
+need robots are loaded when they are first used.
 """
 
 import importlib

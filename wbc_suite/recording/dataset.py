@@ -41,11 +41,9 @@ class Dataset:
     followed, sizes are checked before memory is allocated. An interrupted recording
     reads as if it had been closed.
 
-    Args:
-        path: The file.
-        alone: Whether finished episodes beside the file are left out.
-        checked: Whether this process has read or written the files before; all others
-            are read by a child process first, see `check_files`.
+    With `alone`, finished episodes beside the file are left out. With `checked`, this
+    process has read or written the files before; all others are read by a child process
+    first, see `check_files`.
 
     Raises:
         DatasetError: If it, or later an episode, cannot be read.

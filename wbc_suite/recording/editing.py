@@ -68,9 +68,7 @@ def repair(path: str | Path) -> list[Finding]:
 
 
 def merge(sources: Sequence[str | Path], out: str | Path) -> int:
-    """Merge the episodes of several files into one; return their number.
-
-    An episode that is in several files is written once.
+    """Merge the episodes of several files, each one once; return their number.
 
     Raises:
         DatasetError: If they are of different environments, or one cannot be read.

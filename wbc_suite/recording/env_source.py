@@ -118,9 +118,8 @@ class EnvSource:
 def header_of(env: Any) -> dict[str, Fact]:
     """Return the attributes of `data`, common to all episodes of an environment."""
     inner = env.unwrapped
-    versions = {name: _version(name) for name in PACKAGES}
-    versions |= {"wbc-suite": __version__, "python": platform.python_version()}
-    versions["system"] = platform.system()
+    versions = {"wbc-suite": __version__, "python": platform.python_version()}
+    versions |= {"system": platform.system()} | {p: _version(p) for p in PACKAGES}
     source = EnvSource.of(env)
     controllers = [
         load_composite_controller_config(given, robot)

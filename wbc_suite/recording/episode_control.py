@@ -8,8 +8,7 @@ from enum import StrEnum
 from wbc_suite.errors import DatasetError
 from wbc_suite.recording.recorder import Recorder
 
-SUCCESS_STEPS = 10
-"""Successive steps with success after which an episode of a plan is kept."""
+SUCCESS_STEPS = 10  # successive ones after which an episode of a plan is kept
 
 
 class EpisodeCommand(StrEnum):
@@ -48,11 +47,9 @@ class EpisodeStatus:
 class EpisodeControl:
     """Takes commands from any thread, and applies them in the loop's thread.
 
-    Args:
-        recorder: Records the environment of the loop; its wrapper is not automatic.
-        seed: Seed of the first episode; each further one takes the next seed.
-        plan: Episodes that begin and end by themselves; None for commands only.
-        report: Called with each new message, in the loop's thread.
+    The recorder's wrapper is not automatic. The first episode has the given seed, each
+    further one the next. Without a plan, episodes begin and end by commands only. In
+    the loop's thread, `report` is called with each new message.
     """
 
     def __init__(
@@ -139,8 +136,7 @@ class EpisodeControl:
             self._try(lambda: self._begin(reset))
 
     def _apply(self, command: EpisodeCommand, reset: Callable[[int], None]) -> str:
-        recorder = self._recorder
-        planned = self._plan is not None
+        recorder, planned = self._recorder, self._plan is not None
         if command is EpisodeCommand.UNDO and (planned or not recorder.recording):
             name = recorder.undo()
             return f"Took {name} back." if name else "There is nothing to take back."
@@ -148,15 +144,12 @@ class EpisodeControl:
             if command is EpisodeCommand.RECORD:
                 return self._begin(reset)
             return "Nothing is being recorded."
-        match command:
-            case EpisodeCommand.RECORD:
-                return self._keep(success=None)
-            case EpisodeCommand.SUCCESS:
-                return self._keep(success=True)
-            case EpisodeCommand.DISCARD:
-                recorder.discard()
-                return "Discarded."
-        return "Keep or discard this episode first."
+        if command is EpisodeCommand.UNDO:
+            return "Keep or discard this episode first."
+        if command is EpisodeCommand.DISCARD:
+            recorder.discard()
+            return "Discarded."
+        return self._keep(success=True if command is EpisodeCommand.SUCCESS else None)
 
     def _keep(self, *, success: bool | None) -> str:
         recorder, length = self._recorder, self._recorder.length

@@ -25,9 +25,7 @@ ENOUGH = 20 << 20  # bytes that must be free when recording begins
 class Store:
     """Adds episodes to a file; after `add` returns, the episode is on disk.
 
-    Args:
-        path: The file; episodes are added to those in it.
-        header: Attributes of `data`; a file that exists must be of the same `env_args`.
+    `header` has the attributes of `data`; a file that exists must be of its `env_args`.
 
     Raises:
         DatasetError: If the folder cannot be written to, the disk is nearly full, the

@@ -27,8 +27,7 @@ MEMORY_BYTES = 4 << 30  # address space of the child
 WALL_FACTOR = 10  # wall time over processor time, for a busy machine or a slow disk
 SPARSE_FROM, SPARSE = 1 << 30, 20  # larger files with less than 1/20 on disk: bombs
 OUT_OF_MEMORY = 3  # exit code of the child
-TOLERATED = (*hdf5_reader.ERRORS, DatasetError)
-"""Errors that the child leaves to the parent, which meets them where they matter."""
+TOLERATED = (*hdf5_reader.ERRORS, DatasetError)  # which the parent meets, too
 T = TypeVar("T")
 COMMAND = "from wbc_suite.recording.hdf5_check import read_files; read_files()"
 

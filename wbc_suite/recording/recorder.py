@@ -19,15 +19,10 @@ from wbc_suite.recording.step_buffer import StepBuffer
 
 
 class Recorder:
-    """Records one environment's episodes into a file.
+    """Records episodes of an environment of this package, wrapped or not.
 
-    Args:
-        env: An environment of this package, wrapped or not.
-        path: The file; see `Store`.
-        next_obs: Whether observations after each action are stored too.
-
-    Attributes:
-        succeeded: Whether the benchmark counts as solved at the last action.
+    With `next_obs`, observations after each action are stored too. `succeeded` says
+    whether the benchmark counts as solved at the last action. For the file see `Store`.
     """
 
     def __init__(self, env: Any, path: str | Path, *, next_obs: bool = False) -> None:

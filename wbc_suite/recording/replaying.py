@@ -23,19 +23,12 @@ _JOINT = re.compile(r'<(?:free)?joint\b[^<>]*?\bname="([^"<>]{1,200})"')
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Divergence:
-    """Difference of a replay by actions from the recording.
+    """Difference of a replay by actions from the recording."""
 
-    Attributes:
-        steps: Number of actions played.
-        largest: Largest difference of any number of the state (m, rad, m/s, rad/s).
-        first: Action with the first difference after it; None without any.
-        success: Whether the benchmark is solved at the end of the replay.
-    """
-
-    steps: int
-    largest: float
-    first: int | None
-    success: bool
+    steps: int  # actions played
+    largest: float  # of all numbers of the state, m, rad, m/s, rad/s
+    first: int | None  # action with the first difference after it; None without any
+    success: bool  # at the end of the replay
 
     @property
     def exact(self) -> bool:
@@ -47,10 +40,8 @@ def start_as(env: RobotEnv, episode: Episode) -> None:
     """Reset the environment to the start of a recorded episode.
 
     With the recorded state of the random generator the start is equal to the bit, sizes
-    of objects included. Without it, the physics state is set.
-
-    Raises:
-        DatasetError: If the state, or the names of joints, do not fit the environment.
+    of objects included. Without it, the physics state is set. Raises DatasetError if
+    the state, or the names of joints, do not fit the environment.
     """
     if "states" not in episode.columns or not episode.length:
         raise DatasetError(f"'{episode.name}' has no states to start from.")

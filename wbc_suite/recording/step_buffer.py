@@ -25,13 +25,10 @@ OUTCOME |= {"step_time": "f8", "stamp": "f8"}
 class RowBuffer:
     """Rows of one structured type, in a file without a name in a folder.
 
-    Two rows are in memory: the one in progress and the next one, which may be begun
-    too. `advance` completes the first, and the places change their roles. Nothing is
-    left in the folder, also after a crash.
-
-    Attributes:
-        pair: The two rows, shape (2,); another array after each `begin`.
-        at: Index of the row in progress; the next one is at `1 - at`.
+    Two rows are in memory, in `pair`, an array that `begin` replaces: the one in
+    progress, at index `at`, and the next one, at `1 - at`, which may be begun too.
+    `advance` completes the first, and the places change their roles. Nothing is left in
+    the folder, also after a crash.
     """
 
     def __init__(self, folder: Path) -> None:

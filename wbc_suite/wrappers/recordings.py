@@ -77,10 +77,8 @@ class DataCollection(gymnasium.Wrapper[Any, Any, Any, Any]):
 class Playback(gymnasium.Wrapper[Any, Any, Any, Any]):
     """Replaces the given actions by recorded ones, episode after episode, cyclically.
 
-    The environment is made with the arguments of the recording.
-
-    Raises:
-        DatasetError: If the recording has no episodes, or is of another environment.
+    Raises DatasetError if the recording has no episodes, or is not of the wrapped
+    environment.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], dataset: Dataset) -> None:

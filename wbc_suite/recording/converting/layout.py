@@ -18,19 +18,12 @@ Finish: TypeAlias = Callable[[Dataset, Path, Sequence[Mapping[str, Any]]], None]
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Piece:
-    """Successive episodes of a dataset that one worker converts.
-
-    Attributes:
-        number: Number of the piece.
-        names: Names of its episodes.
-        start: Number of actions of the dataset before its first episode.
-        before: Number of episodes of the dataset before it.
-    """
+    """Successive episodes of a dataset that one worker converts."""
 
     number: int
     names: tuple[str, ...]
-    start: int
-    before: int
+    start: int  # number of actions in the dataset before these episodes
+    before: int  # number of episodes before these
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
