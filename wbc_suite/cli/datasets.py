@@ -12,9 +12,7 @@ if TYPE_CHECKING:
     from wbc_suite.recording import Dataset
     from wbc_suite.recording.editing import Finding
 
-OutOption = Annotated[
-    Path, typer.Option("--out", "-o", help="File, or folder, to write.")
-]
+OutOption = Annotated[Path, typer.Option("--out", "-o", help="File or folder.")]
 SHOWN = 20  # episodes
 
 

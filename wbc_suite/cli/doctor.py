@@ -15,7 +15,7 @@ from wbc_suite.errors import WbcError
 
 BASE_SOLVERS = ("daqp", "proxqp", "osqp")  # of the package; names of `qpsolvers`
 EXTRA_SOLVERS = ("piqp", "clarabel", "quadprog")  # of the extra `solvers`
-MUJOCO_PARTS = ("mujoco", "mujoco-core", "mujoco-studio")  # of one version
+MUJOCO_PARTS = ("mujoco", "mujoco-core", "mujoco-studio")  # distributions of MuJoCo 4
 REPAIR_MUJOCO = "pip install --force-reinstall --no-deps " + " ".join(MUJOCO_PARTS)
 
 _MARKS = {"fine": "ok  ", "optional": "note", "broken": "BAD "}

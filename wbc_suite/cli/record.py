@@ -100,13 +100,14 @@ def record(
                 device=make(env),
                 stages=stages_of(device=True, scale=scale, mirror=mirror),
                 episode_control=EpisodeControl(
-                    collected.recorder,
-                    seed=seed,
-                    plan=plan,
-                    report=lambda message: print(f"  {message}", flush=True),
+                    collected.recorder, seed=seed, plan=plan, report=_print_message
                 ),
             )
     print(f"{out}: {collected.recorder.kept} episodes.")
+
+
+def _print_message(message: str) -> None:
+    print(f"  {message}", flush=True)
 
 
 def _collect(

@@ -26,9 +26,8 @@ def view(
     from wbc_suite.viewers.page_server import PageServer
     from wbc_suite.viewers.robot_page import RobotPage
 
-    description = load_robot(
-        robot, gripper=options.chosen(gripper), base=base, skin=skin
-    )
+    chosen = options.chosen(gripper)
+    description = load_robot(robot, gripper=chosen, base=base, skin=skin)
     page = RobotPage(description, PageServer(host, port))
     options.serve_until_interrupted(page.site, description.title or description.name)
     page.stop()
