@@ -40,7 +40,9 @@ class RobosuiteEnv:
         self.env = RobotEnv(env_name, **kwargs)
         self.name, self.unwrapped = env_name, self
         self.sim = Sim(self.env)
-        self.viewer = SimpleNamespace(set_camera=lambda _: None, update=lambda: None)
+        self.viewer = SimpleNamespace(
+            set_camera=lambda camera_id: None, update=lambda: None
+        )
         self.model = self.sim.model
         self.robots = tuple(RobotView(*pair) for pair in self.env.simulation.pairs)
         self.action_dim = self.env.action_layout.size

@@ -22,7 +22,7 @@ _OF_DATA = re.compile(r"get_(body|geom|site|camera|joint)_(\w+)")
 
 
 class Model:
-    """MuJoCo's model, its names (`site_name2id`, `camera_names`, ...), and its text."""
+    """MuJoCo's model (`_model`), its names (`site_name2id`, ...), and its text."""
 
     def __init__(self, env: RobotEnv) -> None:
         self._env = env
@@ -31,7 +31,7 @@ class Model:
         found = _OF_MODEL.fullmatch(name)
         model = self._env.simulation.model
         if found is None:
-            return getattr(model, name)
+            return model if name == "_model" else getattr(model, name)
         names = _names(model, found[1])
         if found[2] == "names":
             return names
@@ -45,7 +45,7 @@ class Model:
 
 
 class Data:
-    """MuJoCo's state, and its arrays by name: `get_site_xpos`, ..."""
+    """MuJoCo's state (`_data`), and its arrays by name: `get_site_xpos`, ..."""
 
     def __init__(self, env: RobotEnv) -> None:
         object.__setattr__(self, "_env", env)
@@ -53,7 +53,8 @@ class Data:
     def __getattr__(self, name: str) -> Any:
         found = _OF_DATA.fullmatch(name)
         if found is None:
-            return getattr(self._env.simulation.data, name)
+            data = self._env.simulation.data
+            return data if name == "_data" else getattr(data, name)
         kind, column = found.groups()
         return lambda name: np.array(self._view(kind, name, column))
 
