@@ -18,13 +18,12 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOME = {
-    "Catalogue": "wbc_suite.catalogue",
-    "RobotDescription": "wbc_suite.robot",
-    "load_composite_controller_config": "wbc_suite.control",
-    "load_robot": "wbc_suite.robot",
-    "make": "wbc_suite.envs",
+    "Catalogue": "catalogue",
+    "RobotDescription": "robot",
+    "load_composite_controller_config": "control",
+    "load_robot": "robot",
+    "make": "envs",
 }
-_MODULES = ("errors", "kinematics", "qp")
 
 __all__ = [
     "Catalogue",
@@ -41,10 +40,10 @@ register_environments()
 
 
 def __getattr__(name: str) -> Any:
-    if name in _MODULES:
+    if name in ("errors", "kinematics", "qp"):
         return importlib.import_module(f"wbc_suite.{name}")
     if name in _HOME:
-        return getattr(importlib.import_module(_HOME[name]), name)
+        return getattr(importlib.import_module(f"wbc_suite.{_HOME[name]}"), name)
     raise AttributeError(f"module 'wbc_suite' has no attribute '{name}'")
 
 

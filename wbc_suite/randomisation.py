@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import mujoco
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, field_validator
 
@@ -156,10 +155,7 @@ def _texture(model: Any, _: bool, rng: np.random.Generator) -> None:
 def draw_pattern(
     height: int, width: int, rng: np.random.Generator
 ) -> NDArray[np.uint8]:
-    """Return a random pattern of two colours, shape (height, width, 3).
-
-    It is plain, chequered, a sine grating or blocky noise.
-    """
+    """Return a random pattern of two colours, shape (height, width, 3)."""
     first, second = rng.uniform(0.0, 255.0, (2, 3))
     y, x = np.mgrid[0.0 : 1.0 : height * 1j, 0.0 : 1.0 : width * 1j]
     kind = rng.integers(4)
@@ -188,7 +184,8 @@ def _light_position(model: Any, size: float, rng: np.random.Generator) -> None:
 
 
 def _light_brightness(model: Any, share: float, rng: np.random.Generator) -> None:
-    _scale(model.light_diffuse, share, rng, rows=True)
+    factors = rng.uniform(1.0 - share, 1.0 + share, (model.nlight, 1))
+    model.light_diffuse[:] *= factors
 
 
 def _camera_position(model: Any, size: float, rng: np.random.Generator) -> None:
@@ -196,10 +193,9 @@ def _camera_position(model: Any, size: float, rng: np.random.Generator) -> None:
 
 
 def _camera_rotation(model: Any, size: float, rng: np.random.Generator) -> None:
-    for k, turn in enumerate(rng.uniform(-size, size, (model.ncam, 3))):
-        x, y, z, w = pin.Quaternion(pin.exp3(turn)).coeffs()
-        now = model.cam_quat[k].copy()
-        mujoco.mju_mulQuat(model.cam_quat[k], now, np.array([w, x, y, z]))
+    turns = rng.uniform(-size, size, (model.ncam, 3))
+    for quat, turn in zip(model.cam_quat, turns, strict=True):
+        mujoco.mju_quatIntegrate(quat, turn, 1.0)
 
 
 def _camera_fovy(model: Any, size: float, rng: np.random.Generator) -> None:
@@ -225,19 +221,10 @@ def _inertia(model: Any, share: float, rng: np.random.Generator) -> None:
     _scale_simple_inertia(model, factors[:, 0], rotation_only=True)
 
 
-def _friction(model: Any, share: float, rng: np.random.Generator) -> None:
-    _scale(model.geom_friction, share, rng)
-
-
-def _damping(model: Any, share: float, rng: np.random.Generator) -> None:
-    _scale(model.dof_damping, share, rng, rows=True)
-    _scale(model.dof_frictionloss, share, rng)
-
-
 def _armature(model: Any, share: float, rng: np.random.Generator) -> None:
-    before = model.dof_armature.copy()
-    _scale(model.dof_armature, share, rng)
-    model.dof_M0[:] += model.dof_armature - before
+    added = rng.uniform(-share, share, model.nv) * model.dof_armature
+    model.dof_armature[:] += added
+    model.dof_M0[:] += added
 
 
 def _gains(model: Any, share: float, rng: np.random.Generator) -> None:
@@ -246,24 +233,10 @@ def _gains(model: Any, share: float, rng: np.random.Generator) -> None:
     model.actuator_biasprm[:] *= factors
 
 
-def _scale(
-    values: Array, share: float, rng: np.random.Generator, *, rows: bool = False
-) -> None:
-    """Multiply values by random factors, one for each, or one for each row."""
-    shape = (len(values), *(1,) * (values.ndim - 1)) if rows else values.shape
-    values[:] *= rng.uniform(1.0 - share, 1.0 + share, shape)
-
-
 def _scale_simple_inertia(
     model: Any, factors: Array, *, rotation_only: bool = False
 ) -> None:
-    """Scale the mass matrix of simple bodies, which MuJoCo takes from `dof_M0`.
-
-    Args:
-        model: The scene.
-        factors: Factor of each body, shape (nbody,).
-        rotation_only: Whether only entries of rotations are scaled.
-    """
+    """Scale the mass matrix of simple bodies, which MuJoCo takes from `dof_M0`."""
     scaled = model.dof_simplenum > 0
     if rotation_only:
         joint = model.dof_jntid
@@ -278,6 +251,18 @@ def _scale_simple_inertia(
 
 Draw: TypeAlias = Callable[[Any, Any, np.random.Generator], None]
 
+
+def _scales(*arrays: str) -> tuple[tuple[str, ...], Draw]:
+    """Return a draw that multiplies every value of arrays by a factor of its own."""
+
+    def draw(model: Any, share: float, rng: np.random.Generator) -> None:
+        for name in arrays:
+            values = getattr(model, name)
+            values[:] *= rng.uniform(1.0 - share, 1.0 + share, values.shape)
+
+    return arrays, draw
+
+
 _DRAWS: dict[str, tuple[tuple[str, ...], Draw]] = {
     "color": (("geom_rgba", "mat_rgba"), _color),
     "texture": (("tex_data",), _texture),
@@ -288,8 +273,8 @@ _DRAWS: dict[str, tuple[tuple[str, ...], Draw]] = {
     "camera_fovy": (("cam_fovy",), _camera_fovy),
     "mass": (("body_mass", "body_inertia", "body_subtreemass", "dof_M0"), _mass),
     "inertia": (("body_inertia", "dof_M0"), _inertia),
-    "friction": (("geom_friction",), _friction),
-    "damping": (("dof_damping", "dof_frictionloss"), _damping),
+    "friction": _scales("geom_friction"),
+    "damping": _scales("dof_damping", "dof_frictionloss"),
     "armature": (("dof_armature", "dof_M0"), _armature),
     "gains": (("actuator_gainprm", "actuator_biasprm"), _gains),
 }

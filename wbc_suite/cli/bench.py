@@ -1,22 +1,13 @@
 """`wbc-suite bench`: how fast environments are on this machine."""
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from wbc_suite.cli.options import (
-    BaseOption,
-    CamerasOption,
-    CatalogueOption,
-    ControllerOption,
-    GripperOption,
-    PictureSizeOption,
-    RobotsOption,
-    environment_arguments,
-    writing,
-)
+from wbc_suite.cli import options
 
 if TYPE_CHECKING:
     from wbc_suite.envs import RobotEnv
@@ -30,28 +21,31 @@ SHARE = 0.05  # of the way from what holds the robot to a random action
 def bench(
     benchmark: Annotated[str, typer.Argument(help="Benchmark to step.")] = "Lift",
     *,
-    robots: RobotsOption = None,
-    controller: ControllerOption = None,
+    robots: options.RobotsOption = None,
+    controller: options.ControllerOption = None,
     rate: Annotated[float, typer.Option(help="Actions per second, Hz.")] = 20.0,
     actions: Annotated[int, typer.Option(min=BLOCKS, help="How many to time.")] = 200,
-    camera: CamerasOption = None,
-    size: PictureSizeOption = 84,
+    camera: options.CamerasOption = None,
+    size: options.PictureSizeOption = 84,
     output: Annotated[
         Path | None, typer.Option("--json", help="Write the figures here, too.")
     ] = None,
-    gripper: GripperOption = None,
-    base: BaseOption = None,
-    catalogue: CatalogueOption = None,
+    gripper: options.GripperOption = None,
+    base: options.BaseOption = None,
+    catalogue: options.CatalogueOption = None,
 ) -> None:
     """Time steps of an environment beside its raw physics, resets and pictures.
 
     Times are of the processor, so that other programs disturb them little. Example:
     wbc-suite bench Door --robots GR1 --controller WHOLE_BODY_IK --camera agentview
     """
+    import numpy as np
+
     import wbc_suite
     from wbc_suite.envs import RobotEnv
+    from wbc_suite.timing import time_frames
 
-    arguments = environment_arguments(
+    arguments = options.environment_arguments(
         robots=robots, controller=controller, gripper=gripper, base=base
     )
     arguments |= {"control_freq": rate, "horizon": 10**9}
@@ -59,12 +53,15 @@ def bench(
     assert isinstance(env, RobotEnv), "`make` made it"
     found = _times(env, actions)
     for name in camera or ():
-        found[f"picture of {name}, {size} x {size}"] = _pictures(env, name, size)
+        draw = partial(env.cameras.image, name, width=size, height=size)
+        draw()  # makes the renderer
+        times = np.array(time_frames(PICTURES, draw).cpu)
+        found[f"picture of {name}, {size} x {size}"] = times
     env.close()
     names = " and ".join(robots or ["Panda"])
     _print_table(f"{benchmark}, {names}, {rate:g} Hz", found)
     if output is not None:
-        with writing(output):
+        with options.writing(output):
             rows = {name: times.tolist() for name, times in found.items()}
             output.write_text(json.dumps({"us": rows}) + "\n", encoding="utf-8")
 
@@ -84,32 +81,18 @@ def _times(env: "RobotEnv", actions: int) -> "dict[str, Vector]":
         env.reset(seed=k)
         count, hold = actions // BLOCKS, env.hold_action
         drawn = rng.uniform(layout.low, layout.high, (count, hold.size))
-        block = time_block(
-            env.step,
-            list(hold + SHARE * (drawn - hold)),
-            model=simulation.model,
-            data=simulation.data,
-            substeps=substeps,
+        actions_taken = list(hold + SHARE * (drawn - hold))
+        model, data = simulation.model, simulation.data
+        found.extend(
+            time_block(
+                env.step, actions_taken, model=model, data=data, substeps=substeps
+            )
         )
-        found.extend(block)
     return {
         "step": np.array(found.step),
         f"raw physics, {substeps} steps of it": np.array(found.raw),
         "reset": np.array(times(RESETS, env.reset)),
     }
-
-
-def _pictures(env: "RobotEnv", camera: str, size: int) -> "Vector":
-    """Return CPU times of pictures, us; the first makes the renderer."""
-    import numpy as np
-
-    from wbc_suite.timing import time_frames
-
-    def take() -> object:
-        return env.cameras.image(camera, width=size, height=size)
-
-    take()
-    return np.array(time_frames(PICTURES, take).cpu)
 
 
 def _print_table(title: str, found: "dict[str, Vector]") -> None:

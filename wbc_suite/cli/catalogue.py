@@ -1,26 +1,16 @@
 """`wbc-suite list | check | schema`: what the catalogue has, and files for it."""
 
 import json
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal, TypeAlias, get_args
 
 import typer
 
 from wbc_suite.cli.options import CatalogueOption
 
-if TYPE_CHECKING:
-    from rich.table import Table
-
-    from wbc_suite.catalogue import Catalogue
-
 Kind = Literal["robots", "grippers", "bases", "benchmarks", "controllers"]
-
-_FOLDERS = {
-    "grippers": "robots/gripper",
-    "bases": "robots/base",
-    "benchmarks": "tasks",
-    "controllers": "controllers",
-}
+Row: TypeAlias = tuple[str, ...]
 
 
 def list_catalogue(
@@ -31,90 +21,83 @@ def list_catalogue(
 ) -> None:
     """Show the robots, grippers, bases, benchmarks and controllers there are."""
     from rich.console import Console
+    from rich.table import Table
 
     from wbc_suite.catalogue import Catalogue
 
-    console = Console(soft_wrap=True)
-    known = Catalogue()
+    console, catalogued = Console(soft_wrap=True), Catalogue()
     kinds: tuple[Kind, ...] = (kind,) if kind else get_args(Kind)
-    for chosen in kinds:
-        if chosen == "robots":
-            console.print(_robots(known))
-        elif chosen in ("grippers", "bases"):
-            console.print(_components(known, chosen))
-        else:
-            console.print(_files(known, chosen))
+    for listed in kinds:
+        folder, columns, rows = _LISTS[listed]
+        table = Table(title_justify="left", title_style="bold", box=None)
+        table.title = listed.capitalize()
+        for column in columns:
+            side = "right" if column in ("dof", "kg") else "left"
+            table.add_column(column, justify=side, no_wrap=column == "name")
+        for row in rows(catalogued.files(folder)):
+            table.add_row(*row)
+        console.print(table)
 
 
-def _robots(catalogue: "Catalogue") -> "Table":
+def _robots(files: Sequence[Path]) -> Iterator[Row]:
     from wbc_suite.robot import load_robot
 
-    table = _table("Robots", "name", "", "dof", "kg", "root")
-    for name in catalogue.names("robots"):
-        robot = load_robot(name, catalogue=catalogue)
+    for robot in map(load_robot, files):
         numbers = str(robot.dof), f"{robot.mass:.1f}"
-        table.add_row(robot.name, robot.title, *numbers, robot.root.kind)
-    return table
+        yield robot.name, robot.title, *numbers, robot.root.kind
 
 
-def _components(catalogue: "Catalogue", kind: Kind) -> "Table":
-    """List grippers with the side they fit, bases with the root they bring."""
+def _components(files: Sequence[Path]) -> Iterator[Row]:
+    """Yield grippers with the side they fit, bases with the root they bring."""
     from wbc_suite.robot.robot_file import Component, read_robot_file
 
-    what = "side" if kind == "grippers" else "root"
-    table = _table(kind.capitalize(), "name", "", what, "kg")
-    for path in catalogue.files(_FOLDERS[kind]):
-        component = read_robot_file(path)
+    for component in map(read_robot_file, files):
         if not isinstance(component, Component):
             continue
         header = component.component
-        fits = header.side or "both" if what == "side" else component.root.kind
+        is_base = header.kind == "base"
+        fits = component.root.kind if is_base else header.side or "both"
         mass = sum(link.mass for link in component.links)
-        table.add_row(header.name, header.title, fits, f"{mass:.2f}")
-    return table
+        yield header.name, header.title, fits, f"{mass:.2f}"
 
 
-def _files(catalogue: "Catalogue", kind: Kind) -> "Table":
+def _benchmarks(files: Sequence[Path]) -> Iterator[Row]:
     from wbc_suite.tomlfile import read_toml
 
-    table = _table(kind.capitalize(), "name", "")
-    if kind == "controllers":
-        from wbc_suite.control import composite_names
-        from wbc_suite.control.part.registry import part_models
+    for content in map(read_toml, files):
+        yield content["name"], content["title"]
 
-        for name in composite_names():
-            table.add_row(name, "for any robot, with its file below when there is one")
-        for name, model in part_models().items():
-            about = str(model.__doc__).split("\n")[0].partition(";")[0]
-            table.add_row(name, f"of one part: {about}")
-    for path in catalogue.files(_FOLDERS[kind]):
-        content = read_toml(path)
-        if kind == "controllers":
-            table.add_row(path.stem, _controlled(content))
-        else:
-            table.add_row(content["name"], content["title"])
-    return table
+
+def _controllers(files: Sequence[Path]) -> Iterator[Row]:
+    from wbc_suite.control import composite_names
+    from wbc_suite.control.part.registry import part_models
+    from wbc_suite.tomlfile import read_toml
+
+    for name in composite_names():
+        yield name, "for any robot, with its file below when there is one"
+    for name, model in part_models().items():
+        about = str(model.__doc__).split("\n")[0].partition(";")[0]
+        yield name, f"of one part: {about}"
+    for file in files:
+        yield file.stem, _controlled(read_toml(file))
+
+
+_LISTS = {
+    "robots": ("robots", ("name", "", "dof", "kg", "root"), _robots),
+    "grippers": ("robots/gripper", ("name", "", "side", "kg"), _components),
+    "bases": ("robots/base", ("name", "", "root", "kg"), _components),
+    "benchmarks": ("tasks", ("name", ""), _benchmarks),
+    "controllers": ("controllers", ("name", ""), _controllers),
+}
+"""Folder, columns, and function that yields the rows of each kind."""
 
 
 def _controlled(content: dict[str, Any]) -> str:
-    """Return what a controller's file controls."""
     if "body_parts" in content:
         parts = content["body_parts"].items()
         return ", ".join(f"{name}: {part['type']}" for name, part in parts)
     walk = ["walk", "height"] if "gait" in content else []
     return ", ".join([*(frame["name"] for frame in content.get("frame", ())), *walk])
-
-
-def _table(title: str, *columns: str) -> "Table":
-    from rich.table import Table
-
-    table = Table(title=title, title_justify="left", title_style="bold", box=None)
-    for column in columns:
-        right = column in ("dof", "kg")
-        table.add_column(
-            column, justify="right" if right else "left", no_wrap=column == "name"
-        )
-    return table
 
 
 def check_file(
@@ -138,13 +121,26 @@ def check_file(
     content = read_toml(file) if file.suffix == ".toml" else {"component": None}
     controls = not content.keys().isdisjoint(("body_parts", "frame", "gait"))
     if "name" in content:
-        print(f"{file}: fine. {_benchmark(file)}")
+        from wbc_suite.benchmark import load_benchmark
+
+        benchmark = load_benchmark(file)
+        found = f"Benchmark '{benchmark.name}': {benchmark.horizon} actions an episode."
     elif file.suffix == ".json" or (controls and "component" not in content):
-        print(f"{file}: fine. {_controller(file, robot)}")
+        from wbc_suite.control import load_composite_controller_config
+
+        config = load_composite_controller_config(file, robot)
+        found = f"{config['type']} of {_controlled(config)}."
     elif "provider" in content:
-        print(f"{file}: fine. {_skin(file)}")
+        from wbc_suite.robot.skins import read_skin
+
+        skin = read_skin(file)
+        meshes = sum(len(pieces) for pieces in skin.link.values())
+        found = (
+            f"Skin of {len(skin.link)} links with {meshes} meshes of {skin.provider}."
+        )
     else:
-        print(f"{file}: fine. {_robot(file)}")
+        found = _robot(file)
+    print(f"{file}: fine. {found}")
 
 
 def _robot(file: Path) -> str:
@@ -158,28 +154,6 @@ def _robot(file: Path) -> str:
         f"{robot.mass:.1f} kg, {robot.root.kind} root; MuJoCo and Pinocchio models "
         f"with nv = {simulated.nv} and {computed.nv}."
     )
-
-
-def _skin(file: Path) -> str:
-    from wbc_suite.robot.skins import read_skin
-
-    table = read_skin(file)
-    meshes = sum(len(pieces) for pieces in table.link.values())
-    return f"Skin of {len(table.link)} links with {meshes} meshes of {table.provider}."
-
-
-def _benchmark(file: Path) -> str:
-    from wbc_suite.benchmark import load_benchmark
-
-    benchmark = load_benchmark(file)
-    return f"Benchmark '{benchmark.name}': {benchmark.horizon} actions an episode."
-
-
-def _controller(file: Path, robot: str | None) -> str:
-    from wbc_suite.control import load_composite_controller_config
-
-    config = load_composite_controller_config(file, robot)
-    return f"{config['type']} of {_controlled(config)}."
 
 
 def print_schema(

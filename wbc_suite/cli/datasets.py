@@ -6,28 +6,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wbc_suite.cli.options import (
-    CamerasOption,
-    ExecutorOption,
-    PictureSizeOption,
-    RecordingArgument,
-    TrustFilesOption,
-    camera_arguments,
-    progress,
-)
+from wbc_suite.cli import options
 
 if TYPE_CHECKING:
     from wbc_suite.recording import Dataset
     from wbc_suite.recording.editing import Finding
 
-OutOption = Annotated[Path, typer.Option("--out", "-o", help="File to write.")]
-
-
+OutOption = Annotated[Path, typer.Option("--out", "-o", help="File or folder.")]
 SHOWN = 20  # episodes
 
 
 def inspect(
-    file: RecordingArgument,
+    file: options.RecordingArgument,
     *,
     every: Annotated[
         bool, typer.Option("--all", help="List every episode, not twenty.")
@@ -45,20 +35,21 @@ def inspect(
 ) -> None:
     """Show lengths, success and origin of episodes; write plots, a contact sheet."""
     from wbc_suite.recording import Dataset
+    from wbc_suite.recording.plots import write_plots
+    from wbc_suite.recording.video import write_sheet
 
     with Dataset(file) as dataset:
         _print_origin(dataset)
         _print_episodes(dataset, len(dataset) if every else SHOWN)
         if columns and len(dataset):
-            _print_columns(dataset)
+            episode = dataset.episode(dataset.names[0])
+            print(f"  {episode.name} holds:")
+            for name, column in sorted(episode.columns.items()):
+                print(f"    {name:<36} {column.dtype!s:<8} {column.shape}")
         if plots is not None:
-            from wbc_suite.recording.plots import write_plots
-
             write_plots(dataset, plots)
             print(f"Wrote {plots}.")
         if sheet is not None:
-            from wbc_suite.recording.video import write_sheet
-
             write_sheet(dataset, sheet, camera=camera)
             print(f"Wrote {sheet}.")
 
@@ -66,14 +57,11 @@ def inspect(
 def _print_origin(dataset: "Dataset") -> None:
     from wbc_suite.recording import EnvSource
 
-    header = dataset.header
-    env_args = header.get("env_args")
-    if env_args is not None:
-        source = EnvSource.parse(str(env_args))
-        arguments = json.dumps(dict(source.arguments))
-        print(f"{dataset.path}: {source.benchmark} {arguments[:300]}")
-    else:
-        print(f"{dataset.path}: its environment is not named")
+    header, origin = dataset.header, "its environment is not named"
+    if "env_args" in header:
+        source = EnvSource.parse(str(header["env_args"]))
+        origin = f"{source.benchmark} {json.dumps(dict(source.arguments))[:300]}"
+    print(f"{dataset.path}: {origin}")
     for key in ("schema_version", "date", "versions", "model_hash"):
         if key in header:
             print(f"  {key:<15} {str(header[key])[:200]}")
@@ -104,22 +92,14 @@ def _print_episodes(dataset: "Dataset", most: int) -> None:
         print(f"    ... and {len(lengths) - most} more (--all)")
 
 
-def _print_columns(dataset: "Dataset") -> None:
-    episode = dataset.episode(dataset.names[0])
-    print(f"  {episode.name} holds:")
-    for name, column in sorted(episode.columns.items()):
-        print(f"    {name:<36} {column.dtype!s:<8} {column.shape}")
-
-
-def verify(file: RecordingArgument) -> None:
+def verify(file: options.RecordingArgument) -> None:
     """Read every episode and compare it with the checksum it was written with."""
     from wbc_suite.recording import editing
 
-    bad = _report(editing.verify(file))
-    raise typer.Exit(1 if bad else 0)
+    raise typer.Exit(1 if _report(editing.verify(file)) else 0)
 
 
-def repair(file: RecordingArgument) -> None:
+def repair(file: options.RecordingArgument) -> None:
     """Restore readable episodes into one file, after a crash or damage."""
     from wbc_suite.recording import editing
 
@@ -139,7 +119,7 @@ def merge(
 
 
 def split(
-    file: RecordingArgument,
+    file: options.RecordingArgument,
     *,
     valid: Annotated[
         float, typer.Option(min=0.0, max=1.0, help="Share kept for validation.")
@@ -155,7 +135,7 @@ def split(
 
 
 def filter_episodes(
-    file: RecordingArgument,
+    file: options.RecordingArgument,
     *,
     out: OutOption,
     success: Annotated[
@@ -196,13 +176,11 @@ def _report(findings: "list[Finding]") -> int:
 
 
 def convert(
-    file: RecordingArgument,
+    file: options.RecordingArgument,
     *,
     to: Annotated[str, typer.Option(help="robomimic, npz, lerobot, minari or mcap.")],
-    out: Annotated[
-        Path, typer.Option("--out", "-o", help="File, or folder, to write.")
-    ],
-    executor: ExecutorOption = "serial",
+    out: OutOption,
+    executor: options.ExecutorOption = "serial",
     workers: Annotated[
         int, typer.Option(min=1, help="At once, for lerobot and npz; others are one.")
     ] = 1,
@@ -215,7 +193,7 @@ def convert(
     from wbc_suite.recording.converting import convert as write
 
     asked = None if executor == "serial" else make_executor(executor, workers=workers)
-    with progress("Converting", _count_episodes(file)) as advance:
+    with options.progress("Converting", _count_episodes(file)) as advance:
         written = write(file, out, to, advance, executor=asked, workers=workers)
     print(f"Wrote {written}.")
 
@@ -228,20 +206,20 @@ def _count_episodes(file: Path) -> int:
 
 
 def extract(
-    file: RecordingArgument,
+    file: options.RecordingArgument,
     *,
     out: OutOption,
-    camera: CamerasOption = None,
-    size: PictureSizeOption = 84,
+    camera: options.CamerasOption = None,
+    size: options.PictureSizeOption = 84,
     depth: Annotated[bool, typer.Option("--depth", help="See depth too.")] = False,
     shaped: Annotated[
         bool, typer.Option("--shaped", help="Reward progress, not success alone.")
     ] = False,
-    executor: ExecutorOption = "process",
+    executor: options.ExecutorOption = "process",
     workers: Annotated[
         int, typer.Option(min=1, help="At once; each makes an environment.")
     ] = 1,
-    trust_files: TrustFilesOption = False,
+    trust_files: options.TrustFilesOption = False,
 ) -> None:
     """Restore recorded states, and store other observations and rewards.
 
@@ -251,11 +229,10 @@ def extract(
     from wbc_suite.recording.extracting import extract as extract_observations
 
     changes: dict[str, Any] = {"reward_shaping": shaped, "use_camera_obs": bool(camera)}
-    changes |= camera_arguments(camera, size)
     if camera:
-        changes["camera_depths"] = depth
+        changes |= options.camera_arguments(camera, size) | {"camera_depths": depth}
     chosen = "serial" if executor == "process" and workers == 1 else executor
-    with progress("Extracting", _count_episodes(file)) as advance:
+    with options.progress("Extracting", _count_episodes(file)) as advance:
         count = extract_observations(
             file,
             out,

@@ -17,7 +17,6 @@ RATE = 50  # Hz, of actions
 PERIOD = 4.0  # s, of one figure
 REST = 1.0  # s, standing still at the end
 FRAMES_PER_SECOND = 10
-SIZE = (480, 480)  # pixels
 
 
 def demo(
@@ -30,19 +29,22 @@ def demo(
     ] = "WHOLE_BODY_IK",
 ) -> None:
     """Move both hands of GR1 along curves; print tracking errors, write pictures."""
+    from PIL import Image
+
     import wbc_suite
+    from wbc_suite.recording.plots import save_picture
+    from wbc_suite.recording.video import write_video
 
     seconds = figures * PERIOD + REST
-    env = wbc_suite.make(
-        "Lift",
-        robots="GR1",
-        controller_configs=controller,
-        control_freq=RATE,
-        horizon=round(seconds * RATE) + 1,
-    )
+    horizon = round(seconds * RATE) + 1
+    made = {"controller_configs": controller, "control_freq": RATE, "horizon": horizon}
+    env = wbc_suite.make("Lift", robots="GR1", **made)
     errors, step_times, pictures = _reach(env.unwrapped, seconds)
     _report(controller, errors, step_times)
-    _write(output, pictures)
+    still, film = output / "reach.png", output / "reach.gif"
+    save_picture(Image.fromarray(pictures[len(pictures) // 4]), still)
+    write_video(pictures, film, rate=FRAMES_PER_SECOND)
+    print(f"Wrote {still} and {film}.")
 
 
 def _reach(env: Any, seconds: float) -> "tuple[Matrix, Vector, list[Image]]":
@@ -54,11 +56,9 @@ def _reach(env: Any, seconds: float) -> "tuple[Matrix, Vector, list[Image]]":
     env.reset(seed=0)
     layout = env.action_layout
     start = layout.unpack(env.hold_action)
-    data = env.simulation.data
+    model, data = env.simulation.model, env.simulation.data
     errors, step_times, pictures = [], [], []
-    with Camera(
-        env.simulation.model, data, width=SIZE[0], height=SIZE[1], subject="robot0_"
-    ) as camera:
+    with Camera(model, data, width=480, height=480, subject="robot0_") as camera:
         for step in range(round(seconds * RATE)):
             goals = {
                 hand: np.concatenate([start[hand][:3] + offset, start[hand][3:]])
@@ -100,15 +100,3 @@ def _report(controller: str, errors: "Matrix", step_times: "Vector") -> None:
         )
     median, slowest = np.percentile(1e3 * step_times, [50, 99])
     print(f"  step time   median {median:5.2f} ms, 99 % under {slowest:.2f} ms")
-
-
-def _write(folder: Path, pictures: "list[Image]") -> None:
-    from PIL import Image
-
-    from wbc_suite.recording.plots import save_picture
-    from wbc_suite.recording.video import write_video
-
-    still, film = folder / "reach.png", folder / "reach.gif"
-    save_picture(Image.fromarray(pictures[len(pictures) // 4]), still)
-    write_video(pictures, film, rate=FRAMES_PER_SECOND)
-    print(f"Wrote {still} and {film}.")

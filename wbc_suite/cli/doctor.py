@@ -3,7 +3,7 @@
 import importlib
 import platform
 import sys
-import time
+import timeit
 from collections.abc import Iterator
 from dataclasses import KW_ONLY, dataclass
 from importlib import metadata
@@ -13,14 +13,10 @@ import typer
 
 from wbc_suite.errors import WbcError
 
-BASE_SOLVERS = ("daqp", "proxqp", "osqp")
-"""QP solvers that come with the package, by the names `qpsolvers` gives them."""
-EXTRA_SOLVERS = ("piqp", "clarabel", "quadprog")
-"""QP solvers that come with the extra `solvers`."""
-MUJOCO_PARTS = ("mujoco", "mujoco-core", "mujoco-studio")
-"""MuJoCo 4 is three distributions of one version."""
+BASE_SOLVERS = ("daqp", "proxqp", "osqp")  # of the package; names of `qpsolvers`
+EXTRA_SOLVERS = ("piqp", "clarabel", "quadprog")  # of the extra `solvers`
+MUJOCO_PARTS = ("mujoco", "mujoco-core", "mujoco-studio")  # distributions of MuJoCo 4
 REPAIR_MUJOCO = "pip install --force-reinstall --no-deps " + " ".join(MUJOCO_PARTS)
-
 
 _MARKS = {"fine": "ok  ", "optional": "note", "broken": "BAD "}
 
@@ -44,14 +40,7 @@ def doctor() -> None:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One property of this machine.
-
-    Attributes:
-        topic: What was checked.
-        text: Result of the check.
-        state: Severity.
-        cure: The command that repairs it; empty if nothing is wrong.
-    """
+    """The result of one check; `cure` is the command that repairs what is wrong."""
 
     topic: str
     text: str
@@ -70,12 +59,10 @@ def _system() -> Iterator[Finding]:
     name = platform.freedesktop_os_release() if sys.platform == "linux" else {}
     system = name.get("PRETTY_NAME", platform.platform())
     yield Finding("system", f"{system}, {platform.machine()}")
-    version = platform.python_version()
-    yield Finding("python", f"{version} at {sys.executable}")
+    yield Finding("python", f"{platform.python_version()} at {sys.executable}")
 
 
 def _packages() -> Iterator[Finding]:
-    """Check that all required packages are installed."""
     versions = {name: _version(name) for name in _required()}
     for name, version in versions.items():
         if version is None:
@@ -117,16 +104,14 @@ def _mujoco() -> Iterator[Finding]:
 
 
 def _solvers() -> Iterator[Finding]:
-    known = importlib.import_module("qpsolvers").available_solvers
-    yield Finding("QP solvers", ", ".join(sorted(known)))
-    broken = ", ".join(name for name in BASE_SOLVERS if name not in known)
-    if broken:
+    topic, known = "QP solvers", importlib.import_module("qpsolvers").available_solvers
+    yield Finding(topic, ", ".join(sorted(known)))
+    if broken := ", ".join(name for name in BASE_SOLVERS if name not in known):
         cure = "pip install --force-reinstall daqp proxsuite osqp"
-        yield Finding("QP solvers", f"missing: {broken}", state="broken", cure=cure)
-    absent = ", ".join(name for name in EXTRA_SOLVERS if name not in known)
-    if absent:
+        yield Finding(topic, f"missing: {broken}", state="broken", cure=cure)
+    if absent := ", ".join(name for name in EXTRA_SOLVERS if name not in known):
         text, cure = f"not installed: {absent}", 'pip install "wbc-suite[solvers]"'
-        yield Finding("QP solvers", text, state="optional", cure=cure)
+        yield Finding(topic, text, state="optional", cure=cure)
 
 
 def _catalogue() -> Iterator[Finding]:
@@ -172,11 +157,10 @@ def _frame_seconds() -> float:
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     fast = RenderPreset.FAST
-    best = float("inf")
     with make_renderer(model, width=256, height=256, preset=fast) as renderer:
-        for _ in range(20):
-            start = time.perf_counter()
+
+        def draw() -> None:
             renderer.update_scene(data)
             renderer.render()
-            best = min(best, time.perf_counter() - start)
-    return best
+
+        return min(timeit.repeat(draw, number=1, repeat=20))

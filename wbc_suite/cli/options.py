@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from wbc_suite.viewers.page_process import PageProcess
     from wbc_suite.viewers.page_server import PageServer
 
+T = TypeVar("T")
+
 RobotArgument = Annotated[
     str,
     typer.Argument(
@@ -47,28 +49,22 @@ SkinOption = Annotated[
 RobotsOption = Annotated[
     list[str] | None, typer.Option(help="Robot; repeat it for several.")
 ]
-
 ControllerOption = Annotated[
     str | None, typer.Option(help="Controller, by name or file.")
 ]
-
 CamerasOption = Annotated[
     list[str] | None, typer.Option("--camera", help="Camera; may be repeated.")
 ]
-
 PictureSizeOption = Annotated[
     int, typer.Option(min=8, max=2048, help="Of camera pictures, pixels.")
 ]
-
 RecordingArgument = Annotated[Path, typer.Argument(help="Recording.")]
-
 TrustFilesOption = Annotated[
     bool,
     typer.Option(
         "--trust-files", help="Let the recording name files to read robots from."
     ),
 ]
-
 DeviceOptions = Annotated[
     list[str] | None,
     typer.Option(
@@ -100,17 +96,12 @@ PortOption = Annotated[
 ]
 
 
-T = TypeVar("T")
-
-
 def _add_to_catalogue(folders: list[Path] | None) -> list[Path]:
     """Add folders to every `Catalogue()` of this process."""
-    added = [str(folder) for folder in folders or []]
-    known = os.environ.get(ENVIRONMENT_VARIABLE, "")
-    if added:
-        os.environ[ENVIRONMENT_VARIABLE] = os.pathsep.join([known, *added]).strip(
-            os.pathsep
-        )
+    if folders:
+        known = os.environ.get(ENVIRONMENT_VARIABLE, "")
+        all_folders = filter(None, [known, *map(str, folders)])
+        os.environ[ENVIRONMENT_VARIABLE] = os.pathsep.join(all_folders)
     return folders or []
 
 
@@ -129,10 +120,8 @@ def chosen(gripper: str | None) -> str | dict[str, str] | None:
     """Return the value of `--gripper`: one for all sides, or one for each."""
     if gripper is None or "=" not in gripper:
         return gripper
-    return {
-        side.strip(): name.strip()
-        for side, _, name in (part.partition("=") for part in gripper.split(","))
-    }
+    pairs = (part.partition("=") for part in gripper.split(","))
+    return {side.strip(): name.strip() for side, _, name in pairs}
 
 
 def environment_arguments(
@@ -143,16 +132,13 @@ def environment_arguments(
     base: str | None,
 ) -> dict[str, Any]:
     """Return the arguments of `make` for the options that are given."""
-    arguments: dict[str, Any] = {}
-    if robots:
-        arguments["robots"] = robots[0] if len(robots) == 1 else robots
-    if controller:
-        arguments["controller_configs"] = controller
-    if gripper:
-        arguments["gripper_types"] = chosen(gripper)
-    if base:
-        arguments["base_types"] = base
-    return arguments
+    arguments: dict[str, Any] = {
+        "robots": robots[0] if robots and len(robots) == 1 else robots,
+        "controller_configs": controller,
+        "gripper_types": chosen(gripper),
+        "base_types": base,
+    }
+    return {name: value for name, value in arguments.items() if value}
 
 
 def camera_arguments(cameras: list[str] | None, size: int) -> dict[str, Any]:
@@ -168,13 +154,7 @@ def camera_arguments(cameras: list[str] | None, size: int) -> dict[str, Any]:
 
 
 def device_options(pairs: list[str] | None) -> dict[str, object]:
-    """Return the options of `--device-option NAME=VALUE`.
-
-    Values are read as TOML (`8091`, `true`, `["right", "left"]`), else they are text.
-
-    Raises:
-        ConfigError: If there is no `=`.
-    """
+    """Return the options of `--device-option NAME=VALUE`, TOML values or texts."""
     options: dict[str, object] = {}
     for pair in pairs or []:
         name, equals, value = pair.partition("=")
@@ -199,19 +179,14 @@ def writing(path: Path) -> Iterator[None]:
 @contextmanager
 def progress(title: str, total: int) -> Iterator[Callable[[int], None]]:
     """Show a bar on the error output where that is a terminal; call to advance it."""
+    from rich import progress as rich
     from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TimeRemainingColumn,
-    )
 
     console = Console(stderr=True)
-    columns = (title, BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(
-        *columns, console=console, transient=True, disable=not console.is_terminal
-    ) as bar:
+    columns = rich.BarColumn(), rich.MofNCompleteColumn(), rich.TimeRemainingColumn()
+    bar = rich.Progress(title, *columns, console=console, transient=True)
+    bar.disable = not console.is_terminal
+    with bar:
         line = bar.add_task(title, total=total)
         yield lambda done: bar.advance(line, done)
 

@@ -7,29 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from wbc_suite.cli.options import (
-    BaseOption,
-    CamerasOption,
-    CatalogueOption,
-    ControllerOption,
-    DeviceOptions,
-    GripperOption,
-    HostOption,
-    MirrorOption,
-    PictureSizeOption,
-    PortOption,
-    RobotsOption,
-    ScaleOption,
-    camera_arguments,
-    environment_arguments,
-)
+from wbc_suite.cli import options
 from wbc_suite.cli.teleop import ONE_DAY, device_maker, drive, stages_of
 
 if TYPE_CHECKING:
     from wbc_suite.wrappers import DataCollection
 
-BY_POLICY, BY_HAND = 20.0, 100.0
-"""Hz; at 20 Hz an operator notices the latency of 50 ms."""
+BY_POLICY, BY_HAND = 20.0, 100.0  # Hz; an operator notices a latency of 50 ms
 
 
 OutOption = Annotated[
@@ -63,26 +47,26 @@ def record(
     benchmark: Annotated[str, typer.Argument(help="Benchmark to record.")] = "Lift",
     *,
     out: OutOption,
-    robots: RobotsOption = None,
+    robots: options.RobotsOption = None,
     device: PolicyOption = "scripted",
     episodes: Annotated[int, typer.Option(min=1, help="How many to keep.")] = 10,
-    controller: ControllerOption = None,
+    controller: options.ControllerOption = None,
     horizon: HorizonOption = None,
     rate: RateOption = None,
     seed: Annotated[int, typer.Option(min=0, help="Of the first episode.")] = 0,
     only_success: OnlySuccessOption = False,
     next_obs: NextObsOption = False,
-    camera: CamerasOption = None,
-    size: PictureSizeOption = 84,
-    device_option: DeviceOptions = None,
-    scale: ScaleOption = 1.0,
-    mirror: MirrorOption = False,
-    host: HostOption = "127.0.0.1",
-    port: PortOption = None,
+    camera: options.CamerasOption = None,
+    size: options.PictureSizeOption = 84,
+    device_option: options.DeviceOptions = None,
+    scale: options.ScaleOption = 1.0,
+    mirror: options.MirrorOption = False,
+    host: options.HostOption = "127.0.0.1",
+    port: options.PortOption = None,
     page: PageOption = True,
-    gripper: GripperOption = None,
-    base: BaseOption = None,
-    catalogue: CatalogueOption = None,
+    gripper: options.GripperOption = None,
+    base: options.BaseOption = None,
+    catalogue: options.CatalogueOption = None,
 ) -> None:
     """Record episodes in robomimic's HDF5 layout; each is safe once it is kept."""
     import wbc_suite
@@ -93,10 +77,10 @@ def record(
     by_hand = is_device(device)
     rate = rate or (BY_HAND if by_hand else BY_POLICY)
     controller = controller or ("WHOLE_BODY_IK" if by_hand else None)
-    arguments = environment_arguments(
+    arguments = options.environment_arguments(
         robots=robots, controller=controller, gripper=gripper, base=base
     )
-    arguments |= camera_arguments(camera, size) | {"control_freq": rate}
+    arguments |= options.camera_arguments(camera, size) | {"control_freq": rate}
     if horizon or by_hand:
         arguments["horizon"] = round(ONE_DAY * rate) if by_hand else horizon
     make = device_maker(device, device_option) if by_hand else None
@@ -131,25 +115,18 @@ def _collect(
 ) -> None:
     """Drive episodes until so many are kept, or twenty times as many were tried."""
     from wbc_suite.envs import RobotEnv
-    from wbc_suite.evaluation import make_policy
+    from wbc_suite.evaluation.rollouts import run_episode
 
-    inner = env.unwrapped
+    inner, recorder, kept = env.unwrapped, env.recorder, 0
     assert isinstance(inner, RobotEnv), "`make` made it"
-    kept = 0
-    for tried in range(20 * episodes):
-        policy = make_policy(device, inner, seed + tried)
-        observation, _ = env.reset(seed=seed + tried)
-        env.recorder.begin()
-        ended, info = False, {}
-        while not ended:
-            observation, _, terminated, truncated, info = env.step(policy(observation))
-            ended = terminated or truncated
-        length, success = env.recorder.length, bool(info.get("success"))
+    for each in range(seed, seed + 20 * episodes):
+        played = run_episode(env, inner, each, device, begin=recorder.begin)
+        length, success = played["steps"], played["success"]
         if only_success and not success:
-            env.recorder.discard()
-            print(f"  seed {seed + tried}: discarded, no success in {length} actions")
+            recorder.discard()
+            print(f"  seed {each}: discarded, no success in {length} actions")
             continue
-        name, kept = env.recorder.keep(), kept + 1
+        name, kept = recorder.keep(), kept + 1
         result = "success" if success else "no success"
         print(f"  {name}: {length} actions, {result} ({kept} of {episodes})")
         if kept == episodes:

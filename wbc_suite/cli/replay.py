@@ -1,38 +1,31 @@
 """`wbc-suite replay`: recorded episodes, played again."""
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from wbc_suite.cli.options import (
-    HostOption,
-    PortOption,
-    RecordingArgument,
-    TrustFilesOption,
-    serve_until_interrupted,
-    tracked,
-)
+from wbc_suite.cli import options
 
 if TYPE_CHECKING:
     from wbc_suite.envs import RobotEnv
-    from wbc_suite.recording import Dataset, Episode
-
-Way = Literal["states", "actions"]
-Place = Literal["browser", "screen"]
+    from wbc_suite.recording import Episode
+    from wbc_suite.viewers.episode_player import EpisodePlayer
 
 
 def replay(
-    file: RecordingArgument,
+    file: options.RecordingArgument,
     *,
     by: Annotated[
-        Way, typer.Option(help="States as recorded, or actions, open loop.")
+        Literal["states", "actions"],
+        typer.Option(help="States as recorded, or actions, open loop."),
     ] = "actions",
     episode: Annotated[
         list[str] | None, typer.Option(help="Episode; all when left out.")
     ] = None,
     show: Annotated[
-        Place | None,
+        Literal["browser", "screen"] | None,
         typer.Option(help="Play them in a page, or in MuJoCo's own window."),
     ] = None,
     film: Annotated[
@@ -40,15 +33,17 @@ def replay(
     ] = None,
     camera: Annotated[str, typer.Option(help="Camera of the film.")] = "agentview",
     size: Annotated[int, typer.Option(min=16, max=2048, help="Pixels.")] = 256,
-    trust_files: TrustFilesOption = False,
-    host: HostOption = "127.0.0.1",
-    port: PortOption = None,
+    trust_files: options.TrustFilesOption = False,
+    host: options.HostOption = "127.0.0.1",
+    port: options.PortOption = None,
 ) -> None:
     """Play episodes again, and say whether they come out as they were recorded."""
     from wbc_suite.recording import Dataset, rebuild
     from wbc_suite.recording.video import check_video
+    from wbc_suite.viewers.episode_player import open_player
+    from wbc_suite.viewers.replay_window import show_in_window
 
-    shown = {}
+    shown, by_states = {}, by == "states"
     if film is not None:
         check_video(film)
         shown = {"render_mode": "rgb_array", "render_camera": camera}
@@ -58,85 +53,68 @@ def replay(
         env = rebuild(dataset, trust_files=trust_files, use_camera_obs=False, **shown)
         try:
             if show is not None:
-                _show(env, dataset, names, by, show, (host, port))
+                player = open_player(dataset, names, env, by_states=by_states)
+                if show == "screen":
+                    show_in_window(player, env)
+                else:
+                    _show(player, env, file, host, port)
                 return
-            played = tracked(names, "Replaying")
-            exact = [_play(env, dataset.episode(name), by) for name in played]
+            played = map(dataset.episode, options.tracked(names, "Replaying"))
+            exact = [_play(env, episode, by_states=by_states) for episode in played]
             if film is not None:
-                _film(env, dataset, names, by, film)
+                drawn = map(dataset.episode, options.tracked(names, "Drawing"))
+                _film(env, drawn, film, by_states=by_states)
         finally:
             env.close()
-    if by == "actions":
+    if not by_states:
         print(f"{sum(exact)} of {len(exact)} episodes replay bit by bit.")
 
 
 def _show(
-    env: "RobotEnv",
-    dataset: "Dataset",
-    names: tuple[str, ...],
-    by: Way,
-    place: Place,
-    address: tuple[str, int | None],
+    player: "EpisodePlayer", env: "RobotEnv", file: Path, host: str, port: int | None
 ) -> None:
-    """Show episodes until the user ends it."""
-    from wbc_suite.viewers.episode_player import open_player
-
-    player = open_player(dataset, names, env, by_states=by == "states")
-    if place == "screen":
-        from wbc_suite.viewers.replay_window import show_in_window
-
-        show_in_window(player, env)
-        return
+    """Show episodes in a page until the user ends it."""
     from wbc_suite.viewers.page_server import PageServer
     from wbc_suite.viewers.replay_page import ReplayPage
 
-    page = ReplayPage(
-        player, env, PageServer(*address), label=f"Replay · {dataset.path.name}"
-    )
+    site = PageServer(host, port)
+    page = ReplayPage(player, env, site, label=f"Replay · {file.name}")
     page.start()
-    serve_until_interrupted(page.site, f"Replay of {dataset.path}:")
+    options.serve_until_interrupted(page.site, f"Replay of {file}:")
     page.stop()
 
 
-def _play(env: "RobotEnv", episode: "Episode", by: Way) -> bool:
+def _play(env: "RobotEnv", episode: "Episode", *, by_states: bool) -> bool:
     from wbc_suite.recording.replaying import divergence, play_states
 
-    if by == "states":
-        count = sum(1 for _ in play_states(env, episode))
-        solved = "solved" if env.benchmark.success() else "not solved"
-        print(f"  {episode.name}: {count} states; at the end {solved}")
-        return True
-    found = divergence(env, episode)
-    how = (
-        "bit by bit as recorded"
-        if found.exact
-        else f"differs from action {found.first} on, by {found.largest:.2e} at most"
-    )
-    solved = "solved" if found.success else "not solved"
-    print(f"  {episode.name}: {found.steps} actions, {how}; at the end {solved}")
-    return found.exact
+    if by_states:
+        result = f"{sum(1 for _ in play_states(env, episode))} states"
+        success, exact = env.benchmark.success(), True
+    else:
+        found = divergence(env, episode)
+        success, exact = found.success, found.exact
+        result = f"{found.steps} actions, bit by bit as recorded"
+        if not exact:
+            result = (
+                f"{found.steps} actions, differs from action {found.first} on, by "
+                f"{found.largest:.2e} at most"
+            )
+    solved = "solved" if success else "not solved"
+    print(f"  {episode.name}: {result}; at the end {solved}")
+    return exact
 
 
 def _film(
-    env: "RobotEnv",
-    dataset: "Dataset",
-    names: tuple[str, ...],
-    by: Way,
-    path: Path,
+    env: "RobotEnv", episodes: Iterable["Episode"], path: Path, *, by_states: bool
 ) -> None:
     from wbc_suite.recording.video import RATE, episode_pictures, write_video
 
     control = env.config.control_freq
     every = max(1, round(control / RATE))
-    write_video(
-        (
-            picture
-            for name in tracked(names, "Drawing")
-            for picture in episode_pictures(
-                env, dataset.episode(name), by_states=by == "states", every=every
-            )
-        ),
-        path,
-        rate=control / every,
+    pictures = (
+        picture
+        for episode in episodes
+        for picture in episode_pictures(env, episode, by_states=by_states, every=every)
     )
+    write_video(pictures, path, rate=control / every)
     print(f"Wrote {path}.")

@@ -5,18 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from wbc_suite.cli.options import (
-    BaseOption,
-    CatalogueOption,
-    GripperOption,
-    HostOption,
-    PortOption,
-    RobotArgument,
-    SkinOption,
-    chosen,
-    serve_until_interrupted,
-    writing,
-)
+from wbc_suite.cli import options
 
 if TYPE_CHECKING:
     from wbc_suite.control import ActionSlice
@@ -24,27 +13,28 @@ if TYPE_CHECKING:
 
 
 def view(
-    robot: RobotArgument,
-    gripper: GripperOption = None,
-    base: BaseOption = None,
-    skin: SkinOption = None,
-    host: HostOption = "127.0.0.1",
-    port: PortOption = None,
-    catalogue: CatalogueOption = None,
+    robot: options.RobotArgument,
+    gripper: options.GripperOption = None,
+    base: options.BaseOption = None,
+    skin: options.SkinOption = None,
+    host: options.HostOption = "127.0.0.1",
+    port: options.PortOption = None,
+    catalogue: options.CatalogueOption = None,
 ) -> None:
     """Show a robot: joints, frames, collision shapes, centre of mass, inertia."""
     from wbc_suite.robot import load_robot
     from wbc_suite.viewers.page_server import PageServer
     from wbc_suite.viewers.robot_page import RobotPage
 
-    description = load_robot(robot, gripper=chosen(gripper), base=base, skin=skin)
+    chosen = options.chosen(gripper)
+    description = load_robot(robot, gripper=chosen, base=base, skin=skin)
     page = RobotPage(description, PageServer(host, port))
-    serve_until_interrupted(page.site, description.title or description.name)
+    options.serve_until_interrupted(page.site, description.title or description.name)
     page.stop()
 
 
 def render(
-    robot: RobotArgument,
+    robot: options.RobotArgument,
     *,
     output: Annotated[Path, typer.Option("--output", "-o", help="Picture to write.")],
     view: Annotated[
@@ -54,10 +44,10 @@ def render(
     keyframe: Annotated[str, typer.Option(help="Posture of the robot.")] = "ready",
     width: Annotated[int, typer.Option(min=16, max=8192, help="Pixels.")] = 800,
     height: Annotated[int, typer.Option(min=16, max=8192, help="Pixels.")] = 800,
-    gripper: GripperOption = None,
-    base: BaseOption = None,
-    skin: SkinOption = None,
-    catalogue: CatalogueOption = None,
+    gripper: options.GripperOption = None,
+    base: options.BaseOption = None,
+    skin: options.SkinOption = None,
+    catalogue: options.CatalogueOption = None,
 ) -> None:
     """Draw a robot in the studio, without a display."""
     from PIL import Image
@@ -66,18 +56,18 @@ def render(
     from wbc_suite.viewers.offscreen import render_robot
 
     picture = render_robot(
-        load_robot(robot, gripper=chosen(gripper), base=base, skin=skin),
+        load_robot(robot, gripper=options.chosen(gripper), base=base, skin=skin),
         view=view,
         keyframe=keyframe,
         size=(width, height),
     )
-    with writing(output):
+    with options.writing(output):
         Image.fromarray(picture).save(output)
     print(f"Wrote {output}.")
 
 
 def export_robot(
-    robot: RobotArgument,
+    robot: options.RobotArgument,
     *,
     to: Annotated[
         Literal["mjcf", "urdf", "toml"], typer.Option(help="Format to write.")
@@ -87,12 +77,11 @@ def export_robot(
         typer.Option("--output", "-o", help="File to write; otherwise it is printed."),
     ] = None,
     mend_inertias: Annotated[
-        bool,
-        typer.Option(help="Replace inertias that no body has (of a URDF file)."),
+        bool, typer.Option(help="Replace inertias that no body has (of a URDF file).")
     ] = False,
-    gripper: GripperOption = None,
-    base: BaseOption = None,
-    catalogue: CatalogueOption = None,
+    gripper: options.GripperOption = None,
+    base: options.BaseOption = None,
+    catalogue: options.CatalogueOption = None,
 ) -> None:
     """Write a robot for other programs, or a URDF or MJCF file as a TOML to edit."""
     from wbc_suite.robot import load_robot
@@ -101,16 +90,12 @@ def export_robot(
     if mend_inertias and robot.endswith(".urdf"):
         description = read_urdf(robot, mend_inertias=True)
     else:
-        description = load_robot(robot, gripper=chosen(gripper), base=base)
-    text = {
-        "mjcf": description.to_mjcf,
-        "urdf": description.to_urdf,
-        "toml": description.to_toml,
-    }[to]()
+        description = load_robot(robot, gripper=options.chosen(gripper), base=base)
+    text = getattr(description, f"to_{to}")()
     if output is None:
         print(text)
         return
-    with writing(output):
+    with options.writing(output):
         output.write_text(text, encoding="utf-8")
     print(f"Wrote {output} ({len(text) / 1000:.0f} kB).")
 
@@ -127,21 +112,21 @@ ZEROS = {
 
 
 def describe_action(
-    robot: RobotArgument,
+    robot: options.RobotArgument,
     *,
     controller: Annotated[
         str | None,
         typer.Option(help="Name or file of a controller; else the robot's usual one."),
     ] = None,
     benchmark: Annotated[str, typer.Option(help="Where the robot stands.")] = "Lift",
-    gripper: GripperOption = None,
-    base: BaseOption = None,
-    catalogue: CatalogueOption = None,
+    gripper: options.GripperOption = None,
+    base: options.BaseOption = None,
+    catalogue: options.CatalogueOption = None,
 ) -> None:
     """Show the slices of an action: names, places, units, bounds, and what 0 means."""
     import wbc_suite
 
-    built = wbc_suite.load_robot(robot, gripper=chosen(gripper), base=base)
+    built = wbc_suite.load_robot(robot, gripper=options.chosen(gripper), base=base)
     config = wbc_suite.load_composite_controller_config(controller, built)
     env = wbc_suite.make(benchmark, robots=built, controller_configs=config)
     env.reset(seed=0)

@@ -30,8 +30,7 @@ def rollout(
         typer.Option(help="Controller, by name or file. Repeat it to compare."),
     ] = None,
     policy: Annotated[
-        str,
-        typer.Option(help="random, hold, scripted (Lift), or module:function."),
+        str, typer.Option(help="random, hold, scripted (Lift), or module:function.")
     ] = "random",
     episodes: Annotated[int, typer.Option(min=1, help="Per case.")] = 10,
     first_seed: Annotated[int, typer.Option(min=0, help="Seed of the first.")] = 0,
@@ -74,22 +73,17 @@ def rollout(
             every,
             folder=output,
             executor=make_executor(executor, workers=workers),
-            on_outcome=_reporter(advance),
+            on_outcome=lambda item, outcome: _finish(item, outcome, advance),
         )
     _report(items, outcomes, output)
 
 
-def _reporter(
-    advance: Callable[[int], None],
-) -> "Callable[[WorkItem, Outcome], None]":
-    """Return a function that prints an item's error and advances the bar."""
-
-    def report(item: "WorkItem", outcome: "Outcome") -> None:
-        if outcome.error is not None:
-            print(f"{item.name}: {outcome.error}")
-        advance(1)
-
-    return report
+def _finish(
+    item: "WorkItem", outcome: "Outcome", advance: Callable[[int], None]
+) -> None:
+    if outcome.error is not None:
+        print(f"{item.name}: {outcome.error}")
+    advance(1)
 
 
 def _cases(
@@ -131,8 +125,7 @@ def _report(
     by_name = {outcome.name: outcome for outcome in outcomes}
     summaries: dict[str, Summary] = {}
     for case, mine in items.items():
-        played = episodes_of(by_name[item.name] for item in mine)
-        if played:
+        if played := episodes_of(by_name[item.name] for item in mine):
             summaries[case.title] = summarise(played)
     _print_table(summaries)
     path = output / "summary.json"
@@ -142,10 +135,8 @@ def _report(
     print(f"Written: {path}; every episode is in {output / 'results'}.")
     failed = sum(outcome.error is not None for outcome in outcomes)
     if failed:
-        print(
-            f"{failed} of {len(outcomes)} items failed; the same command does them "
-            "again."
-        )
+        count = f"{failed} of {len(outcomes)}"
+        print(f"{count} items failed; the same command does them again.")
         raise typer.Exit(1)
 
 
@@ -156,14 +147,8 @@ def _print_table(summaries: "dict[str, Summary]") -> None:
     table = Table("case", "episodes", "success", "95 %", "return", "steps", "steps/s")
     for title, s in summaries.items():
         low, high = s.interval
-        table.add_row(
-            title,
-            str(s.episodes),
-            f"{s.success:.1%}",
-            f"{low:.1%} to {high:.1%}",
-            f"{s.mean_return:.3g}",
-            f"{s.mean_steps:.0f}"
-            + (f" ({s.physics_errors} broken)" * bool(s.physics_errors)),
-            f"{s.steps_per_second:.0f}",
-        )
+        shares = f"{s.success:.1%}", f"{low:.1%} to {high:.1%}"
+        broken = f" ({s.physics_errors} broken)" if s.physics_errors else ""
+        steps = f"{s.mean_steps:.0f}{broken}", f"{s.steps_per_second:.0f}"
+        table.add_row(title, str(s.episodes), *shares, f"{s.mean_return:.3g}", *steps)
     Console().print(table)

@@ -15,10 +15,7 @@ from wbc_suite.catalogue import Catalogue
 from wbc_suite.compat.robosuite_env import GymWrapper, RobosuiteEnv
 from wbc_suite.control import composite_names
 from wbc_suite.control import load_composite_controller_config as _load_composite
-from wbc_suite.control.part.registry import (
-    load_part_controller_config as _load_part,
-)
-from wbc_suite.control.part.registry import part_models
+from wbc_suite.control.part import registry
 from wbc_suite.errors import ConfigError, DatasetError
 
 __all__ = [
@@ -36,26 +33,21 @@ __all__ = [
     "make_from_env_args",
 ]
 
-__version__ = "1.5.2"
-"""The robosuite version of this interface."""
+__version__ = "1.5.2"  # the robosuite version of this interface
 
-_IGNORED = frozenset(
-    {
-        *("has_offscreen_renderer", "render_collision_mesh", "render_visual_mesh"),
-        *("render_gpu_device_id", "hard_reset", "renderer", "renderer_config"),
-        *("render_camera_size", "reward_normalised", "camera_renderer"),
-    }
+_IGNORED = (
+    *("has_offscreen_renderer", "render_collision_mesh", "render_visual_mesh"),
+    *("render_gpu_device_id", "hard_reset", "renderer", "renderer_config"),
+    *("render_camera_size", "reward_normalised", "camera_renderer"),
 )
 """Arguments without a meaning here."""
-
-RENDER_CAMERA = "frontview"
 
 _RENAMED = {"damping": "damping_ratio", "damping_limits": "damping_ratio_limits"}
 """Keys of controllers that robosuite 1.5 renamed."""
 
 ALL_ENVIRONMENTS = benchmark_names()
 ALL_COMPOSITE_CONTROLLERS = composite_names()
-ALL_PART_CONTROLLERS = tuple(part_models())
+ALL_PART_CONTROLLERS = tuple(registry.part_models())
 
 
 def __getattr__(name: str) -> Any:
@@ -69,10 +61,7 @@ def __getattr__(name: str) -> Any:
 def load_composite_controller_config(
     controller: str | Path | None = None, robot: str | None = None
 ) -> dict[str, Any]:
-    """Return a composite controller's config; see `wbc_suite.control`'s.
-
-    BASIC without a robot has all parts; `make` leaves out those that a robot lacks.
-    """
+    """Return a composite's config; BASIC without a robot has all parts there are."""
     if robot is not None or str(controller).upper() != "BASIC":
         return _load_composite(controller, robot)
     arm = load_part_controller_config(default_controller="OSC_POSE")
@@ -94,14 +83,12 @@ def load_part_controller_config(
 ) -> dict[str, Any]:
     """Return the config of a part controller: a JSON file's, or a type's defaults.
 
-    It goes into `body_parts` of a composite config.
-
     Raises:
         ConfigError: If neither is given, or the file cannot be read.
         UnknownNameError: If there is no such type.
     """
     if default_controller is not None:
-        return _load_part(default_controller)
+        return registry.load_part_controller_config(default_controller)
     if custom_fpath is None:
         raise ConfigError("load_part_controller_config: name a file or a type.")
     try:
@@ -122,25 +109,15 @@ def make(env_name: str, robots: Any = None, **kwargs: Any) -> RobosuiteEnv:
 
 
 def make_from_env_args(env_args: str | dict[str, Any]) -> RobosuiteEnv:
-    """Make the environment of a dataset's `env_args`, JSON text or a dictionary.
-
-    Raises:
-        DatasetError: If there is no `env_name` in it.
-    """
-    data = json.loads(env_args) if isinstance(env_args, str) else dict(env_args)
+    """Make the environment of a dataset's `env_args`, JSON text or a dictionary."""
+    data = json.loads(env_args) if isinstance(env_args, str) else env_args
     if "env_name" not in data:
         raise DatasetError("env_args has no 'env_name'.")
-    given = dict(data.get("env_kwargs", {}))
-    given.pop("env_name", None)
-    return make(data["env_name"], **given)
+    return make(**{**data.get("env_kwargs", {}), "env_name": data["env_name"]})
 
 
 def make_from_dataset(path: str | Path) -> RobosuiteEnv:
-    """Make the environment of an HDF5 dataset, by its attribute `env_args`.
-
-    Raises:
-        DatasetError: If the file cannot be read or has no such attribute.
-    """
+    """Make the environment of an HDF5 dataset, by its attribute `env_args`."""
     import h5py
 
     from wbc_suite.recording import hdf5_reader
@@ -161,7 +138,7 @@ def _ours(kwargs: dict[str, Any]) -> dict[str, Any]:
     }
     if given.pop("has_renderer", False):
         given["render_mode"] = "human"
-    given.setdefault("render_camera", RENDER_CAMERA)
+    given.setdefault("render_camera", "frontview")
     for key in ("env_name", "type", "env_version"):
         given.pop(key, None)
     for key in ("robots", "gripper_types", "base_types", "controller_configs"):
@@ -176,11 +153,10 @@ def _ours(kwargs: dict[str, Any]) -> dict[str, Any]:
 
 
 def _updated(config: dict[str, Any]) -> dict[str, Any]:
-    """Return a config of robosuite 1.2 to 1.4 in the form of 1.5; others unchanged.
-
-    Those are configs of one arm, with goals in the world's axes.
-    """
-    if config.get("type") not in part_models() or "control_delta" not in config:
+    """Return a config of robosuite 1.2 to 1.4, of one arm, in the form of 1.5."""
+    if not registry.is_part_controller(config.get("type")):
+        return config
+    if "control_delta" not in config:
         return config
     new = {_RENAMED.get(key, key): value for key, value in config.items()}
     new["input_type"] = "delta" if new.pop("control_delta") else "absolute"

@@ -1,12 +1,13 @@
 """robosuite's environment and `GymWrapper` around ours."""
 
 from collections.abc import Sequence
+from types import SimpleNamespace
 from typing import Any
 
 import gymnasium
 import numpy as np
 
-from wbc_suite.compat.robosuite_sim import Model, RobotView, Sim
+from wbc_suite.compat.robosuite_sim import RobotView, Sim
 from wbc_suite.envs import RobotEnv
 from wbc_suite.errors import ConfigError, DatasetError
 
@@ -16,18 +17,15 @@ Observation = dict[str, Any]
 class RobosuiteEnv:
     """An environment with robosuite's calls.
 
-    Args:
-        env_name: Name of the benchmark.
-        ignore_done: Whether steps after the end of an episode are allowed.
-        seed: Seed of the first episode.
-        kwargs: Our arguments.
+    `seed` is that of the first episode; with `ignore_done`, steps after the end of an
+    episode are allowed. `kwargs` are arguments of our environment.
 
     Attributes:
-        env: Our environment.
-        sim: Model and state, under robosuite's names.
+        env: Our environment; `render`, `close` and `horizon` are its own.
+        sim: Model and state, under robosuite's names; `model` is its model.
         robots: The robots, likewise.
-        viewer: Stand-in for robosuite's window; does nothing.
-        name: Name of the benchmark.
+        control_freq: Actions per second, Hz.
+        model_timestep: Duration of a physics step, s.
     """
 
     def __init__(
@@ -40,9 +38,17 @@ class RobosuiteEnv:
     ) -> None:
         self.ignore_done, self._seed = bool(ignore_done), seed
         self.env = RobotEnv(env_name, **kwargs)
-        self.name = env_name
-        self.sim, self.viewer = Sim(self.env), Viewer()
+        self.name, self.unwrapped = env_name, self
+        self.sim = Sim(self.env)
+        self.viewer = SimpleNamespace(
+            set_camera=lambda camera_id: None, update=lambda: None
+        )
+        self.model = self.sim.model
         self.robots = tuple(RobotView(*pair) for pair in self.env.simulation.pairs)
+        self.action_dim = self.env.action_layout.size
+        self.horizon, self.control_freq = self.env.horizon, self.env.config.control_freq
+        self.model_timestep = self.env.simulation.timestep
+        self.render, self.close = self.env.render, self.env.close
         self.timestep, self.done = 0, False
         self._ep_meta: dict[str, Any] = {}
 
@@ -54,11 +60,7 @@ class RobosuiteEnv:
         return self._in_their_form(observation)
 
     def step(self, action: Any) -> tuple[Observation, float, bool, dict[str, Any]]:
-        """Advance one control period.
-
-        Raises:
-            ValueError: If the episode is over and `ignore_done` is not set.
-        """
+        """Advance one control period; raise ValueError if the episode is over."""
         if self.done:
             raise ValueError("executing action in terminated episode")
         observation, reward, terminated, truncated, info = self.env.step(action)
@@ -72,14 +74,6 @@ class RobosuiteEnv:
         given = self.env.benchmark.reward(shaped=config.reward_shaping)
         return given * config.reward_scale
 
-    def render(self) -> None:
-        """Show the scene on a page, if `has_renderer` was set."""
-        self.env.render()
-
-    def close(self) -> None:
-        """Close renderers and page."""
-        self.env.close()
-
     def seed(self, seed: int) -> None:
         """Seed the next episode."""
         self._seed = seed
@@ -89,36 +83,6 @@ class RobosuiteEnv:
         """Least and greatest actions."""
         layout = self.env.action_layout
         return layout.low.copy(), layout.high.copy()
-
-    @property
-    def action_dim(self) -> int:
-        """Length of an action."""
-        return int(self.action_spec[0].size)
-
-    @property
-    def unwrapped(self) -> "RobosuiteEnv":
-        """This environment."""
-        return self
-
-    @property
-    def model(self) -> Model:
-        """The scene."""
-        return self.sim.model
-
-    @property
-    def model_timestep(self) -> float:
-        """Duration of a physics step, s."""
-        return self.env.simulation.timestep
-
-    @property
-    def horizon(self) -> int:
-        """Actions in an episode."""
-        return self.env.horizon
-
-    @property
-    def control_freq(self) -> float:
-        """Actions a second."""
-        return self.env.config.control_freq
 
     @property
     def observation_names(self) -> set[str]:
@@ -133,13 +97,12 @@ class RobosuiteEnv:
         self, observable_name: str, attribute: str, modifier: Any
     ) -> None:
         """Change an observation; `corrupter` and `delayer` as in robosuite."""
-        renamed = {
-            "corrupter": ("noise", lambda values, rng: modifier(values)),
-            "delayer": ("delay", lambda rng: modifier()),
-        }
-        name, change = renamed.get(attribute, (attribute, modifier))
-        change = None if modifier is None else change
-        self.env.observables.modify(observable_name, **{name: change})
+        change = {attribute: modifier}
+        if attribute == "corrupter":
+            change = {"noise": modifier and (lambda values, rng: modifier(values))}
+        elif attribute == "delayer":
+            change = {"delay": modifier and (lambda rng: modifier())}
+        self.env.observables.modify(observable_name, **change)
 
     def get_ep_meta(self) -> dict[str, Any]:
         """Return the value of `set_ep_meta`."""
@@ -161,11 +124,7 @@ class RobosuiteEnv:
         return xml
 
     def reset_from_xml_string(self, xml: str) -> None:
-        """Start an episode in the scene of a recording, which must be this one.
-
-        Raises:
-            DatasetError: If the text is another scene's, such as robosuite's own.
-        """
+        """Start an episode in a recording's scene; raise DatasetError for others."""
         if xml != self.sim.model.get_xml():
             raise DatasetError(
                 "The recording's scene is not this environment's: states of other "
@@ -174,11 +133,10 @@ class RobosuiteEnv:
         self.reset()
 
     def _get_observations(self, force_update: bool = False) -> Observation:
-        """Return the present observation."""
-        return self._in_their_form(self.sim.observe())
+        self.env.observables.update()
+        return self._in_their_form(self.env.observation())
 
     def _check_success(self) -> bool:
-        """Whether the benchmark is solved now."""
         return self.env.benchmark.success()
 
     def _in_their_form(self, observation: Observation) -> Observation:
@@ -191,23 +149,11 @@ class RobosuiteEnv:
         return observation
 
 
-class Viewer:
-    """Stand-in for robosuite's window."""
-
-    def set_camera(self, camera_id: int) -> None:
-        """Do nothing."""
-
-    def update(self) -> None:
-        """Do nothing: a page follows every step."""
-
-
 class GymWrapper(gymnasium.Env[Any, Any]):
-    """Gymnasium's five-tuple around `RobosuiteEnv`; observations in one vector.
+    """Gymnasium's five-tuple around `RobosuiteEnv`.
 
-    Args:
-        env: The environment.
-        keys: Observed keys; by default objects, pictures and robots, in this order.
-        flatten_obs: Whether they are one vector; otherwise a dictionary.
+    Observed are objects, pictures and robots, or the given keys, in this order: in one
+    vector with `flatten_obs`, else in a dictionary.
     """
 
     metadata: dict[str, Any] = {"render_modes": []}
@@ -221,20 +167,18 @@ class GymWrapper(gymnasium.Env[Any, Any]):
         self.env, self.flatten_obs = env, flatten_obs
         example = env.observation_spec()
         if keys is None:
-            keys = [key for key in ("object-state",) if key in example]
-            keys += [key for key in example if key.endswith("_image")]
-            keys += [key for key in example if key.endswith("proprio-state")]
+            kinds = "object-state", "_image", "proprio-state"
+            keys = [key for kind in kinds for key in example if key.endswith(kind)]
         self.keys = list(keys)
         first = self._chosen(example)
-        self.observation_space = (
-            _box(first)
-            if flatten_obs
-            else gymnasium.spaces.Dict({k: _box(v) for k, v in first.items()})
-        )
-        low, high = env.action_spec
-        self.action_space = gymnasium.spaces.Box(
-            np.float32(low), np.float32(high), dtype=np.float32
-        )
+        if flatten_obs:
+            self.observation_space = _box(first)
+        else:
+            self.observation_space = gymnasium.spaces.Dict(
+                {key: _box(values) for key, values in first.items()}
+            )
+        low, high = (limit.astype(np.float32) for limit in env.action_spec)
+        self.action_space = gymnasium.spaces.Box(low, high, dtype=np.float32)
         self.name = f"{'_'.join(r.name for r in env.robots)}_{env.name}"
 
     def reset(

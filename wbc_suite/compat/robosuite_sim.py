@@ -21,38 +21,23 @@ _COUNTS = {"joint": "jnt", "camera": "cam", "actuator": "u"}
 _OF_DATA = re.compile(r"get_(body|geom|site|camera|joint)_(\w+)")
 
 
-class FlatState:
-    """A physics state."""
-
-    def __init__(self, values: Vector) -> None:
-        self._values = values
-
-    def flatten(self) -> Vector:
-        """Return time, qpos and qvel in one vector."""
-        return self._values
-
-
 class Model:
-    """MuJoCo's model, its names (`site_name2id`, `camera_names`, ...), and its text."""
+    """MuJoCo's model (`_model`), its names (`site_name2id`, ...), and its text."""
 
     def __init__(self, env: RobotEnv) -> None:
         self._env = env
 
     def __getattr__(self, name: str) -> Any:
         found = _OF_MODEL.fullmatch(name)
+        model = self._env.simulation.model
         if found is None:
-            return getattr(self._model, name)
-        names = _names(self._model, found[1])
+            return model if name == "_model" else getattr(model, name)
+        names = _names(model, found[1])
         if found[2] == "names":
             return names
         if found[2] == "id2name":
             return lambda index: names[index]
         return lambda name: _index(found[1], name, names)
-
-    @property
-    def _model(self) -> mujoco.MjModel:
-        """MuJoCo's own object."""
-        return self._env.simulation.model
 
     def get_xml(self) -> str:
         """Return the scene as MJCF text."""
@@ -60,7 +45,7 @@ class Model:
 
 
 class Data:
-    """MuJoCo's state, and its arrays by name: `get_site_xpos`, ..."""
+    """MuJoCo's state (`_data`), and its arrays by name: `get_site_xpos`, ..."""
 
     def __init__(self, env: RobotEnv) -> None:
         object.__setattr__(self, "_env", env)
@@ -68,17 +53,13 @@ class Data:
     def __getattr__(self, name: str) -> Any:
         found = _OF_DATA.fullmatch(name)
         if found is None:
-            return getattr(self._data, name)
+            data = self._env.simulation.data
+            return data if name == "_data" else getattr(data, name)
         kind, column = found.groups()
         return lambda name: np.array(self._view(kind, name, column))
 
     def __setattr__(self, name: str, value: Any) -> None:
-        setattr(self._data, name, value)
-
-    @property
-    def _data(self) -> mujoco.MjData:
-        """MuJoCo's own object."""
-        return self._env.simulation.data
+        setattr(self._env.simulation.data, name, value)
 
     def set_joint_qpos(self, name: str, value: Any) -> None:
         """Write a joint's position."""
@@ -89,43 +70,32 @@ class Data:
         self._view("joint", name, "qvel")[:] = value
 
     def _view(self, kind: str, name: str, column: str) -> Any:
-        _index(kind, name, _names(self._env.simulation.model, kind))
-        found: Any = getattr(getattr(self._data, kind)(name), column)
+        simulation = self._env.simulation
+        _index(kind, name, _names(simulation.model, kind))
+        found: Any = getattr(getattr(simulation.data, kind)(name), column)
         return found.reshape(3, 3) if column.endswith("mat") else found
 
 
 class Sim:
-    """The simulation of one environment.
-
-    Attributes:
-        model: The scene.
-        data: Its state.
-    """
+    """The simulation of one environment; `forward` computes what depends on a state."""
 
     def __init__(self, env: RobotEnv) -> None:
         self._env, self.model, self.data = env, Model(env), Data(env)
+        self.forward = env.simulation.forward
 
-    def get_state(self) -> FlatState:
-        """Return the physics state."""
-        return FlatState(self._env.physics_state)
+    def get_state(self) -> SimpleNamespace:
+        """Return the physics state; `flatten()` gives time, qpos and qvel."""
+        state = self._env.physics_state
+        return SimpleNamespace(flatten=lambda: state)
 
     def set_state_from_flattened(self, values: Vector) -> None:
         """Write a physics state; controllers start from there."""
-        model, data = self._env.simulation.model, self._env.simulation.data
-        write_physics(model, data, values)
-        self._env.simulation.start()
-
-    def forward(self) -> None:
-        """Compute all that depends on positions and velocities."""
-        self._env.simulation.forward()
+        simulation = self._env.simulation
+        write_physics(simulation.model, simulation.data, values)
+        simulation.start()
 
     def reset(self) -> None:
         """Do nothing: scripts write a state after it."""
-
-    def observe(self) -> dict[str, Any]:
-        """Return the observation of the present state."""
-        self._env.observables.update()
-        return self._env.observation()
 
     def render(
         self,
@@ -150,9 +120,9 @@ class Sim:
     def opengl_depth(self, distance: Array) -> Array:
         """Return distances from a camera, m, as OpenGL's depths, 0 to 1."""
         model = self._env.simulation.model
-        near = model.vis.map.znear * model.stat.extent
-        far = model.vis.map.zfar * model.stat.extent
-        return (1.0 - near / np.maximum(distance, near)) / (1.0 - near / far)
+        near, far = model.vis.map.znear, model.vis.map.zfar
+        scaled = np.maximum(distance / model.stat.extent, near)
+        return (1.0 - near / scaled) / (1.0 - near / far)
 
 
 def _names(model: mujoco.MjModel, kind: str) -> tuple[str, ...]:
@@ -169,36 +139,31 @@ def _index(kind: str, name: str, names: tuple[str, ...]) -> int:
 class RobotView:
     """One robot; other attributes are those of its description.
 
-    Args:
-        state: The robot in the simulation.
-        controller: Its controller.
-
     Attributes:
-        name: Name of the robot.
         robot_model: Its `name`, and `naming_prefix` of its names in the scene.
         composite_controller: Its controller.
         arms: `right`, `left`, or the names of its hands.
         gripper: The gripper of each arm; `dof` is its number of action values.
+        action_dim: Length of this robot's part of an action.
+        is_mobile: Whether the robot has a moving base.
     """
 
     def __init__(self, state: RobotState, controller: CompositeController) -> None:
         robot, layout = state.robot, controller.layout
-        self._state, self._slices = state, {s.name: s for s in layout.slices}
+        self._state = state
         self.name = robot.name
         self.robot_model = SimpleNamespace(name=robot.name, naming_prefix=state.prefix)
-        self.composite_controller = controller
+        self.composite_controller, self.action_dim = controller, layout.size
+        self.is_mobile = robot.root.kind != "fixed"
         self.arms = tuple(robot.hands)
+        sizes = {part.name: part.stop - part.start for part in layout.slices}
         self.gripper = {
-            arm: SimpleNamespace(dof=self._size(f"{arm}_gripper")) for arm in self.arms
+            arm: SimpleNamespace(dof=sizes.get(f"{arm}_gripper", 0))
+            for arm in self.arms
         }
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._state.robot, name)
-
-    @property
-    def action_dim(self) -> int:
-        """Length of this robot's part of an action."""
-        return self.composite_controller.layout.size
 
     @property
     def action_limits(self) -> tuple[Vector, Vector]:
@@ -209,12 +174,8 @@ class RobotView:
     @property
     def _action_split_indexes(self) -> dict[str, tuple[int, int]]:
         """Begin and end of each part of the action."""
-        return {name: (part.start, part.stop) for name, part in self._slices.items()}
-
-    @property
-    def is_mobile(self) -> bool:
-        """Whether the robot has a moving base."""
-        return self._state.robot.root.kind != "fixed"
+        slices = self.composite_controller.layout.slices
+        return {part.name: (part.start, part.stop) for part in slices}
 
     @property
     def _ref_joint_pos_indexes(self) -> Indices:
@@ -226,17 +187,6 @@ class RobotView:
         return np.array(places, dtype=np.int64)
 
     def create_action_vector(self, parts: Mapping[str, ArrayLike]) -> Vector:
-        """Return an action from values of parts; other parts get zeros.
-
-        Raises:
-            UnknownNameError: If there is no such part.
-            ActionError: If a part has a wrong size.
-        """
-        zeros = {name: np.zeros(self._size(name)) for name in self._slices}
-        return self.composite_controller.layout.pack(
-            zeros | {name: np.atleast_1d(values) for name, values in parts.items()}
-        )
-
-    def _size(self, part: str) -> int:
-        found = self._slices.get(part)
-        return 0 if found is None else found.stop - found.start
+        """Return an action from values of parts, and zeros for the others."""
+        layout = self.composite_controller.layout
+        return layout.pack(parts, base=np.zeros(layout.size))

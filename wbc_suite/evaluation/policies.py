@@ -33,10 +33,8 @@ def random(env: RobotEnv, rng: np.random.Generator) -> Policy:
 def scripted(env: RobotEnv, rng: np.random.Generator) -> Policy:
     """Make a policy that picks up the cube of Lift: above it, down, close, up.
 
-    It commands differences of position, as `OSC_POSE` takes them, for one arm.
-
-    Raises:
-        ConfigError: If the environment is another one.
+    It commands differences of position, as `OSC_POSE` takes them, for one arm. Raises
+    ConfigError in other environments.
     """
     names = [part.name for part in env.action_layout.slices]
     if env.benchmark.name != "Lift" or names != ["right", "right_gripper"]:
@@ -72,18 +70,15 @@ POLICIES: Mapping[str, Callable[[RobotEnv, np.random.Generator], Policy]] = {
 
 
 def make_policy(name: str, env: RobotEnv, seed: int) -> Policy:
-    """Make a policy for one episode.
+    """Make a policy for one episode of an environment that was reset.
 
-    Args:
-        name: One of `POLICIES`, or `package.module:function` of your own, where the
-            function takes the environment and a generator and returns the policy.
-        env: The environment it acts in, reset.
-        seed: Seed of the episode; the policy's own randomness follows from it.
+    The name is one of `POLICIES`, or `package.module:function` of your own, where the
+    function takes the environment and a generator, which follows from the seed of the
+    episode, and returns the policy.
 
     Raises:
         UnknownNameError: If there is no such policy.
-        ConfigError: If its module or its function cannot be found, or it cannot drive
-            this environment.
+        ConfigError: If its function cannot be found, or it cannot drive this one.
     """
     rng = np.random.default_rng([seed, 1])
     if ":" not in name:

@@ -1,11 +1,9 @@
 """Episodes of policies in environments, as work items of an executor."""
 
-import hashlib
-import json
 import re
 import shutil
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -24,13 +22,8 @@ from wbc_suite.wrappers import DataCollection
 class Case:
     """An environment and the policy that acts in it.
 
-    Attributes:
-        benchmark: Its name, or a file.
-        robots: Their names.
-        controller: A name or a file; None for each robot's own.
-        policy: See `make_policy`.
-        record: Whether episodes are recorded.
-        arguments: Further arguments of `wbc_suite.make`, plain JSON data, sorted.
+    Benchmark and controller are names or files. `arguments` are further ones of
+    `wbc_suite.make`, plain JSON data, sorted.
     """
 
     benchmark: str
@@ -51,42 +44,27 @@ def plan_rollouts(cases: Iterable[Case], *, seeds: range, chunk: int) -> list[Wo
     """Split the episodes of all cases into items of `chunk` seeds each.
 
     An item depends on its own case and seeds only, so that results are found again
-    when other cases are added.
-
-    Raises:
-        ConfigError: If there are no seeds, or the chunk is empty.
+    when other cases are added. Raises ConfigError if there are no seeds.
     """
     if len(seeds) == 0 or seeds.start < 0 or seeds.step != 1 or chunk < 1:
         raise ConfigError(f"Seeds {seeds} in chunks of {chunk}: at least one of each.")
-    starts = range(seeds.start, seeds.stop, chunk)
-    return [
-        _item(case, start, min(start + chunk, seeds.stop))
-        for case in cases
-        for start in starts
-    ]
-
-
-def _item(case: Case, start: int, stop: int) -> WorkItem:
-    payload = asdict(case) | {"arguments": dict(case.arguments), "seeds": [start, stop]}
-    text = json.dumps(payload, sort_keys=True)
-    digest = hashlib.sha256(text.encode()).hexdigest()[:8]
-    title = re.sub(r"[^A-Za-z0-9]+", "-", case.title).strip("-")[:90]
-    return WorkItem(name=f"{title}-{start:06d}-{digest}", payload=payload)
+    items = []
+    for case in cases:
+        title = re.sub(r"[^A-Za-z0-9]+", "-", case.title).strip("-")[:90]
+        payload = asdict(case) | {"arguments": dict(case.arguments)}
+        for start in range(seeds.start, seeds.stop, chunk):
+            mine = {"seeds": [start, min(start + chunk, seeds.stop)]}
+            label = f"{title}-{start:06d}"
+            items.append(WorkItem.with_digest(label, payload | mine))
+    return items
 
 
 def run_rollouts(item: WorkItem, folder: Path) -> dict[str, Any]:
-    """Run the episodes of an item; the work of `run_items`.
+    """Run an item; return `episodes`, one dictionary per episode.
 
-    An episode counts as a success if the benchmark is solved at any step
-    (`succeeded`), or at the last step (`success`). A physics error ends it as a
-    failure.
-
-    Args:
-        item: See `plan_rollouts`.
-        folder: Folder of the results; recordings go to `episodes`, one file per item.
-
-    Returns:
-        `episodes`: one dictionary per episode.
+    An episode counts as a success if the benchmark is solved at any step (`succeeded`),
+    or at the last step (`success`). A physics error ends it as a failure. Recordings go
+    to `episodes` in the folder, one file per item.
     """
     payload = item.payload
     env = inner = make(
@@ -102,16 +80,23 @@ def run_rollouts(item: WorkItem, folder: Path) -> dict[str, Any]:
         env = DataCollection(inner, path)
     try:
         seeds = range(*payload["seeds"])
-        episodes = [_run_episode(env, inner, s, payload["policy"]) for s in seeds]
+        episodes = [run_episode(env, inner, s, payload["policy"]) for s in seeds]
     finally:
         env.close()
     return {"episodes": episodes}
 
 
-def _run_episode(
-    env: gymnasium.Env[Any, Any], inner: RobotEnv, seed: int, name: str
+def run_episode(
+    env: gymnasium.Env[Any, Any],
+    inner: RobotEnv,
+    seed: int,
+    name: str,
+    *,
+    begin: Callable[[], None] = lambda: None,
 ) -> dict[str, Any]:
+    """Run an episode of a policy; `begin` is called after the reset."""
     observation, info = env.reset(seed=seed)
+    begin()
     policy = make_policy(name, inner, seed)
     start, steps, total, succeeded, over = time.perf_counter(), 0, 0.0, False, False
     while not over:

@@ -22,11 +22,7 @@ EXECUTORS = ("process", "serial", "ray", "slurm")
 
 
 def make_executor(name: str, *, workers: int | None = None) -> Executor:
-    """Make an executor by name.
-
-    Args:
-        name: One of `EXECUTORS`.
-        workers: Number of items that run at once; None for one per processor.
+    """Make one of `EXECUTORS` for so many items at once; None for one per processor.
 
     Raises:
         UnknownNameError: If there is no such executor.

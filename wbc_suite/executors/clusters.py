@@ -15,14 +15,12 @@ POLL_SECONDS = 0.5
 class RayCluster:
     """Runs items as Ray tasks; Ray runs those of dead workers again, elsewhere.
 
-    The cluster is that of `RAY_ADDRESS`, or else one on this machine.
+    The cluster is that of `RAY_ADDRESS`, or else one on this machine. Needs the extra
+    `ray`, or raises ConfigError.
 
     Args:
         workers: Number of items that run at once; None for one per processor.
         attempts: How often an item may lose its worker before it fails.
-
-    Raises:
-        ConfigError: If Ray is not installed (`pip install 'wbc-suite[ray]'`).
 
     Source: https://docs.ray.io/en/latest/ray-core/fault_tolerance/tasks.html
     """
@@ -37,7 +35,7 @@ class RayCluster:
     def run(
         self, work: Work, items: Sequence[WorkItem], folder: Path
     ) -> Iterator[Outcome]:
-        """Run all items; see `Executor`. All machines must share the folder."""
+        """See `Executor`; all machines must share the folder."""
         remote = self._ray.remote(num_cpus=1, max_retries=self._attempts - 1)(run_item)
         waiting = list(reversed(items))
         busy = {}
@@ -54,29 +52,23 @@ class RayCluster:
             return self._ray.get(reference)
         except self._ray.exceptions.RayTaskError as error:
             # `run_item` raises nothing: the worker could not load the work.
-            reason = str(error).strip().splitlines()[-1]
-            return Outcome(
-                name=item.name,
-                error=f"{reason}. All machines need wbc_suite and the work's module.",
-            )
+            last = str(error).strip().splitlines()[-1]
+            reason = f"{last}. All machines need wbc_suite and the work's module."
         except self._ray.exceptions.RayError as error:
-            return Outcome(
-                name=item.name,
-                error=f"Its worker was lost {self._attempts} times: "
-                f"{type(error).__name__}.",
-            )
+            kind = type(error).__name__
+            reason = f"Its worker was lost {self._attempts} times: {kind}."
+        return Outcome(name=item.name, error=reason)
 
 
 class Slurm:
     """Runs every item as a job of its own; logs are in the folder's `jobs`.
 
+    Needs the extra `slurm`, or raises ConfigError.
+
     Args:
         cluster: "slurm", "local" for processes of this machine, None to detect it.
         attempts: How often a job is submitted before its item fails.
         parameters: Parameters of submitit, such as `timeout_min`, `slurm_partition`.
-
-    Raises:
-        ConfigError: If submitit is not installed (`pip install 'wbc-suite[slurm]'`).
 
     Source: https://github.com/facebookincubator/submitit
     """
@@ -89,14 +81,13 @@ class Slurm:
         parameters: dict[str, object] | None = None,
     ) -> None:
         self._submitit = _import("submitit", extra="slurm")
-        self._cluster = cluster
-        self._attempts = attempts
+        self._cluster, self._attempts = cluster, attempts
         self._parameters = {"timeout_min": 240, **(parameters or {})}
 
     def run(
         self, work: Work, items: Sequence[WorkItem], folder: Path
     ) -> Iterator[Outcome]:
-        """Run all items; see `Executor`. All machines must share the folder."""
+        """See `Executor`; all machines must share the folder."""
         executor = self._submitit.AutoExecutor(folder / "jobs", cluster=self._cluster)
         executor.update_parameters(**self._parameters)
         jobs = {executor.submit(run_item, work, item, folder): item for item in items}

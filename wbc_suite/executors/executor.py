@@ -1,5 +1,7 @@
 """Work items, their outcomes, and the interface of what runs them."""
 
+import hashlib
+import json
 import re
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -16,13 +18,19 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,150}")
 class WorkItem:
     """A unit of work that can run alone, again, and on another machine.
 
-    Attributes:
-        name: Names its result file; letters, digits, dots, dashes and underscores.
-        payload: Arguments of the work, plain JSON data.
+    The name, of letters, digits, dots, dashes and underscores, names its result file;
+    the payload has the arguments of the work, plain JSON data.
     """
 
     name: str
     payload: Mapping[str, Any]
+
+    @classmethod
+    def with_digest(cls, label: str, payload: Mapping[str, Any]) -> "WorkItem":
+        """Make an item whose name is a label and a digest of its payload."""
+        text = json.dumps(payload, sort_keys=True)
+        digest = hashlib.sha256(text.encode()).hexdigest()[:12]
+        return cls(name=f"{label}-{digest}", payload=payload)
 
     def __post_init__(self) -> None:
         if not _NAME.fullmatch(self.name):
@@ -34,13 +42,7 @@ class WorkItem:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Outcome:
-    """Result or error of an item.
-
-    Attributes:
-        name: The item's name.
-        result: What the work returned, plain JSON data; empty after an error.
-        error: Error message, or None.
-    """
+    """Result of an item, plain JSON data, or its error message."""
 
     name: str
     result: Mapping[str, Any] = field(default_factory=dict)
@@ -57,16 +59,11 @@ class Executor(Protocol):
     def run(
         self, work: Work, items: Sequence[WorkItem], folder: Path
     ) -> Iterator[Outcome]:
-        """Run all items.
+        """Run all items; yield one outcome per item.
 
-        Args:
-            work: Function of an importable module.
-            items: Items to run.
-            folder: Where the work may write; every worker must reach it.
-
-        Yields:
-            One outcome per item. If a worker dies, the other items are not affected;
-            its own item runs again, and fails if its worker dies every time.
+        Every worker must reach the folder, where the work may write. If a worker dies,
+        the other items are not affected; its own item runs again, and fails if its
+        worker dies every time.
         """
         ...
 

@@ -26,16 +26,12 @@ class Serial:
 
 
 class Processes:
-    """Runs items in newly started processes.
+    """Runs items in newly started processes, by default one per processor.
 
     When a worker dies (killed, out of memory, a crash in C), the pool is started
-    again. The items that were running are suspects: each runs again alone, so that the
-    one which kills its worker is identified and no other item fails with it.
-
-    Args:
-        workers: Number of processes; None for one per processor.
-        attempts: How often an item may kill its worker, running alone, before it
-            fails.
+    again. Each item that was running then runs alone, so that the one which kills its
+    worker is identified and no other item fails with it. It fails after so many
+    attempts alone.
     """
 
     def __init__(self, workers: int | None = None, *, attempts: int = 3) -> None:

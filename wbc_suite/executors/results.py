@@ -9,24 +9,17 @@ from typing import Any
 from wbc_suite.errors import DatasetError
 from wbc_suite.executors.executor import Executor, Outcome, Work, WorkItem
 
-MAX_BYTES = 64 << 20
-"""Larger result files are not read."""
+MAX_BYTES = 64 << 20  # larger result files are not read
 
 
 class ResultFolder:
-    """One JSON file per finished item, in the subfolder `results`.
+    """One JSON file per finished item, in the subfolder `results` of a folder.
 
-    A file is complete or absent: it is written under another name and renamed.
-
-    Args:
-        folder: Folder of the whole work; made when it is missing.
-
-    Raises:
-        DatasetError: If the folder cannot be written to.
+    A file is complete or absent: it is written under another name and renamed. Raises
+    DatasetError if the folder, which is made if missing, cannot be written to.
     """
 
     def __init__(self, folder: Path) -> None:
-        self.folder = folder
         self._results = folder / "results"
         try:
             self._results.mkdir(parents=True, exist_ok=True)
@@ -35,12 +28,8 @@ class ResultFolder:
 
     def write(self, item: WorkItem, outcome: Outcome) -> None:
         """Write an item's outcome, in place of an earlier one."""
-        record = {
-            "item": item.name,
-            "payload": item.payload,
-            "error": outcome.error,
-            "result": outcome.result,
-        }
+        record = {"item": item.name, "payload": item.payload}
+        record |= {"error": outcome.error, "result": outcome.result}
         path = self._path(item)
         temporary = path.with_suffix(f".{os.getpid()}.tmp")
         text = json.dumps(record, indent=1, sort_keys=True)
@@ -77,21 +66,11 @@ def run_items(
     executor: Executor,
     on_outcome: Callable[[WorkItem, Outcome], None] | None = None,
 ) -> list[Outcome]:
-    """Run the items that have no result yet, and write each outcome as it ends.
+    """Run items that have no result yet; return all outcomes, in order of the items.
 
-    The call can be stopped at any time and repeated: finished items do not run again,
-    failed ones do.
-
-    Args:
-        work: Function of an importable module; see `Work`.
-        items: All items, finished or not; their names must differ.
-        folder: Folder of the results, and of what the work writes.
-        executor: Runs the items.
-        on_outcome: Called with every item and its outcome; at once for items that
-            finished in an earlier call.
-
-    Returns:
-        All outcomes, in the order of the items.
+    Each outcome is written as it ends. The call can be stopped and repeated: finished
+    items do not run again, failed ones do. `on_outcome` is called with every item and
+    its outcome; at once for items that finished in an earlier call.
 
     Raises:
         DatasetError: If two items have one name, or the folder cannot be written to.

@@ -1,6 +1,7 @@
 """Demonstrations: recording, storage, replay and conversion.
 
-Modules that need robots are loaded when they are first used.
+Functions raise DatasetError for what cannot be read, written or replayed. Modules that
+need robots are loaded when they are first used.
 """
 
 import importlib
@@ -14,16 +15,12 @@ if TYPE_CHECKING:
     from wbc_suite.recording.env_source import EnvSource, rebuild
     from wbc_suite.recording.recorder import Recorder
 
-_HOME = {
-    "EnvSource": "wbc_suite.recording.env_source",
-    "Recorder": "wbc_suite.recording.recorder",
-    "rebuild": "wbc_suite.recording.env_source",
-}
+_HOME = {"EnvSource": "env_source", "Recorder": "recorder", "rebuild": "env_source"}
 
 __all__ = ["Dataset", "EnvSource", "Episode", "Recorder", "Store", "rebuild"]
 
 
 def __getattr__(name: str) -> Any:
     if name in _HOME:
-        return getattr(importlib.import_module(_HOME[name]), name)
-    raise AttributeError(f"module 'wbc_suite.recording' has no attribute '{name}'")
+        return getattr(importlib.import_module(f"{__name__}.{_HOME[name]}"), name)
+    raise AttributeError(f"module '{__name__}' has no attribute '{name}'")

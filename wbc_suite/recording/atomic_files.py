@@ -7,16 +7,11 @@ from pathlib import Path
 
 from wbc_suite.errors import DatasetError
 
-RESERVE = 1 << 20
-"""Bytes that must be left on the disk after a file is written."""
+RESERVE = 1 << 20  # bytes that must be left on the disk after a file is written
 
 
 def check_folder(folder: Path, needed: int = 0) -> None:
-    """Make a folder if it is missing, and check that `needed` bytes fit into it.
-
-    Raises:
-        DatasetError: If it cannot be made, is read-only, or has less space.
-    """
+    """Make a folder if missing; raise DatasetError if `needed` bytes do not fit."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         probe = folder / f".wbc-suite-{os.getpid()}"
@@ -36,27 +31,21 @@ def check_folder(folder: Path, needed: int = 0) -> None:
 
 
 def new_folder(folder: Path, content: str) -> None:
-    """Make an empty folder for `content`, which the message names.
-
-    Raises:
-        DatasetError: If it is not empty, or see `check_folder`.
-    """
+    """Make a folder for `content`; raise DatasetError if it exists and is not empty."""
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise DatasetError(f"'{folder}' is not empty; {content} needs a new folder.")
     check_folder(folder)
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """Write a file; it is complete or absent, also after a power failure.
-
-    Raises:
-        DatasetError: If it cannot be written; an old file stays as it was.
-    """
+    """Write a file; see `replace_file`."""
     replace_file(path, lambda temporary: temporary.write_bytes(content))
 
 
 def replace_file(path: Path, write: Callable[[Path], object]) -> None:
-    """Let `write` write a temporary file, and rename it to `path`.
+    """Let `write` write a temporary file, sync it, and rename it to `path`.
+
+    The file is complete or absent, also after a power failure.
 
     Raises:
         DatasetError: If it cannot be written; an old file stays as it was.

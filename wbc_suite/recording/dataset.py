@@ -15,7 +15,6 @@ from wbc_suite.recording.episode import Column, Episode, Fact, fingerprint, piec
 from wbc_suite.recording.hdf5_check import check_files, open_safely
 
 _DEMO = re.compile(r"demo_?(\d{1,9})\Z")
-_GROUPS = ("obs", "next_obs")
 _DIMENSIONS = {"states": 2, "actions": 2, "rewards": 1, "dones": 1}
 
 
@@ -42,19 +41,17 @@ class Dataset:
     followed, sizes are checked before memory is allocated. An interrupted recording
     reads as if it had been closed.
 
-    Args:
-        path: The file.
-        alone: Whether finished episodes beside the file are left out.
-        checked: Whether this process has read or written the files before; all others
-            are read by a child process first, see `check_files`.
+    With `alone`, finished episodes beside the file are left out. With `checked`, this
+    process has read or written the files before; all others are read by a child process
+    first, see `check_files`.
 
     Raises:
-        DatasetError: If it cannot be read.
+        DatasetError: If it, or later an episode, cannot be read.
+        UnknownNameError: Later, if there is no episode of a name.
 
     Attributes:
-        path: The file.
         header: Attributes of `data`: `env_args`, `schema_version`, ...
-        names: Of the episodes, in their order.
+        names: Names of the episodes, in their order.
         masks: Names of episodes by filter key.
     """
 
@@ -65,6 +62,7 @@ class Dataset:
         files = [self.path] if alone else dataset_files(self.path)
         self._open = ExitStack()
         self._groups: dict[str, tuple[Path, h5py.Group]] = {}
+        self._uids: set[Fact] = set()
         self.header: dict[str, Fact] = {}
         self.masks: dict[str, list[str]] = {}
         if not checked:
@@ -78,19 +76,15 @@ class Dataset:
         self.names = tuple(sorted(self._groups, key=_number))
 
     def __enter__(self) -> Self:
-        """Return the dataset."""
         return self
 
     def __exit__(self, *error: object) -> None:
-        """Close it."""
         self.close()
 
     def __len__(self) -> int:
-        """Return the number of episodes."""
         return len(self.names)
 
     def __iter__(self) -> Iterator[Episode]:
-        """Read episodes one by one."""
         return (self.episode(name) for name in self.names)
 
     def close(self) -> None:
@@ -98,12 +92,7 @@ class Dataset:
         self._open.close()
 
     def facts(self, name: str) -> Mapping[str, Fact]:
-        """Return the facts of an episode, without reading its columns.
-
-        Raises:
-            UnknownNameError: If there is none of that name.
-            DatasetError: If it cannot be read.
-        """
+        """Return the facts of an episode, without reading its columns."""
         path, group = self._find(name)
         with hdf5_reader.reading(path):
             return _facts(group)
@@ -115,12 +104,7 @@ class Dataset:
             return _dataset(group, "actions").shape[0]
 
     def column(self, name: str, key: str) -> Column:
-        """Return one column of an episode.
-
-        Raises:
-            UnknownNameError: If there is no such episode or column.
-            DatasetError: If it cannot be read.
-        """
+        """Return one column of an episode, or raise UnknownNameError."""
         path, group = self._find(name)
         with hdf5_reader.reading(path):
             columns = _columns(group)
@@ -129,26 +113,14 @@ class Dataset:
             return hdf5_reader.StoredColumn(columns[key], path)[:]
 
     def streamed(self) -> Iterator[Episode]:
-        """Read episodes one by one; their columns are read slice by slice when used.
-
-        Columns have length, shape, type and slices, while the dataset is open.
-
-        Raises:
-            DatasetError: See `episode`.
-        """
+        """Read episodes one by one, and slices of columns when they are used."""
         return (self.episode(name, later=True) for name in self.names)
 
     def episode(self, name: str, *, later: bool = False) -> Episode:
-        """Read an episode.
-
-        Args:
-            name: Its name.
-            later: Whether columns are read when they are used; see `streamed`.
+        """Read an episode; with `later`, columns are read when they are used.
 
         Raises:
-            UnknownNameError: If there is none of that name.
-            DatasetError: If it cannot be read, its columns differ in length, or its
-                numbers are not those that were written.
+            DatasetError: If columns differ in length, or numbers are not those written.
         """
         path, group = self._find(name)
         with hdf5_reader.reading(path):
@@ -161,7 +133,7 @@ class Dataset:
             }
             last = hdf5_reader.child(group, "final_state", h5py.Dataset)
             final = None if last is None else hdf5_reader.StoredColumn(last, path)[:]
-            _check_lengths(name, columns)
+            _check_columns(name, columns)
             facts = _facts(group)
             written = facts.pop("sha256", None)
             facts.pop("num_samples", None)
@@ -182,18 +154,15 @@ class Dataset:
             data = hdf5_reader.child(file, "data", h5py.Group)
             if data is None:
                 raise DatasetError("there is no group 'data'; that is no dataset.")
-            known = {
-                facts["uid"]
-                for _, group in self._groups.values()
-                if "uid" in (facts := _facts(group))
-            }
-            for name in hdf5_reader.child_names(data):
-                if not _DEMO.match(name):
-                    continue
+            earlier = set(self._uids)
+            for name in filter(_DEMO.match, hdf5_reader.child_names(data)):
                 group = hdf5_reader.child(data, name, h5py.Group)
-                if group is None or _facts(group).get("uid", name) in known:
+                uid = None if group is None else _facts(group).get("uid")
+                if group is None or uid in earlier:
                     continue
                 self._groups[free_name(name, self._groups)] = path, group
+                if uid is not None:
+                    self._uids.add(uid)
             if not self.header:
                 self.header = _facts(data)
                 self.header.pop("total", None)
@@ -208,8 +177,7 @@ def free_name(name: str, taken: Container[str]) -> str:
 
 
 def _number(name: str) -> int:
-    match = _DEMO.match(name)
-    return int(match[1]) if match else 0
+    return int(name.removeprefix("demo").removeprefix("_"))
 
 
 def _facts(group: h5py.Group) -> dict[str, Fact]:
@@ -245,7 +213,7 @@ def _columns(group: h5py.Group) -> dict[str, h5py.Dataset]:
     for name in hdf5_reader.child_names(group):
         if name == "final_state":
             continue
-        if name in _GROUPS:
+        if name in ("obs", "next_obs"):
             inner = hdf5_reader.child(group, name, h5py.Group)
             assert inner is not None, "its name was listed"
             for key in hdf5_reader.child_names(inner):
@@ -255,7 +223,7 @@ def _columns(group: h5py.Group) -> dict[str, h5py.Dataset]:
     return found
 
 
-def _check_lengths(name: str, columns: Mapping[str, Column]) -> None:
+def _check_columns(name: str, columns: Mapping[str, Column]) -> None:
     length = len(columns["actions"])
     for key, column in columns.items():
         if len(column) != length:
@@ -265,10 +233,7 @@ def _check_lengths(name: str, columns: Mapping[str, Column]) -> None:
     for key, dimensions in _DIMENSIONS.items():
         if key in columns and columns[key].ndim != dimensions:
             raise DatasetError(f"'{name}': '{key}' has the shape {columns[key].shape}.")
-    bad = [k for k in ("states", "actions") if k in columns and not _finite(columns[k])]
-    if bad:
-        raise DatasetError(f"'{name}': '{bad[0]}' holds numbers that are not finite.")
-
-
-def _finite(column: Column) -> bool:
-    return all(bool(np.isfinite(piece).all()) for _, piece in pieces(column))
+    for key in ("states", "actions"):
+        parts = pieces(columns[key]) if key in columns else ()
+        if not all(np.isfinite(part).all() for _, part in parts):
+            raise DatasetError(f"'{name}': '{key}' holds numbers that are not finite.")

@@ -1,10 +1,7 @@
-"""Datasets verified, repaired, merged, split and filtered.
+"""Datasets verified, repaired, merged, split and filtered, each file atomically."""
 
-Every result replaces the old file atomically.
-"""
-
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from shutil import rmtree
@@ -27,12 +24,7 @@ from wbc_suite.recording.hdf5_writer import write_dataset
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Finding:
-    """Result of reading an episode, or a file that cannot be opened.
-
-    Attributes:
-        place: File, and name of the episode.
-        problem: Description of the damage; None if there is none.
-    """
+    """Result of reading an episode or a file; `problem` is None without damage."""
 
     place: str
     problem: str | None = None
@@ -76,9 +68,7 @@ def repair(path: str | Path) -> list[Finding]:
 
 
 def merge(sources: Sequence[str | Path], out: str | Path) -> int:
-    """Merge the episodes of several files into one; return their number.
-
-    An episode that is in several files is written once.
+    """Merge the episodes of several files, each one once; return their number.
 
     Raises:
         DatasetError: If they are of different environments, or one cannot be read.
@@ -92,10 +82,14 @@ def merge(sources: Sequence[str | Path], out: str | Path) -> int:
                 "These are recordings of different environments: "
                 + "; ".join(sorted(o[:120] for o in origins))
             )
-        wanted = _distinct(datasets)
+        wanted: dict[Fact, tuple[Dataset, str]] = {}  # by uid
+        for dataset in datasets:
+            for name in dataset.names:
+                uid = dataset.facts(name).get("uid", f"{dataset.path}: {name}")
+                wanted.setdefault(uid, (dataset, name))
         renamed = (
             replace(dataset.episode(name), name=f"demo_{k}")
-            for k, (dataset, name) in enumerate(wanted)
+            for k, (dataset, name) in enumerate(wanted.values())
         )
         needed = sum(d.path.stat().st_size for d in datasets if d.path.exists())
         write_dataset(out, renamed, datasets[0].header, needed=needed)
@@ -107,13 +101,8 @@ def split(
 ) -> Mapping[str, Sequence[str]]:
     """Write the masks `train` and `valid` into a file, as robomimic reads them.
 
-    Args:
-        path: The file.
-        valid: Share of the episodes for validation.
-        seed: Seed of the draw.
-
-    Raises:
-        DatasetError: If either would be empty.
+    `valid` is the share of the episodes for validation, drawn with the seed. Raises
+    DatasetError if either mask would be empty.
     """
     path = Path(path)
     with Dataset(path) as dataset:
@@ -125,10 +114,9 @@ def split(
                 "empty."
             )
         drawn = np.random.default_rng(seed).permutation(len(names))
-        chosen = {names[k] for k in drawn[:count]}
         masks = {
-            "train": [n for n in names if n not in chosen],
-            "valid": [n for n in names if n in chosen],
+            "train": [names[k] for k in sorted(drawn[count:])],
+            "valid": [names[k] for k in sorted(drawn[:count])],
         }
         write_dataset(path, dataset, dataset.header, masks={**dataset.masks, **masks})
     return masks
@@ -139,19 +127,15 @@ def filter_dataset(
 ) -> int:
     """Write the episodes for which `keep(dataset, name)` is true; return their number.
 
-    They keep their names; masks keep the names that remain.
-
-    Raises:
-        DatasetError: If none remains.
+    They keep their names; masks keep the names that remain. Raises DatasetError if none
+    remains.
     """
     with Dataset(path) as dataset:
         names = [name for name in dataset.names if keep(dataset, name)]
         if not names:
             raise DatasetError(f"None of the {len(dataset)} episodes would be left.")
-        masks = {
-            key: [n for n in held if n in names] for key, held in dataset.masks.items()
-        }
         chosen = (dataset.episode(name) for name in names)
+        masks = _masks_of(dataset, names)
         write_dataset(Path(out), chosen, dataset.header, masks=masks)
     return len(names)
 
@@ -193,34 +177,23 @@ def _damage(files: Sequence[Path]) -> dict[Path, str]:
 def _write_repaired(path: Path, names: Mapping[str, str], *, keep_old: bool) -> None:
     """Write episodes into one file, with their new names by their places."""
     header: dict[str, Fact] = {}
-    masks: dict[str, list[str]] = {}  # with names of the first file
-    for file in [path, *part_files(path)]:
-        try:
-            with Dataset(file, alone=True) as dataset:
-                header, masks = dataset.header, dataset.masks
+    masks: dict[str, list[str]] = {}
+    for file in [path, *part_files(path)]:  # the first that can be opened
+        with suppress(DatasetError), Dataset(file, alone=True) as dataset:
+            header, masks = dataset.header, _masks_of(dataset, names.values())
             break
-        except DatasetError:
-            continue
-    kept = {
-        k: [n for n in masked if n in names.values()] for k, masked in masks.items()
-    }
     renamed = (
         replace(episode, name=names[finding.place])
         for finding, episode in _read_all(path)
         if episode is not None and finding.place in names
     )
     repaired = path.with_name(path.name + ".repaired")
-    write_dataset(repaired, renamed, header, masks=kept)
+    write_dataset(repaired, renamed, header, masks=masks)
     if keep_old and path.exists():
         path.replace(path.with_name(path.name + ".damaged"))
     repaired.replace(path)
 
 
-def _distinct(datasets: Iterable[Dataset]) -> list[tuple[Dataset, str]]:
-    """Return the dataset and name of each episode, once for each `uid`."""
-    found: dict[str, tuple[Dataset, str]] = {}
-    for dataset in datasets:
-        for name in dataset.names:
-            uid = str(dataset.facts(name).get("uid", f"{dataset.path}: {name}"))
-            found.setdefault(uid, (dataset, name))
-    return list(found.values())
+def _masks_of(dataset: Dataset, names: Collection[str]) -> dict[str, list[str]]:
+    """Return a dataset's masks, with the names that remain."""
+    return {k: [n for n in held if n in names] for k, held in dataset.masks.items()}

@@ -2,6 +2,7 @@
 
 import json
 import platform
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
@@ -15,12 +16,12 @@ from wbc_suite.errors import DatasetError, WbcError
 from wbc_suite.recording.dataset import Dataset
 from wbc_suite.recording.episode import Fact
 
-GYM_TYPE = 2
-"""Type of Gymnasium environments in robomimic's `env_args`."""
+GYM_TYPE = 2  # type of Gymnasium environments in robomimic's `env_args`
 PACKAGES = ("mujoco", "pin", "numpy", "gymnasium", "h5py", "daqp")
 MAX_TEXT = 1_000_000  # characters of env_args
 _SHOWN = {"render_mode", "render_camera", "render_size", "render_preset", "skin"}
 """Arguments of rendering, which do not change an episode."""
+_PATH = re.compile(r"[/\\]|\.(toml|json|xml|urdf|py)\Z", re.IGNORECASE)
 _NAMES = ("robots", "controller_configs", "gripper_types", "base_types")
 
 
@@ -28,11 +29,8 @@ _NAMES = ("robots", "controller_configs", "gripper_types", "base_types")
 class EnvSource:
     """Name and arguments of an environment.
 
-    Attributes:
-        benchmark: Its name.
-        arguments: Plain data.
-        package: Package of the environment: `wbc_suite`, or another one.
-        missing: Arguments that are not plain data, such as a user's sampler.
+    `arguments` are plain data; `missing` names those that are not, such as a user's
+    sampler. `package` is `wbc_suite`, or another one.
     """
 
     benchmark: str
@@ -42,11 +40,7 @@ class EnvSource:
 
     @classmethod
     def of(cls, env: Any) -> "EnvSource":
-        """Describe an environment.
-
-        Raises:
-            DatasetError: If it is not an environment of this package.
-        """
+        """Describe an environment; raise DatasetError if it is not of this package."""
         inner = env.unwrapped
         if not isinstance(inner, RobotEnv):
             raise DatasetError(
@@ -63,11 +57,7 @@ class EnvSource:
 
     @classmethod
     def parse(cls, env_args: str | None) -> "EnvSource":
-        """Parse `env_args` of a dataset.
-
-        Raises:
-            DatasetError: If it is missing or is no description of an environment.
-        """
+        """Parse `env_args` of a dataset; raise DatasetError if they are none."""
         if not env_args:
             raise DatasetError("The dataset does not name its environment.")
         fields = _parse_json(env_args)
@@ -100,9 +90,8 @@ class EnvSource:
     def build(self, *, trust_files: bool = False, **changes: Any) -> RobotEnv:
         """Make the environment for replay; rendering arguments are left out.
 
-        Args:
-            trust_files: Whether names in the dataset may be paths of files here.
-            changes: Arguments that replace recorded ones.
+        With `trust_files`, names in the dataset may be paths of files here. `changes`
+        replace recorded arguments.
 
         Raises:
             DatasetError: If it cannot be made from the description.
@@ -129,17 +118,14 @@ class EnvSource:
 def header_of(env: Any) -> dict[str, Fact]:
     """Return the attributes of `data`, common to all episodes of an environment."""
     inner = env.unwrapped
-    versions = {name: _version(name) for name in PACKAGES}
-    versions |= {
-        "wbc-suite": __version__,
-        "python": platform.python_version(),
-        "system": platform.system(),
-    }
+    versions = {"wbc-suite": __version__, "python": platform.python_version()}
+    versions |= {"system": platform.system()} | {p: _version(p) for p in PACKAGES}
     source = EnvSource.of(env)
     controllers = [
         load_composite_controller_config(given, robot)
         for given, robot in zip(inner.config.controller_list, inner.robots, strict=True)
     ]
+    space = inner.action_space
     layout = [
         {"name": s.name, "kind": str(s.kind), "labels": list(s.labels)}
         for s in inner.action_layout.slices
@@ -152,9 +138,7 @@ def header_of(env: Any) -> dict[str, Fact]:
         "versions": json.dumps(versions),
         "controller_config": json.dumps(controllers, default=_plain),
         "action_layout": json.dumps(layout),
-        "action_bounds": json.dumps(
-            [inner.action_space.low.tolist(), inner.action_space.high.tolist()]
-        ),
+        "action_bounds": json.dumps([space.low, space.high], default=_plain),
     }
 
 
@@ -209,13 +193,8 @@ def _refuse_paths(values: list[Any]) -> None:
             _refuse_paths(list(value.values()))
         elif isinstance(value, list):
             _refuse_paths(value)
-        elif isinstance(value, str) and _looks_like_path(value):
+        elif isinstance(value, str) and _PATH.search(value):
             raise DatasetError(
                 f"The dataset names a file, '{value[:80]}'. If you trust it, use "
                 "--trust-files."
             )
-
-
-def _looks_like_path(text: str) -> bool:
-    ends = (".toml", ".json", ".xml", ".urdf", ".py")
-    return "/" in text or "\\" in text or text.lower().endswith(ends)

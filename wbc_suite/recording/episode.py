@@ -9,13 +9,10 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-Column: TypeAlias = NDArray[Any]
-"""One row per action."""
-Fact: TypeAlias = str | int | float | bool
-"""A value about a whole episode."""
+Column: TypeAlias = NDArray[Any]  # one row per action
+Fact: TypeAlias = str | int | float | bool  # a value about a whole episode
 
-PIECE = 1 << 20
-"""Bytes that are read at once while a column is written."""
+PIECE = 1 << 20  # bytes that are read at once while a column is written
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -68,11 +65,7 @@ def fingerprint(columns: Mapping[str, Column], final_state: Column | None) -> st
 
 
 def pieces(column: Column) -> Iterator[tuple[int, Column]]:
-    """Yield contiguous pieces of at most a megabyte, with the number of the first row.
-
-    Pages of a mapped file are released after use; they would count as memory of this
-    process.
-    """
+    """Yield contiguous pieces of at most a megabyte, and their first rows' numbers."""
     if not column.ndim:
         column = np.reshape(column, 1)
     wide = abs(column.strides[0]) if isinstance(column, np.ndarray) else 0
@@ -80,7 +73,7 @@ def pieces(column: Column) -> Iterator[tuple[int, Column]]:
     rows = max(1, PIECE // wide if wide else len(column))
     for begin in range(0, len(column), rows):
         yield begin, np.ascontiguousarray(column[begin : begin + rows])
-        _release_pages(column)
+        _release_pages(column)  # of a mapped file; they would count as memory
 
 
 def _release_pages(column: Column) -> None:

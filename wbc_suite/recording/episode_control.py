@@ -8,33 +8,25 @@ from enum import StrEnum
 from wbc_suite.errors import DatasetError
 from wbc_suite.recording.recorder import Recorder
 
-SUCCESS_STEPS = 10
-"""Successive steps with success after which an episode of a plan is kept."""
+SUCCESS_STEPS = 10  # successive ones after which an episode of a plan is kept
 
 
 class EpisodeCommand(StrEnum):
     """A command, sent by one key or button."""
 
-    RECORD = "keep"
-    """Begin an episode, or keep the one in progress."""
-    SUCCESS = "success"
-    """Keep the episode in progress as a success, whatever the benchmark reports."""
-    DISCARD = "discard"
-    """Discard the episode in progress."""
-    UNDO = "undo"
-    """Delete the episode that was kept last."""
+    RECORD = "keep"  # begin an episode, or keep the one in progress
+    SUCCESS = "success"  # keep it as a success, whatever the benchmark reports
+    DISCARD = "discard"  # discard it
+    UNDO = "undo"  # delete the episode that was kept last
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class RecordingPlan:
     """Episodes that begin by themselves until a number of them is kept.
 
-    A solved episode is kept and the next one begins. Commands remain possible.
-
-    Attributes:
-        episodes: Number of episodes to keep.
-        horizon: Maximum number of actions in an episode; None for no limit.
-        only_success: Whether episodes that are not solved are discarded.
+    A solved episode is kept and the next one begins. `horizon` is the maximum number of
+    actions in an episode; with `only_success`, those that are not solved are discarded.
+    Commands remain possible.
     """
 
     episodes: int
@@ -44,14 +36,7 @@ class RecordingPlan:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class EpisodeStatus:
-    """State of the recording.
-
-    Attributes:
-        recording: Whether an episode is in progress.
-        length: Its actions.
-        kept: Episodes in the file.
-        message: Result of the last command.
-    """
+    """State of the recording; `kept` counts the episodes in the file."""
 
     recording: bool
     length: int
@@ -62,12 +47,9 @@ class EpisodeStatus:
 class EpisodeControl:
     """Takes commands from any thread, and applies them in the loop's thread.
 
-    Args:
-        recorder: Records the environment of the loop; its wrapper must not be
-            automatic.
-        seed: Seed of the first episode; each further one takes the next seed.
-        plan: Episodes that begin and end by themselves; None for commands only.
-        report: Called with each new message, in the loop's thread.
+    The recorder's wrapper is not automatic. The first episode has the given seed, each
+    further one the next. Without a plan, episodes begin and end by commands only. In
+    the loop's thread, `report` is called with each new message.
     """
 
     def __init__(
@@ -88,11 +70,10 @@ class EpisodeControl:
     @property
     def status(self) -> EpisodeStatus:
         """State of the recording; the loop's thread only."""
-        recorder = self._recorder
         return EpisodeStatus(
-            recording=recorder.recording,
-            length=recorder.length,
-            kept=recorder.kept,
+            recording=self._recorder.recording,
+            length=self._recorder.length,
+            kept=self._recorder.kept,
             message=self._message,
         )
 
@@ -117,7 +98,7 @@ class EpisodeControl:
         return self._recorder.kept - self._kept_before
 
     def update(self, reset: Callable[[int], None]) -> None:
-        """Apply the commands between two steps; `reset` is given a seed."""
+        """Apply the commands between two steps; `reset` is called with a seed."""
         with self._lock:
             commands, self._commands = self._commands, []
         if self._was_recording and not self._recorder.recording:
@@ -155,8 +136,7 @@ class EpisodeControl:
             self._try(lambda: self._begin(reset))
 
     def _apply(self, command: EpisodeCommand, reset: Callable[[int], None]) -> str:
-        recorder = self._recorder
-        planned = self._plan is not None
+        recorder, planned = self._recorder, self._plan is not None
         if command is EpisodeCommand.UNDO and (planned or not recorder.recording):
             name = recorder.undo()
             return f"Took {name} back." if name else "There is nothing to take back."
@@ -164,15 +144,12 @@ class EpisodeControl:
             if command is EpisodeCommand.RECORD:
                 return self._begin(reset)
             return "Nothing is being recorded."
-        match command:
-            case EpisodeCommand.RECORD:
-                return self._keep(success=None)
-            case EpisodeCommand.SUCCESS:
-                return self._keep(success=True)
-            case EpisodeCommand.DISCARD:
-                recorder.discard()
-                return "Discarded."
-        return "Keep or discard this episode first."
+        if command is EpisodeCommand.UNDO:
+            return "Keep or discard this episode first."
+        if command is EpisodeCommand.DISCARD:
+            recorder.discard()
+            return "Discarded."
+        return self._keep(success=True if command is EpisodeCommand.SUCCESS else None)
 
     def _keep(self, *, success: bool | None) -> str:
         recorder, length = self._recorder, self._recorder.length
@@ -184,10 +161,9 @@ class EpisodeControl:
         name = recorder.keep(success=success)
         if name is None:
             return "Nothing to keep yet."
-        text = f"Kept as {name}: {length} actions, {result}"
-        if self._plan is None:
-            return f"{text}."
-        return f"{text} ({self._planned_kept} of {self._plan.episodes})."
+        plan, count = self._plan, self._planned_kept
+        progress = "" if plan is None else f" ({count} of {plan.episodes})"
+        return f"Kept as {name}: {length} actions, {result}{progress}."
 
     def _begin(self, reset: Callable[[int], None]) -> str:
         seed, self._seed = self._seed, self._seed + 1

@@ -19,24 +19,17 @@ from wbc_suite.recording.dataset import Dataset, part_files, parts_folder
 from wbc_suite.recording.episode import Episode, Fact
 from wbc_suite.recording.hdf5_writer import uncompressed_bytes, write_dataset
 
-ENOUGH = 20 << 20
-"""Bytes that must be free when recording begins."""
+ENOUGH = 20 << 20  # bytes that must be free when recording begins
 
 
 class Store:
     """Adds episodes to a file; after `add` returns, the episode is on disk.
 
-    Args:
-        path: The file; episodes are added to those in it.
-        header: Attributes of `data`; those of a file that exists must be for the same
-            environment.
+    `header` has the attributes of `data`; a file that exists must be of its `env_args`.
 
     Raises:
         DatasetError: If the folder cannot be written to, the disk is nearly full, the
             file is another environment's, or another process records into it.
-
-    Attributes:
-        path: The file.
     """
 
     def __init__(self, path: str | Path, header: Mapping[str, Fact]) -> None:
@@ -56,7 +49,6 @@ class Store:
         return self._closed + len(self._own)
 
     def __enter__(self) -> Self:
-        """Return the store."""
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *error: object) -> None:
@@ -67,11 +59,7 @@ class Store:
             self._lock.close()
 
     def add(self, episode: Episode) -> str:
-        """Write an episode to disk; return its name.
-
-        Raises:
-            DatasetError: If it cannot be written; those before it are safe.
-        """
+        """Write an episode to disk; return its name. Those before it are safe."""
         name = f"demo_{self._next}"
         named = replace(episode, name=name)
         file = self._parts / f"episode_{self._next:09d}.hdf5"
@@ -81,10 +69,7 @@ class Store:
         return name
 
     def undo(self) -> str | None:
-        """Delete the last episode that was added; return its name, or None.
-
-        Episodes of earlier sessions stay.
-        """
+        """Delete the last episode of this session; return its name, or None."""
         if not self._own:
             return None
         self._own.pop().unlink(missing_ok=True)
@@ -94,9 +79,8 @@ class Store:
     def close(self) -> None:
         """Merge all episodes into the file, and delete the files beside it.
 
-        Raises:
-            DatasetError: If it cannot be written; then episodes stay beside the file,
-                where `Dataset` reads them, and `repair` can merge them.
+        After an error, episodes stay beside the file, where `Dataset` reads them, and
+        `repair` can merge them.
         """
         if self._lock.closed:
             return
@@ -141,11 +125,7 @@ class Store:
 
 @contextmanager
 def locked(path: Path) -> Iterator[None]:
-    """Lock a file against recording by other processes.
-
-    Raises:
-        DatasetError: If another process records into it.
-    """
+    """Lock a file; raise DatasetError if another process records into it."""
     folder = parts_folder(path)
     check_folder(folder)
     with _lock(folder / "lock"):

@@ -19,8 +19,7 @@ from wbc_suite.recording.hdf5_writer import write_dataset
 from wbc_suite.recording.replaying import play_states
 from wbc_suite.recording.resumable_work import run_pieces, work_folder
 
-PART = 10
-"""Maximum number of episodes of a work item; each item makes an environment."""
+PART = 10  # maximum number of episodes of a work item; each item makes an environment
 
 
 def extract(
@@ -33,22 +32,13 @@ def extract(
     on_progress: Callable[[int], None] = lambda _: None,
     **changes: Any,
 ) -> int:
-    """Restore every recorded state, and store its observations and rewards.
+    """Restore recorded states, and store observations and rewards; count episodes.
 
-    Finished parts wait in `OUT.work`: a stopped extraction continues when called again.
-
-    Args:
-        path: A recording whose states fit the environment.
-        out: File to write; it may be the same.
-        trust_files: See `EnvSource.build`.
-        executor: Runs the parts; this process when left out.
-        workers: Number of workers that the episodes are split among.
-        on_progress: Called with the number of episodes of each finished piece.
-        changes: Arguments of the environment, such as `use_camera_obs`,
-            `camera_names`, `reward_shaping`.
-
-    Returns:
-        The number of episodes.
+    The file `out` may be the same. Episodes are split among `workers` of the executor,
+    or run in this process. Finished parts wait in `OUT.work`: a stopped extraction
+    continues when called again. `on_progress` is called with the number of episodes of
+    each part. `changes` are arguments of the environment, such as `use_camera_obs`,
+    `camera_names`, `reward_shaping`; for `trust_files` see `EnvSource.build`.
 
     Raises:
         DatasetError: If the environment cannot be made, or states do not fit.

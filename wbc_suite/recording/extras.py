@@ -7,11 +7,7 @@ from wbc_suite.errors import DatasetError
 
 
 def import_extra(module: str, extra: str) -> Any:
-    """Import a module of an optional package.
-
-    Raises:
-        DatasetError: If it is not installed; the message names the extra.
-    """
+    """Import a module of an optional package; a DatasetError names the extra."""
     try:
         return importlib.import_module(module)
     except ImportError as error:

@@ -21,30 +21,19 @@ import wbc_suite
 from wbc_suite.errors import DatasetError
 from wbc_suite.recording import hdf5_reader
 
-CPU_SECONDS = 10
-"""Processor time for the start and for small files, s."""
-BYTES_PER_SECOND = 10_000_000
-"""Larger files get one second more for so many bytes."""
-MEMORY_BYTES = 4 << 30
-"""Address space of the child."""
-WALL_FACTOR = 10
-"""Wall time over processor time, for a busy machine or a slow disk."""
-SPARSE_FROM, SPARSE = 1 << 30, 20
-"""A file this large, with less than one in so many bytes on disk, is a bomb."""
-OUT_OF_MEMORY = 3
-"""Exit code of the child."""
-TOLERATED = (*hdf5_reader.ERRORS, DatasetError)
-"""Errors that the child leaves to the parent, which meets them where they matter."""
+CPU_SECONDS = 10  # processor time for the start and for small files, s
+BYTES_PER_SECOND = 10_000_000  # larger files get one second more for so many bytes
+MEMORY_BYTES = 4 << 30  # address space of the child
+WALL_FACTOR = 10  # wall time over processor time, for a busy machine or a slow disk
+SPARSE_FROM, SPARSE = 1 << 30, 20  # larger files with less than 1/20 on disk: bombs
+OUT_OF_MEMORY = 3  # exit code of the child
+TOLERATED = (*hdf5_reader.ERRORS, DatasetError)  # which the parent meets, too
 T = TypeVar("T")
 COMMAND = "from wbc_suite.recording.hdf5_check import read_files; read_files()"
 
 
 def open_safely(path: Path, *, checked: bool = False) -> h5py.File:
-    """Open a file for reading.
-
-    Args:
-        path: The file.
-        checked: Whether `check_files` has read it before; it is called if not.
+    """Open a file for reading, after `check_files` unless it was `checked` before.
 
     Raises:
         DatasetError: If it is missing, no HDF5 file or too damaged to be read.
@@ -111,11 +100,7 @@ def _reason(code: int, seconds: int, messages: bytes) -> str:
 
 
 def read_files() -> None:
-    """Read the files that standard input names; the child's main function.
-
-    A line is written for each file when it is done. Errors that h5py reports are left
-    to the parent, which finds them where they matter.
-    """
+    """Read the files named by standard input, in the child; write a line for each."""
     seconds = int(sys.argv[1])
     resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))

@@ -22,20 +22,13 @@ MAX_ATTRIBUTES = 1000  # of a group or dataset
 MAX_NAME = 200  # characters
 MAX_BYTES = 1 << 32  # of one column
 MAX_TEXT = 1 << 26  # characters of an attribute
-MAX_RATIO = 1100
-"""Bytes that one stored byte can stand for; deflate's limit is 1032."""
+MAX_RATIO = 1100  # bytes that one stored byte can stand for; deflate's limit is 1032
 FILTERS = {1: "gzip", 2: "shuffle", 3: "fletcher32", 32000: "lzf"}
 """By HDF5's numbers; others load libraries from a search path."""
-HIGHEST_CHUNK = 1 << 20
-"""Bytes of rows; larger chunks would be unpacked again for each slice."""
+HIGHEST_CHUNK = 1 << 20  # bytes; larger ones are unpacked for each slice
 ERRORS = (
-    OSError,
-    ValueError,
-    LookupError,
-    TypeError,
-    RuntimeError,
-    AttributeError,
-    OverflowError,
+    *(OSError, ValueError, LookupError, TypeError, RuntimeError),
+    *(AttributeError, OverflowError),
 )
 """What h5py raises for damaged files."""
 _PLAIN = re.compile(r"[^/\x00]+\Z")
@@ -45,11 +38,7 @@ Node = TypeVar("Node", bound=h5py.HLObject)
 
 @contextmanager
 def reading(path: Path) -> Iterator[None]:
-    """Turn errors of HDF5 into one line that names the file.
-
-    Raises:
-        DatasetError: For every error that a file can cause.
-    """
+    """Turn every error that a file can cause into a DatasetError that names it."""
     try:
         yield
     except UnknownNameError:
@@ -69,11 +58,7 @@ def reading(path: Path) -> Iterator[None]:
 
 
 def child_names(group: h5py.Group) -> list[str]:
-    """Return the names in a group.
-
-    Raises:
-        DatasetError: If there are too many.
-    """
+    """Return the names in a group; raise DatasetError if there are too many."""
     count = group.id.get_num_objs()
     if count > MAX_CHILDREN:
         raise DatasetError(f"'{group.name}' has {count} entries; that is no dataset.")
@@ -81,12 +66,7 @@ def child_names(group: h5py.Group) -> list[str]:
 
 
 def child(group: h5py.Group, name: str, kind: type[Node]) -> Node | None:
-    """Return a member of a group, or None when there is none of that name.
-
-    Raises:
-        DatasetError: If the name is not allowed, or is a link, or the member is of
-            another kind.
-    """
+    """Return a member of a group, or None; raise DatasetError for links."""
     if len(name) > MAX_NAME or not _PLAIN.match(name) or name in (".", ".."):
         raise DatasetError(f"'{name:.40}' is no name for a part of a dataset.")
     link = group.get(name, getlink=True)
@@ -106,11 +86,7 @@ def child(group: h5py.Group, name: str, kind: type[Node]) -> Node | None:
 
 
 def attribute_names(node: h5py.Group | h5py.Dataset) -> list[str]:
-    """Return the names of a node's attributes.
-
-    Raises:
-        DatasetError: If there are too many.
-    """
+    """Return the names of attributes; raise DatasetError if there are too many."""
     if len(node.attrs) > MAX_ATTRIBUTES:
         raise DatasetError(f"'{node.name}' has {len(node.attrs)} attributes.")
     return list(node.attrs)
@@ -119,11 +95,7 @@ def attribute_names(node: h5py.Group | h5py.Dataset) -> list[str]:
 def attribute(
     node: h5py.Group | h5py.Dataset, name: str
 ) -> str | int | float | bool | None:
-    """Return a single text or number, or None when there is no such attribute.
-
-    Raises:
-        DatasetError: If it is something else, or too long.
-    """
+    """Return a text or number, or None if missing; raise DatasetError for others."""
     if name not in node.attrs:
         return None
     held = node.attrs.get_id(name)
@@ -148,13 +120,8 @@ def attribute(
 class StoredColumn:
     """Numbers that are read slice by slice when they are used.
 
-    Args:
-        dataset: Where they are.
-        path: The file, for messages.
-
-    Attributes:
-        shape, dtype, ndim, nbytes: NumPy's.
-        sliced: Whether a slice is read without reading much else.
+    `shape`, `dtype`, `ndim` and `nbytes` are NumPy's; `sliced` says whether a slice is
+    read without reading much else. `path` is the file, for messages.
 
     Raises:
         DatasetError: If they are no numbers, too many, or not in this file; or later,
@@ -173,21 +140,15 @@ class StoredColumn:
         self.sliced = row > 0 and (high == 1 or high * row <= HIGHEST_CHUNK)
 
     def __len__(self) -> int:
-        """Return the number of rows."""
         return self.shape[0]
 
     def __getitem__(self, rows: slice) -> NDArray[Any]:
-        """Read some rows."""
         with reading(self._path):
             return np.asarray(self._dataset[rows])
 
 
 def read_names(dataset: h5py.Dataset) -> list[str]:
-    """Return a list of names, as filter keys have it.
-
-    Raises:
-        DatasetError: If it is no list of short texts.
-    """
+    """Return a list of short texts, as filter keys have it, or raise DatasetError."""
     _check_storage(dataset)
     text = h5py.check_string_dtype(dataset.dtype)
     if text is None or dataset.ndim != 1 or len(dataset) > MAX_CHILDREN:
@@ -195,8 +156,7 @@ def read_names(dataset: h5py.Dataset) -> list[str]:
     if text.length is not None and text.length > MAX_NAME:
         raise DatasetError(f"'{dataset.name}' has names of {text.length} characters.")
     names = []
-    for k in range(len(dataset)):
-        name = bytes(dataset[k])
+    for name in (bytes(dataset[k]) for k in range(len(dataset))):
         if len(name) > MAX_NAME:
             raise DatasetError(f"'{dataset.name}' has a name of {len(name)} letters.")
         names.append(name.decode("utf-8", errors="replace"))

@@ -18,8 +18,7 @@ from wbc_suite.recording.atomic_files import check_folder, replace_file
 from wbc_suite.recording.episode import Column, Episode, Fact, fingerprint, pieces
 
 SCHEMA_VERSION = 1
-PICTURE_BYTES = 10_000
-"""Rows of bytes of at least this size are pictures, and are compressed."""
+PICTURE_BYTES = 10_000  # rows of at least so many are pictures, and are compressed
 
 
 def uncompressed_bytes(episode: Episode) -> int:
@@ -36,46 +35,32 @@ def write_dataset(
     masks: Mapping[str, Sequence[str]] | None = None,
     needed: int = 0,
 ) -> None:
-    """Write a dataset; it replaces an old file atomically.
+    """Write a dataset; it replaces an old file atomically, or stays as it was.
 
-    Args:
-        path: File to write.
-        episodes: Read one by one; a piece of a column is in memory at a time.
-        header: Attributes of `data`, such as `env_args`.
-        masks: Names of episodes by filter key.
-        needed: Bytes that it will take, if known.
+    Episodes are read one by one, with a piece of a column in memory at a time. `header`
+    has the attributes of `data`, `masks` the names of episodes by filter key. `needed`
+    bytes must fit on the disk.
 
     Raises:
-        DatasetError: If it cannot be written; an old file stays as it was.
+        DatasetError: If it cannot be written.
     """
     check_folder(path.parent, needed)
 
     def write(temporary: Path) -> None:
         with open_late_errors(temporary) as disk, h5py.File(disk, "w") as file:
-            _write(file, episodes, header, masks or {})
+            data, total = file.create_group("data"), 0
+            data.attrs.update(header)
+            data.attrs["schema_version"] = SCHEMA_VERSION
+            for episode in episodes:
+                if episode.name in data:
+                    raise DatasetError(f"There are two episodes '{episode.name}'.")
+                total += episode.length
+                _write_episode(data.create_group(episode.name), episode)
+            data.attrs["total"] = total
+            for key, names in (masks or {}).items():
+                file.create_dataset(f"mask/{key}", data=np.array(names, dtype="S"))
 
     replace_file(path, write)
-
-
-def _write(
-    file: h5py.File,
-    episodes: Iterable[Episode],
-    header: Mapping[str, Fact],
-    masks: Mapping[str, Sequence[str]],
-) -> None:
-    data = file.create_group("data")
-    for name, value in header.items():
-        data.attrs[name] = value
-    data.attrs["schema_version"] = SCHEMA_VERSION
-    total = 0
-    for episode in episodes:
-        if episode.name in data:
-            raise DatasetError(f"There are two episodes '{episode.name}'.")
-        total += episode.length
-        _write_episode(data.create_group(episode.name), episode)
-    data.attrs["total"] = total
-    for key, names in masks.items():
-        file.create_dataset(f"mask/{key}", data=np.array(names, dtype="S"))
 
 
 def _write_episode(group: h5py.Group, episode: Episode) -> None:
@@ -87,8 +72,7 @@ def _write_episode(group: h5py.Group, episode: Episode) -> None:
             stored[begin : begin + len(piece)] = piece
     if episode.final_state is not None:
         group.create_dataset("final_state", data=episode.final_state)
-    for name, fact in episode.facts.items():
-        group.attrs[name] = fact
+    group.attrs.update(episode.facts)
     group.attrs["num_samples"] = episode.length
     group.attrs["sha256"] = fingerprint(episode.columns, episode.final_state)
 
@@ -105,10 +89,7 @@ def open_late_errors(path: Path) -> Iterator[Any]:
     """Open a new file for h5py that reports write errors when it is closed.
 
     HDF5 crashes if a write fails on a full disk. Here nothing more is written after
-    the first error; it is raised at the end, and the file must not be used.
-
-    Raises:
-        OSError: If something could not be written.
+    the first OSError; it is raised at the end, and the file must not be used.
     """
     file = _LateErrorFile(os.open(path, os.O_RDWR | os.O_CREAT | os.O_TRUNC, 0o666))
     try:

@@ -10,17 +10,9 @@ from wbc_suite.recording.extras import import_extra
 
 
 class Mp4Writer:
-    """Writes an H.264 video picture by picture; needs the package `av`.
+    """Writes an H.264 video picture by picture at a rate, Hz; needs the package `av`.
 
-    Args:
-        path: File to write.
-        rate: Pictures per second.
-        extra: The extra that an error names if `av` is missing.
-        options: Options of the encoder libx264.
-
-    Raises:
-        DatasetError: If `av` is not installed.
-        OSError: If the file cannot be written.
+    An error names the `extra` that installs it; `options` are those of libx264.
     """
 
     def __init__(

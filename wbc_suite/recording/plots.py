@@ -11,16 +11,11 @@ from wbc_suite.typing import Vector
 
 WIDTH, HEIGHT, MARGIN = 720, 150, 28  # pixels of one plot
 INK, CURVE, GOOD, BAD = "#333333", "#4a6fa5", "#3f8f5b", "#c8553d"
-MOST = 400
-"""Episodes and points that are drawn at most."""
+MOST = 400  # episodes and points that are drawn at most
 
 
 def write_plots(dataset: Dataset, path: Path) -> None:
-    """Draw lengths by episode, and how actions and rewards spread.
-
-    Raises:
-        DatasetError: If there are no episodes, or the file cannot be written.
-    """
+    """Draw lengths by episode, and how actions and rewards spread."""
     names = dataset.names[:MOST]
     if not names:
         raise DatasetError(f"'{dataset.path}' has no episodes to plot.")
@@ -33,18 +28,13 @@ def write_plots(dataset: Dataset, path: Path) -> None:
     _bars(pen, 0, "Actions per episode (green: success)", lengths, colours)
     spread = actions.std(axis=0)
     _bars(pen, 1, "Spread of each action", spread, [CURVE] * len(spread))
-    sizes = [float(np.linalg.norm(a)) for a in actions[:: len(actions) // MOST + 1]]
-    values = np.array(sizes)
-    _bars(pen, 2, "Size of the action over time", values, [CURVE] * len(values))
+    sizes = np.linalg.norm(actions[:: len(actions) // MOST + 1], axis=1)
+    _bars(pen, 2, "Size of the action over time", sizes, [CURVE] * len(sizes))
     save_picture(sheet, path)
 
 
 def save_picture(picture: Image.Image, path: Path) -> None:
-    """Write a picture in the format of the path's suffix; make its folder.
-
-    Raises:
-        DatasetError: If it cannot be written.
-    """
+    """Write a picture in the format of the path's suffix, or raise DatasetError."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         picture.save(path)

@@ -19,31 +19,22 @@ from wbc_suite.recording.step_buffer import StepBuffer
 
 
 class Recorder:
-    """Records one environment's episodes into a file.
+    """Records episodes of an environment of this package, wrapped or not.
 
-    Args:
-        env: An environment of this package, wrapped or not.
-        path: The file; episodes are added to those in it.
-        next_obs: Whether observations after each action are stored too.
-
-    Raises:
-        DatasetError: If it is another environment, or see `Store`.
-
-    Attributes:
-        path: The file.
+    With `next_obs`, observations after each action are stored too. `succeeded` says
+    whether the benchmark counts as solved at the last action. For the file see `Store`.
     """
 
     def __init__(self, env: Any, path: str | Path, *, next_obs: bool = False) -> None:
         self._inner, self._next_obs = env.unwrapped, next_obs
-        self.path = Path(path)
         self._model_file = self._inner.scene_xml
         digest = hashlib.sha256(self._model_file.encode()).hexdigest()
         date = datetime.now(UTC).isoformat(timespec="seconds")
         header = header_of(env) | {"model_hash": digest, "date": date}
-        self._store = Store(self.path, header)
-        self._rows = StepBuffer(env, self.path.parent)
+        self._store = Store(path, header)
+        self._rows = StepBuffer(env, self._store.path.parent)
         self._facts: dict[str, Fact] | None = None
-        self._clipped, self._succeeded = 0, False
+        self._clipped, self.succeeded = 0, False
 
     @property
     def kept(self) -> int:
@@ -60,11 +51,6 @@ class Recorder:
         """Actions of the episode in progress."""
         return len(self._rows)
 
-    @property
-    def succeeded(self) -> bool:
-        """Whether the benchmark counts as solved at the last action."""
-        return self._succeeded
-
     def begin(self) -> None:
         """Begin an episode, right after the environment's reset."""
         self.discard()
@@ -80,7 +66,7 @@ class Recorder:
             self._facts["seed"] = int(seed)
         if placed is not None:
             self._facts["placed"] = json.dumps(placed.tolist())
-        self._clipped, self._succeeded, self._began = 0, False, time.monotonic()
+        self._clipped, self.succeeded, self._began = 0, False, time.monotonic()
         self._rows.begin()
 
     def add(
@@ -93,11 +79,7 @@ class Recorder:
         info: Mapping[str, Any],
         step_time: float,
     ) -> None:
-        """Record a step that the environment has just taken.
-
-        Raises:
-            DatasetError: If the disk is full; then the episode is lost.
-        """
+        """Record a step that was taken; if the disk is full, the episode is lost."""
         success = bool(info.get("success", False))
         clipped = int(info.get("clipped", 0))
         stamp = time.monotonic() - self._began
@@ -108,17 +90,13 @@ class Recorder:
             self.discard()
             raise
         self._clipped += clipped > 0
-        self._succeeded = success
+        self.succeeded = success
 
     def keep(self, success: bool | None = None) -> str | None:
         """End the episode and store it; return its name, or None if it has no steps.
 
-        Args:
-            success: Success by an operator's judgement; None for the benchmark's.
-
-        Raises:
-            DatasetError: If it cannot be stored; it stays in progress, and `keep` may
-                be called again.
+        `success` is an operator's judgement; None for the benchmark's. An episode that
+        cannot be stored stays in progress, and `keep` may be called again.
         """
         if self._facts is None or not len(self._rows):
             self.discard()
@@ -127,7 +105,7 @@ class Recorder:
         dones = np.concatenate([piece for _, piece in pieces(columns["dones"])])
         dones[-1] = 1
         facts = self._facts | {
-            "success": self._succeeded if success is None else bool(success),
+            "success": self.succeeded if success is None else bool(success),
             "clipped_steps": self._clipped,
         }
         columns |= {"dones": dones}

@@ -23,19 +23,12 @@ _JOINT = re.compile(r'<(?:free)?joint\b[^<>]*?\bname="([^"<>]{1,200})"')
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Divergence:
-    """Difference of a replay by actions from the recording.
+    """Difference of a replay by actions from the recording."""
 
-    Attributes:
-        steps: Actions played.
-        largest: Largest difference of any number of the state (m, rad, m/s, rad/s).
-        first: Action with the first difference after it; None without any.
-        success: Whether the benchmark is solved at the end of the replay.
-    """
-
-    steps: int
-    largest: float
-    first: int | None
-    success: bool
+    steps: int  # actions played
+    largest: float  # of all numbers of the state, m, rad, m/s, rad/s
+    first: int | None  # action with the first difference after it; None without any
+    success: bool  # at the end of the replay
 
     @property
     def exact(self) -> bool:
@@ -47,11 +40,8 @@ def start_as(env: RobotEnv, episode: Episode) -> None:
     """Reset the environment to the start of a recorded episode.
 
     With the recorded state of the random generator the start is equal to the bit, sizes
-    of objects included. Without it, the physics state is set.
-
-    Raises:
-        DatasetError: If the recorded state does not fit the environment, or the joints
-            of a recording of this package have other names.
+    of objects included. Without it, the physics state is set. Raises DatasetError if
+    the state, or the names of joints, do not fit the environment.
     """
     if "states" not in episode.columns or not episode.length:
         raise DatasetError(f"'{episode.name}' has no states to start from.")
@@ -69,7 +59,10 @@ def start_as(env: RobotEnv, episode: Episode) -> None:
             env.reset_to(state)
         else:
             placed = json.loads(str(episode.facts.get("placed", "null")))
-            env.begin_at(_generator_state(str(generator)), placed)
+            drawn = json.loads(str(generator)[:2000])
+            if not isinstance(drawn, dict) or drawn.get("bit_generator") != "PCG64":
+                raise ValueError("its random generator is not the one used here")
+            env.begin_at(drawn, placed)
     except (ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
         raise DatasetError(f"'{episode.name}' has no usable start: {error}") from error
     except WbcError as error:
@@ -77,17 +70,11 @@ def start_as(env: RobotEnv, episode: Episode) -> None:
 
 
 def play_states(env: RobotEnv, episode: Episode) -> Iterator[int]:
-    """Set the simulation to every recorded state, one after the other.
-
-    Yields:
-        The number of the action taken in the state; at last the number of actions.
-    """
+    """Set the simulation to every recorded state; yield the number of each."""
     start_as(env, episode)
     simulation = env.simulation
-    states = list(episode.columns["states"])
-    if episode.final_state is not None:
-        states.append(episode.final_state)
-    for k, state in enumerate(states):
+    last = () if episode.final_state is None else (episode.final_state,)
+    for k, state in enumerate((*episode.columns["states"], *last)):
         write_physics(simulation.model, simulation.data, state)
         simulation.forward()
         env.benchmark.after_step()
@@ -98,21 +85,16 @@ def play_states(env: RobotEnv, episode: Episode) -> Iterator[int]:
 def play_actions(
     env: RobotEnv, episode: Episode
 ) -> Iterator[tuple[int, Vector, dict[str, Any]]]:
-    """Apply the recorded actions, open loop.
-
-    Yields:
-        Number of the action, difference of the state after it from the recorded one
-        (zero if that is missing), and `info`.
-    """
+    """Apply the actions; yield number, difference of the state after it, and `info`."""
     start_as(env, episode)
-    if episode.columns["actions"].shape[1] != env.action_layout.size:
+    states, actions = episode.columns["states"], episode.columns["actions"]
+    if actions.shape[1] != env.action_layout.size:
         raise DatasetError(
-            f"'{episode.name}' has actions of {episode.columns['actions'].shape[1]} "
-            f"numbers, and this environment's have {env.action_layout.size}: it can "
-            "be replayed by states only."
+            f"'{episode.name}' has actions of {actions.shape[1]} numbers, and this "
+            f"environment's have {env.action_layout.size}: it can be replayed by "
+            "states only."
         )
-    states = episode.columns["states"]
-    for k, action in enumerate(episode.columns["actions"]):
+    for k, action in enumerate(actions):
         *_, info = env.advance(action)
         after = states[k + 1] if k + 1 < len(states) else episode.final_state
         now = env.physics_state
@@ -135,7 +117,9 @@ def divergence(env: RobotEnv, episode: Episode) -> Divergence:
 
 def _check_joints(env: RobotEnv, episode: Episode) -> None:
     """Refuse states of another robot with the same number of joints."""
-    recorded = _joints_named(str(episode.facts.get("model_file", "")))
+    mjcf = str(episode.facts.get("model_file", ""))  # untrusted, and not parsed
+    world = mjcf[mjcf.find("<worldbody") : mjcf.rfind("</worldbody>") + 1]
+    recorded = _JOINT.findall(world)
     model = env.simulation.model
     here = [model.joint(number).name for number in range(model.njnt)]
     if not recorded or recorded == here:
@@ -149,16 +133,3 @@ def _check_joints(env: RobotEnv, episode: Episode) -> None:
             f"have as many numbers; {words}."
         )
     log.warning("'%s': %s; states are taken in order", episode.name, words)
-
-
-def _joints_named(mjcf: str) -> list[str]:
-    """Return the names of a scene's joints, without parsing the untrusted MJCF."""
-    world = mjcf[mjcf.find("<worldbody") : mjcf.rfind("</worldbody>") + 1]
-    return _JOINT.findall(world)
-
-
-def _generator_state(text: str) -> dict[str, Any]:
-    state = json.loads(text[:2000])
-    if not isinstance(state, dict) or state.get("bit_generator") != "PCG64":
-        raise ValueError("its random generator is not the one used here")
-    return state

@@ -1,7 +1,5 @@
 """Work on a recording that is split into pieces and continues after a stop."""
 
-import hashlib
-import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -28,13 +26,8 @@ def run_pieces(
 ) -> list[tuple[WorkItem, Mapping[str, Any]]]:
     """Run the pieces that are not finished; return all, in order, with their results.
 
-    Args:
-        work: See `Work`; its payload contains the `source` too.
-        payloads: Arguments of each piece.
-        source: The recording; results of another or a changed one are not used.
-        out: What is being written.
-        executor: Runs the pieces; this process when left out.
-        on_piece: Called with every finished piece.
+    Results of another source, or of one that changed, are not used. The source is in
+    every payload. `on_piece` is called with every finished piece.
 
     Raises:
         DatasetError: If a piece fails; results of the others are kept.
@@ -42,15 +35,12 @@ def run_pieces(
     folder = work_folder(out)
     check_folder(folder)
     stat = source.stat() if source.exists() else None
-    common = {
-        "source": str(source.resolve()),
-        "written": None if stat is None else [stat.st_size, stat.st_mtime_ns],
-    }
-    items = []
-    for k, payload in enumerate({**common, **payload} for payload in payloads):
-        text = json.dumps(payload, sort_keys=True)
-        digest = hashlib.sha256(text.encode()).hexdigest()[:12]
-        items.append(WorkItem(name=f"{k:06d}-{digest}", payload=payload))
+    written = None if stat is None else [stat.st_size, stat.st_mtime_ns]
+    common = {"source": str(source.resolve()), "written": written}
+    items = [
+        WorkItem.with_digest(f"{k:06d}", {**common, **payload})
+        for k, payload in enumerate(payloads)
+    ]
 
     def report(item: WorkItem, outcome: Outcome) -> None:
         if outcome.error is None:

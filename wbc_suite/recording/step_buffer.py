@@ -15,31 +15,20 @@ from wbc_suite.envs import RobotEnv
 from wbc_suite.errors import DatasetError
 from wbc_suite.recording.episode import Column
 
-BLOCK_BYTES = 1 << 16
-"""Rows are written to disk in blocks of so many bytes."""
+BLOCK_BYTES = 1 << 16  # rows are written to disk in blocks of so many bytes
 
-OUTCOME = (
-    ("rewards", "f8"),
-    ("dones", "i8"),
-    ("clipped", "i8"),
-    ("step_time", "f8"),
-    ("stamp", "f8"),
-)
-"""Columns of numbers that a step returns."""
+OUTCOME = {"rewards": "f8", "dones": "i8", "clipped": "i8"}
+OUTCOME |= {"step_time": "f8", "stamp": "f8"}
+"""Columns of numbers that a step returns, and their types."""
 
 
 class RowBuffer:
-    """Rows of one structured type, in a file without a name.
+    """Rows of one structured type, in a file without a name in a folder.
 
-    Two rows are in memory: the one in progress and the next one, which may be begun
-    too. `advance` completes the first, and the places change their roles.
-
-    Args:
-        folder: Folder of the file. Nothing is left in it, also after a crash.
-
-    Attributes:
-        pair: The two rows, shape (2,); another array after each `begin`.
-        at: Index of the row in progress; the next one is at `1 - at`.
+    Two rows are in memory, in `pair`, an array that `begin` replaces: the one in
+    progress, at index `at`, and the next one, at `1 - at`, which may be begun too.
+    `advance` completes the first, and the places change their roles. Nothing is left in
+    the folder, also after a crash.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -57,11 +46,7 @@ class RowBuffer:
         self.pair = np.zeros(2, dtype=kind)
 
     def advance(self) -> None:
-        """Complete the row in progress; the next one begins.
-
-        Raises:
-            DatasetError: If the disk is full.
-        """
+        """Complete the row in progress; raise DatasetError if the disk is full."""
         self._write()
         self._count += 1
         self.at = 1 - self.at
@@ -70,10 +55,7 @@ class RowBuffer:
         """Return all complete rows and the one in progress, read-only.
 
         They are read from disk when they are used. Later rows do not change them, but
-        for the last.
-
-        Raises:
-            DatasetError: If the disk is full.
+        for the last. Raises DatasetError if the disk is full.
         """
         self._write(in_progress=True)
         held = mmap.mmap(self._file.fileno(), 0, access=mmap.ACCESS_READ)
@@ -106,12 +88,7 @@ class RowBuffer:
 
 
 class StepBuffer:
-    """Steps of the episode in progress: state and observation, action, outcome.
-
-    Args:
-        env: An environment of this package, wrapped or not.
-        folder: See `RowBuffer`.
-    """
+    """Steps of an environment's episode in progress, in a `RowBuffer` in a folder."""
 
     def __init__(self, env: Any, folder: Path) -> None:
         self._env: RobotEnv = env.unwrapped
@@ -135,12 +112,12 @@ class StepBuffer:
         fields = [("states", "f8", env.physics_state.shape), ("vectors", "f8", (size,))]
         fields += [(f"obs/{key}", a.dtype, a.shape) for key, a in apart.items()]
         fields += [("actions", "f8", (env.action_layout.size,))]
-        fields += [(name, kind, ()) for name, kind in OUTCOME]
+        fields += [(name, kind, ()) for name, kind in OUTCOME.items()]
         self._rows.begin(np.dtype(fields, align=True))
         pair = self._rows.pair
         self._states, self._vectors = pair["states"], pair["vectors"]
         self._actions = pair["actions"]
-        self._outcome = [pair[name] for name, _ in OUTCOME]
+        self._outcome = [pair[name] for name in OUTCOME]
         self._apart = [(key, pair[f"obs/{key}"]) for key in apart]
         self._write_state(0, observation)
 
@@ -150,17 +127,7 @@ class StepBuffer:
         observation: Mapping[str, Any],
         outcome: tuple[float, int, int, float, float],
     ) -> None:
-        """Complete a step, and begin the next one.
-
-        Args:
-            action: The action that was taken.
-            observation: Observation after it.
-            outcome: Values of `OUTCOME`.
-
-        Raises:
-            DatasetError: If shapes or keys differ from the first step's, or the disk
-                is full.
-        """
+        """Complete a step with the values of `OUTCOME`, and begin the next one."""
         at = self._rows.at
         try:
             self._actions[at] = action
@@ -178,17 +145,10 @@ class StepBuffer:
         self._rows.advance()
 
     def columns(self, *, next_obs: bool = False) -> tuple[dict[str, Column], Column]:
-        """Return columns by name, read-only, and the state after the last action.
-
-        Observations after each action are included with `next_obs`.
-
-        Raises:
-            DatasetError: If the disk is full.
-        """
+        """Return columns by name, read-only, and the state after the last action."""
         rows = self._rows.rows()
         before, after = rows[:-1], rows[1:]
-        names = "states", "actions", *(name for name, _ in OUTCOME)
-        columns = {name: before[name] for name in names}
+        columns = {name: before[name] for name in ("states", "actions", *OUTCOME)}
         for group, some in (("obs", before), ("next_obs", after))[: 1 + next_obs]:
             columns |= {f"{group}/{key}": self._column(some, key) for key in self._keys}
         return columns, rows["states"][-1].copy()

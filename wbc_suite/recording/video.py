@@ -28,11 +28,7 @@ LABEL = 14  # pixels
 
 
 def check_video(path: Path) -> None:
-    """Check that a video can be written, before anything is drawn.
-
-    Raises:
-        DatasetError: If the format is unknown, or its package is not installed.
-    """
+    """Raise DatasetError for an unknown format, or a package that is missing."""
     suffix = path.suffix.lower()
     if suffix == ".mp4":
         import_extra("av", "video")
@@ -45,14 +41,7 @@ def check_video(path: Path) -> None:
 def episode_pictures(
     env: RobotEnv, episode: Episode, *, by_states: bool, every: int = 1
 ) -> Iterator[Picture]:
-    """Play an episode, and draw it as `env.render` does.
-
-    Args:
-        env: Made with `render_mode="rgb_array"`.
-        episode: What is played.
-        by_states: Whether states are shown as recorded; else actions are taken.
-        every: Draw every so many actions.
-    """
+    """Play an episode, and draw every so many states as `env.render` does."""
     play: Callable[..., Iterator[Any]] = play_states if by_states else play_actions
     for k, _ in enumerate(play(env, episode)):
         if k % every == 0:
@@ -60,11 +49,7 @@ def episode_pictures(
 
 
 def write_video(pictures: Iterable[Picture], path: Path, *, rate: float) -> None:
-    """Write pictures as .mp4 (H.264, needs `av`), .webp or .gif.
-
-    Raises:
-        DatasetError: If it cannot be written.
-    """
+    """Write pictures as .mp4 (H.264, needs `av`), .webp or .gif."""
     check_video(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -79,23 +64,21 @@ def write_video(pictures: Iterable[Picture], path: Path, *, rate: float) -> None
 
 
 def write_sheet(dataset: Dataset, path: Path, *, camera: str = "agentview") -> None:
-    """Draw episodes, one per row, from their beginning to their end.
-
-    Recorded pictures of the camera are used if there are any; otherwise recorded
-    states are rendered.
-
-    Raises:
-        DatasetError: If there is nothing to draw, or the file cannot be written.
-    """
+    """Draw episodes, one per row, by their pictures of the camera or their states."""
     names = dataset.names[:SHEET_ROWS]
     if not names:
         raise DatasetError(f"'{dataset.path}' has no episodes to draw.")
     env: RobotEnv | None = None
-    rows = []
-    for name in names:
-        episode = dataset.episode(name)
-        pictures = episode.columns.get(f"obs/{camera}_image")
+    height = SHEET_SIZE + LABEL
+    size = SHEET_COLUMNS * SHEET_SIZE, len(names) * height
+    sheet = Image.new("RGB", size, "white")
+    pen = ImageDraw.Draw(sheet)
+    for row, episode in enumerate(map(dataset.episode, names)):
+        word = {None: "", True: ", success", False: ", no success"}[episode.success]
+        caption = f"{episode.name}: {episode.length} actions{word}"
+        pen.text((4, row * height + 1), caption, fill="black")
         at = np.linspace(0, episode.length - 1, SHEET_COLUMNS).round().astype(int)
+        pictures: Any = episode.columns.get(f"obs/{camera}_image")
         if pictures is None:
             env = env or rebuild(
                 dataset,
@@ -104,37 +87,14 @@ def write_sheet(dataset: Dataset, path: Path, *, camera: str = "agentview") -> N
                 render_size=(SHEET_SIZE, SHEET_SIZE),
                 use_camera_obs=False,
             )
-            wanted = set(at.tolist())
-            drawn = {
-                k: np.asarray(env.render())
-                for k in play_states(env, episode)
-                if k in wanted
-            }
-            row = [drawn[k] for k in at.tolist()]
-        else:
-            row = [pictures[k] for k in at.tolist()]
-        rows.append((_caption(episode), row))
+            states = play_states(env, episode)
+            pictures = {k: np.asarray(env.render()) for k in states if k in at}
+        for column, k in enumerate(at.tolist()):
+            image = Image.fromarray(pictures[k]).resize((SHEET_SIZE, SHEET_SIZE))
+            sheet.paste(image, (column * SHEET_SIZE, row * height + LABEL))
     if env is not None:
         env.close()
-    save_picture(_tile(rows), path)
-
-
-def _caption(episode: Episode) -> str:
-    word = {None: "", True: ", success", False: ", no success"}[episode.success]
-    return f"{episode.name}: {episode.length} actions{word}"
-
-
-def _tile(rows: list[tuple[str, list[Picture]]]) -> Image.Image:
-    """Put pictures beside each other, each row under its words."""
-    height = SHEET_SIZE + LABEL
-    sheet = Image.new("RGB", (SHEET_COLUMNS * SHEET_SIZE, len(rows) * height), "white")
-    pen = ImageDraw.Draw(sheet)
-    for k, (caption, pictures) in enumerate(rows):
-        pen.text((4, k * height + 1), caption, fill="black")
-        for j, picture in enumerate(pictures):
-            image = Image.fromarray(picture).resize((SHEET_SIZE, SHEET_SIZE))
-            sheet.paste(image, (j * SHEET_SIZE, k * height + LABEL))
-    return sheet
+    save_picture(sheet, path)
 
 
 def _write_animation(pictures: Iterable[Picture], path: Path, rate: float) -> None:

@@ -15,15 +15,9 @@ Flattened = NDArray[np.float32]
 class Flat(gymnasium.Wrapper[Flattened, Flattened, Any, Any]):
     """Observations as one float32 vector, actions as float32 between -1 and 1.
 
-    It passes the checker of Stable-Baselines3.
-
-    Args:
-        env: One of our environments.
-        keys: Observed keys in this order; by default the vectors of robots and of
-            objects (`robot0_proprio-state`, `object-state`).
-
-    Raises:
-        UnknownNameError: If a key is not observed.
+    It passes the checker of Stable-Baselines3. Observed are the `keys` in this order,
+    by default the vectors of robots and of objects (`robot0_proprio-state`,
+    `object-state`); an unknown one raises UnknownNameError.
     """
 
     def __init__(

@@ -14,14 +14,8 @@ from wbc_suite.errors import ConfigError
 class Indicators(gymnasium.Wrapper[Any, Any, Any, Any]):
     """Draws a disc into `render`'s pictures at each hand and at chosen places.
 
-    Observed pictures have no marks.
-
-    Args:
-        env: One of our environments with `render_mode="rgb_array"`.
-        radius: Radius of a disc, m.
-
-    Attributes:
-        places: Places in the world and colours, by name; may be changed.
+    The environment has `render_mode="rgb_array"`; its observed pictures have no marks.
+    `places` are places in the world and colours, by name, and may be changed.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], *, radius: float = 0.012) -> None:

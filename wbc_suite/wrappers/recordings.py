@@ -18,17 +18,11 @@ from wbc_suite.typing import Matrix
 
 
 class DataCollection(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """Records every episode, or chosen ones.
+    """Records every episode of one of our environments, or chosen ones.
 
-    Args:
-        env: One of our environments, wrapped or not.
-        path: The file; episodes are appended.
-        automatic: Whether each episode is recorded from its reset on, and kept when it
-            ends or the next one begins. Otherwise call `recorder.begin` and `keep`.
-        next_obs: See `Recorder`.
-
-    Attributes:
-        recorder: The recorder of episodes.
+    With `automatic`, each episode is recorded from its reset on, and kept when it ends
+    or the next one begins. Otherwise call `recorder.begin` and `keep`. For `path` and
+    `next_obs` see `Recorder`.
     """
 
     def __init__(
@@ -47,13 +41,12 @@ class DataCollection(gymnasium.Wrapper[Any, Any, Any, Any]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         """Start an episode; one that was in progress is kept if `automatic`."""
-        if self.automatic:
-            self.recorder.keep()
-        else:
+        if not self.automatic:
             self.recorder.discard()
+            return self.env.reset(seed=seed, options=options)
+        self.recorder.keep()
         result = self.env.reset(seed=seed, options=options)
-        if self.automatic:
-            self.recorder.begin()
+        self.recorder.begin()
         return result
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
@@ -82,14 +75,10 @@ class DataCollection(gymnasium.Wrapper[Any, Any, Any, Any]):
 
 
 class Playback(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """Replaces the given actions by recorded ones, episode after episode.
+    """Replaces the given actions by recorded ones, episode after episode, cyclically.
 
-    Args:
-        env: One of our environments, made with the arguments of the recording.
-        dataset: The recording; its first episode follows its last.
-
-    Raises:
-        DatasetError: If the recording has no episodes, or is of another environment.
+    Raises DatasetError if the recording has no episodes, or is not of the wrapped
+    environment.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], dataset: Dataset) -> None:
@@ -120,9 +109,8 @@ class Playback(gymnasium.Wrapper[Any, Any, Any, Any]):
         k, columns = self._taken, self._episode.columns
         if k >= self._episode.length:
             raise DatasetError(f"'{self._episode.name}' is over: call reset first.")
-        observation, reward, terminated, truncated, info = self.env.step(
-            columns["actions"][k]
-        )
+        action = columns["actions"][k]
+        observation, reward, terminated, truncated, info = self.env.step(action)
         self._taken += 1
         over = self._taken == self._episode.length
         after = self._episode.final_state if over else columns["states"][k + 1]
@@ -135,16 +123,14 @@ class Playback(gymnasium.Wrapper[Any, Any, Any, Any]):
 class DemoStart(gymnasium.Wrapper[Any, Any, Any, Any]):
     """Starts episodes at states of demonstrations.
 
-    With `window`, they start near the ends of the demonstrations at first, and the
-    window grows towards their beginnings: a curriculum.
-
     Args:
         env: One of our environments, unwrapped or wrapped.
         demonstrations: Physics states of each demonstration, shape (n, 1 + nq + nv):
             time, qpos, qvel, as in datasets.
         share: Share of episodes that start there; the others start as usual.
         window: Number of last states to draw from at first; None for all.
-        growth: Number of states that the window grows by with each episode.
+        growth: Number of states that the window grows by with each episode, towards the
+            beginnings of demonstrations: a curriculum.
 
     Raises:
         ConfigError: If there is no state, or one has a wrong size.

@@ -4,12 +4,12 @@ import shutil
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 from wbc_suite.errors import DatasetError, UnknownNameError
 from wbc_suite.executors import Executor, WorkItem
 from wbc_suite.recording.atomic_files import delete_temporaries
+from wbc_suite.recording.converting import lerobot, mcap, minari, npz, robomimic
 from wbc_suite.recording.converting.layout import (
     Layout,
     Piece,
@@ -17,23 +17,16 @@ from wbc_suite.recording.converting.layout import (
     split_dataset,
     whole_dataset,
 )
-from wbc_suite.recording.converting.lerobot import LEROBOT
-from wbc_suite.recording.converting.mcap import MCAP
-from wbc_suite.recording.converting.minari import MINARI
-from wbc_suite.recording.converting.npz import NPZ
-from wbc_suite.recording.converting.robomimic import ROBOMIMIC
 from wbc_suite.recording.dataset import Dataset
 from wbc_suite.recording.resumable_work import run_pieces, work_folder
 
-LAYOUTS: Mapping[str, Layout] = MappingProxyType(
-    {
-        "robomimic": ROBOMIMIC,
-        "npz": NPZ,
-        "lerobot": LEROBOT,
-        "minari": MINARI,
-        "mcap": MCAP,
-    }
-)
+LAYOUTS: Mapping[str, Layout] = {
+    "robomimic": robomimic.LAYOUT,
+    "npz": npz.LAYOUT,
+    "lerobot": lerobot.LAYOUT,
+    "minari": minari.LAYOUT,
+    "mcap": mcap.LAYOUT,
+}
 
 
 def convert(
@@ -45,23 +38,16 @@ def convert(
     executor: Executor | None = None,
     workers: int = 1,
 ) -> Path:
-    """Write a recording in another layout; return the path that was written.
+    """Write a recording in one of `LAYOUTS`; return the path that was written.
 
-    With an executor, finished pieces wait in `OUT.work` until all are finished: a
+    Without an executor, this process writes one piece. With one, episodes are split
+    among `workers`, and finished pieces wait in `OUT.work` until all are finished: a
     stopped conversion continues when called again. Layouts of one file are one piece.
-
-    Args:
-        source: The recording.
-        out: File or folder to write.
-        layout: One of `LAYOUTS`.
-        on_progress: Called with the number of episodes since the last call.
-        executor: Runs the pieces; this process, in one piece, when left out.
-        workers: Number of workers that the episodes are split among.
+    `on_progress` is called with the number of episodes since the last call.
 
     Raises:
         UnknownNameError: If there is no such layout.
-        DatasetError: If the recording cannot be read, a package is missing, or the
-            path cannot be written.
+        DatasetError: If a package is missing, or see `Dataset`.
     """
     source, out = Path(source), Path(out)
     if layout not in LAYOUTS:
@@ -71,27 +57,23 @@ def convert(
         if not len(dataset):
             raise DatasetError(f"'{source}' has no episodes.")
         chosen.begin(out)
-        if executor is None:
-            whole = whole_dataset(dataset)
-            results = [chosen.write(dataset, whole, out, on_progress) or {}]
-            chosen.finish(dataset, out, results)
-            return out
         pieces = [whole_dataset(dataset)]
+        if executor is None:
+            result = chosen.write(dataset, pieces[0], out, on_progress)
+            chosen.finish(dataset, out, [result or {}])
+            return out
         if chosen.in_pieces:
             pieces = split_dataset(dataset, workers)
-        payloads = [
-            {"layout": layout, "out": out.name, "piece": asdict(piece)}
-            for piece in pieces
-        ]
+        common = {"layout": layout, "out": out.name}
         done = run_pieces(
             convert_piece,
-            payloads,
+            [common | {"piece": asdict(piece)} for piece in pieces],
             source=source,
             out=out,
             executor=executor,
             on_piece=lambda item: on_progress(len(item.payload["piece"]["names"])),
         )
-        written = _written(work_folder(out), out.name)
+        written = work_folder(out) / "written" / out.name
         chosen.finish(dataset, written, [result for _, result in done])
     delete_temporaries(written)
     _move(written, out)
@@ -100,20 +82,15 @@ def convert(
 
 
 def convert_piece(item: WorkItem, folder: Path) -> Mapping[str, Any]:
-    """Write one piece into the work folder, in place of what a dead worker left."""
+    """Write one piece, under its final name, into the work folder."""
     payload = item.payload
     layout, piece = LAYOUTS[payload["layout"]], Piece(**payload["piece"])
-    written = _written(folder, payload["out"])
+    written = folder / "written" / payload["out"]
     if not layout.in_pieces:
-        shutil.rmtree(written, ignore_errors=True)
+        shutil.rmtree(written, ignore_errors=True)  # of a worker that died
     written.parent.mkdir(parents=True, exist_ok=True)
     with Dataset(payload["source"]) as dataset:
         return layout.write(dataset, piece, written, lambda _: None) or {}
-
-
-def _written(folder: Path, name: str) -> Path:
-    """Return where pieces are written, under the final name, which layouts may use."""
-    return folder / "written" / name
 
 
 def _move(written: Path, out: Path) -> None:

@@ -8,8 +8,7 @@ from typing import Any, TypeAlias
 
 from wbc_suite.recording.dataset import Dataset
 
-MAX_EPISODES = 50
-"""Episodes of a piece, which are lost with a killed worker."""
+MAX_EPISODES = 50  # episodes of a piece, which are lost with a killed worker
 
 Progress: TypeAlias = Callable[[int], None]
 """Called with the number of episodes that were written since the last call."""
@@ -19,31 +18,21 @@ Finish: TypeAlias = Callable[[Dataset, Path, Sequence[Mapping[str, Any]]], None]
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Piece:
-    """Successive episodes of a dataset that one worker converts.
-
-    Attributes:
-        number: Number of the piece.
-        names: Names of its episodes.
-        start: Actions of the dataset before its first episode.
-        before: Episodes of the dataset before its first one.
-    """
+    """Successive episodes of a dataset that one worker converts."""
 
     number: int
     names: tuple[str, ...]
-    start: int
-    before: int
+    start: int  # number of actions in the dataset before these episodes
+    before: int  # number of episodes before these
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Layout:
     """How recordings are written in a format of another project.
 
-    Attributes:
-        begin: Checks that packages are installed and the path can be written.
-        write: Writes the episodes of a piece; returns what `finish` needs of it, if
-            anything.
-        finish: Writes files about all pieces.
-        in_pieces: Whether several workers may each write a piece.
+    `begin` checks that packages are installed and the path can be written. `write`
+    writes a piece, and returns what `finish` needs of it to write files about all. With
+    `in_pieces`, several workers may each write a piece.
     """
 
     begin: Callable[[Path], None]

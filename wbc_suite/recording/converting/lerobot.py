@@ -31,11 +31,11 @@ from wbc_suite.recording.extras import import_extra
 from wbc_suite.recording.mp4_writer import Mp4Writer
 
 CHUNK = 1000  # files in a folder
+MOMENTS = ("min", "max", "mean", "std")
 QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
-PICTURE = "_image"
-"""How keys of pictures end."""
-PICTURES_IN_STATS = 20
-"""Of an episode, evenly spread; all of them would take minutes."""
+SHAPE = ("height", "width", "channels")
+PICTURE = "_image"  # how keys of pictures end
+PICTURES_IN_STATS = 20  # of an episode, evenly spread; all of them would take minutes
 
 Stats = dict[str, Any]
 
@@ -46,19 +46,14 @@ def _begin(out: Path) -> None:
 
 
 def _import_pyarrow() -> tuple[Any, Any]:
-    return import_extra("pyarrow", "lerobot"), import_extra(
-        "pyarrow.parquet", "lerobot"
-    )
+    arrow = import_extra("pyarrow", "lerobot")
+    return arrow, import_extra("pyarrow.parquet", "lerobot")
 
 
 def _write(
     dataset: Dataset, piece: Piece, out: Path, on_progress: Progress
 ) -> dict[str, Any]:
-    """Write frames and videos of some episodes as files of their own.
-
-    Returns:
-        `rows`: rows of the table of episodes.
-    """
+    """Write frames and videos of a piece; return its rows of the table of episodes."""
     arrow, parquet = _import_pyarrow()
     rate, place = _rate(dataset), _place(piece.number)
     first = dataset.episode(piece.names[0])
@@ -78,12 +73,10 @@ def _write(
                 for picture in pictures:
                     writer.add(picture)
                 stats[_feature(key)] = _picture_stats(pictures)
-            rows.append(_episode_row(dataset, piece, number, episode, start, writers))
-            rows[-1] |= {
-                f"stats/{feature}/{name}": value
-                for feature, figures in stats.items()
-                for name, value in figures.items()
-            }
+            row = _episode_row(dataset, piece, number, episode.length, start, writers)
+            for feature, figures in stats.items():
+                row |= {f"stats/{feature}/{name}": v for name, v in figures.items()}
+            rows.append(row)
             start += episode.length
             on_progress(1)
         table = arrow.concat_tables(tables)
@@ -105,20 +98,15 @@ def _finish(dataset: Dataset, out: Path, pieces: Sequence[Mapping[str, Any]]) ->
     episodes = arrow.Table.from_pylist(rows)
     _write_table(parquet, episodes, out / f"meta/episodes/{_place(0)}.parquet")
     tasks = arrow.table({"task_index": arrow.array([0]), "task": [_task(dataset)]})
-    kinds = ("task_index", "int64", "int64"), ("task", "unicode", "object")
+    keys = "name", "field_name", "pandas_type", "numpy_type", "metadata"
+    columns = [
+        ("task_index", "task_index", "int64", "int64", None),
+        ("task", "task", "unicode", "object", None),
+    ]
     pandas = {
         "index_columns": ["task"],
         "column_indexes": [],
-        "columns": [
-            {
-                "name": name,
-                "field_name": name,
-                "pandas_type": kind,
-                "numpy_type": numpy_kind,
-                "metadata": None,
-            }
-            for name, kind, numpy_kind in kinds
-        ],
+        "columns": [dict(zip(keys, column, strict=True)) for column in columns],
         "creator": {"library": "pyarrow", "version": arrow.__version__},
         "pandas_version": "2.0.0",
     }
@@ -168,32 +156,25 @@ def _vectors(episode: Episode) -> dict[str, NDArray[np.float32]]:
 def _frames(
     arrow: Any, columns: Mapping[str, Any], number: int, start: int, rate: int
 ) -> Any:
-    """Return the rows of one episode."""
-    length = len(columns["action"])
     table = {
         name: arrow.FixedSizeListArray.from_arrays(column.ravel(), column.shape[1])
         for name, column in columns.items()
     }
-    frames = np.arange(length, dtype=np.int64)
-    table["timestamp"] = arrow.array((frames / rate).astype(np.float32))
-    table["frame_index"] = arrow.array(frames)
-    table["episode_index"] = arrow.array(np.full(length, number, dtype=np.int64))
-    table["index"] = arrow.array(frames + start)
-    table["task_index"] = arrow.array(np.zeros(length, dtype=np.int64))
+    frames = np.arange(len(columns["action"]), dtype=np.int64)
+    table["timestamp"] = (frames / rate).astype(np.float32)
+    table["frame_index"] = frames
+    table["episode_index"] = np.full_like(frames, number)
+    table["index"] = frames + start
+    table["task_index"] = np.zeros_like(frames)
     return arrow.table(table)
 
 
 def _stats(column: NDArray[Any]) -> Stats:
     values = np.asarray(column, dtype=np.float64)
-    found: Stats = {
-        "min": values.min(axis=0).tolist(),
-        "max": values.max(axis=0).tolist(),
-        "mean": values.mean(axis=0).tolist(),
-        "std": values.std(axis=0).tolist(),
-        "count": [len(values)],
-    }
+    found = {name: getattr(values, name)(axis=0).tolist() for name in MOMENTS}
     quantiles = np.quantile(values, list(QUANTILES.values()), axis=0).tolist()
-    return found | dict(zip(QUANTILES, quantiles, strict=True))
+    found |= dict(zip(QUANTILES, quantiles, strict=True))
+    return found | {"count": [len(values)]}
 
 
 def _picture_stats(pictures: NDArray[np.uint8]) -> Stats:
@@ -209,11 +190,11 @@ def _episode_row(
     dataset: Dataset,
     piece: Piece,
     number: int,
-    episode: Episode,
+    length: int,
     start: int,
     videos: Iterable[str],
 ) -> dict[str, Any]:
-    length, rate = episode.length, _rate(dataset)
+    rate = _rate(dataset)
     place = {"chunk_index": piece.number // CHUNK, "file_index": piece.number % CHUNK}
     row: dict[str, Any] = {
         "episode_index": number,
@@ -240,29 +221,25 @@ def _info(dataset: Dataset, first: Episode, frames: int) -> dict[str, Any]:
         for name, column in _vectors(first).items()
     }
     for key in videos:
-        height, width, channels = first.columns[f"obs/{key}"].shape[1:]
+        shape = dict(zip(SHAPE, first.columns[f"obs/{key}"].shape[1:], strict=True))
+        info = {"codec": "h264", "pix_fmt": "yuv420p", "is_depth_map": False}
+        info |= {"fps": rate, **shape}
         features[_feature(key)] = {
             "dtype": "video",
-            "shape": [height, width, channels],
-            "names": ["height", "width", "channels"],
-            "info": {
-                "video.height": height,
-                "video.width": width,
-                "video.codec": "h264",
-                "video.pix_fmt": "yuv420p",
-                "video.is_depth_map": False,
-                "video.fps": rate,
-                "video.channels": channels,
-                "has_audio": False,
-            },
+            "shape": list(shape.values()),
+            "names": list(shape),
+            "info": {f"video.{name}": value for name, value in info.items()}
+            | {"has_audio": False},
         }
     features["timestamp"] = {"dtype": "float32", "shape": [1], "names": None}
     for name in ("frame_index", "episode_index", "index", "task_index"):
         features[name] = {"dtype": "int64", "shape": [1], "names": None}
+    source = json.loads(str(dataset.header.get("env_args", "{}")))
+    robots = source.get("env_kwargs", {}).get("robots", "unknown")
     place = "chunk-{chunk_index:03d}/file-{file_index:03d}"
     return {
         "codebase_version": "v3.0",
-        "robot_type": _robot(dataset),
+        "robot_type": " ".join(robots) if isinstance(robots, list) else str(robots),
         "total_episodes": len(dataset),
         "total_frames": frames,
         "total_tasks": 1,
@@ -277,12 +254,6 @@ def _info(dataset: Dataset, first: Episode, frames: int) -> dict[str, Any]:
     }
 
 
-def _robot(dataset: Dataset) -> str:
-    found = json.loads(str(dataset.header.get("env_args", "{}")))
-    robots = found.get("env_kwargs", {}).get("robots", "unknown")
-    return " ".join(robots) if isinstance(robots, list) else str(robots)
-
-
 def _all_stats(table: Any, rows: list[dict[str, Any]]) -> dict[str, Stats]:
     """Return the stats of all frames; those of pictures from those of episodes."""
     found = {}
@@ -293,17 +264,14 @@ def _all_stats(table: Any, rows: list[dict[str, Any]]) -> dict[str, Stats]:
     for key in keys:
         held = {
             name: np.array([row[f"stats/{key}/{name}"] for row in rows])
-            for name in ("min", "max", "mean", "std", "count", *QUANTILES)
+            for name in (*MOMENTS, *QUANTILES, "count")
         }
-        mean = held["mean"].mean(axis=0)
-        spread = held["std"] ** 2 + (held["mean"] - mean) ** 2
-        found[key] = {q: held[q].mean(axis=0).tolist() for q in QUANTILES} | {
-            "min": held["min"].min(axis=0).tolist(),
-            "max": held["max"].max(axis=0).tolist(),
-            "mean": mean.tolist(),
-            "std": np.sqrt(spread.mean(axis=0)).tolist(),
-            "count": [int(held["count"].sum())],
-        }
+        all_frames = {q: held[q].mean(axis=0) for q in ("mean", *QUANTILES)}
+        spread = held["std"] ** 2 + (held["mean"] - all_frames["mean"]) ** 2
+        all_frames["std"] = np.sqrt(spread.mean(axis=0))
+        for name, reduce in (("min", np.min), ("max", np.max), ("count", np.sum)):
+            all_frames[name] = reduce(held[name], axis=0)
+        found[key] = {name: value.tolist() for name, value in all_frames.items()}
     return found
 
 
@@ -318,4 +286,4 @@ def _open_video(path: Path, rate: int) -> Mp4Writer:
     return Mp4Writer(path, rate=rate, extra="lerobot", options={"g": "2", "crf": "23"})
 
 
-LEROBOT = Layout(begin=_begin, write=_write, finish=_finish, in_pieces=True)
+LAYOUT = Layout(begin=_begin, write=_write, finish=_finish, in_pieces=True)

@@ -59,7 +59,6 @@ def _begin(out: Path) -> None:
 
 
 def _write(dataset: Dataset, piece: Piece, out: Path, on_progress: Progress) -> None:
-    """Write the episodes as one log."""
     writer = import_extra("mcap.writer", "mcap")
 
     def write(temporary: Path) -> None:
@@ -68,8 +67,7 @@ def _write(dataset: Dataset, piece: Piece, out: Path, on_progress: Progress) -> 
             log.start(library=f"wbc-suite {__version__}")
             header = {name: str(fact) for name, fact in dataset.header.items()}
             log.add_metadata("wbc_suite", header)
-            rate = float(dataset.header.get("control_freq", 20.0))
-            episodes = _EpisodeWriter(log, rate)
+            episodes = _EpisodeWriter(log, float(header.get("control_freq", 20.0)))
             for episode in map(dataset.episode, piece.names):
                 episodes.add(episode)
                 on_progress(1)
@@ -96,7 +94,7 @@ class _EpisodeWriter:
         self._write("/episode", "wbc_suite.Episode", start, summary, {})
         for k, time in enumerate(times.tolist()):
             for name, column in episode.columns.items():
-                if _is_picture(column):
+                if column.dtype == np.uint8 and column.shape[3:] == (3,):
                     schema = "foxglove.CompressedImage"
                     message = _picture(column[k], time, name)
                 else:
@@ -108,22 +106,19 @@ class _EpisodeWriter:
     def _write(
         self, topic: str, schema: str, time: int, message: Any, metadata: dict[str, str]
     ) -> None:
+        if schema not in self._schemas:
+            table = {"title": schema, "type": "object", "properties": SCHEMAS[schema]}
+            text = json.dumps(table).encode()
+            number = self._log.register_schema(schema, "jsonschema", text)
+            self._schemas[schema] = number
         if topic not in self._channels:
-            self._channels[topic] = self._log.register_channel(
-                topic, "json", self._schema(schema), metadata
-            )
+            number = self._schemas[schema]
+            channel = self._log.register_channel(topic, "json", number, metadata)
+            self._channels[topic] = channel
         content = json.dumps(message, allow_nan=False).encode()
         self._log.add_message(
             self._channels[topic], log_time=time, publish_time=time, data=content
         )
-
-    def _schema(self, name: str) -> int:
-        if name not in self._schemas:
-            schema = {"title": name, "type": "object", "properties": SCHEMAS[name]}
-            self._schemas[name] = self._log.register_schema(
-                name, "jsonschema", json.dumps(schema).encode()
-            )
-        return self._schemas[name]
 
 
 def _start_time(episode: Episode) -> int:
@@ -155,10 +150,6 @@ def _numbers(row: Any) -> list[Any]:
     return values.tolist()
 
 
-def _is_picture(column: NDArray[Any]) -> bool:
-    return column.dtype == np.uint8 and column.ndim == 4 and column.shape[-1] == 3
-
-
 def _picture(pixels: NDArray[np.uint8], time: int, frame: str) -> dict[str, Any]:
     memory = io.BytesIO()
     Image.fromarray(pixels).save(memory, format="PNG", compress_level=1)
@@ -170,4 +161,4 @@ def _picture(pixels: NDArray[np.uint8], time: int, frame: str) -> dict[str, Any]
     }
 
 
-MCAP = Layout(begin=_begin, write=_write)
+LAYOUT = Layout(begin=_begin, write=_write)

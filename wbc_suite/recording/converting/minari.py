@@ -29,24 +29,10 @@ from wbc_suite.registration import BENCHMARKS
 
 VERSION = "0.5.4"
 _NAME = re.compile(r"[-\w]+?-v\d+\Z")
-_INFOS = ("states", "clipped", "step_time", "stamp")
-"""Columns of ours that are Minari's `infos`."""
-
-
-def _begin(out: Path) -> None:
-    new_folder(out, "a Minari dataset")
 
 
 def _write(dataset: Dataset, piece: Piece, out: Path, on_progress: Progress) -> None:
-    """Write the episodes into a folder.
-
-    The observation after the last action repeats the one before it where `next_obs`
-    was not recorded. Pictures are stored uncompressed, not as JPEG.
-
-    Raises:
-        DatasetError: If the folder cannot be written, or episodes differ in their
-            columns.
-    """
+    """Write the episodes into a folder; pictures are not compressed as JPEG."""
     first = dataset.episode(piece.names[0])
     steps = 0
 
@@ -63,12 +49,13 @@ def _write(dataset: Dataset, piece: Piece, out: Path, on_progress: Progress) -> 
     (out / "data").mkdir(parents=True)
     main = out / "data/main_data.hdf5"
     replace_file(main, write)
+    spaces = {key: _box(first.columns[f"obs/{key}"]) for key in first.observed}
     metadata = {
         "total_episodes": len(dataset),
         "total_steps": steps,
         "data_format": "hdf5",
         "jpeg_encoding": False,
-        "observation_space": json.dumps(_observation_space(first)),
+        "observation_space": json.dumps({"type": "Dict", "subspaces": spaces}),
         "action_space": json.dumps(_action_space(dataset, first)),
         "env_spec": json.dumps(_env_spec(dataset)),
         "dataset_id": _dataset_id(dataset, out),
@@ -99,23 +86,15 @@ def _write_episode(group: h5py.Group, number: int, episode: Episode) -> None:
     solved = ended & bool(episode.success)
     group["terminations"] = solved
     group["truncations"] = ended & ~solved
-    infos = group.create_group("infos")
-    for name in _INFOS:
+    infos = group.create_group("infos")  # of n + 1 rows; the first is of the reset
+    for name in ("clipped", "step_time", "stamp"):
         if name in columns:
-            infos[name] = _after(columns[name], episode, name)
-
-
-def _after(column: NDArray[Any], episode: Episode, name: str) -> NDArray[Any]:
-    """Return n + 1 rows, as infos have: the first is of the reset."""
-    if name == "states":
-        final = episode.final_state
-        return np.concatenate([column, column[-1:] if final is None else final[None]])
-    return np.concatenate([np.zeros_like(column[:1]), column])
-
-
-def _observation_space(first: Episode) -> dict[str, Any]:
-    spaces = {key: _box(first.columns[f"obs/{key}"]) for key in first.observed}
-    return {"type": "Dict", "subspaces": spaces}
+            zeros = np.zeros_like(columns[name][:1])
+            infos[name] = np.concatenate([zeros, columns[name]])
+    if "states" in columns:
+        states, final = columns["states"], episode.final_state
+        last = states[-1:] if final is None else final[None]
+        infos["states"] = np.concatenate([states, last])
 
 
 def _action_space(dataset: Dataset, first: Episode) -> dict[str, Any]:
@@ -174,4 +153,4 @@ def _dataset_id(dataset: Dataset, out: Path) -> str:
     return f"{word.strip('-').lower() or 'demonstrations'}-v0"
 
 
-MINARI = Layout(begin=_begin, write=_write)
+LAYOUT = Layout(begin=lambda out: new_folder(out, "a Minari dataset"), write=_write)

@@ -17,10 +17,7 @@ _FACTS = ("model_file", "success", "seed", "uid")
 
 
 def _write(dataset: Dataset, piece: Piece, out: Path, on_progress: Progress) -> None:
-    """Write the episodes as `demo_0`, `demo_1`, ... with `next_obs`.
-
-    The last action's `next_obs` repeats its `obs` where it was not recorded.
-    """
+    """Write `demo_0`, ...; the last `next_obs` repeats `obs` if it was not recorded."""
     names = {name: f"demo_{k}" for k, name in enumerate(piece.names)}
 
     def episodes() -> Iterator[Episode]:
@@ -44,4 +41,4 @@ def _own_columns(episode: Episode, name: str) -> Episode:
     return replace(episode, name=name, columns=columns, facts=facts, final_state=None)
 
 
-ROBOMIMIC = Layout(begin=lambda out: check_folder(out.parent), write=_write)
+LAYOUT = Layout(begin=lambda out: check_folder(out.parent), write=_write)
