@@ -23,7 +23,13 @@ from wbc_suite.cli.options import (
     camera_arguments,
     environment_arguments,
 )
-from wbc_suite.cli.teleop import ONE_DAY, device_maker, drive, stages_of
+from wbc_suite.cli.teleop import (
+    ONE_DAY,
+    default_controller,
+    device_maker,
+    drive,
+    stages_of,
+)
 
 if TYPE_CHECKING:
     from wbc_suite.wrappers import DataCollection
@@ -92,7 +98,9 @@ def record(
 
     by_hand = is_device(device)
     rate = rate or (BY_HAND if by_hand else BY_POLICY)
-    controller = controller or ("WHOLE_BODY_IK" if by_hand else None)
+    if by_hand and controller is None:
+        chosen = {default_controller(robot) for robot in robots or ["Panda"]}
+        controller = chosen.pop() if len(chosen) == 1 else "WHOLE_BODY_IK"
     arguments = environment_arguments(
         robots=robots, controller=controller, gripper=gripper, base=base
     )

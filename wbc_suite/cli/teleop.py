@@ -33,7 +33,11 @@ DeviceMaker = Callable[["gymnasium.Env[Any, Any]"], "Device"]
 
 
 WholeBodyOption = Annotated[
-    str, typer.Option(help="Whole-body controller, by name or TOML file.")
+    str | None,
+    typer.Option(
+        help="Whole-body controller, by name or TOML file; by default WHOLE_BODY_ID "
+        "for robots that walk, else WHOLE_BODY_IK."
+    ),
 ]
 TargetRateOption = Annotated[
     float, typer.Option(help="Targets taken per second, Hz.", min=5.0, max=200.0)
@@ -54,7 +58,7 @@ RecordOption = Annotated[
 def teleop(
     benchmark: Annotated[str, typer.Argument(help="Benchmark to play in.")] = "Lift",
     robots: Annotated[str, typer.Option(help="Robot.")] = "GR1",
-    controller: WholeBodyOption = "WHOLE_BODY_IK",
+    controller: WholeBodyOption = None,
     rate: TargetRateOption = 100.0,
     gripper: GripperOption = None,
     base: BaseOption = None,
@@ -69,7 +73,7 @@ def teleop(
     record: RecordOption = None,
     catalogue: CatalogueOption = None,
 ) -> None:
-    """Move a robot's hands, head, feet and base by dragging them in a web page."""
+    """Move a robot's hands, head, feet and base in a web page, or let it walk."""
     import wbc_suite
     from wbc_suite.recording.episode_control import EpisodeControl
     from wbc_suite.wrappers import DataCollection
@@ -80,7 +84,7 @@ def teleop(
     env: gymnasium.Env[Any, Any] = wbc_suite.make(
         benchmark,
         robots=robots,
-        controller_configs=controller,
+        controller_configs=controller or default_controller(robots),
         gripper_types=chosen(gripper),
         base_types=base,
         control_freq=rate,
@@ -105,6 +109,18 @@ def teleop(
         )
     finally:
         env.close()
+
+
+def default_controller(robot: str) -> str:
+    """Return the whole-body controller that a robot is teleoperated with."""
+    from wbc_suite.control import load_composite_controller_config
+    from wbc_suite.errors import ConfigError
+
+    try:
+        load_composite_controller_config("WHOLE_BODY_ID", robot)
+    except ConfigError:  # it has no free root, or its feet are not known
+        return "WHOLE_BODY_IK"
+    return "WHOLE_BODY_ID"
 
 
 def device_maker(name: str, pairs: list[str] | None) -> DeviceMaker:

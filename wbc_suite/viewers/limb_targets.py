@@ -79,15 +79,19 @@ class LimbTarget:
         """Return the state of the limb.
 
         Args:
-            report: The controller's report of its frame; empty before a solve.
+            report: The controller's report of its frame; empty before a solve, or if
+                it reports none: then errors are those of the shown target.
             now: Wall time, s.
         """
         measured = self.stages.port.measure()
+        target = self.shown_target(measured)
+        away = float(np.linalg.norm(target.translation - measured.translation))
+        turn = float(np.linalg.norm(pin.log3(target.rotation @ measured.rotation.T)))
         return LimbStatus(
             measured=measured,
-            target=self.shown_target(measured),
-            position_error=float(report.get("position_error", 0.0)),
-            orientation_error=float(report.get("orientation_error", 0.0)),
+            target=target,
+            position_error=float(report.get("position_error", away)),
+            orientation_error=float(report.get("orientation_error", turn)),
             reached=bool(report.get("reached", True)),
             reasons=tuple(report.get("reasons", ())),
             holder=self.ownership.holder(now),
