@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 ONE_DAY = 86_400  # s; horizon of a session, in place of the benchmark's
 POLL_PERIOD = 0.2  # s; of a session without a page
+DRIVING = ("keyboard", "gamepad", "dualsense")
+"""Devices whose keys and sticks drive robots that walk, at first."""
 DeviceMaker = Callable[["gymnasium.Env[Any, Any]"], "Device"]
 
 
@@ -132,6 +134,11 @@ def device_maker(name: str, pairs: list[str] | None) -> DeviceMaker:
     def build(env: "gymnasium.Env[Any, Any]") -> "Device":
         if name.lower() == "mjgui":
             options["env"] = env  # it shows the scene
+        walks = any(
+            part.name.endswith("walk") for part in env.unwrapped.action_layout.slices
+        )
+        if walks and name.lower() in DRIVING:
+            options.setdefault("drives", True)
         return make(**options)
 
     return build

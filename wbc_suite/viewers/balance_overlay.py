@@ -14,9 +14,10 @@ if TYPE_CHECKING:
     from wbc_suite.viewers.page_process import Session
 
 STANDING, LIFTED, FOOTSTEP = (48, 150, 84), (120, 130, 145), (232, 140, 30)
-CAPTURE_POINT, FORCE = (190, 50, 150), (205, 60, 50)
+CAPTURE_POINT, FORCE = (190, 50, 150), (190, 25, 20)
 ABOVE = 0.006  # m, of what is drawn on the ground
-LINE, BALL = 0.006, 0.022  # m: thickness of outlines, radius of the capture point
+LINE = 0.008  # m, thickness of outlines
+CROSS = 0.09  # m, arms of the cross at the capture point
 RADIUS = 0.035  # m, of the circle that stands for a foot without a sole
 ARROW = 0.5  # m, length of a force that is the robot's weight
 LEAST = 0.01  # of the weight; smaller forces are not drawn
@@ -69,15 +70,9 @@ class _Overlay:
                 ("standing", STANDING),
                 ("lifted", LIFTED),
                 ("footstep", FOOTSTEP),
+                ("capture_point", CAPTURE_POINT),
             )
         }
-        self._point = scene.add_icosphere(
-            "/balance/capture_point",
-            radius=BALL,
-            color=CAPTURE_POINT,
-            cast_shadow=False,
-            visible=False,
-        )
         self._forces = scene.add_arrows(
             "/balance/forces",
             none,
@@ -95,16 +90,13 @@ class _Overlay:
             node.visible = colour in lines
             if colour in lines:
                 node.points = lines[colour]
-        self._point.visible = balance is not None
-        if balance is not None:
-            self._point.position = tuple(balance.capture_point)
         self._forces.visible = len(arrows) > 0
         if len(arrows):
             self._forces.points = arrows
 
 
 def outlines(balance: BalanceStatus | None) -> dict[Colour, Matrix]:
-    """Return segments of the outlines of feet and the next footstep by their colour.
+    """Return segments of feet, next footstep and capture point by their colour.
 
     Returns:
         Segments, m, shape (n, 2, 3) each; only colours that have any.
@@ -119,6 +111,8 @@ def outlines(balance: BalanceStatus | None) -> dict[Colour, Matrix]:
     if lifted is not None and balance.footstep is not None:
         moved = lifted.corners - lifted.corners.mean(axis=0) + balance.footstep
         found[FOOTSTEP] = [_outline(moved)]
+    arms = CROSS * np.array([[[-1, -1, 0], [1, 1, 0]], [[-1, 1, 0], [1, -1, 0]]])
+    found[CAPTURE_POINT] = [balance.capture_point + arms + np.array([0.0, 0.0, ABOVE])]
     return {
         colour: np.concatenate(parts).astype(np.float32)
         for colour, parts in found.items()
@@ -141,7 +135,7 @@ def legend_html() -> str:
         ("&#9645;", STANDING, "foot that stands"),
         ("&#9645;", LIFTED, "lifted foot"),
         ("&#9645;", FOOTSTEP, "next footstep"),
-        ("&#9679;", CAPTURE_POINT, "capture point"),
+        ("&#10005;", CAPTURE_POINT, "capture point"),
         ("&#8593;", FORCE, f"contact force, {100 * ARROW:.0f} cm for the weight"),
     )
     rows = "".join(

@@ -63,6 +63,7 @@ class BalanceReader:
     Attributes:
         walks: Whether the controller reports balance, as WHOLE_BODY_ID does.
         report: What it reported last, `info["balance"]`; empty before.
+        fell: When and why the robot fell, as first reported; empty while it has not.
     """
 
     def __init__(
@@ -72,6 +73,12 @@ class BalanceReader:
         self._controller, self._clients = controller, set[int]()
         self.walks = hasattr(controller, "dynamics")
         self.report: Mapping[str, Any] = {}
+        self.fell = ""
+
+    def take(self, report: Mapping[str, Any]) -> None:
+        """Take the report of a step; an empty one after a reset."""
+        self.report = report
+        self.fell = (self.fell or report.get("fell") or "") if report else ""
 
     def watch(self, client: int, watched: bool) -> None:
         """Note whether a client displays the balance."""

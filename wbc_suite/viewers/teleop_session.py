@@ -287,8 +287,8 @@ class TeleopSession:
             info, self._message = {}, str(error)
         now = self._clock()
         self._times.end_step(inputs, now)
-        self._ik, self._balance.report = info.get("ik", {}), info.get("balance", {})
-        self._success = bool(info.get("success", False))
+        self._balance.take(info.get("balance", {}))
+        self._ik, self._success = info.get("ik", {}), bool(info.get("success", False))
         if "physics_error" in info:
             self._reset()
             self._message = f"The simulation diverged ({info['physics_error']}): reset."
@@ -306,7 +306,7 @@ class TeleopSession:
             self._open_grippers()
             self._drive.clear()
         self._message, self._success, self._ik = "", False, {}
-        self._balance.report = {}
+        self._balance.take({})
         self._times.restart()
         self._epoch += 1
 
@@ -346,5 +346,5 @@ class TeleopSession:
             velocity=self._pipeline.drive.velocity,
             rides=all(limb.stages.rides for limb in self.limbs.values()),
             balance=balance,
-            fell=self._balance.report.get("fell") or "",
+            fell=self._balance.fell,
         )
