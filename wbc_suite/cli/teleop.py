@@ -134,9 +134,8 @@ def device_maker(name: str, pairs: list[str] | None) -> DeviceMaker:
     def build(env: "gymnasium.Env[Any, Any]") -> "Device":
         if name.lower() == "mjgui":
             options["env"] = env  # it shows the scene
-        walks = any(
-            part.name.endswith("walk") for part in env.unwrapped.action_layout.slices
-        )
+        layout = env.unwrapped.action_layout  # type: ignore[attr-defined]
+        walks = any(part.name.endswith("walk") for part in layout.slices)
         if walks and name.lower() in DRIVING:
             options.setdefault("drives", True)
         return make(**options)

@@ -15,14 +15,20 @@ STEP = 1e-3  # m; shorter motions are collected
 
 
 class CameraFollower:
-    """Move the cameras of clients by as much as the robot has moved.
+    """Move the cameras of clients so that they look at the robot; height is theirs.
+
+    A camera keeps its direction and distance. Its error is measured, not summed up:
+    what a client tells of its camera is old.
 
     Args:
         model: The scene.
         positions: Positions of its bodies at the start, m, shape (nbody, 3).
+        middle: Point at the robot that cameras look at, at the start, m, shape (3,).
     """
 
-    def __init__(self, model: mujoco.MjModel, positions: Matrix) -> None:
+    def __init__(
+        self, model: mujoco.MjModel, positions: Matrix, middle: Vector
+    ) -> None:
         self._body = next(
             body
             for body in range(model.nbody)
@@ -30,6 +36,7 @@ class CameraFollower:
         )
         self._start = self._place(positions)
         self._followed, self._smooth = self._start.copy(), self._start.copy()
+        self._middle = middle
         self._clients: dict[int, viser.ClientHandle] = {}
 
     @property
@@ -52,11 +59,12 @@ class CameraFollower:
         """Move the cameras towards the robot, or with `jump` all of the way."""
         away = self._place(positions) - self._smooth
         self._smooth = self._smooth + (1.0 if jump else SMOOTHING) * away
-        step = self._smooth - self._followed
-        if np.linalg.norm(step) < STEP:
+        if np.linalg.norm(self._smooth - self._followed) < STEP:
             return
         self._followed = self._smooth
         for client in [*self._clients.values()]:
+            step = self._middle + self.moved - client.camera.look_at
+            step[2] = 0.0
             client.camera.position = client.camera.position + step
 
     def _place(self, positions: Matrix) -> Vector:

@@ -46,7 +46,9 @@ class TeleopPage:
         )
         self.markers = TargetMarkers(self.server, session.info, snapshot, colours)
         low, high = robot_box(model, snapshot.body_positions, snapshot.body_quaternions)
-        self.cameras = CameraFollower(model, snapshot.body_positions)
+        self.cameras = CameraFollower(
+            model, snapshot.body_positions, (low + high) / 2.0
+        )
         self.overlays = BalanceOverlays(session)
         self.panel = TeleopPanel(
             self.server,

@@ -1,0 +1,103 @@
+"""Balance: contact forces against weights, and what is drawn."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from wbc_suite.viewers.balance_overlay import (
+    ARROW,
+    CAPTURE_POINT,
+    FOOTSTEP,
+    LIFTED,
+    STANDING,
+    force_arrows,
+    outlines,
+)
+from wbc_suite.viewers.balance_status import BalanceStatus, FootStatus, contact_forces
+
+BOX = """<mujoco>
+  <option timestep="0.001"/>
+  <worldbody>
+    <geom name="floor" type="plane" size="5 5 0.1"/>
+    <body name="robot" pos="0 0 0.1">
+      <freejoint/>
+      <geom type="box" size="0.2 0.1 0.1" mass="5"/>
+      <geom type="box" size="0.05 0.05 0.05" pos="0.1 0 0.15" mass="3"/>
+    </body>
+    <body name="other" pos="1 0 0.1">
+      <freejoint/>
+      <geom type="box" size="0.1 0.1 0.1" mass="2"/>
+    </body>
+  </worldbody>
+</mujoco>"""
+WEIGHT = 8.0 * 9.81
+
+
+@pytest.fixture(params=[False, True], ids=["floor first", "floor last"])
+def at_rest(request):
+    """A box at rest; MuJoCo orders the geoms of a contact, so both orders are tried."""
+    text = BOX
+    if request.param:  # a floor in a fixed body behind the robot
+        text = text.replace('<geom name="floor" type="plane" size="5 5 0.1"/>', "")
+        floor = '<body pos="0 0 -1"><geom type="box" size="5 5 1"/></body>'
+        text = text.replace("</worldbody>", floor + "</worldbody>")
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    for _ in range(2000):
+        mujoco.mj_step(model, data)
+    return model, data
+
+
+def test_contact_force_carries_the_weight_at_the_centre_of_mass(at_rest):
+    model, data = at_rest
+    points, forces = contact_forces(model, data, model.body("robot").id)
+    assert len(points) == 1  # the other box's contacts are not the robot's
+    np.testing.assert_allclose(forces[0], [0, 0, WEIGHT], atol=0.02 * WEIGHT)
+    com = data.subtree_com[model.body("robot").id]
+    np.testing.assert_allclose(points[0][:2], com[:2], atol=2e-3)
+
+
+def test_nothing_in_contact_gives_no_force(at_rest):
+    model, data = at_rest
+    data.qpos[2] += 1.0
+    mujoco.mj_forward(model, data)
+    points, forces = contact_forces(model, data, model.body("robot").id)
+    assert points.shape == forces.shape == (0, 3)
+
+
+def status(*, walking):
+    sole = np.array([[0, 0, 0], [0.2, 0, 0], [0.2, 0.1, 0], [0, 0.1, 0]], dtype=float)
+    return BalanceStatus(
+        feet=(
+            FootStatus(name="left", corners=sole + np.array([0, 0.2, 0]), stands=True),
+            FootStatus(name="right", corners=sole, stands=not walking),
+        ),
+        capture_point=np.array([0.3, 0.1, 0.0]),
+        margin=0.0,
+        footstep=np.array([0.5, 0.05, 0.0]) if walking else None,
+        forces=np.array([[0, 0, 500.0], [0, 0, 1.0]]),
+        points=np.array([[0.1, 0.25, 0], [0.1, 0.05, 0]]),
+        weight=500.0,
+    )
+
+
+def test_feet_footstep_and_capture_point_are_outlined_where_they_are():
+    lines = outlines(status(walking=True))
+    assert {*lines} == {STANDING, LIFTED, FOOTSTEP, CAPTURE_POINT}
+    for colour, middle in (
+        (STANDING, [0.1, 0.25]),
+        (LIFTED, [0.1, 0.05]),
+        (FOOTSTEP, [0.5, 0.05]),
+        (CAPTURE_POINT, [0.3, 0.1]),
+    ):
+        found = lines[colour][..., :2].mean(axis=(0, 1))
+        np.testing.assert_allclose(found, middle, atol=1e-6)
+    assert {*outlines(status(walking=False))} == {STANDING, CAPTURE_POINT}
+    assert outlines(None) == {}
+
+
+def test_arrow_of_the_whole_weight_has_its_length_and_weak_forces_none():
+    arrows = force_arrows(status(walking=True))
+    assert arrows.shape == (1, 2, 3)
+    np.testing.assert_allclose(arrows[0, 1] - arrows[0, 0], [0, 0, ARROW], atol=1e-6)
+    assert len(force_arrows(None)) == 0
