@@ -1,6 +1,7 @@
 """Sessions with robots that walk or drive: velocity, hands, balance, falls."""
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import wbc_suite
@@ -122,6 +123,21 @@ def test_hands_go_with_the_body_or_stay_in_the_world(standing):
     standing.run(1.0, 0.25 * BACK)
     np.testing.assert_allclose(hand().target.translation, held, atol=1e-6)
     assert hand().position_error < 0.03
+
+
+def test_target_that_is_let_go_out_of_reach_returns_to_its_hand(standing):
+    session, name = standing.session, "right_hand"
+    start = session.snapshot.limbs[name].target
+    far = pin.SE3(start.rotation, start.translation - np.array([0.0, 1.0, 0.0]))
+    session.grab(name, PAGE, start)
+    session.drag(name, PAGE, far)
+    assert standing.run(0.2).limbs[name].position_error > 0.3
+    session.release(name, PAGE)
+    status = standing.run(6.0).limbs[name]
+    assert status.position_error < 0.03
+    assert standing.session.snapshot.fell == ""
+    reach = np.linalg.norm(status.target.translation - start.translation)
+    assert 0.1 < reach < 0.8
 
 
 def test_height_is_lowered_by_a_key_and_kept(standing):

@@ -62,12 +62,14 @@ class LimbTarget:
         enabled: Whether the clutch is engaged.
         rest: Number of ticks that the limb has rested since its release; None if it
             was not released lately.
+        reported: Whether the controller reports on the limb, as of the last status.
     """
 
     stages: LimbPipeline
     ownership: Ownership = field(default_factory=Ownership)
     enabled: bool = True
     rest: int | None = None
+    reported: bool = False
 
     @property
     def info(self) -> LimbInfo:
@@ -83,6 +85,7 @@ class LimbTarget:
                 it reports none: then errors are those of the shown target.
             now: Wall time, s.
         """
+        self.reported = bool(report)
         measured = self.stages.port.measure()
         target = self.shown_target(measured)
         away = float(np.linalg.norm(target.translation - measured.translation))
@@ -163,14 +166,16 @@ class LimbTarget:
         measured = self.stages.port.measure()
         step = np.linalg.norm(measured.translation - before.measured.translation)
         self.rest = self.rest + 1 if step < REST_SPEED * period else 0
-        if self.ownership.holder(now) is not None or before.reached:
+        is_near = (
+            before.position_error < MAX_POSITION_ERROR
+            and before.orientation_error < MAX_ORIENTATION_ERROR
+        )
+        reached = before.reached if self.reported else is_near
+        if self.ownership.holder(now) is not None or reached:
             self.rest = None
         elif self.rest * period > REST_TIME:
             self.rest = None
-            if (
-                before.position_error > MAX_POSITION_ERROR
-                or before.orientation_error > MAX_ORIENTATION_ERROR
-            ):
+            if not is_near:
                 self.stages.place(measured)
 
 
