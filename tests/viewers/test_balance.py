@@ -1,5 +1,7 @@
 """Balance: contact forces against weights, and what is drawn."""
 
+import dataclasses
+
 import mujoco
 import numpy as np
 import pytest
@@ -9,9 +11,10 @@ from wbc_suite.viewers.balance_overlay import (
     CAPTURE_POINT,
     FOOTSTEP,
     LIFTED,
+    RADIUS,
     STANDING,
     force_arrows,
-    outlines,
+    marks_of,
 )
 from wbc_suite.viewers.balance_status import BalanceStatus, FootStatus, contact_forces
 
@@ -66,38 +69,58 @@ def test_nothing_in_contact_gives_no_force(at_rest):
 
 
 def status(*, walking):
-    sole = np.array([[0, 0, 0], [0.2, 0, 0], [0.2, 0.1, 0], [0, 0.1, 0]], dtype=float)
+    def foot(name, y, stands):
+        return FootStatus(
+            name=name,
+            position=np.array([0.1, y, 0.0]),
+            yaw=np.pi / 2,
+            sole=np.array([-0.1, 0.2, -0.03, 0.03]),
+            stands=stands,
+        )
+
     return BalanceStatus(
-        feet=(
-            FootStatus(name="left", corners=sole + np.array([0, 0.2, 0]), stands=True),
-            FootStatus(name="right", corners=sole, stands=not walking),
-        ),
+        feet=(foot("left", 0.2, True), foot("right", 0.0, not walking)),
         capture_point=np.array([0.3, 0.1, 0.0]),
         margin=0.0,
-        footstep=np.array([0.5, 0.05, 0.0]) if walking else None,
+        footstep=np.array([0.5, 0.0, 0.0]) if walking else None,
         forces=np.array([[0, 0, 500.0], [0, 0, 1.0]]),
         points=np.array([[0.1, 0.25, 0], [0.1, 0.05, 0]]),
         weight=500.0,
     )
 
 
+def box(mark):
+    """Lowest and highest x and y of the lines, in the world."""
+    points = mark.segments.reshape(-1, 3) @ mark.pose.rotation.T + mark.pose.translation
+    return [*points[:, :2].min(axis=0), *points[:, :2].max(axis=0)]
+
+
 def test_feet_footstep_and_capture_point_are_outlined_where_they_are():
-    lines = outlines(status(walking=True))
-    assert {*lines} == {STANDING, LIFTED, FOOTSTEP, CAPTURE_POINT}
-    for colour, middle in (
-        (STANDING, [0.1, 0.25]),
-        (LIFTED, [0.1, 0.05]),
-        (FOOTSTEP, [0.5, 0.05]),
-        (CAPTURE_POINT, [0.3, 0.1]),
+    marks = marks_of(status(walking=True))
+    for name, colour, expected in (
+        ("standing/left", STANDING, [0.07, 0.1, 0.13, 0.4]),  # it points along y
+        ("lifted/right", LIFTED, [0.07, -0.1, 0.13, 0.2]),
+        ("footstep/right", FOOTSTEP, [0.47, -0.1, 0.53, 0.2]),
+        ("capture_point", CAPTURE_POINT, [0.21, 0.01, 0.39, 0.19]),
     ):
-        found = lines[colour][..., :2].mean(axis=(0, 1))
-        np.testing.assert_allclose(found, middle, atol=1e-6)
-    assert {*outlines(status(walking=False))} == {STANDING, CAPTURE_POINT}
-    assert outlines(None) == {}
+        assert marks[name].colour == colour
+        np.testing.assert_allclose(box(marks[name]), expected, atol=1e-6)
+    assert len(marks) == 4
+    standing = marks_of(status(walking=False))
+    assert {*standing} == {"standing/left", "standing/right", "capture_point"}
+
+
+def test_a_foot_without_a_sole_is_a_circle():
+    state = status(walking=False)
+    ball = dataclasses.replace(state.feet[0], sole=np.zeros(4))
+    marks = marks_of(dataclasses.replace(state, feet=(ball,)))
+    low, high = np.reshape(box(marks["standing/left"]), (2, 2))
+    np.testing.assert_allclose(high - low, 2.0 * RADIUS, atol=1e-6)
+    np.testing.assert_allclose((high + low) / 2.0, [0.1, 0.2], atol=1e-6)
 
 
 def test_arrow_of_the_whole_weight_has_its_length_and_weak_forces_none():
-    arrows = force_arrows(status(walking=True))
-    assert arrows.shape == (1, 2, 3)
-    np.testing.assert_allclose(arrows[0, 1] - arrows[0, 0], [0, 0, ARROW], atol=1e-6)
-    assert len(force_arrows(None)) == 0
+    points, vectors = force_arrows(status(walking=True))
+    np.testing.assert_allclose(points, [[0.1, 0.25, 0.0]])
+    np.testing.assert_allclose(vectors, [[0.0, 0.0, ARROW]])
+    assert len(force_arrows(None)[0]) == 0

@@ -158,7 +158,7 @@ def test_balance_is_published_for_those_who_watch(standing):
     assert [foot.stands for foot in balance.feet] == [True, True]
     assert balance.footstep is None
     assert balance.margin > 0.0
-    middle = np.mean([foot.corners.mean(axis=0) for foot in balance.feet], axis=0)
+    middle = np.mean([foot.position for foot in balance.feet], axis=0)
     np.testing.assert_allclose(balance.capture_point, middle, atol=0.08)
     np.testing.assert_allclose(
         balance.forces.sum(axis=0), [0, 0, balance.weight], atol=0.1 * balance.weight

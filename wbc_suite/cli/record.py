@@ -98,9 +98,8 @@ def record(
 
     by_hand = is_device(device)
     rate = rate or (BY_HAND if by_hand else BY_POLICY)
-    if by_hand and controller is None:
-        chosen = {default_controller(robot) for robot in robots or ["Panda"]}
-        controller = chosen.pop() if len(chosen) == 1 else "WHOLE_BODY_IK"
+    if by_hand:
+        controller = controller or default_controller(*(robots or ["Panda"]))
     arguments = environment_arguments(
         robots=robots, controller=controller, gripper=gripper, base=base
     )

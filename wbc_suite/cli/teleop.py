@@ -113,14 +113,15 @@ def teleop(
         env.close()
 
 
-def default_controller(robot: str) -> str:
-    """Return the whole-body controller that a robot is teleoperated with."""
+def default_controller(*robots: str) -> str:
+    """Return the whole-body controller that robots are teleoperated with."""
     from wbc_suite.control import load_composite_controller_config
     from wbc_suite.errors import ConfigError
 
     try:
-        load_composite_controller_config("WHOLE_BODY_ID", robot)
-    except ConfigError:  # it has no free root, or its feet are not known
+        for robot in robots:
+            load_composite_controller_config("WHOLE_BODY_ID", robot)
+    except ConfigError:  # one has no free root, or its feet are not known
         return "WHOLE_BODY_IK"
     return "WHOLE_BODY_ID"
 

@@ -1,12 +1,13 @@
 """Feet, capture point, next footstep and contact forces in a client's scene."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 from wbc_suite.typing import Matrix, Vector
 from wbc_suite.viewers.balance_status import BalanceStatus
-from wbc_suite.viewers.scene_setup import Colour, css
+from wbc_suite.viewers.scene_setup import Colour, css, place
 
 if TYPE_CHECKING:
     import viser
@@ -21,6 +22,7 @@ CROSS = 0.09  # m, arms of the cross at the capture point
 RADIUS = 0.035  # m, of the circle that stands for a foot without a sole
 ARROW = 0.5  # m, length of a force that is the robot's weight
 LEAST = 0.01  # of the weight; smaller forces are not drawn
+VISIBLE = 0.01  # m; an arrow that changes by less keeps its geometry
 
 
 class BalanceOverlays:
@@ -56,77 +58,93 @@ class BalanceOverlays:
 class _Overlay:
     """Draw the balance of a robot for one client.
 
+    Nodes are moved where possible: new geometry takes a browser longer than a new pose.
+
     Args:
         client: The client.
     """
 
     def __init__(self, client: "viser.ClientHandle") -> None:
-        scene, none = client.scene, np.zeros((1, 2, 3), dtype=np.float32)
-        self._outlines = {
-            colour: scene.add_line_segments(
-                f"/balance/{name}", none, colors=colour, thickness=LINE, visible=False
-            )
-            for name, colour in (
-                ("standing", STANDING),
-                ("lifted", LIFTED),
-                ("footstep", FOOTSTEP),
-                ("capture_point", CAPTURE_POINT),
-            )
-        }
-        self._forces = scene.add_arrows(
-            "/balance/forces",
-            none,
+        self._scene = client.scene
+        self._lines: dict[str, viser.LineSegmentsHandle] = {}
+        self._arrows: list[viser.ArrowsHandle] = []
+
+    def update(self, balance: BalanceStatus | None) -> None:
+        """Draw a state; nothing for None."""
+        marks = {} if balance is None else marks_of(balance)
+        for name, mark in marks.items():
+            node = self._lines.get(name) or self._add_lines(name, mark)
+            place(node, mark.pose)
+        for name, node in self._lines.items():
+            node.visible = name in marks
+        points, vectors = force_arrows(balance)
+        while len(self._arrows) < len(points):
+            self._arrows.append(self._add_arrow(len(self._arrows)))
+        for k, arrow in enumerate(self._arrows):
+            arrow.visible = k < len(points)
+            if arrow.visible:
+                arrow.position = tuple(points[k])
+                self._stretch(arrow, vectors[k])
+
+    def _add_lines(self, name: str, mark: "Mark") -> "viser.LineSegmentsHandle":
+        self._lines[name] = self._scene.add_line_segments(
+            f"/balance/{name}", mark.segments, colors=mark.colour, thickness=LINE
+        )
+        return self._lines[name]
+
+    def _add_arrow(self, number: int) -> "viser.ArrowsHandle":
+        return self._scene.add_arrows(
+            f"/balance/force_{number}",
+            np.array([[np.zeros(3), [0.0, 0.0, ARROW]]], dtype=np.float32),
             FORCE,
             shaft_radius=0.008,
             head_radius=0.02,
             head_length=0.05,
-            visible=False,
         )
 
-    def update(self, balance: BalanceStatus | None) -> None:
-        """Draw a state; nothing for None."""
-        lines, arrows = outlines(balance), force_arrows(balance)
-        for colour, node in self._outlines.items():
-            node.visible = colour in lines
-            if colour in lines:
-                node.points = lines[colour]
-        self._forces.visible = len(arrows) > 0
-        if len(arrows):
-            self._forces.points = arrows
+    def _stretch(self, arrow: "viser.ArrowsHandle", vector: Vector) -> None:
+        if np.linalg.norm(arrow.points[0, 1] - vector) > VISIBLE:
+            points = np.stack([np.zeros(3), vector])
+            arrow.points = points[None].astype(np.float32)
 
 
-def outlines(balance: BalanceStatus | None) -> dict[Colour, Matrix]:
-    """Return segments of feet, next footstep and capture point by their colour.
+class Mark(NamedTuple):
+    """Lines on the ground.
 
-    Returns:
-        Segments, m, shape (n, 2, 3) each; only colours that have any.
+    Attributes:
+        colour: Their colour.
+        segments: Lines about the pose, m, shape (n, 2, 3).
+        pose: Where they are, in the world.
     """
-    found: dict[Colour, list[Matrix]] = {}
-    if balance is None:
-        return {}
+
+    colour: Colour
+    segments: Matrix
+    pose: pin.SE3
+
+
+def marks_of(balance: BalanceStatus) -> dict[str, Mark]:
+    """Return the marks of feet, next footstep and capture point, by a name for each."""
+    marks = {}
     for foot in balance.feet:
-        colour = STANDING if foot.stands else LIFTED
-        found.setdefault(colour, []).append(_outline(foot.corners))
+        kind, colour = ("standing", STANDING) if foot.stands else ("lifted", LIFTED)
+        outline, pose = _outline(foot.sole), _pose(foot.position, foot.yaw)
+        marks[f"{kind}/{foot.name}"] = Mark(colour, outline, pose)
     lifted = next((foot for foot in balance.feet if not foot.stands), None)
     if lifted is not None and balance.footstep is not None:
-        moved = lifted.corners - lifted.corners.mean(axis=0) + balance.footstep
-        found[FOOTSTEP] = [_outline(moved)]
+        outline, pose = _outline(lifted.sole), _pose(balance.footstep, lifted.yaw)
+        marks[f"footstep/{lifted.name}"] = Mark(FOOTSTEP, outline, pose)
     arms = CROSS * np.array([[[-1, -1, 0], [1, 1, 0]], [[-1, 1, 0], [1, -1, 0]]])
-    found[CAPTURE_POINT] = [balance.capture_point + arms + np.array([0.0, 0.0, ABOVE])]
-    return {
-        colour: np.concatenate(parts).astype(np.float32)
-        for colour, parts in found.items()
-    }
+    pose = _pose(balance.capture_point, 0.0)
+    marks["capture_point"] = Mark(CAPTURE_POINT, arms.astype(np.float32), pose)
+    return marks
 
 
-def force_arrows(balance: BalanceStatus | None) -> Matrix:
-    """Return start and end of an arrow for each contact force, m, shape (n, 2, 3)."""
+def force_arrows(balance: BalanceStatus | None) -> tuple[Matrix, Matrix]:
+    """Return start and vector of an arrow for each contact force, m, shape (n, 3)."""
     if balance is None:
-        return np.zeros((0, 2, 3), dtype=np.float32)
+        return np.zeros((0, 3)), np.zeros((0, 3))
     strong = np.linalg.norm(balance.forces, axis=1) > LEAST * balance.weight
-    start = balance.points[strong]
-    end = start + ARROW / balance.weight * balance.forces[strong]
-    return np.stack([start, end], axis=1).astype(np.float32)
+    return balance.points[strong], ARROW / balance.weight * balance.forces[strong]
 
 
 def legend_html() -> str:
@@ -146,14 +164,19 @@ def legend_html() -> str:
     return f"<div style='padding:.2em .9em .4em;font-size:.82em'>{rows}</div>"
 
 
-def _outline(corners: Matrix) -> Matrix:
-    """Return the segments around a sole or a ball, above the ground, (n, 2, 3)."""
-    around = corners if len(corners) > 1 else _circle(corners[0])
-    around = around + np.array([0.0, 0.0, ABOVE])
-    return np.stack([around, np.roll(around, -1, axis=0)], axis=1)
+def _outline(sole: Vector) -> Matrix:
+    """Return the segments around a sole, or a circle for a ball, m, (n, 2, 3)."""
+    heel, toes, right, left = sole
+    if heel < toes:
+        x, y = np.array([heel, toes, toes, heel]), np.array([right, right, left, left])
+    else:
+        angle = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
+        x, y = RADIUS * np.cos(angle), RADIUS * np.sin(angle)
+    around = np.column_stack([x, y, np.zeros_like(x)])
+    lines = np.stack([around, np.roll(around, -1, axis=0)], axis=1)
+    return lines.astype(np.float32)
 
 
-def _circle(middle: Vector) -> Matrix:
-    angle = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
-    around = np.column_stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)])
-    return middle + RADIUS * around
+def _pose(position: Vector, yaw: float) -> pin.SE3:
+    above = position + np.array([0.0, 0.0, ABOVE])
+    return pin.SE3(pin.utils.rotate("z", yaw), above)

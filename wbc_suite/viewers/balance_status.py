@@ -19,12 +19,17 @@ class FootStatus:
 
     Attributes:
         name: Name of its frame.
-        corners: Corners of its sole in order, m, shape (4, 3); one point for a ball.
+        position: Middle of its contact, m, shape (3,).
+        yaw: Its heading, rad.
+        sole: Edges of its sole about the middle: heel, toes, right, left, m; zero for
+            a ball.
         stands: Whether it carries weight.
     """
 
     name: str
-    corners: Matrix
+    position: Vector
+    yaw: float
+    sole: Vector
     stands: bool
 
 
@@ -115,9 +120,9 @@ class BalanceReader:
         return tuple(
             FootStatus(
                 name=foot.frame,
-                corners=_corners(
-                    measured.foot[k], float(measured.foot_yaw[k]), gait.sole[k]
-                ),
+                position=measured.foot[k].copy(),
+                yaw=float(measured.foot_yaw[k]),
+                sole=gait.sole[k].copy(),
                 stands=foot.frame in self.report["stance"],
             )
             for k, foot in enumerate(self._controller.config.feet)
@@ -157,14 +162,3 @@ def contact_forces(
     pressed = [sums for sums in total.values() if sums[6] > 0.0]
     rows = np.array(pressed).reshape(-1, 7)
     return rows[:, 3:6] / rows[:, 6:], rows[:, :3]
-
-
-def _corners(middle: Vector, yaw: float, sole: Vector) -> Matrix:
-    """Return the corners of a sole in order, or the middle of a ball, m."""
-    heel, toes, right, left = sole
-    if heel == toes:
-        return middle[None].copy()
-    x = np.array([heel, toes, toes, heel])
-    y = np.array([right, right, left, left])
-    offset = [np.cos(yaw) * x - np.sin(yaw) * y, np.sin(yaw) * x + np.cos(yaw) * y]
-    return middle + np.column_stack([*offset, np.zeros(4)])
