@@ -1,10 +1,15 @@
 """Sessions with robots that walk or drive: velocity, hands, balance, falls."""
 
+import time
+
 import numpy as np
 import pinocchio as pin
 import pytest
+from websockets.sync.client import connect
 
 import wbc_suite
+from wbc_suite.viewers.held_keys import SOCKET
+from wbc_suite.viewers.page_process import PageProcess
 from wbc_suite.viewers.teleop_session import DRIVE_TIMEOUT, TeleopSession
 
 pytestmark = pytest.mark.slow
@@ -218,3 +223,42 @@ def test_arm_on_a_table_has_nothing_to_drive():
     player = Player("Panda", "WHOLE_BODY_IK")
     assert not player.session.info.drive.any()
     player.env.close()
+
+
+def test_page_in_its_own_process_drives_and_its_end_stops_the_robot():
+    env = wbc_suite.make(
+        "Lift",
+        robots="Spot",
+        controller_configs="WHOLE_BODY_ID",
+        control_freq=RATE,
+        horizon=10**6,
+    )
+    session = TeleopSession(env, period=1.0 / RATE)
+    session.tick()  # the loop is compiled
+    page = PageProcess(session, "127.0.0.1", 0, label="Spot")
+    session.start()
+    try:
+        page.wait()
+        address = page.url.replace("http", "ws").rstrip("/") + SOCKET
+        with connect(address) as socket:
+
+            def is_driven():
+                socket.send("[-1, 0, 0, 0]")
+                return session.snapshot.velocity[0] < -0.3
+
+            wait_until(is_driven)
+            wait_until(lambda: not session.snapshot.velocity.any())  # no more messages
+            wait_until(is_driven)
+        wait_until(lambda: not session.snapshot.velocity.any())
+        assert session.running
+    finally:
+        session.stop()
+        page.stop()
+        env.close()
+
+
+def wait_until(condition, patience=120.0):
+    deadline = time.monotonic() + patience
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
