@@ -96,10 +96,9 @@ def record(
     from wbc_suite.recording.episode_control import EpisodeControl, RecordingPlan
     from wbc_suite.wrappers import DataCollection
 
-    by_hand = is_device(device)
+    by_hand, named = is_device(device), robots or ["Panda"]
     rate = rate or (BY_HAND if by_hand else BY_POLICY)
-    if by_hand:
-        controller = controller or default_controller(*(robots or ["Panda"]))
+    controller = controller or (default_controller(*named) if by_hand else None)
     arguments = environment_arguments(
         robots=robots, controller=controller, gripper=gripper, base=base
     )
@@ -116,7 +115,7 @@ def record(
         else:
             drive(
                 collected,
-                names=(" and ".join(robots or ["Panda"]), benchmark),
+                names=(" and ".join(named), benchmark),
                 rate=rate,
                 seed=seed,
                 address=(host, port) if page else None,
