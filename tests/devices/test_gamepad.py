@@ -72,6 +72,31 @@ def test_pad_moves_the_hand_and_says_its_buttons():
     assert state.buttons == {"grip", "next"}
 
 
+def test_both_sticks_drive_after_a_press_of_the_left_one(tmp_path):
+    file = tmp_path / "js0"
+    os.mkfifo(file)
+    gamepad = Gamepad(file)
+    gamepad.start()
+    with file.open("wb", buffering=0) as writer:
+        writer.write(event(1, 9, 1) + event(1, 9, 0))
+        writer.write(event(2, 1, -32767) + event(2, 3, 32767) + event(2, 4, 32767))
+        state = gamepad.read()
+        assert state.base[0] > 0.0 > state.base[2]
+        assert state.height < 0.0
+        assert not state.limbs["hand"].twist.any()
+        writer.write(event(2, 1, 0) + event(2, 3, 0) + event(2, 4, 0))
+        state = gamepad.read()
+        assert not state.base.any()
+        assert state.height == 0.0
+        writer.write(event(1, 9, 1) + event(2, 1, -32767))
+        assert gamepad.read().limbs["hand"].twist[0] > 0.0
+    gamepad.stop()
+
+
+def test_dualsense_names_presses_of_its_sticks():
+    assert parse_dualsense(dualsense(rest=0b1000000)).down == {"l3"}
+
+
 def test_small_deflections_are_rest():
     state = pad_state(0.0, Pad(left=(0.06, 0.06), right=(0.0, -0.09)))
     assert not state.limbs["hand"].twist.any()

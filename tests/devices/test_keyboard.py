@@ -65,6 +65,18 @@ def test_arrows_drive_the_base(terminal):
     assert (np.sign(state.base) == [1, 0, 1]).all()
 
 
+def test_key_v_lets_the_other_keys_drive_until_they_are_released(terminal):
+    state = terminal(b"vwqf")
+    assert (np.sign(state.base) == [1, 0, 1]).all()
+    assert state.height < 0.0
+    assert not state.limbs["hand"].twist.any()
+    state = terminal(b"i", 0.2)
+    assert not state.base.any()
+    assert state.height == 0.0
+    assert state.limbs["hand"].twist[4] > 0.0  # turns of the hand have their keys
+    assert terminal(b"vw", 0.2).limbs["hand"].twist[0] > 0.0
+
+
 def test_a_pipe_is_no_terminal():
     reader, writer = os.pipe()
     with pytest.raises(DeviceError, match="needs a terminal"):

@@ -8,7 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from wbc_suite.cli import options
-from wbc_suite.cli.teleop import ONE_DAY, device_maker, drive, stages_of
+from wbc_suite.cli.teleop import (
+    ONE_DAY,
+    default_controller,
+    device_maker,
+    drive,
+    stages_of,
+)
 
 if TYPE_CHECKING:
     from wbc_suite.wrappers import DataCollection
@@ -74,9 +80,9 @@ def record(
     from wbc_suite.recording.episode_control import EpisodeControl, RecordingPlan
     from wbc_suite.wrappers import DataCollection
 
-    by_hand = is_device(device)
+    by_hand, named = is_device(device), robots or ["Panda"]
     rate = rate or (BY_HAND if by_hand else BY_POLICY)
-    controller = controller or ("WHOLE_BODY_IK" if by_hand else None)
+    controller = controller or (default_controller(*named) if by_hand else None)
     arguments = options.environment_arguments(
         robots=robots, controller=controller, gripper=gripper, base=base
     )
@@ -93,7 +99,7 @@ def record(
         else:
             drive(
                 collected,
-                names=(" and ".join(robots or ["Panda"]), benchmark),
+                names=(" and ".join(named), benchmark),
                 rate=rate,
                 seed=seed,
                 address=(host, port) if page else None,

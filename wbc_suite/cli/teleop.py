@@ -29,11 +29,17 @@ if TYPE_CHECKING:
 
 ONE_DAY = 86_400  # s; horizon of a session, in place of the benchmark's
 POLL_PERIOD = 0.2  # s; of a session without a page
+DRIVING = ("keyboard", "gamepad", "dualsense")
+"""Devices whose keys and sticks drive robots that walk, at first."""
 DeviceMaker = Callable[["gymnasium.Env[Any, Any]"], "Device"]
 
 
 WholeBodyOption = Annotated[
-    str, typer.Option(help="Whole-body controller, by name or TOML file.")
+    str | None,
+    typer.Option(
+        help="Whole-body controller, by name or TOML file; by default WHOLE_BODY_ID "
+        "for robots that walk, else WHOLE_BODY_IK."
+    ),
 ]
 TargetRateOption = Annotated[
     float, typer.Option(help="Targets taken per second, Hz.", min=5.0, max=200.0)
@@ -54,7 +60,7 @@ RecordOption = Annotated[
 def teleop(
     benchmark: Annotated[str, typer.Argument(help="Benchmark to play in.")] = "Lift",
     robots: Annotated[str, typer.Option(help="Robot.")] = "GR1",
-    controller: WholeBodyOption = "WHOLE_BODY_IK",
+    controller: WholeBodyOption = None,
     rate: TargetRateOption = 100.0,
     gripper: GripperOption = None,
     base: BaseOption = None,
@@ -69,7 +75,7 @@ def teleop(
     record: RecordOption = None,
     catalogue: CatalogueOption = None,
 ) -> None:
-    """Move a robot's hands, head, feet and base by dragging them in a web page."""
+    """Move a robot's hands, head, feet and base in a web page, or let it walk."""
     import wbc_suite
     from wbc_suite.recording.episode_control import EpisodeControl
     from wbc_suite.wrappers import DataCollection
@@ -80,7 +86,7 @@ def teleop(
     env: gymnasium.Env[Any, Any] = wbc_suite.make(
         benchmark,
         robots=robots,
-        controller_configs=controller,
+        controller_configs=controller or default_controller(robots),
         gripper_types=chosen(gripper),
         base_types=base,
         control_freq=rate,
@@ -107,6 +113,19 @@ def teleop(
         env.close()
 
 
+def default_controller(*robots: str) -> str:
+    """Return the whole-body controller that robots are teleoperated with."""
+    from wbc_suite.control import load_composite_controller_config
+    from wbc_suite.errors import ConfigError
+
+    try:
+        for robot in robots:
+            load_composite_controller_config("WHOLE_BODY_ID", robot)
+    except ConfigError:  # one has no free root, or its feet are not known
+        return "WHOLE_BODY_IK"
+    return "WHOLE_BODY_ID"
+
+
 def device_maker(name: str, pairs: list[str] | None) -> DeviceMaker:
     """Return a function that makes a device with options `NAME=VALUE`."""
     from wbc_suite.devices import find_device
@@ -116,6 +135,10 @@ def device_maker(name: str, pairs: list[str] | None) -> DeviceMaker:
     def build(env: "gymnasium.Env[Any, Any]") -> "Device":
         if name.lower() == "mjgui":
             options["env"] = env  # it shows the scene
+        layout = env.unwrapped.action_layout  # type: ignore[attr-defined]
+        walks = any(part.name.endswith("walk") for part in layout.slices)
+        if walks and name.lower() in DRIVING:
+            options.setdefault("drives", True)
         return make(**options)
 
     return build

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import partial
 from typing import Any
 
 import mujoco
@@ -34,8 +35,8 @@ class LimbPort:
         body: Body that the frame is fixed to; -1 for none.
         measure: Returns the pose of the simulated frame in the world.
         encode: Returns the values of the slice for a target in the world.
-        ground: Returns the pose of the base that targets move with; None if they are
-            fixed in the world.
+        ground: Returns the pose of the base that targets move with; None if there is
+            none.
     """
 
     name: str
@@ -48,20 +49,32 @@ class LimbPort:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SpeedPort:
-    """A slice that commands the velocity of a base.
+    """A slice that commands the velocity of a base, or of a robot that walks.
 
     Attributes:
         axes: Indices of its values in forward, left, turn.
         unit: Velocity of a value of 1, m/s or rad/s.
+        low: Least values.
+        high: Greatest values.
     """
 
     name: str
     axes: tuple[int, ...]
     unit: Vector
+    low: Vector
+    high: Vector
+
+    @property
+    def limits(self) -> Vector:
+        """Greatest speed forward, left (m/s), and turn (rad/s); 0 for a missing one."""
+        limits = np.zeros(3)
+        limits[list(self.axes)] = np.minimum(-self.low, self.high) * self.unit
+        return limits
 
     def encode(self, velocity: Vector) -> Vector:
         """Return the values of the slice for a velocity, shape (3,)."""
-        return velocity[list(self.axes)] / self.unit
+        values = velocity[list(self.axes)] / self.unit
+        return np.clip(values, self.low, self.high)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,11 +82,12 @@ class JointPort:
     """A slice that commands joint positions, or steps of them.
 
     `measure` returns the positions of the joints, rad or m, and `encode` the values of
-    the slice for target positions.
+    the slice for target positions; `lifting` are the joints that lift the torso.
     """
 
     name: str
     joints: tuple[str, ...]
+    lifting: tuple[int, ...]
     measure: Callable[[], Vector]
     encode: Callable[[Vector], Vector]
 
@@ -93,13 +107,29 @@ def limb_ports(env: Any) -> dict[str, LimbPort]:
 
 
 def speed_ports(env: Any) -> dict[str, SpeedPort]:
-    """Return the slices that command velocities of a base, by name."""
+    """Return the slices that command velocities of a base or a walk, by name."""
     ports = {}
     for part in env.unwrapped.action_layout.slices:
-        if part.kind is SliceKind.BASE and {*part.labels} <= {*_VELOCITY_AXES}:
-            axes = tuple(_VELOCITY_AXES.index(Axis(label)) for label in part.labels)
-            ports[part.name] = SpeedPort(name=part.name, axes=axes, unit=_unit(part))
+        moves = part.kind in (SliceKind.BASE, SliceKind.VELOCITY)
+        if moves and {*part.labels} <= {*_VELOCITY_AXES}:
+            ports[part.name] = SpeedPort(
+                name=part.name,
+                axes=tuple(_VELOCITY_AXES.index(Axis(label)) for label in part.labels),
+                unit=_unit(part),
+                low=np.array(part.low),
+                high=np.array(part.high),
+            )
     return ports
+
+
+def height_slices(env: Any) -> dict[str, ActionSlice]:
+    """Return the slices that command the height of a robot that walks, by name."""
+    return {
+        part.name: part
+        for _, _, slices in _robots(env)
+        for name, part in slices.items()
+        if name == "height" and part.labels == (Axis.Z,)
+    }
 
 
 def joint_ports(env: Any) -> dict[str, JointPort]:
@@ -134,7 +164,17 @@ def _joint_port(part: ActionSlice, places: list[Any]) -> JointPort:
             return np.clip((target - measure()) / _unit(part), part.low, part.high)
         return np.clip(target, part.low, part.high)
 
-    return JointPort(name=part.name, joints=part.labels, measure=measure, encode=encode)
+    return JointPort(
+        name=part.name,
+        joints=part.labels,
+        lifting=tuple(
+            k
+            for k, (joint, unit) in enumerate(zip(part.labels, part.units, strict=True))
+            if unit.symbol == "m" and ("torso" in joint or "lift" in joint)
+        ),
+        measure=measure,
+        encode=encode,
+    )
 
 
 def _robots(env: Any) -> Iterator[tuple[int, Any, dict[str, ActionSlice]]]:
@@ -154,12 +194,21 @@ def _whole_body(
     env: Any, controller: Any, index: int, slices: dict[str, ActionSlice]
 ) -> Iterator[LimbPort]:
     config = controller.config
-    if (config.input_type, config.input_ref_frame) != ("absolute", "world"):
+    walks = hasattr(controller, "heading")
+    in_base = walks and config.input_ref_frame == "base"
+    if config.input_type != "absolute" or not (
+        in_base or config.input_ref_frame == "world"
+    ):
         raise ConfigError(
             "Teleoperation needs a whole-body controller with input_type 'absolute' "
-            f"and input_ref_frame 'world', not {type(controller).__name__} with "
-            f"{config.input_type!r} and {config.input_ref_frame!r}."
+            "and input_ref_frame 'world', or 'base' of WHOLE_BODY_ID, not "
+            f"{type(controller).__name__} with {config.input_type!r} and "
+            f"{config.input_ref_frame!r}."
         )
+
+    def heading() -> pin.SE3:
+        return controller.heading
+
     for frame in config.frames:
         kind = frame.behaviour
         body, measure = _reader(env.unwrapped.simulation, frame.frame, f"robot{index}_")
@@ -168,8 +217,16 @@ def _whole_body(
             kind=_limb_kind(kind),
             body=body,
             measure=measure,
-            encode=kind.values,
+            encode=partial(_encode_in_base, kind, heading) if in_base else kind.values,
+            ground=heading if walks else None,
         )
+
+
+def _encode_in_base(
+    kind: FrameKind, base: Callable[[], pin.SE3], T_world_target: pin.SE3
+) -> Vector:
+    """Return the values of a slice whose targets are given in a moving base."""
+    return kind.values(base().actInv(T_world_target))
 
 
 def _limb_kind(kind: FrameKind) -> LimbKind:

@@ -18,7 +18,7 @@ from wbc_suite.typing import Vector
 
 DEAD = 0.1  # dead zone, as a fraction of a stick's range
 SPEED, TURN = 0.3, 1.0  # m/s and rad/s at full deflection
-DRIVE, SPIN = 0.4, 0.6  # of the base
+DRIVE, SPIN, RISE = 0.4, 0.6, 0.1  # of the base, and of the body up and down
 SONY, DUALSENSE = (0x054C,), (0x0CE6, 0x0DF2)
 
 BUTTONS = {
@@ -37,7 +37,7 @@ class Pad:
         triggers: Left and right, 0 .. 1.
         cross: Right and up, -1, 0 or 1.
         down: Names of pressed buttons: `south`, `east`, `west`, `north`, `l1`, `r1`,
-            `select`, `start`.
+            `select`, `start`, `l3` and `r3` (presses of the sticks).
     """
 
     left: tuple[float, float] = (0.0, 0.0)
@@ -60,7 +60,7 @@ def parse_dualsense(report: bytes) -> Pad | None:
         return None
     x, y, rx, ry, left, right = body[:6]
     hat, bits = body[7] & 15, int.from_bytes(body[7:9], "little") >> 4
-    above = ("l1", "r1", "l2", "r2", "select", "start")
+    above = ("l1", "r1", "l2", "r2", "select", "start", "l3", "r3")
     names = ("west", "south", "east", "north", *above)
     down = {name for k, name in enumerate(names) if bits >> k & 1}
     around = [(0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1)]
@@ -83,6 +83,7 @@ def parse_joystick(event: bytes, pad: Pad) -> Pad:
     if kind & 2:  # an axis; bit 7 marks the first report
         return _with_axis(pad, number, value / 32767.0)
     names = ("south", "east", "west", "north", "l1", "r1", "select", "start")
+    names = (*names, "guide", "l3", "r3")
     if not kind & 1 or number >= len(names):
         return pad
     name = {names[number]}
@@ -104,15 +105,27 @@ def _with_axis(pad: Pad, number: int, x: float) -> Pad:
     return replace(pad, **changes.get(number, {}))
 
 
-def pad_state(time: float, pad: Pad, pressed: Set[str] = frozenset()) -> DeviceState:
+def pad_state(
+    time: float,
+    pad: Pad,
+    pressed: Set[str] = frozenset(),
+    *,
+    drives: bool = False,
+) -> DeviceState:
     """Return velocities of the selected hand and the base.
 
     Args:
         time: s.
         pad: State of the gamepad.
         pressed: Buttons that were pressed since the last state.
+        drives: Whether the sticks drive the robot; else they move the hand.
     """
     (lx, ly), (rx, ry) = _without_dead_zone(pad.left), _without_dead_zone(pad.right)
+    base = np.array([DRIVE * pad.cross[1], 0.0, -SPIN * pad.cross[0]])
+    height = 0.0
+    if drives:
+        base += [DRIVE * ly, -DRIVE * lx, -SPIN * rx]
+        height, (lx, ly), (rx, ry) = RISE * ry, (0.0, 0.0), (0.0, 0.0)
     rise = pad.triggers[1] - pad.triggers[0]
     roll = float("r1" in pad.down) - float("l1" in pad.down)
     linear, angular = np.array([ly, -lx, rise]), np.array([roll, ry, -rx])
@@ -120,7 +133,8 @@ def pad_state(time: float, pad: Pad, pressed: Set[str] = frozenset()) -> DeviceS
     return DeviceState(
         time=time,
         limbs={"hand": LimbInput(twist=twist)},
-        base=np.array([DRIVE * pad.cross[1], 0.0, -SPIN * pad.cross[0]]),
+        base=base,
+        height=height,
         buttons=frozenset(BUTTONS[n] for n in (pad.down | pressed) & BUTTONS.keys()),
     )
 
@@ -133,19 +147,24 @@ class Gamepad:
     Args:
         path: The joystick file.
         clock: Source of time, s.
+        drives: Whether the sticks drive the robot at first; pressing the left one
+            changes it.
     """
 
     help = (
         "Gamepad: left stick and triggers move the hand, right stick turns it, "
-        "south button closes, north: next hand, the cross drives.\n"
+        "south button closes, north: next hand, the cross drives. Press the left "
+        "stick: both sticks drive.\n"
     )
 
     def __init__(
         self,
         path: str | Path = "/dev/input/js0",
         clock: Callable[[], float] = time.monotonic,
+        *,
+        drives: bool = False,
     ) -> None:
-        self._path, self._clock = Path(path), clock
+        self._path, self._clock, self._drives = Path(path), clock, drives
         self._file, self._pad = -1, Pad()
 
     def start(self) -> None:
@@ -163,12 +182,13 @@ class Gamepad:
         pressed: frozenset[str] = frozenset()
         try:
             while len(event := os.read(self._file, 8)) == 8:
-                self._pad = parse_joystick(event, self._pad)
+                before, self._pad = self._pad, parse_joystick(event, self._pad)
                 pressed |= self._pad.down
+                self._drives ^= "l3" in self._pad.down - before.down
         except OSError as error:
             if error.errno != errno.EAGAIN:  # unplugged: everything at rest
                 self._pad = Pad()
-        return pad_state(self._clock(), self._pad, pressed)
+        return pad_state(self._clock(), self._pad, pressed, drives=self._drives)
 
     def stop(self) -> None:
         """Close the file."""
@@ -183,6 +203,7 @@ class DualSense:
     Args:
         find: Opens the connected gamepads.
         clock: Source of time, s.
+        drives: As of `Gamepad`.
     """
 
     help = Gamepad.help
@@ -191,9 +212,11 @@ class DualSense:
         self,
         find: Callable[[], list[Any]] | None = None,
         clock: Callable[[], float] = time.monotonic,
+        *,
+        drives: bool = False,
     ) -> None:
         self._find = find or (lambda: open_hid("DualSense", SONY, DUALSENSE))
-        self._clock = clock
+        self._clock, self._drives = clock, drives
         self._hid: Any = None
         self._pad = Pad()
 
@@ -205,9 +228,10 @@ class DualSense:
         """Return the state of the gamepad."""
         pressed: frozenset[str] = frozenset()
         for report in waiting_reports(self._hid):
-            self._pad = parse_dualsense(report) or self._pad
+            before, self._pad = self._pad, parse_dualsense(report) or self._pad
             pressed |= self._pad.down
-        return pad_state(self._clock(), self._pad, pressed)
+            self._drives ^= "l3" in self._pad.down - before.down
+        return pad_state(self._clock(), self._pad, pressed, drives=self._drives)
 
     def stop(self) -> None:
         """Close the gamepad."""

@@ -18,6 +18,7 @@ from wbc_suite.typing import Vector
 HOLD = 0.12  # s, after a press; a terminal repeats a held key every 0.03 s
 TWIST = (0.25, 0.25, 0.25, 0.8, 0.8, 0.8)  # m/s and rad/s, of a held key
 BASE = (0.4, 0.4, 0.6)  # m/s and rad/s
+RISE = 0.1  # m/s, of the body
 FACTORS = {"+": 1.5, "=": 1.5, "-": 1.0 / 1.5}  # of the speeds, by key
 SLOWEST, FASTEST = 0.1, 4.0
 
@@ -33,6 +34,12 @@ BASE_JOG: dict[str, tuple[int, float]] = {
 }  # fmt: skip
 """Component of the base's velocity and sign by key."""
 
+DRIVE_JOG: dict[str, tuple[int, float]] = {
+    "w": (0, 1), "s": (0, -1), "a": (1, 1), "d": (1, -1), "q": (2, 1), "e": (2, -1),
+    "r": (3, 1), "f": (3, -1),
+}  # fmt: skip
+"""Component of the robot's velocity and sign by key, while keys drive."""
+
 BUTTONS = {
     " ": "grip", "tab": "next", "m": "mirror", "h": "home", "p": "pause", "0": "reset",
     "enter": "keep", "backspace": "discard", "z": "undo", "escape": "quit",
@@ -44,6 +51,7 @@ HELP = """\
   a d  left, right       i k  pitch      tab    next hand      m  mirror
   r f  up, down          j l  yaw        + -    faster, slower  h  home
   arrows , .  drive and turn the base    p pause  0 reset  esc quit
+  v  let w s a d q e r f drive: forward, back, left, right, turn, up, down
   enter  keep the episode    backspace  discard it    z  undo
 """
 
@@ -82,13 +90,20 @@ class Keyboard:
     Args:
         descriptor: File descriptor of the terminal; standard input by default.
         clock: Source of time, s.
+        drives: Whether w s a d q e r f drive the robot at first; else they move the
+            selected hand. The key v changes it.
     """
 
     help = HELP
 
     def __init__(
-        self, descriptor: int | None = None, clock: Callable[[], float] = time.monotonic
+        self,
+        descriptor: int | None = None,
+        clock: Callable[[], float] = time.monotonic,
+        *,
+        drives: bool = False,
     ) -> None:
+        self._drives = drives
         self._asked, self._descriptor = descriptor, -1
         self._clock, self._pace = clock, 1.0
         self._until: dict[str, float] = {}
@@ -119,13 +134,21 @@ class Keyboard:
             if key in FACTORS:
                 pace = self._pace * FACTORS[key]
                 self._pace = min(max(pace, SLOWEST), FASTEST)
+        self._drives ^= "v" in fresh
         self._until |= dict.fromkeys(pressed, now + HOLD)
         held = self._until.keys()
-        twist = self._pace * _velocity(held, JOG, TWIST)
+        driving = held & DRIVE_JOG.keys() if self._drives else set[str]()
+        drive = _velocity(driving, DRIVE_JOG, (*BASE, RISE))
+        base = drive[:3] + _velocity(held, BASE_JOG, BASE)
         return DeviceState(
             time=now,
-            limbs={"hand": LimbInput(twist=twist)},
-            base=self._pace * _velocity(held, BASE_JOG, BASE),
+            limbs={
+                "hand": LimbInput(
+                    twist=self._pace * _velocity(held - driving, JOG, TWIST)
+                )
+            },
+            base=self._pace * base,
+            height=self._pace * float(drive[3]),
             buttons=frozenset(BUTTONS[key] for key in fresh & BUTTONS.keys()),
         )
 

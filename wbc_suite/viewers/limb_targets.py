@@ -60,12 +60,14 @@ class LimbTarget:
         enabled: Whether the clutch is engaged.
         rest: Number of ticks that the limb has rested since its release; None if it
             was not released lately.
+        reported: Whether the controller reports on the limb, as of the last status.
     """
 
     stages: LimbPipeline
     ownership: Ownership = field(default_factory=Ownership)
     enabled: bool = True
     rest: int | None = None
+    reported: bool = False
 
     @property
     def info(self) -> LimbInfo:
@@ -76,14 +78,19 @@ class LimbTarget:
     def status(self, report: Mapping[str, Any], *, now: float) -> LimbStatus:
         """Return the state at wall time `now`, s.
 
-        `report` is the controller's report of the frame; empty before a solve.
+        `report` is the controller's report of the frame; empty before a solve, or where
+        it reports none: then errors are those of the shown target.
         """
+        self.reported = bool(report)
         measured = self.stages.port.measure()
+        target = self.shown_target(measured)
+        away = float(np.linalg.norm(target.translation - measured.translation))
+        turn = float(np.linalg.norm(pin.log3(target.rotation @ measured.rotation.T)))
         return LimbStatus(
             measured=measured,
-            target=self.shown_target(measured),
-            position_error=float(report.get("position_error", 0.0)),
-            orientation_error=float(report.get("orientation_error", 0.0)),
+            target=target,
+            position_error=float(report.get("position_error", away)),
+            orientation_error=float(report.get("orientation_error", turn)),
             reached=bool(report.get("reached", True)),
             reasons=tuple(report.get("reasons", ())),
             holder=self.ownership.holder(now),
@@ -144,12 +151,16 @@ class LimbTarget:
         measured = self.stages.port.measure()
         step = np.linalg.norm(measured.translation - before.measured.translation)
         self.rest = self.rest + 1 if step < REST_SPEED * period else 0
-        if self.ownership.holder(now) is not None or before.reached:
+        is_near = (
+            before.position_error < MAX_POSITION_ERROR
+            and before.orientation_error < MAX_ORIENTATION_ERROR
+        )
+        reached = before.reached if self.reported else is_near
+        if self.ownership.holder(now) is not None or reached:
             self.rest = None
         elif self.rest * period > REST_TIME:
             self.rest = None
-            far = before.position_error > MAX_POSITION_ERROR
-            if far or before.orientation_error > MAX_ORIENTATION_ERROR:
+            if not is_near:
                 self.stages.place(measured)
 
 

@@ -2,7 +2,7 @@
 
 viser serves pages and messages on 127.0.0.1 without tokens or origins. The proxy
 listens where clients connect, admits them by `AccessRules`, fetches pages and relays
-WebSocket messages.
+WebSocket messages. It adds the script of `HeldKeys` to the page.
 """
 
 import asyncio
@@ -21,6 +21,7 @@ from aiohttp import WSMsgType, hdrs, web
 
 from wbc_suite.devices.web_server import WebServer, page_url, token_for
 from wbc_suite.errors import DeviceError
+from wbc_suite.viewers.held_keys import HeldKeys
 
 if TYPE_CHECKING:
     import viser
@@ -45,6 +46,7 @@ class PageServer:
     Attributes:
         server: The viser server.
         token: Secret that clients need; None on a loopback address.
+        keys: Keys that are held on the pages.
         update_times: Processor time of the last updates, s.
 
     Raises:
@@ -53,7 +55,7 @@ class PageServer:
 
     def __init__(self, host: str = "127.0.0.1", port: int | None = None) -> None:
         self.host, self.token = host, token_for(host)
-        self.server = _start_viser()
+        self.server, self.keys = _start_viser(), HeldKeys()
         try:
             self._proxy = self._start_proxy(PORTS if port is None else [port])
         except DeviceError:
@@ -99,7 +101,10 @@ class PageServer:
             count += 1
 
     def _start_proxy(self, ports: Sequence[int]) -> WebServer:
-        routes = proxy(self.server.get_port())
+        routes = [
+            *self.keys.routes,
+            *proxy(self.server.get_port(), self.keys.add_script),
+        ]
         for port in ports:
             try:
                 return WebServer(self.host, port, routes, token=self.token)
@@ -123,19 +128,44 @@ def _start_viser() -> "viser.ViserServer":
         return Server(host="127.0.0.1", port=0, verbose=False)
 
 
-def proxy(port: int) -> list[web.AbstractRouteDef]:
-    """Return routes that pass every GET request on to a port of 127.0.0.1."""
+def proxy(
+    port: int, rewrite: Callable[[bytes], bytes] = bytes
+) -> list[web.AbstractRouteDef]:
+    """Return routes that pass every GET request on to a port of 127.0.0.1.
+
+    Args:
+        port: The port.
+        rewrite: Changes the page at `/`.
+    """
 
     async def handle(request: web.Request) -> web.StreamResponse:
         target = f"http://127.0.0.1:{port}{quote(request.path)}"
         try:
             if request.headers.get(hdrs.UPGRADE, "").lower() == "websocket":
                 return await _relay(request, target)
+            if request.path == "/":
+                return await _fetch_page(target, rewrite)
             return await _fetch(request, target)
         except (aiohttp.ClientError, TimeoutError):
             return web.Response(status=HTTPStatus.BAD_GATEWAY)
 
     return [web.get("/{path:.*}", handle, allow_head=False)]
+
+
+async def _fetch_page(target: str, rewrite: Callable[[bytes], bytes]) -> web.Response:
+    """Fetch the page; it is decoded, changed and compressed."""
+    async with (
+        aiohttp.ClientSession() as session,
+        session.get(target, allow_redirects=False) as answer,
+    ):
+        kind = answer.headers.get(hdrs.CONTENT_TYPE, "text/html")
+        page = web.Response(
+            status=answer.status,
+            body=rewrite(await answer.read()),
+            headers={hdrs.CONTENT_TYPE: kind},
+        )
+        page.enable_compression()
+        return page
 
 
 async def _fetch(request: web.Request, target: str) -> web.Response:

@@ -59,7 +59,7 @@ class ReplayPage:
         data = env.simulation.data
         box = robot_box(env.simulation.model, data.xpos, data.xquat)
         set_camera(self.server, box)
-        self.server.on_client_connect(lambda client: add_views(client, box))
+        self.server.on_client_connect(lambda client: add_views(client, lambda: box))
 
     def start(self) -> None:
         """Start to play."""

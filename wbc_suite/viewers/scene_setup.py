@@ -1,7 +1,7 @@
 """Floor, light, camera, theme and colours of every page."""
 
 import colorsys
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 Colour: TypeAlias = tuple[int, int, int]
 """Red, green and blue, 0 to 255."""
+Box: TypeAlias = tuple[Vector, Vector]
+"""Corners with the smallest and the largest coordinates, m."""
 
 FIELD_OF_VIEW = np.deg2rad(42.0)  # vertical
 VIEWS = {
@@ -69,7 +71,7 @@ def set_up_scene(server: "viser.ViserServer", *, label: str) -> None:
     )
 
 
-def set_camera(server: "viser.ViserServer", box: tuple[Vector, Vector]) -> None:
+def set_camera(server: "viser.ViserServer", box: Box) -> None:
     """Point the cameras of new clients at a box, from its front right and above.
 
     Its two corners have the smallest and the largest coordinates, shape (3,), m.
@@ -80,19 +82,19 @@ def set_camera(server: "viser.ViserServer", box: tuple[Vector, Vector]) -> None:
     server.initial_camera.fov = FIELD_OF_VIEW
 
 
-def add_views(client: "viser.ClientHandle", box: tuple[Vector, Vector]) -> None:
+def add_views(client: "viser.ClientHandle", box: Callable[[], Box]) -> None:
     """Add buttons that point one client's camera at a box, each from a direction."""
     buttons = client.gui.add_button_group("View from", tuple(VIEWS))
 
     @buttons.on_click
     def _(_: object) -> None:
-        position, look_at = _camera(box, VIEWS[buttons.value])
+        position, look_at = _camera(box(), VIEWS[buttons.value])
         with client.atomic():
             client.camera.position = position
             client.camera.look_at = look_at
 
 
-def _camera(box: tuple[Vector, Vector], direction: Vector) -> tuple[Vector, Vector]:
+def _camera(box: Box, direction: Vector) -> tuple[Vector, Vector]:
     """Return the position of the camera and the point that it looks at."""
     low, high = box
     middle = (low + high) / 2.0

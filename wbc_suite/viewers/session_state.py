@@ -10,6 +10,7 @@ from wbc_suite.control.reasons import Reason
 from wbc_suite.devices.action_ports import LimbKind
 from wbc_suite.recording.episode_control import EpisodeStatus
 from wbc_suite.typing import Matrix, Vector
+from wbc_suite.viewers.balance_status import BalanceStatus
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,12 +31,24 @@ class LimbInfo:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SessionInfo:
-    """Constant properties of a session: limbs, and synergies of grippers, by name."""
+    """Constant properties of a session.
+
+    Attributes:
+        limbs: Limbs that can be dragged, by name.
+        grippers: Names of each gripper's synergies, by the gripper's name.
+        drive: Greatest velocity forward, left (m/s), turn (rad/s) and up (m/s) that
+            keys command, 0 for what the robot cannot do, shape (4,).
+        rides: Whether targets of hands can move with the body.
+        walks: Whether the robot walks, and reports its balance.
+    """
 
     model: mujoco.MjModel
     limbs: Mapping[str, LimbInfo]
     grippers: Mapping[str, tuple[str, ...]]
     records: bool
+    drive: Vector
+    rides: bool
+    walks: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,6 +98,10 @@ class Snapshot:
         device: State of the device beside the page, as the pipeline reports it.
         selected: Limb that a device for one hand moves; empty if none is used.
         recording: State of the recording; None if the session cannot record.
+        velocity: Commanded velocity forward, left (m/s), turn (rad/s), up (m/s).
+        rides: Whether targets of hands move with the body.
+        balance: Balance of a robot that walks, if a client displays it.
+        fell: When and why the robot fell; empty while it has not.
     """
 
     tick: int
@@ -103,3 +120,7 @@ class Snapshot:
     device: tuple[str, ...]
     selected: str
     recording: EpisodeStatus | None
+    velocity: Vector
+    rides: bool
+    balance: BalanceStatus | None
+    fell: str

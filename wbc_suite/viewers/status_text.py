@@ -84,12 +84,19 @@ def status_html(
         for name, status in snapshot.limbs.items()
         if (text := explain(status))
     )
+    fall = (
+        f"<div style='margin-top:.6em;padding:.4em .6em;border-radius:.3em;"
+        f"border-left:.25em solid {RED};background:rgba(200,85,61,.14);"
+        f"font-size:.88em'>{html.escape(snapshot.fell)}</div>"
+        if snapshot.fell
+        else ""
+    )
     return (
         "<div style='padding:.5em .7em .6em'>"
         "<div style='font-weight:600;margin-bottom:.5em'>"
         f"<span style='color:{dot}'>&#9679;</span> {html.escape(state)}</div>"
         f"<div style='display:flex;gap:.4em'>{cells}</div>"
-        f"{_recording_html(snapshot)}{reasons}</div>"
+        f"{_recording_html(snapshot)}{fall}{reasons}</div>"
     )
 
 
@@ -111,6 +118,8 @@ def _state(snapshot: Snapshot) -> tuple[str, str]:
     """Return the state of the session and its colour."""
     if snapshot.message:
         return snapshot.message, RED
+    if snapshot.fell:
+        return "Fallen", RED
     if snapshot.paused:
         return "Paused", YELLOW
     if snapshot.device:

@@ -3,6 +3,8 @@
 from typing import TYPE_CHECKING
 
 from wbc_suite.devices.action_ports import LimbKind
+from wbc_suite.viewers.balance_overlay import BalanceOverlays
+from wbc_suite.viewers.camera_follower import CameraFollower
 from wbc_suite.viewers.drag_handles import DragHandles
 from wbc_suite.viewers.model_scene import ModelScene, robot_box
 from wbc_suite.viewers.page_server import PageServer
@@ -43,9 +45,24 @@ class TeleopPage:
             session, {n: _scale(n, limb.kind) for n, limb in limbs.items()}
         )
         self.markers = TargetMarkers(self.server, session.info, snapshot, colours)
-        box = robot_box(model, snapshot.body_positions, snapshot.body_quaternions)
-        self.panel = TeleopPanel(self.server, session, self.handles, colours, box)
-        set_camera(self.server, box)
+        low, high = robot_box(model, snapshot.body_positions, snapshot.body_quaternions)
+        self.cameras = CameraFollower(
+            model, snapshot.body_positions, (low + high) / 2.0
+        )
+        self.overlays = BalanceOverlays(session)
+        self.panel = TeleopPanel(
+            self.server,
+            session,
+            self.handles,
+            colours,
+            cameras=self.cameras,
+            overlays=self.overlays,
+            box=lambda: (low + self.cameras.moved, high + self.cameras.moved),
+        )
+        if self.panel.drive is not None:
+            site.keys.listen(self.panel.drive.receive)
+        self._epoch = snapshot.epoch
+        set_camera(self.server, (low, high))
         self.server.on_client_connect(self._connect)
         self.server.on_client_disconnect(self._disconnect)
 
@@ -69,6 +86,9 @@ class TeleopPage:
             }
             self.markers.update(snapshot, notes)
         self.handles.update(snapshot)
+        self.overlays.update(snapshot.balance)
+        was_reset, self._epoch = snapshot.epoch != self._epoch, snapshot.epoch
+        self.cameras.update(snapshot.body_positions, jump=was_reset)
         self.panel.record_plots(snapshot)
         if count % PANEL_EVERY == 0:
             self.panel.update(snapshot)
@@ -80,7 +100,8 @@ class TeleopPage:
         self.panel.add_client(client)
 
     def _disconnect(self, client: "viser.ClientHandle") -> None:
-        self.handles.remove_client(client.client_id)
+        for part in (self.handles, self.cameras, self.overlays):
+            part.remove_client(client.client_id)
 
 
 def _scale(name: str, kind: LimbKind) -> float:

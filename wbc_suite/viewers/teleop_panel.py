@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wbc_suite.recording.episode_control import EpisodeCommand
-from wbc_suite.typing import Vector
+from wbc_suite.viewers.balance_overlay import BalanceOverlays, legend_html
+from wbc_suite.viewers.camera_follower import CameraFollower
 from wbc_suite.viewers.drag_handles import DragHandles, HandleMode
+from wbc_suite.viewers.drive_panel import DrivePanel
 from wbc_suite.viewers.gripper_sliders import GripperSliders
-from wbc_suite.viewers.scene_setup import Colour, add_plot, add_views, css
+from wbc_suite.viewers.scene_setup import Box, Colour, add_plot, add_views, css
 from wbc_suite.viewers.session_state import Snapshot
 from wbc_suite.viewers.status_text import limbs_html, status_html
 
@@ -30,10 +32,11 @@ RECORD_NOTE = (
     "`wbc-suite teleop --record FILE` records."
 )
 BUTTON_HINT = (
-    "Keys: P pause, R reset, C record or keep, Y keep as a success, X discard, "
+    "Keys: P pause, 0 reset, C record or keep, Y keep as a success, X discard, "
     "U delete the last episode"
 )
 CLUTCH_HINT = "Engaged: the limb follows its handle. Else only the handle moves."
+BALANCE_HINT = "Feet, capture point, next footstep and contact forces."
 SHADOW_HINT = "Two thirds of the rendering time without a graphics card."
 STEP_COLOUR = "#4a6fa5"
 RECORD_KEYS = {
@@ -55,7 +58,9 @@ class TeleopPanel:
         session: Session that is displayed and commanded.
         handles: The clients' handles.
         colours: Colour of each limb.
-        box: Two corners of the robot, for the cameras, m.
+        cameras: Moves cameras with the robot.
+        overlays: Draws the balance of the robot.
+        box: Returns two corners of the robot, for the cameras, m.
     """
 
     def __init__(
@@ -64,24 +69,32 @@ class TeleopPanel:
         session: "Session",
         handles: DragHandles,
         colours: Mapping[str, Colour],
-        box: tuple[Vector, Vector],
+        *,
+        cameras: CameraFollower,
+        overlays: BalanceOverlays,
+        box: Callable[[], Box],
     ) -> None:
         self._server, self._session, self._handles = server, session, handles
-        self._colours, self._box = colours, box
+        self._colours, self._cameras, self._overlays = colours, cameras, overlays
+        self._box = box
         self._info = info = session.info
         # Rows of wall time, step time, and the position error of every limb.
         self._history: deque[list[float]] = deque(maxlen=PLOT_ROWS)
         self._last_tick = -1
         self._adding = threading.Lock()
         self._status = server.gui.add_html("")
+        self._stand_up = server.gui.add_button(
+            "Reset after the fall", color="red", visible=False
+        )
+        self._stand_up.on_click(lambda _: session.reset())
         self._add_buttons()
-        with server.gui.add_folder("Limbs"):
-            self._limbs = server.gui.add_html("")
-        self._handle_folder = server.gui.add_folder("Handles")
-        with server.gui.add_folder("Clutches", expand_by_default=False):
-            for name, limb in info.limbs.items():
-                engage = functools.partial(session.enable, name)
-                _add_checkbox(server.gui, limb.title, engage, CLUTCH_HINT)
+        self.drive = DrivePanel(server, session) if info.drive.any() else None
+        if info.limbs:
+            with server.gui.add_folder("Limbs"):
+                self._limbs = server.gui.add_html("")
+        self._handle_folder = server.gui.add_folder("Handles" if info.limbs else "View")
+        if info.limbs:
+            self._add_clutches()
         self._grippers: dict[str, GripperSliders] = {}
         if info.grippers:
             with server.gui.add_folder("Grippers"):
@@ -91,31 +104,26 @@ class TeleopPanel:
                 }
         with server.gui.add_folder("Tracking and timing"):
             errors = {limb.title: css(colours[n]) for n, limb in info.limbs.items()}
-            self._error_plot = add_plot(server, "Distance to target [mm]", errors)
+            if errors:
+                self._error_plot = add_plot(server, "Distance to target [mm]", errors)
             times = {"step": STEP_COLOUR}
             self._time_plot = add_plot(server, "Solve time [ms]", times, height=120)
 
     def add_client(self, client: "viser.ClientHandle") -> None:
         """Add the controls that each client has for itself."""
-        from viser import Icon
-
-        number = client.client_id
         with self._adding, self._handle_folder:  # viser: one thread at a time
-            mode = client.gui.add_button_group(
-                "Drag to",
-                _marked(HandleMode.MOVE),
-                hint="Arrows move, arcs turn. Key: T",
-            )
-            recall = client.gui.add_button(
-                "Bring handles to the limbs",
-                icon=Icon.ARROWS_MINIMIZE,
-                color="gray",
-                hint="After a handle was moved with its clutch disengaged. Key: H",
-            )
+            if self._info.limbs:
+                self._add_handle_controls(client)
             add_views(client, self._box)
+            if self.drive is not None:
+                follow = functools.partial(self._cameras.follow, client)
+                _add_checkbox(client.gui, "Camera follows the robot", follow)
+                follow(True)
+            if self._info.walks:
+                self._add_balance(client)
             with client.gui.add_folder("Show", expand_by_default=False):
                 for name, limb in self._info.limbs.items():
-                    show = functools.partial(self._handles.show, number, name)
+                    show = functools.partial(self._handles.show, client.client_id, name)
                     _add_checkbox(client.gui, limb.title, show)
                 _add_checkbox(
                     client.gui,
@@ -123,6 +131,33 @@ class TeleopPanel:
                     lambda on: client.scene.configure_default_lights(cast_shadow=on),
                     SHADOW_HINT,
                 )
+
+    def _add_balance(self, client: "viser.ClientHandle") -> None:
+        """Add the checkbox that draws the balance for one client, and a legend."""
+
+        def show(shown: bool) -> None:
+            self._overlays.show(client, shown)
+            legend.visible = shown
+
+        _add_checkbox(client.gui, "Balance", show, BALANCE_HINT, value=False)
+        legend = client.gui.add_html(legend_html(), visible=False)
+
+    def _add_handle_controls(self, client: "viser.ClientHandle") -> None:
+        """Add mode and recall of one client's handles."""
+        from viser import Icon
+
+        number = client.client_id
+        mode = client.gui.add_button_group(
+            "Drag to",
+            _marked(HandleMode.MOVE),
+            hint="Arrows move, arcs turn. Key: T",
+        )
+        recall = client.gui.add_button(
+            "Bring handles to the limbs",
+            icon=Icon.ARROWS_MINIMIZE,
+            color="gray",
+            hint="After a handle was moved with its clutch disengaged. Key: H",
+        )
 
         def set_mode(chosen: HandleMode) -> None:
             self._handles.set_mode(number, chosen)
@@ -137,11 +172,21 @@ class TeleopPanel:
             lambda _: self._handles.recall(number)
         )
 
+    def _add_clutches(self) -> None:
+        with self._server.gui.add_folder("Clutches", expand_by_default=False):
+            for name, limb in self._info.limbs.items():
+                engage = functools.partial(self._session.enable, name)
+                _add_checkbox(self._server.gui, limb.title, engage, CLUTCH_HINT)
+
     def update(self, snapshot: Snapshot) -> None:
         """Display the state of the session."""
         limbs = self._info.limbs  # viser sends only changes
         self._status.content = status_html(snapshot, limbs, self._colours)
-        self._limbs.content = limbs_html(snapshot, limbs, self._colours)
+        self._stand_up.visible = bool(snapshot.fell)
+        if limbs:
+            self._limbs.content = limbs_html(snapshot, limbs, self._colours)
+        if self.drive is not None:
+            self.drive.update(snapshot)
         for name, sliders in self._grippers.items():
             sliders.update(snapshot.grippers[name])
         self._buttons.options = _buttons(snapshot)
@@ -164,7 +209,8 @@ class TeleopPanel:
         step = max(1, len(rows) // PLOT_POINTS)
         rows, ago = rows[::-step][::-1], ago[::-step][::-1]
         errors = [np.ascontiguousarray(column) for column in 1e3 * rows[:, 2:].T]
-        self._error_plot.data = (ago, *errors)
+        if errors:
+            self._error_plot.data = (ago, *errors)
         self._time_plot.data = (ago, 1e3 * rows[:, 1])
 
     def _add_buttons(self) -> None:
@@ -188,7 +234,7 @@ class TeleopPanel:
         gui.add_command("Pause or resume", hotkey="P").on_trigger(
             lambda _: self._toggle()
         )
-        gui.add_command("Reset", hotkey="R").on_trigger(lambda _: self._session.reset())
+        gui.add_command("Reset", hotkey="0").on_trigger(lambda _: self._session.reset())
 
         for key, (request, text) in RECORD_KEYS.items():
             command = gui.add_command(text, hotkey=key)  # type: ignore[arg-type]
@@ -209,10 +255,15 @@ class TeleopPanel:
 
 
 def _add_checkbox(
-    gui: "viser.GuiApi", label: str, set_value: Callable[[bool], None], hint: str = ""
+    gui: "viser.GuiApi",
+    label: str,
+    set_value: Callable[[bool], None],
+    hint: str = "",
+    *,
+    value: bool = True,
 ) -> None:
-    """Add a checkbox, checked at first, that calls a function with its value."""
-    box = gui.add_checkbox(label, initial_value=True, hint=hint or None)
+    """Add a checkbox that calls a function with its value when it changes."""
+    box = gui.add_checkbox(label, initial_value=value, hint=hint or None)
     box.on_update(lambda _: set_value(box.value))
 
 

@@ -7,7 +7,6 @@ loop never waits for a page.
 
 import threading
 import time
-from collections import deque
 from collections.abc import Callable
 from typing import Any
 
@@ -18,24 +17,27 @@ import pinocchio as pin
 
 from wbc_suite.devices import Device, DeviceState, Pipeline, PipelineConfig
 from wbc_suite.devices.pipeline.config import RatesConfig
+from wbc_suite.devices.pipeline.drive import HeldCommand
 from wbc_suite.errors import DatasetError, UnknownNameError
 from wbc_suite.recording.episode_control import EpisodeCommand, EpisodeControl
 from wbc_suite.typing import Vector
+from wbc_suite.viewers.balance_status import BalanceReader
 from wbc_suite.viewers.limb_targets import LimbTarget
 from wbc_suite.viewers.loop_timing import LoopTimer, raise_priority
 from wbc_suite.viewers.session_state import SessionInfo, Snapshot
+from wbc_suite.viewers.step_times import StepTimes
 
 DRAGGED = PipelineConfig(
     jump=None,  # a page that draws slowly sends a drag in few, long steps
     leash=None,  # a target out of reach is reported instead; see `LimbTargets.settle`
     linear=RatesConfig(speed=2.0, acceleration=30.0, jerk=1500.0),
     angular=RatesConfig(speed=6.0, acceleration=90.0, jerk=4500.0),
+    base_speed=(1.0, 1.0),
     ramp=0.0,
     return_after=None,
 )
 """The pipeline of handles that are dragged on a page."""
-SMOOTHING = 0.03  # weight of the newest tick in the displayed speed
-LATENCIES = 512  # inputs over which the displayed latency is the median
+DRIVE_TIMEOUT = 0.5  # s; a robot stops if the page does not repeat a velocity
 
 
 class TeleopSession:
@@ -83,23 +85,31 @@ class TeleopSession:
         self._stopping, self.quit = threading.Event(), threading.Event()
         self._message, self._success, self._selected = "", False, ""
         self._ik: dict[str, Any] = {}
-        self._latencies: deque[float] = deque(maxlen=LATENCIES)
-        self._last_step = self._step_time = float("nan")  # wall time, smoothed
+        self._drive, self._times = HeldCommand(4, DRIVE_TIMEOUT), StepTimes()
 
         env.reset(seed=seed)
-        self._controller = env.unwrapped.controllers[0]  # type: ignore[attr-defined]
+        controller = env.unwrapped.controllers[0]  # type: ignore[attr-defined]
+        self._balance = BalanceReader(self.model, self._simulation.data, controller)
         self._pipeline = Pipeline(env, pipeline)
         self.limbs = {n: LimbTarget(limb) for n, limb in self._pipeline.limbs.items()}
         self._open_grippers()
-        self.info = self._describe()
+        self.info = SessionInfo(
+            model=self.model,
+            limbs={name: limb.info for name, limb in self.limbs.items()},
+            grippers={name: grip.labels for name, grip in self._pipeline.grips.items()},
+            records=self.episode_control is not None,
+            drive=self._pipeline.drive.limits,
+            rides=self._pipeline.carries,
+            walks=self._balance.walks,
+        )
         self._publish()
 
     # Inputs, from any thread.
 
     def grab(self, name: str, client: int, T_world_input: pin.SE3) -> bool:
         """Take a limb and latch the input to it; False if another client holds it."""
+        now = self._clock()
         with self._lock:
-            now = self._clock()
             return self._limb(name).drag(client, T_world_input, now=now, grab=True)
 
     def drag(
@@ -109,10 +119,7 @@ class TeleopSession:
         T_world_input: pin.SE3,
         arrived: float | None = None,
     ) -> bool:
-        """Move a limb's target with the input; False if another client holds it.
-
-        `arrived` is when the input arrived, by the session's clock; None for now.
-        """
+        """Move a limb's target; `arrived` is by the session's clock, None for now."""
         now = self._clock()
         with self._lock:
             limb = self._limb(name)
@@ -130,6 +137,27 @@ class TeleopSession:
         """Release everything that a client holds, for instance when its tab closes."""
         for name in self.limbs:
             self.release(name, client)
+        self.watch_balance(client, False)
+        with self._lock:
+            self._drive.leave(client)
+
+    def drive(self, client: int, velocity: Vector) -> None:
+        """Drive by forward, left (m/s), turn (rad/s), up (m/s); see `HeldCommand`."""
+        now = self._clock()
+        with self._lock:
+            if self._drive.set(velocity, client=client, now=now):
+                self._inputs.append(now)
+
+    def ride(self, rides: bool) -> None:
+        """Hold hands' targets in the body if `rides`, else in the world."""
+        with self._lock:
+            for limb in self.limbs.values():
+                limb.stages.rides = rides
+
+    def watch_balance(self, client: int, watched: bool) -> None:
+        """Publish the balance while a client displays it."""
+        with self._lock:
+            self._balance.watch(client, watched)
 
     def enable(self, name: str, enabled: bool) -> None:
         """Engage or disengage a limb's clutch; its target does not move."""
@@ -213,12 +241,8 @@ class TeleopSession:
         self._publish()
 
     def latencies(self) -> Vector:
-        """Return the times from an input's arrival to its joint target, s.
-
-        They end when the controller has solved for the joint targets that follow from
-        the input.
-        """
-        return np.array(self._latencies, dtype=np.float64)
+        """Return times from inputs to the joint targets that follow from them, s."""
+        return self._times.latencies
 
     def _read_device(self) -> DeviceState:
         """Return the device's state; handle the buttons of the session."""
@@ -253,7 +277,8 @@ class TeleopSession:
 
     def _step(self, state: DeviceState, inputs: list[float]) -> None:
         with self._lock:
-            action = self._pipeline.update(state)
+            velocity = self._drive.read(self._clock())
+            action = self._pipeline.update(state, velocity)
         self._selected = self._pipeline.selected if "hand" in state.limbs else ""
         self.timer.wait_for_step()
         try:
@@ -261,24 +286,16 @@ class TeleopSession:
         except DatasetError as error:  # the disk is full; teleoperation goes on
             info, self._message = {}, str(error)
         now = self._clock()
-        self._latencies.extend(max(now - arrived, 0.0) for arrived in inputs)
-        self._ik = info.get("ik", {})
-        self._success = bool(info.get("success", False))
+        self._times.end_step(inputs, now)
+        self._balance.take(info.get("balance", {}))
+        self._ik, self._success = info.get("ik", {}), bool(info.get("success", False))
         if "physics_error" in info:
             self._reset()
             self._message = f"The simulation diverged ({info['physics_error']}): reset."
-        self._measure_speed(now)
         with self._lock:
             for name, limb in self.limbs.items():
                 limb.settle(self.snapshot.limbs[name], period=self.period, now=now)
         self._tick += 1
-
-    def _measure_speed(self, now: float) -> None:
-        spent, self._last_step = now - self._last_step, now
-        if np.isnan(self._step_time):
-            self._step_time = spent
-        elif not np.isnan(spent):
-            self._step_time += SMOOTHING * (spent - self._step_time)
 
     def _reset(self, seed: int | None = None) -> None:
         self.env.reset(seed=self._seed if seed is None else seed)
@@ -287,8 +304,10 @@ class TeleopSession:
             for limb in self.limbs.values():
                 limb.rest = None
             self._open_grippers()
+            self._drive.clear()
         self._message, self._success, self._ik = "", False, {}
-        self._last_step = float("nan")
+        self._balance.take({})
+        self._times.restart()
         self._epoch += 1
 
     def _open_grippers(self) -> None:
@@ -296,14 +315,6 @@ class TeleopSession:
             grip.goal[:] = -1.0
 
     # What is displayed.
-
-    def _describe(self) -> SessionInfo:
-        return SessionInfo(
-            model=self.model,
-            limbs={name: limb.info for name, limb in self.limbs.items()},
-            grippers={name: grip.labels for name, grip in self._pipeline.grips.items()},
-            records=self.episode_control is not None,
-        )
 
     def _publish(self) -> None:
         data, now = self._simulation.data, self._clock()
@@ -314,7 +325,7 @@ class TeleopSession:
                 for name, limb in self.limbs.items()
             }
             grippers = {name: goal.copy() for name, goal in self.grippers.items()}
-        latencies = self.latencies()
+            balance = self._balance.status()
         self.snapshot = Snapshot(
             tick=self._tick,
             epoch=self._epoch,
@@ -323,13 +334,17 @@ class TeleopSession:
             body_quaternions=data.xquat.copy(),
             limbs=limbs,
             grippers=grippers,
-            step_time=self._step_time,
-            latency=float(np.median(latencies)) if len(latencies) else float("nan"),
-            speed=self.period / max(self._step_time, 1e-9),
+            step_time=self._times.mean,
+            latency=self._times.latency,
+            speed=self.period / max(self._times.mean, 1e-9),
             paused=self._paused,
             success=self._success,
             message=self._message,
             device=self._pipeline.acting.get("device", ()),
             selected=self._selected,
             recording=self.episode_control and self.episode_control.status,
+            velocity=self._pipeline.drive.velocity,
+            rides=all(limb.stages.rides for limb in self.limbs.values()),
+            balance=balance,
+            fell=self._balance.fell,
         )

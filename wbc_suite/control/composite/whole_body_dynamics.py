@@ -210,6 +210,19 @@ class WholeBodyID:
             record["stage"] = Stage.SOLVED
 
     @property
+    def heading(self) -> pin.SE3:
+        """The frame of hands' goals with `input_ref_frame = "base"`, in the world.
+
+        Its x axis is the heading of the robot, its origin the centre of mass, at the
+        commanded height.
+        """
+        gait, com = self.dynamics.gait.state[0], self.dynamics.measured.com
+        height = float(gait["ground"] + gait["height"])
+        return pin.SE3(
+            pin.utils.rotate("z", float(gait["yaw"])), np.array([*com[:2], height])
+        )
+
+    @property
     def hold_action(self) -> Vector:
         """The action that keeps the hands' goals and stands still."""
         action = np.zeros(self.layout.size)

@@ -82,8 +82,10 @@ class PipelineConfig(FrozenModel):
             `joints` of each finger, or the `pinch` of thumb and index; None for
             neither.
         joint: Limits of each joint that a device commands, rad or m.
-        base_speed: Greatest speed of the base, m/s and rad/s.
-        base_rise: Limits of the derivatives of that speed, m/s and rad/s.
+        base_speed: Greatest speed of the base or the walk, m/s and rad/s; not more
+            than the action permits.
+        rise_speed: Greatest speed up and down of the body, m/s.
+        base_rise: Limits of the derivatives of those speeds, m/s and rad/s.
         ramp: Time over which the permitted speed rises after a reset, s.
         hold_after: Time without new data after which limbs are held, s.
         return_after: Time without new data after which limbs move home, s; None for
@@ -103,6 +105,7 @@ class PipelineConfig(FrozenModel):
     fingers: Literal["joints", "pinch"] | None = "joints"
     joint: RatesConfig = RatesConfig(speed=2.0, acceleration=15.0, jerk=450.0)
     base_speed: tuple[PositiveFloat, PositiveFloat] = (0.6, 1.0)
+    rise_speed: PositiveFloat = 0.1
     base_rise: RatesConfig = RatesConfig(speed=2.0, acceleration=20.0, jerk=600.0)
     ramp: NonNegativeFloat = 2.0
     hold_after: PositiveFloat = 0.15

@@ -26,6 +26,7 @@ class LimbPipeline:
         home: Pose of the limb at the last reset.
         clutch: Couples the input to the requested target, before bounds and limits.
         acting: What stages did to the last target.
+        rides: Whether the target moves with the base, if there is one.
     """
 
     def __init__(self, port: LimbPort, config: PipelineConfig, dt: float) -> None:
@@ -33,6 +34,7 @@ class LimbPipeline:
         smooth = config.one_euro
         self._filter = None if smooth is None else OneEuroFilter(smooth, dt)
         self._limit = MotionLimit(config.linear, config.angular, dt)
+        self.rides = True
         self.reset()
 
     def reset(self) -> None:
@@ -125,8 +127,9 @@ class LimbPipeline:
             return
         ground = self.port.ground()
         step, self._ground = ground * self._ground.inverse(), ground
-        self.carry(step)
-        self._limit.pose = step * self._limit.pose
+        if self.rides:
+            self.carry(step)
+            self._limit.pose = step * self._limit.pose
 
     def _jumps(self, pose: pin.SE3) -> bool:
         last, limit = self._last_input, self._config.jump

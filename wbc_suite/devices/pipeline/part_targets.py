@@ -1,10 +1,10 @@
-"""Targets of grippers, joints and base velocities, each within its limits."""
+"""Targets of grippers and joints, each within its limits."""
 
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from wbc_suite.devices.action_ports import JointPort, SpeedPort, robot_of
+from wbc_suite.devices.action_ports import JointPort
 from wbc_suite.devices.pipeline.config import PipelineConfig
 from wbc_suite.devices.pipeline.motion_limit import LimitedMotion
 from wbc_suite.typing import Vector
@@ -66,11 +66,14 @@ class JointTargets:
             self._goal[k] = joints[self._port.joints[k]]
         return bool(own)
 
+    @property
+    def lifts(self) -> bool:
+        """Whether one of the joints lifts the torso."""
+        return bool(self._port.lifting)
+
     def lift(self, step: float) -> None:
         """Move the torso's goal by a step, m."""
-        for k, name in enumerate(self._port.joints):
-            if "torso" in name or "lift" in name:
-                self._goal[k] += step
+        self._goal[list(self._port.lifting)] += step
 
     def hold(self) -> None:
         """Stop at the current targets."""
@@ -82,25 +85,3 @@ class JointTargets:
         for k, motion in enumerate(self._motions):
             self._target[k] += motion.step(error[k : k + 1], pace)[0]
         return self._port.encode(self._target)
-
-
-class BaseVelocity:
-    """Velocity of a base, which changes towards a goal."""
-
-    def __init__(self, port: SpeedPort, config: PipelineConfig, dt: float) -> None:
-        self.robot = robot_of(port.name)
-        self._port = port
-        self._change = LimitedMotion(3, config.base_rise, dt)
-        self.reset()
-
-    def reset(self) -> None:
-        """Stop."""
-        self.goal: Vector = np.zeros(3)
-        self._velocity: Vector = np.zeros(3)
-        self._change.stop()
-
-    def update(self) -> Vector:
-        """Advance by one tick; return the values of the slice."""
-        step = self._change.step(self.goal - self._velocity)
-        self._velocity = self._velocity + step
-        return self._port.encode(self._velocity)

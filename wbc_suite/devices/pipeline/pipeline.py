@@ -1,14 +1,17 @@
 """The pipeline: from the states of a device to actions."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
+from wbc_suite.control.action import ActionSlice
 from wbc_suite.devices.action_ports import (
     LimbKind,
     LimbPort,
+    SpeedPort,
+    height_slices,
     joint_ports,
     limb_ports,
     robot_of,
@@ -16,12 +19,9 @@ from wbc_suite.devices.action_ports import (
     speed_ports,
 )
 from wbc_suite.devices.pipeline.config import PipelineConfig
+from wbc_suite.devices.pipeline.drive import RobotDrive
 from wbc_suite.devices.pipeline.limb_pipeline import LimbPipeline
-from wbc_suite.devices.pipeline.part_targets import (
-    BaseVelocity,
-    GripTarget,
-    JointTargets,
-)
+from wbc_suite.devices.pipeline.part_targets import GripTarget, JointTargets
 from wbc_suite.devices.pipeline.retarget import retarget
 from wbc_suite.devices.pipeline.watchdog import Phase, Watchdog
 from wbc_suite.devices.state import DeviceState, LimbInput, mirrored
@@ -57,40 +57,60 @@ class Pipeline:
         self._dt = dt = 1.0 / self._env.config.control_freq
         ports = limb_ports(env)
         self.limbs = {n: LimbPipeline(p, settings, dt) for n, p in ports.items()}
+        self._planar = [n for n, p in ports.items() if p.kind is LimbKind.PLANAR]
         self.grips = {
             s.name: GripTarget(s.labels, settings, dt)
             for s in self._layout.slices
             if s.kind == "gripper"
         }
-        self._bases = {
-            name: BaseVelocity(port, settings, dt)
-            for name, port in speed_ports(env).items()
-        }
         self._joints = {
             name: JointTargets(port, settings, dt)
             for name, port in joint_ports(env).items()
         }
-        if not (ports or self._joints):
+        speeds, heights = speed_ports(env), height_slices(env)
+        if not (ports or self._joints or speeds):
             raise ConfigError(
-                "The action has no slice that a device can command: no frame and no "
-                "joint position. Use a whole-body controller, or OSC_POSE or "
-                "JOINT_POSITION for the arms."
+                "The action has no slice that a device can command: no frame, no joint "
+                "position and no velocity of a base. Use a whole-body controller, or "
+                "OSC_POSE or JOINT_POSITION for the arms."
             )
+        self._drives = self._make_drives(speeds.values(), heights.values())
         self._selector = LimbSelector(list(ports), _hands(ports, self.grips))
         self._watchdog = Watchdog(settings.hold_after, settings.return_after, dt)
         self.reset()
 
+    def _make_drives(
+        self, speeds: Iterable[SpeedPort], heights: Iterable[ActionSlice]
+    ) -> dict[str, RobotDrive]:
+        """Return the drive of each robot, by the prefix of its slices."""
+        planar = {robot_of(name) for name in self._planar}
+        lifts = {robot_of(n) for n, joints in self._joints.items() if joints.lifts}
+        speeds, heights = tuple(speeds), tuple(heights)
+        names = (*self.limbs, *self._joints, *(port.name for port in speeds))
+        return {
+            robot: RobotDrive(
+                [port for port in speeds if robot_of(port.name) == robot],
+                [part for part in heights if robot_of(part.name) == robot],
+                self._config,
+                self._dt,
+                glides=robot in planar,
+                lifts=robot in lifts,
+            )
+            for robot in sorted({robot_of(name) for name in names})
+        }
+
     def reset(self) -> None:
         """Start an episode: every target is at its limb."""
-        parts = *self.limbs.values(), *self._joints.values(), *self._bases.values()
-        for part in parts:
+        for part in (*self.limbs.values(), *self._joints.values()):
             part.reset()
         held = self._layout.unpack(self._env.hold_action)
+        for drive in self._drives.values():
+            drive.reset(held)
         for name, grip in self.grips.items():
             grip.reset(held[name])
         self._watchdog.reset()
         self._mirror, self._pressed = self._config.mirror, frozenset[str]()
-        self._time, self._height = 0.0, 0.0
+        self._time, self._velocity = 0.0, np.zeros(4)
         self._inputs: dict[str, LimbInput] = {}
         self._driven: set[str] = set()
         self.acting: dict[str, tuple[str, ...]] = {}
@@ -100,14 +120,34 @@ class Pipeline:
         """The limb that a device for one hand moves."""
         return self._selector.selected
 
-    def update(self, state: DeviceState) -> Vector:
-        """Return the action of one step; call it once per step."""
+    @property
+    def carries(self) -> bool:
+        """Whether targets of hands can move with a base, or be held in the world."""
+        hands = [x for x in self.limbs.values() if x.port.kind is LimbKind.POSE]
+        grounded = any(limb.port.ground is not None for limb in hands)
+        return grounded or bool(hands and self._planar)
+
+    @property
+    def drive(self) -> RobotDrive:
+        """What drives the robot of the selected hand, or the first one."""
+        robot = robot_of(self.selected) if self.selected else min(self._drives)
+        return self._drives[robot]
+
+    def update(self, state: DeviceState, drive: Vector | None = None) -> Vector:
+        """Return the action of one step; call it once per step.
+
+        Args:
+            state: State of the device.
+            drive: Velocity forward, left (m/s), turn (rad/s) and up (m/s) that is
+                commanded while the device commands none, shape (4,).
+        """
         new = self._watchdog.check(state)
         if new is not None:
             self._press(new.buttons)
             self._read(mirrored(new) if self._mirror else new)
         if self._watchdog.phase is not Phase.LIVE:
             self._hold_or_return()
+        self._steer(drive)
         action = self._layout.pack(self._move(), base=self._env.hold_action)
         notes = {name: limb.acting for name, limb in self.limbs.items()}
         notes["device"] = tuple(filter(None, [self._watchdog.acting]))
@@ -144,9 +184,8 @@ class Pipeline:
             self._close(limb or name, given)  # a leader arm has no limb
         for joints in self._joints.values():
             joints.aim(state.joints)
-        self._height = state.height
-        if state.base is not None:
-            self._steer(state.base)
+        base = np.zeros(3) if state.base is None else state.base
+        self._velocity = np.append(base, state.height)
         self._driven |= self._inputs.keys()
 
     def _close(self, limb: str, given: LimbInput) -> None:
@@ -161,21 +200,22 @@ class Pipeline:
             grip = retarget(given.fingers, labels, by_pinch=by_pinch)
             self.grips[name].aim(grip)
 
-    def _steer(self, velocity: Vector) -> None:
-        """Drive the base of the selected hand's robot: forward, left, turn."""
-        linear, angular = self._config.base_speed
-        forward, left = velocity[:2] / max(1.0, np.hypot(*velocity[:2]) / linear)
-        turn = np.clip(velocity[2], -angular, angular)
-        robot = robot_of(self._selector.selected)
-        for base in self._bases.values():
-            goal = [forward, left, turn] if base.robot == robot else np.zeros(3)
-            base.goal = np.array(goal)
-        for name, limb in self.limbs.items():
-            if limb.port.kind is LimbKind.PLANAR and robot_of(name) == robot:
-                R = limb.clutch.target.rotation
-                along = R @ np.array([forward, left, 0.0])
-                twist = np.array([*along, 0.0, 0.0, turn])
-                self._inputs[name] = LimbInput(twist=twist)
+    def _steer(self, drive: Vector | None) -> None:
+        """Drive the robot of the selected hand; others stop."""
+        velocity = self._velocity
+        if drive is not None and not velocity.any():
+            velocity = drive
+        for other in self._drives.values():
+            other.aim(velocity if other is self.drive else np.zeros(4))
+
+    def _base_input(self, name: str) -> LimbInput | None:
+        """Return the input of a base whose pose is commanded, in place of a speed."""
+        forward, left, turn, _ = self._drives[robot_of(name)].velocity
+        if not any((forward, left, turn)):
+            return self._inputs.get(name)
+        R = self.limbs[name].clutch.target.rotation
+        along = R @ np.array([forward, left, 0.0])
+        return LimbInput(twist=np.array([*along, 0.0, 0.0, turn]))
 
     def _move(self) -> dict[str, Vector]:
         """Advance all targets by one tick; return the action's values by slice."""
@@ -184,31 +224,32 @@ class Pipeline:
         started = 1.0 if ramp == 0.0 else min(1.0, self._time / ramp)
         pace = FIRST_PACE + (1.0 - FIRST_PACE) * started
         values: dict[str, Vector] = {}
-        planar = [n for n, b in self.limbs.items() if b.port.kind is LimbKind.PLANAR]
-        for name in (*planar, *(n for n in self.limbs if n not in planar)):
+        for drive in self._drives.values():
+            values |= drive.update()
+        others = [name for name in self.limbs if name not in self._planar]
+        for name in (*self._planar, *others):
             limb = self.limbs[name]
-            before = limb.target
-            values[name] = limb.update(self._inputs.get(name), pace)
-            if name in planar:
+            before, is_base = limb.target, name in self._planar
+            given = self._base_input(name) if is_base else self._inputs.get(name)
+            values[name] = limb.update(given, pace)
+            if is_base:
                 self._carry(name, limb.target * before.inverse())
         values |= {name: grip.update() for name, grip in self.grips.items()}
-        values |= {name: base.update() for name, base in self._bases.items()}
         for name, joints in self._joints.items():
-            joints.lift(self._height * self._dt)
+            joints.lift(self._drives[robot_of(name)].velocity[3] * self._dt)
             values[name] = joints.update(pace)
         return values
 
     def _carry(self, base: str, T_step: pin.SE3) -> None:
         """Move the targets of a robot's hands with its base."""
         for name, limb in self.limbs.items():
-            if limb.port.kind is LimbKind.POSE and robot_of(name) == robot_of(base):
+            same = robot_of(name) == robot_of(base)
+            if limb.port.kind is LimbKind.POSE and same and limb.rides:
                 limb.carry(T_step)
 
     def _hold_or_return(self) -> None:
         """Hold the limbs that the device moved, or move them home."""
-        self._inputs, self._height = {}, 0.0
-        for base in self._bases.values():
-            base.goal = np.zeros(3)
+        self._inputs, self._velocity = {}, np.zeros(4)
         for joints in self._joints.values():
             joints.hold()
         if self._watchdog.phase is Phase.RETURN:
