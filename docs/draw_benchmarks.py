@@ -35,6 +35,7 @@ ROBOTS: dict[str, str | list[str]] = {
     "NutAssemblySquare": "TiagoDifferential",
     "NutAssemblyRound": "SpotWithArm",
     "Door": "Panda",
+    "WalkTo": "Spot",
     "Wipe": "GR1FreeBody",
     "ToolHang": "SpotWithArmFloating",
     "TwoArmLift": "Baxter",
@@ -84,7 +85,7 @@ def draw(name: str) -> None:
 
 
 def viewpoint(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjvCamera:
-    """Return a camera that sees everything from knee height up."""
+    """Return a camera that sees everything, and tall scenes from knee height up."""
     shown = (model.geom_group < 3) & (model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE)
     centers, half = np.split(model.geom_aabb[shown], 2, axis=1)
     turns = data.geom_xmat[shown].reshape(-1, 3, 3)
@@ -92,7 +93,8 @@ def viewpoint(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjvCamera:
     reach = np.einsum("gij,gj->gi", np.abs(turns), half)
     here = np.linalg.norm(middles, axis=1) < ROOM  # what is not used stands far off
     low, high = (middles - reach)[here].min(0), (middles + reach)[here].max(0)
-    low[2] = KNEE
+    flat = high[2] < 2 * KNEE
+    low[2] = 0.0 if flat else KNEE
     camera = mujoco.MjvCamera()
     camera.lookat[:] = 0.5 * (low + high)
     camera.azimuth, camera.elevation = AZIMUTH, ELEVATION
@@ -102,7 +104,7 @@ def viewpoint(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjvCamera:
         np.abs(right[:2][::-1]) @ (high - low)[:2]
     )
     fitting = 0.48 * max(wide, tall) / np.tan(np.radians(22.5)) + 0.3
-    camera.distance = max(fitting, NEAR)
+    camera.distance = max(fitting, NEAR) + flat * 0.25 * (high - low)[0]
     return camera
 
 

@@ -22,6 +22,7 @@ BENCHMARKS = (
     "Stack",
     "ToolHang",
     *("TwoArmHandover", "TwoArmLift", "TwoArmPegInHole", "TwoArmTransport"),
+    "WalkTo",
     "Wipe",
 )
 """Benchmarks with an id, `wbc_suite/{name}-v0`."""

@@ -17,6 +17,7 @@ from wbc_suite.benchmark.two_arm_handover import TwoArmHandover
 from wbc_suite.benchmark.two_arm_lift import TwoArmLift
 from wbc_suite.benchmark.two_arm_peg_in_hole import TwoArmPegInHole
 from wbc_suite.benchmark.two_arm_transport import TwoArmTransport
+from wbc_suite.benchmark.walk_to import WalkTo
 from wbc_suite.benchmark.wipe import Wipe
 
 __all__ = [
@@ -33,6 +34,7 @@ __all__ = [
     "TwoArmLift",
     "TwoArmPegInHole",
     "TwoArmTransport",
+    "WalkTo",
     "Wipe",
     "benchmark_names",
     "load_benchmark",
@@ -62,6 +64,7 @@ for _build, _names in (
     (TwoArmLift, ("TwoArmLift",)),
     (TwoArmPegInHole, ("TwoArmPegInHole",)),
     (TwoArmTransport, ("TwoArmTransport",)),
+    (WalkTo, ("WalkTo",)),
     (Wipe, ("Wipe",)),
 ):
     for _name in _names:
