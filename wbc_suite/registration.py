@@ -16,10 +16,12 @@ from types import ModuleType
 BENCHMARKS = (
     "Door",
     "Lift",
+    "LocoLift",
     *("NutAssembly", "NutAssemblySingle", "NutAssemblySquare", "NutAssemblyRound"),
     *("PickPlace", "PickPlaceSingle"),
     *("PickPlaceMilk", "PickPlaceBread", "PickPlaceCereal", "PickPlaceCan"),
     "Stack",
+    "Stand",
     "ToolHang",
     *("TwoArmHandover", "TwoArmLift", "TwoArmPegInHole", "TwoArmTransport"),
     "WalkTo",

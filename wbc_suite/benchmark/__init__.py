@@ -8,10 +8,12 @@ from wbc_suite.benchmark.base import (
 )
 from wbc_suite.benchmark.door import Door
 from wbc_suite.benchmark.lift import Lift
+from wbc_suite.benchmark.loco_lift import LocoLift
 from wbc_suite.benchmark.nut_assembly import NutAssembly
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
 from wbc_suite.benchmark.pick_place import PickPlace
 from wbc_suite.benchmark.stack import Stack
+from wbc_suite.benchmark.stand import Stand
 from wbc_suite.benchmark.tool_hang import ToolHang
 from wbc_suite.benchmark.two_arm_handover import TwoArmHandover
 from wbc_suite.benchmark.two_arm_lift import TwoArmLift
@@ -24,11 +26,13 @@ __all__ = [
     "Benchmark",
     "Door",
     "Lift",
+    "LocoLift",
     "NutAssembly",
     "ObjectBenchmark",
     "ObjectBenchmarkConfig",
     "PickPlace",
     "Stack",
+    "Stand",
     "ToolHang",
     "TwoArmHandover",
     "TwoArmLift",
@@ -44,6 +48,7 @@ __all__ = [
 for _build, _names in (
     (Door, ("Door",)),
     (Lift, ("Lift",)),
+    (LocoLift, ("LocoLift",)),
     (
         NutAssembly,
         (
@@ -59,6 +64,7 @@ for _build, _names in (
         ),
     ),
     (Stack, ("Stack",)),
+    (Stand, ("Stand",)),
     (ToolHang, ("ToolHang",)),
     (TwoArmHandover, ("TwoArmHandover",)),
     (TwoArmLift, ("TwoArmLift",)),

@@ -12,6 +12,8 @@ from wbc_suite.benchmark.object_benchmark import Places
 from wbc_suite.control import RobotState
 from wbc_suite.errors import ConfigError
 from wbc_suite.robot import RobotDescription
+from wbc_suite.robot.shapes import Interval, SizeInterval
+from wbc_suite.scene import add_camera
 from wbc_suite.sensing.hands import pairs_in_contact
 from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Vector
@@ -37,6 +39,20 @@ class StandingConfig(FrozenModel):
     speed: PositiveFloat
     turn: PositiveFloat
     hold: PositiveInt
+
+
+class StartConfig(FrozenModel):
+    """Start of a robot before a table, drawn at each reset.
+
+    Attributes:
+        distance: Of the trunk from the table's edge, m.
+        aside: Of the trunk from the table's middle, to the left, m.
+        heading: Relative to that towards the table, rad.
+    """
+
+    distance: SizeInterval
+    aside: Interval
+    heading: Interval
 
 
 def arrange_on_feet(
@@ -72,6 +88,15 @@ def arrange_on_feet(
                 f"{name} needs {hands} hand(s); {robot.name} has {len(robot.hands)}."
             )
     return arrange_one(name, robots, configuration, places)
+
+
+def add_floor_cameras(spec: mujoco.MjSpec) -> None:
+    """Add cameras that show a robot and the floor around it."""
+    middle = (0.0, 0.0, 0.5)
+    add_camera(spec, "agentview", (4.5, -2.5, 3.2), middle)
+    add_camera(spec, "frontview", (5.5, 0.0, 2.0), middle)
+    add_camera(spec, "sideview", (0.0, -5.5, 2.0), middle)
+    add_camera(spec, "birdview", (0.0, 0.0, 9.0), (0.0, 0.0, 0.0))
 
 
 class Standing:
@@ -124,6 +149,20 @@ class Standing:
         mujoco.mju_mulQuat(quat, turn, np.array(robot.root.quat))
         self._data.qpos[self._q : self._q + 3] = x, y, robot.root.pos[2]
         self._data.qpos[self._q + 3 : self._q + 7] = quat
+
+    def start_before(
+        self, edge: tuple[float, float], start: StartConfig, rng: np.random.Generator
+    ) -> None:
+        """Draw and write the start before a table that lies towards +x.
+
+        Args:
+            edge: Middle of the table's edge, m.
+            start: What is drawn.
+            rng: Source of randomness.
+        """
+        x = edge[0] - rng.uniform(*start.distance)
+        y = edge[1] + rng.uniform(*start.aside)
+        self.place(x, y, rng.uniform(*start.heading))
 
     @property
     def position(self) -> Vector:
@@ -181,8 +220,8 @@ class Standing:
             return None
         return (
             f"{self.state.robot.name} fell: its trunk was tilted by "
-            f"{math.degrees(tilt):.0f} degrees, and {100 * sunk:.0f} cm lower than at "
-            "the start."
+            f"{math.degrees(tilt):.0f} degrees, and its height had changed by "
+            f"{-100 * sunk:.0f} cm."
         )
 
     def offset_to(self, x: float, y: float) -> tuple[float, float]:

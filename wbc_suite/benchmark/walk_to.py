@@ -13,6 +13,7 @@ from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmar
 from wbc_suite.benchmark.standing import (
     Standing,
     StandingConfig,
+    add_floor_cameras,
     arrange_on_feet,
     wrapped,
 )
@@ -20,7 +21,6 @@ from wbc_suite.control import RobotState
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.elements import Channel
 from wbc_suite.robot.shapes import Interval, Size, SizeInterval
-from wbc_suite.scene import add_camera
 from wbc_suite.scene.objects import Part, SceneObject
 from wbc_suite.sensing.reading import Reading, body_position, body_quat, computed
 from wbc_suite.tomlfile import FrozenModel
@@ -100,10 +100,7 @@ class WalkTo(ObjectBenchmark):
     def furnish(self, spec: mujoco.MjSpec) -> None:
         """Add cameras."""
         self.standing.reserve(spec)
-        add_camera(spec, "agentview", (4.5, -2.5, 3.2), (0.0, 0.0, 0.3))
-        add_camera(spec, "frontview", (5.5, 0.0, 2.0), (0.0, 0.0, 0.5))
-        add_camera(spec, "sideview", (0.0, -5.5, 2.0), (0.0, 0.0, 0.5))
-        add_camera(spec, "birdview", (0.0, 0.0, 9.0), (0.0, 0.0, 0.0))
+        add_floor_cameras(spec)
 
     def objects(self) -> Sequence[SceneObject]:
         """Return the mark: a disc with an arrow, without collisions."""
