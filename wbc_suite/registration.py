@@ -20,6 +20,7 @@ BENCHMARKS = (
     *("NutAssembly", "NutAssemblySingle", "NutAssemblySquare", "NutAssemblyRound"),
     *("PickPlace", "PickPlaceSingle"),
     *("PickPlaceMilk", "PickPlaceBread", "PickPlaceCereal", "PickPlaceCan"),
+    "Reach",
     "Stack",
     "Stand",
     "ToolHang",

@@ -12,6 +12,7 @@ from wbc_suite.benchmark.loco_lift import LocoLift
 from wbc_suite.benchmark.nut_assembly import NutAssembly
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
 from wbc_suite.benchmark.pick_place import PickPlace
+from wbc_suite.benchmark.reach import Reach
 from wbc_suite.benchmark.stack import Stack
 from wbc_suite.benchmark.stand import Stand
 from wbc_suite.benchmark.tool_hang import ToolHang
@@ -31,6 +32,7 @@ __all__ = [
     "ObjectBenchmark",
     "ObjectBenchmarkConfig",
     "PickPlace",
+    "Reach",
     "Stack",
     "Stand",
     "ToolHang",
@@ -63,6 +65,7 @@ for _build, _names in (
             *("PickPlaceMilk", "PickPlaceBread", "PickPlaceCereal", "PickPlaceCan"),
         ),
     ),
+    (Reach, ("Reach",)),
     (Stack, ("Stack",)),
     (Stand, ("Stand",)),
     (ToolHang, ("ToolHang",)),
