@@ -14,6 +14,7 @@ from importlib.machinery import ModuleSpec
 from types import ModuleType
 
 BENCHMARKS = (
+    "Carry",
     "Door",
     "Lift",
     "LocoLift",

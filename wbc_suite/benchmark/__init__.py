@@ -6,6 +6,7 @@ from wbc_suite.benchmark.base import (
     load_benchmark,
     register_benchmark,
 )
+from wbc_suite.benchmark.carry import Carry
 from wbc_suite.benchmark.door import Door
 from wbc_suite.benchmark.lift import Lift
 from wbc_suite.benchmark.loco_lift import LocoLift
@@ -25,6 +26,7 @@ from wbc_suite.benchmark.wipe import Wipe
 
 __all__ = [
     "Benchmark",
+    "Carry",
     "Door",
     "Lift",
     "LocoLift",
@@ -48,6 +50,7 @@ __all__ = [
 ]
 
 for _build, _names in (
+    (Carry, ("Carry",)),
     (Door, ("Door",)),
     (Lift, ("Lift",)),
     (LocoLift, ("LocoLift",)),

@@ -18,7 +18,7 @@ from wbc_suite.benchmark.standing import (
 )
 from wbc_suite.control import RobotState
 from wbc_suite.robot import RobotDescription
-from wbc_suite.scene import PushConfig, draw_pushes
+from wbc_suite.scene import Push, PushConfig, draw_pushes
 from wbc_suite.scene.objects import SceneObject
 from wbc_suite.sensing.reading import Reading, computed
 from wbc_suite.tomlfile import FrozenModel
@@ -71,6 +71,7 @@ class Stand(ObjectBenchmark):
         self.config = load_config(StandConfig, path)
         super().__init__(self.config)
         self.standing = Standing(self.config.standing)
+        self.pushes: Sequence[Push] = ()
 
     def arrange(
         self, robots: Sequence[RobotDescription], configuration: str
