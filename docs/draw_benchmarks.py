@@ -19,6 +19,7 @@ PAGE = HERE / "benchmark_gallery.md"
 AZIMUTH, ELEVATION = 142.0, -20.0  # degrees; 180 looks the robot in the face
 ROOM, NEAR = 4.0, 2.5  # m
 KNEE = 0.45  # m; below stand legs of tables
+SPREAD = 1.5  # m; wider scenes with tables come nearer to the camera than their middle
 SIZE = (320, 240)  # pixels; drawn twice as large: smooth edges
 COLUMNS = 3
 ROBOTS: dict[str, str | list[str]] = {
@@ -35,7 +36,11 @@ ROBOTS: dict[str, str | list[str]] = {
     "NutAssemblySquare": "TiagoDifferential",
     "NutAssemblyRound": "SpotWithArm",
     "Door": "Panda",
+    "Stand": "GR1FreeBody",
+    "Reach": "GR1FreeBody",
     "WalkTo": "Spot",
+    "Carry": "GR1FreeBody",
+    "LocoLift": "SpotWithArm",
     "Wipe": "GR1FreeBody",
     "ToolHang": "SpotWithArmFloating",
     "TwoArmLift": "Baxter",
@@ -104,7 +109,8 @@ def viewpoint(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjvCamera:
         np.abs(right[:2][::-1]) @ (high - low)[:2]
     )
     fitting = 0.48 * max(wide, tall) / np.tan(np.radians(22.5)) + 0.3
-    camera.distance = max(fitting, NEAR) + flat * 0.25 * (high - low)[0]
+    near = high[:2] - low[:2] - (0.0 if flat else SPREAD)
+    camera.distance = max(fitting, NEAR) + 0.35 * max(*near, 0.0)
     return camera
 
 
