@@ -1,5 +1,6 @@
 import math
 
+import gymnasium
 import numpy as np
 import pytest
 from feet import count, hold, lie_at, make, stand_at
@@ -98,6 +99,37 @@ def test_a_fallen_robot_ends_the_episode_and_never_succeeds(env):
         assert not info["success"]
         assert reward < 1.0
     assert "Spot fell: its trunk was tilted by" in info["failure"]
+
+
+def test_a_fall_in_one_of_several_environments_ends_that_episode_alone():
+    envs = gymnasium.make_vec(
+        "wbc_suite/WalkTo-v0",
+        num_envs=2,
+        vectorization_mode="vector_entry_point",
+        robots="Spot",
+        controller_configs="WHOLE_BODY_ID",
+    )
+    envs.reset(seed=0)
+    lie_at(envs.envs[0], 0.0, 0.0)
+    actions = np.stack([env.hold_action for env in envs.envs])
+    _, _, terminated, _, infos = envs.step(actions)
+    assert terminated.tolist() == [True, False]
+    assert infos["_failure"].tolist() == [True, False]
+    assert "Spot fell" in infos["failure"][0]
+    *_, terminated, _, infos = envs.step(actions)  # the next episode begins
+    assert terminated.tolist() == [False, False]
+    assert "failure" not in infos
+    envs.close()
+
+
+def test_a_state_is_continued_with_its_count(env):
+    env.reset(seed=0)
+    for _ in range(30):
+        env.step(env.hold_action)
+    saved, memory = env.get_state(), env.simulation.data.userdata.copy()
+    env.reset(seed=1)
+    env.set_state(saved)
+    np.testing.assert_array_equal(env.simulation.data.userdata, memory)
 
 
 def test_a_stop_that_is_interrupted_counts_anew(env):
