@@ -8,9 +8,8 @@ import numpy as np
 import wbc_suite
 
 FAR = 0.6  # m; from here on the robot looks where it walks
-GAIN = np.array([1.0, 1.0, 1.0])  # 1/s
 THERE = 0.05  # m, rad; a robot that is so near stands still
-SLOWLY = np.array([0.5, 0.3, 0.5])  # m/s, m/s, rad/s: of what the robot may
+FASTEST = np.array([0.5, 0.3, 0.5])  # m/s, m/s, rad/s
 
 
 def walk_command(forward: float, left: float, turn: float) -> np.ndarray:
@@ -21,8 +20,8 @@ def walk_command(forward: float, left: float, turn: float) -> np.ndarray:
     if math.hypot(forward, left) > FAR:
         turn = ahead
         if abs(ahead) > 0.5:
-            return np.clip([0.0, 0.0, turn], -SLOWLY, SLOWLY)
-    return np.clip(GAIN * [forward, left, turn], -SLOWLY, SLOWLY)
+            return np.clip([0.0, 0.0, turn], -FASTEST, FASTEST)
+    return np.clip([forward, left, turn], -FASTEST, FASTEST)
 
 
 def main() -> None:
