@@ -19,6 +19,7 @@ PAGE = HERE / "benchmark_gallery.md"
 AZIMUTH, ELEVATION = 142.0, -20.0  # degrees; 180 looks the robot in the face
 ROOM, NEAR = 4.0, 2.5  # m
 KNEE = 0.45  # m; below stand legs of tables
+SPREAD = 1.5  # m; wider scenes with tables come nearer to the camera than their middle
 SIZE = (320, 240)  # pixels; drawn twice as large: smooth edges
 COLUMNS = 3
 ROBOTS: dict[str, str | list[str]] = {
@@ -35,6 +36,11 @@ ROBOTS: dict[str, str | list[str]] = {
     "NutAssemblySquare": "TiagoDifferential",
     "NutAssemblyRound": "SpotWithArm",
     "Door": "Panda",
+    "Stand": "GR1FreeBody",
+    "Reach": "GR1FreeBody",
+    "WalkTo": "Spot",
+    "Carry": "GR1FreeBody",
+    "LocoLift": "SpotWithArm",
     "Wipe": "GR1FreeBody",
     "ToolHang": "SpotWithArmFloating",
     "TwoArmLift": "Baxter",
@@ -47,8 +53,9 @@ ROBOTS: dict[str, str | list[str]] = {
 HEAD = """# Benchmarks
 
 Each is `wbc_suite.make(NAME, robots=...)`, or `wbc_suite/NAME-v0` for gymnasium, and
-works with every robot that has enough hands. Parameters are in `tasks/`, formulas of
-success and reward in `wbc_suite/benchmark/`. Written by `make gallery`.
+works with every robot that has enough hands, or feet where it walks. Parameters are in
+`tasks/`, formulas of success and reward in `wbc_suite/benchmark/`. Written by
+`make gallery`.
 """
 
 
@@ -84,7 +91,7 @@ def draw(name: str) -> None:
 
 
 def viewpoint(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjvCamera:
-    """Return a camera that sees everything from knee height up."""
+    """Return a camera that sees everything, and tall scenes from knee height up."""
     shown = (model.geom_group < 3) & (model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE)
     centers, half = np.split(model.geom_aabb[shown], 2, axis=1)
     turns = data.geom_xmat[shown].reshape(-1, 3, 3)
@@ -92,7 +99,8 @@ def viewpoint(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjvCamera:
     reach = np.einsum("gij,gj->gi", np.abs(turns), half)
     here = np.linalg.norm(middles, axis=1) < ROOM  # what is not used stands far off
     low, high = (middles - reach)[here].min(0), (middles + reach)[here].max(0)
-    low[2] = KNEE
+    flat = high[2] < 2 * KNEE
+    low[2] = 0.0 if flat else KNEE
     camera = mujoco.MjvCamera()
     camera.lookat[:] = 0.5 * (low + high)
     camera.azimuth, camera.elevation = AZIMUTH, ELEVATION
@@ -102,7 +110,8 @@ def viewpoint(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjvCamera:
         np.abs(right[:2][::-1]) @ (high - low)[:2]
     )
     fitting = 0.48 * max(wide, tall) / np.tan(np.radians(22.5)) + 0.3
-    camera.distance = max(fitting, NEAR)
+    near = high[:2] - low[:2] - (0.0 if flat else SPREAD)
+    camera.distance = max(fitting, NEAR) + 0.35 * max(*near, 0.0)
     return camera
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, field_validator
 
+from wbc_suite.scene import Push, PushConfig, draw_pushes
 from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Array
 
@@ -44,6 +45,8 @@ class Randomisation(FrozenModel):
         gains: Share for each actuator's force.
         latency: Least and greatest delay of actions, s, constant in an episode; delayed
             actions wait in a queue.
+        pushes: Pushes on the first link of each robot, such as the trunk of one that
+            stands on its feet.
     """
 
     color: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
@@ -60,6 +63,7 @@ class Randomisation(FrozenModel):
     armature: Share = 0.0
     gains: Share = 0.0
     latency: tuple[NonNegativeFloat, NonNegativeFloat] = (0.0, 0.0)
+    pushes: PushConfig | None = None
 
     @field_validator("latency")
     @classmethod
@@ -111,7 +115,7 @@ class BoundRandomisation:
         """Restore the nominal values."""
         for name, values in self._nominal.items():
             getattr(self._model, name)[:] = values
-        self._env.latency = 0
+        self._env.latency, self._env.pushes = 0, ()
         self._upload_textures()
 
     def apply(self, rng: np.random.Generator) -> None:
@@ -122,7 +126,17 @@ class BoundRandomisation:
         if most:
             delay = rng.uniform(least, most)
             self._env.latency = round(delay / self._env.simulation.timestep)
+        if self._amounts.pushes is not None:
+            self._env.pushes = self._pushes(self._amounts.pushes, rng)
         self._upload_textures()
+
+    def _pushes(self, config: PushConfig, rng: np.random.Generator) -> tuple[Push, ...]:
+        until = self._env.horizon / self._env.config.control_freq
+        pushes: list[Push] = []
+        for state in self._env.simulation.robots:
+            body = self._model.body(state.prefix + state.robot.links[0].name).id
+            pushes += draw_pushes(config, rng, body=body, until=until)
+        return tuple(pushes)
 
     def _upload_textures(self) -> None:
         if self._amounts.texture:

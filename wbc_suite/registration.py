@@ -13,14 +13,19 @@ from importlib.machinery import ModuleSpec
 from types import ModuleType
 
 BENCHMARKS = (
+    "Carry",
     "Door",
     "Lift",
+    "LocoLift",
     *("NutAssembly", "NutAssemblySingle", "NutAssemblySquare", "NutAssemblyRound"),
     *("PickPlace", "PickPlaceSingle"),
     *("PickPlaceMilk", "PickPlaceBread", "PickPlaceCereal", "PickPlaceCan"),
+    "Reach",
     "Stack",
+    "Stand",
     "ToolHang",
     *("TwoArmHandover", "TwoArmLift", "TwoArmPegInHole", "TwoArmTransport"),
+    "WalkTo",
     "Wipe",
 )
 """Benchmarks with an id, `wbc_suite/{name}-v0`."""

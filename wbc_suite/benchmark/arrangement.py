@@ -14,18 +14,19 @@ from wbc_suite.scene import place_robot
 T = TypeVar("T")
 
 
-def _with_default(values: dict[str, Any]) -> dict[str, Any]:
+def with_default(values: dict[str, Any]) -> dict[str, Any]:
+    """Check that there is an entry named `default`."""
     if "default" not in values:
         raise ValueError("an entry named 'default' is needed")
     return values
 
 
 Places: TypeAlias = Annotated[
-    dict[str, tuple[Real, Real]], AfterValidator(_with_default)
+    dict[str, tuple[Real, Real]], AfterValidator(with_default)
 ]
 """Position of each robot, m; `default` is that of all others."""
 
-Opposed: TypeAlias = Annotated[dict[str, PositiveFloat], AfterValidator(_with_default)]
+Opposed: TypeAlias = Annotated[dict[str, PositiveFloat], AfterValidator(with_default)]
 """Distance of each of two opposed robots from the middle, m; `default` likewise."""
 
 

@@ -12,6 +12,7 @@ from wbc_suite.catalogue import Catalogue
 from wbc_suite.control import RobotState
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.robot import RobotDescription
+from wbc_suite.scene import Push
 from wbc_suite.sensing.reading import Reading
 from wbc_suite.tomlfile import parse_model, read_toml
 
@@ -25,12 +26,14 @@ class Benchmark(Protocol):
         horizon: Default number of actions in an episode.
         robots: Default robots.
         gripper: Default gripper of the robots; None for their own.
+        pushes: Forces on bodies in this episode, drawn at a reset.
     """
 
     name: str
     horizon: int
     robots: Sequence[str]
     gripper: str | None
+    pushes: Sequence[Push]
 
     def arrange(
         self, robots: Sequence[RobotDescription], configuration: str
@@ -82,6 +85,10 @@ class Benchmark(Protocol):
 
     def success(self) -> bool:
         """Whether the task is solved now."""
+        ...
+
+    def failure(self) -> str | None:
+        """Return why the task cannot be solved any more, or None; ends the episode."""
         ...
 
     def reward(self, *, shaped: bool, success: bool | None = None) -> float:

@@ -19,6 +19,7 @@ from wbc_suite.benchmark.arrangement import (
 from wbc_suite.control import RobotState
 from wbc_suite.errors import PlacementError
 from wbc_suite.robot import RobotDescription
+from wbc_suite.scene import Push
 from wbc_suite.scene.objects import ObjectState, SceneObject
 from wbc_suite.scene.placement import Placed, Sampler
 from wbc_suite.sensing.hands import hands_of, pairs_in_contact
@@ -77,6 +78,7 @@ class ObjectBenchmark(ABC):
     robots: Sequence[str] = ("Panda",)
     gripper: str | None = None
     needs_gripper = True
+    pushes: Sequence[Push] = ()
 
     def __init__(self, config: ObjectBenchmarkConfig) -> None:
         self.name, self.horizon, self._placement = config.name, config.horizon, config
@@ -176,6 +178,10 @@ class ObjectBenchmark(ABC):
 
     def after_step(self) -> None:  # noqa: B027 - most benchmarks have no memory
         """Update the benchmark's own state after a control period: there is none."""
+
+    def failure(self) -> str | None:
+        """Return None: most tasks can be solved until the horizon."""
+        return None
 
     def observables(self) -> dict[str, Reading]:
         """Return the pose of each object (x y z w) and its offset from each hand.

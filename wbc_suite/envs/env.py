@@ -26,6 +26,8 @@ from wbc_suite.envs.building import (
 from wbc_suite.envs.config import EnvArguments, checked_seed, parse_env_config
 from wbc_suite.envs.states import EnvState, write_physics, write_scene
 from wbc_suite.errors import ConfigError, PhysicsError
+from wbc_suite.scene import Push
+from wbc_suite.scene.pushes import PushSchedule
 from wbc_suite.sensing.observation_buffer import ObservationBuffer
 from wbc_suite.typing import Vector
 
@@ -54,6 +56,7 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
             with `reset_to`; with the actions they determine the episode.
         latency: Physics steps between a step's begin and its action taking effect; may
             exceed a control period.
+        pushes: Forces on bodies in this episode, besides those of the benchmark.
     """
 
     metadata = {"render_modes": ["human", "rgb_array", "depth_array"], "render_fps": 20}
@@ -84,6 +87,7 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         self.metadata = {**self.metadata, "render_fps": round(self.config.control_freq)}
         self.horizon = self.config.horizon or self.benchmark.horizon
         self._steps, self._broken, self.latency = 0, "", 0
+        self.pushes: tuple[Push, ...] = ()
         given = self.config.randomisation
         self._randomiser = None if given is None else given.bind(self)
         self._start(np.random.default_rng(0))
@@ -113,6 +117,9 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
             ActionError: If the action has a wrong shape or type, or is not finite; then
                 nothing has changed.
             PhysicsError: If the last step ended in one and `reset` was not called.
+
+        Where the benchmark says that it has failed, such as by a fall, the episode is
+        terminated, and `info["failure"]` says why.
         """
         reward, terminated, truncated, info = self.advance(action)
         if self.render_mode == "human":
@@ -147,6 +154,9 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         )
         info = self._info(clipped, success)
         terminated = self.config.terminate_on_success and success
+        failure = self.benchmark.failure()
+        if failure is not None:
+            info["failure"], terminated = failure, True
         truncated = self._steps >= self.horizon
         return reward * self.config.reward_scale, terminated, truncated, info
 
@@ -273,6 +283,8 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         if placed is not None:
             write_physics(simulation.model, simulation.data, placed)
         simulation.start()
+        pushes = *self.benchmark.pushes, *self.pushes
+        self._schedule = PushSchedule(pushes, simulation.data, simulation.timestep)
         self._steps, self._broken = 0, ""
         self.observables.start(rng)
 
@@ -284,19 +296,20 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         while self._waiting and self._waiting[0][0] < end:
             due, action = self._waiting.popleft()
             if due > now:
-                self._step_physics(due - now)
+                self._step_physics(now, due)
                 now = due
             self._set_goals(action)
-        self._step_physics(end - now)
+        self._step_physics(now, end)
 
-    def _step_physics(self, n: int) -> None:
-        """Advance n physics steps; changed observations are sampled after each."""
-        if not self.observables.follows_physics:
-            self.simulation.tick(n)
-            return
-        for _ in range(n):
-            self.simulation.tick(1)
-            self.observables.sample()
+    def _step_physics(self, first: int, last: int) -> None:
+        """Advance physics steps; changed observations are sampled after each."""
+        for n in self._schedule.spans(first, last):
+            if not self.observables.follows_physics:
+                self.simulation.tick(n)
+                continue
+            for _ in range(n):
+                self.simulation.tick(1)
+                self.observables.sample()
 
     def _set_goals(self, action: Vector) -> None:
         start, period = 0, 1.0 / self.config.control_freq

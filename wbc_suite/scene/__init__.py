@@ -17,8 +17,11 @@ from wbc_suite.scene.compose import (
     place_robot,
     robot_prefix,
 )
+from wbc_suite.scene.pushes import Push, PushConfig, draw_pushes
 
 __all__ = [
+    "Push",
+    "PushConfig",
     "TableConfig",
     "add_camera",
     "add_robot_view",
@@ -28,6 +31,7 @@ __all__ = [
     "aim_robot_view",
     "attach_robot",
     "compile_scene",
+    "draw_pushes",
     "empty_arena",
     "fix_to_frame",
     "place_robot",

@@ -1,0 +1,138 @@
+"""Stand: stay on the feet while pushes act on the trunk."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
+
+from wbc_suite.benchmark.base import load_config
+from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
+from wbc_suite.benchmark.standing import (
+    Standing,
+    StandingConfig,
+    add_floor_cameras,
+    arrange_on_feet,
+)
+from wbc_suite.control import RobotState
+from wbc_suite.robot import RobotDescription
+from wbc_suite.scene import Push, PushConfig, draw_pushes
+from wbc_suite.scene.objects import SceneObject
+from wbc_suite.sensing.reading import Reading, computed
+from wbc_suite.tomlfile import FrozenModel
+from wbc_suite.typing import Vector
+
+
+class RewardConfig(FrozenModel):
+    """Numbers of the reward; see `Stand.progress`."""
+
+    upright: NonNegativeFloat
+    rest: NonNegativeFloat
+    speed_scale: PositiveFloat
+
+    @model_validator(mode="after")
+    def _stays_below_one(self) -> "RewardConfig":
+        if self.upright + self.rest >= 1.0:
+            raise ValueError("upright + rest is below 1")
+        return self
+
+
+class StandConfig(ObjectBenchmarkConfig):
+    """`tasks/stand.toml`.
+
+    Attributes:
+        standing: Falls and rest.
+        pushes: Pushes on the trunk.
+        until: When the last push has ended, s from the start.
+        actions: Actions before a success; the pushes end earlier.
+        reward: Numbers of the reward.
+    """
+
+    standing: StandingConfig
+    pushes: PushConfig
+    until: PositiveFloat
+    actions: PositiveInt
+    reward: RewardConfig
+
+
+class Stand(ObjectBenchmark):
+    """The robot is to withstand pushes from random directions, and to come to rest.
+
+    Args:
+        path: `tasks/stand.toml`, or a file of the same form.
+    """
+
+    robots: Sequence[str] = ("GR1FreeBody",)
+    needs_gripper = False
+
+    def __init__(self, path: Path) -> None:
+        self.config = load_config(StandConfig, path)
+        super().__init__(self.config)
+        self.standing = Standing(self.config.standing)
+        self.pushes: Sequence[Push] = ()
+
+    def arrange(
+        self, robots: Sequence[RobotDescription], configuration: str
+    ) -> tuple[RobotDescription, ...]:
+        """Return the robot; see `arrange_on_feet`."""
+        return arrange_on_feet(self.name, robots, configuration, self.config.places)
+
+    def furnish(self, spec: mujoco.MjSpec) -> None:
+        """Add cameras."""
+        self.standing.reserve(spec)
+        self._entry = spec.nuserdata
+        spec.nuserdata += 1
+        add_floor_cameras(spec)
+
+    def objects(self) -> Sequence[SceneObject]:
+        """Return no objects."""
+        return []
+
+    def bind(
+        self, model: mujoco.MjModel, data: mujoco.MjData, robots: Sequence[RobotState]
+    ) -> None:
+        """Look up the robot."""
+        super().bind(model, data, robots)
+        self.standing.bind(model, data, robots[0])
+        self._taken: Vector = data.userdata[self._entry : self._entry + 1]
+
+    def reset(self, rng: np.random.Generator) -> None:
+        """Draw the pushes."""
+        config, body = self.config, self.standing.trunk
+        self.pushes = draw_pushes(config.pushes, rng, body=body, until=config.until)
+
+    def observables(self) -> dict[str, Reading]:
+        """Return the share of the actions that are taken, `progress`."""
+        share = 1.0 / self.config.actions
+        return {"progress": computed(1, lambda: min(share * self._taken.item(0), 1.0))}
+
+    def after_step(self) -> None:
+        """Note a fall, and how long the robot has rested after all actions."""
+        self._taken[0] += 1.0
+        done = self._taken[0] > self.config.actions - self.config.standing.hold
+        self.standing.observe(done and self.standing.rests)
+
+    def success(self) -> bool:
+        """Whether the robot has not fallen in all actions and rests on its feet now."""
+        return self.standing.held
+
+    def failure(self) -> str | None:
+        """Return how the robot has fallen, or None."""
+        return self.standing.fall()
+
+    def progress(self) -> float:
+        """Return the shaped reward.
+
+        With the tilt t and the speed v of the trunk, it is 0 after a fall, and else
+
+            upright max(cos t, 0) + rest (1 - tanh(speed_scale v))
+        """
+        numbers, standing = self.config.reward, self.standing
+        if standing.fall() is not None:
+            return 0.0
+        still = 1.0 - math.tanh(numbers.speed_scale * standing.speed)
+        return (
+            numbers.upright * max(math.cos(standing.tilt), 0.0) + numbers.rest * still
+        )
