@@ -23,7 +23,13 @@ from wbc_suite.cli.options import (
     camera_arguments,
     environment_arguments,
 )
-from wbc_suite.cli.teleop import ONE_DAY, device_maker, drive, stages_of
+from wbc_suite.cli.teleop import (
+    ONE_DAY,
+    device_maker,
+    drive,
+    stages_of,
+    targets_in_world,
+)
 
 if TYPE_CHECKING:
     from wbc_suite.wrappers import DataCollection
@@ -92,9 +98,9 @@ def record(
 
     by_hand = is_device(device)
     rate = rate or (BY_HAND if by_hand else BY_POLICY)
-    controller = controller or ("WHOLE_BODY_IK" if by_hand else None)
+    config = targets_in_world(controller, robots or ["Panda"]) if by_hand else None
     arguments = environment_arguments(
-        robots=robots, controller=controller, gripper=gripper, base=base
+        robots=robots, controller=config or controller, gripper=gripper, base=base
     )
     arguments |= camera_arguments(camera, size) | {"control_freq": rate}
     if horizon or by_hand:

@@ -33,7 +33,11 @@ DeviceMaker = Callable[["gymnasium.Env[Any, Any]"], "Device"]
 
 
 WholeBodyOption = Annotated[
-    str, typer.Option(help="Whole-body controller, by name or TOML file.")
+    str | None,
+    typer.Option(
+        help="Whole-body controller, by name or TOML file. Default: WHOLE_BODY_ID for "
+        "robots that walk, else WHOLE_BODY_IK."
+    ),
 ]
 TargetRateOption = Annotated[
     float, typer.Option(help="Targets taken per second, Hz.", min=5.0, max=200.0)
@@ -54,7 +58,7 @@ RecordOption = Annotated[
 def teleop(
     benchmark: Annotated[str, typer.Argument(help="Benchmark to play in.")] = "Lift",
     robots: Annotated[str, typer.Option(help="Robot.")] = "GR1",
-    controller: WholeBodyOption = "WHOLE_BODY_IK",
+    controller: WholeBodyOption = None,
     rate: TargetRateOption = 100.0,
     gripper: GripperOption = None,
     base: BaseOption = None,
@@ -80,7 +84,7 @@ def teleop(
     env: gymnasium.Env[Any, Any] = wbc_suite.make(
         benchmark,
         robots=robots,
-        controller_configs=controller,
+        controller_configs=targets_in_world(controller, [robots]),
         gripper_types=chosen(gripper),
         base_types=base,
         control_freq=rate,
@@ -105,6 +109,24 @@ def teleop(
         )
     finally:
         env.close()
+
+
+def targets_in_world(controller: str | None, robots: list[str]) -> Any:
+    """Return a whole-body controller whose targets are poses in the world.
+
+    Of several robots all have the named one, or WHOLE_BODY_IK.
+    """
+    from wbc_suite.control import default_composite, load_composite_controller_config
+    from wbc_suite.robot import load_robot
+
+    walks, one = "WHOLE_BODY_ID", len(robots) == 1
+    if controller is None:
+        walking = one and default_composite(load_robot(robots[0])) == walks
+        controller = walks if walking else "WHOLE_BODY_IK"
+    if controller.upper() != walks or not one:
+        return controller
+    config = load_composite_controller_config(controller, robots[0])
+    return config | {"input_ref_frame": "world"}
 
 
 def device_maker(name: str, pairs: list[str] | None) -> DeviceMaker:
