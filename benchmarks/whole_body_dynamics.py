@@ -29,7 +29,7 @@ PUSH = 0.1  # s
 ACTION = 0.02  # s between two actions
 SETTLED = 1.0  # s after which errors count
 COLUMNS = ("trials", "survived", "travelled_m", "drift_m", "turned_deg", "slip_mm")
-COLUMNS += ("hand_median_mm", "hand_worst_mm", "unsolved_per_s")
+COLUMNS += ("hand_median_mm", "hand_worst_mm", "torque_change_nm", "unsolved_per_s")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,6 +58,11 @@ class Case:
     mass: float = 1.0
     damping: float = 0.0  # N m s
     jitter: float = 0.01  # rad; of the posture at the start
+    period: float = ACTION  # s between two actions
+    timestep: float = 0.002  # s
+    delay: int = 0  # actions; from the command to its effect
+    noise: float = 0.0  # rad/s; of measured joint velocities
+    cutoff: float | None = None  # Hz; of the filter of velocities
     most: dict[str, float] = field(default_factory=dict)  # what is asked for
 
     @property
@@ -119,6 +124,15 @@ def cases() -> list[Case]:
             add(robot, "hand/load", load=2.0, in_world=True)
             add(robot, "hand/march", walk=(0.0, 0.0, 0.0011), in_world=True)
             add(robot, "hand/far", far_goals=True, seconds=5.0)
+        go = {"walk": (0.5 * v, 0.0, 0.0)}
+        add(robot, "rate/action_1khz", period=0.001, timestep=0.001, **go)
+        add(robot, "rate/step_1ms", timestep=0.001, **go)
+        add(robot, "rate/step_4ms", timestep=0.004, **go)
+        add(robot, "rate/delay_20ms", delay=1, **go)
+        add(robot, "noise/0.05", noise=0.05, **go)
+        for cutoff in (None, 25.0):
+            name = "noise/0.02" + ("/filtered" if cutoff else "")
+            add(robot, name, noise=0.02, cutoff=cutoff, **go)
     add(GR1, "hand/walk_loaded", walk=(0.3, 0.0, 0.0), load=5.0, seconds=10.0)
     return found
 
@@ -131,6 +145,8 @@ class Trial:
         config = load_composite_controller_config("WHOLE_BODY_ID", case.robot)
         config["input_ref_frame"] = "world" if case.in_world else "base"
         config["gait"] = {**config["gait"], "recover": case.recover}
+        if case.cutoff is not None:
+            config["velocity_cutoff"] = case.cutoff
         self.stand = Stand(case.robot, config, self._edit)
         self._change_model()
         self.at = case.at + seed % 8 / 8.0
@@ -145,9 +161,12 @@ class Trial:
         self.command, self.force = np.zeros(3), np.zeros(2)
         self.goals = self.stand.controller.hold_action
         self.errors: list[float] = []
+        self.changes: list[float] = []
+        self.waiting = [self.goals] * case.delay
         self.yaw, self.slip = 0.0, 0.0
 
     def _edit(self, spec: mujoco.MjSpec) -> None:
+        spec.option.timestep = self.case.timestep
         if self.case.boxes:
             rng = np.random.default_rng(0)
             for x in np.arange(0.8, 16.0, 0.25):
@@ -181,7 +200,7 @@ class Trial:
     def _act(self, t: float) -> None:
         case, controller = self.case, self.stand.controller
         layout, action = controller.layout, self.goals.copy()
-        if case.random_commands and round(t / ACTION) % 100 == 0:
+        if case.random_commands and round(t / case.period) % 100 == 0:
             most = np.array([0.3, 0.15, 0.4] if case.robot == GR1 else [0.8, 0.3, 0.8])
             self.command = self.rng.uniform(-most, most)
         walk = layout["walk"]
@@ -202,8 +221,23 @@ class Trial:
                 action[part.start : part.start + 3] += (
                     2.0 * direction / np.linalg.norm(direction)
                 )
+        self.waiting.append(action)
+        action = self.waiting.pop(0)
         self.action = action  # references arrive a period later: errors are of those
-        controller.set_goal(layout.clip(layout.check(action))[0], ACTION)
+        controller.set_goal(layout.clip(layout.check(action))[0], case.period)
+
+    def _advance(self, steps: int) -> None:
+        """Make physics steps; the velocities of each are measured with noise."""
+        case, stand = self.case, self.stand
+        if case.noise == 0.0:
+            stand.simulation.tick(steps)
+            return
+        error = self.arrays.velocity_error
+        for _ in range(steps):
+            error[6:] = self.rng.normal(0.0, case.noise, len(error) - 6)
+            before = stand.data.ctrl.copy()
+            stand.simulation.tick(1)
+            self.changes.append(float(np.abs(stand.data.ctrl - before).max()))
 
     def _disturb(self, t: float) -> None:
         case, data = self.case, self.stand.data
@@ -217,7 +251,7 @@ class Trial:
         if case.push is not None and self.at <= t < self.at + PUSH:
             data.xfrc_applied[self.body, :3] = case.push
         if case.pushes is not None and t > 2.0:
-            if t % 3.0 < ACTION:
+            if t % 3.0 < case.period:
                 angle = self.rng.uniform(0.0, 2.0 * np.pi)
                 self.force = self.rng.uniform(*case.pushes) * np.array(
                     [np.cos(angle), np.sin(angle)]
@@ -252,13 +286,13 @@ class Trial:
     def run(self) -> dict[str, Any]:
         """Return what happened."""
         stand, case = self.stand, self.case
-        steps = round(ACTION / stand.model.opt.timestep)
-        i, planned = 0, round(case.seconds / ACTION)
+        steps = round(case.period / stand.model.opt.timestep)
+        i, planned = 0, round(case.seconds / case.period)
         while i < planned:
-            t = i * ACTION
+            t = i * case.period
             self._act(t)
             self._disturb(t)
-            stand.simulation.tick(steps)
+            self._advance(steps)
             self._observe(t)
             trunk = stand.data.xpos[self.body]
             low = trunk[2] < self.first[2] + min(case.height, 0.0) - DROPPED
@@ -267,7 +301,7 @@ class Trial:
             if stand.data.xmat[self.body][8] < TILTED:
                 break
             i += 1
-        return self._found(i * ACTION)
+        return self._found(i * case.period)
 
     def _found(self, seconds: float) -> dict[str, Any]:
         data, case = self.stand.data, self.case
@@ -288,6 +322,8 @@ class Trial:
             "turned": float(np.degrees(self.yaw)),
             "slip": 1e3 * float(slip) if steps == 0 else np.nan,
             "hand": errors,
+            "change": float(np.median(self.changes)) if self.changes else np.nan,
+            "reported": self.arrays.state["fell"][0] >= 0.0,
             "unsolved": int(self.arrays.state["unsolved"][0]) / max(seconds, 1e-9),
         }
 
@@ -317,6 +353,8 @@ def summary(case: Case, trials: list[dict[str, Any]]) -> dict[str, Any]:
         "slip_mm": worst("slip"),
         "hand_median_mm": float(np.median(hands)) if np.isfinite(hands).all() else None,
         "hand_worst_mm": float(hands.max()) if np.isfinite(hands).all() else None,
+        "torque_change_nm": worst("change"),
+        "false_alarms": sum(trial["reported"] for trial in survived),
         "unsolved_per_s": float(np.median([trial["unsolved"] for trial in trials])),
     }
 

@@ -8,7 +8,9 @@ import pinocchio as pin
 import pytest
 
 import wbc_suite
+from wbc_suite.cli.teleop import default_controller
 from wbc_suite.control import load_composite_controller_config
+from wbc_suite.control.composite.balance_report import FallCause
 from wbc_suite.control.composite.whole_body_dynamics_config import (
     default_dynamics_config,
 )
@@ -16,7 +18,9 @@ from wbc_suite.control.dynamics.arrays import EDGES
 from wbc_suite.control.dynamics.fallback import QpFallback
 from wbc_suite.control.dynamics.terms import write_frame_terms
 from wbc_suite.control.loop.physics import bind_physics
+from wbc_suite.control.reasons import Contact, InMotion
 from wbc_suite.errors import ConfigError
+from wbc_suite.qp import ActiveLimit, OutOfReach
 from wbc_suite.qp.solution import Fallback
 from wbc_suite.robot import load_robot
 
@@ -224,12 +228,63 @@ def test_gr1_steps_when_it_is_pushed(alone, push):
     assert walker.data.xmat[walker.link][8] > 0.98
 
 
-def test_a_fall_is_told_and_torques_stay_finite(alone):
-    walker, torques = Walker(alone, "GR1FreeBody").act(0.7), []
-    walker.act(0.1, push=(1500, 900, 0))
-    walker.act(1.5, each=lambda: torques.append(walker.data.ctrl.copy()))
+@pytest.mark.parametrize("push", [(1500, 900, 0), (0, 0, -6000)])
+def test_a_fall_is_reported_before_the_trunk_has_dropped_20_cm(alone, push):
+    walker, torques, told = Walker(alone, "GR1FreeBody").act(0.7), [], []
+    start = float(walker.data.xpos[walker.link][2])
+
+    def note():
+        torques.append(walker.data.ctrl.copy())
+        if walker.balance["fell"] is not None and not told:
+            told.append(start - walker.data.xpos[walker.link][2])
+
+    walker.act(0.1, push=push, each=note).act(1.5, each=note)
     assert np.isfinite(torques).all()
-    assert "fell" in walker.balance["fell"]
+    fall = walker.balance["fell"]
+    assert fall.drop < 0.2
+    assert told[0] < (0.2 if push[2] == 0 else 0.4)  # seen every 20 ms, at 8 m/s
+    low = fall.drop > 0.15
+    assert low == (fall.cause is FallCause.HEIGHT)
+    assert ("too low" in str(fall)) == low
+    assert (fall.tilt > np.deg2rad(53.0)) == (not low)
+
+
+def test_loads_of_feet_are_the_forces_of_the_simulation(standing):
+    forces = [standing.balance["loads"][foot] for foot in standing.balance["stance"]]
+    weight = 9.81 * standing.model.body_subtreemass[standing.link]
+    np.testing.assert_allclose(
+        np.sum(forces, axis=0), [0, 0, weight], atol=0.02 * weight
+    )
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_a_hand_out_of_reach_is_reported_with_its_reason(alone, name):
+    walker = Walker(alone, name).act(0.2)
+    hand = walker.controller.info(walker.state)["ik"]["frames"]["right_hand"]
+    assert hand["reached"]
+    action = walker.controller.hold_action
+    part = walker.controller.layout["right_hand"]
+    action[part.start : part.start + 3] += [1.5, 0.0, 0.5]
+    walker.controller.set_goal(action, 0.02)
+    walker.simulation.tick(100)
+    report = walker.controller.info(walker.state)["ik"]
+    assert InMotion() in report["frames"]["right_hand"]["reasons"]
+    walker.simulation.tick(4000)
+    report = walker.controller.info(walker.state)["ik"]
+    assert not report["reached"]
+    reasons = report["frames"]["right_hand"]["reasons"]
+    assert any(isinstance(r, ActiveLimit | OutOfReach) for r in reasons), reasons
+    assert walker.balance["fell"] is None
+
+
+def test_robots_with_a_file_walk_by_default():
+    found = {
+        name: load_composite_controller_config(robot=name)["type"]
+        for name in ("GR1FreeBody", "Spot", "SpotWithArm", "GR1", "SpotWithArmFloating")
+    }
+    assert list(found.values()) == ["WHOLE_BODY_ID"] * 3 + ["WHOLE_BODY_IK"] * 2
+    assert default_controller("Spot") == "WHOLE_BODY_ID"
+    assert default_controller("Spot", "GR1") == "WHOLE_BODY_IK"
 
 
 def test_a_load_in_the_hands_is_observed_and_held(alone):
@@ -238,7 +293,8 @@ def test_a_load_in_the_hands_is_observed_and_held(alone):
     walker.data.xfrc_applied[hands, 2] = -2.0 * 9.81
     before = walker.data.site_xpos[walker.body.hand].copy()
     walker.act(2.5)
-    for load in walker.balance["loads"].values():
+    for hand in ("right_hand", "left_hand"):
+        load = walker.balance["loads"][hand]
         np.testing.assert_allclose(load, [0.0, 0.0, -2.0 * 9.81], atol=2.0)
     moved = walker.data.site_xpos[walker.body.hand] - before
     np.testing.assert_allclose(moved, 0.0, atol=2e-3)
@@ -325,3 +381,61 @@ def test_an_environment_walks(alone):
     assert info["balance"]["fell"] is None
     assert EDGES == 4
     env.close()
+
+
+@pytest.mark.slow
+def test_spots_hand_reaches_a_place_over_the_cube_and_reports_what_it_touches():
+    config = load_composite_controller_config("WHOLE_BODY_ID", "SpotWithArm")
+    config["input_ref_frame"] = "world"
+    env = wbc_suite.make("Lift", robots="SpotWithArm", controller_configs=config)
+    env.reset(seed=0)
+    data, action = env.simulation.data, env.hold_action
+    goal = data.body("cube").xpos + np.array([0.0, 0.0, 0.08])
+    start = env.action_layout["right_hand"].start
+    action[start : start + 3] = goal
+    for _ in range(100):
+        *_, info = env.step(action)
+    hand = data.site(int(env.controllers[0].dynamics.hand[0])).xpos
+    assert np.linalg.norm(hand - goal) < 2e-3
+    assert info["ik"]["frames"]["right_hand"]["position_error"] < 2e-3
+    action[start + 2] -= 0.08
+    for _ in range(40):
+        *_, info = env.step(action)
+    reasons = info["ik"]["frames"]["right_hand"]["reasons"]
+    assert {r.other for r in reasons if isinstance(r, Contact)} & {"table", "cube"}
+    assert info["balance"]["fell"] is None
+    env.close()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ROBOTS)
+def test_filtered_velocities_keep_torques_smooth_in_noise(alone, name):
+    medians = {}
+    for cutoff in (None, 25.0):
+        walker = Walker(alone, name, velocity_cutoff=cutoff)
+        rng, changes, noise = np.random.default_rng(0), [], walker.body.velocity_error
+        layout, hold = walker.controller.layout, walker.controller.hold_action
+        walker.controller.set_goal(layout.pack({"walk": [0.2, 0.0, 0.0]}, base=hold))
+        for _ in range(1500):
+            noise[6:] = rng.normal(0.0, 0.02, len(noise) - 6)
+            before = walker.data.ctrl.copy()
+            walker.simulation.tick(1)
+            changes.append(np.abs(walker.data.ctrl - before).max())
+        assert walker.balance["fell"] is None
+        assert walker.data.qpos[0] > 0.1
+        medians[cutoff] = np.median(changes)
+    assert medians[25.0] < min(2.0, medians[None])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("push", [(250, 0, 0), (-150, 0, 0), (0, -300, 0)])
+def test_gr1_turns_its_trunk_where_its_feet_may_not_step(alone, push):
+    gait = load_composite_controller_config("WHOLE_BODY_ID", "GR1FreeBody")["gait"]
+    walker = Walker(alone, "GR1FreeBody", gait=gait | {"recover": False}).act(1.0)
+    tilt = []
+    walker.act(0.1, push=push)
+    walker.act(3.0, each=lambda: tilt.append(walker.data.xmat[walker.link][8]))
+    assert min(tilt) < 0.98
+    assert tilt[-1] > 0.99
+    assert walker.balance["fell"] is None
+    assert walker.body.gait.state["steps"][0] == 0

@@ -127,7 +127,7 @@ def chosen(gripper: str | None) -> str | dict[str, str] | None:
 def environment_arguments(
     *,
     robots: list[str] | None,
-    controller: str | None,
+    controller: str | dict[str, Any] | None,
     gripper: str | None,
     base: str | None,
 ) -> dict[str, Any]:

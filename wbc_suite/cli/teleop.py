@@ -115,15 +115,12 @@ def teleop(
 
 def default_controller(*robots: str) -> str:
     """Return the whole-body controller that robots are teleoperated with."""
-    from wbc_suite.control import load_composite_controller_config
-    from wbc_suite.errors import ConfigError
+    from wbc_suite.control import default_composite
+    from wbc_suite.robot import load_robot
 
-    try:
-        for robot in robots:
-            load_composite_controller_config("WHOLE_BODY_ID", robot)
-    except ConfigError:  # one has no free root, or its feet are not known
-        return "WHOLE_BODY_IK"
-    return "WHOLE_BODY_ID"
+    walks = "WHOLE_BODY_ID"
+    defaults = {default_composite(load_robot(robot)) for robot in robots}
+    return walks if defaults == {walks} else "WHOLE_BODY_IK"
 
 
 def device_maker(name: str, pairs: list[str] | None) -> DeviceMaker:

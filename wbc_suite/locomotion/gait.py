@@ -75,6 +75,7 @@ class WalkConfig(FrozenModel):
         forward: Longest step forward, m.
         backward: Longest step backward, m.
         acceleration: Greatest change of the commanded velocity, m/s^2 and rad/s^2.
+        ahead: How far in front of the middle of the soles the centre of mass stands, m.
         lower: How much lower than at `ready` the centre of mass is carried, m.
         margin: Distance of the centre of pressure from the edges of soles, m.
         gain: Feedback on the divergent component of motion, 1/s.
@@ -92,6 +93,7 @@ class WalkConfig(FrozenModel):
     forward: PositiveFloat = 0.6
     backward: PositiveFloat = 0.4
     acceleration: PositiveFloat = 0.4
+    ahead: float = 0.0
     lower: NonNegativeFloat = 0.02
     margin: NonNegativeFloat = 0.006
     gain: PositiveFloat = 4.0

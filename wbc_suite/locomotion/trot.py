@@ -36,12 +36,12 @@ SETTLING = 0.3
 LEASH = 0.1
 """m; the reference is not farther from the centre of mass."""
 
-STANDING_GAINS = (30.0, 11.0)
+STANDING_GAINS = (60.0, 20.0)
 STEPPING_GAINS = (10.0, 8.0)
 HEIGHT_GAINS = (150.0, 24.0)
 """1/s^2 and 1/s."""
 
-GREATEST = 8.0
+GREATEST = 12.0
 """m/s^2; acceleration of the centre of mass."""
 
 

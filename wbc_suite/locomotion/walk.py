@@ -46,6 +46,9 @@ OUTSIDE = 0.01
 DISTURBED = 0.06
 """m; distance of the DCM from its reference at which a walk counts as pushed."""
 
+FIXED_GAIN = 20.0
+"""1/s; feedback on the DCM of a robot that may not step."""
+
 COMMITTED = 0.06
 """s before the landing at which place and time of a step are fixed."""
 
@@ -113,6 +116,7 @@ def _stand(
     wanted, inside, R = np.empty(2), np.empty(2), heading_axes(state.yaw)
     for i in range(2):
         wanted[i] = 0.5 * (measured.foot[0, i] + measured.foot[1, i])
+        wanted[i] += settings.ahead * R[i, 0]
     middle = wanted.copy()
     if moving:
         _, own, _ = _periodic_step(gait, omega, state.stance)
@@ -136,8 +140,9 @@ def _stand(
             side += R[i, 1] * (dcm[i] - middle[i])
         state.until = state.time + RECOVERY
         _begin_step(gait, 1 if side > 0.0 else 0, settings.double_support)
+    gain = settings.gain if settings.recover > 0.0 else FIXED_GAIN
     for i in range(2):
-        zmp[i] = dcm[i] + settings.gain / omega * (dcm[i] - wanted[i])
+        zmp[i] = dcm[i] + gain / omega * (dcm[i] - wanted[i])
     if settings.recover > 0.0:
         keep_in_soles(gait, measured, zmp.copy(), -1, zmp)
 

@@ -133,7 +133,8 @@ def _read(
         return _converted(dict(controller), source, robot, catalogue), source
     if not isinstance(controller, str | Path | None):
         raise UnknownNameError("composite controller", controller, _KINDS)
-    name = str(controller or (default_composite(robot) if robot else "BASIC"))
+    name = controller or (default_composite(robot, catalogue) if robot else "BASIC")
+    name = str(name)
     if name.endswith(".json"):
         return _converted(read_json(Path(name)), name, robot, catalogue), name
     if is_part_controller(name.upper()):
@@ -181,16 +182,31 @@ def _of_arms(
     return basic | {"body_parts": basic["body_parts"] | arms}
 
 
-def default_composite(robot: RobotDescription) -> str:
+def default_composite(
+    robot: RobotDescription, catalogue: Catalogue | None = None
+) -> str:
     """Return the composite of a robot that is asked for none.
 
-    What has feet or no hand: WHOLE_BODY_IK. Arms on a base that drives:
-    HYBRID_MOBILE_BASE. Other arms: BASIC.
+    On its own feet, with a file for it: WHOLE_BODY_ID. What else has feet or no hand:
+    WHOLE_BODY_IK. Arms on a base that drives: HYBRID_MOBILE_BASE. Other arms: BASIC.
     """
+    if robot.root.kind == "free" and _walks(robot, catalogue or Catalogue()):
+        return "WHOLE_BODY_ID"
     if not robot.hands or any(frame.role == "foot" for frame in robot.frames):
         return "WHOLE_BODY_IK"
     driven = robot.root.kind == "planar" and robot.root.actuated
     return "HYBRID_MOBILE_BASE" if driven else "BASIC"
+
+
+def _walks(robot: RobotDescription, catalogue: Catalogue) -> bool:
+    """Whether there is a file of WHOLE_BODY_ID that fits the robot."""
+    name = f"{robot.name}_whole_body_id"
+    try:
+        file = catalogue.find("controllers", name, kind="controller file")
+        _find("WHOLE_BODY_ID").check(read_toml(file), robot, str(file))
+    except (UnknownNameError, ConfigError):
+        return False
+    return True
 
 
 def _named(

@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.control.action import ActionLayout, ActionPart, Axis, SliceKind, Unit
+from wbc_suite.control.composite.balance_report import BalanceReport
 from wbc_suite.control.composite.frame_goals import FrameGoals
 from wbc_suite.control.composite.reduced_robot import lock_groups, moved_joints
 from wbc_suite.control.composite.whole_body_dynamics_config import (
@@ -69,6 +70,13 @@ class WholeBodyID:
             -1,
         )
         self.dynamics = self._make_dynamics(state)
+        self._report = BalanceReport(
+            self.config,
+            self.dynamics,
+            law=self._law,
+            moves=self._chains(state),
+            links=[_link(state, foot.frame) for foot in self.config.feet],
+        )
         self._fallback = QpFallback(self.dynamics.qp)
         self.fallback = Fallback.NONE
         self.laws: tuple[Law, ...] = (self._law, *(g.law for g in self._grippers))
@@ -109,8 +117,19 @@ class WholeBodyID:
         own["root_qpos"], own["root_dof"] = root.qposadr[0], dof
         own["body"] = root.bodyid[0]
         own["friction"], own["dt"] = config.friction, state.model.opt.timestep
+        rate = 2.0 * np.pi * (config.velocity_cutoff or np.inf)
+        own["trust"] = 1.0 - np.exp(-rate * state.model.opt.timestep)
         own["hand_frame"] = config.input_ref_frame == "base"
         return dynamics
+
+    def _chains(self, state: RobotState) -> Indices:
+        """Return which joints move each hand, (h, n)."""
+        chains = [
+            _chain(state.model, _link(state, str(frame.frame)))
+            for frame in self.config.frames
+        ]
+        rows = [[d in chain for d in self._law.drives["dof"]] for chain in chains]
+        return np.array(rows, dtype=np.int64).reshape(-1, len(self._law.joints))
 
     def _arms(self, state: RobotState) -> Indices:
         """Return which joints move each hand, and no other hand or foot, (h, n)."""
@@ -154,6 +173,8 @@ class WholeBodyID:
             measured.foot[k] = data.site_xpos[site] + middle
             measured.foot_yaw[k] = np.arctan2(R[1, 0], R[0, 0])
         begin_gait(own.gait, measured, yaw)
+        ground = float(own.gait.state["ground"][0])
+        record["trunk_height"] = data.xpos[int(record["body"]), 2] - ground
         own.command[:] = 0.0
         own.load[:] = 0.0
         own.qp.side[:] = 0
@@ -234,41 +255,15 @@ class WholeBodyID:
         return action
 
     def info(self, state: RobotState) -> dict[str, Any]:
-        """Return `{"balance": ...}`: feet, capture point, loads, next footstep, falls.
+        """Return `{"balance": ..., "ik": ...}`.
 
-        `stance` names the feet that stand, `margin` is the distance of the capture
-        point from the edge of what the robot stands on, m; `loads` are the forces on
-        hands, N; `fell` says when and why the robot fell, or is None.
+        `balance` has `stance`, names of the feet that stand; `margin`, the distance of
+        the capture point from the edge of what the robot stands on, m; `loads`, the
+        observed forces on hands and feet, N; `footstep`, where the next foot lands, m;
+        `fell`, a `Fall` or None. `ik` has errors and reasons of hands, as that of
+        WHOLE_BODY_IK.
         """
-        own = self.dynamics
-        feet = [foot.frame for foot in self.config.feet]
-        names = [frame.name for frame in self.config.frames]
-        return {
-            "balance": {
-                "stance": [
-                    f for f, x in zip(feet, own.plan.load, strict=True) if x > 0
-                ],
-                "margin": float(own.plan.margin[0]),
-                "loads": {
-                    name: load[:3].copy()
-                    for name, load in zip(names, own.load, strict=True)
-                },
-                "footstep": own.plan.footstep.copy(),
-                "walking": bool(own.gait.state["mode"][0]),
-                "unsolved": int(own.state["unsolved"][0]),
-                "fell": self._fall(state),
-            }
-        }
-
-    def _fall(self, state: RobotState) -> str | None:
-        when = float(self.dynamics.state["fell"][0])
-        if when < 0.0:
-            return None
-        tilt = np.degrees(np.arccos(np.clip(state.root_pose.rotation[2, 2], -1.0, 1.0)))
-        return (
-            f"It fell {when:.2f} s after the reset: its trunk is tilted by {tilt:.0f} "
-            "degrees. The capture point had left what its feet can reach."
-        )
+        return self._report.info(state)
 
 
 def _walk_parts(config: WholeBodyIDConfig) -> list[ActionPart]:

@@ -89,8 +89,11 @@ class WholeBodyIDConfig(FrozenModel):
         sensors: Where the state of the robot comes from: the simulation, or an IMU and
             encoders, with noise and delay.
         friction: Coefficient of friction that contact forces keep to.
+        velocity_cutoff: Cut-off frequency of the low-pass filter of velocities, Hz;
+            absent without a filter. 25 Hz suits noise of 0.02 rad/s.
         max_walk: Greatest commands: forward, left (m/s), turn (rad/s).
         height: Lowest and highest command of height, m.
+        tolerance: Errors below which a hand has reached its target, m and rad.
         input_type: `absolute` targets of hands, or `delta` steps from the last target.
         input_ref_frame: Axes of hands' targets and steps: `world`; `base`, which is the
             heading of the robot at its centre of mass; or the hand's own (`eef`).
@@ -107,8 +110,10 @@ class WholeBodyIDConfig(FrozenModel):
     posture: StanceConfig = StanceConfig()
     sensors: StateSourceConfig = StateSourceConfig()
     friction: PositiveFloat = 0.6
+    velocity_cutoff: PositiveFloat | None = None
     max_walk: tuple[PositiveFloat, PositiveFloat, PositiveFloat] = (1.0, 0.4, 1.0)
     height: tuple[float, float] = (-0.15, 0.02)
+    tolerance: tuple[PositiveFloat, PositiveFloat] = (2e-3, 1e-2)
     input_type: InputType = "absolute"
     input_ref_frame: InputFrame = "base"
     delta_position: PositiveFloat = 0.05

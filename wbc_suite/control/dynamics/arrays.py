@@ -34,10 +34,15 @@ STATE = np.dtype(
         ("mass", "f8"),  # kg; as of the last tick
         ("friction", "f8"),  # coefficient
         ("dt", "f8"),  # s between two steps of the loop
+        ("trust", "f8"),  # part of measured velocities' errors corrected in a step
         ("stage", "i8"),  # `Stage`
         ("ticks", "i8"),
         ("unsolved", "i8"),  # ticks whose active set was not found
         ("fell", "f8"),  # time of the fall, s since the reset; negative before
+        ("fell_by_tilt", "i8"),  # 1: its tilt told it, 0: its height
+        ("tilt", "f8"),  # of the trunk then, rad
+        ("drop", "f8"),  # height that it had lost then, m
+        ("trunk_height", "f8"),  # of the trunk over the ground at the reset, m
         ("hand_frame", "i8"),  # 1: goals of hands are given in the heading frame
     ]
 )
@@ -88,7 +93,7 @@ class Terms(NamedTuple):
     Attributes:
         M: Inertia, shape (6 + n, 6 + n).
         h: Bias less passive forces, shape (6 + n,).
-        v: Velocity, shape (6 + n,).
+        v: Velocity as filtered, shape (6 + n,).
         a: Accelerations of the answer, shape (6 + n,).
         B: Generalised force of each pyramid edge, shape (edges, 6 + n).
         root: [X | x] with a_root = X y + x, shape (6, ny + 1).
@@ -145,7 +150,9 @@ class WholeBodyDynamics(NamedTuple):
         limits: Position low and high, velocity, torque low and high, shape (5, n).
         command: Forward, left (m/s), turn (rad/s), height (m), shape (4,).
         torque: Torques of contact forces and loads at the joints, J^T f, shape (n,).
-        last_velocity: Velocity of the last tick, shape (6 + n,).
+        last_velocity: Velocity as measured at the last tick, shape (6 + n,).
+        velocity_error: Error of the next measurement, such as noise: added to the
+            simulation's velocity, shape (6 + n,).
         gait: The gait.
         measured: What its planner reads.
         plan: What it writes.
@@ -179,6 +186,7 @@ class WholeBodyDynamics(NamedTuple):
     command: Vector
     torque: Vector
     last_velocity: Vector
+    velocity_error: Vector
     gait: Gait
     measured: Measured
     plan: Plan
@@ -238,6 +246,7 @@ def make_dynamics(
         command=np.zeros(4),
         torque=np.zeros(n),
         last_velocity=np.zeros(6 + n),
+        velocity_error=np.zeros(6 + n),
         gait=gait,
         measured=make_measured(f),
         plan=make_plan(f),

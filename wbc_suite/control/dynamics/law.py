@@ -7,6 +7,7 @@ from wbc_suite.control.dynamics.arrays import Stage, WholeBodyDynamics
 from wbc_suite.control.dynamics.qp_rows import state_qp
 from wbc_suite.control.dynamics.terms import (
     measure,
+    measured_velocity,
     write_frame_terms,
     write_terms,
 )
@@ -41,8 +42,8 @@ DAMPING = 1e-3
 TILTED = 0.6
 """Cosine of the tilt from which a robot has fallen: 53 degrees."""
 
-DROPPED = 0.2
-"""m; a centre of mass so much lower than commanded has fallen."""
+DROPPED = 0.15
+"""m; a robot whose trunk is so much lower than commanded has fallen."""
 
 
 @compiled
@@ -89,7 +90,7 @@ def write_whole_body(physics: Physics, body: WholeBodyDynamics) -> None:
         body.torque[j] = held
     for i in range(body.dofs.shape[0]):
         physics.acceleration[body.dofs[i]] = terms.a[i]
-        body.last_velocity[i] = terms.v[i]
+        body.last_velocity[i] = measured_velocity(physics, body, i)
 
 
 @compiled
@@ -109,7 +110,8 @@ def _observe_loads(physics: Physics, body: WholeBodyDynamics) -> None:
     missed, residual = np.zeros(size), np.empty(size)
     if state.ticks > 0:
         for i in range(size):
-            missed[i] = (terms.v[i] - body.last_velocity[i]) / state.dt - terms.a[i]
+            change = measured_velocity(physics, body, i) - body.last_velocity[i]
+            missed[i] = change / state.dt - terms.a[i]
     for i in range(size):
         residual[i] = dot(terms.M[i], missed, size)
     mass, moment, rate = state.mass, np.zeros(2), np.zeros(2)
@@ -165,9 +167,13 @@ def _missing_wrench(body: WholeBodyDynamics, k: int, residual: Vector) -> Vector
 
 @compiled
 def _watch_fall(physics: Physics, body: WholeBodyDynamics) -> None:
-    """Note when the robot falls."""
+    """Note when and why the robot falls."""
     state, gait = body.state[0], body.gait.state[0]
-    tilt = rotation(physics.xmat, state.body)[2, 2]
-    low = body.measured.com[2] < gait.ground + gait.height - DROPPED
-    if state.fell < 0.0 and (tilt < TILTED or low):
-        state.fell = gait.time
+    upright = rotation(physics.xmat, state.body)[2, 2]
+    lower = gait.nominal_height - gait.height
+    height = physics.xpos[state.body, 2] - gait.ground
+    drop = state.trunk_height - lower - height
+    if state.fell < 0.0 and (upright < TILTED or drop > DROPPED):
+        state.fell, state.drop = gait.time, drop
+        state.tilt = np.arccos(min(max(upright, -1.0), 1.0))
+        state.fell_by_tilt = 1 if upright < TILTED else 0

@@ -12,9 +12,11 @@ from wbc_suite.control.dynamics.terms import (
 )
 from wbc_suite.control.loop.physics import Physics
 from wbc_suite.control.loop.rigid_body import matrix_product, rotated, rotation
-from wbc_suite.locomotion.gait import GRAVITY
+from wbc_suite.locomotion.gait import GRAVITY, GaitKind, Mode
 from wbc_suite.qp.lie import exp3, log3, saturate
 from wbc_suite.typing import Matrix, Vector
+
+_WALK, _STEP = int(GaitKind.WALK), int(Mode.STEP)
 
 CONTACT = (100.0, 60.0)
 """Weight of the rows that keep a foot at rest, and their damping, 1/s."""
@@ -40,6 +42,16 @@ HELD_BACK = (0.06, 0.3)
 
 RECOVERING = 0.3
 """Part of the hands' weights while a robot recovers from a push."""
+
+EDGE = (0.02, 0.07)
+"""m; margins of the capture point between which attitude, height and hands yield."""
+
+YIELDING = 0.05
+"""Part of the weights of attitude and angular momentum that remains then: the trunk
+turns to keep the centre of mass over the feet."""
+
+YIELDING_HEIGHT, YIELDING_HANDS = 0.1, 0.1
+"""Parts of those of height and hands: turning hips needs bent knees."""
 
 
 @compiled
@@ -122,6 +134,20 @@ def _add_foot(physics: Physics, body: WholeBodyDynamics, k: int, row: int) -> in
 
 
 @compiled
+def _yield(body: WholeBodyDynamics, least: float) -> float:
+    """Return the part of a weight that remains near the edge of the feet.
+
+    A biped that steps has the edge of one sole behind it in every step: its steps
+    keep the balance.
+    """
+    gait = body.gait
+    if gait.settings[0].kind == _WALK and gait.state[0].mode == _STEP:
+        return 1.0
+    inside = (body.plan.margin[0] - EDGE[0]) / (EDGE[1] - EDGE[0])
+    return min(max(inside, least), 1.0)
+
+
+@compiled
 def _add_momentum(physics: Physics, body: WholeBodyDynamics, row: int) -> int:
     """Add rows of the centre of mass and of angular momentum; return the next row.
 
@@ -134,22 +160,23 @@ def _add_momentum(physics: Physics, body: WholeBodyDynamics, row: int) -> int:
     com, root = terms.com, physics.qpos[state.root_qpos :]
     R = rotation(physics.xmat, state.body)
     x, y, z = com[0] - root[0], com[1] - root[1], com[2] - root[2]
-    weight = COM_WEIGHT / state.mass
+    weight, turning = np.full(3, COM_WEIGHT), SPIN[0] * _yield(body, YIELDING)
+    weight[2] *= _yield(body, YIELDING_HEIGHT)
     for i in range(6):
         for j in range(qp.W.shape[1]):
             qp.W[row + i, j] = 0.0
     for k in range(edges):
         f, m = terms.B[k, :3], rotated(R, terms.B[k, 3:6])
         for i in range(3):
-            qp.W[row + i, k] = weight * f[i]
-        qp.W[row + 3, k] = SPIN[0] * (m[0] - (y * f[2] - z * f[1]))
-        qp.W[row + 4, k] = SPIN[0] * (m[1] - (z * f[0] - x * f[2]))
-        qp.W[row + 5, k] = SPIN[0] * (m[2] - (x * f[1] - y * f[0]))
+            qp.W[row + i, k] = weight[i] / state.mass * f[i]
+        qp.W[row + 3, k] = turning * (m[0] - (y * f[2] - z * f[1]))
+        qp.W[row + 4, k] = turning * (m[1] - (z * f[0] - x * f[2]))
+        qp.W[row + 5, k] = turning * (m[2] - (x * f[1] - y * f[0]))
     for i in range(3):
         fall = GRAVITY if i == 2 else 0.0
         wanted = plan.com_acceleration[i] + fall - terms.held[i] / state.mass
-        qp.e[row + i] = COM_WEIGHT * wanted
-        qp.e[row + 3 + i] = -SPIN[0] * (SPIN[1] * terms.spin[i] + terms.held[3 + i])
+        qp.e[row + i] = weight[i] * wanted
+        qp.e[row + 3 + i] = -turning * (SPIN[1] * terms.spin[i] + terms.held[3 + i])
     return row + 6
 
 
@@ -163,13 +190,14 @@ def _add_upright(physics: Physics, body: WholeBodyDynamics, k: int, row: int) ->
     _write_heading(gait.yaw, heading)
     matrix_product(heading, body.upright_pose[k].reshape((3, 3)), R_goal)
     matrix_product(R_goal, rotation(physics.xmat, link).T, R_error)
-    turn = np.empty(3)
+    turn, share = np.empty(3), _yield(body, YIELDING)
     log3(R_error, turn)
     for i in range(3):
         rate = gait.velocity[2] if i == 2 and gait.mode == 1 else 0.0
         wanted = UPRIGHT[0] * turn[i] + UPRIGHT[1] * (rate - terms.velocity[3 + i])
         wanted -= terms.drift[3 + i]
-        _add_row(body, row + i, terms.J[3 + i], wanted, body.upright_weight[k])
+        weight = body.upright_weight[k] * (1.0 if i == 2 else share)
+        _add_row(body, row + i, terms.J[3 + i], wanted, weight)
     return row + 3
 
 
@@ -217,6 +245,7 @@ def _add_hand(physics: Physics, body: WholeBodyDynamics, k: int, row: int) -> in
             )
     kd = 2.0 * np.sqrt(HAND_KP)
     share = RECOVERING if gait.time < gait.until else 1.0
+    share = min(share, _yield(body, YIELDING_HANDS))
     for i in range(6):
         wanted = HAND_KP * error[i] + kd * (lead[i] - terms.velocity[i])
         weight = share * body.hand_weight[k, i // 3]

@@ -18,12 +18,27 @@ from wbc_suite.typing import Vector
 
 @compiled
 def write_terms(physics: Physics, body: WholeBodyDynamics) -> None:
-    """Write inertia, bias, velocity and angular momentum."""
-    terms, dofs = body.terms, body.dofs
+    """Write inertia, bias and velocity.
+
+    The velocity is the last one and what the last accelerations add, corrected by a
+    part of the distance from the measured velocity: a low-pass filter without lag
+    where the robot moves as the law asks.
+    """
+    terms, dofs, state = body.terms, body.dofs, body.state[0]
     write_inertia(physics, dofs, dofs.shape[0], terms.M)
     for i in range(dofs.shape[0]):
-        terms.v[i] = physics.qvel[dofs[i]]
+        measured = measured_velocity(physics, body, i)
+        if state.trust < 1.0 and state.ticks > 0:
+            predicted = terms.v[i] + state.dt * terms.a[i]
+            measured = predicted + state.trust * (measured - predicted)
+        terms.v[i] = measured
         terms.h[i] = physics.qfrc_bias[dofs[i]] - physics.qfrc_passive[dofs[i]]
+
+
+@compiled
+def measured_velocity(physics: Physics, body: WholeBodyDynamics, i: int) -> float:
+    """Return the velocity of a degree of freedom of the robot as it is measured."""
+    return float(physics.qvel[body.dofs[i]] + body.velocity_error[i])
 
 
 @compiled
@@ -82,6 +97,8 @@ def write_frame_terms(
             for i in range(6):
                 terms.J[i, j] = column[i]
         dof = int(physics.dof_parentid[dof])
+    for i in range(6):
+        terms.velocity[i] = dot(terms.J[i], terms.v, terms.v.shape[0])
 
 
 @compiled
