@@ -61,7 +61,8 @@ class Case:
     period: float = ACTION  # s between two actions
     timestep: float = 0.002  # s
     delay: int = 0  # actions; from the command to its effect
-    noise: float = 0.0  # rad/s; of measured joint velocities
+    sensors: dict[str, Any] = field(default_factory=dict)  # of the controller
+    smooth: bool = False  # whether changes of torques are noted
     cutoff: float | None = None  # Hz; of the filter of velocities
     most: dict[str, float] = field(default_factory=dict)  # what is asked for
 
@@ -129,10 +130,16 @@ def cases() -> list[Case]:
         add(robot, "rate/step_1ms", timestep=0.001, **go)
         add(robot, "rate/step_4ms", timestep=0.004, **go)
         add(robot, "rate/delay_20ms", delay=1, **go)
-        add(robot, "noise/0.05", noise=0.05, **go)
+        add(robot, "sensors/delay_20ms", sensors={"delay": 0.02}, **go)
+        add(robot, "sensors/noise/0.05", sensors={"velocity_noise": 0.05}, **go)
         for cutoff in (None, 25.0):
-            name = "noise/0.02" + ("/filtered" if cutoff else "")
-            add(robot, name, noise=0.02, cutoff=cutoff, **go)
+            name = "sensors/noise/0.02" + ("/filtered" if cutoff else "")
+            noise = {"velocity_noise": 0.02}
+            add(robot, name, sensors=noise, cutoff=cutoff, smooth=True, **go)
+        noise = {"gyro_noise": 0.005, "acceleration_noise": 0.05}
+        noise |= {"velocity_noise": 0.02, "source": "estimator"}
+        long = {"walk": (0.8 * v, 0.0, 0.0), "seconds": 14.0 if fast else 15.0}
+        add(robot, "sensors/estimator", sensors=noise, cutoff=25.0, **long)
     add(GR1, "hand/walk_loaded", walk=(0.3, 0.0, 0.0), load=5.0, seconds=10.0)
     return found
 
@@ -145,6 +152,7 @@ class Trial:
         config = load_composite_controller_config("WHOLE_BODY_ID", case.robot)
         config["input_ref_frame"] = "world" if case.in_world else "base"
         config["gait"] = {**config["gait"], "recover": case.recover}
+        config["sensors"] = {**case.sensors, "seed": seed}
         if case.cutoff is not None:
             config["velocity_cutoff"] = case.cutoff
         self.stand = Stand(case.robot, config, self._edit)
@@ -227,14 +235,12 @@ class Trial:
         controller.set_goal(layout.clip(layout.check(action))[0], case.period)
 
     def _advance(self, steps: int) -> None:
-        """Make physics steps; the velocities of each are measured with noise."""
-        case, stand = self.case, self.stand
-        if case.noise == 0.0:
+        """Make physics steps; note how torques change from one to the next."""
+        stand = self.stand
+        if not self.case.smooth:
             stand.simulation.tick(steps)
             return
-        error = self.arrays.velocity_error
         for _ in range(steps):
-            error[6:] = self.rng.normal(0.0, case.noise, len(error) - 6)
             before = stand.data.ctrl.copy()
             stand.simulation.tick(1)
             self.changes.append(float(np.abs(stand.data.ctrl - before).max()))

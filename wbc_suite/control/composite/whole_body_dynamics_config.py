@@ -140,6 +140,7 @@ def default_dynamics_config(robot: RobotDescription) -> dict[str, Any]:
     Raises:
         ConfigError: If the robot has no four feet; soles of a biped are not known.
     """
+    _require_free_root(robot)
     feet = [frame.name for frame in robot.frames if frame.role == "foot"]
     if len(feet) < 2:
         raise ConfigError(
@@ -164,6 +165,14 @@ def default_dynamics_config(robot: RobotDescription) -> dict[str, Any]:
         "gait": TrotConfig().model_dump(),
         "upright": [{"frame": robot.links[0].name}],
     }
+
+
+def _require_free_root(robot: RobotDescription) -> None:
+    if robot.root.kind != "free":
+        raise ConfigError(
+            f"{robot.name} has a {robot.root.kind} root, and WHOLE_BODY_ID moves "
+            "robots on their feet. Use WHOLE_BODY_IK, or give it a free root."
+        )
 
 
 def _suggested(robot: RobotDescription, feet: list[str]) -> str:
@@ -202,11 +211,7 @@ def read_dynamics(
         ConfigError: If it breaks a rule of the format, names what the robot does not
             have, or the robot's root is not free.
     """
-    if robot.root.kind != "free":
-        raise ConfigError(
-            f"{robot.name} has a {robot.root.kind} root, and WHOLE_BODY_ID moves "
-            "robots on their feet. Use WHOLE_BODY_IK, or give it a free root."
-        )
+    _require_free_root(robot)
     read = parse_model(WholeBodyIDConfig, config, source=source)
     for key, kind, name, known in _names(read, robot):
         if name not in known:

@@ -151,8 +151,6 @@ class WholeBodyDynamics(NamedTuple):
         command: Forward, left (m/s), turn (rad/s), height (m), shape (4,).
         torque: Torques of contact forces and loads at the joints, J^T f, shape (n,).
         last_velocity: Velocity as measured at the last tick, shape (6 + n,).
-        velocity_error: Error of the next measurement, such as noise: added to the
-            simulation's velocity, shape (6 + n,).
         gait: The gait.
         measured: What its planner reads.
         plan: What it writes.
@@ -186,7 +184,6 @@ class WholeBodyDynamics(NamedTuple):
     command: Vector
     torque: Vector
     last_velocity: Vector
-    velocity_error: Vector
     gait: Gait
     measured: Measured
     plan: Plan
@@ -246,7 +243,6 @@ def make_dynamics(
         command=np.zeros(4),
         torque=np.zeros(n),
         last_velocity=np.zeros(6 + n),
-        velocity_error=np.zeros(6 + n),
         gait=gait,
         measured=make_measured(f),
         plan=make_plan(f),

@@ -7,7 +7,6 @@ from wbc_suite.control.dynamics.arrays import Stage, WholeBodyDynamics
 from wbc_suite.control.dynamics.qp_rows import state_qp
 from wbc_suite.control.dynamics.terms import (
     measure,
-    measured_velocity,
     write_frame_terms,
     write_terms,
 )
@@ -90,7 +89,7 @@ def write_whole_body(physics: Physics, body: WholeBodyDynamics) -> None:
         body.torque[j] = held
     for i in range(body.dofs.shape[0]):
         physics.acceleration[body.dofs[i]] = terms.a[i]
-        body.last_velocity[i] = measured_velocity(physics, body, i)
+        body.last_velocity[i] = physics.qvel[body.dofs[i]]
 
 
 @compiled
@@ -110,7 +109,7 @@ def _observe_loads(physics: Physics, body: WholeBodyDynamics) -> None:
     missed, residual = np.zeros(size), np.empty(size)
     if state.ticks > 0:
         for i in range(size):
-            change = measured_velocity(physics, body, i) - body.last_velocity[i]
+            change = physics.qvel[body.dofs[i]] - body.last_velocity[i]
             missed[i] = change / state.dt - terms.a[i]
     for i in range(size):
         residual[i] = dot(terms.M[i], missed, size)

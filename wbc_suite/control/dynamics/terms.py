@@ -27,18 +27,12 @@ def write_terms(physics: Physics, body: WholeBodyDynamics) -> None:
     terms, dofs, state = body.terms, body.dofs, body.state[0]
     write_inertia(physics, dofs, dofs.shape[0], terms.M)
     for i in range(dofs.shape[0]):
-        measured = measured_velocity(physics, body, i)
+        measured = physics.qvel[dofs[i]]
         if state.trust < 1.0 and state.ticks > 0:
             predicted = terms.v[i] + state.dt * terms.a[i]
             measured = predicted + state.trust * (measured - predicted)
         terms.v[i] = measured
         terms.h[i] = physics.qfrc_bias[dofs[i]] - physics.qfrc_passive[dofs[i]]
-
-
-@compiled
-def measured_velocity(physics: Physics, body: WholeBodyDynamics, i: int) -> float:
-    """Return the velocity of a degree of freedom of the robot as it is measured."""
-    return float(physics.qvel[body.dofs[i]] + body.velocity_error[i])
 
 
 @compiled
