@@ -53,8 +53,9 @@ $(VENV)/.installed-peers: $(VENV)/.installed-dev
 	.venv-$*/bin/python -m pip install --disable-pip-version-check -r $<
 	@touch $@
 
-pictures: $(VENV)/.installed ## draw the pictures of the README anew
+pictures: $(VENV)/.installed ## draw the pictures of the README and of walking anew
 	$(PY) docs/draw_pictures.py
+	$(PY) docs/draw_walking.py
 
 gallery: $(VENV)/.installed ## draw every robot, gripper and base for the README, and every benchmark
 	$(PY) docs/draw_gallery.py $(ARGS)

@@ -18,7 +18,6 @@ from wbc_suite.envs import Simulation
 from wbc_suite.robot import load_robot
 from wbc_suite.scene import attach_robot, empty_arena
 from wbc_suite.sensing.renderer import make_renderer
-from wbc_suite.viewers.offscreen import add_studio
 
 IMAGES = Path(__file__).parent / "images"
 PERIOD = 0.02  # s between two actions
@@ -26,8 +25,8 @@ RATE = 12.5  # pictures a second
 SECONDS = 7.0
 PUSHED = (3.0, 3.1)  # s
 SIZE = (400, 400)
-SHOWN = (1.0, 2.6, 3.2, 3.6, 4.2, 6.0)  # s; moments of the strip
-ROBOTS = {"GR1FreeBody": (0.4, 280.0, 2.6), "SpotWithArm": (0.8, 450.0, 2.2)}
+SHOWN = (1.04, 2.64, 3.2, 3.52, 4.24, 6.0)  # s; moments of the strip
+ROBOTS = {"GR1FreeBody": (0.3, 200.0, 3.0), "SpotWithArm": (0.6, 450.0, 2.8)}
 """Speed, m/s; push from the right, N; distance of the camera, m."""
 
 
@@ -39,7 +38,6 @@ class Walk:
         robot = load_robot(name)
         spec = empty_arena()
         attach_robot(spec, robot, "robot0_")
-        add_studio(spec)
         self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
         state = RobotState(self.model, self.data, robot, prefix="robot0_")
@@ -57,7 +55,7 @@ class Walk:
         self.camera = mujoco.MjvCamera()
         self.camera.azimuth, self.camera.elevation = 150.0, -8.0
         self.camera.distance = distance
-        self.height = 0.9 * self.trunk.xpos[2]
+        self.height = 0.8 * self.trunk.xpos[2]
         width, height = SIZE
         self.renderer = make_renderer(
             self.model, width=2 * width, height=2 * height, preset="quality"
