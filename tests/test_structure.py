@@ -22,7 +22,7 @@ TREES = {
 
 MAX_LINES, MAX_MODULES = 45_000, 320  # without what is listed in `ADDED`
 ADDED = ("locomotion/", "control/dynamics/", "control/composite/whole_body_dynamics")
-ADDED += ("control/composite/balance_report", "qp/dynamics_", "robot/soles")
+ADDED += ("control/composite/balance_report", "qp/dynamics_", "robot/sole_inference")
 ADDED += ("scene/pushes", "devices/pipeline/drive", "viewers/balance_")
 ADDED += ("viewers/camera_follower", "viewers/drive_panel", "viewers/held_keys")
 ADDED += ("viewers/step_times", "benchmark/carry", "benchmark/loco_lift")

@@ -15,7 +15,7 @@ from wbc_suite.control.composite.whole_body_dynamics_config import (
     default_dynamics_config,
 )
 from wbc_suite.control.dynamics.arrays import EDGES
-from wbc_suite.control.dynamics.fallback import QpFallback
+from wbc_suite.control.dynamics.qp_fallback import QpFallback
 from wbc_suite.control.dynamics.terms import write_frame_terms, write_terms
 from wbc_suite.control.loop.physics import bind_physics
 from wbc_suite.control.reasons import Contact, InMotion

@@ -13,7 +13,7 @@ from wbc_suite.qp import (
     SelfCollisionLimit,
     TaskStack,
 )
-from wbc_suite.qp.capsule_distance import segment_parameters
+from wbc_suite.qp.self_collision_rows import segment_parameters
 from wbc_suite.robot import load_robot
 from wbc_suite.robot.collision_capsules import collision_pairs, enclosing_capsules
 

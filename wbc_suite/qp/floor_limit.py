@@ -10,10 +10,10 @@ from wbc_suite.arguments import check_count, check_number
 from wbc_suite.compiling import as_argument, compiled, struct
 from wbc_suite.kinematics import Configuration
 from wbc_suite.kinematics.forward import RobotArrays, compute_joint_poses
-from wbc_suite.qp.capsule_distance import SEPARATION, insert_nearest
 from wbc_suite.qp.kernel import Kernel
 from wbc_suite.qp.limit import LimitKind, RowLimit, joint_movers
 from wbc_suite.qp.problem import UNBOUNDED
+from wbc_suite.qp.self_collision_rows import SEPARATION, insert_nearest
 from wbc_suite.typing import Indices, Matrix, Vector
 
 

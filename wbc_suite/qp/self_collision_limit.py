@@ -12,9 +12,9 @@ from wbc_suite.arguments import check_count, check_number
 from wbc_suite.compiling import as_argument
 from wbc_suite.kinematics import Configuration
 from wbc_suite.kinematics.forward import compute_joint_poses
-from wbc_suite.qp.capsule_distance import CapsuleArrays, self_collision_rows
 from wbc_suite.qp.kernel import Kernel
 from wbc_suite.qp.limit import LimitKind, RowLimit, joint_movers
+from wbc_suite.qp.self_collision_rows import CapsuleArrays, self_collision_rows
 from wbc_suite.robot.collision_capsules import (
     EnclosingCapsule,
     collision_pairs,

@@ -14,11 +14,11 @@ import numpy as np
 from wbc_suite.compiling import compiled, struct
 from wbc_suite.kinematics.forward import RobotArrays, compute_joint_poses
 from wbc_suite.qp.active_set import QpArrays, solve_warm
-from wbc_suite.qp.capsule_distance import CapsuleArrays, self_collision_rows
 from wbc_suite.qp.equality import HeldFrames, hold_frames
 from wbc_suite.qp.floor_limit import SphereArrays, floor_rows
 from wbc_suite.qp.limit import JointBounds, merge_bounds
 from wbc_suite.qp.problem import UNBOUNDED, worst_violation
+from wbc_suite.qp.self_collision_rows import CapsuleArrays, self_collision_rows
 from wbc_suite.qp.strict_level import LevelArrays, restrict_level
 from wbc_suite.qp.task_kernels import TaskArrays, write_tasks
 from wbc_suite.typing import Indices, Vector

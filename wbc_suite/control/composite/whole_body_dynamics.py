@@ -17,7 +17,7 @@ from wbc_suite.control.composite.whole_body_dynamics_config import (
     read_dynamics,
 )
 from wbc_suite.control.dynamics.arrays import Foot, Limits, Stage, make_dynamics
-from wbc_suite.control.dynamics.fallback import QpFallback
+from wbc_suite.control.dynamics.qp_fallback import QpFallback
 from wbc_suite.control.law.law import Law
 from wbc_suite.control.loop.records import LawKind
 from wbc_suite.control.part.gripper import GripperController

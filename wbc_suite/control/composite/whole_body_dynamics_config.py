@@ -17,7 +17,7 @@ from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.locomotion import GaitConfig, TrotConfig
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.elements import Name
-from wbc_suite.robot.soles import ball_radius, guess_sole
+from wbc_suite.robot.sole_inference import ball_radius, guess_sole
 from wbc_suite.tomlfile import FrozenModel, parse_model
 
 

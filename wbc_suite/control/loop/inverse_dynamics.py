@@ -10,7 +10,7 @@ forces that laws of feet plan.
 from typing import Any, TypeAlias
 
 from wbc_suite.compiling import compiled
-from wbc_suite.control.dynamics.law import solve_whole_body, write_whole_body
+from wbc_suite.control.dynamics.solve_tick import solve_whole_body, write_whole_body
 from wbc_suite.control.law.balance import balance_law
 from wbc_suite.control.law.custom import custom_kernel
 from wbc_suite.control.law.free_root import is_of_feet, subtract_contact_forces
