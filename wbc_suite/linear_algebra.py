@@ -25,6 +25,16 @@ def dot(a: Vector, b: Vector, n: int) -> float:
 
 
 @compiled
+def cross(a: Vector, b: Vector) -> Vector:
+    """Return the cross product of two vectors, shape (3,)."""
+    c = np.empty(3)
+    c[0] = a[1] * b[2] - a[2] * b[1]
+    c[1] = a[2] * b[0] - a[0] * b[2]
+    c[2] = a[0] * b[1] - a[1] * b[0]
+    return c
+
+
+@compiled
 def cholesky(A: Matrix, n: int, tolerance: float) -> int:
     """Factorise `A = L L^T` in place; return the number of independent rows.
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wbc_suite.compiling import compiled, struct
-from wbc_suite.linear_algebra import dot, solve
+from wbc_suite.linear_algebra import cross, dot, solve
 from wbc_suite.qp.lie import exp3
 from wbc_suite.typing import Indices, Matrix, Vector
 
@@ -167,7 +167,7 @@ def _write_transition(
     for i in range(3):
         F[POSITION + i, VELOCITY + i] = dt
         F[TURN + i, GYRO_BIAS + i] = -dt
-        across = _cross(R[i], f)  # row i of R [f]x
+        across = cross(R[i], f)  # row i of R [f]x
         for j in range(3):
             F[VELOCITY + i, TURN + j] = -dt * across[j]
             F[VELOCITY + i, ACCELERATION_BIAS + j] = -dt * R[i, j]
@@ -301,12 +301,3 @@ def _apply(estimate: BaseEstimate, change: Vector) -> None:
     for k in range(estimate.feet.shape[0]):
         for i in range(3):
             estimate.feet[k, i] += change[FEET + 3 * k + i]
-
-
-@compiled
-def _cross(a: Vector, b: Vector) -> Vector:
-    c = np.empty(3)
-    c[0] = a[1] * b[2] - a[2] * b[1]
-    c[1] = a[2] * b[0] - a[0] * b[2]
-    c[2] = a[0] * b[1] - a[1] * b[0]
-    return c

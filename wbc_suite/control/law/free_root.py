@@ -22,6 +22,7 @@ from wbc_suite.control.loop.rigid_body import (
     rotation,
     write_inertia,
 )
+from wbc_suite.linear_algebra import cross
 from wbc_suite.qp.lie import exp3, log3
 from wbc_suite.typing import Indices, Matrix, Vector
 
@@ -126,18 +127,9 @@ def root_reference(
     position[:3] = p_goal - physics.qpos[root.qpos : root.qpos + 3]
     velocity[:3], velocity[3:] = rotated(R_goal, v), w
     velocity -= physics.qvel[root.dof : root.dof + 6]
-    acceleration[:3] = rotated(R_goal, twist_rate[:3] + _cross(w, v))
+    acceleration[:3] = rotated(R_goal, twist_rate[:3] + cross(w, v))
     acceleration[3:] = twist_rate[3:]
     return position, velocity, acceleration
-
-
-@compiled
-def _cross(a: Vector, b: Vector) -> Vector:
-    c = np.empty(3)
-    c[0] = a[1] * b[2] - a[2] * b[1]
-    c[1] = a[2] * b[0] - a[0] * b[2]
-    c[2] = a[0] * b[1] - a[1] * b[0]
-    return c
 
 
 @compiled
@@ -150,8 +142,8 @@ def _exp6_translation(twist: Vector) -> Vector:
     else:
         b = (1.0 - np.cos(angle)) / angle**2
         c = (angle - np.sin(angle)) / angle**3
-    side = _cross(w, v)
-    return v + b * side + c * _cross(w, side)
+    side = cross(w, v)
+    return v + b * side + c * cross(w, side)
 
 
 @compiled
