@@ -105,7 +105,7 @@ class Clock:
             return result
 
         env.step = noted_step
-        session._latencies = Latencies(self.latencies)
+        session._times._latencies = Latencies(self.latencies)
 
 
 class Latencies(deque):

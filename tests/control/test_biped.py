@@ -1,4 +1,4 @@
-"""A humanoid that stands on two feet: it reaches, squats and is pushed, and stands."""
+"""A humanoid on two feet under WHOLE_BODY_IK: it reaches, squats, is pushed, stands."""
 
 from typing import Any
 
@@ -19,6 +19,7 @@ def make(**options: Any) -> Any:
     env: gymnasium.Env[Any, Any] = wbc_suite.make(
         "Lift",
         robots="GR1FreeBody",
+        controller_configs="WHOLE_BODY_IK",
         control_freq=RATE,
         initialization_noise=None,
         **options,

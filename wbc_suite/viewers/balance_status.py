@@ -83,7 +83,8 @@ class BalanceReader:
     def take(self, report: Mapping[str, Any]) -> None:
         """Take the report of a step; an empty one after a reset."""
         self.report = report
-        self.fell = (self.fell or report.get("fell") or "") if report else ""
+        fell = report.get("fell") if report else None
+        self.fell = (self.fell or str(fell or "")) if report else ""
 
     def watch(self, client: int, watched: bool) -> None:
         """Note whether a client displays the balance."""
