@@ -89,7 +89,9 @@ class HandGoal:
         if not moves.any():
             return
         start, axes = self.pose, self._axes()
-        if self._from_hand:
+        if self._from_hand and moves.all():
+            start = hand
+        elif self._from_hand:
             to_hand = _step_between(start, hand, axes)
             start = _moved(start, np.where(moves, to_hand, 0.0), axes)
         self.set(_moved(start, step, axes))
