@@ -1,6 +1,7 @@
 """Damaged benchmark and controller files work, or one error names file and key."""
 
 import copy
+import functools
 
 import numpy as np
 import pytest
@@ -25,7 +26,7 @@ CONTROLLERS = [read_toml(path) for path in FILES]
 ROBOTS = [
     wbc_suite.load_robot(path.stem.removesuffix("_whole_body_ik")) for path in FILES
 ]
-PANDA = wbc_suite.load_robot("Panda", gripper="none")
+load_robot = functools.cache(wbc_suite.load_robot)
 TASKS = [read_toml(path) for path in Catalogue().files("tasks")]
 
 NUMBERS = st.one_of(
@@ -101,7 +102,7 @@ def test_a_damaged_benchmark_works_or_names_the_file(data, tmp_path_factory):
     file.write_text("\n".join(f"{dump(k)} = {dump(v)}" for k, v in task.items()))
     try:
         benchmark = load_benchmark(file)
-        benchmark.arrange([PANDA] * len(benchmark.robots), "default")
+        benchmark.arrange([load_robot(r) for r in benchmark.robots], "default")
         spec = empty_arena()
         benchmark.build(spec)
         spec.compile()

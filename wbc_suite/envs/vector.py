@@ -21,7 +21,7 @@ Info = dict[str, Any]
 Flags = NDArray[np.bool_]
 
 
-class VectorRobotEnv(SyncVectorEnv[Observations, Array]):
+class VectorRobotEnv(SyncVectorEnv):
     """Copies of one environment with their own states, stepped in threads.
 
     Physics and control laws run without Python's lock; an idle thread takes the next
