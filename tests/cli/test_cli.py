@@ -13,6 +13,7 @@ from PIL import Image
 from wbc_suite.benchmark import benchmark_names
 from wbc_suite.catalogue import ENVIRONMENT_VARIABLE, Catalogue
 from wbc_suite.cli import main
+from wbc_suite.cli.options import robot_names
 from wbc_suite.robot import load_robot
 
 FILES = [
@@ -287,3 +288,8 @@ def test_bench_times_steps_beside_raw_physics(wbc_suite_command, tmp_path):
         assert name in out
     ratio = np.median(times["step"]) / np.median(times["raw physics, 25 steps of it"])
     assert f"{ratio:.2f} of its own raw physics" in out
+
+
+@pytest.mark.parametrize("given", [["Panda", "UR5e"], ["Panda,UR5e"], ["Panda , UR5e"]])
+def test_robots_are_repeated_or_have_commas(given):
+    assert robot_names(given) == ["Panda", "UR5e"]

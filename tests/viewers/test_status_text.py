@@ -24,6 +24,7 @@ def status(**changes):
         "holder": None,
         "enabled": True,
         "acting": (),
+        "moved": True,
     }
     return LimbStatus(**(values | changes))
 
@@ -83,6 +84,10 @@ def test_reasons_read_as_sentences(reason, words):
 def test_explanation_says_how_far_and_why():
     why = explain(status(reasons=(Conflict("left_hand"),)))
     assert why == "6 cm short: conflict with left hand"
+
+
+def test_a_limb_that_nobody_moved_is_not_explained():
+    assert explain(status(moved=False, reasons=(Conflict("left_hand"),))) == ""
 
 
 def test_turn_that_is_missing_is_told_in_degrees():

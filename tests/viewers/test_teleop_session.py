@@ -1,5 +1,6 @@
 import threading
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pinocchio as pin
@@ -9,7 +10,7 @@ from fake_env import REACH, FakeEnv, upper_limit
 from wbc_suite.devices import DeviceState, LimbInput, Scripted
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.viewers.scene_setup import limb_colours
-from wbc_suite.viewers.status_text import limbs_html
+from wbc_suite.viewers.status_text import limbs_html, status_html
 from wbc_suite.viewers.teleop_session import TeleopSession
 
 ALICE, BOB = 1, 2
@@ -259,7 +260,43 @@ def test_limbs_say_which_of_them_a_device_for_one_hand_moves():
     for name in ("right_hand", "right_hand", "left_hand"):
         session.tick()
         assert session.snapshot.selected == name
-    rows = limbs_html(session.snapshot, session.info.limbs, limb_colours(session.limbs))
+    colours = limb_colours(session.limbs)
+    rows = limbs_html(session.snapshot, session.info.limbs, colours, client=0)
     right, left = rows.split("</tr>")[:2]
     assert "selected" in left
     assert "selected" not in right
+
+
+def test_attempts_and_successes_are_counted():
+    env = FakeEnv()
+    session = TeleopSession(env, period=0.02)
+    step, solved = env.step, {"success": True}
+    env.step = lambda action: (*step(action)[:4], solved)
+    ticks(session, 3)
+    assert session.snapshot.solved == 1
+    assert session.snapshot.solved_at == pytest.approx(0.02)
+    session.reset()
+    solved["success"] = False
+    ticks(session, 2)
+    snapshot = session.snapshot
+    assert (snapshot.epoch, snapshot.solved) == (1, 1)
+    assert np.isnan(snapshot.solved_at)
+
+
+def test_the_status_says_task_and_first_gesture_until_a_limb_was_moved():
+    env = FakeEnv()
+    env.benchmark = SimpleNamespace(title="Lift <a> cube")
+    session = TeleopSession(env, period=0.02)
+    colours = limb_colours(session.limbs)
+    text = status_html(session.snapshot, session.info, colours)
+    assert "Lift &lt;a&gt; cube" in text
+    assert "Drag an arrow" in text
+    session.grab("left_hand", 1, session.snapshot.limbs["left_hand"].target)
+    session.tick()
+    assert "Drag an arrow" not in status_html(session.snapshot, session.info, colours)
+    tables = [
+        limbs_html(session.snapshot, session.info.limbs, colours, client=client)
+        for client in (0, 1)
+    ]
+    assert "held by viewer 2" in tables[0]
+    assert "held by you" in tables[1]

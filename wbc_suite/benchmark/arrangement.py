@@ -83,8 +83,8 @@ def arrange_two_arms(
     if sum(len(robot.hands) for robot in robots) != 2 or len(robots) > 2:
         names = ", ".join(f"{r.name} with {len(r.hands)}" for r in robots)
         raise ConfigError(
-            f"{config.name} needs two arms: robots=['Panda', 'Panda'], or one robot "
-            f"with two, such as 'Baxter'; not {names}."
+            f"{config.name} needs two arms: two robots with one, such as Panda "
+            f"and Panda, or one robot with two, such as Baxter; not {names}."
         )
     alone = len(robots) == 1
     if configuration == "default":

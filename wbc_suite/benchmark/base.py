@@ -23,6 +23,7 @@ class Benchmark(Protocol):
     """A task: a scene, start states, a reward and a success; no controller.
 
     Attributes:
+        title: The task in a few words, in the imperative.
         horizon: Default number of actions in an episode.
         robots: Default robots.
         gripper: Default gripper of the robots; None for their own.
@@ -30,6 +31,7 @@ class Benchmark(Protocol):
     """
 
     name: str
+    title: str
     horizon: int
     robots: Sequence[str]
     gripper: str | None

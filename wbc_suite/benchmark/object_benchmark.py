@@ -81,7 +81,8 @@ class ObjectBenchmark(ABC):
     pushes: Sequence[Push] = ()
 
     def __init__(self, config: ObjectBenchmarkConfig) -> None:
-        self.name, self.horizon, self._placement = config.name, config.horizon, config
+        self.name, self.title, self.horizon = config.name, config.title, config.horizon
+        self._placement = config
         self.sampler: Sampler | None = None
 
     @abstractmethod

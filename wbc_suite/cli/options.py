@@ -47,7 +47,8 @@ SkinOption = Annotated[
     ),
 ]
 RobotsOption = Annotated[
-    list[str] | None, typer.Option(help="Robot; repeat it for several.")
+    list[str] | None,
+    typer.Option(help="Robot; several with commas between them: Panda,Panda."),
 ]
 ControllerOption = Annotated[
     str | None, typer.Option(help="Controller, by name or file.")
@@ -96,6 +97,11 @@ PortOption = Annotated[
 ]
 
 
+def robot_names(given: Sequence[str]) -> list[str]:
+    """Return the robots of an option that is repeated, or has commas."""
+    return [name.strip() for names in given for name in names.split(",")]
+
+
 def _add_to_catalogue(folders: list[Path] | None) -> list[Path]:
     """Add folders to every `Catalogue()` of this process."""
     if folders:
@@ -132,8 +138,9 @@ def environment_arguments(
     base: str | None,
 ) -> dict[str, Any]:
     """Return the arguments of `make` for the options that are given."""
+    names = robot_names(robots or ())
     arguments: dict[str, Any] = {
-        "robots": robots[0] if robots and len(robots) == 1 else robots,
+        "robots": names[0] if len(names) == 1 else names,
         "controller_configs": controller,
         "gripper_types": chosen(gripper),
         "base_types": base,

@@ -80,7 +80,7 @@ def record(
     from wbc_suite.recording.episode_control import EpisodeControl, RecordingPlan
     from wbc_suite.wrappers import DataCollection
 
-    by_hand, named = is_device(device), robots or ["Panda"]
+    by_hand, named = is_device(device), options.robot_names(robots or ["Panda"])
     rate = rate or (BY_HAND if by_hand else BY_POLICY)
     controller = controller or (default_controller(*named) if by_hand else None)
     arguments = options.environment_arguments(

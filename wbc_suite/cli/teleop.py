@@ -14,10 +14,12 @@ from wbc_suite.cli.options import (
     HostOption,
     MirrorOption,
     PortOption,
+    RobotsOption,
     ScaleOption,
     SkinOption,
     chosen,
     device_options,
+    robot_names,
     serve_until_interrupted,
 )
 
@@ -59,7 +61,8 @@ RecordOption = Annotated[
 
 def teleop(
     benchmark: Annotated[str, typer.Argument(help="Benchmark to play in.")] = "Lift",
-    robots: Annotated[str, typer.Option(help="Robot.")] = "GR1",
+    others: Annotated[list[str] | None, typer.Argument(hidden=True)] = None,
+    robots: RobotsOption = None,
     controller: WholeBodyOption = None,
     rate: TargetRateOption = 100.0,
     gripper: GripperOption = None,
@@ -80,13 +83,15 @@ def teleop(
     from wbc_suite.recording.episode_control import EpisodeControl
     from wbc_suite.wrappers import DataCollection
 
+    names = robot_names([*(robots or ["GR1"]), *(others or ())])
     make = None if device is None else device_maker(device, device_option)
     stages = stages_of(device=device is not None, scale=scale, mirror=mirror)
-    print(f"Building {benchmark} with {robots} ...", flush=True)
+    label = " and ".join(names)
+    print(f"Building {benchmark} with {label} ...", flush=True)
     env: gymnasium.Env[Any, Any] = wbc_suite.make(
         benchmark,
-        robots=robots,
-        controller_configs=controller or default_controller(robots),
+        robots=names,
+        controller_configs=controller or default_controller(*names),
         gripper_types=chosen(gripper),
         base_types=base,
         control_freq=rate,
@@ -101,7 +106,7 @@ def teleop(
     try:
         drive(
             env,
-            names=(robots, benchmark),
+            names=(label, benchmark),
             rate=rate,
             seed=seed,
             address=(host, port),

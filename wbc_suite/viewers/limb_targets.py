@@ -96,6 +96,7 @@ class LimbTarget:
             holder=self.ownership.holder(now),
             enabled=self.enabled,
             acting=self.stages.acting,
+            moved=self.stages.moved,
         )
 
     def shown_target(self, measured: pin.SE3) -> pin.SE3:

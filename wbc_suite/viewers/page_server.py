@@ -7,6 +7,7 @@ WebSocket messages. It adds the script of `HeldKeys` to the page.
 
 import asyncio
 import contextlib
+import html
 import io
 import logging
 import threading
@@ -33,6 +34,13 @@ PORTS = range(8080, 8100)  # tried in turn if no port is given
 MESSAGE_LIMIT = 50 * 1024 * 1024  # bytes, viser's own limit
 HEARTBEAT = 30.0  # s between pings that find clients that are gone
 
+HELP_KEY = """<head><script>addEventListener("keydown", e => {
+  if (e.key !== "?" || e.target.closest?.("input, textarea")) return;
+  const buttons = [...document.querySelectorAll("button")];
+  buttons.find(b => b.textContent.trim() === "Keys and gestures")?.click();
+})</script>"""
+"""viser has no hotkey for a question mark."""
+
 DATA = (WSMsgType.TEXT, WSMsgType.BINARY)
 WebSocket: TypeAlias = web.WebSocketResponse | aiohttp.ClientWebSocketResponse
 
@@ -47,6 +55,7 @@ class PageServer:
         server: The viser server.
         token: Secret that clients need; None on a loopback address.
         keys: Keys that are held on the pages.
+        title: Title of the page in its browser's tab.
         update_times: Processor time of the last updates, s.
 
     Raises:
@@ -56,6 +65,7 @@ class PageServer:
     def __init__(self, host: str = "127.0.0.1", port: int | None = None) -> None:
         self.host, self.token = host, token_for(host)
         self.server, self.keys = _start_viser(), HeldKeys()
+        self.title = "wbc_suite"
         try:
             self._proxy = self._start_proxy(PORTS if port is None else [port])
         except DeviceError:
@@ -100,10 +110,16 @@ class PageServer:
             self.update_times = [*self.update_times[-999:], time.thread_time() - began]
             count += 1
 
+    def _rewrite(self, page: bytes) -> bytes:
+        title = f"<title>{html.escape(self.title)}</title>"
+        page = page.replace(b"<title>Viser</title>", title.encode(), 1)
+        page = page.replace(b"<head>", HELP_KEY.encode(), 1)
+        return self.keys.add_script(page)
+
     def _start_proxy(self, ports: Sequence[int]) -> WebServer:
         routes = [
             *self.keys.routes,
-            *proxy(self.server.get_port(), self.keys.add_script),
+            *proxy(self.server.get_port(), self._rewrite),
         ]
         for port in ports:
             try:

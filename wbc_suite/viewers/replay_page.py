@@ -45,7 +45,7 @@ class ReplayPage:
     ) -> None:
         self.player, self.site, self._env = player, site, env
         self.server = site.server
-        set_up_scene(self.server, label=label)
+        set_up_scene(site, label=label)
         self._clip: Clip | None = None
         self._shape = np.empty(0)
         self._status = self.server.gui.add_html("")

@@ -37,7 +37,7 @@ class RobotPage:
         self.data = mujoco.MjData(self.model)
         self._lock = threading.Lock()
         self._sliders: dict[str, viser.GuiSliderHandle[float]] = {}
-        set_up_scene(site.server, label=f"wbc_suite · {robot.name}")
+        set_up_scene(site, label=f"wbc_suite · {robot.name}")
         self.scene = ModelScene(site.server, self.model)
         site.server.gui.add_markdown(
             f"**{robot.title or robot.name}**  \n"

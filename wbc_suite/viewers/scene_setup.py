@@ -13,6 +13,8 @@ from wbc_suite.typing import Vector
 if TYPE_CHECKING:
     import viser
 
+    from wbc_suite.viewers.page_server import PageServer
+
 Colour: TypeAlias = tuple[int, int, int]
 """Red, green and blue, 0 to 255."""
 Box: TypeAlias = tuple[Vector, Vector]
@@ -22,8 +24,8 @@ FIELD_OF_VIEW = np.deg2rad(42.0)  # vertical
 VIEWS = {
     "Front": np.array([1.0, -0.62, 0.5]),
     "Left": np.array([0.1, 1.0, 0.25]),
-    "Behind": np.array([-1.0, -0.35, 0.6]),
-    "Above": np.array([-0.15, 0.0, 1.0]),
+    "Back": np.array([-1.0, -0.35, 0.6]),
+    "Top": np.array([-0.15, 0.0, 1.0]),
 }
 """Direction from the robot, which faces x, to the camera."""
 BRAND = (38, 98, 132)
@@ -43,11 +45,10 @@ _BY_WORD: tuple[tuple[tuple[str, ...], Colour], ...] = (
 )
 
 
-def set_up_scene(server: "viser.ViserServer", *, label: str) -> None:
-    """Add the floor and the lights, and set the theme."""
-    server.gui.configure_theme(
-        show_logo=False, show_share_button=False, brand_color=BRAND
-    )
+def set_up_scene(site: "PageServer", *, label: str) -> None:
+    """Add the floor and the lights, and set theme and title of the page."""
+    server, site.title = site.server, label
+    set_theme(server.gui)
     server.gui.set_panel_label(label)
     server.gui.main_panel.dock_right()
     server.scene.world_axes.visible = False
@@ -68,6 +69,13 @@ def set_up_scene(server: "viser.ViserServer", *, label: str) -> None:
         background_blurriness=1.0,
         background_intensity=0.65,
         environment_intensity=0.3,
+    )
+
+
+def set_theme(gui: "viser.GuiApi", dark: bool = False) -> None:
+    """Set the colours of the panel, for all clients or for one."""
+    gui.configure_theme(
+        show_logo=False, show_share_button=False, brand_color=BRAND, dark_mode=dark
     )
 
 

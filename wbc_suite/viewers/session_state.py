@@ -40,6 +40,7 @@ class SessionInfo:
             keys command, 0 for what the robot cannot do, shape (4,).
         rides: Whether targets of hands can move with the body.
         walks: Whether the robot walks, and reports its balance.
+        task: What is to be done, in a few words; empty if the benchmark does not say.
     """
 
     model: mujoco.MjModel
@@ -49,6 +50,7 @@ class SessionInfo:
     drive: Vector
     rides: bool
     walks: bool
+    task: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,6 +68,7 @@ class LimbStatus:
         holder: Client that holds the limb, or None.
         enabled: Whether the limb's clutch is engaged.
         acting: What stages of the pipeline do to the target.
+        moved: Whether somebody has moved the target since the reset.
     """
 
     measured: pin.SE3
@@ -77,6 +80,7 @@ class LimbStatus:
     holder: int | None
     enabled: bool
     acting: tuple[str, ...]
+    moved: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,6 +90,8 @@ class Snapshot:
     Attributes:
         tick: Number of ticks since the session was created.
         epoch: Number of resets; a reset moves all targets.
+        solved: Number of attempts, from reset to reset, in which the task was solved.
+        solved_at: Simulated time when it was solved in this attempt, s; else nan.
         time: Simulated time, s.
         body_positions: Positions of all bodies in the world, m, shape (nbody, 3).
         body_quaternions: Their orientations (wxyz), shape (nbody, 4).
@@ -106,6 +112,8 @@ class Snapshot:
 
     tick: int
     epoch: int
+    solved: int
+    solved_at: float
     time: float
     body_positions: Matrix
     body_quaternions: Matrix

@@ -15,9 +15,16 @@ from wbc_suite.control.reasons import (
 from wbc_suite.devices.action_ports import LimbKind
 from wbc_suite.qp import ActiveLimit, Conflict, LimitKind, LinkPair, OutOfReach
 from wbc_suite.viewers.scene_setup import Colour, css
-from wbc_suite.viewers.session_state import LimbInfo, LimbStatus, Snapshot
+from wbc_suite.viewers.session_state import (
+    LimbInfo,
+    LimbStatus,
+    SessionInfo,
+    Snapshot,
+)
 
 GREEN, YELLOW, RED = "#3f8f5b", "#b08a2e", "#c8553d"
+FIRST_DRAG = "Drag an arrow or an arc of a handle: the limb follows."
+FIRST_WALK = "Hold W A S D to move, Q E to turn."
 
 
 def plain(name: str) -> str:
@@ -52,8 +59,11 @@ def describe_reason(reason: Reason) -> str:
 
 
 def explain(status: LimbStatus, *, at_most: int = 3) -> str:
-    """Return why a limb is not at its target; empty if it is, or moves there."""
-    error = _tracking_error(status)
+    """Return why a limb is not where somebody moved its target.
+
+    Empty if it is there, moves there, or nobody has moved its target.
+    """
+    error = _tracking_error(status) if status.moved else ""
     reasons = [r for r in status.reasons if not is_transient(r)]
     if status.reached or not error or (status.reasons and not reasons):
         return ""
@@ -62,10 +72,9 @@ def explain(status: LimbStatus, *, at_most: int = 3) -> str:
 
 
 def status_html(
-    snapshot: Snapshot, limbs: Mapping[str, LimbInfo], colours: Mapping[str, Colour]
+    snapshot: Snapshot, info: SessionInfo, colours: Mapping[str, Colour]
 ) -> str:
-    """Return the state of the session, with reasons of limbs that miss their target."""
-    state, dot = _state(snapshot)
+    """Return task and state, with reasons of limbs that miss their target."""
     figures = (
         ("input to joint target", _or_dash(1e3 * snapshot.latency, "ms")),
         ("step time", _or_dash(1e3 * snapshot.step_time, "ms", digits=1)),
@@ -80,7 +89,7 @@ def status_html(
         "<div style='margin-top:.6em;padding:.4em .6em;border-radius:.3em;"
         f"border-left:.25em solid {css(colours[name])};"
         "background:rgba(200,120,60,.10);font-size:.88em'>"
-        f"<b>{html.escape(limbs[name].title)}</b>: {html.escape(text)}</div>"
+        f"<b>{html.escape(info.limbs[name].title)}</b>: {html.escape(text)}</div>"
         for name, status in snapshot.limbs.items()
         if (text := explain(status))
     )
@@ -93,21 +102,45 @@ def status_html(
     )
     return (
         "<div style='padding:.5em .7em .6em'>"
-        "<div style='font-weight:600;margin-bottom:.5em'>"
-        f"<span style='color:{dot}'>&#9679;</span> {html.escape(state)}</div>"
+        f"{_task_html(snapshot, info)}"
         f"<div style='display:flex;gap:.4em'>{cells}</div>"
         f"{_recording_html(snapshot)}{fall}{reasons}</div>"
     )
 
 
+def _task_html(snapshot: Snapshot, info: SessionInfo) -> str:
+    """Return the task, the state of the attempt, and the first thing to do."""
+    state, dot = _state(snapshot)
+    attempts = f"attempt {snapshot.epoch + 1}, {snapshot.solved} solved"
+    hint = ""
+    if snapshot.epoch == 0 and not any(x.moved for x in snapshot.limbs.values()):
+        hints = (FIRST_DRAG, bool(info.limbs)), (FIRST_WALK, bool(info.drive.any()))
+        text = " ".join(text for text, is_possible in hints if is_possible)
+        hint = f"<div style='margin-bottom:.5em;font-size:.88em'>{text}</div>"
+    return (
+        f"<div style='font-weight:600;font-size:1.1em'>{html.escape(info.task)}</div>"
+        "<div style='display:flex;justify-content:space-between;margin:.2em 0 .5em'>"
+        f"<span style='font-weight:600'><span style='color:{dot}'>&#9679;</span> "
+        f"{html.escape(state)}</span>"
+        f"<span style='opacity:.65;font-size:.88em'>{attempts}</span></div>{hint}"
+    )
+
+
 def limbs_html(
-    snapshot: Snapshot, limbs: Mapping[str, LimbInfo], colours: Mapping[str, Colour]
+    snapshot: Snapshot,
+    limbs: Mapping[str, LimbInfo],
+    colours: Mapping[str, Colour],
+    *,
+    client: int,
 ) -> str:
-    """Return a table of the limbs: who holds them, and their tracking error."""
+    """Return a table of the limbs: who holds them, and their tracking error.
+
+    `client` is the number of the viewer who reads it.
+    """
     rows = "".join(
         f"<tr><td><span style='color:{css(colours[name])}'>&#9632;</span> "
         f"{html.escape(limbs[name].title)}</td>"
-        f"<td style='opacity:.65'>{html.escape(_notes(snapshot, name))}</td>"
+        f"<td style='opacity:.65'>{html.escape(_notes(snapshot, name, client))}</td>"
         f"<td style='text-align:right'>{_error_cell(limbs[name], status)}</td></tr>"
         for name, status in snapshot.limbs.items()
     )
@@ -125,7 +158,7 @@ def _state(snapshot: Snapshot) -> tuple[str, str]:
     if snapshot.device:
         return ", ".join(snapshot.device).capitalize(), YELLOW
     if snapshot.success:
-        return "Solved", GREEN
+        return f"Solved in {snapshot.solved_at:.0f} s", GREEN
     return f"Running, {snapshot.time:.0f} s", GREEN
 
 
@@ -142,11 +175,12 @@ def _recording_html(snapshot: Snapshot) -> str:
     return f"<div style='margin-top:.5em'>{dot}{html.escape(text)}</div>"
 
 
-def _notes(snapshot: Snapshot, name: str) -> str:
+def _notes(snapshot: Snapshot, name: str, client: int) -> str:
     status = snapshot.limbs[name]
     notes = ["selected"] if name == snapshot.selected else []
     if status.holder is not None:
-        notes.append(f"held by viewer {status.holder + 1}")
+        you = status.holder == client
+        notes.append("held by you" if you else f"held by viewer {status.holder + 1}")
     return ", ".join([*notes, *status.acting])
 
 

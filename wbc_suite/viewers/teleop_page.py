@@ -36,7 +36,7 @@ class TeleopPage:
         self.session, self.site = session, site
         model, limbs = session.info.model, session.info.limbs
         self.server = site.server
-        set_up_scene(self.server, label=label)
+        set_up_scene(site, label=label)
         snapshot = session.snapshot
         colours = limb_colours(limbs)
         self.scene = ModelScene(self.server, model)
@@ -100,7 +100,7 @@ class TeleopPage:
         self.panel.add_client(client)
 
     def _disconnect(self, client: "viser.ClientHandle") -> None:
-        for part in (self.handles, self.cameras, self.overlays):
+        for part in (self.handles, self.cameras, self.overlays, self.panel):
             part.remove_client(client.client_id)
 
 

@@ -15,8 +15,15 @@ from wbc_suite.viewers.camera_follower import CameraFollower
 from wbc_suite.viewers.drag_handles import DragHandles, HandleMode
 from wbc_suite.viewers.drive_panel import DrivePanel
 from wbc_suite.viewers.gripper_sliders import GripperSliders
-from wbc_suite.viewers.scene_setup import Box, Colour, add_plot, add_views, css
-from wbc_suite.viewers.session_state import Snapshot
+from wbc_suite.viewers.scene_setup import (
+    Box,
+    Colour,
+    add_plot,
+    add_views,
+    css,
+    set_theme,
+)
+from wbc_suite.viewers.session_state import SessionInfo, Snapshot
 from wbc_suite.viewers.status_text import limbs_html, status_html
 
 if TYPE_CHECKING:
@@ -38,6 +45,7 @@ BUTTON_HINT = (
 CLUTCH_HINT = "Engaged: the limb follows its handle. Else only the handle moves."
 BALANCE_HINT = "Feet, capture point, next footstep and contact forces."
 SHADOW_HINT = "Two thirds of the rendering time without a graphics card."
+HELP = "Keys and gestures"
 STEP_COLOUR = "#4a6fa5"
 RECORD_KEYS = {
     "C": (EpisodeCommand.RECORD, "Record or keep the episode"),
@@ -90,8 +98,8 @@ class TeleopPanel:
         self._add_buttons()
         self.drive = DrivePanel(server, session) if info.drive.any() else None
         if info.limbs:
-            with server.gui.add_folder("Limbs"):
-                self._limbs = server.gui.add_html("")
+            self._limb_folder = server.gui.add_folder("Limbs")
+        self._limbs: dict[int, viser.GuiHtmlHandle] = {}
         self._handle_folder = server.gui.add_folder("Handles" if info.limbs else "View")
         if info.limbs:
             self._add_clutches()
@@ -111,7 +119,10 @@ class TeleopPanel:
 
     def add_client(self, client: "viser.ClientHandle") -> None:
         """Add the controls that each client has for itself."""
-        with self._adding, self._handle_folder:  # viser: one thread at a time
+        if self._info.limbs:
+            with self._adding, self._limb_folder:  # viser: one thread at a time
+                self._limbs[client.client_id] = client.gui.add_html("")
+        with self._adding, self._handle_folder:
             if self._info.limbs:
                 self._add_handle_controls(client)
             add_views(client, self._box)
@@ -131,6 +142,14 @@ class TeleopPanel:
                     lambda on: client.scene.configure_default_lights(cast_shadow=on),
                     SHADOW_HINT,
                 )
+                dark = functools.partial(set_theme, client.gui)
+                _add_checkbox(client.gui, "Dark panel", dark, value=False)
+            keys = client.gui.add_button(HELP, color="gray", hint="Key: ?")
+            keys.on_click(lambda _: _show_help(client, self._info))
+
+    def remove_client(self, client: int) -> None:
+        """Forget the controls of a client that has left."""
+        self._limbs.pop(client, None)
 
     def _add_balance(self, client: "viser.ClientHandle") -> None:
         """Add the checkbox that draws the balance for one client, and a legend."""
@@ -181,10 +200,10 @@ class TeleopPanel:
     def update(self, snapshot: Snapshot) -> None:
         """Display the state of the session."""
         limbs = self._info.limbs  # viser sends only changes
-        self._status.content = status_html(snapshot, limbs, self._colours)
+        self._status.content = status_html(snapshot, self._info, self._colours)
         self._stand_up.visible = bool(snapshot.fell)
-        if limbs:
-            self._limbs.content = limbs_html(snapshot, limbs, self._colours)
+        for client, table in list(self._limbs.items()):
+            table.content = limbs_html(snapshot, limbs, self._colours, client=client)
         if self.drive is not None:
             self.drive.update(snapshot)
         for name, sliders in self._grippers.items():
@@ -265,6 +284,35 @@ def _add_checkbox(
     """Add a checkbox that calls a function with its value when it changes."""
     box = gui.add_checkbox(label, initial_value=value, hint=hint or None)
     box.on_update(lambda _: set_value(box.value))
+
+
+def _show_help(client: "viser.ClientHandle", info: SessionInfo) -> None:
+    """Show keys and gestures to one client until it closes them."""
+    rows = [row for row, is_possible in _help_rows(info) if is_possible]
+    with client.gui.add_modal(HELP) as modal:
+        table = "\n".join(f"| {key} | {text} |" for key, text in rows)
+        client.gui.add_markdown(f"| | |\n|---|---|\n{table}")
+        client.gui.add_button("Close").on_click(lambda _: modal.close())
+
+
+def _help_rows(info: SessionInfo) -> list[tuple[tuple[str, str], bool]]:
+    """Return keys and what they do, and whether the session has them."""
+    limbs, drives = bool(info.limbs), bool(info.drive.any())
+    return [
+        (("Drag an arrow, an arc", "move, turn a limb"), limbs),
+        (("T", "change between arrows and arcs"), limbs),
+        (("H", "bring handles to the limbs"), limbs),
+        (("W A S D", "forward, left, back, right"), drives),
+        (("Q E", "turn left, right"), drives),
+        (("R F", "body up, down"), bool(info.drive[3])),
+        (("P", "pause or resume"), True),
+        (("0", "reset: the next attempt"), True),
+        *(
+            ((key, text.lower()), info.records)
+            for key, (_, text) in RECORD_KEYS.items()
+        ),
+        (("Drag the floor", "turn the camera; wheel: closer, farther"), True),
+    ]
 
 
 def _buttons(snapshot: Snapshot) -> tuple[str, ...]:

@@ -80,11 +80,11 @@ class TeleopSession:
         self._lock = threading.Lock()
         self._inputs: list[float] = []  # arrival times since the last tick
         self._reset_requested = self._paused = False
-        self._epoch = self._tick = 0
+        self._epoch = self._tick = self._solved = 0
         self._thread: threading.Thread | None = None
         self._stopping, self.quit = threading.Event(), threading.Event()
         self._message, self._success, self._selected = "", False, ""
-        self._ik: dict[str, Any] = {}
+        self._solved_at, self._ik = np.nan, dict[str, Any]()
         self._drive, self._times = HeldCommand(4, DRIVE_TIMEOUT), StepTimes()
 
         env.reset(seed=seed)
@@ -101,10 +101,9 @@ class TeleopSession:
             drive=self._pipeline.drive.limits,
             rides=self._pipeline.carries,
             walks=self._balance.walks,
+            task=getattr(getattr(env.unwrapped, "benchmark", None), "title", ""),
         )
         self._publish()
-
-    # Inputs, from any thread.
 
     def grab(self, name: str, client: int, T_world_input: pin.SE3) -> bool:
         """Take a limb and latch the input to it; False if another client holds it."""
@@ -198,8 +197,6 @@ class TeleopSession:
             raise UnknownNameError("limb", name, self.limbs)
         return self.limbs[name]
 
-    # The loop.
-
     def start(self, *, urgent: bool = False) -> None:
         """Run the loop in a thread, at the session's rate.
 
@@ -289,6 +286,9 @@ class TeleopSession:
         self._times.end_step(inputs, now)
         self._balance.take(info.get("balance", {}))
         self._ik, self._success = info.get("ik", {}), bool(info.get("success", False))
+        if self._success and np.isnan(self._solved_at):
+            self._solved += 1
+            self._solved_at = float(self._simulation.data.time)
         if "physics_error" in info:
             self._reset()
             self._message = f"The simulation diverged ({info['physics_error']}): reset."
@@ -306,6 +306,7 @@ class TeleopSession:
             self._open_grippers()
             self._drive.clear()
         self._message, self._success, self._ik = "", False, {}
+        self._solved_at = np.nan
         self._balance.take({})
         self._times.restart()
         self._epoch += 1
@@ -314,14 +315,11 @@ class TeleopSession:
         for grip in self._pipeline.grips.values():
             grip.goal[:] = -1.0
 
-    # What is displayed.
-
     def _publish(self) -> None:
         data, now = self._simulation.data, self._clock()
         with self._lock:
-            reports = self._ik.get("frames", {})
             limbs = {
-                name: limb.status(reports.get(name, {}), now=now)
+                name: limb.status(self._ik.get("frames", {}).get(name, {}), now=now)
                 for name, limb in self.limbs.items()
             }
             grippers = {name: goal.copy() for name, goal in self.grippers.items()}
@@ -329,6 +327,8 @@ class TeleopSession:
         self.snapshot = Snapshot(
             tick=self._tick,
             epoch=self._epoch,
+            solved=self._solved,
+            solved_at=self._solved_at,
             time=float(data.time),
             body_positions=data.xpos.copy(),
             body_quaternions=data.xquat.copy(),

@@ -17,7 +17,7 @@ class WatchPage:
 
     def __init__(self, model: mujoco.MjModel) -> None:
         self.site = PageServer()
-        set_up_scene(self.site.server, label="wbc_suite")
+        set_up_scene(self.site, label="wbc_suite")
         self._scene = ModelScene(self.site.server, model)
         middle, reach = model.stat.center, 0.5 * model.stat.extent
         set_camera(self.site.server, (middle - reach, middle + reach))

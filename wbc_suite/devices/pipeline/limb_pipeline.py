@@ -27,6 +27,7 @@ class LimbPipeline:
         clutch: Couples the input to the requested target, before bounds and limits.
         acting: What stages did to the last target.
         rides: Whether the target moves with the base, if there is one.
+        moved: Whether an input has moved the target since the reset.
     """
 
     def __init__(self, port: LimbPort, config: PipelineConfig, dt: float) -> None:
@@ -47,7 +48,7 @@ class LimbPipeline:
         if self._filter is not None:
             self._filter.reset(self.home)
         self.acting: tuple[str, ...] = ()
-        self._clutch_note = ""
+        self._clutch_note, self.moved = "", False
 
     @property
     def target(self) -> pin.SE3:
@@ -95,6 +96,8 @@ class LimbPipeline:
             self.release()
             self._clutch_note = "clutch disengaged"
             return
+        turns = given.twist is not None and bool(given.twist.any())
+        self.moved = self.moved or turns or given.pose is not None
         if given.twist is not None:
             before, step = self.clutch.target, given.twist * self._dt
             turned = pin.exp3(step[3:]) @ before.rotation
