@@ -81,7 +81,7 @@ def teleop(
     from wbc_suite.wrappers import DataCollection
 
     make = None if device is None else device_maker(device, device_option)
-    stages = stages_of(device=device is not None, scale=scale, mirror=mirror)
+    stages = stages_of(device, scale=scale, mirror=mirror)
     print(f"Building {benchmark} with {robots} ...", flush=True)
     env: gymnasium.Env[Any, Any] = wbc_suite.make(
         benchmark,
@@ -141,15 +141,14 @@ def device_maker(name: str, pairs: list[str] | None) -> DeviceMaker:
     return build
 
 
-def stages_of(*, device: bool, scale: float, mirror: bool) -> "PipelineConfig":
-    """Return the pipeline's stages; a device gets a leash."""
-    from wbc_suite.devices.pipeline.config import Leash
-    from wbc_suite.viewers.teleop_session import DRAGGED
+def stages_of(device: str | None, *, scale: float, mirror: bool) -> "PipelineConfig":
+    """Return the pipeline's stages: the defaults, but for a mouse alone."""
+    from wbc_suite.devices import PipelineConfig
+    from wbc_suite.devices.pipeline.config import DRAGGED
 
-    changes: dict[str, object] = {"mirror": mirror, "scale": scale}
-    if device:
-        changes["leash"] = Leash()
-    return DRAGGED.model_copy(update=changes)
+    by_mouse = device is None or device.lower() == "mjgui"
+    stages = DRAGGED if by_mouse else PipelineConfig()
+    return stages.model_copy(update={"mirror": mirror, "scale": scale})
 
 
 def drive(
