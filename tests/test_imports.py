@@ -19,6 +19,7 @@ BASE = (
     "tomlfile",
     "catalogue",
     "registration",
+    "kernel_cache",
     "compiling",
     "linear_algebra",
 )

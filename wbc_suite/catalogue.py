@@ -7,6 +7,7 @@ command line or the variable `WBC_SUITE_CATALOGUE`; its files take precedence.
 """
 
 import os
+import tempfile
 import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -18,8 +19,21 @@ ENVIRONMENT_VARIABLE = "WBC_SUITE_CATALOGUE"
 
 
 def user_cache_root() -> Path:
-    """Return the user's cache folder, shared by all programs."""
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    """Return the user's cache folder, shared by all programs.
+
+    A user without a home has a folder for temporary files in its place.
+    """
+    if folder := os.environ.get("XDG_CACHE_HOME"):
+        return Path(folder)
+    try:
+        return Path.home() / ".cache"
+    except RuntimeError:  # neither HOME nor an entry in passwd
+        return temporary_root()
+
+
+def temporary_root() -> Path:
+    """Return this user's own folder among temporary files; it may not exist yet."""
+    return Path(tempfile.gettempdir()) / f"wbc_suite-{os.getuid()}"
 
 
 def user_cache() -> Path:

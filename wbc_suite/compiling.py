@@ -3,16 +3,12 @@
 Machine code is kept on disk, in one folder for each state of the package's kernels.
 """
 
-import hashlib
 import logging
-import shutil
-import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
-from functools import cache, partial
-from pathlib import Path
+from contextlib import contextmanager
+from functools import partial
 from types import FunctionType
 from typing import Any, TypeVar, cast
 
@@ -21,7 +17,7 @@ import numpy as np
 from numba import types
 from numba.experimental import structref
 
-from wbc_suite.catalogue import user_cache
+from wbc_suite.kernel_cache import cache_folder
 from wbc_suite.typing import Records
 
 log = logging.getLogger(__name__)
@@ -35,7 +31,6 @@ Fields = TypeVar("Fields", bound=tuple[Any, ...])
 
 PATIENCE = 1.5  # s; what compiles for longer is announced; reading the code takes 0.2
 INTERVAL = 5.0  # s between two messages about the progress of compiling
-KEPT = 7 * 24 * 3600.0  # s; code that no process asks for in this time is deleted
 
 _KERNELS: list[Any] = []
 """All kernels of imported modules, to report how many are compiled."""
@@ -137,43 +132,6 @@ class _StructType(types.StructRef):
     def preprocess_fields(self, fields: Any) -> Any:
         """Return the fields with types of numbers in place of those of constants."""
         return tuple((name, types.unliteral(kind)) for name, kind in fields)
-
-
-@cache
-def cache_folder() -> Path:
-    """Return where machine code is kept, which depends on the state of the kernels.
-
-    In `NUMBA_CACHE_DIR` when that is set, else in the user's cache folder, else, when
-    nothing there can be written, in one that lasts as long as the process.
-    """
-    parent = Path(_numba.CACHE_DIR or user_cache()) / "compiled"
-    folder = parent / _kernels_digest()
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        folder.touch()
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError:
-        return Path(tempfile.mkdtemp(prefix="wbc_suite_"))
-    with suppress(OSError):
-        for other in parent.iterdir():
-            if time.time() - other.stat().st_mtime > KEPT:
-                shutil.rmtree(other, ignore_errors=True)
-    return folder
-
-
-def _kernels_digest() -> str:
-    """Return a digest of all source files that hold kernels, and of numba's version.
-
-    Numba compiles a function again when its own file changes, not when a function
-    changes that it calls from another file.
-    """
-    digest = hashlib.sha256(numba.__version__.encode())
-    for file in sorted(Path(__file__).parent.rglob("*.py")):
-        source = file.read_bytes()
-        if b"wbc_suite.compiling import" in source or file.name == "compiling.py":
-            digest.update(source)
-    return digest.hexdigest()[:16]
 
 
 @contextmanager

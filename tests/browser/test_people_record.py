@@ -59,7 +59,7 @@ class Room:
             collection,
             period=1.0 / RATE,
             device=self.stream,
-            pipeline=stages_of(device=True, scale=1.0, mirror=False),
+            pipeline=stages_of("stream", scale=1.0, mirror=False),
             episode_control=self.episode_control,
         )
         self.session.tick()

@@ -1,18 +1,13 @@
 """The compiled loop does what the plain one does, for any mix of laws."""
 
-import os
-import shutil
 import subprocess
 import sys
-import time
-from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
 
 import wbc_suite
-from wbc_suite import compiling
 from wbc_suite.control.loop.advance import advance
 
 CASES = [
@@ -128,62 +123,6 @@ def test_sensors_that_are_switched_off_stay_off():
     before = simulation.data.sensordata.copy()
     env.step(env.hold_action + 0.1)
     np.testing.assert_array_equal(simulation.data.sensordata, before)
-
-
-@pytest.fixture
-def machine_code(monkeypatch, tmp_path):
-    """Machine code is kept in an empty folder."""
-    monkeypatch.setattr(compiling, "user_cache", lambda: tmp_path)
-    monkeypatch.setattr("numba.config.CACHE_DIR", "")
-    compiling.cache_folder.cache_clear()
-    yield tmp_path / "compiled"
-    compiling.cache_folder.cache_clear()
-
-
-def test_changed_kernels_get_another_folder(machine_code, monkeypatch, tmp_path):
-    """The folder depends on files with kernels, and on no other."""
-    source = Path(compiling.__file__).parent
-    package = tmp_path / source.name
-    package.mkdir()
-    for name in ("compiling.py", "errors.py", "qp/lie.py"):
-        (package / name).parent.mkdir(exist_ok=True)
-        shutil.copy(source / name, package / name)
-    monkeypatch.setattr(compiling, "__file__", str(package / "compiling.py"))
-
-    def folder_after_change(name):
-        with (package / name).open("a") as file:
-            file.write("# changed\n")
-        compiling.cache_folder.cache_clear()
-        return compiling.cache_folder()
-
-    first = folder_after_change("errors.py")
-    assert first.parent == machine_code
-    assert folder_after_change("errors.py") == first
-    assert folder_after_change("qp/lie.py") != first
-
-
-def test_machine_code_that_is_long_unused_is_deleted(machine_code):
-    for age, name in ((0.5, "recent"), (1.5, "old")):
-        folder = machine_code / name
-        folder.mkdir(parents=True)
-        then = time.time() - age * compiling.KEPT
-        os.utime(folder, (then, then))
-    present = compiling.cache_folder().name
-    kept = {folder.name for folder in machine_code.iterdir()}
-    assert kept == {present, "recent"}
-
-
-def test_a_folder_that_cannot_be_written_is_replaced(monkeypatch, tmp_path):
-    blocked = tmp_path / "file"
-    blocked.write_text("not a folder")
-    monkeypatch.setattr("numba.config.CACHE_DIR", str(blocked))
-    compiling.cache_folder.cache_clear()
-    try:
-        folder = compiling.cache_folder()
-        assert folder.is_dir()
-        assert blocked not in folder.parents
-    finally:
-        compiling.cache_folder.cache_clear()
 
 
 @pytest.mark.slow

@@ -74,7 +74,7 @@ def run(env, story):
     """Return the targets of the law at every step of physics, (n, 3, joints)."""
     env.reset(seed=0)
     controller = env.unwrapped.controllers[0]
-    pipeline = Pipeline(env, PipelineConfig(ramp=0.0, jump=None))
+    pipeline = Pipeline(env, PipelineConfig(ramp=0.0, jump=None, jump_angle=None))
     dt, steps = env.unwrapped.simulation.timestep, controller._steps_per_solve
     sampled = []
     for state in states(story):

@@ -92,7 +92,7 @@ def test_twist_jogs_the_hand_and_goes_on_between_messages(person):
 
 
 def test_scale_makes_small_motions_of_large_ones():
-    person = Person(FloatingEnv(), scale=0.25, jump=None)
+    person = Person(FloatingEnv(), scale=0.25, jump=None, jump_angle=None)
     person.say(right=LimbInput(pose=hand()))
     person.say(150, right=LimbInput(pose=hand(z=0.2)))
     assert person.target()[2] == pytest.approx(1.05, abs=1e-4)
@@ -120,7 +120,7 @@ def test_workspace_keeps_the_hand_inside_and_does_not_wind_up():
 
 def test_leash_lets_a_target_lead_by_so_much_and_no_more():
     leash = {"distance": 0.1, "angle": 0.5}
-    person = Person(FloatingEnv(stuck=True), leash=leash, jump=None)
+    person = Person(FloatingEnv(stuck=True), leash=leash, jump=None, jump_angle=None)
     person.say(right=LimbInput(pose=hand()))
     person.say(300, right=LimbInput(pose=hand(x=1.0)))
     assert person.target()[0] == pytest.approx(0.5, abs=1e-3)
@@ -259,7 +259,7 @@ def test_no_device_makes_a_target_exceed_its_limits(messages, absolute):
     """It jumps, stalls, repeats, goes back in time, says NaN, or floods."""
     env = FloatingEnv()
     mode = "absolute" if absolute else "relative"
-    config = PipelineConfig(mode=mode, return_after=0.5, jump=None)
+    config = PipelineConfig(mode=mode, return_after=0.5, jump=None, jump_angle=None)
     pipeline = Pipeline(env, config)
     time, path, grips = 0.0, [env.action_layout.unpack(pipeline.update(SILENT))], []
     for step, kind, numbers, engaged, button, count in messages:

@@ -1,5 +1,6 @@
 """Access over real sockets: who is admitted, and what a server must survive."""
 
+import contextlib
 import http.client
 import socket
 import time
@@ -156,12 +157,20 @@ def test_server_outlives_a_hundred_connects(server):
     assert get(server)[0].status == 200
 
 
-def test_connections_beyond_the_limit_are_closed(server, monkeypatch):
+def test_connection_beyond_the_limit_closes_the_one_that_waits_longest(
+    server, monkeypatch
+):
     monkeypatch.setattr(web_server, "CONNECTIONS", 3)
-    waiting = [client_of(server) for _ in range(3)]
-    time.sleep(0.1)  # until the server has accepted them
-    with client_of(server) as fourth:
-        assert is_closed(fourth)
+    waiting = []
+    for _ in range(4):
+        waiting.append(client_of(server))
+        time.sleep(0.05)  # until the server has accepted it
+    assert is_closed(waiting[0])
+    for client in waiting[1:]:
+        client.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+        assert client.recv(4096).startswith(b"HTTP/1.1 200")
+    with client_of(server) as fifth:  # all others have been answered
+        assert is_closed(fifth)
     for client in waiting:
         client.close()
     deadline = time.monotonic() + PATIENCE
@@ -172,6 +181,19 @@ def test_connections_beyond_the_limit_are_closed(server, monkeypatch):
         except (ConnectionError, http.client.RemoteDisconnected):
             time.sleep(0.01)
     raise AssertionError("closed connections are still counted")
+
+
+def test_slow_connections_do_not_lock_visitors_out(server):
+    """The one that waits longest for its first request makes room."""
+    slow = [client_of(server) for _ in range(300)]
+    for client in slow:
+        with contextlib.suppress(OSError):
+            client.sendall(b"GET / HTTP/1.1\r\n")
+    start = time.monotonic()
+    assert get(server)[0].status == 200
+    assert time.monotonic() - start < 1.0
+    for client in slow:
+        client.close()
 
 
 def test_connection_without_a_request_is_closed_after_a_while(served, monkeypatch):

@@ -4,6 +4,7 @@
 
 import errno
 import os
+import platform
 import shutil
 import subprocess
 import sys
@@ -44,6 +45,33 @@ def test_every_finished_episode_outlives_kills(tmp_path):
         with Dataset(path, alone=True) as dataset:
             assert len(dataset) == len(uids)
     assert held > KILLS
+
+
+@pytest.mark.slow
+def test_commands_that_are_killed_leave_nothing_torn(tmp_path):
+    """The next run makes what the first would have made, and removes what was left."""
+    script = Path(__file__).with_name("kill_commands.py")
+    command = [sys.executable, str(script), str(tmp_path), str(4 * KILLS)]
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stderr
+    rows = [line.split() for line in result.stdout.splitlines()]
+    assert {"robomimic", "npz", "minari", "merge", "split", "repair", "export"} <= {
+        name for name, *_ in rows
+    }
+    assert sum(int(cut) for *_, cut in rows) > KILLS
+
+
+def test_the_temporary_file_of_another_process_is_kept(tmp_path):
+    path = tmp_path / "a.hdf5"
+    ours = atomic_files.temporary_path(path)
+    assert ours.suffix == ".hdf5"
+    running = ours.with_name(ours.name.replace(str(os.getpid()), str(os.getppid())))
+    dead = ours.with_name(ours.name.replace(str(os.getpid()), "999999999"))
+    elsewhere = ours.with_name(ours.name.replace(platform.node(), "other-node"))
+    for left in (running, dead, elsewhere):
+        left.touch()
+    atomic_files.write_bytes(path, b"whole")
+    assert set(tmp_path.iterdir()) == {path, running, elsewhere}
 
 
 def test_a_full_disk_loses_nothing_that_is_finished(tmp_path, monkeypatch):

@@ -18,7 +18,7 @@ from wbc_suite.devices.web_server import WebServer
 from wbc_suite.viewers.page_server import PageServer, proxy
 
 PATIENCE = 60.0  # s, for a busy machine
-BIG = 5_000_000  # bytes; a robot's meshes take a few million
+BIG = b"x" * 5_000_000  # a robot's meshes take a few million bytes
 
 
 @pytest.fixture
@@ -43,6 +43,8 @@ def echo():
         for message in connection:
             if message == "close":
                 connection.close(1002, "as asked")
+            elif message == "big":
+                connection.send(BIG)
             else:
                 connection.send(message)
 
@@ -56,9 +58,9 @@ def echo():
     )
     thread = threading.Thread(target=upstream.serve_forever, daemon=True)
     thread.start()
-    server = WebServer(
-        "127.0.0.1", 0, proxy(upstream.socket.getsockname()[1]), token=None
-    )
+    port = upstream.socket.getsockname()[1]
+    routes = proxy(port, admits=lambda message: message != "bad")
+    server = WebServer("127.0.0.1", 0, routes, token=None)
     yield server.port
     server.stop()
     upstream.shutdown()
@@ -134,10 +136,44 @@ def test_share_tunnel_cannot_be_requested(monkeypatch):
 def test_messages_pass_both_ways_with_their_type_order_and_protocol(echo):
     with socket_to(echo, protocol="b") as client:
         assert client.subprotocol == "b"
-        sent = ["text", b"\x00binary", "", b"x" * BIG]
+        sent = ["text", b"\x00binary", "", "big"]
         for message in sent:
             client.send(message)
-        assert [client.recv(timeout=PATIENCE) for _ in sent] == sent
+        received = [client.recv(timeout=PATIENCE) for _ in sent]
+        assert received == [*sent[:3], BIG]
+
+
+@pytest.mark.parametrize("message", ["bad", "x" * 20_000])
+def test_bad_message_costs_its_sender_the_connection_and_nobody_else(echo, message):
+    with (
+        socket_to(echo, protocol="b") as client,
+        socket_to(echo, protocol="b") as other,
+    ):
+        client.send(message)
+        with pytest.raises(websockets.ConnectionClosed, match=r"1008|1009"):
+            client.recv(timeout=PATIENCE)
+        other.send("text")
+        assert other.recv(timeout=PATIENCE) == "text"
+
+
+def test_upload_to_a_slider_is_refused(site):
+    """viser keeps what is uploaded to any element in memory."""
+    slider = site.server.gui.add_slider(
+        "a", min=0.0, max=1.0, step=0.1, initial_value=0
+    )
+    upload = {
+        "type": "FileTransferStartUpload",
+        "source_component_uuid": slider._impl.uuid,
+        "transfer_uuid": "a",
+        "filename": "a",
+        "mime_type": "text/plain",
+        "part_count": 1000,
+        "size_bytes": 500_000_000,
+    }
+    with socket_to(site.port) as client:
+        client.send(msgspec.msgpack.encode(upload))
+        with pytest.raises(websockets.ConnectionClosed, match="1008"):
+            receive_until_closed(client)
 
 
 def test_reason_for_which_the_page_server_closes_arrives(echo):
@@ -160,7 +196,7 @@ def test_relayed_drag_at_100_hz_comes_back_within_a_frame(echo):
 
 
 def test_page_server_that_is_gone_is_a_bad_gateway():
-    server = WebServer("127.0.0.1", 0, proxy(9), token=None)
+    server = WebServer("127.0.0.1", 0, proxy(9, admits=bool), token=None)
     try:
         with pytest.raises(urllib.error.HTTPError, match="502"):
             urllib.request.urlopen(f"http://127.0.0.1:{server.port}/", timeout=PATIENCE)

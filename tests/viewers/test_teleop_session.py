@@ -7,6 +7,7 @@ import pinocchio as pin
 import pytest
 from fake_env import REACH, FakeEnv, upper_limit
 
+from wbc_suite.cli.teleop import stages_of
 from wbc_suite.devices import DeviceState, LimbInput, Scripted
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.viewers.scene_setup import limb_colours
@@ -223,6 +224,116 @@ def test_error_in_the_loop_ends_it_and_says_so(session):
         time.sleep(0.01)
     session.stop()
     assert "Stopped by an error" in session.snapshot.message
+
+
+def test_loop_survives_a_device_that_fails_and_says_why():
+    class Faulty(Scripted):
+        def read(self):
+            if 3 <= len(told) < 20:
+                told.append(None)
+                raise OSError("unplugged")
+            told.append(super().read())
+            return told[-1]
+
+    told = []
+    up = {"left": LimbInput(twist=np.array([0, 0, 0.1, 0, 0, 0]))}
+    says = [DeviceState(time=0.02 * k, limbs=up) for k in range(1, 50)]
+    session = TeleopSession(FakeEnv(), period=0.02, device=Faulty(says))
+    ticks(session, 5)
+    assert session.snapshot.device[0] == "the device fails: unplugged"
+    ticks(session, 10)
+    held = session.snapshot.limbs["left_hand"].target.translation
+    ticks(session, 2)
+    assert session.snapshot.limbs["left_hand"].target.translation == pytest.approx(held)
+    ticks(session, 10)
+    assert session.snapshot.device == ()
+    assert session.snapshot.limbs["left_hand"].target.translation[2] > held[2]
+    assert np.isfinite(session.env.actions).all()
+
+
+def test_loop_survives_an_input_that_causes_an_error(session):
+    def broken(*_):
+        raise FloatingPointError("worse than NaN")
+
+    update, session._pipeline.update = session._pipeline.update, broken
+    session.tick()
+    assert session.snapshot.message == "An input was refused: worse than NaN"
+    np.testing.assert_array_equal(session.env.actions[-1], session.env.hold_action)
+    session._pipeline.update = update
+    session.tick()
+    assert error(session) < 1e-9
+
+
+@pytest.mark.parametrize("field", ["twist", "fingers"])
+def test_arrays_of_a_wrong_shape_are_refused_where_they_come_in(field):
+    with pytest.raises(ValueError, match=r"has shape \(2,\)"):
+        LimbInput(**{field: np.zeros(2)})
+    with pytest.raises(ValueError, match=r"has shape \(2,\)"):
+        DeviceState(time=0.0, base=np.zeros(2))
+
+
+@pytest.mark.parametrize("device", ["stream", "SpaceMouse", "my:Device"])
+@pytest.mark.parametrize("jump", ["position", "angle"])
+def test_headset_that_loses_track_moves_no_hand(device, jump):
+    """With the stages of the command line: the pose jumps by 0.5 m, or by 120 deg."""
+    offset = pin.SE3(np.eye(3), np.array([0.5, 0.0, 0.0]))
+    if jump == "angle":
+        offset = pin.SE3(pin.exp3(np.array([0.0, 0.0, 2.1])), np.zeros(3))
+    poses = [pin.SE3.Identity()] * 150 + [offset] * 50
+    says = [
+        DeviceState(time=0.02 * k, limbs={"right": LimbInput(pose=pose)})
+        for k, pose in enumerate(poses)
+    ]
+    stages = stages_of(device, scale=1.0, mirror=False)
+    session = TeleopSession(
+        FakeEnv(), period=0.02, device=Scripted(says), pipeline=stages
+    )
+    start = session.snapshot.limbs["right_hand"].measured
+    moved = turned = 0.0
+    for _ in poses:
+        session.tick()
+        now = session.snapshot.limbs["right_hand"].measured
+        moved = max(moved, np.linalg.norm(now.translation - start.translation))
+        turned = max(turned, np.linalg.norm(pin.log3(start.rotation.T @ now.rotation)))
+    assert moved < 1e-3
+    assert turned < 1e-3
+
+
+def test_drags_of_the_page_in_long_steps_count_beside_a_device():
+    device = Scripted([DeviceState(time=0.0)])
+    stages = stages_of("stream", scale=1.0, mirror=False)
+    session = TeleopSession(FakeEnv(), period=0.02, device=device, pipeline=stages)
+    start = session.snapshot.limbs["right_hand"].target
+    session.grab("right_hand", ALICE, start)
+    far = pin.SE3(start.rotation, start.translation - [0.0, 0.0, 0.4])
+    session.drag("right_hand", ALICE, far)
+    ticks(session, 150)
+    moved = (
+        session.snapshot.limbs["right_hand"].measured.translation - start.translation
+    )
+    assert moved[2] == pytest.approx(-stages.leash.distance, abs=1e-3)
+
+
+def test_page_takes_a_limb_over_from_a_device_that_went_silent():
+    says = [
+        DeviceState(time=0.02 * k, limbs={"right": LimbInput(pose=pin.SE3.Identity())})
+        for k in range(20)
+    ]
+    stages = stages_of("stream", scale=1.0, mirror=False)
+    session = TeleopSession(
+        FakeEnv(), period=0.02, device=Scripted(says), pipeline=stages
+    )
+    ticks(session, 200)
+    start = session.snapshot.limbs["right_hand"].target
+    session.grab("right_hand", ALICE, start)
+    for k in range(600):  # longer than the time after which the limb would move home
+        lower = start.translation - [0.0, 0.0, min(0.2, 0.002 * k)]
+        session.drag("right_hand", ALICE, pin.SE3(start.rotation, lower))
+        session.tick()
+    moved = (
+        session.snapshot.limbs["right_hand"].measured.translation - start.translation
+    )
+    assert moved[2] == pytest.approx(-0.2, abs=0.01)
 
 
 def test_controller_that_takes_no_world_targets_is_refused():

@@ -61,9 +61,8 @@ def bench(
     names = " and ".join(robots or ["Panda"])
     _print_table(f"{benchmark}, {names}, {rate:g} Hz", found)
     if output is not None:
-        with options.writing(output):
-            rows = {name: times.tolist() for name, times in found.items()}
-            output.write_text(json.dumps({"us": rows}) + "\n", encoding="utf-8")
+        text = json.dumps({"us": {k: times.tolist() for k, times in found.items()}})
+        options.write_file(output, lambda path: path.write_text(text + "\n", "utf-8"))
 
 
 def _times(env: "RobotEnv", actions: int) -> "dict[str, Vector]":

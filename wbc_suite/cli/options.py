@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import typer
 
 from wbc_suite.catalogue import ENVIRONMENT_VARIABLE
-from wbc_suite.errors import ConfigError
+from wbc_suite.errors import ConfigError, WbcError
 
 if TYPE_CHECKING:
     from wbc_suite.viewers.page_process import PageProcess
@@ -174,12 +174,15 @@ def device_options(pairs: list[str] | None) -> dict[str, object]:
     return options
 
 
-@contextmanager
-def writing(path: Path) -> Iterator[None]:
-    """Turn errors of an output file into one line that names it."""
+def write_file(path: Path, write: Callable[[Path], object]) -> None:
+    """Let `write` write a file, whole or not at all; raises a WbcError."""
+    from wbc_suite.recording.atomic_files import replace_file
+
     try:
-        yield
-    except (OSError, ValueError) as error:
+        replace_file(path, write)
+    except WbcError:
+        raise
+    except ValueError as error:  # Pillow: an unknown suffix
         raise ConfigError(f"'{path}' cannot be written: {error}.") from error
 
 

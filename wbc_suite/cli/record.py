@@ -104,7 +104,7 @@ def record(
                 seed=seed,
                 address=(host, port) if page else None,
                 device=make(env),
-                stages=stages_of(device=True, scale=scale, mirror=mirror),
+                stages=stages_of(device, scale=scale, mirror=mirror),
                 episode_control=EpisodeControl(
                     collected.recorder, seed=seed, plan=plan, report=_print_message
                 ),

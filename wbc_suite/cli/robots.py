@@ -61,8 +61,7 @@ def render(
         keyframe=keyframe,
         size=(width, height),
     )
-    with options.writing(output):
-        Image.fromarray(picture).save(output)
+    options.write_file(output, Image.fromarray(picture).save)
     print(f"Wrote {output}.")
 
 
@@ -95,8 +94,7 @@ def export_robot(
     if output is None:
         print(text)
         return
-    with options.writing(output):
-        output.write_text(text, encoding="utf-8")
+    options.write_file(output, lambda path: path.write_text(text, encoding="utf-8"))
     print(f"Wrote {output} ({len(text) / 1000:.0f} kB).")
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from wbc_suite.cli.options import CatalogueOption, ExecutorOption, progress, writing
+from wbc_suite.cli.options import CatalogueOption, ExecutorOption, progress, write_file
 
 if TYPE_CHECKING:
     from wbc_suite.evaluation import Case, Summary
@@ -129,9 +129,9 @@ def _report(
             summaries[case.title] = summarise(played)
     _print_table(summaries)
     path = output / "summary.json"
-    with writing(path):
-        figures = {title: asdict(summary) for title, summary in summaries.items()}
-        path.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
+    figures = {title: asdict(summary) for title, summary in summaries.items()}
+    text = json.dumps(figures, indent=1) + "\n"
+    write_file(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
     print(f"Written: {path}; every episode is in {output / 'results'}.")
     failed = sum(outcome.error is not None for outcome in outcomes)
     if failed:

@@ -85,9 +85,14 @@ def teleop(
 
     names = robot_names([*(robots or ["GR1"]), *(others or ())])
     make = None if device is None else device_maker(device, device_option)
+<<<<<<< HEAD
     stages = stages_of(device=device is not None, scale=scale, mirror=mirror)
     label = " and ".join(names)
     print(f"Building {benchmark} with {label} ...", flush=True)
+=======
+    stages = stages_of(device, scale=scale, mirror=mirror)
+    print(f"Building {benchmark} with {robots} ...", flush=True)
+>>>>>>> attack
     env: gymnasium.Env[Any, Any] = wbc_suite.make(
         benchmark,
         robots=names,
@@ -146,15 +151,14 @@ def device_maker(name: str, pairs: list[str] | None) -> DeviceMaker:
     return build
 
 
-def stages_of(*, device: bool, scale: float, mirror: bool) -> "PipelineConfig":
-    """Return the pipeline's stages; a device gets a leash."""
-    from wbc_suite.devices.pipeline.config import Leash
-    from wbc_suite.viewers.teleop_session import DRAGGED
+def stages_of(device: str | None, *, scale: float, mirror: bool) -> "PipelineConfig":
+    """Return the pipeline's stages: the defaults, but for a mouse alone."""
+    from wbc_suite.devices import PipelineConfig
+    from wbc_suite.devices.pipeline.config import DRAGGED
 
-    changes: dict[str, object] = {"mirror": mirror, "scale": scale}
-    if device:
-        changes["leash"] = Leash()
-    return DRAGGED.model_copy(update=changes)
+    by_mouse = device is None or device.lower() == "mjgui"
+    stages = DRAGGED if by_mouse else PipelineConfig()
+    return stages.model_copy(update={"mirror": mirror, "scale": scale})
 
 
 def drive(

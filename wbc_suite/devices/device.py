@@ -1,11 +1,15 @@
 """The protocol of devices, and their registry by name."""
 
 import importlib
+import logging
+import time
 from collections.abc import Callable, Iterable
 from typing import Any, Protocol
 
 from wbc_suite.devices.state import DeviceState
 from wbc_suite.errors import ConfigError, DeviceError, UnknownNameError
+
+log = logging.getLogger(__name__)
 
 
 class Device(Protocol):
@@ -44,6 +48,35 @@ class Scripted:
 
     def stop(self) -> None:
         """Do nothing."""
+
+
+class ButtonReader:
+    """Read a device, or none; an error of the device does not stop its reader.
+
+    Attributes:
+        faults: Why the last read failed; empty if it did not.
+    """
+
+    def __init__(self, device: Device | None) -> None:
+        self._device, self._last = device, DeviceState(time=0.0)
+        self.faults: tuple[str, ...] = ()
+
+    def read(self) -> tuple[DeviceState, frozenset[str]]:
+        """Return the state, and the buttons that were not pressed before.
+
+        If the device fails it is the last state.
+        """
+        before = self._last.buttons
+        if self._device is None:
+            return DeviceState(time=time.perf_counter()), frozenset()
+        try:
+            self._last, self.faults = self._device.read(), ()
+            return self._last, self._last.buttons - before
+        except Exception as error:
+            if not self.faults:
+                log.exception("A device failed")
+            self.faults = (f"the device fails: {error}",)
+        return self._last, frozenset()
 
 
 _DEVICES: dict[str, str | Callable[..., Device]] = {

@@ -14,10 +14,12 @@ _FLIP = np.diag([1.0, -1.0, 1.0])  # left and right change places
 _TWIST = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])  # a rotation is a pseudovector
 
 
-def _frozen(values: ArrayLike | None) -> Vector | None:
+def _frozen(values: ArrayLike | None, shape: tuple[int, ...] = ()) -> Vector | None:
     if values is None:
         return None
     array = np.array(values, dtype=np.float64)
+    if shape and array.shape != shape:
+        raise ValueError(f"an array of a device has shape {array.shape}, not {shape}")
     array.flags.writeable = False
     return array
 
@@ -43,8 +45,9 @@ class LimbInput:
     fingers: Matrix | None = None
 
     def __post_init__(self) -> None:
-        for name in ("twist", "grip", "fingers"):
-            object.__setattr__(self, name, _frozen(getattr(self, name)))
+        shapes = {"twist": (6,), "grip": (), "fingers": (25, 3)}
+        for name, shape in shapes.items():
+            object.__setattr__(self, name, _frozen(getattr(self, name), shape))
 
     @property
     def finite(self) -> bool:
@@ -83,7 +86,7 @@ class DeviceState:
     def __post_init__(self) -> None:
         object.__setattr__(self, "limbs", MappingProxyType(dict(self.limbs)))
         object.__setattr__(self, "joints", MappingProxyType(dict(self.joints)))
-        object.__setattr__(self, "base", _frozen(self.base))
+        object.__setattr__(self, "base", _frozen(self.base, (3,)))
 
     @property
     def finite(self) -> bool:

@@ -29,7 +29,7 @@ from wbc_suite.errors import DeviceError
 logger = logging.getLogger(__name__)
 
 CONNECTIONS = 256  # at a time; a browser opens one, and a few more while it loads
-HEAD_TIMEOUT = 10.0  # s, from a connection to its first complete request
+HEAD_TIMEOUT = 10.0  # s, to the first and between two complete requests
 SHUTDOWN_TIMEOUT = 0.2  # s; handlers of open WebSockets are cancelled after it
 
 
@@ -59,7 +59,8 @@ class WebServer:
     """Serve routes to the clients that the access rules admit.
 
     aiohttp limits the size of request lines and header fields (8 kB each). Connections
-    beyond `CONNECTIONS`, and those without a request for `HEAD_TIMEOUT`, are closed.
+    without a request for `HEAD_TIMEOUT` are closed; where there are `CONNECTIONS`, the
+    one that has waited longest for its first request makes room for the next.
 
     Port 0 is any free one. `token` is the secret that clients need; None if `host` is a
     loopback address. Without `tls` it is plain HTTP.
@@ -106,12 +107,16 @@ class WebServer:
         runner = web.AppRunner(
             app,
             access_log=None,
+            keepalive_timeout=HEAD_TIMEOUT,
             shutdown_timeout=SHUTDOWN_TIMEOUT,
             logger=logging.Logger("web", logging.CRITICAL),  # malformed requests
         )
         await runner.setup()
         listener = await self._loop.create_server(
-            lambda: self._accept(runner.server), sock=self._socket, ssl=self._tls
+            lambda: self._accept(runner.server),
+            sock=self._socket,
+            ssl=self._tls,
+            ssl_handshake_timeout=HEAD_TIMEOUT if self._tls else None,
         )
         started.set()
         try:
@@ -122,8 +127,14 @@ class WebServer:
 
     def _accept(self, server: web.Server | None) -> asyncio.Protocol:
         """Return the protocol of a new connection."""
-        if server is None or len(server.connections) >= CONNECTIONS:
+        if server is None:
             return _Refused()
+        if len(server.connections) >= CONNECTIONS:
+            silent = (c for c in server.connections if c in self._no_request_yet)
+            longest = next(silent, None)  # connections are in order
+            if longest is None:
+                return _Refused()
+            self._close_without_request(longest)
         connection = server()
         self._no_request_yet.add(connection)
         self._loop.call_later(HEAD_TIMEOUT, self._close_without_request, connection)

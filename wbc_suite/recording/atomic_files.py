@@ -1,8 +1,12 @@
 """Files that are written completely or not at all: written aside, synced, renamed."""
 
+import glob
 import os
+import platform
 import shutil
+import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 from wbc_suite.errors import DatasetError
@@ -14,9 +18,8 @@ def check_folder(folder: Path, needed: int = 0) -> None:
     """Make a folder if missing; raise DatasetError if `needed` bytes do not fit."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        probe = folder / f".wbc-suite-{os.getpid()}"
-        probe.touch()
-        probe.unlink()
+        with tempfile.TemporaryFile(dir=folder):
+            pass
         free = shutil.disk_usage(folder).free
     except OSError as error:
         raise DatasetError(
@@ -45,12 +48,13 @@ def write_bytes(path: Path, content: bytes) -> None:
 def replace_file(path: Path, write: Callable[[Path], object]) -> None:
     """Let `write` write a temporary file, sync it, and rename it to `path`.
 
-    The file is complete or absent, also after a power failure.
+    The file is complete or absent, also after a power failure. The temporary file has
+    the suffix of the path.
 
     Raises:
         DatasetError: If it cannot be written; an old file stays as it was.
     """
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    temporary = temporary_path(path)
     try:
         try:
             write(temporary)
@@ -66,10 +70,35 @@ def replace_file(path: Path, write: Callable[[Path], object]) -> None:
         ) from error
 
 
+def temporary_path(path: Path) -> Path:
+    """Return where this process writes `path`; delete what killed ones left of it."""
+    start = f".{path.name}.{platform.node()}-"
+    for left in path.parent.glob(f"{glob.escape(start)}*.tmp*"):
+        number = left.name.removeprefix(start).partition(".")[0]
+        if number.isdigit() and not _runs(int(number)):
+            _delete(left)
+    return path.with_name(f"{start}{os.getpid()}.tmp{path.suffix}")
+
+
+def _runs(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:  # another user's
+        return True
+    return True
+
+
+def _delete(path: Path) -> None:
+    with suppress(OSError):
+        shutil.rmtree(path) if path.is_dir() else path.unlink()
+
+
 def delete_temporaries(folder: Path) -> None:
     """Delete what killed processes left of files that they were writing."""
-    for temporary in folder.rglob(".*.tmp"):
-        temporary.unlink()
+    for temporary in folder.rglob(".*.tmp*"):
+        _delete(temporary)
 
 
 def _sync(path: Path) -> None:

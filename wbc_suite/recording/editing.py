@@ -190,7 +190,12 @@ def _write_repaired(path: Path, names: Mapping[str, str], *, keep_old: bool) -> 
     repaired = path.with_name(path.name + ".repaired")
     write_dataset(repaired, renamed, header, masks=masks)
     if keep_old and path.exists():
-        path.replace(path.with_name(path.name + ".damaged"))
+        damaged = path.with_name(path.name + ".damaged")
+        damaged.unlink(missing_ok=True)
+        try:
+            damaged.hardlink_to(path)  # so that `path` is there all the time
+        except OSError:  # a file system without hard links
+            path.replace(damaged)
     repaired.replace(path)
 
 

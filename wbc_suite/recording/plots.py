@@ -6,6 +6,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from wbc_suite.errors import DatasetError
+from wbc_suite.recording.atomic_files import replace_file
 from wbc_suite.recording.dataset import Dataset
 from wbc_suite.typing import Vector
 
@@ -37,7 +38,7 @@ def save_picture(picture: Image.Image, path: Path) -> None:
     """Write a picture in the format of the path's suffix, or raise DatasetError."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        picture.save(path)
+        replace_file(path, picture.save)
     except (OSError, ValueError) as error:
         raise DatasetError(f"'{path}' cannot be written: {error}.") from error
 

@@ -11,6 +11,7 @@ from PIL import Image, ImageDraw
 
 from wbc_suite.envs import RobotEnv
 from wbc_suite.errors import DatasetError
+from wbc_suite.recording.atomic_files import check_folder, replace_file
 from wbc_suite.recording.dataset import Dataset
 from wbc_suite.recording.env_source import rebuild
 from wbc_suite.recording.episode import Episode
@@ -51,16 +52,17 @@ def episode_pictures(
 def write_video(pictures: Iterable[Picture], path: Path, *, rate: float) -> None:
     """Write pictures as .mp4 (H.264, needs `av`), .webp or .gif."""
     check_video(path)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+
+    def write(temporary: Path) -> None:
         if path.suffix.lower() in PILLOW:
-            _write_animation(pictures, path, rate)
+            _write_animation(pictures, temporary, rate)
             return
-        with closing(Mp4Writer(path, rate=round(rate), extra="video")) as writer:
+        with closing(Mp4Writer(temporary, rate=round(rate), extra="video")) as writer:
             for picture in pictures:
                 writer.add(picture)
-    except OSError as error:
-        raise DatasetError(f"'{path}' cannot be written: {error}.") from error
+
+    check_folder(path.parent)
+    replace_file(path, write)
 
 
 def write_sheet(dataset: Dataset, path: Path, *, camera: str = "agentview") -> None:

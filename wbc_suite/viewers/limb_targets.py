@@ -126,7 +126,7 @@ class LimbTarget:
         if self.enabled:
             if grab:
                 self.stages.release()
-            self.stages.follow(LimbInput(pose=T_world_input))
+            self.stages.follow(LimbInput(pose=T_world_input), by_hand=True)
         return True
 
     def release(self, client: int) -> None:

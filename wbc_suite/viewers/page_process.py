@@ -108,7 +108,11 @@ class PageProcess:
             if self._pipe.poll(POLL_PERIOD):
                 self._session.timer.idle.wait(POLL_PERIOD)  # both need Python's lock
                 request, arguments = self._pipe.recv()
-                answer = self._handle(request, *arguments)
+                answer = None
+                try:
+                    answer = self._handle(request, *arguments)
+                except Exception:
+                    log.exception("The page asked for something invalid")
                 if request in QUERIES:
                     self._pipe.send(answer)
 

@@ -2,7 +2,8 @@
 
 viser serves pages and messages on 127.0.0.1 without tokens or origins. The proxy
 listens where clients connect, admits them by `AccessRules`, fetches pages and relays
-WebSocket messages. It adds the script of `HeldKeys` to the page.
+WebSocket messages. A client that sends an invalid one is disconnected. The proxy adds
+the script of `HeldKeys` to the page.
 """
 
 import asyncio
@@ -22,6 +23,7 @@ from aiohttp import WSMsgType, hdrs, web
 
 from wbc_suite.devices.web_server import WebServer, page_url, token_for
 from wbc_suite.errors import DeviceError
+from wbc_suite.viewers import page_messages
 from wbc_suite.viewers.held_keys import HeldKeys
 
 if TYPE_CHECKING:
@@ -31,7 +33,7 @@ log = logging.getLogger(__name__)
 
 UPDATE_RATE = 25.0  # Hz
 PORTS = range(8080, 8100)  # tried in turn if no port is given
-MESSAGE_LIMIT = 50 * 1024 * 1024  # bytes, viser's own limit
+MESSAGE_LIMIT = 50 * 1024 * 1024  # bytes from viser, its own limit
 HEARTBEAT = 30.0  # s between pings that find clients that are gone
 
 HELP_KEY = """<head><script>addEventListener("keydown", e => {
@@ -107,6 +109,8 @@ class PageServer:
                 # A client connected or left while viser iterated over them. What was
                 # not sent still differs from what is displayed: it is sent next time.
                 log.debug("The page missed an update", exc_info=True)
+            except Exception:  # one client must not stop the others
+                log.exception("The page missed an update")
             self.update_times = [*self.update_times[-999:], time.thread_time() - began]
             count += 1
 
@@ -119,7 +123,9 @@ class PageServer:
     def _start_proxy(self, ports: Sequence[int]) -> WebServer:
         routes = [
             *self.keys.routes,
-            *proxy(self.server.get_port(), self._rewrite),
+            *proxy(
+                self.server.get_port(), self._rewrite, admits=page_messages.is_valid
+            ),
         ]
         for port in ports:
             try:
@@ -145,20 +151,24 @@ def _start_viser() -> "viser.ViserServer":
 
 
 def proxy(
-    port: int, rewrite: Callable[[bytes], bytes] = bytes
+    port: int,
+    rewrite: Callable[[bytes], bytes] = bytes,
+    *,
+    admits: Callable[[str | bytes], bool],
 ) -> list[web.AbstractRouteDef]:
     """Return routes that pass every GET request on to a port of 127.0.0.1.
 
     Args:
         port: The port.
         rewrite: Changes the page at `/`.
+        admits: Whether a client may send a message; others end its connection.
     """
 
     async def handle(request: web.Request) -> web.StreamResponse:
         target = f"http://127.0.0.1:{port}{quote(request.path)}"
         try:
             if request.headers.get(hdrs.UPGRADE, "").lower() == "websocket":
-                return await _relay(request, target)
+                return await _relay(request, target, admits)
             if request.path == "/":
                 return await _fetch_page(target, rewrite)
             return await _fetch(request, target)
@@ -201,7 +211,9 @@ async def _fetch(request: web.Request, target: str) -> web.Response:
         return web.Response(status=answer.status, body=body, headers=headers)
 
 
-async def _relay(request: web.Request, target: str) -> web.WebSocketResponse:
+async def _relay(
+    request: web.Request, target: str, admits: Callable[[str | bytes], bool]
+) -> web.WebSocketResponse:
     """Relay the messages of a WebSocket both ways until one side closes it."""
     offered = request.headers.get(hdrs.SEC_WEBSOCKET_PROTOCOL, "").split(",")
     async with (
@@ -214,20 +226,28 @@ async def _relay(request: web.Request, target: str) -> web.WebSocketResponse:
     ):
         client = web.WebSocketResponse(
             protocols=[upstream.protocol] if upstream.protocol else (),
-            max_msg_size=MESSAGE_LIMIT,
+            max_msg_size=page_messages.MAX_BYTES,
             heartbeat=HEARTBEAT,
             compress=False,
         )
         await client.prepare(request)
         await asyncio.gather(
-            _copy(client, upstream), _copy(upstream, client), return_exceptions=True
+            _copy(client, upstream, admits),
+            _copy(upstream, client, lambda _: True),
+            return_exceptions=True,
         )
         return client
 
 
-async def _copy(source: WebSocket, sink: WebSocket) -> None:
+async def _copy(
+    source: WebSocket, sink: WebSocket, admits: Callable[[str | bytes], bool]
+) -> None:
     """Copy messages until the source closes; close the sink with the same reason."""
     while (message := await source.receive()).type in DATA:
+        if not admits(message.data):
+            log.warning("A viewer sent an invalid message and was disconnected.")
+            await source.close(code=aiohttp.WSCloseCode.POLICY_VIOLATION)
+            break
         if message.type is WSMsgType.TEXT:
             await sink.send_str(message.data)
         else:

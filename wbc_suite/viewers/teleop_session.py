@@ -16,7 +16,8 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.devices import Device, DeviceState, Pipeline, PipelineConfig
-from wbc_suite.devices.pipeline.config import RatesConfig
+from wbc_suite.devices.device import ButtonReader
+from wbc_suite.devices.pipeline.config import DRAGGED
 from wbc_suite.devices.pipeline.drive import HeldCommand
 from wbc_suite.errors import DatasetError, UnknownNameError
 from wbc_suite.recording.episode_control import EpisodeCommand, EpisodeControl
@@ -27,16 +28,6 @@ from wbc_suite.viewers.loop_timing import LoopTimer, raise_priority
 from wbc_suite.viewers.session_state import SessionInfo, Snapshot
 from wbc_suite.viewers.step_times import StepTimes
 
-DRAGGED = PipelineConfig(
-    jump=None,  # a page that draws slowly sends a drag in few, long steps
-    leash=None,  # a target out of reach is reported instead; see `LimbTargets.settle`
-    linear=RatesConfig(speed=2.0, acceleration=30.0, jerk=1500.0),
-    angular=RatesConfig(speed=6.0, acceleration=90.0, jerk=4500.0),
-    base_speed=(1.0, 1.0),
-    ramp=0.0,
-    return_after=None,
-)
-"""The pipeline of handles that are dragged on a page."""
 DRIVE_TIMEOUT = 0.5  # s; a robot stops if the page does not repeat a velocity
 
 
@@ -74,7 +65,7 @@ class TeleopSession:
         self.env, self.episode_control = env, episode_control
         self.period, self.timer = period, LoopTimer(period, clock=clock)
         self._seed, self._clock = seed, clock
-        self._device, self._pressed = device, frozenset[str]()
+        self._device = ButtonReader(device)
         self._simulation = env.unwrapped.simulation  # type: ignore[attr-defined]
         self.model: mujoco.MjModel = self._simulation.model
         self._lock = threading.Lock()
@@ -109,6 +100,7 @@ class TeleopSession:
         """Take a limb and latch the input to it; False if another client holds it."""
         now = self._clock()
         with self._lock:
+            self._pipeline.leave(name)
             return self._limb(name).drag(client, T_world_input, now=now, grab=True)
 
     def drag(
@@ -243,10 +235,7 @@ class TeleopSession:
 
     def _read_device(self) -> DeviceState:
         """Return the device's state; handle the buttons of the session."""
-        if self._device is None:
-            return DeviceState(time=self._clock())
-        state = self._device.read()
-        pressed, self._pressed = state.buttons - self._pressed, state.buttons
+        state, pressed = self._device.read()
         if "pause" in pressed:
             self._paused = not self._paused
         if "reset" in pressed:
@@ -256,6 +245,17 @@ class TeleopSession:
         if self.episode_control is not None:
             self.episode_control.press_buttons(pressed)
         return state
+
+    def _act(self, state: DeviceState) -> Vector:
+        """Return the action of a tick; that which holds if an input causes an error."""
+        with self._lock:
+            try:
+                velocity = self._drive.read(self._clock())
+                return self._pipeline.update(state, velocity)
+            except Exception as error:  # noqa: BLE001 -- no input ends the loop
+                self._pipeline.reset()
+                self._message = f"An input was refused: {error}"
+        return self.env.unwrapped.hold_action  # type: ignore[attr-defined]
 
     def _run(self, urgent: bool) -> None:
         if urgent:
@@ -273,9 +273,7 @@ class TeleopSession:
                 self._publish()
 
     def _step(self, state: DeviceState, inputs: list[float]) -> None:
-        with self._lock:
-            velocity = self._drive.read(self._clock())
-            action = self._pipeline.update(state, velocity)
+        action = self._act(state)
         self._selected = self._pipeline.selected if "hand" in state.limbs else ""
         self.timer.wait_for_step()
         try:
@@ -340,7 +338,7 @@ class TeleopSession:
             paused=self._paused,
             success=self._success,
             message=self._message,
-            device=self._pipeline.acting.get("device", ()),
+            device=self._device.faults + self._pipeline.acting.get("device", ()),
             selected=self._selected,
             recording=self.episode_control and self.episode_control.status,
             velocity=self._pipeline.drive.velocity,

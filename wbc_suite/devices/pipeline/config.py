@@ -72,6 +72,7 @@ class PipelineConfig(FrozenModel):
         mirror: Swap left and right, for a user who faces the robot.
         jump: An input that moves further than this in one message, m, has lost track
             and is latched again; None follows all motion.
+        jump_angle: The same for its rotation, rad.
         one_euro: Filter for a trembling input; None for none.
         workspace: Box in which targets are kept; None for no bound.
         leash: How far targets may be ahead; None for no bound.
@@ -96,6 +97,7 @@ class PipelineConfig(FrozenModel):
     scale: PositiveFloat = 1.0
     mirror: bool = False
     jump: PositiveFloat | None = 0.3
+    jump_angle: PositiveFloat | None = 1.5
     one_euro: OneEuro | None = None
     workspace: WorkspaceBox | None = None
     leash: Leash | None = Leash()
@@ -110,3 +112,16 @@ class PipelineConfig(FrozenModel):
     ramp: NonNegativeFloat = 2.0
     hold_after: PositiveFloat = 0.15
     return_after: PositiveFloat | None = Field(default=10.0)
+
+
+DRAGGED = PipelineConfig(
+    jump=None,
+    jump_angle=None,
+    leash=None,  # a target out of reach is reported instead; see `LimbTarget.settle`
+    linear=RatesConfig(speed=2.0, acceleration=30.0, jerk=1500.0),
+    angular=RatesConfig(speed=6.0, acceleration=90.0, jerk=4500.0),
+    base_speed=(1.0, 1.0),
+    ramp=0.0,
+    return_after=None,
+)
+"""The pipeline of handles that a mouse drags, alone."""

@@ -90,8 +90,11 @@ class LimbPipeline:
         self.acting = tuple(filter(None, notes))
         return self.port.encode(target)
 
-    def follow(self, given: LimbInput) -> None:
-        """Move the clutch by an input; may be called often between two ticks."""
+    def follow(self, given: LimbInput, *, by_hand: bool = False) -> None:
+        """Move the clutch by an input; may be called often between two ticks.
+
+        A slow page sends a drag `by_hand` in few, long steps: they are no jumps.
+        """
         if not given.engaged:
             self.release()
             self._clutch_note = "clutch disengaged"
@@ -104,7 +107,7 @@ class LimbPipeline:
             self.place(pin.SE3(turned, before.translation + step[:3]))
         if given.pose is None:
             return
-        jumped = self._jumps(given.pose)
+        jumped = not by_hand and self._jumps(given.pose)
         self._last_input = given.pose
         if self._config.mode == "absolute":
             origin, pose = self.home.translation, given.pose
@@ -135,10 +138,14 @@ class LimbPipeline:
             self._limit.pose = step * self._limit.pose
 
     def _jumps(self, pose: pin.SE3) -> bool:
-        last, limit = self._last_input, self._config.jump
-        if last is None or limit is None:
+        last, settings = self._last_input, self._config
+        if last is None:
             return False
-        return bool(np.linalg.norm(pose.translation - last.translation) > limit)
+        step = np.linalg.norm(pose.translation - last.translation)
+        angle = np.linalg.norm(pin.log3(last.rotation.T @ pose.rotation))
+        far = settings.jump is not None and step > settings.jump
+        turned = settings.jump_angle is not None and angle > settings.jump_angle
+        return bool(far or turned)
 
 
 def clip_to_box(target: pin.SE3, box: WorkspaceBox) -> tuple[pin.SE3, bool]:

@@ -133,6 +133,10 @@ class Pipeline:
         robot = robot_of(self.selected) if self.selected else min(self._drives)
         return self._drives[robot]
 
+    def leave(self, name: str) -> None:
+        """Leave a limb to other inputs while the device sends nothing for it."""
+        self._driven.discard(name)
+
     def update(self, state: DeviceState, drive: Vector | None = None) -> Vector:
         """Return the action of one step; call it once per step.
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from wbc_suite.errors import DatasetError, UnknownNameError
 from wbc_suite.executors import Executor, WorkItem
-from wbc_suite.recording.atomic_files import delete_temporaries
+from wbc_suite.recording.atomic_files import delete_temporaries, temporary_path
 from wbc_suite.recording.converting import lerobot, mcap, minari, npz, robomimic
 from wbc_suite.recording.converting.layout import (
     Layout,
@@ -59,8 +59,15 @@ def convert(
         chosen.begin(out)
         pieces = [whole_dataset(dataset)]
         if executor is None:
-            result = chosen.write(dataset, pieces[0], out, on_progress)
-            chosen.finish(dataset, out, [result or {}])
+            aside = temporary_path(out)
+            try:
+                aside.mkdir()
+                written = aside / out.name
+                result = chosen.write(dataset, pieces[0], written, on_progress)
+                chosen.finish(dataset, written, [result or {}])
+                _move(written, out)
+            finally:
+                shutil.rmtree(aside, ignore_errors=True)
             return out
         if chosen.in_pieces:
             pieces = split_dataset(dataset, workers)
@@ -94,12 +101,11 @@ def convert_piece(item: WorkItem, folder: Path) -> Mapping[str, Any]:
 
 
 def _move(written: Path, out: Path) -> None:
-    """Move a file into place, or the content of a folder."""
+    """Move a file or a folder into place, or its content into one that has some."""
     try:
-        if not written.is_dir():
+        if not (written.is_dir() and out.is_dir() and any(out.iterdir())):
             written.replace(out)
             return
-        out.mkdir(parents=True, exist_ok=True)
         for path in sorted(written.iterdir()):
             path.replace(out / path.name)
     except OSError as error:

@@ -1,0 +1,124 @@
+"""Random and hostile messages to the page and the stream, with a viewer watching.
+
+The loop must neither stop nor stall, and the viewer must keep its connection.
+"""
+
+import contextlib
+import json
+import math
+import random
+import time
+
+import msgspec
+import numpy as np
+import pytest
+import viser
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
+from websockets.typing import Subprotocol
+
+from tests.viewers.fake_env import FakeEnv
+from wbc_suite.cli.teleop import stages_of
+from wbc_suite.devices.stream import Stream
+from wbc_suite.viewers.page_process import PageProcess
+from wbc_suite.viewers.teleop_session import TeleopSession
+
+MESSAGES = 10_000
+VALUES = (0, 1, -1, 0.5, 1e6, 1e300, math.nan, math.inf, -math.inf, "a", None, [], {})
+TYPES = (
+    "ViewerCameraMessage",
+    "GuiUpdateMessage",
+    "CommandTriggerMessage",
+    "TransformControlsDragStartMessage",
+    "TransformControlsUpdateMessage",
+    "TransformControlsDragEndMessage",
+    "FileTransferStartUpload",
+    "FileTransferPart",
+    "GuiFormSubmitMessage",
+    "SceneNodeClickMessage",
+    "ShareUrlRequest",
+    "nonsense",
+)
+FIELDS = ("name", "owner", "uuid", "position", "wxyz", "updates", "fov", "near")
+
+
+def vector(rng, size):
+    return [rng.choice(VALUES) for _ in range(size)]
+
+
+def page_message(rng):
+    """Return a message of viser's shape, of any quality, or bytes."""
+    if rng.random() < 0.1:
+        return rng.randbytes(rng.randrange(200))
+    message = {"type": rng.choice(TYPES), "name": "/gizmos/right_hand", "owner": "0"}
+    if rng.random() < 0.8:
+        message |= {"wxyz": vector(rng, 4), "position": vector(rng, 3)}
+    for field in rng.sample(FIELDS, rng.randrange(4)):
+        message[field] = rng.choice((*VALUES, {"value": rng.choice(VALUES)}))
+    return msgspec.msgpack.encode(message)
+
+
+def frame(rng, index):
+    """Return a pose frame, of any quality, or text."""
+    if rng.random() < 0.1:
+        return rng.choice(("", "[", "null", "[" * 2000, '{"a":1}', "\x00"))
+    limb = {"pose": {"position": vector(rng, 3), "orientation": vector(rng, 4)}}
+    limb |= {"twist": vector(rng, 6), "grip": rng.choice(VALUES)}
+    limb = {name: limb[name] for name in limb if rng.random() < 0.5}
+    content = {"format": "wbc-pose-frame/1", "time": 0.01 * index}
+    content |= {"limbs": {rng.choice(("right", "left", "hand", "head")): limb}}
+    if rng.random() < 0.3:
+        content[rng.choice(("base", "height", "buttons", "x"))] = vector(rng, 3)
+    return json.dumps(content)
+
+
+class Attacker:
+    """A client that connects again whenever it is disconnected."""
+
+    def __init__(self, address, **options):
+        self._address, self._options, self._socket = address, options, None
+        self.connections = 0
+
+    def send(self, message):
+        with contextlib.suppress(ConnectionClosed, OSError):
+            if self._socket is None or self._socket.protocol.state.name != "OPEN":
+                self._socket = connect(self._address, max_size=None, **self._options)
+                self.connections += 1
+            self._socket.send(message)
+
+
+@pytest.mark.slow
+def test_ten_thousand_messages_stop_neither_the_loop_nor_a_viewer():
+    stream = Stream(port=0)
+    session = TeleopSession(
+        FakeEnv(),
+        period=0.02,
+        device=stream,
+        pipeline=stages_of("stream", scale=1.0, mirror=False),
+    )
+    page = PageProcess(session, "127.0.0.1", 0, label="test")
+    page.wait()
+    stream.start()
+    session.start()
+    options = {"subprotocols": [Subprotocol(f"viser-v{viser.__version__}")]}
+    address = page.url.rstrip("/").replace("http", "ws")
+    viewer = connect(address, max_size=None, **options)
+    page_attacker = Attacker(address, **options)
+    stream_attacker = Attacker(stream.url.rstrip("/").replace("http", "ws") + "/frames")
+    rng, began = random.Random(0), time.monotonic()
+    for index in range(MESSAGES // 2):
+        page_attacker.send(page_message(rng))
+        stream_attacker.send(frame(rng, index))
+    spent, ticks = time.monotonic() - began, session.snapshot.tick
+    try:
+        assert session.running
+        assert page_attacker.connections > 100  # most messages ended a connection
+        assert ticks * session.period > 0.8 * spent  # the rest is a busy machine
+        assert np.isfinite(session.env.actions).all()
+        viewer.ping().wait(10.0)
+        assert viewer.protocol.state.name == "OPEN"
+        page.check()
+    finally:
+        session.stop()
+        page.stop()
+        stream.stop()

@@ -1,0 +1,158 @@
+"""The folder where numba keeps machine code: chosen, checked and cleaned.
+
+numba reads these files without a check: a damaged one would end every start, and one of
+another user could hold anything. So files are checked when they are new or changed, and
+folders are private.
+"""
+
+import atexit
+import hashlib
+import json
+import os
+import pickletools
+import shutil
+import stat
+import tempfile
+import time
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numba
+
+from wbc_suite.catalogue import temporary_root, user_cache
+
+_untyped: Any = numba
+
+KEPT = 7 * 24 * 3600.0  # s; code that no process asks for in this time is deleted
+TORN = 3600.0  # s; a file that is still being written after this was abandoned
+ROOM = 1 << 16  # bytes that must fit on the disk
+CHECKED = "checked.json"
+"""Size and time of change of each file, by name, when it was checked."""
+
+
+@cache
+def cache_folder() -> Path:
+    """Return where machine code is kept, which depends on the state of the kernels.
+
+    In `NUMBA_CACHE_DIR` when that is set, else in the user's cache folder. Where that
+    cannot be written, in a temporary folder of this user, with links to what the other
+    one holds; else in one that is removed when the process ends.
+    """
+    digest = _kernels_digest()
+    preferred = Path(_untyped.config.CACHE_DIR or user_cache()) / "compiled" / digest
+    for folder in (preferred, temporary_root() / "compiled" / digest):
+        with suppress(OSError):
+            _prepare(folder)
+            if folder != preferred:
+                _link(preferred, folder)
+            _drop_damaged(folder)
+            _drop_old(folder.parent)
+            return folder
+    folder = Path(tempfile.mkdtemp(prefix="wbc_suite_"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
+
+
+def _prepare(folder: Path) -> None:
+    """Create a folder; raises OSError if it is another user's, or cannot be written."""
+    if folder.is_relative_to(temporary_root()):
+        temporary_root().mkdir(mode=0o700, exist_ok=True)
+        found = temporary_root().lstat()
+        private = found.st_uid == os.getuid() and not found.st_mode & 0o077
+        if not (stat.S_ISDIR(found.st_mode) and private):
+            raise PermissionError(f"'{temporary_root()}' is not private.")
+    folder.mkdir(parents=True, exist_ok=True)
+    folder.touch()
+    with tempfile.TemporaryFile(dir=folder) as file:
+        file.write(bytes(ROOM))
+
+
+def _link(source: Path, folder: Path) -> None:
+    """Link the files of a folder that cannot be written into another one."""
+    for file in source.rglob("*.nb[ic]"):
+        link = folder / file.relative_to(source)
+        link.parent.mkdir(exist_ok=True)
+        with suppress(FileExistsError):
+            link.symlink_to(file)
+
+
+def _drop_damaged(folder: Path) -> None:
+    """Delete files that are no whole pickles, or were changed since they were checked.
+
+    numba writes machine code (.nbc) after its index (.nbi): code that changed alone is
+    damaged.
+    """
+    try:
+        known = dict(json.loads((folder / CHECKED).read_text()))
+    except (OSError, ValueError, TypeError):
+        known = {}
+    found = {file: _state(file) for file in folder.rglob("*.nb[ic]")}
+    checked = {}
+    for file, state in found.items():
+        index = file.with_name(file.name.rsplit(".", 2)[0] + ".nbi")
+        index = index if file.suffix == ".nbc" else file
+        name, changed = _name(file, folder), known.get(_name(index, folder))
+        fresh = name not in known or found.get(index) != changed
+        if known.get(name) == state or (fresh and _is_whole(file)):
+            checked[name] = state
+            continue
+        with suppress(OSError):
+            shutil.rmtree(file) if file.is_dir() else file.unlink()
+    if checked != known:
+        with tempfile.NamedTemporaryFile("w", dir=folder, delete=False) as new:
+            json.dump(checked, new)
+        Path(new.name).replace(folder / CHECKED)
+
+
+def _name(file: Path, folder: Path) -> str:
+    return file.relative_to(folder).as_posix()
+
+
+def _state(file: Path) -> list[int]:
+    """Return the size and the time of the last change; nothing if it is gone."""
+    try:
+        found = file.stat()
+    except OSError:
+        return []
+    return [found.st_size, found.st_mtime_ns]
+
+
+def _is_whole(file: Path) -> bool:
+    """Return whether a file consists of pickles, without running them."""
+    try:
+        with file.open("rb") as stream:
+            size = os.fstat(stream.fileno()).st_size
+            while stream.tell() < size:
+                for _ in pickletools.genops(stream):
+                    pass
+    except (OSError, ValueError, EOFError):
+        return False
+    return size > 0
+
+
+def _drop_old(parent: Path) -> None:
+    """Delete folders that no process has asked for lately, and abandoned files."""
+    now = time.time()
+    with suppress(OSError):
+        for other in parent.iterdir():
+            if now - other.stat().st_mtime > KEPT:
+                shutil.rmtree(other, ignore_errors=True)
+        for file in parent.glob("*/*/*.tmp.*"):
+            if now - file.stat().st_mtime > TORN:
+                file.unlink()
+
+
+def _kernels_digest() -> str:
+    """Return a digest of all source files that hold kernels, and of numba's version.
+
+    Numba compiles a function again when its own file changes, not when a function
+    changes that it calls from another file.
+    """
+    digest = hashlib.sha256(numba.__version__.encode())
+    for file in sorted(Path(__file__).parent.rglob("*.py")):
+        source = file.read_bytes()
+        if b"wbc_suite.compiling import" in source or file.name == "compiling.py":
+            digest.update(source)
+    return digest.hexdigest()[:16]
