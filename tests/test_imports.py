@@ -40,6 +40,7 @@ TOP = (
     "devices",
     "recording",
     "wrappers",
+    "experts",
     "evaluation",
     "compat",
     "viewers",

@@ -72,6 +72,7 @@ class ObjectBenchmark(ABC):
     Attributes:
         sampler: Draws the start poses; may be replaced by a sampler of your own.
         states: The objects in the simulation, by name, after `bind`.
+        grasps: Where and how hands can hold each object, by its name, after `bind`.
         hands: The hands of all robots, after `bind`.
     """
 
@@ -138,7 +139,9 @@ class ObjectBenchmark(ABC):
             g for g, body in enumerate(bodies) if prefixes and body.startswith(prefixes)
         )
         self.hands = [hand for state in robots for hand in hands_of(state)]
-        self.states = {t.name: ObjectState(model, data, t.name) for t in self.objects()}
+        things = self.objects()
+        self.states = {t.name: ObjectState(model, data, t.name) for t in things}
+        self.grasps = {t.name: t.grasps for t in things}
 
     def reset(self, rng: np.random.Generator) -> None:
         """Place the objects; sizes and poses are written into model and data."""

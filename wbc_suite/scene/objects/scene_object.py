@@ -13,6 +13,7 @@ from wbc_suite.robot.mjcf_compile import compile_mjcf
 from wbc_suite.robot.shape_geometry import mesh_of
 from wbc_suite.robot.shapes import Box, Cylinder, Hull, Loft, Vector3
 from wbc_suite.scene.materials import material_named, use_material
+from wbc_suite.scene.objects.grasp_site import GraspSite
 
 Color: TypeAlias = tuple[float, float, float, float]
 Quat: TypeAlias = tuple[float, float, float, float]
@@ -150,6 +151,7 @@ class SceneObject:
         motion: `free`, `fixed` (placed at a reset, then still), or a hinge.
         pos: Position in the scene, or on its parent, m.
         children: Objects attached to it.
+        grasps: Where and how hands can hold it.
     """
 
     name: str
@@ -159,6 +161,7 @@ class SceneObject:
     pos: Vector3 = (0.0, 0.0, 0.0)
     quat: Quat = STANDING
     children: "tuple[SceneObject, ...]" = ()
+    grasps: tuple[GraspSite, ...] = ()
 
     def add_to(
         self,
@@ -231,6 +234,7 @@ class MjcfObject:
     motion: Literal["free", "fixed"] = "free"
     pos: Vector3 = (0.0, 0.0, 0.0)
     quat: Quat = STANDING
+    grasps: tuple[GraspSite, ...] = ()
 
     def add_to(self, spec: mujoco.MjSpec) -> None:
         """Add it to a scene; raises as `compile_mjcf`, and unless it is one body."""

@@ -5,6 +5,7 @@ from dataclasses import replace
 from functools import partial
 
 from wbc_suite.robot.shapes import Vector3
+from wbc_suite.scene.objects.grasp_site import GraspSite
 from wbc_suite.scene.objects.scene_object import Color, Part, SceneObject
 from wbc_suite.scene.objects.vessels import ring_of_boxes, walls_around
 
@@ -117,7 +118,18 @@ def _with_handle(
         quat=(1.0, 0.0, 0.0, 0.0),
     )
     sites = {"center": (0.0, 0.0, 0.0), "handle": at}
-    return SceneObject(name=name, parts=(*ring, grip), sites=sites).with_mass(0.04)
+    across = [
+        GraspSite(
+            pos=(at[0], 0.0, -0.4 * side * half_height),  # fingers clear of a table
+            approach=(0.0, 0.0, side),
+            closing=(0.0, 1.0, 0.0),
+            tilt=0.6,
+        )
+        for side in (1.0, -1.0)
+    ]
+    grasps = tuple(turn for one in across for turn in (one, one.turned()))
+    whole = SceneObject(name=name, parts=(*ring, grip), sites=sites, grasps=grasps)
+    return whole.with_mass(0.04)
 
 
 def wrench(

@@ -1,0 +1,140 @@
+"""Skills of one arm: move, grasp, carry, release."""
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from wbc_suite.experts.arm import SPEED, TURN, Arm
+from wbc_suite.experts.grasp_choice import Choice, choose_grasp
+from wbc_suite.experts.workcell import Steps, Workcell, wait_until
+
+UP = np.array([0.0, 0.0, 1.0])
+STALLED = 8  # control periods without progress end a motion
+
+
+def shifted(pose: pin.SE3, offset: Iterable[float]) -> pin.SE3:
+    """Return a pose moved by an offset in the world, m."""
+    return pin.SE3(pose.rotation, pose.translation + np.asarray([*offset]))
+
+
+def move(
+    arm: Arm,
+    target: pin.SE3 | Callable[[], pin.SE3],
+    *,
+    speed: float = SPEED,
+    turn: float = TURN,
+    tolerance: float = 0.004,
+    turn_tolerance: float = 0.04,
+    most: int = 120,
+) -> Steps[bool]:
+    """Move a hand to a pose; return whether it got within the tolerances, m and rad.
+
+    A target that is a function is followed. It ends without success when the hand makes
+    no more progress.
+    """
+    best, waited = np.inf, 0
+    for _ in range(most):
+        arm.aim(target() if callable(target) else target, speed=speed, turn=turn)
+        distance, angle = arm.error()
+        if distance < tolerance and angle < turn_tolerance:
+            return True
+        left = distance + 0.1 * angle
+        waited = 0 if left < best - 2e-4 else waited + 1
+        best = min(best, left)
+        if waited > STALLED:
+            return False
+        yield
+    return False
+
+
+def settle(cell: Workcell, name: str, *, most: int = 20) -> Steps[bool]:
+    """Wait until an object lies still."""
+    yield
+    return (yield from wait_until(lambda: cell.speed(name) < 0.02, most=most))
+
+
+def grip(cell: Workcell, arm: Arm, name: str, *, most: int = 16) -> Steps[bool]:
+    """Close the gripper until it holds an object; return whether it does."""
+    arm.close()
+    held = 0
+    for _ in range(most):
+        yield
+        held = held + 1 if cell.holds(arm, name) else 0
+        if held >= 2:
+            return True
+    return cell.holds(arm, name)
+
+
+def release(arm: Arm, *, back: float = 0.08, steps: int = 5) -> Steps[None]:
+    """Open the gripper, and withdraw along the approach."""
+    arm.open()
+    for _ in range(steps):
+        yield
+    away = arm.pose
+    out = pin.SE3(away.rotation, away.translation - back * away.rotation[:, 2])
+    yield from move(arm, out, tolerance=0.02, turn_tolerance=0.3, most=30)
+
+
+def pick(
+    cell: Workcell,
+    name: str,
+    *,
+    then: Sequence[Sequence[pin.SE3]] = ((),),
+    arms: Sequence[Arm] | None = None,
+    raised: float = 0.1,
+    tries: int = 3,
+    **options: Any,
+) -> Steps[Choice | None]:
+    """Grasp an object and raise it; return how, or None if all tries fail.
+
+    Args:
+        cell: The workcell.
+        name: The object.
+        then: Where the object will be carried: alternatives, each a chain of poses.
+        arms: The arms that may do it; all by default.
+        raised: How far to raise it, m.
+        tries: How often.
+        options: Further arguments of `choose_grasp`.
+    """
+    for _ in range(tries):
+        choice = choose_grasp(
+            cell, name, then=then, arms=arms or cell.arms, raised=raised, **options
+        )
+        if choice is None:
+            return None
+        if (yield from _take(cell, name, choice, raised)):
+            return choice
+        choice.arm.open()
+        yield from move(choice.arm, shifted(choice.arm.pose, raised * UP), most=20)
+        yield from settle(cell, name)
+    return None
+
+
+def _take(cell: Workcell, name: str, choice: Choice, raised: float) -> Steps[bool]:
+    """Grasp an object as chosen, and raise it; return whether it came along."""
+    arm = choice.arm
+    arm.open(choice.site.grasp)
+    yield from move(arm, choice.before, tolerance=0.02, turn_tolerance=0.15)
+    yield from move(arm, lambda: choice.hand_at(cell.pose(name)))
+    if not (yield from grip(cell, arm, name)):
+        return False
+    if raised > 0.0:
+        yield from move(arm, shifted(arm.pose, raised * UP), tolerance=0.02)
+    return cell.holds(arm, name)
+
+
+def carry(
+    cell: Workcell,
+    arm: Arm,
+    name: str,
+    goal: pin.SE3,
+    **options: Any,
+) -> Steps[bool]:
+    """Bring a held object to a pose; its place in the hand is measured in each step."""
+
+    def target() -> pin.SE3:
+        return goal * cell.pose(name).actInv(arm.pose)
+
+    return (yield from move(arm, target, **options))
