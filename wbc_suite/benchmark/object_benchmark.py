@@ -16,6 +16,7 @@ from wbc_suite.benchmark.arrangement import (
     arrange_one,
     arrange_two_arms,
 )
+from wbc_suite.benchmark.falls import fall_of
 from wbc_suite.control import RobotState
 from wbc_suite.errors import PlacementError
 from wbc_suite.robot import RobotDescription
@@ -131,7 +132,7 @@ class ObjectBenchmark(ABC):
                 self.name,
                 ", ".join(state.robot.name for state in robots),
             )
-        self.model, self.data = model, data
+        self.model, self.data, self._robots = model, data, tuple(robots)
         self._sites: dict[str, Vector] = {}
         prefixes = tuple(state.prefix for state in robots)
         bodies = [model.body(int(b)).name for b in model.geom_bodyid]
@@ -183,8 +184,8 @@ class ObjectBenchmark(ABC):
         """Update the benchmark's own state after a control period: there is none."""
 
     def failure(self) -> str | None:
-        """Return None: most tasks can be solved until the horizon."""
-        return None
+        """Return which robot has fallen; else tasks can be solved until the end."""
+        return fall_of(self._robots)
 
     def observables(self) -> dict[str, Reading]:
         """Return the pose of each object (x y z w) and its offset from each hand.

@@ -74,7 +74,7 @@ def _panel(name: str, hinge_x: float, latch: bool) -> SceneObject:
 def _handle(name: str, latch: bool) -> SceneObject:
     """Return the lever; its bolt leaves the post as it turns."""
     out, axis = HANDLE_OUT, (0.0, -1.0, 0.0)
-    hinge = partial(Hinge, axis=axis, damping=0.05)
+    hinge = partial(Hinge, axis=axis, damping=0.05, armature=0.001)
     turned = hinge(range=(0.0, 1.6), stiffness=0.2, friction=0.03)
     fixed = hinge(range=(0.0, 0.001))
     spindle = brass(

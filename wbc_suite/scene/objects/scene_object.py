@@ -30,6 +30,10 @@ SLIDING, TORSION = 3, 4
 """Dimensions of contacts. A box touches with several corners, whose sliding friction
 keeps it from turning; a contact at one point needs torsional friction for that."""
 
+FIRM = (0.99, 0.9999)
+"""Least and greatest impedance of constraints that hardly give, whatever pushes: the
+penetration at rest is `(1 - d) / d` of what the default of 0.95 leaves."""
+
 _KINDS = {
     "box": (mujoco.mjtGeom.mjGEOM_BOX, 3),
     "ball": (mujoco.mjtGeom.mjGEOM_SPHERE, 1),
@@ -52,6 +56,8 @@ class Part:
         material: Name in `scene.materials`; also gives density and friction.
         solid: Whether it collides and has mass; otherwise it is visual only.
         drawn: Whether it is drawn; visuals may be finer than collision shapes.
+        firm: Whether contacts with other firm parts hardly give: for thin walls, and
+            what is light and pressed hard.
     """
 
     kind: Literal["box", "ball", "cylinder", "capsule", "ellipsoid", "mesh"]
@@ -63,6 +69,7 @@ class Part:
     material: str = "plastic"
     solid: bool = True
     drawn: bool = True
+    firm: bool = False
     density: float | None = None
     friction: Vector3 | None = None
 
@@ -96,6 +103,8 @@ class Part:
         if self.solid:
             geom.condim = SLIDING if self.kind == "box" else TORSION
             geom.solref[:2] = CONTACT_SOLREF
+            if self.firm:
+                geom.solimp[:2] = FIRM
         else:
             geom.contype = geom.conaffinity = 0
             geom.mass = 0.0
@@ -126,6 +135,8 @@ def _add_mesh(
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Hinge:
     """Hinge joint between an object and its parent, named `{object}_joint`.
+
+    Its stops hardly give.
 
     The axis is in the object's frame, through its origin. SI units; `friction` is dry,
     `stiffness` that of a spring to angle zero.
@@ -218,6 +229,7 @@ def _add_hinge(body: mujoco.MjsBody, name: str, hinge: Hinge) -> None:
     joint.stiffness[0] = hinge.stiffness
     joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
     joint.range = hinge.range
+    joint.solimp_limit[:2] = FIRM
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -181,9 +181,10 @@ def stand(
     end of the socket), `floor` (its lower end).
     """
     board, half = 2 * half_size[2], height / 2
+    firm = partial(wooden_box, firm=True)
     parts = (
-        wooden_box(size=half_size, pos=(0.0, 0.0, half_size[2])),
-        *walls_around(hole, hole, wall, half, at=board + half, part=wooden_box),
+        firm(size=half_size, pos=(0.0, 0.0, half_size[2])),
+        *walls_around(hole, hole, wall, half, at=board + half, part=firm),
     )
     sites = {"socket": (0.0, 0.0, board + height), "floor": (0.0, 0.0, board)}
     return SceneObject(name=name, parts=parts, sites=sites)
@@ -206,7 +207,7 @@ def hanging_frame(
     end, bend, r = length / 2, 0.018, radius
     grip = (0.0, 0.0, 0.5 * end)
     parts = (
-        steel_box(size=(r, r, end)),
+        steel_box(size=(r, r, end), firm=True),
         steel_box(size=(arm / 2, r, r), pos=(arm / 2, 0.0, end)),
         steel_box(size=(r, r, bend / 2), pos=(arm, 0.0, end + bend / 2)),
         Part(kind="box", size=(2 * r, 2 * r, 0.025), pos=grip, color=BLACK),
