@@ -73,7 +73,8 @@ class ObjectBenchmark(ABC):
     Attributes:
         sampler: Draws the start poses; may be replaced by a sampler of your own.
         states: The objects in the simulation, by name, after `bind`.
-        grasps: Where and how hands can hold each object, by its name, after `bind`.
+        grasps: Where and how hands can hold each object, and the objects attached to
+            it, by name, after `bind`.
         hands: The hands of all robots, after `bind`.
     """
 
@@ -142,7 +143,7 @@ class ObjectBenchmark(ABC):
         self.hands = [hand for state in robots for hand in hands_of(state)]
         things = self.objects()
         self.states = {t.name: ObjectState(model, data, t.name) for t in things}
-        self.grasps = {t.name: t.grasps for t in things}
+        self.grasps = {t.name: t.grasps for thing in things for t in thing.family()}
 
     def reset(self, rng: np.random.Generator) -> None:
         """Place the objects; sizes and poses are written into model and data."""

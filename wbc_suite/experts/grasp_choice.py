@@ -54,6 +54,7 @@ def choose_grasp(
     away: float = 0.08,
     upright: float = 0.8,
     direction: Vector = DOWN,
+    place: str = "",
 ) -> Choice | None:
     """Return the best grasp of an object; None if it has none along the direction.
 
@@ -66,6 +67,7 @@ def choose_grasp(
         away: Distance from which the hand approaches, m.
         upright: Greatest angle of the approach to the wanted direction, rad.
         direction: Wanted direction of approach, a unit vector in the world.
+        place: Name of the place to grasp, where the object has several.
     """
     T_wo = cell.pose(name)
     least = math.cos(upright)
@@ -74,7 +76,7 @@ def choose_grasp(
         if found and min(choice.cost for choice in found) < GOOD:
             break
         for arm, site, way in itertools.product(arms, cell.grasps(name), then):
-            if abs(tilt) > site.tilt:
+            if abs(tilt) > site.tilt or site.name != place:
                 continue
             grasp = tilted(site, tilt)
             along = float((T_wo * grasp).rotation[:, 2] @ direction)

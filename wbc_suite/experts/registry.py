@@ -5,13 +5,25 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from wbc_suite.benchmark import Lift, NutAssembly, ObjectBenchmark, PickPlace, Stack
+from wbc_suite.benchmark import (
+    Door,
+    Lift,
+    NutAssembly,
+    ObjectBenchmark,
+    PickPlace,
+    Stack,
+    TwoArmLift,
+    TwoArmPegInHole,
+)
 from wbc_suite.envs import RobotEnv
 from wbc_suite.errors import UnknownNameError
+from wbc_suite.experts.door import door
 from wbc_suite.experts.lift import lift
 from wbc_suite.experts.nut_assembly import nut_assembly
 from wbc_suite.experts.pick_place import pick_place
 from wbc_suite.experts.stack import stack
+from wbc_suite.experts.two_arm_lift import two_arm_lift
+from wbc_suite.experts.two_arm_peg_in_hole import two_arm_peg_in_hole
 from wbc_suite.experts.workcell import Steps, Workcell
 from wbc_suite.typing import Vector
 
@@ -59,7 +71,10 @@ def expert(
     return drive
 
 
+register_expert(Door, door)
 register_expert(Lift, lift)
 register_expert(NutAssembly, nut_assembly)
 register_expert(PickPlace, pick_place)
 register_expert(Stack, stack)
+register_expert(TwoArmLift, two_arm_lift)
+register_expert(TwoArmPegInHole, two_arm_peg_in_hole)

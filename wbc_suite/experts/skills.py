@@ -104,7 +104,7 @@ def pick(
         )
         if choice is None:
             return None
-        if (yield from _take(cell, name, choice, raised)):
+        if (yield from take(cell, name, choice, raised=raised)):
             return choice
         choice.arm.open()
         yield from move(choice.arm, shifted(choice.arm.pose, raised * UP), most=20)
@@ -112,8 +112,10 @@ def pick(
     return None
 
 
-def _take(cell: Workcell, name: str, choice: Choice, raised: float) -> Steps[bool]:
-    """Grasp an object as chosen, and raise it; return whether it came along."""
+def take(
+    cell: Workcell, name: str, choice: Choice, *, raised: float = 0.0
+) -> Steps[bool]:
+    """Grasp an object as chosen, and raise it, m; return whether it came along."""
     arm = choice.arm
     arm.open(choice.site.grasp)
     yield from move(arm, choice.before, tolerance=0.02, turn_tolerance=0.15)
@@ -123,6 +125,47 @@ def _take(cell: Workcell, name: str, choice: Choice, raised: float) -> Steps[boo
     if raised > 0.0:
         yield from move(arm, shifted(arm.pose, raised * UP), tolerance=0.02)
     return cell.holds(arm, name)
+
+
+def follow_arc(
+    cell: Workcell, arm: Arm, joint: str, angle: float, *, speed: float
+) -> Steps[bool]:
+    """Turn a hinge to an angle with the hand that holds what it carries.
+
+    The hand moves about the hinge's present axis ahead of its angle, by 0.25 rad at
+    most. Returns whether the hinge got there, to 0.02 rad.
+
+    Args:
+        cell: The workcell.
+        arm: The arm.
+        joint: The hinge.
+        angle: The angle, rad.
+        speed: Of the hand's goal, rad/s.
+    """
+    hinge, index = cell.data.joint(joint), cell.model.joint(joint).id
+    start, grip = hinge.qpos.item(), arm.pose
+    axis, anchor = cell.data.xaxis[index].copy(), cell.data.xanchor[index].copy()
+    wanted = start
+    for _ in range(round(abs(angle - start) / (speed * cell.period)) + 30):
+        present = hinge.qpos.item()
+        if abs(angle - present) < 0.02:
+            return True
+        step = np.clip(angle - wanted, -speed * cell.period, speed * cell.period)
+        if abs(wanted + step - present) < 0.25:
+            wanted += step
+        R = pin.exp3((wanted - start) * axis)
+        at = anchor + R @ (grip.translation - anchor)
+        arm.aim(pin.SE3(R @ grip.rotation, at))
+        yield
+    return False
+
+
+def turned_about(cell: Workcell, pose: pin.SE3, joint: str, angle: float) -> pin.SE3:
+    """Return a pose turned about a hinge's present axis by an angle, rad."""
+    index = cell.model.joint(joint).id
+    R = pin.exp3(angle * cell.data.xaxis[index])
+    anchor = cell.data.xanchor[index]
+    return pin.SE3(R @ pose.rotation, anchor + R @ (pose.translation - anchor))
 
 
 def carry(

@@ -40,6 +40,7 @@ class Workcell(Generic[B]):
         self._env, self.benchmark, self.rng = env, benchmark, rng
         self.model, self.data = env.simulation.model, env.simulation.data
         self._copy = mujoco.MjData(self.model)
+        self._objects = dict(benchmark.states)
         self.period = 1.0 / env.config.control_freq
         self.arms = tuple(self._arms())
         if not self.arms:
@@ -57,8 +58,10 @@ class Workcell(Generic[B]):
         return action
 
     def object(self, name: str) -> ObjectState:
-        """Return an object's state."""
-        return self.benchmark.states[name]
+        """Return the state of an object, or of a body attached to one."""
+        if name not in self._objects:
+            self._objects[name] = ObjectState(self.model, self.data, name)
+        return self._objects[name]
 
     def pose(self, name: str) -> pin.SE3:
         """Return the pose T_wo of an object."""

@@ -26,6 +26,7 @@ class GraspSite:
         closing: Unit vector along which its fingers close, at right angles to it.
         grasp: Kind of grasp, `pinch` between finger tips or `wrap` around a bar.
         tilt: Greatest turn about the closing axis by which it may be held too, rad.
+        name: Name of the place, where an object has several, such as handles.
     """
 
     pos: Vector3 = (0.0, 0.0, 0.0)
@@ -33,6 +34,7 @@ class GraspSite:
     closing: Vector3
     grasp: str = "pinch"
     tilt: float = 0.0
+    name: str = ""
 
     @property
     def pose(self) -> pin.SE3:
@@ -75,6 +77,7 @@ def rod_grasps(
     steps: int = 8,
     grasp: str = "pinch",
     tilt: float = 0.6,
+    name: str = "",
 ) -> tuple[GraspSite, ...]:
     """Return grasps across a round rod along an axis (0, 1, 2), from all around."""
     along, first = AXES[axis], AXES[(axis + 1) % 3]
@@ -88,6 +91,7 @@ def rod_grasps(
             closing=vector(np.cross(approach, along)),
             grasp=grasp,
             tilt=tilt,
+            name=name,
         )
         found += [one, one.turned()]
     return tuple(found)

@@ -1,6 +1,6 @@
 """Objects of a scene: bodies made of parts, with child objects on hinges."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal, TypeAlias
@@ -199,6 +199,12 @@ class SceneObject:
         for child in self.children:
             child.add_to(spec, body, visual=visual)
 
+    def family(self) -> "Iterator[SceneObject]":
+        """Yield it, its children, and theirs."""
+        yield self
+        for child in self.children:
+            yield from child.family()
+
     def compiled_alone(self) -> mujoco.MjModel:
         """Compile it as a free body, without textures and children."""
         spec = mujoco.MjSpec()
@@ -247,6 +253,10 @@ class MjcfObject:
     pos: Vector3 = (0.0, 0.0, 0.0)
     quat: Quat = STANDING
     grasps: tuple[GraspSite, ...] = ()
+
+    def family(self) -> "Iterator[MjcfObject]":
+        """Yield it: it has no children of its own."""
+        yield self
 
     def add_to(self, spec: mujoco.MjSpec) -> None:
         """Add it to a scene; raises as `compile_mjcf`, and unless it is one body."""

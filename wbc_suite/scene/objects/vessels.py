@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import partial
 
 from wbc_suite.robot.shapes import Vector3
+from wbc_suite.scene.objects.grasp_site import rod_grasps
 from wbc_suite.scene.objects.scene_object import Color, Part, SceneObject
 
 WOOD: Color = (0.80, 0.62, 0.42, 1.0)
@@ -159,4 +160,10 @@ def pot(
         "center": (0.0, 0.0, 0.0),
         "bottom": (0.0, 0.0, -z),
     }
-    return SceneObject(name=name, parts=tuple(parts), sites=sites)
+    grasps = [
+        rod_grasps([sites[handle]], axis=0, grasp="wrap", tilt=0.4, name=handle)
+        for handle in ("handle0", "handle1")
+    ]
+    return SceneObject(
+        name=name, parts=tuple(parts), sites=sites, grasps=(*grasps[0], *grasps[1])
+    )
