@@ -15,7 +15,8 @@ from wbc_suite.typing import Vector
 
 SPEED, TURN = 0.6, 3.0  # m/s, rad/s of goals
 LEAD = 0.08  # m; a goal waits for a hand that lags farther behind
-CORRECTION, MOST = 0.3, 0.02  # share of a resting error, m
+CORRECTION, MOST = 0.3, 0.02  # share of a resting error; greatest correction, m
+MOST_TURN = 0.15  # rad, likewise
 SETTLED = 0.03  # m; errors are resting errors below it
 OPEN, CLOSED = (-1.0, 1.0), 1
 
@@ -53,8 +54,8 @@ class Arm:
         self._offset = cache(self._measure_offset)
         self._closing = 0
         self._goal = self._target = self.pose
-        self._speed, self._turn = SPEED, TURN
-        self._correction = np.zeros(3)
+        self._speed, self._turn, self._exact = SPEED, TURN, True
+        self._correction, self._turn_correction = np.zeros(3), np.zeros(3)
         self._moves, self._grips = False, False
 
     @property
@@ -72,17 +73,28 @@ class Arm:
         """Whether the gripper is commanded to be open."""
         return self._closing == 0
 
-    def aim(self, target: pin.SE3, *, speed: float = SPEED, turn: float = TURN) -> None:
-        """Move on a straight line to a pose, at speeds in m/s and rad/s."""
+    def aim(
+        self,
+        target: pin.SE3,
+        *,
+        speed: float = SPEED,
+        turn: float = TURN,
+        exact: bool = True,
+    ) -> None:
+        """Move on a straight line to a pose, at speeds in m/s and rad/s.
+
+        A resting error is corrected if it must be `exact`; not so for a hand that
+        presses on something.
+        """
         if not self._moves:
             self._goal = self.pose
         self._moves, self._target = True, target
-        self._speed, self._turn = speed, turn
+        self._speed, self._turn, self._exact = speed, turn, exact
 
     def stop(self) -> None:
         """Stay where the hand is."""
         self._goal = self._target = self.pose
-        self._correction[:] = 0.0
+        self._correction, self._turn_correction = np.zeros(3), np.zeros(3)
 
     def open(self, grasp: str | None = None) -> None:
         """Open the gripper for a kind of grasp, the present one by default."""
@@ -106,6 +118,7 @@ class Arm:
             self._advance(period)
             goal = self._goal.copy()
             goal.translation = goal.translation + self._correction
+            goal.rotation = pin.exp3(self._turn_correction) @ goal.rotation
             target = goal * self._offset(self.grasp).inverse()
             action[self._slice.start : self._slice.stop] = self._port.encode(target)
         if self._grips and self._gripper is not None:
@@ -130,12 +143,19 @@ class Arm:
                 goal.translation + share * shift,
             )
         self._goal = goal
-        error = target.translation - pose.translation
-        if far <= period and np.linalg.norm(error) < SETTLED:
-            self._correction += CORRECTION * error
-            self._correction *= min(
-                1.0, MOST / max(float(np.linalg.norm(self._correction)), 1e-9)
-            )
+        if far <= period:
+            error = target.translation - pose.translation
+            self._correct(error, pin.log3(target.rotation @ pose.rotation.T))
+
+    def _correct(self, shift: Vector, turn: Vector) -> None:
+        """Correct a resting error, m and rad in world axes."""
+        if not self._exact:
+            self._correction[:] = 0.0
+        elif np.linalg.norm(shift) < SETTLED:
+            self._correction = shortened(self._correction + CORRECTION * shift, MOST)
+        if np.linalg.norm(turn) < MOST_TURN:
+            turn = self._turn_correction + CORRECTION * turn
+            self._turn_correction = shortened(turn, MOST_TURN)
 
     def _choose(self, grasp: str) -> None:
         """Go on with the frame of another kind of grasp."""
@@ -157,3 +177,8 @@ class Arm:
 
     def _make_look_ahead(self, grasp: str) -> LookAhead:
         return LookAhead(self.state, self._joints, self._frame(grasp))
+
+
+def shortened(v: Vector, most: float) -> Vector:
+    """Return a vector shortened to a greatest length."""
+    return v * min(1.0, most / max(float(np.linalg.norm(v)), 1e-12))

@@ -14,6 +14,7 @@ from wbc_suite.benchmark import (
     Stack,
     TwoArmLift,
     TwoArmPegInHole,
+    Wipe,
 )
 from wbc_suite.envs import RobotEnv
 from wbc_suite.errors import UnknownNameError
@@ -24,6 +25,7 @@ from wbc_suite.experts.pick_place import pick_place
 from wbc_suite.experts.stack import stack
 from wbc_suite.experts.two_arm_lift import two_arm_lift
 from wbc_suite.experts.two_arm_peg_in_hole import two_arm_peg_in_hole
+from wbc_suite.experts.wipe import wipe
 from wbc_suite.experts.workcell import Steps, Workcell
 from wbc_suite.typing import Vector
 
@@ -78,3 +80,4 @@ register_expert(PickPlace, pick_place)
 register_expert(Stack, stack)
 register_expert(TwoArmLift, two_arm_lift)
 register_expert(TwoArmPegInHole, two_arm_peg_in_hole)
+register_expert(Wipe, wipe)
