@@ -9,7 +9,7 @@ import pinocchio as pin
 from wbc_suite.control import ActionLayout, RobotState
 from wbc_suite.control.action import ActionSlice
 from wbc_suite.devices.action_ports import LimbPort
-from wbc_suite.experts.look_ahead import LookAhead
+from wbc_suite.experts.look_ahead import LookAhead, Outlook
 from wbc_suite.sensing.hands import Hand
 from wbc_suite.typing import Vector
 
@@ -63,10 +63,13 @@ class Arm:
         """Measured pose T_wh of the frame of the present grasp."""
         return self._port.measure() * self._offset(self.grasp)
 
-    @property
-    def look_ahead(self) -> LookAhead:
-        """Kinematic look-ahead of the frame of the present grasp."""
-        return self._look_ahead(self.grasp)
+    def look_ahead(self, poses: Sequence[pin.SE3], grasp: str | None = None) -> Outlook:
+        """Look along a chain of poses of a grasp's frame, by default the present."""
+        return self._look_ahead(grasp or self.grasp).along(poses)
+
+    def configuration(self, q: Vector) -> Vector:
+        """Return the robot's configuration with joints as an outlook has them."""
+        return self._look_ahead(self.grasp).full(q)
 
     @property
     def is_open(self) -> bool:

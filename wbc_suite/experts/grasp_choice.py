@@ -17,6 +17,7 @@ from wbc_suite.typing import Vector
 DOWN = np.array([0.0, 0.0, -1.0])
 TILTS = (0.0, 0.35, -0.35, 0.6, -0.6)  # rad, about the closing axis
 COLLISION = 5.0  # cost
+ANGLE = 0.4  # cost of an approach that deviates from the wanted one, 1/rad
 GOOD = 1.0  # of outlooks; tilted grasps are looked at if none is so good
 
 
@@ -82,10 +83,19 @@ def choose_grasp(
             along = float((T_wo * grasp).rotation[:, 2] @ direction)
             if along < least:
                 continue
-            choice = _outlook(
-                cell, name, arm, site, grasp, tuple(way), raised=raised, away=away
+            found.append(
+                _outlook(
+                    cell,
+                    name,
+                    arm,
+                    site,
+                    grasp,
+                    tuple(way),
+                    raised=raised,
+                    away=away,
+                    direction=direction,
+                )
             )
-            found.append(choice)
     if not found:
         return None
     return _first_clear(cell, name, sorted(found, key=lambda choice: choice.cost))
@@ -96,7 +106,7 @@ def _first_clear(cell: Workcell, name: str, choices: Sequence[Choice]) -> Choice
     for choice in choices:
         if choice.cost > choices[0].cost + COLLISION:
             break
-        before, at = map(choice.arm.look_ahead.full, choice.outlook.q[:2])
+        before, at = map(choice.arm.configuration, choice.outlook.q[:2])
         if all(cell.is_clear(choice.arm, q, but=name) for q in (at, before)):
             return choice
     return choices[0]
@@ -119,18 +129,15 @@ def _outlook(
     *,
     raised: float,
     away: float,
+    direction: Vector,
 ) -> Choice:
     """Look along a grasp and what follows."""
-    held = arm.grasp
-    arm.open(site.grasp)
     at = cell.pose(name) * grasp
     before = pin.SE3(at.rotation, at.translation - away * at.rotation[:, 2])
     up = pin.SE3(at.rotation, at.translation - raised * DOWN)
     chain = [before, at, up, *(pose * grasp for pose in then)]
-    outlook = arm.look_ahead.along(chain)
-    tilt = math.acos(min(1.0, abs(float(at.rotation[:, 2] @ DOWN))))
-    cost = outlook.cost + 0.3 * min(tilt, 1.0)
-    arm.grasp = held
+    outlook = arm.look_ahead(chain, site.grasp)
+    angle = math.acos(min(1.0, max(-1.0, float(at.rotation[:, 2] @ direction))))
     return Choice(
         arm=arm,
         site=site,
@@ -138,5 +145,5 @@ def _outlook(
         grasp=grasp,
         then=then,
         outlook=outlook,
-        cost=cost,
+        cost=outlook.cost + ANGLE * angle,
     )

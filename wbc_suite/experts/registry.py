@@ -12,8 +12,10 @@ from wbc_suite.benchmark import (
     ObjectBenchmark,
     PickPlace,
     Stack,
+    TwoArmHandover,
     TwoArmLift,
     TwoArmPegInHole,
+    TwoArmTransport,
     Wipe,
 )
 from wbc_suite.envs import RobotEnv
@@ -23,8 +25,10 @@ from wbc_suite.experts.lift import lift
 from wbc_suite.experts.nut_assembly import nut_assembly
 from wbc_suite.experts.pick_place import pick_place
 from wbc_suite.experts.stack import stack
+from wbc_suite.experts.two_arm_handover import two_arm_handover
 from wbc_suite.experts.two_arm_lift import two_arm_lift
 from wbc_suite.experts.two_arm_peg_in_hole import two_arm_peg_in_hole
+from wbc_suite.experts.two_arm_transport import two_arm_transport
 from wbc_suite.experts.wipe import wipe
 from wbc_suite.experts.workcell import Steps, Workcell
 from wbc_suite.typing import Vector
@@ -78,6 +82,8 @@ register_expert(Lift, lift)
 register_expert(NutAssembly, nut_assembly)
 register_expert(PickPlace, pick_place)
 register_expert(Stack, stack)
+register_expert(TwoArmHandover, two_arm_handover)
 register_expert(TwoArmLift, two_arm_lift)
 register_expert(TwoArmPegInHole, two_arm_peg_in_hole)
 register_expert(Wipe, wipe)
+register_expert(TwoArmTransport, two_arm_transport)

@@ -9,6 +9,7 @@ import pinocchio as pin
 from wbc_suite.experts.arm import SPEED, TURN, Arm
 from wbc_suite.experts.grasp_choice import Choice, choose_grasp
 from wbc_suite.experts.workcell import Steps, Workcell, wait_until
+from wbc_suite.typing import Vector
 
 UP = np.array([0.0, 0.0, 1.0])
 STALLED = 8  # control periods without progress end a motion
@@ -125,6 +126,33 @@ def take(
     if raised > 0.0:
         yield from move(arm, shifted(arm.pose, raised * UP), tolerance=0.02)
     return cell.holds(arm, name)
+
+
+def put_down(
+    cell: Workcell, arm: Arm, name: str, at: Vector, *, over: float
+) -> Steps[None]:
+    """Let go of a held object at a point, the hand pointing down.
+
+    Args:
+        cell: The workcell.
+        arm: The arm.
+        name: The object.
+        at: Where its origin is when it is let go, m.
+        over: Height above that at which it is brought there, m.
+    """
+    held = cell.pose(name).actInv(arm.pose)
+    down = np.diag([1.0, -1.0, -1.0])
+    best, cost = [], np.inf
+    for k in range(8):
+        R = pin.exp3(k * np.pi / 4 * UP) @ down @ held.rotation.T
+        poses = [pin.SE3(R, at + height * UP) for height in (over, 0.0)]
+        found = arm.look_ahead([pose * held for pose in poses]).cost
+        if found < cost:
+            best, cost = poses, found
+    above, low = best
+    yield from carry(cell, arm, name, above, tolerance=0.02, turn_tolerance=0.1)
+    yield from carry(cell, arm, name, low, tolerance=0.01, turn_tolerance=0.1)
+    yield from release(arm, back=over)
 
 
 def follow_arc(

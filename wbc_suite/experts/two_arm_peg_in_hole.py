@@ -75,7 +75,7 @@ def _easiest(
     """Return the pose of a fixed object that its arm reaches best, with its cost."""
     held = cell.pose(name).actInv(arm.pose)
     costs = [
-        arm.look_ahead.along([shifted(pose, o) * held for o in offsets]).cost
+        arm.look_ahead([shifted(pose, o) * held for o in offsets]).cost
         for pose in poses
     ]
     k = int(np.argmin(costs))

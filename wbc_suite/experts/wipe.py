@@ -44,7 +44,5 @@ def _rotation(arm: Arm, points: list[Vector]) -> np.ndarray:
     down = np.diag([1.0, -1.0, -1.0])
     heading = math.atan2(y, x)
     ways = [pin.exp3((heading + turn) * UP) @ down for turn in TURNS]
-    costs = [
-        arm.look_ahead.along([pin.SE3(R, point) for point in points]).cost for R in ways
-    ]
+    costs = [arm.look_ahead([pin.SE3(R, point) for point in points]).cost for R in ways]
     return ways[int(np.argmin(costs))]

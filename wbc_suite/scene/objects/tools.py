@@ -5,13 +5,15 @@ from dataclasses import replace
 from functools import partial
 
 from wbc_suite.robot.shapes import Vector3
-from wbc_suite.scene.objects.grasp_site import GraspSite
+from wbc_suite.scene.objects.grasp_site import GraspSite, rod_grasps
 from wbc_suite.scene.objects.scene_object import Color, Part, SceneObject
 from wbc_suite.scene.objects.vessels import ring_of_boxes, walls_around
 
 WOOD: Color = (0.72, 0.50, 0.28, 1.0)
 STEEL: Color = (0.62, 0.64, 0.67, 1.0)
 BLACK: Color = (0.13, 0.13, 0.14, 1.0)
+FINGER = 0.02
+"""Half of a finger's width and some room, m: grasps keep so far from ends."""
 ALONG_X = (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
 HAMMER_LYING = (0.5, 0.5, 0.5, 0.5)
 """Turns a hammer on its side: its handle, z, to x, and its head, x, to y."""
@@ -30,8 +32,9 @@ def hammer(
 ) -> SceneObject:
     """Make a hammer with its handle along z and its head above; origin in the handle.
 
-    Sites: `handle` (the middle of the handle, the origin), `head`. `head_half_size` is
-    that of the middle block of the head; m and kg.
+    Sites: `handle` (the middle of the handle, the origin), `head`. Grasps: `neck` (next
+    to the head) and `end`, around the handle. `head_half_size` is that of the middle
+    block of the head; m and kg.
     """
     h, top = head_half_size, handle_length / 2
     middle = top + h
@@ -50,7 +53,11 @@ def hammer(
         *(claw(pos=(-1.6 * h, side * 0.5 * h, middle)) for side in (-1.0, 1.0)),
     )
     sites = {"handle": (0.0, 0.0, 0.0), "head": (0.0, 0.0, middle)}
-    return SceneObject(name=name, parts=parts, sites=sites).with_mass(mass)
+    neck, end = (0.0, 0.0, top - FINGER), (0.0, 0.0, FINGER - top)
+    grasps = rod_grasps([neck], axis=2, name="neck")
+    grasps += rod_grasps([end], axis=2, name="end")
+    whole = SceneObject(name=name, parts=parts, sites=sites, grasps=grasps)
+    return whole.with_mass(mass)
 
 
 def plate_with_hole(
