@@ -27,6 +27,7 @@ def hand_over(
     places: tuple[str, str],
     height: float,
     raised: float = 0.1,
+    over: float | None = None,
     tries: int = 3,
 ) -> Steps[bool]:
     """Pick an object up with one arm and give it to another.
@@ -39,6 +40,7 @@ def hand_over(
         places: Names of the places that either arm grasps.
         height: Of the meeting point in the world, m.
         raised: How far the giver raises it first, m.
+        over: Height at which the giver comes, see `pick`, m.
         tries: How often.
 
     Returns:
@@ -55,6 +57,7 @@ def hand_over(
                 arms=[giver],
                 place=places[0],
                 raised=raised,
+                over=over,
             )
             if choice is None:
                 return False

@@ -13,6 +13,8 @@ from wbc_suite.typing import Vector
 
 UP = np.array([0.0, 0.0, 1.0])
 STALLED = 8  # control periods without progress end a motion
+OPENING = 8  # control periods until a gripper is open
+PASSING = 0.03  # m, tolerance of poses on the way
 
 
 def shifted(pose: pin.SE3, offset: Iterable[float]) -> pin.SE3:
@@ -50,6 +52,26 @@ def move(
     return False
 
 
+def travel(arm: Arm, target: pin.SE3, *, height: float, **options: Any) -> Steps[bool]:
+    """Move over what is below a height in the world, m, then down to a pose.
+
+    `options` are those of `move`, for the last part.
+    """
+    pose = arm.pose
+    if pose.translation[2] < height - PASSING:
+        yield from move(arm, at_height(pose, height), tolerance=PASSING, most=40)
+    if target.translation[2] < height - PASSING:
+        over = at_height(target, height)
+        yield from move(arm, over, tolerance=PASSING, turn_tolerance=0.3, most=60)
+    return (yield from move(arm, target, **options))
+
+
+def at_height(pose: pin.SE3, height: float) -> pin.SE3:
+    """Return a pose at another height in the world, m."""
+    x, y, _ = pose.translation
+    return pin.SE3(pose.rotation, np.array([x, y, height]))
+
+
 def settle(cell: Workcell, name: str, *, most: int = 20) -> Steps[bool]:
     """Wait until an object lies still."""
     yield
@@ -85,6 +107,7 @@ def pick(
     then: Sequence[Sequence[pin.SE3]] = ((),),
     arms: Sequence[Arm] | None = None,
     raised: float = 0.1,
+    over: float | None = None,
     tries: int = 3,
     **options: Any,
 ) -> Steps[Choice | None]:
@@ -96,6 +119,7 @@ def pick(
         then: Where the object will be carried: alternatives, each a chain of poses.
         arms: The arms that may do it; all by default.
         raised: How far to raise it, m.
+        over: Height in the world at which to come, m; on a straight line if None.
         tries: How often.
         options: Further arguments of `choose_grasp`.
     """
@@ -105,21 +129,37 @@ def pick(
         )
         if choice is None:
             return None
-        if (yield from take(cell, name, choice, raised=raised)):
+        if (yield from take(cell, name, choice, raised=raised, over=over)):
             return choice
         choice.arm.open()
+        for _ in range(OPENING):
+            yield
         yield from move(choice.arm, shifted(choice.arm.pose, raised * UP), most=20)
         yield from settle(cell, name)
     return None
 
 
 def take(
-    cell: Workcell, name: str, choice: Choice, *, raised: float = 0.0
+    cell: Workcell,
+    name: str,
+    choice: Choice,
+    *,
+    raised: float = 0.0,
+    over: float | None = None,
 ) -> Steps[bool]:
-    """Grasp an object as chosen, and raise it, m; return whether it came along."""
+    """Grasp an object as chosen, and raise it; return whether it came along.
+
+    See `pick` for `raised` and `over`.
+    """
     arm = choice.arm
     arm.open(choice.site.grasp)
-    yield from move(arm, choice.before, tolerance=0.02, turn_tolerance=0.15)
+    near: dict[str, float] = {"tolerance": 0.02, "turn_tolerance": 0.15}
+    if over is None:
+        arrived = yield from move(arm, choice.before, **near)
+    else:
+        arrived = yield from travel(arm, choice.before, height=over, **near)
+    if not arrived and arm.error()[0] > 2 * PASSING:
+        return False
     yield from move(arm, lambda: choice.hand_at(cell.pose(name)))
     if not (yield from grip(cell, arm, name)):
         return False

@@ -13,7 +13,7 @@ from wbc_suite.benchmark.two_arm_transport import (
 )
 from wbc_suite.experts.arm import Arm
 from wbc_suite.experts.handover import hand_over
-from wbc_suite.experts.skills import UP, move, pick, put_down
+from wbc_suite.experts.skills import UP, move, pick, put_down, travel
 from wbc_suite.experts.workcell import Steps, Workcell, together
 from wbc_suite.typing import Vector
 
@@ -37,6 +37,7 @@ def two_arm_transport(cell: Workcell[TwoArmTransport]) -> Steps[None]:
             places=("neck", "end"),
             height=config.table.center[2] + HEIGHT,
             raised=clear + 0.05,
+            over=_over(cell),
         )
         if not handed:
             return
@@ -63,14 +64,22 @@ def _clear(cell: Workcell[TwoArmTransport], arm: Arm, clear: float) -> Steps[Non
     """Throw the trash into its bin."""
     home = arm.pose
     for _ in range(3):
-        choice = yield from pick(cell, TRASH, arms=[arm], raised=clear)
+        choice = yield from pick(
+            cell, TRASH, arms=[arm], raised=clear, over=_over(cell)
+        )
         if choice is None:
             return
         floor = _floor(cell, TRASH_BIN)
         yield from put_down(cell, arm, TRASH, floor + DROP * UP, over=clear)
         if cell.benchmark.inside(TRASH, TRASH_BIN):
             break
-    yield from move(arm, home, tolerance=0.05, turn_tolerance=0.3, most=40)
+    yield from travel(arm, home, height=_over(cell), tolerance=0.05, most=40)
+
+
+def _over(cell: Workcell[TwoArmTransport]) -> float:
+    """Return a height clear of the bins, m."""
+    config = cell.benchmark.config
+    return config.table.center[2] + config.bin.size[2] + CLEAR
 
 
 def _floor(cell: Workcell[TwoArmTransport], name: str) -> Vector:
