@@ -15,7 +15,7 @@ from wbc_suite.scene.objects.grasp_site import GraspSite
 from wbc_suite.typing import Vector
 
 DOWN = np.array([0.0, 0.0, -1.0])
-TILTS = (0.0, 0.35, -0.35, 0.6, -0.6)  # rad, about the closing axis
+TILTS = (0.0, 0.25, -0.25, 0.5, -0.5)  # rad, about the closing axis
 COLLISION = 5.0  # cost
 ANGLE = 0.4  # cost of an approach that deviates from the wanted one, 1/rad
 GOOD = 1.0  # of outlooks; tilted grasps are looked at if none is so good
@@ -50,6 +50,7 @@ def choose_grasp(
     name: str,
     *,
     then: Sequence[Sequence[pin.SE3]] = ((),),
+    costs: Sequence[float] | None = None,
     arms: Sequence[Arm],
     raised: float = 0.1,
     away: float = 0.08,
@@ -63,6 +64,7 @@ def choose_grasp(
         cell: The workcell.
         name: The object.
         then: Alternatives of where it will be carried, each a chain of its poses.
+        costs: Cost of each alternative beside its outlook, s.
         arms: The arms that may do it.
         raised: How far it is raised, m.
         away: Distance from which the hand approaches, m.
@@ -76,7 +78,10 @@ def choose_grasp(
     for tilt in TILTS:
         if found and min(choice.cost for choice in found) < GOOD:
             break
-        for arm, site, way in itertools.product(arms, cell.grasps(name), then):
+        ways = zip(then, costs or [0.0] * len(then), strict=True)
+        for arm, site, (way, extra) in itertools.product(
+            arms, cell.grasps(name), list(ways)
+        ):
             if abs(tilt) > site.tilt or site.name != place:
                 continue
             grasp = tilted(site, tilt)
@@ -94,6 +99,7 @@ def choose_grasp(
                     raised=raised,
                     away=away,
                     direction=direction,
+                    extra=extra,
                 )
             )
     if not found:
@@ -130,6 +136,7 @@ def _outlook(
     raised: float,
     away: float,
     direction: Vector,
+    extra: float,
 ) -> Choice:
     """Look along a grasp and what follows."""
     at = cell.pose(name) * grasp
@@ -145,5 +152,5 @@ def _outlook(
         grasp=grasp,
         then=then,
         outlook=outlook,
-        cost=outlook.cost + ANGLE * angle,
+        cost=outlook.cost + ANGLE * angle + extra,
     )

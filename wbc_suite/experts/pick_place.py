@@ -11,6 +11,7 @@ from wbc_suite.experts.workcell import Steps, Workcell
 
 TURNS = tuple(pin.exp3(k * math.pi / 2 * UP) for k in range(4))
 ASIDE = 0.04  # m, from the middle of a quadrant
+TALLEST = 0.16  # m, of the objects, with some room for fingers
 CLEAR = 0.03  # m, above the walls of the bins
 
 
@@ -41,7 +42,9 @@ def _place(cell: Workcell[PickPlace], name: str) -> Steps[None]:
         for dy in (0.0, -ASIDE, ASIDE)
     ]
     plans = [(shifted(way, over * UP), way) for way in ways]
-    choice = yield from pick(cell, name, then=plans, raised=over)
+    choice = yield from pick(
+        cell, name, then=plans, raised=over, over=config.source.center[2] + TALLEST
+    )
     if choice is None:
         return
     above, at = choice.then

@@ -12,6 +12,7 @@ from wbc_suite.benchmark import (
     ObjectBenchmark,
     PickPlace,
     Stack,
+    ToolHang,
     TwoArmHandover,
     TwoArmLift,
     TwoArmPegInHole,
@@ -25,6 +26,7 @@ from wbc_suite.experts.lift import lift
 from wbc_suite.experts.nut_assembly import nut_assembly
 from wbc_suite.experts.pick_place import pick_place
 from wbc_suite.experts.stack import stack
+from wbc_suite.experts.tool_hang import tool_hang
 from wbc_suite.experts.two_arm_handover import two_arm_handover
 from wbc_suite.experts.two_arm_lift import two_arm_lift
 from wbc_suite.experts.two_arm_peg_in_hole import two_arm_peg_in_hole
@@ -82,6 +84,7 @@ register_expert(Lift, lift)
 register_expert(NutAssembly, nut_assembly)
 register_expert(PickPlace, pick_place)
 register_expert(Stack, stack)
+register_expert(ToolHang, tool_hang)
 register_expert(TwoArmHandover, two_arm_handover)
 register_expert(TwoArmLift, two_arm_lift)
 register_expert(TwoArmPegInHole, two_arm_peg_in_hole)

@@ -77,16 +77,21 @@ def rod_grasps(
     steps: int = 8,
     grasp: str = "pinch",
     tilt: float = 0.6,
+    lift: float = 0.0,
     name: str = "",
 ) -> tuple[GraspSite, ...]:
-    """Return grasps across a round rod along an axis (0, 1, 2), from all around."""
+    """Return grasps across a round rod along an axis (0, 1, 2), from all around.
+
+    Hands stay by `lift` before the axis, m, so that fingers are clear of what the rod
+    lies on.
+    """
     along, first = AXES[axis], AXES[(axis + 1) % 3]
     found = []
     for pos, k in itertools.product(positions, range(steps)):
         angle = 2.0 * math.pi * k / steps
         approach = math.cos(angle) * first + math.sin(angle) * np.cross(along, first)
         one = GraspSite(
-            pos=pos,
+            pos=vector(np.array(pos) - lift * approach),
             approach=vector(approach),
             closing=vector(np.cross(approach, along)),
             grasp=grasp,

@@ -170,7 +170,19 @@ def wrench(
         "hole2": (-end, 0.0, 0.0),
         "grip": (0.0, 0.0, 0.0),
     }
-    return SceneObject(name=name, parts=(*rings, *shaft), sites=sites).with_mass(mass)
+    across = [
+        GraspSite(
+            pos=(0.0, 0.0, -0.004 * side),  # fingers clear of a table
+            approach=(0.0, 0.0, side),
+            closing=(0.0, 1.0, 0.0),
+            tilt=0.4,
+        )
+        for side in (1.0, -1.0)
+    ]
+    grasps = tuple(turn for one in across for turn in (one, one.turned()))
+    parts = (*rings, *shaft)
+    whole = SceneObject(name=name, parts=parts, sites=sites, grasps=grasps)
+    return whole.with_mass(mass)
 
 
 def stand(
@@ -227,4 +239,6 @@ def hanging_frame(
         "hook_tip": (arm, 0.0, end + bend),
         "grip": grip,
     }
-    return SceneObject(name=name, parts=parts, sites=sites).with_mass(mass)
+    grasps = rod_grasps([grip], axis=2, steps=4, tilt=0.6, lift=r)
+    whole = SceneObject(name=name, parts=parts, sites=sites, grasps=grasps)
+    return whole.with_mass(mass)
