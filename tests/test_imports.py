@@ -41,6 +41,7 @@ TOP = (
     "devices",
     "recording",
     "wrappers",
+    "experts",
     "evaluation",
     "compat",
     "viewers",

@@ -8,7 +8,7 @@ import pytest
 
 import wbc_suite
 from wbc_suite.benchmark import benchmark_names
-from wbc_suite.registration import BENCHMARKS, register_environments
+from wbc_suite.registration import BENCHMARKS, environment_id, register_environments
 
 
 def run(code):
@@ -25,7 +25,7 @@ def run(code):
 def test_every_benchmark_has_an_id():
     assert set(BENCHMARKS) == set(benchmark_names())
     for name in BENCHMARKS:
-        assert f"wbc_suite/{name}-v0" in gymnasium.registry
+        assert environment_id(name) in gymnasium.registry
 
 
 def test_registering_twice_changes_nothing(recwarn):
@@ -48,7 +48,7 @@ print(gymnasium.spec("wbc_suite/Lift-v0").entry_point)
 @pytest.mark.parametrize(
     "first_use",
     [
-        "gymnasium.spec('wbc_suite/Door-v0')",
+        "gymnasium.spec('wbc_suite/Stack-v0')",
         "gymnasium.spaces.Box(0, 1)",
         "print(gymnasium.__version__, file=sys.stderr)",
         "isinstance(gymnasium, object) and gymnasium.Env",
@@ -60,7 +60,7 @@ import sys, wbc_suite
 assert "gymnasium.core" not in sys.modules
 import gymnasium
 {first_use}
-print("wbc_suite/Door-v0" in gymnasium.registry, gymnasium.__spec__.name)
+print("wbc_suite/Stack-v0" in gymnasium.registry, gymnasium.__spec__.name)
 """
     assert run(code) == "True gymnasium"
 

@@ -1,4 +1,4 @@
-"""Registration of the benchmarks as Gymnasium environments, `wbc_suite/{name}-v0`.
+"""Registration of the benchmarks as Gymnasium environments, `wbc_suite/{name}-v{n}`.
 
 Importing Gymnasium and NumPy takes 0.15 s, and `import wbc_suite` stays light. So the
 environments are registered at once if Gymnasium is imported already, and otherwise
@@ -28,7 +28,15 @@ BENCHMARKS = (
     "WalkTo",
     "Wipe",
 )
-"""Benchmarks with an id, `wbc_suite/{name}-v0`."""
+"""Benchmarks with an id."""
+
+_CHANGED = ("Door", "NutAssembly", "PickPlace", "ToolHang", "TwoArmPegInHole", "Wipe")
+"""Beginnings of the names whose reward, success or scene has changed: version 1."""
+
+
+def environment_id(name: str) -> str:
+    """Return the id of a benchmark, `wbc_suite/{name}-v0`, or v1 if it has changed."""
+    return f"wbc_suite/{name}-v{int(name.startswith(_CHANGED))}"
 
 
 def register_environments() -> None:
@@ -43,9 +51,9 @@ def _register() -> None:
     from gymnasium.envs.registration import register, registry
 
     for name in BENCHMARKS:
-        if f"wbc_suite/{name}-v0" not in registry:
+        if environment_id(name) not in registry:
             register(
-                id=f"wbc_suite/{name}-v0",
+                id=environment_id(name),
                 entry_point="wbc_suite.envs.env:RobotEnv",
                 vector_entry_point="wbc_suite.envs.vector:VectorRobotEnv",
                 kwargs={"benchmark": name},

@@ -7,7 +7,7 @@ from conftest import penetration, speeds
 
 import wbc_suite
 from wbc_suite.benchmark import benchmark_names
-from wbc_suite.registration import BENCHMARKS
+from wbc_suite.registration import BENCHMARKS, environment_id
 
 NAMES = benchmark_names()
 
@@ -22,7 +22,7 @@ def env(request):
 def test_every_benchmark_has_an_id():
     assert set(NAMES) == set(BENCHMARKS)
     for name in NAMES:
-        assert f"wbc_suite/{name}-v0" in gymnasium.registry
+        assert environment_id(name) in gymnasium.registry
 
 
 @pytest.mark.slow

@@ -44,7 +44,8 @@ def test_stages_rise(env):
     assert rewards[-1] == pytest.approx(0.7)
     assert rewards[1] == pytest.approx(0.1)
     assert 0.35 <= rewards[2] < rewards[3]
-    assert reward(0.0, False, 0.0, 0.0, True) == pytest.approx(0.1)  # thrown
+    assert reward(0.5, False, 0.25, 0.0, True) == pytest.approx(0.7)  # let go
+    assert reward(0.0, False, 0.0, 0.2, False) == pytest.approx(0.1)  # thrown
 
 
 def test_observed_poses_are_those_of_the_hand(env):

@@ -22,7 +22,7 @@ LENGTH = st.floats(0.0, 2.0)
 
 
 def test_a_hand_at_the_object_without_a_grasp_gets_the_reach():
-    given = {"missing": 0.0, "aside": 0.0, "over": True, "grasped": False}
+    given = {"missing": 0.0, "aside": 0.0, "over": False, "grasped": False}
     assert STAGES.value(distance=0.0, **given) == pytest.approx(0.1)
     near = 0.1 * (1.0 - math.tanh(10.0 * 0.05))
     assert STAGES.value(distance=0.05, **given) == pytest.approx(near)
@@ -41,6 +41,13 @@ def test_rewards_stay_between_zero_and_the_hover(distance, missing, aside, held,
     assert 0.0 <= found <= 0.7 + 1e-12
     if held:
         assert found >= 0.35 - 1e-12
+
+
+@given(LENGTH, LENGTH, LENGTH)
+def test_letting_go_over_the_target_costs_nothing(distance, missing, aside):
+    given = {"distance": distance, "missing": missing, "aside": aside, "over": True}
+    held = STAGES.value(grasped=True, **given)
+    assert STAGES.value(grasped=False, **given) == pytest.approx(held)
 
 
 @given(LENGTH, LENGTH, st.booleans())

@@ -44,7 +44,9 @@ def test_a_peg_through_the_hole_is_a_success(env):
     assert peg.reward(shaped=False) == peg.reward(shaped=True) == 1.0
 
 
-@pytest.mark.parametrize("state", [{"depth": 0.139}, {"depth": -0.119}])
+@pytest.mark.parametrize(
+    "state", [{"depth": 0.119}, {"depth": -0.119}, {"aside": 0.0449}]
+)
 def test_anywhere_along_the_peg_is_a_success(env, state):
     assert point(env, **state).success()
 
@@ -52,9 +54,10 @@ def test_anywhere_along_the_peg_is_a_success(env, state):
 @pytest.mark.parametrize(
     "state",
     [
-        {"depth": 0.141},
+        {"depth": 0.121},
+        {"depth": 0.139, "aside": 0.05},  # the tip on the plate, beside the hole
         {"depth": -0.121},
-        {"aside": 0.0601},
+        {"aside": 0.0451},
         {"angle": np.arccos(0.95) + 1e-3},
         {"angle": -np.arccos(0.95) - 1e-3},
     ],

@@ -87,12 +87,16 @@ def test_a_mark_wiped_now_is_rewarded_and_a_reset_brings_it_back(env):
     wipe._newly_wiped = 1
     most = 50 * 100 + 500 * (0.01 + 25.5)
     assert before < 0.1
-    assert 1.0 - 1e-9 < wipe.reward(shaped=True) < 1.0  # 1.4 is cut
+    raw = before / (1.0 - before) + 50 * 500 / most
+    assert wipe.reward(shaped=True) == pytest.approx(raw / (1.0 + raw))
+    one = wipe.reward(shaped=True)
+    wipe._newly_wiped = 20
+    assert 1.0 > wipe.reward(shaped=True) > one + 0.2
     wipe._newly_wiped = 0
     wipe.force = 70.0
-    assert wipe.reward(shaped=True) == pytest.approx(
-        max(before + (0.01 - 0.05 * 70.0) * 500 / most, 0.0)
-    )
+    left = before / (1.0 - before) + (0.01 - 0.05 * 70.0) * 500 / most
+    left = max(left, 0.0)
+    assert wipe.reward(shaped=True) == pytest.approx(left / (1.0 + left))
     wipe.wipe(np.ones(len(wipe.marks)))
     env.reset(seed=1)
     assert not wipe.wiped.any()

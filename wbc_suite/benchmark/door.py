@@ -51,7 +51,8 @@ class DoorConfig(ObjectBenchmarkConfig):
 class Door(ObjectBenchmark):
     """A door with a lever is to be opened.
 
-    Source of geometry and reward: robosuite 1.5, see `Lift`.
+    Source of geometry and reward: robosuite 1.5, see `Lift`. Unlike there, only turning
+    the lever down is rewarded, and its stops do not give way.
     """
 
     needs_gripper = False  # a lever can be pushed down, and the door pulled, without
@@ -113,10 +114,11 @@ class Door(ObjectBenchmark):
 
         With d the distance of the nearest hand to the lever, and h the lever's angle:
 
-            reach (1 - tanh(reach_scale d)) + lever min(|h| / lever_angle, 1)
+            reach (1 - tanh(reach_scale d)) + lever clip(h / lever_angle, 0, 1)
         """
         numbers = self.config.reward
         distance = self.distance(self.handle_position)
         reward = numbers.reach * (1.0 - math.tanh(numbers.reach_scale * distance))
-        turned = abs(self.data.qpos.item(self._lever)) / numbers.lever_angle
-        return reward + self.config.latch * numbers.lever * min(turned, 1.0)
+        turned = self.data.qpos.item(self._lever) / numbers.lever_angle
+        turned = min(max(turned, 0.0), 1.0)
+        return reward + self.config.latch * numbers.lever * turned

@@ -45,6 +45,7 @@ class NutAssemblyConfig(ObjectBenchmarkConfig):
         regions: Region where each nut starts, from the middle of the table's top.
         aside: Largest distance of a placed nut's middle from the axis of its peg, m.
         height: Largest height of a placed nut's middle above the table, m.
+        tilt: Largest angle of a placed nut's axis to its peg's, rad.
         lift_height: Height to which lifting is rewarded, above the table, m.
     """
 
@@ -55,6 +56,7 @@ class NutAssemblyConfig(ObjectBenchmarkConfig):
     regions: dict[Nut, Region]
     aside: PositiveFloat
     height: PositiveFloat
+    tilt: PositiveFloat
     lift_height: PositiveFloat
     stages: StagedReward
 
@@ -62,7 +64,11 @@ class NutAssemblyConfig(ObjectBenchmarkConfig):
 class NutAssembly(ObjectBenchmark):
     """Each nut is to lie around its peg, the hand withdrawn.
 
-    Source of geometry and reward: robosuite 1.5, see `Lift`.
+    A nut that lies flat, so low and so near to the axis of its peg, has the peg in its
+    hole: there is no other room for it.
+
+    Source of geometry and reward: robosuite 1.5, see `Lift`. Unlike there, a nut on its
+    edge beside the peg is not placed, nor one that a hand still holds.
     """
 
     def __init__(self, path: Path) -> None:
@@ -76,7 +82,12 @@ class NutAssembly(ObjectBenchmark):
             floor=config.table.center[2],
             **config.model_dump(include={"height", "lift_height", "pick_one"}),
             stages=config.stages,
+            lies=self._is_flat,
         )
+
+    def _is_flat(self, name: str) -> bool:
+        upright = abs(self.states[name].rotation.item(2, 2))
+        return upright > math.cos(self.config.tilt)
 
     def furnish(self, spec: mujoco.MjSpec) -> None:
         """Add table, pegs and cameras."""

@@ -16,6 +16,7 @@ from wbc_suite.benchmark.arrangement import (
     arrange_one,
     arrange_two_arms,
 )
+from wbc_suite.benchmark.falls import fall_of
 from wbc_suite.control import RobotState
 from wbc_suite.errors import PlacementError
 from wbc_suite.robot import RobotDescription
@@ -72,6 +73,8 @@ class ObjectBenchmark(ABC):
     Attributes:
         sampler: Draws the start poses; may be replaced by a sampler of your own.
         states: The objects in the simulation, by name, after `bind`.
+        grasps: Where and how hands can hold each object, and the objects attached to
+            it, by name, after `bind`.
         hands: The hands of all robots, after `bind`.
     """
 
@@ -131,7 +134,7 @@ class ObjectBenchmark(ABC):
                 self.name,
                 ", ".join(state.robot.name for state in robots),
             )
-        self.model, self.data = model, data
+        self.model, self.data, self._robots = model, data, tuple(robots)
         self._sites: dict[str, Vector] = {}
         prefixes = tuple(state.prefix for state in robots)
         bodies = [model.body(int(b)).name for b in model.geom_bodyid]
@@ -139,7 +142,9 @@ class ObjectBenchmark(ABC):
             g for g, body in enumerate(bodies) if prefixes and body.startswith(prefixes)
         )
         self.hands = [hand for state in robots for hand in hands_of(state)]
-        self.states = {t.name: ObjectState(model, data, t.name) for t in self.objects()}
+        things = self.objects()
+        self.states = {t.name: ObjectState(model, data, t.name) for t in things}
+        self.grasps = {t.name: t.grasps for thing in things for t in thing.family()}
 
     def reset(self, rng: np.random.Generator) -> None:
         """Place the objects; sizes and poses are written into model and data."""
@@ -181,8 +186,8 @@ class ObjectBenchmark(ABC):
         """Update the benchmark's own state after a control period: there is none."""
 
     def failure(self) -> str | None:
-        """Return None: most tasks can be solved until the horizon."""
-        return None
+        """Return which robot has fallen; else tasks can be solved until the end."""
+        return fall_of(self._robots)
 
     def observables(self) -> dict[str, Reading]:
         """Return the pose of each object (x y z w) and its offset from each hand.

@@ -24,6 +24,7 @@ class Sorting:
         lift_height: Height to which lifting is rewarded, above the floor, m.
         pick_one: Whether each episode has one of the objects, drawn at reset.
         stages: Staged reward of each object.
+        lies: Whether an object lies as it should; any way by default.
 
     Attributes:
         active: The objects of this episode.
@@ -42,11 +43,12 @@ class Sorting:
         lift_height: float,
         pick_one: bool,
         stages: StagedReward,
+        lies: Callable[[str], bool] = lambda name: True,
     ) -> None:
         self._benchmark, self._goals, self._names = benchmark, goals, tuple(goals)
         self._within, self._grip, self._floor = within, grip, floor
         self._height, self._lift_height = height, lift_height
-        self._pick_one, self._stages = pick_one, stages
+        self._pick_one, self._stages, self._lies = pick_one, stages, lies
         self.active, self.number = self._names, 0
 
     def draw(self, rng: np.random.Generator) -> list[str]:
@@ -78,6 +80,7 @@ class Sorting:
         return (
             0.0 < above < self._height
             and self._within(dx, dy)
+            and self._lies(name)
             and self._stages.has_left(self._benchmark.distance(self._grip(name)))
             and not self._benchmark.grasped(name)
         )

@@ -52,9 +52,10 @@ class StagedReward(FrozenModel):
 
             reach (1 - tanh(reach_scale d))
             grasp + (lift - grasp) (1 - tanh(lift_scale m))             if grasped
-            base + (hover - lift) (1 - tanh(hover_scale a))             if grasped
+            lift + (hover - lift) (1 - tanh(hover_scale a))             if over
+            the lifting term + (hover - lift) (1 - tanh(hover_scale a)) if grasped
 
-        where `base` is `lift` above the target, and the lifting term elsewhere.
+        An object over its target needs no grasp, so that letting it go costs nothing.
 
         Args:
             distance: Distance of the nearest hand, d, m.
@@ -64,10 +65,11 @@ class StagedReward(FrozenModel):
             over: Whether the object is above its target.
         """
         reward = self.reach * (1.0 - math.tanh(self.reach_scale * distance))
-        if not grasped:
-            return reward
-        high = 1.0 - math.tanh(self.lift_scale * missing)
-        lifted = self.grasp + (self.lift - self.grasp) * high
-        near = 1.0 - math.tanh(self.hover_scale * aside)
-        base = max(self.lift, lifted) if over else lifted
-        return max(reward, base + (self.hover - self.lift) * near)
+        near = (self.hover - self.lift) * (1.0 - math.tanh(self.hover_scale * aside))
+        if over:
+            reward = max(reward, self.lift + near)
+        if grasped:
+            high = 1.0 - math.tanh(self.lift_scale * missing)
+            lifted = self.grasp + (self.lift - self.grasp) * high
+            reward = max(reward, lifted + near)
+        return reward

@@ -113,7 +113,9 @@ class TwoArmHandover(ObjectBenchmark):
         numbers = self.config.hammer
         radius = rng.uniform(*numbers.handle_radius)
         length = rng.uniform(*numbers.handle_length)
-        self.states[HAMMER].reshape(self._hammer(radius, length))
+        drawn = self._hammer(radius, length)
+        self.states[HAMMER].reshape(drawn)
+        self.grasps[HAMMER] = drawn.grasps
         self._head = length / 2 + numbers.head_half_size
         super().reset(rng)
 

@@ -81,8 +81,8 @@ class Wipe(ObjectBenchmark):
     lies flat wipes its whole face, a tilted one its edge, a finger next to nothing.
     Which marks are wiped is kept in `data.userdata`.
 
-    Source of geometry and reward: robosuite 1.5, see `Lift`. Its shaped reward
-    leaves [0, 1]; here it is clipped to that.
+    Source of geometry and reward: robosuite 1.5, see `Lift`. Its shaped reward leaves
+    [0, 1]; here r > 0 becomes r / (1 + r), and twenty marks are worth more than one.
 
     Attributes:
         marks: Positions of the marks in the world, shape (n, 3), m.
@@ -261,7 +261,7 @@ class Wipe(ObjectBenchmark):
              - collision [another part touches the table])
             * H / (mark marks + H (contact + complete))
 
-        clipped to [0, 1].
+        r below 0 gives 0, others r / (1 + r).
         """
         numbers, force = self.config.reward, self.force
         distance = self.distance(self.centroid)
@@ -275,7 +275,8 @@ class Wipe(ObjectBenchmark):
         reward -= numbers.collision * self.collided
         most = numbers.mark * len(self.marks)
         most += self.horizon * (numbers.contact + numbers.complete)
-        return float(reward * self.horizon / most)
+        reward = max(float(reward * self.horizon / most), 0.0)
+        return reward / (1.0 + reward)
 
 
 def _distances(hull: Matrix, points: Matrix) -> Vector:

@@ -8,6 +8,7 @@ import numpy as np
 
 from wbc_suite.envs import RobotEnv
 from wbc_suite.errors import ConfigError, UnknownNameError
+from wbc_suite.experts import expert
 from wbc_suite.typing import Vector
 
 Policy: TypeAlias = Callable[[Mapping[str, Any]], Vector]
@@ -66,6 +67,7 @@ POLICIES: Mapping[str, Callable[[RobotEnv, np.random.Generator], Policy]] = {
     "hold": hold,
     "random": random,
     "scripted": scripted,
+    "expert": expert,
 }
 
 

@@ -25,7 +25,7 @@ from wbc_suite.recording.atomic_files import new_folder, replace_file, write_byt
 from wbc_suite.recording.converting.layout import Layout, Piece, Progress
 from wbc_suite.recording.dataset import Dataset
 from wbc_suite.recording.episode import Episode
-from wbc_suite.registration import BENCHMARKS
+from wbc_suite.registration import BENCHMARKS, environment_id
 
 VERSION = "0.5.4"
 _NAME = re.compile(r"[-\w]+?-v\d+\Z")
@@ -132,7 +132,7 @@ def _env_spec(dataset: Dataset) -> Mapping[str, Any] | None:
     if source.get("package") != "wbc_suite" or name not in BENCHMARKS:
         return None
     return {
-        "id": f"wbc_suite/{name}-v0",
+        "id": environment_id(name),
         "entry_point": "wbc_suite.envs.env:RobotEnv",
         "reward_threshold": None,
         "nondeterministic": False,

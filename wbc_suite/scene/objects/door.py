@@ -2,6 +2,7 @@
 
 from functools import partial
 
+from wbc_suite.scene.objects.grasp_site import GraspSite
 from wbc_suite.scene.objects.scene_object import Color, Hinge, Part, SceneObject
 
 FRAME: Color = (0.62, 0.64, 0.67, 1.0)
@@ -74,7 +75,7 @@ def _panel(name: str, hinge_x: float, latch: bool) -> SceneObject:
 def _handle(name: str, latch: bool) -> SceneObject:
     """Return the lever; its bolt leaves the post as it turns."""
     out, axis = HANDLE_OUT, (0.0, -1.0, 0.0)
-    hinge = partial(Hinge, axis=axis, damping=0.05)
+    hinge = partial(Hinge, axis=axis, damping=0.05, armature=0.001)
     turned = hinge(range=(0.0, 1.6), stiffness=0.2, friction=0.03)
     fixed = hinge(range=(0.0, 0.001))
     spindle = brass(
@@ -98,6 +99,15 @@ def _handle(name: str, latch: bool) -> SceneObject:
         name=f"{name}_handle",
         parts=(spindle, lever, bolt) if latch else (spindle, lever),
         sites={"grip": (-LEVER, out, 0.0)},
+        grasps=tuple(
+            GraspSite(
+                pos=(-LEVER, out, 0.0),
+                approach=(0.0, -1.0, 0.0),
+                closing=(0.0, 0.0, side),
+                tilt=0.6,
+            )
+            for side in (1.0, -1.0)
+        ),
         motion=turned if latch else fixed,
         pos=(2 * HALF_WIDTH + GAP - 0.03, 0.0, 0.0),
     )

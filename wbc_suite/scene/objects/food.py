@@ -4,6 +4,12 @@ from functools import partial
 from typing import Literal
 
 from wbc_suite.robot.shapes import Box, Hull, Loft
+from wbc_suite.scene.objects.grasp_site import (
+    box_grasps,
+    end_grasps,
+    rod_grasps,
+    top_grasps,
+)
 from wbc_suite.scene.objects.scene_object import Color, Part, SceneObject
 
 RED: Color = (0.80, 0.10, 0.12, 1.0)
@@ -33,7 +39,10 @@ def can(name: str, *, radius: float = 0.026, height: float = 0.085) -> SceneObje
         band(size=(radius + 0.0003, 0.22 * height), pos=middle, color=WHITE),
         band(size=(radius + 0.0005, 0.10 * height), pos=middle, color=RED),
     )
-    return SceneObject(name=name, parts=parts).with_mass(0.05)
+    above = (0.0, 0.0, half - 0.024)
+    grasps = end_grasps(above, axis=2, steps=6, tilt=0.35)
+    grasps += rod_grasps([(0.0, 0.0, 0.0)], axis=2, steps=12)
+    return SceneObject(name=name, parts=parts, grasps=grasps).with_mass(0.05)
 
 
 def milk(name: str) -> SceneObject:
@@ -53,7 +62,12 @@ def milk(name: str) -> SceneObject:
         label(size=(around, around, 0.016), pos=(0.0, 0.0, -0.035), color=BLUE),
         label(size=(around, around, 0.002), pos=(0.0, 0.0, -0.012), color=GREEN),
     )
-    return SceneObject(name=name, parts=parts).with_mass(0.05)
+    grasps = top_grasps((0.0, 0.0, 0.046), ((0.0, 1.0, 0.0),), tilt=0.35)
+    sides = box_grasps((half, half, body))
+    grasps += tuple(
+        g.at((0.0, 0.0, shoulder - body)) for g in sides if not g.approach[2]
+    )
+    return SceneObject(name=name, parts=parts, grasps=grasps).with_mass(0.05)
 
 
 def bread(name: str) -> SceneObject:
@@ -74,7 +88,7 @@ def bread(name: str) -> SceneObject:
         shell(surface=crust, color=CRUST, material="card"),
         *(cut(pos=(x, 0.0, 0.0212)) for x in (-0.013, 0.0, 0.013)),
     )
-    return SceneObject(name=name, parts=parts).with_mass(0.03)
+    return SceneObject(name=name, parts=parts, grasps=box_grasps(half)).with_mass(0.03)
 
 
 def cereal(name: str) -> SceneObject:
@@ -89,7 +103,11 @@ def cereal(name: str) -> SceneObject:
         label(size=(x - 0.006, front + 0.0003, 0.006), pos=title, color=RED),
         label(kind="ellipsoid", size=bowl, pos=(0.0, 0.0, -0.016), color=YELLOW),
     )
-    return SceneObject(name=name, parts=parts).with_mass(0.068)
+    grasps = top_grasps(
+        (0.0, 0.0, 0.036), ((0.0, 1.0, 0.0), (1.0, 0.0, 0.0)), tilt=0.35
+    )
+    grasps += tuple(g for g in box_grasps(half) if not g.approach[2])
+    return SceneObject(name=name, parts=parts, grasps=grasps).with_mass(0.068)
 
 
 def bottle(name: str) -> SceneObject:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from wbc_suite.robot.shapes import Hull, Vector3
+from wbc_suite.scene.objects.grasp_site import box_grasps
 from wbc_suite.scene.objects.scene_object import Color, Part, SceneObject
 
 GREY = (0.7, 0.7, 0.7, 1.0)
@@ -20,7 +21,7 @@ def box(
     part = Part(
         kind="box", size=half_size, color=color, material=material, density=density
     )
-    return SceneObject(name=name, parts=(part,))
+    return SceneObject(name=name, parts=(part,), grasps=box_grasps(half_size))
 
 
 def ball(

@@ -1,6 +1,6 @@
 """Objects of a scene: bodies made of parts, with child objects on hinges."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal, TypeAlias
@@ -13,6 +13,7 @@ from wbc_suite.robot.mjcf_compile import compile_mjcf
 from wbc_suite.robot.shape_geometry import mesh_of
 from wbc_suite.robot.shapes import Box, Cylinder, Hull, Loft, Vector3
 from wbc_suite.scene.materials import material_named, use_material
+from wbc_suite.scene.objects.grasp_site import GraspSite
 
 Color: TypeAlias = tuple[float, float, float, float]
 Quat: TypeAlias = tuple[float, float, float, float]
@@ -28,6 +29,10 @@ not rattle when they are put down."""
 SLIDING, TORSION = 3, 4
 """Dimensions of contacts. A box touches with several corners, whose sliding friction
 keeps it from turning; a contact at one point needs torsional friction for that."""
+
+FIRM = (0.99, 0.9999)
+"""Least and greatest impedance of constraints that hardly give, whatever pushes: the
+penetration at rest is `(1 - d) / d` of what the default of 0.95 leaves."""
 
 _KINDS = {
     "box": (mujoco.mjtGeom.mjGEOM_BOX, 3),
@@ -51,6 +56,8 @@ class Part:
         material: Name in `scene.materials`; also gives density and friction.
         solid: Whether it collides and has mass; otherwise it is visual only.
         drawn: Whether it is drawn; visuals may be finer than collision shapes.
+        firm: Whether contacts with other firm parts hardly give: for thin walls, and
+            what is light and pressed hard.
     """
 
     kind: Literal["box", "ball", "cylinder", "capsule", "ellipsoid", "mesh"]
@@ -62,6 +69,7 @@ class Part:
     material: str = "plastic"
     solid: bool = True
     drawn: bool = True
+    firm: bool = False
     density: float | None = None
     friction: Vector3 | None = None
 
@@ -95,6 +103,8 @@ class Part:
         if self.solid:
             geom.condim = SLIDING if self.kind == "box" else TORSION
             geom.solref[:2] = CONTACT_SOLREF
+            if self.firm:
+                geom.solimp[:2] = FIRM
         else:
             geom.contype = geom.conaffinity = 0
             geom.mass = 0.0
@@ -126,6 +136,8 @@ def _add_mesh(
 class Hinge:
     """Hinge joint between an object and its parent, named `{object}_joint`.
 
+    Its stops hardly give.
+
     The axis is in the object's frame, through its origin. SI units; `friction` is dry,
     `stiffness` that of a spring to angle zero.
     """
@@ -150,6 +162,7 @@ class SceneObject:
         motion: `free`, `fixed` (placed at a reset, then still), or a hinge.
         pos: Position in the scene, or on its parent, m.
         children: Objects attached to it.
+        grasps: Where and how hands can hold it.
     """
 
     name: str
@@ -159,6 +172,7 @@ class SceneObject:
     pos: Vector3 = (0.0, 0.0, 0.0)
     quat: Quat = STANDING
     children: "tuple[SceneObject, ...]" = ()
+    grasps: tuple[GraspSite, ...] = ()
 
     def add_to(
         self,
@@ -184,6 +198,12 @@ class SceneObject:
             body.add_site(name=f"{self.name}_{name}", pos=pos, group=SITE_GROUP)
         for child in self.children:
             child.add_to(spec, body, visual=visual)
+
+    def family(self) -> "Iterator[SceneObject]":
+        """Yield it, its children, and theirs."""
+        yield self
+        for child in self.children:
+            yield from child.family()
 
     def compiled_alone(self) -> mujoco.MjModel:
         """Compile it as a free body, without textures and children."""
@@ -215,6 +235,7 @@ def _add_hinge(body: mujoco.MjsBody, name: str, hinge: Hinge) -> None:
     joint.stiffness[0] = hinge.stiffness
     joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
     joint.range = hinge.range
+    joint.solimp_limit[:2] = FIRM
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -231,6 +252,11 @@ class MjcfObject:
     motion: Literal["free", "fixed"] = "free"
     pos: Vector3 = (0.0, 0.0, 0.0)
     quat: Quat = STANDING
+    grasps: tuple[GraspSite, ...] = ()
+
+    def family(self) -> "Iterator[MjcfObject]":
+        """Yield it: it has no children of its own."""
+        yield self
 
     def add_to(self, spec: mujoco.MjSpec) -> None:
         """Add it to a scene; raises as `compile_mjcf`, and unless it is one body."""

@@ -5,12 +5,15 @@ from dataclasses import replace
 from functools import partial
 
 from wbc_suite.robot.shapes import Vector3
+from wbc_suite.scene.objects.grasp_site import GraspSite, rod_grasps
 from wbc_suite.scene.objects.scene_object import Color, Part, SceneObject
 from wbc_suite.scene.objects.vessels import ring_of_boxes, walls_around
 
 WOOD: Color = (0.72, 0.50, 0.28, 1.0)
 STEEL: Color = (0.62, 0.64, 0.67, 1.0)
 BLACK: Color = (0.13, 0.13, 0.14, 1.0)
+FINGER = 0.02
+"""Half of a finger's width and some room, m: grasps keep so far from ends."""
 ALONG_X = (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
 HAMMER_LYING = (0.5, 0.5, 0.5, 0.5)
 """Turns a hammer on its side: its handle, z, to x, and its head, x, to y."""
@@ -29,8 +32,9 @@ def hammer(
 ) -> SceneObject:
     """Make a hammer with its handle along z and its head above; origin in the handle.
 
-    Sites: `handle` (the middle of the handle, the origin), `head`. `head_half_size` is
-    that of the middle block of the head; m and kg.
+    Sites: `handle` (the middle of the handle, the origin), `head`. Grasps: `neck` (next
+    to the head) and `end`, around the handle. `head_half_size` is that of the middle
+    block of the head; m and kg.
     """
     h, top = head_half_size, handle_length / 2
     middle = top + h
@@ -49,7 +53,11 @@ def hammer(
         *(claw(pos=(-1.6 * h, side * 0.5 * h, middle)) for side in (-1.0, 1.0)),
     )
     sites = {"handle": (0.0, 0.0, 0.0), "head": (0.0, 0.0, middle)}
-    return SceneObject(name=name, parts=parts, sites=sites).with_mass(mass)
+    neck, end = (0.0, 0.0, top - FINGER), (0.0, 0.0, FINGER - top)
+    grasps = rod_grasps([neck], axis=2, name="neck")
+    grasps += rod_grasps([end], axis=2, name="end")
+    whole = SceneObject(name=name, parts=parts, sites=sites, grasps=grasps)
+    return whole.with_mass(mass)
 
 
 def plate_with_hole(
@@ -117,7 +125,18 @@ def _with_handle(
         quat=(1.0, 0.0, 0.0, 0.0),
     )
     sites = {"center": (0.0, 0.0, 0.0), "handle": at}
-    return SceneObject(name=name, parts=(*ring, grip), sites=sites).with_mass(0.04)
+    across = [
+        GraspSite(
+            pos=(at[0], 0.0, -0.4 * side * half_height),  # fingers clear of a table
+            approach=(0.0, 0.0, side),
+            closing=(0.0, 1.0, 0.0),
+            tilt=0.6,
+        )
+        for side in (1.0, -1.0)
+    ]
+    grasps = tuple(turn for one in across for turn in (one, one.turned()))
+    whole = SceneObject(name=name, parts=(*ring, grip), sites=sites, grasps=grasps)
+    return whole.with_mass(0.04)
 
 
 def wrench(
@@ -151,7 +170,19 @@ def wrench(
         "hole2": (-end, 0.0, 0.0),
         "grip": (0.0, 0.0, 0.0),
     }
-    return SceneObject(name=name, parts=(*rings, *shaft), sites=sites).with_mass(mass)
+    across = [
+        GraspSite(
+            pos=(0.0, 0.0, -0.004 * side),  # fingers clear of a table
+            approach=(0.0, 0.0, side),
+            closing=(0.0, 1.0, 0.0),
+            tilt=0.4,
+        )
+        for side in (1.0, -1.0)
+    ]
+    grasps = tuple(turn for one in across for turn in (one, one.turned()))
+    parts = (*rings, *shaft)
+    whole = SceneObject(name=name, parts=parts, sites=sites, grasps=grasps)
+    return whole.with_mass(mass)
 
 
 def stand(
@@ -169,9 +200,10 @@ def stand(
     end of the socket), `floor` (its lower end).
     """
     board, half = 2 * half_size[2], height / 2
+    firm = partial(wooden_box, firm=True)
     parts = (
-        wooden_box(size=half_size, pos=(0.0, 0.0, half_size[2])),
-        *walls_around(hole, hole, wall, half, at=board + half, part=wooden_box),
+        firm(size=half_size, pos=(0.0, 0.0, half_size[2])),
+        *walls_around(hole, hole, wall, half, at=board + half, part=firm),
     )
     sites = {"socket": (0.0, 0.0, board + height), "floor": (0.0, 0.0, board)}
     return SceneObject(name=name, parts=parts, sites=sites)
@@ -194,7 +226,7 @@ def hanging_frame(
     end, bend, r = length / 2, 0.018, radius
     grip = (0.0, 0.0, 0.5 * end)
     parts = (
-        steel_box(size=(r, r, end)),
+        steel_box(size=(r, r, end), firm=True),
         steel_box(size=(arm / 2, r, r), pos=(arm / 2, 0.0, end)),
         steel_box(size=(r, r, bend / 2), pos=(arm, 0.0, end + bend / 2)),
         Part(kind="box", size=(2 * r, 2 * r, 0.025), pos=grip, color=BLACK),
@@ -207,4 +239,6 @@ def hanging_frame(
         "hook_tip": (arm, 0.0, end + bend),
         "grip": grip,
     }
-    return SceneObject(name=name, parts=parts, sites=sites).with_mass(mass)
+    grasps = rod_grasps([grip], axis=2, steps=4, tilt=0.6, lift=r)
+    whole = SceneObject(name=name, parts=parts, sites=sites, grasps=grasps)
+    return whole.with_mass(mass)

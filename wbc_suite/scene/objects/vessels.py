@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import partial
 
 from wbc_suite.robot.shapes import Vector3
+from wbc_suite.scene.objects.grasp_site import rod_grasps, top_grasps
 from wbc_suite.scene.objects.scene_object import Color, Part, SceneObject
 
 WOOD: Color = (0.80, 0.62, 0.42, 1.0)
@@ -67,7 +68,9 @@ def lid(
         dark(size=(grip, grip, post), pos=(0.0, -reach, z + post)),
         dark(size=(grip, reach + grip, grip), pos=(0.0, 0.0, above)),
     )
-    return SceneObject(name=name, parts=parts, sites={"handle": (0.0, 0.0, above)})
+    bar = (0.0, 0.0, above)
+    grasps = top_grasps(bar, [(1.0, 0.0, 0.0)], tilt=0.4)
+    return SceneObject(name=name, parts=parts, sites={"handle": bar}, grasps=grasps)
 
 
 def ring_of_boxes(
@@ -159,4 +162,10 @@ def pot(
         "center": (0.0, 0.0, 0.0),
         "bottom": (0.0, 0.0, -z),
     }
-    return SceneObject(name=name, parts=tuple(parts), sites=sites)
+    grasps = [
+        rod_grasps([sites[handle]], axis=0, grasp="wrap", tilt=0.4, name=handle)
+        for handle in ("handle0", "handle1")
+    ]
+    return SceneObject(
+        name=name, parts=tuple(parts), sites=sites, grasps=(*grasps[0], *grasps[1])
+    )

@@ -1,0 +1,6 @@
+"""Experts: scripted policies that solve the benchmarks, with any robot that can."""
+
+from wbc_suite.experts.registry import expert, expert_names, register_expert
+from wbc_suite.experts.workcell import Steps, Workcell
+
+__all__ = ["Steps", "Workcell", "expert", "expert_names", "register_expert"]

@@ -1,0 +1,124 @@
+"""Kinematic look-ahead: how well a hand gets along a chain of poses."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from wbc_suite.control import RobotState
+from wbc_suite.kinematics import Configuration
+from wbc_suite.qp import FrameTask, PositionLimit, PostureTask, TaskStack, VelocityLimit
+from wbc_suite.typing import Vector
+
+STEP = 0.1  # s, time of one iteration
+ITERATIONS = 24  # for each pose at most
+CLOSE = 1e-3  # m and rad
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Outlook:
+    """What a hand would meet along a chain of poses.
+
+    Attributes:
+        error: Largest error at a pose, m, with 0.1 m for each rad.
+        margin: Least distance of a joint from its limits at a pose, rad or m.
+        duration: Time of the slowest joint at its greatest velocity, s.
+        q: Configurations at the poses.
+    """
+
+    error: float
+    margin: float
+    duration: float
+    q: tuple[Vector, ...]
+
+    @property
+    def cost(self) -> float:
+        """Duration, and penalties of poses that are out of reach or near limits."""
+        near = max(0.0, 0.2 - self.margin)
+        return self.duration + 100.0 * max(0.0, self.error - CLOSE) + 10.0 * near
+
+
+class LookAhead:
+    """Follows chains of poses with differential IK, on a copy of the robot.
+
+    Args:
+        state: The robot.
+        joints: The joints that move the hand; others stay where they are.
+        frame: The hand's frame.
+    """
+
+    def __init__(self, state: RobotState, joints: Sequence[str], frame: str) -> None:
+        self._state, self._frame = state, frame
+        model = state.robot.to_pinocchio()
+        moving = {*joints}
+        locked = [i for i, n in enumerate(model.names) if i and n not in moving]
+        self._start = state.q
+        reduced = pin.buildReducedModel(model, locked, self._start)
+        self._index = np.concatenate(
+            [
+                np.arange(j.idx_q, j.idx_q + j.nq)
+                for j in (model.joints[model.getJointId(n)] for n in reduced.names[1:])
+            ]
+        )
+        self._configuration = Configuration(reduced, self._start[self._index])
+        self._task = FrameTask(frame)
+        self._posture = PostureTask(3e-3)
+        self._stack = TaskStack(
+            self._configuration,
+            [self._task, self._posture],
+            limits=[PositionLimit(), VelocityLimit()],
+            escape=False,
+        )
+        low, high = reduced.lowerPositionLimit, reduced.upperPositionLimit
+        self._limited = np.flatnonzero((high - low < 6.5) & (low < high))
+        self._low, self._high = low[self._limited], high[self._limited]
+        speed = reduced.velocityLimit
+        self._speed = np.where((speed > 0.0) & (speed < 1e3), speed, 3.0)
+
+    def full(self, q: Vector) -> Vector:
+        """Return the whole robot's configuration, the other joints as measured."""
+        whole = self._state.q
+        whole[self._index] = q
+        return whole
+
+    def along(self, poses: Sequence[pin.SE3]) -> Outlook:
+        """Follow a chain of poses of the frame in the world from where the hand is."""
+        configuration = self._configuration
+        configuration.update(self._state.q[self._index])
+        error, margin, travel = 0.0, np.inf, np.zeros(configuration.nv)
+        found: list[Vector] = []
+        for pose in poses:
+            self._task.set_target(pose)
+            left, moved = self._descend()
+            travel = travel + moved
+            error = max(error, left)
+            q = configuration.q.copy()
+            found.append(q)
+            limited = q[self._limited]
+            gaps = np.minimum(limited - self._low, self._high - limited)
+            margin = min(margin, float(gaps.min(initial=np.inf)))
+        return Outlook(
+            error=error,
+            margin=margin,
+            duration=float((travel / self._speed).max(initial=0.0)),
+            q=tuple(found),
+        )
+
+    def _descend(self) -> tuple[float, Vector]:
+        """Move to the task's target; return the error, and how far joints went."""
+        configuration = self._configuration
+        travel = np.zeros(configuration.nv)
+        self._stack.reset()
+        for _ in range(ITERATIONS):
+            step = self._stack.solve(STEP).dq
+            configuration.update(configuration.integrate(step))
+            travel += np.abs(step)
+            left = self._error()
+            if left < CLOSE:
+                break
+        return self._error(), travel
+
+    def _error(self) -> float:
+        error = self._task.error(self._configuration)
+        return float(np.linalg.norm(error[:3]) + 0.1 * np.linalg.norm(error[3:]))

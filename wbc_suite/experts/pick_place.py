@@ -1,0 +1,54 @@
+"""The expert of PickPlace and its variants."""
+
+import math
+
+import numpy as np
+import pinocchio as pin
+
+from wbc_suite.benchmark.pick_place import PickPlace
+from wbc_suite.experts.skills import UP, carry, pick, release, settle, shifted
+from wbc_suite.experts.workcell import Steps, Workcell
+
+TURNS = tuple(pin.exp3(k * math.pi / 2 * UP) for k in range(4))
+ASIDE = 0.04  # m, from the middle of a quadrant
+TALLEST = 0.16  # m, of the objects, with some room for fingers
+CLEAR = 0.03  # m, above the walls of the bins
+
+
+def pick_place(cell: Workcell[PickPlace]) -> Steps[None]:
+    """Put each object into its quadrant, as it lies, those in front first."""
+    sorting = cell.benchmark.sorting
+    for _ in range(2 * len(sorting.active)):
+        left = [name for name in sorting.active if not sorting.is_placed(name)]
+        if not left:
+            return
+        yield from settle(cell, left[0])
+        name = max(left, key=lambda n: cell.object(n).position[1])
+        yield from _place(cell, name)
+
+
+def _place(cell: Workcell[PickPlace], name: str) -> Steps[None]:
+    """Carry one object over the walls into its quadrant."""
+    config = cell.benchmark.config
+    x, y = cell.benchmark.goal(name)
+    lying = cell.pose(name)
+    height = lying.translation[2] - config.source.center[2]
+    middle = np.array([x, y, config.target.center[2] + height + 0.004])
+    over = config.target.size[2] + CLEAR
+    ways = [
+        pin.SE3(R @ lying.rotation, middle + np.array([dx, dy, 0.0]))
+        for R in TURNS
+        for dx in (0.0, -ASIDE, ASIDE)
+        for dy in (0.0, -ASIDE, ASIDE)
+    ]
+    plans = [(shifted(way, over * UP), way) for way in ways]
+    choice = yield from pick(
+        cell, name, then=plans, raised=over, over=config.source.center[2] + TALLEST
+    )
+    if choice is None:
+        return
+    above, at = choice.then
+    arm = choice.arm
+    yield from carry(cell, arm, name, above, tolerance=0.02, turn_tolerance=0.1)
+    yield from carry(cell, arm, name, at, tolerance=0.01, turn_tolerance=0.1, speed=0.3)
+    yield from release(arm, back=0.12)

@@ -1,0 +1,92 @@
+"""Experts by benchmark, and the policy that runs one."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from wbc_suite.benchmark import (
+    Door,
+    Lift,
+    NutAssembly,
+    ObjectBenchmark,
+    PickPlace,
+    Stack,
+    ToolHang,
+    TwoArmHandover,
+    TwoArmLift,
+    TwoArmPegInHole,
+    TwoArmTransport,
+    Wipe,
+)
+from wbc_suite.envs import RobotEnv
+from wbc_suite.errors import UnknownNameError
+from wbc_suite.experts.door import door
+from wbc_suite.experts.lift import lift
+from wbc_suite.experts.nut_assembly import nut_assembly
+from wbc_suite.experts.pick_place import pick_place
+from wbc_suite.experts.stack import stack
+from wbc_suite.experts.tool_hang import tool_hang
+from wbc_suite.experts.two_arm_handover import two_arm_handover
+from wbc_suite.experts.two_arm_lift import two_arm_lift
+from wbc_suite.experts.two_arm_peg_in_hole import two_arm_peg_in_hole
+from wbc_suite.experts.two_arm_transport import two_arm_transport
+from wbc_suite.experts.wipe import wipe
+from wbc_suite.experts.workcell import Steps, Workcell
+from wbc_suite.typing import Vector
+
+Expert: TypeAlias = Callable[[Workcell[Any]], Steps[None]]
+"""Program of a benchmark: it moves arms by skills, one control period per `yield`."""
+
+_EXPERTS: dict[type, Expert] = {}
+
+
+def register_expert(benchmark: type, expert: Expert) -> None:
+    """Register the expert of a class of benchmarks, and of those derived from it."""
+    _EXPERTS[benchmark] = expert
+
+
+def expert_names() -> tuple[str, ...]:
+    """Return the names of the benchmarks that have an expert, without variants."""
+    return tuple(sorted(benchmark.__name__ for benchmark in _EXPERTS))
+
+
+def expert(
+    env: RobotEnv, rng: np.random.Generator
+) -> Callable[[Mapping[str, Any]], Vector]:
+    """Make the policy of the benchmark's expert; the environment was reset.
+
+    It reads the state of the simulation, not the observation. After its last step it
+    holds all goals.
+
+    Raises:
+        UnknownNameError: If the benchmark has no expert.
+        ConfigError: If the action has no poses of hands.
+    """
+    benchmark = env.benchmark
+    known = (_EXPERTS[k] for k in type(benchmark).__mro__ if k in _EXPERTS)
+    program = next(known, None)
+    if program is None or not isinstance(benchmark, ObjectBenchmark):
+        raise UnknownNameError("expert", benchmark.name, expert_names())
+    cell = Workcell(env, benchmark, rng)
+    steps = program(cell)
+
+    def drive(observation: Mapping[str, Any]) -> Vector:
+        del observation
+        next(steps, None)
+        return cell.action()
+
+    return drive
+
+
+register_expert(Door, door)
+register_expert(Lift, lift)
+register_expert(NutAssembly, nut_assembly)
+register_expert(PickPlace, pick_place)
+register_expert(Stack, stack)
+register_expert(ToolHang, tool_hang)
+register_expert(TwoArmHandover, two_arm_handover)
+register_expert(TwoArmLift, two_arm_lift)
+register_expert(TwoArmPegInHole, two_arm_peg_in_hole)
+register_expert(Wipe, wipe)
+register_expert(TwoArmTransport, two_arm_transport)

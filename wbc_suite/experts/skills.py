@@ -1,0 +1,251 @@
+"""Skills of one arm: move, grasp, carry, release."""
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from wbc_suite.experts.arm import SPEED, TURN, Arm
+from wbc_suite.experts.grasp_choice import Choice, choose_grasp
+from wbc_suite.experts.workcell import Steps, Workcell, wait_until
+from wbc_suite.typing import Vector
+
+UP = np.array([0.0, 0.0, 1.0])
+STALLED = 8  # control periods without progress end a motion
+OPENING = 8  # control periods until a gripper is open
+PASSING = 0.03  # m, tolerance of poses on the way
+
+
+def shifted(pose: pin.SE3, offset: Iterable[float]) -> pin.SE3:
+    """Return a pose moved by an offset in the world, m."""
+    return pin.SE3(pose.rotation, pose.translation + np.asarray([*offset]))
+
+
+def move(
+    arm: Arm,
+    target: pin.SE3 | Callable[[], pin.SE3],
+    *,
+    speed: float = SPEED,
+    turn: float = TURN,
+    tolerance: float = 0.004,
+    turn_tolerance: float = 0.04,
+    most: int = 120,
+) -> Steps[bool]:
+    """Move a hand to a pose; return whether it got within the tolerances, m and rad.
+
+    A target that is a function is followed. It ends without success when the hand makes
+    no more progress.
+    """
+    best, waited = np.inf, 0
+    for _ in range(most):
+        arm.aim(target() if callable(target) else target, speed=speed, turn=turn)
+        distance, angle = arm.error()
+        if distance < tolerance and angle < turn_tolerance:
+            return True
+        left = distance + 0.1 * angle
+        waited = 0 if left < best - 2e-4 else waited + 1
+        best = min(best, left)
+        if waited > STALLED:
+            return False
+        yield
+    return False
+
+
+def travel(arm: Arm, target: pin.SE3, *, height: float, **options: Any) -> Steps[bool]:
+    """Move over what is below a height in the world, m, then down to a pose.
+
+    `options` are those of `move`, for the last part.
+    """
+    pose = arm.pose
+    if pose.translation[2] < height - PASSING:
+        yield from move(arm, at_height(pose, height), tolerance=PASSING, most=40)
+    if target.translation[2] < height - PASSING:
+        over = at_height(target, height)
+        yield from move(arm, over, tolerance=PASSING, turn_tolerance=0.3, most=60)
+    return (yield from move(arm, target, **options))
+
+
+def at_height(pose: pin.SE3, height: float) -> pin.SE3:
+    """Return a pose at another height in the world, m."""
+    x, y, _ = pose.translation
+    return pin.SE3(pose.rotation, np.array([x, y, height]))
+
+
+def settle(cell: Workcell, name: str, *, most: int = 20) -> Steps[bool]:
+    """Wait until an object lies still."""
+    yield
+    return (yield from wait_until(lambda: cell.speed(name) < 0.02, most=most))
+
+
+def grip(cell: Workcell, arm: Arm, name: str, *, most: int = 16) -> Steps[bool]:
+    """Close the gripper until it holds an object; return whether it does."""
+    arm.close()
+    held = 0
+    for _ in range(most):
+        yield
+        held = held + 1 if cell.holds(arm, name) else 0
+        if held >= 2:
+            return True
+    return cell.holds(arm, name)
+
+
+def release(arm: Arm, *, back: float = 0.08, steps: int = 5) -> Steps[None]:
+    """Open the gripper, and withdraw along the approach."""
+    arm.open()
+    for _ in range(steps):
+        yield
+    away = arm.pose
+    out = pin.SE3(away.rotation, away.translation - back * away.rotation[:, 2])
+    yield from move(arm, out, tolerance=0.02, turn_tolerance=0.3, most=30)
+
+
+def pick(
+    cell: Workcell,
+    name: str,
+    *,
+    then: Sequence[Sequence[pin.SE3]] = ((),),
+    arms: Sequence[Arm] | None = None,
+    raised: float = 0.1,
+    over: float | None = None,
+    tries: int = 3,
+    **options: Any,
+) -> Steps[Choice | None]:
+    """Grasp an object and raise it; return how, or None if all tries fail.
+
+    Args:
+        cell: The workcell.
+        name: The object.
+        then: Where the object will be carried: alternatives, each a chain of poses.
+        arms: The arms that may do it; all by default.
+        raised: How far to raise it, m.
+        over: Height in the world at which to come, m; on a straight line if None.
+        tries: How often.
+        options: Further arguments of `choose_grasp`.
+    """
+    for _ in range(tries):
+        choice = choose_grasp(
+            cell, name, then=then, arms=arms or cell.arms, raised=raised, **options
+        )
+        if choice is None:
+            return None
+        if (yield from take(cell, name, choice, raised=raised, over=over)):
+            return choice
+        choice.arm.open()
+        for _ in range(OPENING):
+            yield
+        yield from move(choice.arm, shifted(choice.arm.pose, raised * UP), most=20)
+        yield from settle(cell, name)
+    return None
+
+
+def take(
+    cell: Workcell,
+    name: str,
+    choice: Choice,
+    *,
+    raised: float = 0.0,
+    over: float | None = None,
+) -> Steps[bool]:
+    """Grasp an object as chosen, and raise it; return whether it came along.
+
+    See `pick` for `raised` and `over`.
+    """
+    arm = choice.arm
+    arm.open(choice.site.grasp)
+    near: dict[str, float] = {"tolerance": 0.02, "turn_tolerance": 0.15}
+    if over is None:
+        arrived = yield from move(arm, choice.before, **near)
+    else:
+        arrived = yield from travel(arm, choice.before, height=over, **near)
+    if not arrived and arm.error()[0] > 2 * PASSING:
+        return False
+    yield from move(arm, lambda: choice.hand_at(cell.pose(name)))
+    if not (yield from grip(cell, arm, name)):
+        return False
+    if raised > 0.0:
+        yield from move(arm, shifted(arm.pose, raised * UP), tolerance=0.02)
+    return cell.holds(arm, name)
+
+
+def put_down(
+    cell: Workcell, arm: Arm, name: str, at: Vector, *, over: float
+) -> Steps[None]:
+    """Let go of a held object at a point, the hand pointing down.
+
+    Args:
+        cell: The workcell.
+        arm: The arm.
+        name: The object.
+        at: Where its origin is when it is let go, m.
+        over: Height above that at which it is brought there, m.
+    """
+    held = cell.pose(name).actInv(arm.pose)
+    down = np.diag([1.0, -1.0, -1.0])
+    best, cost = [], np.inf
+    for k in range(8):
+        R = pin.exp3(k * np.pi / 4 * UP) @ down @ held.rotation.T
+        poses = [pin.SE3(R, at + height * UP) for height in (over, 0.0)]
+        found = arm.look_ahead([pose * held for pose in poses]).cost
+        if found < cost:
+            best, cost = poses, found
+    above, low = best
+    yield from carry(cell, arm, name, above, tolerance=0.02, turn_tolerance=0.1)
+    yield from carry(cell, arm, name, low, tolerance=0.01, turn_tolerance=0.1)
+    yield from release(arm, back=over)
+
+
+def follow_arc(
+    cell: Workcell, arm: Arm, joint: str, angle: float, *, speed: float
+) -> Steps[bool]:
+    """Turn a hinge to an angle with the hand that holds what it carries.
+
+    The hand moves about the hinge's present axis ahead of its angle, by 0.25 rad at
+    most. Returns whether the hinge got there, to 0.02 rad.
+
+    Args:
+        cell: The workcell.
+        arm: The arm.
+        joint: The hinge.
+        angle: The angle, rad.
+        speed: Of the hand's goal, rad/s.
+    """
+    hinge, index = cell.data.joint(joint), cell.model.joint(joint).id
+    start, grip = hinge.qpos.item(), arm.pose
+    axis, anchor = cell.data.xaxis[index].copy(), cell.data.xanchor[index].copy()
+    wanted = start
+    for _ in range(round(abs(angle - start) / (speed * cell.period)) + 30):
+        present = hinge.qpos.item()
+        if abs(angle - present) < 0.02:
+            return True
+        step = np.clip(angle - wanted, -speed * cell.period, speed * cell.period)
+        if abs(wanted + step - present) < 0.25:
+            wanted += step
+        R = pin.exp3((wanted - start) * axis)
+        at = anchor + R @ (grip.translation - anchor)
+        arm.aim(pin.SE3(R @ grip.rotation, at))
+        yield
+    return False
+
+
+def turned_about(cell: Workcell, pose: pin.SE3, joint: str, angle: float) -> pin.SE3:
+    """Return a pose turned about a hinge's present axis by an angle, rad."""
+    index = cell.model.joint(joint).id
+    R = pin.exp3(angle * cell.data.xaxis[index])
+    anchor = cell.data.xanchor[index]
+    return pin.SE3(R @ pose.rotation, anchor + R @ (pose.translation - anchor))
+
+
+def carry(
+    cell: Workcell,
+    arm: Arm,
+    name: str,
+    goal: pin.SE3,
+    **options: Any,
+) -> Steps[bool]:
+    """Bring a held object to a pose; its place in the hand is measured in each step."""
+
+    def target() -> pin.SE3:
+        return goal * cell.pose(name).actInv(arm.pose)
+
+    return (yield from move(arm, target, **options))

@@ -1,0 +1,187 @@
+"""What an expert sees and moves: arms, objects, and the action of both."""
+
+from collections.abc import Callable, Generator, Sequence
+from typing import Generic, TypeAlias, TypeVar
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+
+from wbc_suite.benchmark import ObjectBenchmark
+from wbc_suite.control import RobotState
+from wbc_suite.devices.action_ports import LimbKind, LimbPort, limb_ports
+from wbc_suite.envs import RobotEnv
+from wbc_suite.errors import ConfigError
+from wbc_suite.experts.arm import Arm
+from wbc_suite.scene.objects import ObjectState
+from wbc_suite.scene.objects.grasp_site import GraspSite
+from wbc_suite.sensing.hands import Hand, pairs_in_contact
+from wbc_suite.typing import Vector
+
+T = TypeVar("T")
+B = TypeVar("B", bound=ObjectBenchmark)
+Steps: TypeAlias = Generator[None, None, T]
+"""A skill: it yields once in each control period, and returns what came of it."""
+
+
+class Workcell(Generic[B]):
+    """The arms and objects of an environment that was reset.
+
+    Attributes:
+        benchmark: The environment's benchmark.
+        arms: One for each hand of the benchmark that the action moves.
+        rng: Generator of the episode.
+
+    Raises:
+        ConfigError: If the action has no pose of a hand.
+    """
+
+    def __init__(self, env: RobotEnv, benchmark: B, rng: np.random.Generator) -> None:
+        self._env, self.benchmark, self.rng = env, benchmark, rng
+        self.model, self.data = env.simulation.model, env.simulation.data
+        self._copy = mujoco.MjData(self.model)
+        self._objects = dict(benchmark.states)
+        self.period = 1.0 / env.config.control_freq
+        self.arms = tuple(self._arms())
+        if not self.arms:
+            names = ", ".join(s.name for s in env.action_layout.slices)
+            raise ConfigError(
+                f"An expert moves hands by their poses, such as OSC_POSE; the action "
+                f"has {names}."
+            )
+
+    def action(self) -> Vector:
+        """Return the action of the next control period."""
+        action = self._env.hold_action
+        for arm in self.arms:
+            arm.write(action, self.period)
+        return action
+
+    def object(self, name: str) -> ObjectState:
+        """Return the state of an object, or of a body attached to one."""
+        if name not in self._objects:
+            self._objects[name] = ObjectState(self.model, self.data, name)
+        return self._objects[name]
+
+    def pose(self, name: str) -> pin.SE3:
+        """Return the pose T_wo of an object."""
+        state = self.object(name)
+        return pin.SE3(state.rotation.copy(), state.position.copy())
+
+    def point(self, site: str) -> Vector:
+        """Return the position of a site in the world, m."""
+        return self.data.site_xpos[self.model.site(site).id].copy()
+
+    def speed(self, name: str) -> float:
+        """Return the speed of an object, m/s, with 0.05 m/s for each rad/s."""
+        v = np.zeros(6)
+        mujoco.mj_objectVelocity(
+            self.model,
+            self.data,
+            mujoco.mjtObj.mjOBJ_BODY,
+            self.object(name).body,
+            v,
+            0,
+        )
+        return float(np.linalg.norm(v[3:]) + 0.05 * np.linalg.norm(v[:3]))
+
+    def grasps(self, name: str) -> Sequence[GraspSite]:
+        """Return where and how hands can hold an object."""
+        return self.benchmark.grasps[name]
+
+    def holds(self, arm: Arm, name: str) -> bool:
+        """Whether the fingers of an arm touch an object from two sides."""
+        return arm.hand.grasps(self.object(name).geoms)
+
+    def touching(self, name: str, other: str) -> bool:
+        """Whether two objects touch."""
+        return self.benchmark.touching(name, other)
+
+    def is_clear(self, arm: Arm, q: Vector, *, but: str) -> bool:
+        """Whether a robot at a configuration touches nothing but an object.
+
+        Contacts that there are already do not count, nor those up to 1 mm deep.
+        """
+        data, state = self._copy, arm.state
+        data.qpos[:] = self.data.qpos
+        state.conversion.q_to_mujoco(q, data.qpos)
+        mujoco.mj_kinematics(self.model, data)
+        mujoco.mj_collision(self.model, data)
+        present = {(a, b) for a, b in pairs_in_contact(self.data)}
+        object_geoms = self.object(but).geoms
+        for (a, b), depth in zip(
+            pairs_in_contact(data), data.contact.dist.tolist(), strict=True
+        ):
+            if depth > -1e-3 or (a, b) in present:
+                continue
+            if self._is_of(state, a) == self._is_of(state, b):
+                continue
+            if a not in object_geoms and b not in object_geoms:
+                return False
+        return True
+
+    def _is_of(self, state: RobotState, geom: int) -> bool:
+        body = self.model.geom_bodyid[geom]
+        return self.model.body(body).name.startswith(state.prefix)
+
+    def _arms(self) -> "list[Arm]":
+        ports = [p for p in limb_ports(self._env).values() if p.kind is LimbKind.POSE]
+        hands = iter(self.benchmark.hands)
+        arms = []
+        for state, controller in self._env.simulation.pairs:
+            for _ in state.robot.hands:
+                hand = next(hands)
+                port = next((p for p in ports if self._carries(p, hand)), None)
+                if port is None:
+                    continue
+                arms.append(
+                    Arm(
+                        port,
+                        hand,
+                        state,
+                        layout=self._env.action_layout,
+                        several=len(self._env.robots) > 1,
+                        joints=_joints(state, controller, hand),
+                    )
+                )
+        return arms
+
+    def _carries(self, port: LimbPort, hand: Hand) -> bool:
+        """Whether the frame of a port is rigidly fixed to a hand."""
+        weld = self.model.body_weldid
+        body = self.model.site_bodyid[hand.site]
+        return port.body >= 0 and weld[port.body] == weld[body]
+
+
+def _joints(state: RobotState, controller: object, hand: Hand) -> tuple[str, ...]:
+    """Return the joints that a controller moves a hand by."""
+    parts = getattr(controller, "parts", None)
+    if parts is None:
+        return (*state.robot.root_joint_names, *state.robot.joint_names)
+    part = parts.get(hand.name) or next(iter(parts.values()))
+    return part.law.joints
+
+
+def together(*skills: Steps[T]) -> Steps[list[T]]:
+    """Run skills of several arms at the same time; return their results in order."""
+    results: dict[int, T] = {}
+    running = dict(enumerate(skills))
+    while running:
+        for k, skill in list(running.items()):
+            try:
+                next(skill)
+            except StopIteration as end:
+                results[k] = end.value
+                del running[k]
+        if running:
+            yield
+    return [results[k] for k in range(len(skills))]
+
+
+def wait_until(condition: Callable[[], bool], *, most: int) -> Steps[bool]:
+    """Wait for a condition, for a number of control periods at most."""
+    for _ in range(most):
+        if condition():
+            return True
+        yield
+    return condition()
