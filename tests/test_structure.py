@@ -21,16 +21,20 @@ TREES = {
 }
 
 MAX_LINES, MAX_MODULES = 45_000, 320  # without what is listed in `ADDED`
-ADDED = ("locomotion/", "control/dynamics/", "control/composite/whole_body_dynamics")
-ADDED += ("control/composite/balance_report", "qp/dynamics_", "robot/sole_inference")
-ADDED += ("scene/pushes", "devices/pipeline/drive", "viewers/balance_")
-ADDED += ("viewers/camera_follower", "viewers/drive_panel", "viewers/held_keys")
-ADDED += ("viewers/step_times", "benchmark/carry", "benchmark/loco_lift")
-ADDED += ("benchmark/reach", "benchmark/stand", "benchmark/walk_to")
-ADDED += ("viewers/page_messages", "kernel_cache")
-"""Rooms of walking robots and of checks, which came after the bounds were set."""
-ADDED += ("experts/", "scene/objects/grasp_site", "cli/expert")
-"""Rooms of walking robots, which came after the bounds were set."""
+ADDED = (
+    # walking robots
+    *("locomotion/", "control/dynamics/", "control/composite/whole_body_dynamics"),
+    *("control/composite/balance_report", "qp/dynamics_", "robot/sole_inference"),
+    *("scene/pushes", "devices/pipeline/drive", "viewers/balance_"),
+    *("viewers/camera_follower", "viewers/drive_panel", "viewers/held_keys"),
+    *("viewers/step_times", "benchmark/carry", "benchmark/loco_lift"),
+    *("benchmark/reach", "benchmark/stand", "benchmark/walk_to"),
+    # experts
+    *("experts/", "scene/objects/grasp_site", "cli/expert"),
+    # checks of messages and caches
+    *("viewers/page_messages", "kernel_cache"),
+)
+"""Rooms that came after the bounds were set."""
 
 MAX_MODULE, MAX_FUNCTION = 350, 60  # lines
 MAX_DEPTH = 2  # own classes in a chain of inheritance, foreign bases not counted

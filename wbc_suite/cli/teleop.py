@@ -85,14 +85,9 @@ def teleop(
 
     names = robot_names([*(robots or ["GR1"]), *(others or ())])
     make = None if device is None else device_maker(device, device_option)
-<<<<<<< HEAD
-    stages = stages_of(device=device is not None, scale=scale, mirror=mirror)
+    stages = stages_of(device, scale=scale, mirror=mirror)
     label = " and ".join(names)
     print(f"Building {benchmark} with {label} ...", flush=True)
-=======
-    stages = stages_of(device, scale=scale, mirror=mirror)
-    print(f"Building {benchmark} with {robots} ...", flush=True)
->>>>>>> attack
     env: gymnasium.Env[Any, Any] = wbc_suite.make(
         benchmark,
         robots=names,

@@ -153,7 +153,7 @@ def take(
     """
     arm = choice.arm
     arm.open(choice.site.grasp)
-    near: dict[str, float] = {"tolerance": 0.02, "turn_tolerance": 0.15}
+    near: dict[str, Any] = {"tolerance": 0.02, "turn_tolerance": 0.15}
     if over is None:
         arrived = yield from move(arm, choice.before, **near)
     else:
