@@ -8,6 +8,7 @@ import pinocchio as pin
 from wbc_suite.compiling import compiled
 from wbc_suite.control.law.law import Law
 from wbc_suite.control.law.osc_saturation import keep_direction
+from wbc_suite.control.law.pose_interpolation import interpolate_pose
 from wbc_suite.control.loop.acceleration_limits import limit_accelerations
 from wbc_suite.control.loop.physics import OscWork, Physics
 from wbc_suite.control.loop.records import CompiledRecords, LawKind
@@ -28,7 +29,7 @@ from wbc_suite.linear_algebra import (
     solve_lower,
     solve_upper,
 )
-from wbc_suite.qp.lie import exp3, log3, saturate
+from wbc_suite.qp.lie import log3, saturate
 from wbc_suite.typing import Matrix, Vector
 
 SINGULAR = 1e-4
@@ -199,25 +200,15 @@ def _write_site_jacobian(physics: Physics, law: CompiledRecords, n: int) -> None
 @compiled
 def _write_task_acceleration(physics: Physics, law: CompiledRecords) -> None:
     """Write `wanted = x'' - J' v`, and its part `pull = kd u` towards the goal."""
-    work, phase, rate = physics.osc, 1.0, 0.0
-    if law.duration > 0.0:
-        phase = min(law.since / law.duration, 1.0)
-        rate = 1.0 / law.duration if law.since <= law.duration else 0.0
+    work = physics.osc
     p_ws, R_ws = physics.site_xpos[law.site], rotation(physics.site_xmat, law.site)
     p_wb, R_wb = physics.xpos[law.reference], rotation(physics.xmat, law.reference)
-    R_start, R_turned = np.empty((3, 3)), np.empty((3, 3))
     R_goal, R_error = np.empty((3, 3)), np.empty((3, 3))
-    matrix_product(R_wb, law.start[:9].reshape((3, 3)), R_start)
-    exp3(phase * law.turn[0], phase * law.turn[1], phase * law.turn[2], R_turned)
-    matrix_product(R_start, R_turned, R_goal)
+    p_goal, error, twist = np.empty(3), np.empty(6), np.empty(6)
+    interpolate_pose(law, R_wb, p_wb, R_goal, p_goal, twist)
     matrix_product(R_goal, R_ws.T, R_error)
-    p_goal, error, twist = p_wb.copy(), np.empty(6), np.zeros(6)
     log3(R_error, error[3:])
     for i in range(3):
-        for k in range(3):
-            p_goal[i] += R_wb[i, k] * (law.start[9 + k] + phase * law.shift[k])
-            twist[i] += rate * R_wb[i, k] * law.shift[k]
-            twist[3 + i] += rate * R_start[i, k] * law.turn[k]
         error[i] = p_goal[i] - p_ws[i]
     body, velocity, drift = int(physics.site_bodyid[law.site]), np.empty(6), np.empty(6)
     point_velocity_and_drift(physics, law.reference, p_goal, velocity, work.wanted)
