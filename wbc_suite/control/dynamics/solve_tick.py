@@ -10,6 +10,7 @@ from wbc_suite.control.dynamics.terms import (
     write_frame_terms,
     write_terms,
 )
+from wbc_suite.control.dynamics.tracking import track_motion
 from wbc_suite.control.loop.physics import Physics
 from wbc_suite.control.loop.rigid_body import rotation
 from wbc_suite.linear_algebra import cholesky, dot, solve_lower, solve_upper
@@ -57,11 +58,14 @@ def solve_whole_body(physics: Physics, body: WholeBodyDynamics) -> bool:
     write_terms(physics, body)
     measure(physics, body)
     _observe_loads(physics, body)
-    if body.gait.settings[0].kind == _WALK:
+    if state.tracks == 1:
+        track_motion(physics, body)
+    elif body.gait.settings[0].kind == _WALK:
         plan_walk(body.gait, body.measured, body.command, state.dt, body.plan)
     else:
         plan_trot(body.gait, body.measured, body.command, state.dt, body.plan)
-    _watch_fall(physics, body)
+    if state.tracks == 0:
+        _watch_fall(physics, body)
     state_qp(physics, body)
     state.ticks += 1
     if solve_warm(body.qp):
