@@ -249,6 +249,23 @@ def test_a_fall_is_reported_before_the_trunk_has_dropped_20_cm(alone, push):
     assert (fall.tilt > np.deg2rad(53.0)) == (not low)
 
 
+@pytest.mark.slow
+def test_joints_of_a_robot_that_fell_come_to_rest_without_a_qp(alone):
+    """A step cost 60 ms: no active set was found, and another solver was asked."""
+    walker = Walker(alone, "GR1FreeBody").act(0.7)
+    walker.act(0.1, push=(1500, 900, 0)).act(1.0)
+    assert walker.balance["fell"] is not None
+    before, calls = walker.balance["unsolved"], []
+    for _ in range(250):
+        walker.simulation.tick(10)
+        calls.append(walker.simulation.loop_calls)
+    assert walker.balance["unsolved"] == before
+    assert max(calls) == 1
+    joints = walker.controller.laws[0].drives["dof"]
+    assert np.abs(walker.data.qvel[joints]).max() < 0.05
+    assert np.isfinite(walker.data.ctrl).all()
+
+
 def test_loads_of_feet_are_the_forces_of_the_simulation(standing):
     forces = [standing.balance["loads"][foot] for foot in standing.balance["stance"]]
     weight = 9.81 * standing.model.body_subtreemass[standing.link]

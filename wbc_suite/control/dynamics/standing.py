@@ -84,7 +84,7 @@ class Standing:
         """Forget the last step; stay where the robot is, if there is no motion."""
         own, qpos, qvel = self.dynamics, state.data.qpos, state.data.qvel
         own.state["ticks"] = own.state["unsolved"] = own.state["stage"] = 0
-        own.qp.side[:], own.terms.a[:] = 0, 0.0
+        own.state["fell"], own.qp.side[:], own.terms.a[:] = -1.0, 0, 0.0
         own.last_velocity[:] = qvel[own.dofs]
         if self._stays:
             own.tracked.start[:7] = state.q[:7]
