@@ -45,13 +45,12 @@ def control_only(
     laws: Records,
     drives: Records,
     hands: Needed,
-    feet: Needed,
     custom_law: CustomLaw,
     steps: int,
 ) -> None:
     """Compute the control of one instant again and again."""
     for _ in range(steps):
-        write_commands(physics, laws, drives, hands, feet, custom_law, None)
+        write_commands(physics, laws, drives, hands, custom_law, None)
 
 
 class Law:

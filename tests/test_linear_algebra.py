@@ -8,7 +8,6 @@ from wbc_suite.linear_algebra import (
     inverse_trace,
     lq_factor,
     lq_solve,
-    pseudo_inverse,
     row_space,
     solve,
     solve_lower,
@@ -107,15 +106,6 @@ def test_inverse_trace_bounds_the_least_eigenvalue(rng):
     assert value == pytest.approx(1.0 / np.trace(np.linalg.inv(A)))
     least = np.linalg.eigvalsh(A)[0]
     assert least / 6 <= value <= least
-
-
-@pytest.mark.parametrize("rank", [1, 3, 6])
-def test_pseudo_inverse_is_that_of_numpy(rng, rank):
-    W = rng.normal(size=(rank, 6))
-    out = np.empty((6, 6))
-    pseudo_inverse(W.T @ W, 1e-9, out)
-    expected = np.linalg.pinv(W.T @ W, rcond=1e-9, hermitian=True)
-    np.testing.assert_allclose(out, expected, atol=1e-8 * np.abs(expected).max())
 
 
 def test_row_space_is_that_of_the_singular_value_decomposition(rng):

@@ -11,7 +11,6 @@ from wbc_suite.compiling import compiled
 from wbc_suite.typing import Matrix, Vector
 
 _SMALLEST = 1e-30  # square of a length that counts as zero
-_JACOBI_SWEEPS = 12  # at most; 6 make a matrix of 6 rows diagonal
 
 
 # Sums may be reassociated, which makes them vector instructions. NaN stays NaN.
@@ -209,52 +208,3 @@ def subtract_projection(V: Matrix, count: int, v: Vector) -> None:
         along = dot(V[i], v, n)
         for j in range(n):
             v[j] -= along * V[i, j]
-
-
-@compiled
-def pseudo_inverse(A: Matrix, tolerance: float, out: Matrix) -> None:
-    """Write the pseudo-inverse of a symmetric matrix, by Jacobi's method.
-
-    A, shape (n, n), is positive semidefinite, and destroyed. Eigenvalues below the
-    tolerance times the largest count as zero.
-
-    Source: Golub and Van Loan (2013), "Matrix Computations", section 8.5.
-    """
-    n = A.shape[0]
-    V = np.eye(n)
-    for _ in range(_JACOBI_SWEEPS):
-        if not _jacobi_sweep(A, V):
-            break
-    largest = np.diag(A).max()
-    for i in range(n):
-        for j in range(n):
-            out[i, j] = 0.0
-            for k in range(n):
-                if A[k, k] > tolerance * largest:
-                    out[i, j] += V[i, k] * V[j, k] / A[k, k]
-
-
-@compiled
-def _jacobi_sweep(A: Matrix, V: Matrix) -> bool:
-    """Rotate all off-diagonal entries to zero once; return whether there were any."""
-    n, rotated, size = A.shape[0], False, np.abs(np.diag(A)).max()
-    for i in range(n):
-        for j in range(i + 1, n):
-            if abs(A[i, j]) <= 1e-15 * size:
-                continue
-            rotated = True
-            ratio = 0.5 * (A[j, j] - A[i, i]) / A[i, j]
-            t = 1.0 / (abs(ratio) + np.sqrt(1.0 + ratio * ratio))
-            if ratio < 0.0:
-                t = -t
-            c = 1.0 / np.sqrt(1.0 + t * t)
-            s = c * t
-            for k in range(n):
-                x, y = A[k, i], A[k, j]
-                A[k, i], A[k, j] = c * x - s * y, s * x + c * y
-            for k in range(n):
-                x, y = A[i, k], A[j, k]
-                A[i, k], A[j, k] = c * x - s * y, s * x + c * y
-                x, y = V[k, i], V[k, j]
-                V[k, i], V[k, j] = c * x - s * y, s * x + c * y
-    return rotated

@@ -146,7 +146,7 @@ def test_the_law_solves_the_stated_qp(alone):
         M = truth.M[np.ix_(dofs, dofs)]
         if np.linalg.cond(truth.J @ np.linalg.solve(M, truth.J.T)) > 1e4:
             continue  # damped there
-        rest = textbook(law, rig.state)._rest(rig.state)
+        rest = textbook(law)._rest(rig.state)
         a = qpsolvers.solve_qp(
             M,
             -M @ rest,
@@ -186,14 +186,14 @@ def test_at_limits_the_law_solves_the_stated_qp(alone):
             continue
         law.record["keep_direction"] = 0.0
         nothing = np.zeros(rig.state.model.nv)
-        a = textbook(law, rig.state).acceleration(rig.state, nothing)
+        a = textbook(law).acceleration(rig.state, nothing)
         law.record["keep_direction"] = 1.0
         full = np.zeros(truth.model.nv)
         full[dofs] = a
         tau = (truth.M @ full + truth.h)[dofs]
         tau -= rig.data.qfrc_passive[law.drives["dof"]] + law.drives["disturbance"]
         L, pull = np.linalg.inv(mobility), truth.pull()
-        lower, upper = textbook(law, rig.state).window(rig.state)
+        lower, upper = textbook(law).window(rig.state)
         longest, halves = np.zeros(2), np.zeros((6, 2))
         for k in (0, 1):
             x = np.where(np.arange(6) // 3 == k, pull, 0.0)

@@ -4,32 +4,15 @@ Each class holds one law of `wbc_suite.control.law` to its formula: matrices are
 inverted as they stand there, and QPs are solved by daqp.
 """
 
-from typing import NamedTuple
-
 import daqp
 import mujoco
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.control.law.balance import (
-    COM_STIFFNESS,
-    SHARE_COST,
-    TORQUE_SHARE,
-    TRUNK_COST,
-    TRUNK_STIFFNESS,
-    sole_rows,
-)
-from wbc_suite.control.law.balance import (
-    LEAST_PRESSURE as SOLE_PRESSURE,
-)
-from wbc_suite.control.law.free_root import CONTACT_DAMPING
-from wbc_suite.control.law.free_root import SINGULAR as STRETCHED
 from wbc_suite.control.law.osc import LEAST_DAMPING, SINGULAR
 from wbc_suite.control.law.osc_saturation import POSTURE_COST, SHORTENING_COST
-from wbc_suite.control.law.stance import LEAST_PRESSURE, RANK, TORQUE_ARM
 from wbc_suite.control.loop.acceleration_limits import RATE
 from wbc_suite.control.loop.records import LawKind
-from wbc_suite.typing import Matrix, Vector
 
 UNBOUNDED = 1e30
 
@@ -45,12 +28,8 @@ class Textbook:
         return getattr(self._law, name)
 
     @property
-    def is_of_feet(self):
-        return self.kind in (LawKind.STANCE, LawKind.BALANCE)
-
-    @property
     def is_following(self):
-        return not self.is_of_feet and self.kind not in (LawKind.TORQUE, LawKind.SERVO)
+        return self.kind not in (LawKind.TORQUE, LawKind.SERVO)
 
     def advance(self, state):
         """Let a step's time pass, as the loop does before each step."""
@@ -357,286 +336,6 @@ def _least_change(H, rows, low, high):
     return np.linalg.solve(R.T, y) if flag > 0 else None
 
 
-class Stance(Textbook):
-    def __init__(self, law, state):
-        super().__init__(law)
-        stance, drives = law.record["stance"][0], law.drives
-        root, feet = int(stance["dof"]), int(stance["feet"])
-        self._dofs = np.concatenate([np.arange(root, root + 6), drives["dof"]])
-        self._sites, rows = stance["site"][:feet], stance["rows"][:feet]
-        self._counts = rows
-        self._weights = np.concatenate(
-            [[1.0] * 3 + [TORQUE_ARM**-2] * (count - 3) for count in rows]
-        )
-        ends = np.cumsum(rows).tolist()
-        self._rows = [slice(a, b) for a, b in zip([0, *ends], ends, strict=False)]
-        is_leg = _carrying(state, law.joints, self._sites)
-        self._legs = 6 + np.flatnonzero(is_leg)
-        self._arms = 6 + np.flatnonzero(~is_leg)
-
-    def root_target(self):
-        """Return the root's target now, its velocity and acceleration, (6,) each.
-
-        The latter as MuJoCo has them: linear in the world's axes, angular in its own.
-        """
-        s, stance = float(self.record["since"][0]), self._stance
-        rate, curve, bend = stance["twist"], stance["curve"], stance["bend"]
-        v, a = rate + s * (curve + 0.5 * s * bend), curve + s * bend
-        way = stance["behind"] + s * (rate + s * (0.5 * curve + s / 6.0 * bend))
-        start = self.record["start"][0]
-        pose = pin.SE3(start[:9].reshape(3, 3), start[9:]) * pin.exp6(way)
-        R = pose.rotation
-        linear = R @ (a[:3] + np.cross(v[3:], v[:3]))
-        twist = np.concatenate([R @ v[:3], v[3:]])
-        return pose, twist, np.concatenate([linear, a[3:]])
-
-    def stand(self, state, asked):
-        """Ask root and legs for accelerations as well; note what the feet give.
-
-        Args:
-            state, after `mj_step1`.
-            asked, shape (nv,); changed in place.
-        """
-        position, velocity, root = self._root_errors(state)
-        gains = self.record[0]
-        a, legs, arms = asked[self._dofs], self._legs, self._arms
-        a[:6] = root + gains["kp"] * position + gains["kd"] * velocity
-        J, moved = self._contacts_now(state)
-        a[legs] -= damped_inverse(J[:, legs]) @ (J @ a + moved)
-        M, h = self._dynamics(state)
-        swung = M[:6, arms] @ a[arms]
-        still = M[:6] @ a + h[:6] - swung
-        part = self._bearable(J[:, :6], still, swung)
-        a[arms] *= part
-        f = contact_forces(
-            J[:, :6], still + part * swung, weights=self._weights, contacts=self._rows
-        )
-        self._give(state, asked, a, J, f)
-
-    def _bearable(self, root_jacobian, still, swung):
-        """Return the part of a wrench that leaves all feet pressing, beside another."""
-        normal = [rows.start + 2 for rows in self._rows]
-        give = even_share(root_jacobian, self._weights)[normal]
-        force, change = give @ still, give @ swung
-        less = change < 0.0
-        part = (force[less] - LEAST_PRESSURE) / -change[less]
-        return float(np.clip(part, 0.0, 1.0).min(initial=1.0))
-
-    def _give(self, state, asked, a, J, f):
-        """Hand on accelerations, and what contact forces do at the joints."""
-        stance = self._stance
-        asked[self._dofs] = a
-        stance["desired"], stance["last_velocity"] = (
-            a[:6],
-            state.data.qvel[self._dofs[:6]],
-        )
-        stance["force"][: len(f)] = f
-        self.drives["command"] = J[:, 6:].T @ f
-
-    @property
-    def _stance(self):
-        return self.record["stance"][0]
-
-    def _root_errors(self, state):
-        """Return errors of the root's position and velocity, and the target's motion.
-
-        In MuJoCo's velocity axes, shape (6,) each.
-        """
-        data, stance = state.data, self._stance
-        pose, twist, acceleration = self.root_target()
-        R, k = data.xmat[stance["body"]].reshape(3, 3), int(stance["qpos"])
-        away = pose.translation - data.qpos[k : k + 3]
-        position = np.concatenate([away, pin.log3(R.T @ pose.rotation)])
-        return position, twist - data.qvel[self._dofs[:6]], acceleration
-
-    def _dynamics(self, state):
-        """Return inertia and bias of root and joints, (n, n) and (n,)."""
-        bias = state.data.qfrc_bias - state.data.qfrc_passive
-        return state.mass_matrix()[np.ix_(self._dofs, self._dofs)], bias[self._dofs]
-
-    def _contacts_now(self, state):
-        """Return the contact Jacobian, shape (m, n), and `J' v + k J v`.
-
-        The latter: what feet do without accelerations, and to come to rest.
-        """
-        model, data, v = state.model, state.data, state.data.qvel
-        J, rate = np.zeros((6, model.nv)), np.zeros((6, model.nv))
-        rows = []
-        moved = []
-        for site, count in zip(self._sites, self._counts, strict=True):
-            body, place = model.site_bodyid[site], data.site_xpos[site]
-            mujoco.mj_jac(model, data, J[:3], J[3:], place, body)
-            mujoco.mj_jacDot(model, data, rate[:3], rate[3:], place, body)
-            rows.append(J[:count, self._dofs])
-            moved.append(rate[:count] @ v + CONTACT_DAMPING * (J[:count] @ v))
-        return np.concatenate(rows), np.concatenate(moved)
-
-
-def even_share(root_jacobian, weights):
-    """Return `W^-1 J (J^T W^-1 J)^+`, which makes contact forces of a wrench, (m, 6).
-
-    They are the least by weights that give the wrench, or the nearest to it.
-
-    Args:
-        root_jacobian,
-            shape (m, 6).
-        weights, shape (m,); infinite where nothing is to be given.
-    """
-    scaled = root_jacobian / weights[:, None]
-    return scaled @ np.linalg.pinv(root_jacobian.T @ scaled, rcond=RANK)
-
-
-def contact_forces(
-    root_jacobian,
-    wrench,
-    *,
-    weights,
-    contacts,
-):
-    """Share a wrench on the root among contacts that can push but not pull.
-
-        minimise f^T W f  subject to  J_root^T f = wrench,
-
-    whose solution is `f = W^-1 J_root (J_root^T W^-1 J_root)^+ wrench`. The contact
-    that would have to pull hardest is left out, and the rest is solved again.
-
-    Args:
-        root_jacobian,
-            shape (m, 6).
-        wrench, shape (6,).
-        weights, shape (m,).
-        contacts: Rows of each contact; the third is its vertical force.
-
-    Returns:
-        Contact forces, shape (m,), N and N m.
-    """
-    weights = weights.copy()
-    f = even_share(root_jacobian, weights) @ wrench
-    normal = np.array([rows.start + 2 for rows in contacts])
-    for _ in contacts:
-        worst = int(np.argmin(f[normal]))
-        if f[normal[worst]] >= 0.0:
-            break
-        weights[contacts[worst]] = np.inf
-        f = even_share(root_jacobian, weights) @ wrench
-    return f
-
-
-def damped_inverse(J):
-    """Return J^T (J J^T + eps)^-1, which stays finite at stretched knees."""
-    return np.linalg.solve(J @ J.T + STRETCHED**2 * np.eye(len(J)), J).T
-
-
-def _carrying(state, joints, sites):
-    """Return which joints lie between root and a contact, shape (n,)."""
-    model, bodies = state.model, set[int]()
-    for site in sites:
-        body = int(model.site_bodyid[site])
-        while body:
-            bodies.add(body)
-            body = int(model.body_parentid[body])
-    owners = [int(model.joint(state.prefix + name).bodyid[0]) for name in joints]
-    return np.array([owner in bodies for owner in owners])
-
-
-class Dynamics(NamedTuple):
-    M: Matrix
-    h: Vector
-    J: Matrix
-    S: Matrix
-    s: Vector
-    A: Matrix
-    b: Vector
-    lift: Matrix
-
-
-class Balance(Stance):
-    def stand(self, state, asked):
-        """Do what `StanceLaw.stand` does, for soles."""
-        dynamics = self._standing(state, asked[self._dofs])
-        root = self._root_acceleration(state, dynamics)
-        f = self._forces(state, dynamics, dynamics.A @ root + dynamics.b)
-        root = dynamics.lift @ (dynamics.J[:, :6].T @ f - dynamics.b)
-        self._give(state, asked, dynamics.S @ root + dynamics.s, dynamics.J, f)
-
-    def _standing(self, state, asked):
-        """Express all accelerations by the root's, with soles at rest."""
-        legs, (M, h) = self._legs, self._dynamics(state)
-        J, moved = self._contacts_now(state)
-        J_inverse = damped_inverse(J[:, legs])
-        S, s = np.zeros((len(M), 6)), asked.copy()
-        S[:6], S[legs], s[:6] = np.eye(6), -J_inverse @ J[:, :6], 0.0
-        s[legs] -= J_inverse @ (moved + J[:, legs] @ s[legs])
-        A, b = M[:6] @ S, M[:6] @ s + h[:6]
-        return Dynamics(M=M, h=h, J=J, S=S, s=s, A=A, b=b, lift=np.linalg.inv(A))
-
-    def _root_acceleration(self, state, dynamics):
-        """Return what moves the centre of mass and turns the trunk as wanted, (6,).
-
-        The root's linear rows of M are m J_c: they turn errors of joints into those of
-        the centre of mass.
-        """
-        position, velocity, root = self._root_errors(state)
-        (q, v, a), drives, data = self.target(), self.drives, state.data
-        e = np.concatenate([position, q - data.qpos[drives["qpos"]]])
-        e_rate = np.concatenate([velocity, v - data.qvel[drives["dof"]]])
-        com = np.concatenate([root, a]) + COM_STIFFNESS * e
-        com += _damping(COM_STIFFNESS) * e_rate
-        force = dynamics.M[:3] @ com + dynamics.h[:3]
-        turn = root[3:] + TRUNK_STIFFNESS * position[3:]
-        turn = turn + _damping(TRUNK_STIFFNESS) * velocity[3:]
-        A = dynamics.A[:3]
-        linear = np.linalg.solve(A[:, :3], force - dynamics.b[:3] - A[:, 3:] @ turn)
-        return np.concatenate([linear, turn])
-
-    def _forces(self, state, dynamics, wrench):
-        """Return contact forces that soles and legs can bear, for a wrench or near.
-
-            minimise    || J_r^T (f - f_even) ||^2 + c || f - f_even ||^2
-            subject to  what soles can give and legs can carry
-
-        with errors of the wrench as accelerations, those of the trunk at a lower cost.
-        """
-        J_root = dynamics.J[:, :6]
-        even = even_share(J_root, self._weights) @ wrench
-        rows, low, high = self._bounds(state, dynamics)
-        low, high = low - rows @ even, high - rows @ even
-        if (low <= 0.0).all() and (high >= 0.0).all():
-            return even
-        effect = np.concatenate(
-            [np.eye(6)[:3] / dynamics.M[0, 0], TRUNK_COST * dynamics.lift[3:]]
-        )
-        effect = effect @ J_root.T
-        H = effect.T @ effect + np.diag(SHARE_COST**2 * self._weights)
-        change = _least_change(H, rows, low, high)
-        return even if change is None else even + change
-
-    def _bounds(self, state, dynamics):
-        """Return rows of what soles can give and legs can carry, with their bounds."""
-        legs, J, m = self._legs, dynamics.J, len(dynamics.J)
-        count, drives = len(self._sites), self.drives
-        soles, pressed = np.zeros((10 * count, m)), np.zeros((count, m))
-        for k, site in enumerate(self._sites):
-            rotation = state.data.site_xmat[site].reshape(3, 3)
-            edges = self._stance["edges"][k]
-            soles[10 * k : 10 * k + 10, 6 * k : 6 * k + 6] = sole_rows(edges, rotation)
-            pressed[k, 6 * k + 2] = 1.0
-        M, lift = dynamics.M[legs], dynamics.lift
-        carried = M @ dynamics.S @ lift @ J[:, :6].T - J[:, legs].T
-        offset = M @ (dynamics.s - dynamics.S @ (lift @ dynamics.b)) + dynamics.h[legs]
-        below, above = drives["command_min"][legs - 6], drives["command_max"][legs - 6]
-        least = np.full(count, SOLE_PRESSURE)
-        low = [np.full(10 * count, -np.inf), least, TORQUE_SHARE * below - offset]
-        high = [np.zeros(10 * count), np.full(count, np.inf)]
-        high.append(TORQUE_SHARE * above - offset)
-        rows = np.concatenate([soles, pressed, carried])
-        return rows, np.concatenate(low), np.concatenate(high)
-
-
-def _damping(stiffness):
-    return 2.0 * float(np.sqrt(stiffness))
-
-
 _CLASSES = {
     LawKind.JOINT: Joint,
     LawKind.VELOCITY: Velocity,
@@ -644,8 +343,6 @@ _CLASSES = {
     LawKind.TORQUE: Torque,
     LawKind.SERVO: Servo,
     LawKind.OSC: Osc,
-    LawKind.STANCE: Stance,
-    LawKind.BALANCE: Balance,
 }
 
 
@@ -655,17 +352,14 @@ def kernel_commands(simulation, state):
     return state.data.ctrl[state.actuator_ids].copy()
 
 
-def textbook(law, state):
+def textbook(law):
     """Return the oracle of a law."""
-    kind = LawKind(int(law.record["kind"][0]))
-    if kind in (LawKind.STANCE, LawKind.BALANCE):
-        return _CLASSES[kind](law, state)
-    return _CLASSES[kind](law)
+    return _CLASSES[LawKind(int(law.record["kind"][0]))](law)
 
 
 def commands(state, laws):
     """Return one command per actuator, `M a + h - d - J^T f`."""
-    laws = [textbook(law, state) for law in laws]
+    laws = [textbook(law) for law in laws]
     model, data = state.model, state.data
     _observe(state, laws)
     asked = accelerations(state, laws)
@@ -674,17 +368,13 @@ def commands(state, laws):
     bias = data.qfrc_bias - data.qfrc_passive
     command = np.zeros(len(state.actuators))
     for law in laws:
-        if law.is_of_feet:
-            force[law.drives["dof"]] -= law.drives["command"]
-    for law in laws:
-        if not law.is_of_feet:
-            command[law.outputs] = law.command(state, force, bias)
+        command[law.outputs] = law.command(state, force, bias)
     return command
 
 
 def observe(state, laws):
     """Update the estimated disturbances by one step."""
-    _observe(state, [textbook(law, state) for law in laws])
+    _observe(state, [textbook(law) for law in laws])
 
 
 def _observe(state, laws):
@@ -695,10 +385,6 @@ def _observe(state, laws):
         drives = law.drives
         change = (state.data.qvel[drives["dof"]] - drives["last_velocity"]) / dt
         deviation[drives["dof"]] = change - drives["desired"]
-    for stance in (law.record["stance"][0] for law in laws if law.is_of_feet):
-        root = slice(stance["dof"], stance["dof"] + 6)
-        change = (state.data.qvel[root] - stance["last_velocity"]) / dt
-        deviation[root] = change - stance["desired"]
     force = np.empty(state.model.nv)
     mujoco.mj_mulM(state.model, state.data, force, deviation)
     for law in following:
@@ -733,9 +419,6 @@ def accelerations(state, laws):
         if law.is_following:
             a = law.within_limits(state, law.acceleration(state, asked))
             asked[law.drives["dof"]] = a
-    for law in laws:
-        if law.is_of_feet:
-            law.stand(state, asked)
     for law in laws:
         if law.is_following:
             law.drives["desired"] = asked[law.drives["dof"]]

@@ -17,6 +17,8 @@ from wbc_suite.control import (
     build_composite_controller,
     load_composite_controller_config,
 )
+from wbc_suite.control.composite.protocols import solver_of_body
+from wbc_suite.control.dynamics.arrays import for_plain_python
 from wbc_suite.control.loop.inverse_dynamics import needed_kernels, write_commands
 from wbc_suite.control.loop.physics import bind_physics
 from wbc_suite.control.loop.records import gather
@@ -109,10 +111,11 @@ def parts_in(config):
 def write_all_commands(controller, state):
     """Compute the commands of all actuators once, in plain Python."""
     laws, drives = gather([(law.record, law.drives) for law in controller.laws])
-    kernels = needed_kernels(laws)
+    kernels, solver = needed_kernels(laws), solver_of_body(controller)
+    bodies = None if solver is None else (for_plain_python(solver.dynamics),)
     laws, drives = laws.view(np.recarray), drives.view(np.recarray)
     physics = bind_physics(state.model, state.data)
-    plain(write_commands)(physics, laws, drives, *kernels, None)
+    plain(write_commands)(physics, laws, drives, *kernels, bodies)
 
 
 @pytest.mark.slow

@@ -9,7 +9,7 @@ import numpy as np
 
 from wbc_suite.compiling import announced, as_argument, is_compiling, plain
 from wbc_suite.control import CompositeController, RobotState, SteppedController
-from wbc_suite.control.composite.protocols import DynamicController, TickedController
+from wbc_suite.control.composite.protocols import TickedController, solver_of_body
 from wbc_suite.control.composite.tick import WholeBodyArrays
 from wbc_suite.control.dynamics.arrays import for_plain_python
 from wbc_suite.control.dynamics.state_source import (
@@ -22,7 +22,6 @@ from wbc_suite.control.dynamics.state_source import (
 from wbc_suite.control.loop.advance import advance
 from wbc_suite.control.loop.inverse_dynamics import (
     needed_kernels,
-    solve_bodies,
     write_commands,
 )
 from wbc_suite.control.loop.mujoco_functions import addresses
@@ -81,10 +80,9 @@ class Simulation:
             first, last = self._laws["first"][k], self._laws["last"][k]
             law.adopt(self._laws[k : k + 1], self._drives[first:last], k)
         self._ticked, ticks = self._loop_ticks()
-        self._dynamic = [
-            c for c in self.controllers if isinstance(c, DynamicController)
-        ]
-        exact = all(controller.sensors.is_exact for controller in self._dynamic)
+        found = map(solver_of_body, self.controllers)
+        self._dynamic = [solver for solver in found if solver is not None]
+        exact = all(solver.sensors.is_exact for solver in self._dynamic)
         believed = data if exact else mujoco.MjData(model)
         self._sources = [
             make_state_source(
@@ -94,7 +92,7 @@ class Simulation:
         ]
         self._believed = believed
         physics, state = bind_physics(model, believed), self._watch.state
-        bodies = [controller.dynamics for controller in self._dynamic]
+        bodies = [solver.dynamics for solver in self._dynamic]
         kernels = *needed_kernels(self._laws), tuple(map(as_argument, bodies)) or None
         records = self._laws, self._drives, *kernels
         views = as_argument(physics), as_argument(state)
@@ -102,7 +100,6 @@ class Simulation:
         sources = tuple(map(as_argument, self._sources)) or None
         self._loop_arguments = (*states, *views, *records, ticks, sources)
         self._write_commands = write_commands if compiled else plain(write_commands)
-        self._solve_bodies = solve_bodies if compiled else plain(solve_bodies)
         self._law_arguments = views[0], *records
         if not compiled:
             laws, drives = self._laws.view(np.recarray), self._drives.view(np.recarray)
@@ -213,10 +210,9 @@ class Simulation:
             mujoco.mj_step1(model, data)
             if self._sources:
                 self._sense()
-            if not self._solve_bodies(self._law_arguments[0], self._law_arguments[-1]):
+            while not self._write_commands(*self._law_arguments):
                 for dynamic in self._dynamic:
                     dynamic.finish_tick()
-            self._write_commands(*self._law_arguments)
             data.ctrl[:] = self._believed.ctrl
             for state, controller in self._stepped:
                 data.ctrl[state.actuator_ids] = controller.compute(state)

@@ -55,7 +55,8 @@ class BasicController:
     Attributes:
         layout: Slices of the action: parts, then grippers.
         parts: Controllers by part, grippers as `{part}_gripper`.
-        laws: Their laws, those that hold joints of no part, and that of feet.
+        laws: Their laws, and those that hold joints of no part.
+        standing: Finds the contact forces of a robot on its feet, or None.
     """
 
     def __init__(self, config: Mapping[str, Any], state: RobotState) -> None:
@@ -88,8 +89,9 @@ class BasicController:
         self.laws: tuple[Law, ...] = (
             *(part.law for part in self.parts.values()),
             *self._idle,
-            *(law for part in self.parts.values() for law in part.other_laws),
         )
+        standing = (part.standing for part in self.parts.values())
+        self.standing = next((found for found in standing if found is not None), None)
         self.reset(state)
 
     def reset(self, state: RobotState) -> None:
@@ -100,6 +102,8 @@ class BasicController:
             part.reset(state)
         for law in self._idle:
             law.aim(state.data.qpos[law.drives["qpos"]])
+        if self.standing is not None:
+            self.standing.reset(state)
 
     def set_goal(self, action: Vector, period: float = 0.05) -> None:
         """Hand each part its values; see `layout`."""

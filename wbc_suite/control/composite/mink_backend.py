@@ -26,6 +26,26 @@ POSTURE_FACTOR = 0.1
 """Further factor on the posture, which would pull frames off their targets."""
 
 
+class HeldPoint(mink.FrameTask):
+    """The position of a frame, which mink holds as an equality whatever its cost."""
+
+    def compute_error(self, configuration: mink.Configuration) -> Vector:
+        """Return the distance from the target, world axes, m, shape (3,)."""
+        target = self.transform_target_to_world
+        assert target is not None
+        return self._pose(configuration).translation() - target.translation()
+
+    def compute_jacobian(self, configuration: mink.Configuration) -> Matrix:
+        """Return its derivative, shape (3, nv)."""
+        J_local = configuration.get_frame_jacobian(self.frame_name, self.frame_type)
+        R = self._pose(configuration).rotation().as_matrix()
+        return R @ J_local[:3]
+
+    def _pose(self, configuration: mink.Configuration) -> mink.SE3:
+        name, kind = self.frame_name, self.frame_type
+        return configuration.get_transform_frame_to_world(name, kind)
+
+
 class MinkBackend:
     """`IkBackend` over mink's weighted tasks and limits, solved by daqp.
 
@@ -142,13 +162,9 @@ class MinkBackend:
         return costs
 
     def _hold(self, frame: str, contact: str) -> mink.FrameTask:
-        return mink.FrameTask(
-            frame,
-            self._frame_type(frame),
-            position_cost=1.0,
-            orientation_cost=1.0 if contact == "surface" else 0.0,
-            gain=self._config.frames[0].gain,
-        )
+        kind = mink.FrameTask if contact == "surface" else HeldPoint
+        gain = self._config.frames[0].gain
+        return kind(frame, self._frame_type(frame), 1.0, 1.0, gain=gain)
 
     def _make_limits(self, robot: RobotDescription) -> list[mink.Limit]:
         limits = self._config.limits

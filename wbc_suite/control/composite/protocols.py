@@ -75,11 +75,11 @@ class TickedController(CompositeController, Protocol):
 
 
 @runtime_checkable
-class DynamicController(CompositeController, Protocol):
-    """A composite controller whose accelerations are those of one QP for all joints.
+class BodySolver(Protocol):
+    """Finds contact forces and accelerations of a robot on its feet by one QP.
 
-    Its kernels read and write `dynamics`, see `solve_whole_body`; `sensors` says where
-    the state of the robot comes from.
+    Kernels read and write `dynamics`, see `solve_whole_body`; `sensors` says where the
+    state of the robot comes from.
     """
 
     dynamics: WholeBodyDynamics
@@ -87,3 +87,14 @@ class DynamicController(CompositeController, Protocol):
 
     def finish_tick(self) -> None:
         """Solve the QP if the loop has stated it and not found its active set."""
+
+
+def solver_of_body(controller: CompositeController) -> BodySolver | None:
+    """Return what finds the contact forces of a controller's robot, if it has feet.
+
+    The controller itself, or its attribute `standing`.
+    """
+    if isinstance(controller, BodySolver):
+        return controller
+    standing = getattr(controller, "standing", None)
+    return standing if isinstance(standing, BodySolver) else None

@@ -30,11 +30,7 @@ from wbc_suite.control.composite.progress import (
 from wbc_suite.control.composite.torque_limiter import TorqueArrays, motors_suffice
 from wbc_suite.control.law.reference import set_reference
 from wbc_suite.control.loop.records import CompiledRecords, Records
-from wbc_suite.control.part.spline_reference import (
-    SplineArrays,
-    extend_spline,
-    lead_root,
-)
+from wbc_suite.control.part.spline_reference import SplineArrays, extend_spline
 from wbc_suite.qp.tick import TickArrays, TickStatus, solve_tick
 from wbc_suite.typing import Indices, Vector
 
@@ -80,7 +76,6 @@ class WholeBodyArrays(NamedTuple):
         spline: References until the next tick.
         v: Velocity of the last tick, shape (nv,).
         joint_law: Index of the law of joints in the loop's table.
-        stance_law: That of the law of feet, -1 without one.
         steps: Physics steps between two ticks.
     """
 
@@ -97,7 +92,6 @@ class WholeBodyArrays(NamedTuple):
     spline: SplineArrays
     v: Vector
     joint_law: int
-    stance_law: int
     steps: int
 
 
@@ -134,7 +128,9 @@ def run_tick(
         return False
     tick.v[:] = qp.v
     extend_spline(tick.spline, tick.v)
-    _lead_laws(tick, laws, drives)
+    law = tick.joint_law
+    own = drives[laws[law].first : laws[law].last]
+    set_reference(laws[law : law + 1], own, tick.spline.motion)
     state.stage, state.countdown = Stage.DONE.value, tick.steps
     return True
 
@@ -153,17 +149,3 @@ def _write_task_targets(tick: WholeBodyArrays) -> None:
             target[:12] = found
     posture = levels[tick.posture_level].tasks.joint_target[0]
     posture[:] = tick.posture.target[: posture.shape[0]]
-
-
-@compiled
-def _lead_laws(
-    tick: WholeBodyArrays, laws: CompiledRecords, drives: CompiledRecords
-) -> None:
-    """Hand the spline to the laws."""
-    law, stance = tick.joint_law, tick.stance_law
-    own = drives[laws[law].first : laws[law].last]
-    set_reference(laws[law : law + 1], own, tick.spline.motion)
-    if stance >= 0:
-        own = drives[laws[stance].first : laws[stance].last]
-        set_reference(laws[stance : stance + 1], own, tick.spline.motion)
-        lead_root(tick.spline, laws[stance : stance + 1])

@@ -27,17 +27,14 @@ from wbc_suite.control.composite.whole_body_config import (
     WholeBodyIKConfig,
     read_whole_body,
 )
+from wbc_suite.control.dynamics.arrays import Tracked
+from wbc_suite.control.dynamics.standing import Standing
 from wbc_suite.control.law.joint_laws import JointLaw
 from wbc_suite.control.law.law import Law
-from wbc_suite.control.law.stance import StanceLaw
 from wbc_suite.control.loop.records import readable
 from wbc_suite.control.part.gripper import GripperController
-from wbc_suite.control.part.spline_reference import (
-    SplineReference,
-    lead_root,
-    window_length,
-)
-from wbc_suite.control.part.stance_controller import soles_of, stance_law
+from wbc_suite.control.part.spline_reference import SplineReference, window_length
+from wbc_suite.control.part.stance_controller import feet_of, soles_of
 from wbc_suite.control.state import RobotState
 from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Configuration, Conversion
@@ -130,7 +127,6 @@ class WholeBodyIK:
         held = tuple(name for name in state.actuators if name not in driven)
         gains = self.config.joint_law
         self._law = JointLaw(state, (*moved, *held), kp=gains.kp, kd=gains.kd)
-        self._stance = _stance_law(self._law.joints, self.config, state)
         self._held_index = state.joint_addresses(held)[0]
         q_index, v_index = joint_indices(model, moved)
         mean = window_length(max_acceleration, self.config.limits.jerk, self._dt)
@@ -142,9 +138,46 @@ class WholeBodyIK:
             mean=mean,
             width=len(self._law.joints),
         )
-        servos = tuple(gripper.law for gripper in self._grippers)
-        stances = () if self._stance is None else (self._stance,)
-        self.laws: tuple[Law, ...] = (self._law, *servos, *stances)
+        self.laws: tuple[Law, ...] = (self._law, *(g.law for g in self._grippers))
+        self.standing = None
+        if self.robot.root.kind == "free":
+            self.standing = self._make_standing(state)
+
+    def _make_standing(self, state: RobotState) -> Standing:
+        """Return what keeps a robot on its feet.
+
+        Raises:
+            ConfigError: If the controller holds no foot.
+        """
+        config, name, reference = self.config, self.robot.name, self._reference
+        if not config.held:
+            raise ConfigError(
+                f"{name}: it is free to fall, and the controller holds no foot "
+                "([[held]]). Name its feet there, or let it stand on something: "
+                "root 'fixed' or 'planar', or another base."
+            )
+        if not soles_of(config.held) and len(config.held) < MIN_POINT_CONTACTS:
+            LOG.warning(
+                "%s: it stands on %d feet whose soles are unknown ([[held]] sole), so "
+                "nothing keeps it from tipping over when its hands move: see 'On its "
+                "own feet' in docs/robots.md.",
+                name,
+                len(config.held),
+            )
+        motion = Tracked(
+            joints=reference.motion,
+            start=reference.start,
+            root=reference.root,
+            since=reference.since,
+            wanted=np.zeros(6),
+        )
+        return Standing(
+            state,
+            self._law.joints,
+            feet=feet_of(config.held, state),
+            stiffness=config.joint_law.kp,
+            motion=motion,
+        )
 
     def reset(self, state: RobotState) -> None:
         """Hold the robot where it is."""
@@ -162,6 +195,8 @@ class WholeBodyIK:
         self._planner.reset(keyframe_posture(self.robot, self._configuration, keyframe))
         for gripper in self._grippers:
             gripper.reset(state)
+        if self.standing is not None:
+            self.standing.reset(state)
 
     @property
     def q(self) -> Vector:
@@ -209,7 +244,6 @@ class WholeBodyIK:
             spline=self._reference.argument,
             v=backend.v,
             joint_law=self._law.index,
-            stance_law=-1 if self._stance is None else self._stance.index,
             steps=self._steps_per_solve,
         )
         return as_argument(tick)
@@ -244,9 +278,6 @@ class WholeBodyIK:
         self._answer = answer
         self._reference.extend(answer.v)
         self._law.aim(*self._reference.motion)
-        if self._stance is not None:
-            self._stance.aim(*self._reference.motion)
-            lead_root(self._reference.argument, self._stance.record)
         self._state["stage"] = Stage.DONE_IN_PYTHON
 
     @property
@@ -291,26 +322,3 @@ class WholeBodyIK:
         measured = self._conversion.q_to_pinocchio(state.data.qpos)[:7]
         correction = self._goals.base * pin.XYZQUATToSE3(measured).inverse()
         return [correction * goal for goal in goals]
-
-
-def _stance_law(
-    joints: tuple[str, ...], config: WholeBodyIKConfig, state: RobotState
-) -> StanceLaw | None:
-    name = state.robot.name
-    if state.robot.root.kind != "free":
-        return None
-    if not config.held:
-        raise ConfigError(
-            f"{name}: it is free to fall, and the controller holds no foot "
-            "([[held]]). Name its feet there, or let it stand on something: "
-            "root 'fixed' or 'planar', or another base."
-        )
-    if not soles_of(config.held) and len(config.held) < MIN_POINT_CONTACTS:
-        LOG.warning(
-            "%s: it stands on %d feet whose soles are unknown ([[held]] sole), so "
-            "nothing keeps it from tipping over when its hands move: see 'On its own "
-            "feet' in docs/robots.md.",
-            name,
-            len(config.held),
-        )
-    return stance_law(state, joints, config.held, config.joint_law)

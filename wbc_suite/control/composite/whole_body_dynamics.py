@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from typing import Any
 
-import mujoco
 import numpy as np
 import pinocchio as pin
 
@@ -12,12 +11,12 @@ from wbc_suite.control.composite.balance_report import BalanceReport
 from wbc_suite.control.composite.frame_goals import FrameGoals
 from wbc_suite.control.composite.reduced_robot import lock_groups, moved_joints
 from wbc_suite.control.composite.whole_body_dynamics_config import (
-    FootConfig,
     WholeBodyIDConfig,
     read_dynamics,
 )
-from wbc_suite.control.dynamics.arrays import Foot, Limits, Stage, make_dynamics
+from wbc_suite.control.dynamics.arrays import Stage, make_dynamics
 from wbc_suite.control.dynamics.qp_fallback import QpFallback
+from wbc_suite.control.dynamics.standing import chain, limits_of, make_foot
 from wbc_suite.control.law.law import Law
 from wbc_suite.control.loop.records import LawKind
 from wbc_suite.control.part.gripper import GripperController
@@ -85,7 +84,10 @@ class WholeBodyID:
     def _make_dynamics(self, state: RobotState) -> Any:
         config, drives = self.config, self._law.drives
         root = state.model.joint(f"{state.prefix}root")
-        feet = [_foot(state, foot) for foot in config.feet]
+        feet = [
+            make_foot(state, x.frame, x.sole, height=x.height, radius=x.radius)
+            for x in config.feet
+        ]
         edges = np.array([foot.sole or (0.0,) * 4 for foot in feet])
         dof = int(root.dofadr[0])
         dynamics = make_dynamics(
@@ -105,13 +107,7 @@ class WholeBodyID:
             ),
             upright_weight=np.array([u.weight for u in config.upright]),
             posture_weight=self._posture_weights(),
-            limits=Limits(
-                low=drives["position_min"],
-                high=drives["position_max"],
-                velocity=drives["velocity_max"],
-                torque_low=drives["command_min"],
-                torque_high=drives["command_max"],
-            ),
+            limits=limits_of(drives),
         )
         own = dynamics.state
         own["root_qpos"], own["root_dof"] = root.qposadr[0], dof
@@ -125,21 +121,21 @@ class WholeBodyID:
     def _chains(self, state: RobotState) -> Indices:
         """Return which joints move each hand, (h, n)."""
         chains = [
-            _chain(state.model, _link(state, str(frame.frame)))
+            chain(state.model, _link(state, str(frame.frame)))
             for frame in self.config.frames
         ]
-        rows = [[d in chain for d in self._law.drives["dof"]] for chain in chains]
+        rows = [[d in moved for d in self._law.drives["dof"]] for moved in chains]
         return np.array(rows, dtype=np.int64).reshape(-1, len(self._law.joints))
 
     def _arms(self, state: RobotState) -> Indices:
         """Return which joints move each hand, and no other hand or foot, (h, n)."""
         model, ends = state.model, [*self.config.frames, *self.config.feet]
-        chains = [_chain(model, _link(state, str(end.frame))) for end in ends]
+        chains = [chain(model, _link(state, str(end.frame))) for end in ends]
         hands = len(self.config.frames)
         return np.array(
             [
                 [
-                    dof in chains[k] and sum(dof in chain for chain in chains) == 1
+                    dof in chains[k] and sum(dof in moved for moved in chains) == 1
                     for dof in self._law.drives["dof"]
                 ]
                 for k in range(hands)
@@ -287,30 +283,9 @@ def _walk_parts(config: WholeBodyIDConfig) -> list[ActionPart]:
     return [walk, height]
 
 
-def _foot(state: RobotState, foot: FootConfig) -> Foot:
-    """Return a foot in the simulation."""
-    site = int(_sites(state, [foot.frame])[0])
-    if foot.sole is None:
-        return Foot(site=site, middle=np.array([0.0, 0.0, -foot.radius]))
-    heel, toes, right, left = foot.sole
-    x, y = 0.5 * (heel + toes), 0.5 * (right + left)
-    sole = (heel - x, toes - x, right - y, left - y)
-    return Foot(site=site, middle=np.array([x, y, -foot.height]), sole=sole)
-
-
 def _sites(state: RobotState, names: list[str]) -> Indices:
     ids = [state.model.site(state.prefix + name).id for name in names]
     return np.array(ids, dtype=np.int64)
-
-
-def _chain(model: mujoco.MjModel, link: int) -> set[int]:
-    """Return the degrees of freedom that move a body."""
-    dofs: set[int] = set()
-    while link > 0:
-        first = int(model.body_dofadr[link])
-        dofs.update(range(first, first + int(model.body_dofnum[link])))
-        link = int(model.body_parentid[link])
-    return dofs
 
 
 def _link(state: RobotState, name: str) -> int:

@@ -44,6 +44,10 @@ STATE = np.dtype(
         ("drop", "f8"),  # height that it had lost then, m
         ("trunk_height", "f8"),  # of the trunk over the ground at the reset, m
         ("hand_frame", "i8"),  # 1: goals of hands are given in the heading frame
+        ("tracks", "i8"),  # 1: the robot tracks a motion, see `Tracked`
+        ("stiffness", "f8", (2,)),  # of its position and attitude, 1/s^2
+        ("com_weight", "f8"),  # of the centre of mass that tracks
+        ("root_weight", "f8", (2,)),  # of position and attitude of the root that tracks
     ]
 )
 
@@ -120,6 +124,26 @@ class Terms(NamedTuple):
 
 
 @struct
+class Tracked(NamedTuple):
+    """A motion that a robot on its feet tracks: cubic in the time since it was set.
+
+    Attributes:
+        joints: Position, velocity, acceleration and jerk of joints, shape (4, n).
+        start: Where the root starts: position, quaternion xyzw, shape (7 or more,).
+        root: Offset, velocity, acceleration and jerk of the root from there, linear
+            then angular, in its own axes, shape (4, 6).
+        since: Time since the motion was set, s, shape (1,).
+        wanted: Output: acceleration of the root in MuJoCo's axes, shape (6,).
+    """
+
+    joints: Matrix
+    start: Vector
+    root: Matrix
+    since: Vector
+    wanted: Vector
+
+
+@struct
 class WholeBodyDynamics(NamedTuple):
     """Robot, tasks and QP of whole-body inverse dynamics.
 
@@ -154,6 +178,7 @@ class WholeBodyDynamics(NamedTuple):
         gait: The gait.
         measured: What its planner reads.
         plan: What it writes.
+        tracked: The motion that is tracked without steps, if any is.
         qp: The QP in y = (edges, accelerations of joints).
     """
 
@@ -187,6 +212,7 @@ class WholeBodyDynamics(NamedTuple):
     gait: Gait
     measured: Measured
     plan: Plan
+    tracked: Tracked
     qp: QpArrays
 
 
@@ -205,12 +231,14 @@ def make_dynamics(
     upright_weight: Vector,
     posture_weight: Vector,
     limits: Limits,
+    tracked: Tracked | None = None,
 ) -> WholeBodyDynamics:
     """Return the arrays of a robot; see `WholeBodyDynamics`."""
     n, f, h, u = len(qpos), len(feet), len(hands), len(upright)
     points = [len(foot.corners) for foot in feet]
     edges = EDGES * sum(points)
     rows = sum(6 if foot.sole else 3 for foot in feet) + 6 + 3 * u + 6 * h
+    rows += 0 if tracked is None else 6
     place = np.full(nv, -1, dtype=np.int64)
     place[dofs] = np.arange(6 + n)
     W, diagonal = np.zeros((rows, edges + n)), np.zeros((2, edges + n))
@@ -246,8 +274,21 @@ def make_dynamics(
         gait=gait,
         measured=make_measured(f),
         plan=make_plan(f),
+        tracked=tracked or still_motion(np.zeros(7), np.zeros(n)),
         qp=make_qp_arrays(W, *rest, inequalities=2 * n),
     )
+
+
+def still_motion(start: Vector, joints: Vector) -> Tracked:
+    """Return a motion that stays where it starts.
+
+    Args:
+        start: Position and quaternion xyzw of the root, shape (7,).
+        joints: Positions of joints, shape (n,).
+    """
+    motion = np.zeros((4, len(joints)))
+    motion[0] = joints
+    return Tracked(motion, start.copy(), np.zeros((4, 6)), np.zeros(1), np.zeros(6))
 
 
 def for_plain_python(body: WholeBodyDynamics) -> WholeBodyDynamics:

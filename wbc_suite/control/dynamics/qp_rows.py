@@ -65,6 +65,8 @@ def state_qp(physics: Physics, body: WholeBodyDynamics) -> None:
     for k in range(body.site.shape[0]):
         row = _add_foot(physics, body, k, row)
     row = _add_momentum(physics, body, row)
+    if body.state[0].tracks == 1:
+        row = _add_tracked_root(body, row)
     for k in range(body.upright.shape[0]):
         row = _add_upright(physics, body, k, row)
     for k in range(body.hand.shape[0]):
@@ -162,6 +164,8 @@ def _add_momentum(physics: Physics, body: WholeBodyDynamics, row: int) -> int:
     x, y, z = com[0] - root[0], com[1] - root[1], com[2] - root[2]
     weight, turning = np.full(3, COM_WEIGHT), SPIN[0] * _yield(body, YIELDING)
     weight[2] *= _yield(body, YIELDING_HEIGHT)
+    if state.tracks == 1:
+        weight[:], turning = state.com_weight, 0.0
     for i in range(6):
         for j in range(qp.W.shape[1]):
             qp.W[row + i, j] = 0.0
@@ -177,6 +181,18 @@ def _add_momentum(physics: Physics, body: WholeBodyDynamics, row: int) -> int:
         wanted = plan.com_acceleration[i] + fall - terms.held[i] / state.mass
         qp.e[row + i] = weight[i] * wanted
         qp.e[row + 3 + i] = -turning * (SPIN[1] * terms.spin[i] + terms.held[3 + i])
+    return row + 6
+
+
+@compiled
+def _add_tracked_root(body: WholeBodyDynamics, row: int) -> int:
+    """Add the rows of the accelerations that a tracked root needs."""
+    A, weights = np.zeros(body.dofs.shape[0]), body.state[0].root_weight
+    for i in range(6):
+        weight = weights[i // 3]
+        A[i] = 1.0
+        _add_row(body, row + i, A, body.tracked.wanted[i], weight)
+        A[i] = 0.0
     return row + 6
 
 

@@ -10,6 +10,7 @@ from wbc_suite.control.dynamics.terms import (
     write_frame_terms,
     write_terms,
 )
+from wbc_suite.control.dynamics.tracking import track_motion
 from wbc_suite.control.loop.physics import Physics
 from wbc_suite.control.loop.rigid_body import rotation
 from wbc_suite.linear_algebra import cholesky, dot, solve_lower, solve_upper
@@ -41,6 +42,9 @@ DAMPING = 1e-3
 TILTED = 0.6
 """Cosine of the tilt from which a robot has fallen: 53 degrees."""
 
+FALLEN = (100.0, 40.0)
+"""kp, 1/s^2, and kd, 1/s, that hold the joints of a robot that fell."""
+
 DROPPED = 0.15
 """m; a robot whose trunk is so much lower than commanded has fallen."""
 
@@ -56,12 +60,18 @@ def solve_whole_body(physics: Physics, body: WholeBodyDynamics) -> bool:
         return True
     write_terms(physics, body)
     measure(physics, body)
+    if state.fell >= 0.0:
+        _hold_joints(physics, body)
+        return True
     _observe_loads(physics, body)
-    if body.gait.settings[0].kind == _WALK:
+    if state.tracks == 1:
+        track_motion(physics, body)
+    elif body.gait.settings[0].kind == _WALK:
         plan_walk(body.gait, body.measured, body.command, state.dt, body.plan)
     else:
         plan_trot(body.gait, body.measured, body.command, state.dt, body.plan)
-    _watch_fall(physics, body)
+    if state.tracks == 0:
+        _watch_fall(physics, body)
     state_qp(physics, body)
     state.ticks += 1
     if solve_warm(body.qp):
@@ -73,6 +83,19 @@ def solve_whole_body(physics: Physics, body: WholeBodyDynamics) -> bool:
 
 
 @compiled
+def _hold_joints(physics: Physics, body: WholeBodyDynamics) -> None:
+    """Ask for no contact forces, and for joints as they were at the fall; no QP."""
+    qp, terms = body.qp, body.terms
+    edges = terms.B.shape[0]
+    body.load[:], qp.x[:edges] = 0.0, 0.0
+    for j in range(body.qpos.shape[0]):
+        error = body.posture[j] - physics.qpos[body.qpos[j]]
+        qp.x[edges + j] = FALLEN[0] * error - FALLEN[1] * terms.v[6 + j]
+    body.state[0].ticks += 1
+    body.state[0].stage = _SOLVED
+
+
+@compiled
 def write_whole_body(physics: Physics, body: WholeBodyDynamics) -> None:
     """Write accelerations of root and joints, and torques of contacts and loads."""
     qp, terms = body.qp, body.terms
@@ -80,6 +103,8 @@ def write_whole_body(physics: Physics, body: WholeBodyDynamics) -> None:
     edges, size = terms.B.shape[0], qp.x.shape[0]
     for i in range(6):
         terms.a[i] = dot(terms.root[i], qp.x, size) + terms.root[i, size]
+        if body.state[0].fell >= 0.0:
+            terms.a[i] = 0.0  # it lies
     for j in range(body.qpos.shape[0]):
         terms.a[6 + j] = qp.x[edges + j]
         dof = body.dofs[6 + j]
@@ -176,3 +201,5 @@ def _watch_fall(physics: Physics, body: WholeBodyDynamics) -> None:
         state.fell, state.drop = gait.time, drop
         state.tilt = np.arccos(min(max(upright, -1.0), 1.0))
         state.fell_by_tilt = 1 if upright < TILTED else 0
+        for j in range(body.qpos.shape[0]):
+            body.posture[j] = physics.qpos[body.qpos[j]]

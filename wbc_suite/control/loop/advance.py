@@ -14,7 +14,6 @@ from wbc_suite.control.loop.inverse_dynamics import (
     CustomLaw,
     Needed,
     WholeBodies,
-    solve_bodies,
     write_commands,
 )
 from wbc_suite.control.loop.mujoco_functions import (
@@ -42,7 +41,6 @@ def advance(
     laws: CompiledRecords,
     drives: CompiledRecords,
     hands: Needed,
-    feet: Needed,
     custom_law: CustomLaw,
     bodies: WholeBodies,
     ticks: Ticks,
@@ -63,9 +61,8 @@ def advance(
         laws: `LAW` records.
         drives: `DRIVE` records.
         hands: Whether there are laws in operational space, see `needed_kernels`.
-        feet: Whether there are laws of feet.
         custom_law: Kernel of users' laws.
-        bodies: Robots moved by whole-body inverse dynamics.
+        bodies: Robots on their feet.
         ticks: Whole-body ticks that run here.
         sources: Sensors of robots.
         steps: Number of physics steps.
@@ -85,9 +82,8 @@ def advance(
             mj_kinematics(model, believed)
             use_all_feet(sources)
             mj_step1(model, believed)
-        if not solve_bodies(physics, bodies):
+        if not write_commands(physics, laws, drives, hands, custom_law, bodies):
             break
-        write_commands(physics, laws, drives, hands, feet, custom_law, bodies)
         pass_commands(physics, sources)
         mj_step2(model, data)
         _count_down(ticks)

@@ -1,5 +1,7 @@
 """The disturbance observer: estimate external forces on the joints."""
 
+from typing import Any
+
 import numpy as np
 
 from wbc_suite.compiling import compiled
@@ -8,12 +10,11 @@ from wbc_suite.control.loop.records import CompiledRecords, LawKind
 from wbc_suite.control.loop.rigid_body import multiply_inertia
 
 _TORQUE, _SERVO = int(LawKind.TORQUE), int(LawKind.SERVO)
-_STANCE, _BALANCE = int(LawKind.STANCE), int(LawKind.BALANCE)
 
 
 @compiled
 def observe_disturbances(
-    physics: Physics, laws: CompiledRecords, drives: CompiledRecords
+    physics: Physics, laws: CompiledRecords, drives: CompiledRecords, bodies: Any
 ) -> None:
     """Update the estimated disturbances of all laws that ask for it by one step.
 
@@ -35,6 +36,12 @@ def observe_disturbances(
     if not is_wanted:
         return
     physics.acceleration[:] = 0.0
+    if bodies is not None:
+        for body in bodies:
+            for i in range(6):
+                change = physics.qvel[body.dofs[i]] - body.last_velocity[i]
+                rate = change / physics.timestep
+                physics.acceleration[body.dofs[i]] = rate - body.terms.a[i]
     for k in range(laws.shape[0]):
         _write_deviation(physics, laws[k], drives)
     multiply_inertia(physics, physics.acceleration, physics.force)
@@ -55,13 +62,7 @@ def _write_deviation(
     physics: Physics, law: CompiledRecords, drives: CompiledRecords
 ) -> None:
     """Write the accelerations of the last step less the desired ones."""
-    if law.kind == _STANCE or law.kind == _BALANCE:
-        root = law.stance
-        for i in range(6):
-            change = physics.qvel[root.dof + i] - root.last_velocity[i]
-            rate = change / physics.timestep
-            physics.acceleration[root.dof + i] = rate - root.desired[i]
-    elif law.kind != _TORQUE and law.kind != _SERVO:
+    if law.kind != _TORQUE and law.kind != _SERVO:
         for j in range(law.first, law.last):
             drive = drives[j]
             change = physics.qvel[drive.dof] - drive.last_velocity

@@ -4,20 +4,18 @@
 
 with M and h of the whole scene, so that moving parts do not disturb each other; a are
 the desired accelerations of all laws, d the estimated disturbances, f the contact
-forces that laws of feet plan.
+forces of robots on their feet.
 """
 
 from typing import Any, TypeAlias
 
 from wbc_suite.compiling import compiled
+from wbc_suite.control.dynamics.arrays import Stage
 from wbc_suite.control.dynamics.solve_tick import solve_whole_body, write_whole_body
-from wbc_suite.control.law.balance import balance_law
 from wbc_suite.control.law.custom import custom_kernel
-from wbc_suite.control.law.free_root import is_of_feet, subtract_contact_forces
 from wbc_suite.control.law.joint_laws import base_law, joint_law, velocity_law
 from wbc_suite.control.law.osc import osc_law
 from wbc_suite.control.law.reference import reference_at
-from wbc_suite.control.law.stance import stance_law
 from wbc_suite.control.loop.acceleration_limits import limit_accelerations
 from wbc_suite.control.loop.disturbance_observer import observe_disturbances
 from wbc_suite.control.loop.physics import Physics
@@ -27,8 +25,7 @@ from wbc_suite.control.loop.rigid_body import multiply_inertia
 _JOINT, _OSC = int(LawKind.JOINT), int(LawKind.OSC)
 _BASE, _VELOCITY = int(LawKind.BASE), int(LawKind.VELOCITY)
 _TORQUE, _SERVO = int(LawKind.TORQUE), int(LawKind.SERVO)
-_STANCE, _BALANCE = int(LawKind.STANCE), int(LawKind.BALANCE)
-
+_STATED = int(Stage.STATED)
 
 CustomLaw: TypeAlias = Any
 """One kernel for all laws of users, see `control.law.custom`; None without any."""
@@ -42,43 +39,63 @@ depends on an argument that is None, which halves the time to compile."""
 
 
 @compiled
-def solve_bodies(physics: Physics, bodies: WholeBodies) -> bool:
-    """Solve the QPs of whole-body inverse dynamics; runs after `mj_step1`.
-
-    Returns:
-        Whether all are solved. Others need Python; then this is called again.
-    """
-    done = True
-    if bodies is not None:
-        for body in bodies:
-            done = solve_whole_body(physics, body) and done
-    return done
-
-
-@compiled
-def write_bodies(physics: Physics, bodies: WholeBodies) -> None:
-    """Write the accelerations of whole-body inverse dynamics."""
-    if bodies is not None:
-        for body in bodies:
-            write_whole_body(physics, body)
-
-
-@compiled
 def write_commands(
     physics: Physics,
     laws: CompiledRecords,
     drives: CompiledRecords,
     hands: Needed,
-    feet: Needed,
+    custom_law: CustomLaw,
+    bodies: WholeBodies,
+) -> bool:
+    """Write the commands of all actuators; runs between `mj_step1` and `mj_step2`.
+
+    Returns:
+        Whether it is done. Else the QP of a robot on its feet needs Python, after which
+        this is called again.
+    """
+    if bodies is None:
+        ask_accelerations(physics, laws, drives, hands, custom_law, bodies)
+    else:
+        if bodies[0].state[0].stage == _STATED:  # else it goes on after Python
+            ask_accelerations(physics, laws, drives, hands, custom_law, bodies)
+        if not solve_bodies(physics, bodies):
+            return False
+    multiply_inertia(physics, physics.acceleration, physics.force)
+    if bodies is not None:
+        for body in bodies:
+            for j in range(body.torque.shape[0]):
+                physics.force[body.dofs[6 + j]] -= body.torque[j]
+    for k in range(laws.shape[0]):
+        write_law_commands(physics, laws[k], drives)
+    return True
+
+
+@compiled
+def solve_bodies(physics: Physics, bodies: WholeBodies) -> bool:
+    """Write accelerations and contact forces of robots on their feet, if all solve."""
+    done = True
+    for body in bodies:
+        done = solve_whole_body(physics, body) and done
+    if done:
+        for body in bodies:
+            write_whole_body(physics, body)
+    return done
+
+
+@compiled
+def ask_accelerations(
+    physics: Physics,
+    laws: CompiledRecords,
+    drives: CompiledRecords,
+    hands: Needed,
     custom_law: CustomLaw,
     bodies: WholeBodies,
 ) -> None:
-    """Write the commands of all actuators; runs between `mj_step1` and `mj_step2`.
+    """Write the accelerations that the laws of all joints ask for.
 
-    Each group of laws builds on those before it: hands on the joints that carry them,
-    feet on everything that they carry.
+    Laws of hands build on those of the joints that carry them.
     """
-    observe_disturbances(physics, laws, drives)
+    observe_disturbances(physics, laws, drives, bodies)
     physics.acceleration[:] = 0.0
     for k in range(laws.shape[0]):
         laws[k].since += physics.timestep
@@ -89,25 +106,6 @@ def write_commands(
         for k in range(laws.shape[0]):
             if laws[k].kind == _OSC:
                 osc_law(physics, laws[k], drives)
-    if feet is not None:
-        for k in range(laws.shape[0]):
-            law_of_feet(physics, laws[k], drives)
-    write_bodies(physics, bodies)
-    multiply_inertia(physics, physics.acceleration, physics.force)
-    subtract_contact_forces(physics, laws, drives, bodies)
-    for k in range(laws.shape[0]):
-        write_law_commands(physics, laws[k], drives)
-
-
-@compiled
-def law_of_feet(
-    physics: Physics, law: CompiledRecords, drives: CompiledRecords
-) -> None:
-    """Write accelerations and contact forces of a law of feet."""
-    if law.kind == _STANCE:
-        stance_law(physics, law, drives)
-    elif law.kind == _BALANCE:
-        balance_law(physics, law, drives)
 
 
 @compiled
@@ -133,10 +131,8 @@ def write_law_commands(
     """Write `M a + h - d - J^T f` within the limits of actuators, or setpoints.
 
     `physics.force` holds `M a - J^T f`. A torque law adds its torques to Coriolis,
-    centrifugal and gravity forces; passive forces stay. Laws of feet drive no joint.
+    centrifugal and gravity forces; passive forces stay.
     """
-    if is_of_feet(law):
-        return
     for j in range(law.first, law.last):
         drive = drives[j]
         dof = drive.dof
@@ -155,9 +151,7 @@ def write_law_commands(
         physics.ctrl[drive.ctrl] = drive.command
 
 
-def needed_kernels(laws: Records) -> tuple[Needed, Needed, CustomLaw]:
-    """Return `hands`, `feet`, `custom_law` of `write_commands` for a table of laws."""
+def needed_kernels(laws: Records) -> tuple[Needed, CustomLaw]:
+    """Return `hands` and `custom_law` of `write_commands` for a table of laws."""
     kinds = laws["kind"]
-    hands = kinds == LawKind.OSC
-    feet = (kinds == LawKind.STANCE) | (kinds == LawKind.BALANCE)
-    return bool(hands.any()) or None, bool(feet.any()) or None, custom_kernel(kinds)
+    return bool((kinds == LawKind.OSC).any()) or None, custom_kernel(kinds)

@@ -11,11 +11,8 @@ import numpy as np
 from wbc_suite.compiling import readable
 from wbc_suite.typing import CompiledRecords, Records
 
-__all__ = ["DRIVE", "LAW", "MOST_FEET", "STANCE", "CompiledRecords", "LawKind"]
-__all__ += ["Records", "gather", "new_records", "readable"]
-
-MOST_FEET = 8
-"""Greatest number of feet of one robot."""
+__all__ = ["DRIVE", "LAW", "CompiledRecords", "LawKind", "Records", "gather"]
+__all__ += ["new_records", "readable"]
 
 
 class LawKind(IntEnum):
@@ -27,34 +24,9 @@ class LawKind(IntEnum):
     TORQUE = 3
     SERVO = 4
     VELOCITY = 5
-    STANCE = 6
-    BALANCE = 7
-    DYNAMICS = 8
+    DYNAMICS = 6
     CUSTOM = 100
     """Laws of users: this and larger numbers, see `control.law.register_law`."""
-
-
-STANCE = np.dtype(
-    [
-        ("qpos", "i8"),  # index of the free root in qpos
-        ("dof", "i8"),  # and in qvel
-        ("body", "i8"),  # its link
-        ("feet", "i8"),  # number of feet
-        ("site", "i8", (MOST_FEET,)),  # their frames
-        ("rows", "i8", (MOST_FEET,)),  # 3: a point contact, 6: a surface contact
-        ("edges", "f8", (MOST_FEET, 4)),  # heel, toes, right, left of a sole, m
-        ("force", "f8", (6 * MOST_FEET,)),  # planned contact forces by rows, N and N m
-        # reference of the root: start exp(behind + twist s + curve s^2/2 + bend s^3/6)
-        ("behind", "f8", (6,)),  # linear then angular, in its own axes
-        ("twist", "f8", (6,)),
-        ("curve", "f8", (6,)),
-        ("bend", "f8", (6,)),
-        # state of the disturbance observer for the root
-        ("desired", "f8", (6,)),  # acceleration of the last step
-        ("last_velocity", "f8", (6,)),
-    ]
-)
-"""Data of laws of feet: the root and its contacts."""
 
 
 LAW = np.dtype(
@@ -76,13 +48,10 @@ LAW = np.dtype(
         ("kd", "f8", (6,)),  # 1/s
         ("speed", "f8", (2,)),  # velocity limits, m/s and rad/s
         ("keep_direction", "f8"),  # 1: saturated joints keep the hand's direction
-        ("stance", STANCE),
         ("parameters", "f8", (32,)),  # of users' laws
     ]
 )
-"""A law. Laws of joints do not use the fields of operational space; a law of feet uses
-start, kp and kd for the root, and the references of its joints for the centre of
-mass."""
+"""A law. Laws of joints do not use the fields of operational space."""
 
 DRIVE = np.dtype(
     [

@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Generic, TypeVar
 import pinocchio as pin
 
 from wbc_suite.control.action import ActionPart
+from wbc_suite.control.dynamics.standing import Standing
 from wbc_suite.control.law.law import Law
 from wbc_suite.control.robot_parts import RobotPart
 from wbc_suite.control.state import RobotState
@@ -52,11 +53,13 @@ class PartController(ABC, Generic[LawType]):
         needs_hand: Whether the part must end in a hand.
         drives_base: Whether it drives a base on wheels, which no other may.
         holds_root: Whether it keeps a robot with a free root from falling.
+        standing: Finds the contact forces of such a robot.
     """
 
     needs_hand: ClassVar[bool] = False
     drives_base: ClassVar[bool] = False
     holds_root: ClassVar[bool] = False
+    standing: Standing | None = None
     slices: tuple[ActionPart, ...]
     law: LawType
 
@@ -64,11 +67,6 @@ class PartController(ABC, Generic[LawType]):
     def check(cls, config: Any, part: RobotPart, robot: RobotDescription) -> None:
         """Raise ConfigError if a config does not fit a part; by default any does."""
         return
-
-    @property
-    def other_laws(self) -> tuple[Law, ...]:
-        """Laws beside `law` that the loop computes; none by default."""
-        return ()
 
     @property
     @abstractmethod

@@ -6,7 +6,6 @@ from typing import NamedTuple
 import numpy as np
 
 from wbc_suite.compiling import as_argument, compiled, struct
-from wbc_suite.control.loop.records import CompiledRecords
 from wbc_suite.kinematics import Configuration
 from wbc_suite.kinematics.forward import RobotArrays
 from wbc_suite.kinematics.tangent_space import (
@@ -41,6 +40,9 @@ class SplineArrays(NamedTuple):
         rates: Velocities of the last three steps of the points, shape (3, nv).
         motion: Output in its first m columns: position, velocity, acceleration and
             jerk of the driven joints, shape (4, m or more).
+        root: Output: the same of the first six velocities, as an offset from the first
+            of the points, shape (4, 6 or nv).
+        since: Time since then, s, which others count, shape (1,).
         period: Time between two solves, s.
     """
 
@@ -51,6 +53,8 @@ class SplineArrays(NamedTuple):
     points: Matrix
     rates: Matrix
     motion: Matrix
+    root: Matrix
+    since: Vector
     period: float
 
 
@@ -78,6 +82,9 @@ class SplineReference:
         argument: The argument of kernels that stands for its arrays.
         motion: p, v, a and j of the driven joints after a solve: they are at
             `p + v s + a s^2 / 2 + j s^3 / 6`, s counted from that solve up to T.
+        root: The same of a free root, as an offset from `start` in its axes, (4, 6).
+        start: Configuration that the spline is at before that offset, shape (nq,).
+        since: Time since that solve, s, which the loop counts, shape (1,).
     """
 
     def __init__(
@@ -100,10 +107,15 @@ class SplineReference:
             points=np.zeros((3, nq)),
             rates=np.zeros((3, nv)),
             motion=np.zeros((4, max(width, len(q_index)))),
+            root=np.zeros((4, min(6, nv))),
+            since=np.zeros(1),
             period=float(period),
         )
         self.argument = as_argument(self._arrays)
         self.motion: Matrix = self._arrays.motion
+        self.root: Matrix = self._arrays.root
+        self.start: Vector = self._arrays.points[0]
+        self.since: Vector = self._arrays.since
         self.reset()
 
     def reset(self) -> None:
@@ -113,6 +125,7 @@ class SplineReference:
         joints = slice(len(arrays.q_index))
         arrays.motion[:, joints] = 0.0
         arrays.motion[0, joints] = q[arrays.q_index]
+        arrays.root[:], arrays.since[:] = 0.0, 0.0
 
     def extend(self, v: Vector) -> None:
         """Move the robot by v over one period, and write `motion`."""
@@ -144,6 +157,11 @@ def extend_spline(spline: SplineArrays, v: Vector) -> None:
         lead, v_now, a, jerk = _cubic(rates[0, i], rates[1, i], rates[2, i], period)
         spline.motion[0, j], spline.motion[1, j] = q + lead, v_now
         spline.motion[2, j], spline.motion[3, j] = a, jerk
+    for i in range(spline.root.shape[1]):
+        lead, v_now, a, jerk = _cubic(rates[0, i], rates[1, i], rates[2, i], period)
+        spline.root[0, i], spline.root[1, i] = lead, v_now
+        spline.root[2, i], spline.root[3, i] = a, jerk
+    spline.since[0] = 0.0
 
 
 @compiled
@@ -177,27 +195,3 @@ def _write_mean(robot: RobotArrays, window: Matrix, out: Vector) -> None:
             total[i] += step[i] / count
     out[:] = window[0]
     integrate(robot, out, total)
-
-
-@compiled
-def lead_root(spline: SplineArrays, record: CompiledRecords) -> None:
-    """Set the reference of a free root, which comes first in v; see `StanceLaw.lead`.
-
-    The record is that of a law of feet, shape (1,).
-    """
-    law, period = record[0], spline.period
-    q, rates = spline.points[0], spline.rates
-    x, y, z, w = q[3], q[4], q[5], q[6]
-    start = law.start
-    start[0] = 1.0 - 2.0 * (y * y + z * z)
-    start[4] = 1.0 - 2.0 * (x * x + z * z)
-    start[8] = 1.0 - 2.0 * (x * x + y * y)
-    start[1], start[3] = 2.0 * (x * y - w * z), 2.0 * (x * y + w * z)
-    start[2], start[6] = 2.0 * (x * z + w * y), 2.0 * (x * z - w * y)
-    start[5], start[7] = 2.0 * (y * z - w * x), 2.0 * (y * z + w * x)
-    start[9:] = q[:3]
-    for i in range(6):
-        lead, v, a, jerk = _cubic(rates[0, i], rates[1, i], rates[2, i], period)
-        law.stance.behind[i], law.stance.twist[i] = lead, v
-        law.stance.curve[i], law.stance.bend[i] = a, jerk
-    law.since = 0.0

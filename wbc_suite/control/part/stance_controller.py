@@ -4,13 +4,11 @@ from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
-import pinocchio as pin
 from pydantic import model_validator
 
-from wbc_suite.control.law.free_root import RootMotion
+from wbc_suite.control.dynamics.arrays import Foot
+from wbc_suite.control.dynamics.standing import Standing, make_foot
 from wbc_suite.control.law.joint_laws import JointLaw, JointLawConfig
-from wbc_suite.control.law.law import Law
-from wbc_suite.control.law.stance import StanceContact, StanceLaw
 from wbc_suite.control.part.controller import PartController
 from wbc_suite.control.robot_parts import RobotPart, motors
 from wbc_suite.control.state import RobotState
@@ -18,8 +16,12 @@ from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.qp import Sole
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.elements import Name
+from wbc_suite.robot.sole_inference import ball_radius, guess_sole
 from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Vector
+
+INSET = 0.005
+"""m; distance of pressure from the edges of a sole."""
 
 
 class HeldFrame(FrozenModel):
@@ -49,7 +51,7 @@ class HeldFrame(FrozenModel):
 
 
 class StanceConfig(FrozenModel):
-    """Legs that carry the root while the other parts move; see `StanceLaw`.
+    """Legs that carry the root while the other parts move; see `Standing`.
 
     Attributes:
         held: Frames on the ground; the robot's feet when empty, as soles of a biped
@@ -96,25 +98,31 @@ def soles_of(held: Sequence[HeldFrame]) -> list[Sole]:
     return soles if len(soles) == len(held) else []
 
 
-def stance_law(
-    state: RobotState,
-    joints: tuple[str, ...],
-    held: Sequence[HeldFrame],
-    gains: JointLawConfig,
-) -> StanceLaw:
-    """Return the law that computes contact forces; it balances on known soles."""
-    contacts = [
-        StanceContact(site=state.model.site(state.prefix + h.frame).id, kind=h.contact)
-        for h in held
-    ]
-    return StanceLaw(state, joints, contacts, gains, soles_of(held))
+def feet_of(held: Sequence[HeldFrame], state: RobotState) -> list[Foot]:
+    """Return held frames as feet; what is not told is that of their shapes."""
+    return [_foot(frame, state) for frame in held]
+
+
+def _foot(held: HeldFrame, state: RobotState) -> Foot:
+    robot, name = state.robot, held.frame
+    if held.contact == "point":
+        return make_foot(state, name, radius=ball_radius(robot, name))
+    guess = None if held.sole else guess_sole(robot, name)
+    edges, height = guess or (held.sole, 0.0)
+    if edges is None:
+        return make_foot(state, name)
+    heel, toes, right, left = edges
+    x, y = min(INSET, 0.25 * (toes - heel)), min(INSET, 0.25 * (left - right))
+    return make_foot(
+        state, name, (heel + x, toes - x, right + y, left - y), height=height
+    )
 
 
 class StanceController(PartController[JointLaw]):
     """Holds root and legs at their pose of reset while the other parts move.
 
     It has no slice of the action. The accelerations of all laws determine the contact
-    forces; see `StanceLaw`.
+    forces; see `Standing`.
 
     Args:
         part: The legs.
@@ -123,7 +131,7 @@ class StanceController(PartController[JointLaw]):
 
     Attributes:
         law: Holds the legs' joints where the contacts leave them free.
-        stance: Computes the contact forces, for all laws.
+        standing: Finds the contact forces, for all laws.
         slices: None.
     """
 
@@ -136,7 +144,9 @@ class StanceController(PartController[JointLaw]):
         self.law = JointLaw(state, part.joints, kp=gains.kp, kd=gains.kd)
         self.slices = ()
         held = held_frames(config, state.robot)
-        self.stance = stance_law(state, motors(state.robot), held, gains)
+        self.standing = Standing(
+            state, motors(state.robot), feet=feet_of(held, state), stiffness=gains.kp
+        )
         self.reset(state)
 
     @classmethod
@@ -149,17 +159,9 @@ class StanceController(PartController[JointLaw]):
             if held.frame not in sites:
                 raise ConfigError(str(UnknownNameError("frame", held.frame, sites)))
 
-    @property
-    def other_laws(self) -> tuple[Law, ...]:
-        """The law of the contacts."""
-        return (self.stance,)
-
     def reset(self, state: RobotState) -> None:
         """Stand in the present pose."""
-        data = state.data
-        self.law.aim(data.qpos[self.law.drives["qpos"]])
-        self.stance.aim(data.qpos[self.stance.drives["qpos"]])
-        self.stance.lead(RootMotion.still(pin.XYZQUATToSE3(state.q[:7])))
+        self.law.aim(state.data.qpos[self.law.drives["qpos"]])
 
     def set_goal(self, values: Vector, period: float) -> None:
         """Do nothing: there are no values."""
