@@ -11,7 +11,6 @@ Usage: python benchmarks/import_corpus.py [--quick] [--folder DIR] [--unseen]
        [--only TEXT] [--json FILE] [--table FILE]
 """
 
-import argparse
 import logging
 import multiprocessing
 import re
@@ -22,8 +21,7 @@ import tarfile
 import time
 import traceback
 import zipfile
-from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -31,7 +29,7 @@ from xml.etree import ElementTree
 import mujoco
 import numpy as np
 import pinocchio as pin
-from harness.report import Report, cell, options
+from harness.report import Report, options
 
 from wbc_suite.errors import WbcError
 from wbc_suite.robot import RobotDescription, load_robot
@@ -96,11 +94,14 @@ class Log(logging.Handler):
         super().__init__(logging.INFO)
         self.names: dict[tuple[str, str], str] = {}
         self.warnings: list[str] = []
+        self.meshes = 0
 
     def emit(self, record: logging.LogRecord) -> None:
         if "is imported as" in record.msg and isinstance(record.args, tuple):
             kind, original, name = map(str, record.args)
             self.names.setdefault((kind, original), name)
+        elif "meshes found" in record.msg and isinstance(record.args, tuple):
+            self.meshes = int(str(record.args[1]))
         elif record.levelno >= logging.WARNING:
             self.warnings.append(record.getMessage())
 
@@ -132,7 +133,7 @@ def pinocchio_model(path: Path) -> Any | None:
 def compare_urdf(path: Path, theirs: Any, robot: RobotDescription, log: Log) -> Row:
     """Compare with Pinocchio's own loader."""
     ours = robot.to_pinocchio()
-    tree = ElementTree.parse(path).getroot()
+    tree = elements(path)
     names = {
         name: log.name("joint", name)
         for name in theirs.names[1:]
@@ -181,12 +182,25 @@ def compare_urdf(path: Path, theirs: Any, robot: RobotDescription, log: Log) -> 
         pairs = np.ix_(own_index, own_index), np.ix_(index, index)
         masses = max(masses, differs(M_ours[pairs[0]], M_theirs[pairs[1]]))
     return {
-        "lost": [*lost, *(name for name in bodies if name not in frames)],
+        "lost": [
+            *lost,
+            *(n for n in bodies if n not in frames and not is_world(tree, n, robot)),
+        ],
         "poses": poses,
         "mass_matrix": masses,
         "limits": limits_differ(tree, robot, log),
         "mimics": mimics_lost(tree, robot, log),
     }
+
+
+def elements(path: Path) -> ElementTree.Element:
+    return ElementTree.fromstring(path.read_bytes().strip())
+
+
+def is_world(tree: ElementTree.Element, name: str, robot: RobotDescription) -> bool:
+    """Whether a body of Pinocchio's is the world, to which our root is attached."""
+    children = {child.get("link") for child in tree.iter("child")}
+    return name not in children and robot.links[0].name != name
 
 
 def link_name(model: Any, log: Log, name: str) -> str | None:
@@ -276,6 +290,9 @@ def compare_mjcf(theirs: Any, robot: RobotDescription, log: Log) -> Row:
         name = log.name("link", theirs.body(b).name or f"body{b}")
         bodies[b] = mujoco.mj_name2id(ours, mujoco.mjtObj.mjOBJ_BODY, name)
     lost += [theirs.body(b).name for b, own in bodies.items() if own < 0]
+    left_out = {name for name in lost if f"'{name}'" in " ".join(log.warnings)}
+    lost = [name for name in lost if name and name not in left_out]
+    zero, origins = np.zeros(3), {b: origin(theirs, b) for b in bodies}
     matched = [j for j in found if theirs.jnt_type[j] in single]
     rng = np.random.default_rng(0)
     poses = masses = 0.0
@@ -296,7 +313,10 @@ def compare_mjcf(theirs: Any, robot: RobotDescription, log: Log) -> Row:
             poses = max(
                 poses,
                 differs(
-                    relative(data_ours, base, own), relative(data_theirs, first, b)
+                    relative(data_ours, base, own, zero, zero),
+                    relative(
+                        data_theirs, first, b, origins.get(first, zero), origins[b]
+                    ),
                 ),
             )
         M = {}
@@ -326,11 +346,20 @@ def is_root(model: Any, joint: int, robot: RobotDescription) -> bool:
     return bool(first and robot.root.kind == "planar")
 
 
-def relative(data: Any, base: int, body: int) -> Any:
-    """Return position and rotation of a body in another, as 12 numbers."""
-    R = data.xmat[base].reshape(3, 3)
-    p = R.T @ (data.xpos[body] - data.xpos[base])
-    return np.concatenate([p, (R.T @ data.xmat[body].reshape(3, 3)).ravel()])
+def origin(model: Any, body: int) -> Any:
+    """Return where a body's last joint is; our links have their frame there."""
+    last = model.body_jntadr[body] + model.body_jntnum[body] - 1
+    return model.jnt_pos[last] if model.body_jntnum[body] else np.zeros(3)
+
+
+def relative(data: Any, base: int, body: int, at: Any, origin: Any) -> Any:
+    """Return position and rotation of a body in another, as 12 numbers.
+
+    Both frames are moved to the points `at` and `origin` of their bodies.
+    """
+    R, R_body = (data.xmat[k].reshape(3, 3) for k in (base, body))
+    p = data.xpos[body] + R_body @ origin - data.xpos[base] - R @ at
+    return np.concatenate([R.T @ p, (R.T @ R_body).ravel()])
 
 
 # --- One file --------------------------------------------------------------------------
@@ -338,17 +367,12 @@ def relative(data: Any, base: int, body: int) -> Any:
 
 def mesh_report(path: Path, package: Path, log: Log) -> tuple[int, int]:
     """Return how many meshes of a URDF exist in its package, and how many were found."""
-    names = {
-        mesh.get("filename", "")
-        for mesh in ElementTree.parse(path).getroot().iter("mesh")
-    }
+    names = {mesh.get("filename", "") for mesh in elements(path).iter("mesh")}
     ends = {file.parts[-2:] for file in package.rglob("*") if file.is_file()}
     existing = [n for n in names if Path(n.partition("://")[2] or n).parts[-2:] in ends]
-    absent = " ".join(text for text in log.warnings if "meshes" in text)
-    counted = re.search(r"(\d+) of (\d+) meshes", absent)
-    missing = int(counted[1]) if counted else 0
-    outside = len(names) - len(existing)
-    return len(existing), len(existing) - max(0, missing - outside)
+    missing = len(names) - log.meshes
+    absent = len(names) - len(existing)
+    return len(existing), len(existing) - max(0, missing - absent)
 
 
 def measure(task: tuple[str, Path, Path]) -> Row | None:

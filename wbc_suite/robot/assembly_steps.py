@@ -11,6 +11,9 @@ from wbc_suite.robot.elements import Link
 from wbc_suite.robot.poses import joint_motion, pose_fields, se3_of
 from wbc_suite.robot.shapes import Shape, SkinMesh
 
+LISTS = ("frames", "cameras", "actuators", "sensors", "connects", "tendons")
+"""Lists of a component that are joined in an assembly."""
+
 if TYPE_CHECKING:
     from wbc_suite.robot.robot_file import Component
 
@@ -70,7 +73,7 @@ def prefixed(
         ),
     }
     elsewhere |= {"name": items, "frame": items}
-    for field in ("frames", "cameras", "sensors", "actuators", "connects"):
+    for field in LISTS:
         own = getattr(component, field)
         update[field] = tuple(_prefixed(item, elsewhere) for item in own)
     return component.model_copy(update=update)
@@ -82,6 +85,8 @@ def _prefixed(item: M, prefixes: Mapping[str, str]) -> M:
     for key, value in item:
         if isinstance(value, BaseModel):
             update[key] = _prefixed(value, prefixes)
+        elif isinstance(value, tuple) and key == "path":  # of a tendon
+            update[key] = tuple(_prefixed(step, prefixes) for step in value)
         elif isinstance(value, str) and key in prefixes:
             update[key] = prefixes[key] + value
     return item.model_copy(update=update)

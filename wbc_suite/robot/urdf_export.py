@@ -116,7 +116,7 @@ def _limit(joint: Joint) -> Element:
 
 def _link(robot: RobotDescription, link: Link, mesh_dir: Path | None) -> Element:
     element = Element("link", name=link.name)
-    if link.mass > 0.0:
+    if link.mass > 0.0 or any(link.inertia):
         inertial = SubElement(element, "inertial")
         inertial.append(_origin(pin.SE3(np.eye(3), np.asarray(link.com))))
         SubElement(inertial, "mass", value=_numbers(link.mass))
