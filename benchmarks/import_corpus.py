@@ -251,7 +251,10 @@ def mimics_lost(
 ) -> list[str]:
     """Return the followers of the file that are independent in the description."""
     followers = [
-        j.get("name", "") for j in tree.iter("joint") if j.find("mimic") is not None
+        joint.get("name", "")
+        for joint in tree.iter("joint")
+        for mimic in joint.findall("mimic")
+        if log.name("joint", mimic.get("joint", "")) in robot.joint_names
     ]
     names = [log.name("joint", name) for name in followers]
     return [n for n in names if n in robot.joint_names and robot.joint(n).mimic is None]
@@ -283,17 +286,22 @@ def compare_mjcf(theirs: Any, robot: RobotDescription, log: Log) -> Row:
     lost = [
         theirs.joint(j).name
         for j, own in joints.items()
-        if own < 0 and theirs.jnt_type[j] in single and not is_root(theirs, j, robot)
+        if own < 0
+        and int(theirs.jnt_type[j]) in single
+        and not is_root(theirs, j, robot)
     ]
     bodies = {}
     for b in range(1, theirs.nbody):
         name = log.name("link", theirs.body(b).name or f"body{b}")
         bodies[b] = mujoco.mj_name2id(ours, mujoco.mjtObj.mjOBJ_BODY, name)
-    lost += [theirs.body(b).name for b, own in bodies.items() if own < 0]
-    left_out = {name for name in lost if f"'{name}'" in " ".join(log.warnings)}
-    lost = [name for name in lost if name and name not in left_out]
+    said = " ".join(text for text in log.warnings if "left out" in text)
+    lost += [
+        theirs.body(b).name
+        for b, own in bodies.items()
+        if own < 0 and f"'{theirs.body(int(theirs.body_rootid[b])).name}'" not in said
+    ]
     zero, origins = np.zeros(3), {b: origin(theirs, b) for b in bodies}
-    matched = [j for j in found if theirs.jnt_type[j] in single]
+    matched = [j for j in found if int(theirs.jnt_type[j]) in single]
     rng = np.random.default_rng(0)
     poses = masses = 0.0
     data_ours, data_theirs = mujoco.MjData(ours), mujoco.MjData(theirs)

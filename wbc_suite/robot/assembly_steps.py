@@ -1,7 +1,7 @@
 """Steps of an assembly: order links, prefix names, rename colours, lock joints."""
 
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 from pydantic import BaseModel
@@ -85,8 +85,9 @@ def _prefixed(item: M, prefixes: Mapping[str, str]) -> M:
     for key, value in item:
         if isinstance(value, BaseModel):
             update[key] = _prefixed(value, prefixes)
-        elif isinstance(value, tuple) and key == "path":  # of a tendon
-            update[key] = tuple(_prefixed(step, prefixes) for step in value)
+        elif key == "path":  # of a tendon
+            steps = cast("tuple[BaseModel, ...]", value)
+            update[key] = tuple(_prefixed(step, prefixes) for step in steps)
         elif isinstance(value, str) and key in prefixes:
             update[key] = prefixes[key] + value
     return item.model_copy(update=update)

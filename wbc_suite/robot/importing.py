@@ -32,7 +32,7 @@ OVERLAP = 1e-3  # smallest penetration in m that counts as an overlap
 MAX_JOINTS_BETWEEN = 3
 """Largest number of joints between overlapping links that are excluded from contact.
 Links farther apart, such as an arm and the trunk, overlap because of the posture."""
-CARRIER_MASS, END_MASS = 1e-9, 1e-3
+CARRIER_MASS, END_MASS = 1e-10, 1e-3
 """Mass in kg of a moving link for which the file has none, if it carries others."""
 GYRATION = 0.03  # radius of gyration of such a link, m
 MAX_MESSAGE = 800  # largest number of characters of a list in a message
@@ -159,7 +159,7 @@ def _with_masses(links: Sequence[Link], source: Path, *, strict: bool) -> list[L
     if empty:
         LOG.warning(
             "%s: the links %s move but have no mass; mended: 1e-3 kg for those at the "
-            "ends, a microgram for those that carry others.",
+            "ends, 1e-10 kg for those that carry others.",
             *(source, shown),
         )
     carrying: set[str | None] = set()

@@ -16,7 +16,7 @@ INERTIA_SLACK = 1e-6
 """Relative slack of the triangle inequality; vendors round their tensors."""
 GYRATION_RANGE = (0.08, 1.1)
 """Plausible radius of gyration over half the diagonal of the link's shapes."""
-SMALLEST_MASS = 1e-9  # smallest accepted mass in kg; MuJoCo refuses masses below 1e-15
+SMALLEST_MASS = 1e-10  # smallest accepted mass in kg; MuJoCo refuses masses below 1e-15
 SMALLEST_MOMENT = 1e-14  # principal moments below count as not positive, kg m^2
 COM_SLACK = 0.10
 """Part of the bounding box by which the centre of mass may lie outside it."""

@@ -63,7 +63,10 @@ def read_points(path: Path) -> Matrix:
             f"{path}: the mesh has {size} bytes; at most {MAX_BYTES} are read."
         )
     if path.suffix.lower() == COLLADA:
-        return np.unique(_read_mesh(path, (1.0, 1.0, 1.0))[0], axis=0)
+        try:
+            return np.unique(_read_mesh(path, (1.0, 1.0, 1.0))[0], axis=0)
+        except ConfigError as error:
+            raise DescriptionError(str(error)) from error
     try:
         data = path.read_bytes()
         count = int.from_bytes(data[HEADER - 4 : HEADER], "little")  # in a binary STL
@@ -125,7 +128,9 @@ def _read_mesh(path: Path, scale: Vector3) -> tuple[Matrix, Indices]:
     except Exception as error:  # trimesh raises anything for a malformed file
         raise ConfigError(f"{path}: not a readable mesh: {error}.") from error
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
-    vertices, faces = np.asarray(mesh.vertices) * scale, np.asarray(mesh.faces)
+    factor, times, _ = str(mesh.units).partition(" * ")  # "0.0254 * meters"
+    metres = float(factor) if times else 1.0
+    vertices, faces = np.asarray(mesh.vertices) * scale * metres, np.asarray(mesh.faces)
     if np.prod(scale) < 0.0:  # a reflection turns the faces inside out
         faces = faces[:, ::-1]
     if not len(faces) or not np.isfinite(vertices).all():

@@ -33,7 +33,7 @@ from wbc_suite.typing import Vector
 
 LOG = logging.getLogger(__name__)
 
-DUMMY = {"mass": 1e-9, "inertia": (1e-13, 1e-13, 1e-13, 0.0, 0.0, 0.0)}
+DUMMY = {"mass": 1e-10, "inertia": (1e-13, 1e-13, 1e-13, 0.0, 0.0, 0.0)}
 """Negligible mass and inertia of the links between the joints of one body."""
 FREE, BALL = mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_BALL
 SLIDE, HINGE = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
@@ -48,7 +48,7 @@ def read_mjcf(
 
     MuJoCo compiles it. Bodies become links, sites become frames, joint equalities
     become mimic joints, meshes become convex hulls. A body with several joints becomes
-    a chain with links of a microgram; a ball joint becomes three hinges about x, y and
+    a chain with links of 1e-10 kg; a ball joint becomes three hinges about x, y and
     z. Springs, tendons, gravity compensation and closed loops act in MuJoCo only. Items
     of the world body (floors, lights) are ignored, and so are free objects beside a
     robot. Groups and end effectors are inferred; `to_toml()` writes the result for

@@ -40,7 +40,7 @@ def read_connects(
     """Yield the connects and welds of bodies, whose links have their origin moved."""
     for e in range(m.neq):
         first, second = int(m.eq_obj1id[e]), int(m.eq_obj2id[e])
-        of_bodies = m.eq_objtype[e] == OBJ.mjOBJ_BODY and m.eq_type[e] in LISTED
+        of_bodies = m.eq_objtype[e] == OBJ.mjOBJ_BODY and int(m.eq_type[e]) in LISTED
         if not of_bodies or not {first, second} <= bodies.keys():
             continue
         names = {"link": bodies[first], "other": bodies[second]}
@@ -124,5 +124,5 @@ def not_represented(
             yield f"{name}, which is not linear in another joint"
         elif m.eq_type[e] == EQ.mjEQ_TENDON and not _holds_tendon(m, e):
             yield f"{name}, which couples two tendons"
-        elif m.eq_type[e] in LISTED and m.eq_objtype[e] != OBJ.mjOBJ_BODY:
+        elif int(m.eq_type[e]) in LISTED and m.eq_objtype[e] != OBJ.mjOBJ_BODY:
             yield f"{name}, which is between sites"

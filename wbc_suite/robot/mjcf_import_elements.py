@@ -33,7 +33,7 @@ def read_shapes(
     visual: list[dict[str, Any]] = []
     collision: list[dict[str, Any]] = []
     for g in np.flatnonzero(m.geom_bodyid == body).tolist():
-        if m.geom_type[g] in TERRAINS:
+        if int(m.geom_type[g]) in TERRAINS:
             continue
         shape = _shape(m, g)
         own = pin.SE3(np.eye(3), np.asarray(shape.pop("pos", np.zeros(3))))
