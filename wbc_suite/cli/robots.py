@@ -17,6 +17,7 @@ def view(
     gripper: options.GripperOption = None,
     base: options.BaseOption = None,
     skin: options.SkinOption = None,
+    mesh_root: options.MeshRootOption = None,
     host: options.HostOption = "127.0.0.1",
     port: options.PortOption = None,
     catalogue: options.CatalogueOption = None,
@@ -27,7 +28,9 @@ def view(
     from wbc_suite.viewers.robot_page import RobotPage
 
     chosen = options.chosen(gripper)
-    description = load_robot(robot, gripper=chosen, base=base, skin=skin)
+    description = load_robot(
+        robot, gripper=chosen, base=base, skin=skin, mesh_root=mesh_root
+    )
     page = RobotPage(description, PageServer(host, port))
     options.serve_until_interrupted(page.site, description.title or description.name)
     page.stop()
@@ -76,21 +79,22 @@ def export_robot(
         Path | None,
         typer.Option("--output", "-o", help="File to write; otherwise it is printed."),
     ] = None,
-    mend_inertias: Annotated[
-        bool, typer.Option(help="Replace inertias that no body has (of a URDF file).")
-    ] = False,
+    mesh_root: options.MeshRootOption = None,
+    strict: options.StrictOption = False,
     gripper: options.GripperOption = None,
     base: options.BaseOption = None,
     catalogue: options.CatalogueOption = None,
 ) -> None:
     """Write a robot for other programs, or a URDF or MJCF file as a TOML to edit."""
     from wbc_suite.robot import load_robot
-    from wbc_suite.robot.urdf_import import read_urdf
 
-    if mend_inertias and robot.endswith(".urdf"):
-        description = read_urdf(robot, mend_inertias=True)
-    else:
-        description = load_robot(robot, gripper=options.chosen(gripper), base=base)
+    description = load_robot(
+        robot,
+        gripper=options.chosen(gripper),
+        base=base,
+        mesh_root=mesh_root,
+        strict=strict,
+    )
     text = getattr(description, f"to_{to}")()
     if output is None:
         print(text)

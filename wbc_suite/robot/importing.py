@@ -18,6 +18,7 @@ from wbc_suite.robot.group_inference import (
     infer_role,
 )
 from wbc_suite.robot.inertia import implausible, nearest_physical, unphysical
+from wbc_suite.robot.shapes import Shape
 from wbc_suite.robot.standing_posture import standing_legs
 from wbc_suite.robot.validation import RESERVED
 from wbc_suite.tomlfile import parse_model
@@ -178,7 +179,15 @@ def _with_masses(links: Sequence[Link], source: Path, *, strict: bool) -> list[L
 
 def _physical(links: Sequence[Link], source: Path, *, strict: bool) -> list[Link]:
     """Correct the inertias that no rigid body can have, or refuse them if `strict`."""
-    faults = {link.name: fault for link in links if (fault := unphysical(link))}
+    rigid = rigid_bodies(links)
+    turning = {rigid[link.name] for link in links if any(link.inertia)}
+    moving = {link.name for link in links if link.joint} - turning
+    faults = {
+        link.name: "it turns, and its mass has no extent"
+        for link in links
+        if rigid[link.name] in moving and link.mass > 0.0
+    }
+    faults |= {link.name: fault for link in links if (fault := unphysical(link))}
     shown = "; ".join(f"link '{n}': {fault}" for n, fault in faults.items())
     if faults and strict:
         raise DescriptionError(
@@ -205,6 +214,42 @@ def _accept_implausible(links: Sequence[Link], source: Path) -> list[Link]:
         link.model_copy(update={"accept": dict.fromkeys(faults[link.name], reason)})
         for link in links
     ]
+
+
+def with_soles(robot: RobotDescription) -> RobotDescription:
+    """Return a free robot whose feet collide: with their visual shapes if need be.
+
+    Without frames of feet these are all links.
+
+    Raises:
+        DescriptionError: If it has no shape to stand on.
+    """
+    rigid = rigid_bodies(robot.links)
+    feet = {rigid[frame.link] for frame in robot.frames if frame.role == "foot"}
+    standing = [x for x in robot.links if not feet or rigid[x.name] in feet]
+    solid = {rigid[link.name] for link in standing if link.collision}
+    bare = [x for x in standing if x.visual and rigid[x.name] not in solid]
+    if solid >= feet and solid:
+        return robot
+    if not bare:
+        names = ", ".join(sorted(feet)) or "its links"
+        raise DescriptionError(
+            f"{robot.name}: a free robot stands on its collision shapes, but there are "
+            f"neither these nor visual ones on {names}. Meshes that were not found "
+            "count as none."
+        )
+    shown = join_first([f"'{link.name}'" for link in bare])
+    LOG.warning("%s: collides with its visual shapes: %s.", robot.name, shown)
+    update = {
+        link.name: link.model_copy(update={"collision": _solid(link.visual)})
+        for link in bare
+    }
+    links = tuple(update.get(link.name, link) for link in robot.links)
+    return robot.model_copy(update={"links": links})
+
+
+def _solid(shapes: Sequence[Shape]) -> tuple[Shape, ...]:
+    return tuple(shape.model_copy(update={"color": "grey"}) for shape in shapes)
 
 
 def overlapping_links(robot: RobotDescription) -> tuple[tuple[str, str], ...]:

@@ -182,7 +182,7 @@ class _Importer:
         if self._balls:
             balls = join_first([_joint_name(m, j) for j in self._balls])
             LOG.warning("%s: ball joints become three hinges each: %s.", path, balls)
-        springs = int(np.count_nonzero(np.reshape(m.jnt_stiffness, (m.njnt, -1))[:, 0]))
+        springs = sum(bool(np.any(m.jnt_stiffness[j])) for j in range(m.njnt))
         compensated = int(np.count_nonzero(m.body_gravcomp))
         for count, what in (
             (springs, "joints with springs"),
