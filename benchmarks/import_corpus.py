@@ -5,7 +5,8 @@ their own; nothing of them is run. Every URDF with a moving joint that Pinocchio
 and every MJCF with one that MuJoCo compiles, is imported with default arguments and
 compared with that engine's own loader: poses of all bodies at random positions, mass
 matrix, limits and followers. Meshes count as existing if a file of the package has
-their name and folder. Each robot then holds `ready` for a second.
+their name and folder. Each robot then holds `ready` for a second with its default
+controller; one with legs stands on its own feet.
 
 Usage: python benchmarks/import_corpus.py [--quick] [--folder DIR] [--unseen]
        [--only TEXT] [--json FILE] [--table FILE]
@@ -31,6 +32,7 @@ import numpy as np
 import pinocchio as pin
 from harness.report import Report, options
 
+from wbc_suite.envs.hold_check import hold_faults
 from wbc_suite.errors import WbcError
 from wbc_suite.robot import RobotDescription, load_robot
 
@@ -50,7 +52,6 @@ CONFIGURATIONS = 5  # random positions at which poses and mass matrices are comp
 TOLERANCE = 1e-9  # of the largest magnitude, and absolute for magnitudes below 1
 PATIENCE = 120  # s for one file
 UNLIMITED = 1e6  # effort, velocity or range as large as this means none
-SHARES = {"URDF": 0.97, "MJCF": 0.95, "meshes": 0.95}
 Row = dict[str, Any]
 
 
@@ -105,7 +106,7 @@ class Log(logging.Handler):
         elif record.levelno >= logging.WARNING:
             self.warnings.append(record.getMessage())
 
-    def name(self, kind: str, original: str) -> str:
+    def named(self, kind: str, original: str) -> str:
         """Return the name that an item of the file has in the description."""
         return self.names.get((kind, original), original)
 
@@ -116,9 +117,6 @@ def differs(ours: Any, theirs: Any) -> float:
     if ours.size == 0:
         return 0.0
     return float(np.max(np.abs(ours - theirs)) / max(1.0, np.max(np.abs(theirs))))
-
-
-# --- Pinocchio -------------------------------------------------------------------------
 
 
 def pinocchio_model(path: Path) -> Any | None:
@@ -135,9 +133,9 @@ def compare_urdf(path: Path, theirs: Any, robot: RobotDescription, log: Log) -> 
     ours = robot.to_pinocchio()
     tree = elements(path)
     names = {
-        name: log.name("joint", name)
+        name: log.named("joint", name)
         for name in theirs.names[1:]
-        if ours.existJointName(log.name("joint", name))
+        if ours.existJointName(log.named("joint", name))
         and theirs.joints[theirs.getJointId(name)].nv == 1
     }
     lost = [
@@ -204,7 +202,7 @@ def is_world(tree: ElementTree.Element, name: str, robot: RobotDescription) -> b
 
 
 def link_name(model: Any, log: Log, name: str) -> str | None:
-    known = (log.name("link", name), log.name("frame", name))
+    known = (log.named("link", name), log.named("frame", name))
     return next((own for own in known if model.existFrame(own)), None)
 
 
@@ -232,7 +230,7 @@ def limits_differ(
     """Return the largest difference of ranges, efforts and speeds from the file."""
     worst = 0.0
     for joint in tree.iter("joint"):
-        name, limit = log.name("joint", joint.get("name", "")), joint.find("limit")
+        name, limit = log.named("joint", joint.get("name", "")), joint.find("limit")
         if limit is None or name not in robot.joint_names:
             continue
         own = robot.joint(name)
@@ -254,13 +252,10 @@ def mimics_lost(
         joint.get("name", "")
         for joint in tree.iter("joint")
         for mimic in joint.findall("mimic")
-        if log.name("joint", mimic.get("joint", "")) in robot.joint_names
+        if log.named("joint", mimic.get("joint", "")) in robot.joint_names
     ]
-    names = [log.name("joint", name) for name in followers]
+    names = [log.named("joint", name) for name in followers]
     return [n for n in names if n in robot.joint_names and robot.joint(n).mimic is None]
-
-
-# --- MuJoCo ----------------------------------------------------------------------------
 
 
 def mujoco_model(path: Path) -> Any | None:
@@ -279,7 +274,7 @@ def compare_mjcf(theirs: Any, robot: RobotDescription, log: Log) -> Row:
     single = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
     joints = {}
     for j in range(theirs.njnt):
-        name = log.name("joint", theirs.joint(j).name or f"joint{j}")
+        name = log.named("joint", theirs.joint(j).name or f"joint{j}")
         own = mujoco.mj_name2id(ours, mujoco.mjtObj.mjOBJ_JOINT, name)
         joints[j] = own
     found = {j: own for j, own in joints.items() if own >= 0}
@@ -292,7 +287,7 @@ def compare_mjcf(theirs: Any, robot: RobotDescription, log: Log) -> Row:
     ]
     bodies = {}
     for b in range(1, theirs.nbody):
-        name = log.name("link", theirs.body(b).name or f"body{b}")
+        name = log.named("link", theirs.body(b).name or f"body{b}")
         bodies[b] = mujoco.mj_name2id(ours, mujoco.mjtObj.mjOBJ_BODY, name)
     said = " ".join(text for text in log.warnings if "left out" in text)
     lost += [
@@ -370,11 +365,8 @@ def relative(data: Any, base: int, body: int, at: Any, origin: Any) -> Any:
     return np.concatenate([R.T @ p, (R.T @ R_body).ravel()])
 
 
-# --- One file --------------------------------------------------------------------------
-
-
 def mesh_report(path: Path, package: Path, log: Log) -> tuple[int, int]:
-    """Return how many meshes of a URDF exist in its package, and how many were found."""
+    """Return how many meshes of a URDF exist in its package and how many we found."""
     names = {mesh.get("filename", "") for mesh in elements(path).iter("mesh")}
     ends = {file.parts[-2:] for file in package.rglob("*") if file.is_file()}
     existing = [n for n in names if Path(n.partition("://")[2] or n).parts[-2:] in ends]
@@ -408,6 +400,7 @@ def measure(task: tuple[str, Path, Path]) -> Row | None:
         else:
             row |= compare_mjcf(theirs, robot, log)
         row["joints"], row["root"] = len(robot.joints), robot.root.kind
+        row["seconds_to_motion"], row["holds"] = hold(path, robot)
         row["warnings"] = log.warnings
         row["mended"] = any("mended" in text for text in log.warnings)
         row["result"] = "loaded"
@@ -415,11 +408,24 @@ def measure(task: tuple[str, Path, Path]) -> Row | None:
         row["result"] = f"error: over {PATIENCE} s"
     except WbcError as error:
         row["result"] = f"refused: {error}".replace(f"{root}/", "")
-    except Exception:  # a traceback is a fault that the table must show
+    except Exception:  # noqa: BLE001 - a traceback is a fault that the table shows
         row["result"] = f"error: {traceback.format_exc()[-600:]}"
     finally:
         signal.alarm(0)
     return row
+
+
+def hold(path: Path, robot: RobotDescription) -> tuple[float, list[str]]:
+    """Hold `ready`, legged robots on their feet; return seconds taken and faults."""
+    began = time.perf_counter()
+    feet = any(frame.role == "foot" for frame in robot.frames)
+    try:
+        if feet and robot.root.kind == "fixed":
+            robot = load_robot(path, root="free")
+        faults = hold_faults(robot)
+    except WbcError as error:
+        faults = [f"refused: {error}"]
+    return time.perf_counter() - began, faults
 
 
 def stop(*_: object) -> None:
@@ -449,6 +455,7 @@ def main() -> None:
         "--unseen", action="store_true", help="packages not seen before"
     )
     parser.add_argument("--only", default="", help="files whose path holds this text")
+    parser.add_argument("--table", type=Path, help="page to write")
     parser.add_argument("--processes", type=int, default=2)
     arguments = parser.parse_args()
     packages: Sequence[str] = UNSEEN if arguments.unseen else DEVELOPED_WITH
@@ -468,35 +475,87 @@ def main() -> None:
     report.rows.sort(key=lambda row: (row["side"], row["case"]))
     summarise(report)
     report.write(arguments.json)
+    if arguments.table:
+        write_table(report, arguments.table)
 
 
 def summarise(report: Report) -> None:
     """Print what was refused and what disagrees, and the shares."""
     loaded = [row for row in report.rows if row["result"] == "loaded"]
+    keys = ("lost", "poses", "mass_matrix", "limits", "mimics")
     for row in report.rows:
+        place = f"{row['side']}: {row['case']}"
         if row["result"] != "loaded":
-            print(f"{row['side']}: {row['case']}: {row['result']}\n")
+            print(f"{place}: {row['result']}")
         elif not agrees(row):
-            found = {
-                k: row[k] for k in ("lost", "poses", "mass_matrix", "limits", "mimics")
-            }
-            print(f"{row['side']}: {row['case']}: disagrees: {found}\n")
+            print(f"{place}: disagrees: { {key: row[key] for key in keys} }")
     for kind in ("URDF", "MJCF"):
         rows = [row for row in report.rows if row["format"] == kind]
         good = [row for row in rows if row in loaded]
         if rows:
-            report.ratios[kind] = len(good) / len(rows)
+            report.ratios[f"{kind} loaded"] = len(good) / len(rows)
             report.ratios[f"{kind} agree"] = sum(map(agrees, good)) / max(1, len(good))
-            mended = sum(row["mended"] for row in good)
-            print(
-                f"{kind}: {len(good)} of {len(rows)} load, {mended} with mended inertias"
-            )
+            held = sum(not row["holds"] for row in good)
+            report.ratios[f"{kind} hold still"] = held / max(1, len(good))
     exist = sum(row.get("meshes_exist", 0) for row in loaded)
     found = sum(row.get("meshes_found", 0) for row in loaded)
     if exist:
-        report.ratios["meshes"] = found / exist
-        print(f"meshes: {found} of {exist}")
+        report.ratios["meshes found"] = found / exist
     report.show_ratios()
+
+
+HEAD = """# Public robots
+
+Written by `python benchmarks/import_corpus.py --table FILE`. Each URDF with a moving
+joint that Pinocchio loads, and each MJCF with one that MuJoCo compiles, is imported
+with default arguments.
+
+- *agree*: poses of all bodies at random positions, mass matrix, limits and followers
+  equal those of the engine's own loader to 1e-9.
+- *mended*: the file has inertias that no body can have, or moving links without mass.
+  Its mass matrix is not compared.
+- *hold*: the robot keeps `ready` for a second on a floor under its default controller;
+  one with legs stands free on its feet, without a controller file.
+"""
+
+
+def write_table(report: Report, path: Path) -> None:
+    """Write a page with one line for each package, and what was refused or moves."""
+    lines = [HEAD]
+    head = ("package", "format", "files", "loaded", "agree", "mended", "meshes", "hold")
+    lines += ["| " + " | ".join(head) + " |", "| --- | --- |" + " ---: |" * 6]
+    groups: dict[tuple[str, str], list[Row]] = {}
+    for row in report.rows:
+        groups.setdefault((row["side"], row["format"]), []).append(row)
+    for (package, kind), rows in groups.items():
+        good = [row for row in rows if row["result"] == "loaded"]
+        exist = sum(row.get("meshes_exist", 0) for row in good)
+        found = sum(row.get("meshes_found", 0) for row in good)
+        cells = (package, kind, len(rows), len(good), sum(map(agrees, good)))
+        cells += (sum(row["mended"] for row in good),)
+        cells += (f"{found} of {exist}" if exist else "", held(good))
+        lines.append("| " + " | ".join(map(str, cells)) + " |")
+    lines += ["", "## Not loaded, or different", ""]
+    for row in report.rows:
+        if row["result"] != "loaded":
+            lines.append(f"- `{row['case']}`: {row['result']}")
+        elif not agrees(row):
+            lines.append(f"- `{row['case']}`: disagrees in {disagreement(row)}")
+    lines += ["", "## Do not hold still", ""]
+    for row in report.rows:
+        if row["result"] == "loaded" and row["holds"]:
+            lines.append(f"- `{row['case']}`: {' '.join(row['holds'])}")
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def held(rows: Sequence[Row]) -> int:
+    return sum(not row["holds"] for row in rows)
+
+
+def disagreement(row: Row) -> str:
+    keys = ("poses", "mass_matrix", "limits")
+    found = [f"{key} ({row[key]:.1e})" for key in keys if row[key] > TOLERANCE]
+    return ", ".join([*found, *row["lost"], *row["mimics"]])
 
 
 if __name__ == "__main__":

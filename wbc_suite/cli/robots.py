@@ -85,7 +85,10 @@ def export_robot(
     base: options.BaseOption = None,
     catalogue: options.CatalogueOption = None,
 ) -> None:
-    """Write a robot for other programs, or a URDF or MJCF file as a TOML to edit."""
+    """Write a robot for other programs, or a URDF or MJCF file as a TOML to edit.
+
+    A URDF gets a folder with meshes beside it for shapes that URDF lacks.
+    """
     from wbc_suite.robot import load_robot
 
     description = load_robot(
@@ -95,11 +98,15 @@ def export_robot(
         mesh_root=mesh_root,
         strict=strict,
     )
-    text = getattr(description, f"to_{to}")()
     if output is None:
-        print(text)
+        print(getattr(description, f"to_{to}")())
         return
     with options.writing(output):
+        if to == "urdf":
+            folder = output.with_name(f"{output.stem}_meshes")
+            text = description.to_urdf(mesh_dir=folder)
+        else:
+            text = getattr(description, f"to_{to}")()
         output.write_text(text, encoding="utf-8")
     print(f"Wrote {output} ({len(text) / 1000:.0f} kB).")
 

@@ -1,14 +1,16 @@
 """Simulate a robot for a second at `ready`, and name what moves and why."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import mujoco
 import numpy as np
 
+from wbc_suite.benchmark import ObjectBenchmark, ObjectBenchmarkConfig
 from wbc_suite.envs.env import RobotEnv
 from wbc_suite.errors import WbcError
 from wbc_suite.robot import RobotDescription
 from wbc_suite.scene import robot_prefix
+from wbc_suite.scene.objects import SceneObject
 from wbc_suite.typing import Vector
 
 SECONDS = 1.0
@@ -19,15 +21,44 @@ LIGHT = 1e-4
 SHOWN = 4  # joints that are named
 
 
+class _Floor(ObjectBenchmark):
+    """A robot alone on the floor."""
+
+    needs_gripper = False
+
+    def __init__(self) -> None:
+        places = {"default": (0.0, 0.0)}
+        super().__init__(
+            ObjectBenchmarkConfig(
+                format=1, name="Floor", title="Floor", horizon=1000, places=places
+            )
+        )
+
+    def furnish(self, spec: mujoco.MjSpec) -> None:
+        """Add nothing to the floor."""
+
+    def objects(self) -> Sequence[SceneObject]:
+        """Return no object."""
+        return ()
+
+    def success(self) -> bool:
+        """Return False; there is nothing to do."""
+        return False
+
+    def progress(self) -> float:
+        """Return no reward."""
+        return 0.0
+
+
 def hold_faults(robot: RobotDescription, *, seconds: float = SECONDS) -> list[str]:
     """Return one sentence for each fault of a robot that holds `ready` in simulation.
 
-    The robot stands in Lift with its default controller, a free robot with feet in
-    Stand. Faults are a fall, divergence, and joints that move away, each with its
-    likely cause. The list is empty if the robot stays where it is.
+    The robot is alone on the floor, with its default controller. Faults are a fall,
+    divergence, and joints that move away, each with its likely cause. The list is empty
+    if the robot stays where it is.
     """
     feet = any(frame.role == "foot" for frame in robot.frames)
-    benchmark = "Stand" if feet and robot.root.kind == "free" else "Lift"
+    benchmark = "Stand" if feet and robot.root.kind == "free" else _Floor
     try:
         env = RobotEnv(benchmark, robots=robot, horizon=100_000)
     except WbcError as error:
