@@ -31,6 +31,8 @@ ADDED = (
     *("benchmark/reach", "benchmark/stand", "benchmark/walk_to"),
     # experts
     *("experts/", "scene/objects/grasp_site", "cli/expert"),
+    # imports of other robots
+    *("envs/hold_check", "robot/mjcf_import_constraints"),
     # checks of messages and caches
     *("viewers/page_messages", "kernel_cache"),
 )

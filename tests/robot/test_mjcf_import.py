@@ -5,10 +5,11 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import wbc_suite
 from wbc_suite.catalogue import Catalogue
-from wbc_suite.errors import ConfigError
+from wbc_suite.errors import ConfigError, DescriptionError
 from wbc_suite.robot.mesh_files import write_stl
 from wbc_suite.robot.mjcf_import import read_mjcf
 from wbc_suite.robot.shapes import Box, Hull
@@ -224,33 +225,6 @@ def test_meshes_become_hulls(tmp_path):
 
 
 FAULTS = {
-    "ball": (body('<joint name="j" type="ball"/>'), "joint 'j' is a ball joint"),
-    "spring": (body('<joint name="j" stiffness="3"/>'), "joint 'j' has a spring"),
-    "two free trees": (
-        '<mujoco><worldbody><body><freejoint name="f"/><geom size="1"/></body>'
-        '<body><geom size="1"/></body></worldbody></mujoco>',
-        "joint 'f' is free, but there are several root bodies",
-    ),
-    "weld": (
-        body("", '<equality><weld body1="child"/></equality>'),
-        "neither a joint equality nor a connect of two bodies",
-    ),
-    "polynomial": (
-        body(
-            '<joint name="a"/><joint name="b" axis="1 0 0"/>',
-            '<equality><joint joint1="a" joint2="b" polycoef="0 0 1 0 0"/></equality>',
-        ),
-        "is not linear in another joint",
-    ),
-    "tendon": (
-        body(
-            '<joint name="a"/>',
-            '<tendon><fixed name="t" stiffness="1"><joint joint="a" coef="1"/></fixed>'
-            "</tendon>",
-        ),
-        "tendon 't' has forces",
-    ),
-    "gravcomp": (body("").replace('"child"', '"child" gravcomp="1"'), "gravcomp"),
     "nothing": ("<mujoco/>", "the model has no body"),
     "plugin": (
         '<mujoco><extension><plugin plugin="x"/></extension></mujoco>',
@@ -263,15 +237,6 @@ FAULTS = {
         "MuJoCo refuses it.* valid meshid",
     ),
     "no number": (body('<joint axis="0 nan 1"/>'), "contains NaN; give numbers"),
-    "outside mesh": (
-        '<mujoco><asset><mesh file="../secret.stl"/></asset></mujoco>',
-        "lies outside the folder",
-    ),
-    "outside folder": (
-        '<mujoco><compiler meshdir="/etc"/><asset><mesh file="a.stl"/></asset>'
-        "</mujoco>",
-        "lies outside the folder",
-    ),
     "outside include": (
         '<mujoco><include file="../secret.xml"/></mujoco>',
         "lies outside the folder",
@@ -286,3 +251,137 @@ def test_what_does_not_fit_gets_one_clear_error(tmp_path, text, message):
     with pytest.raises(ConfigError, match=message) as caught:
         read_mjcf(path)
     assert str(path) in str(caught.value)
+
+
+LEFT_OUT = {
+    "polynomial": (
+        body(
+            '<joint name="a"/><joint name="b" axis="1 0 0"/>',
+            '<equality><joint name="e" joint1="a" joint2="b" polycoef="0 0 1 0 0"/>'
+            "</equality>",
+        ),
+        "equality 'e', which is not linear in another joint",
+    ),
+    "wrapping tendon": (
+        body(
+            '<joint name="a"/><site name="s"/><geom name="g" size="0.01"/>'
+            '<site name="e" pos="1 0 0"/>',
+            '<tendon><spatial name="t" stiffness="1"><site site="s"/><geom geom="g"/>'
+            '<site site="e"/></spatial></tendon>',
+        ),
+        "tendon 't', which wraps or leaves the robot",
+    ),
+}
+
+
+@pytest.mark.parametrize(("text", "message"), LEFT_OUT.values(), ids=LEFT_OUT.keys())
+def test_what_is_left_out_is_named_and_refused_if_strict(
+    tmp_path, text, message, caplog
+):
+    path = write(tmp_path, text)
+    read_mjcf(path)
+    assert f"left out: {message}" in caplog.text
+    with pytest.raises(DescriptionError, match=message):
+        read_mjcf(path, strict=True)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '<mujoco><asset><mesh file="../secret.stl"/></asset></mujoco>',
+        '<mujoco><compiler meshdir="FOLDER"/><asset><mesh file="secret.stl"/></asset>'
+        "</mujoco>",
+    ],
+)
+def test_files_outside_the_folder_are_read_only_when_named(tmp_path, text):
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
+    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    write_stl(tmp_path / "secret.stl", vertices, faces)
+    (tmp_path / "robot").mkdir()
+    path = write(tmp_path / "robot", text.replace("FOLDER", str(tmp_path)))
+    with pytest.raises(ConfigError, match="lies outside the folder"):
+        read_mjcf(path)
+    with pytest.raises(DescriptionError, match="no body"):  # the mesh is read
+        read_mjcf(path, mesh_root=tmp_path)
+
+
+SPRUNG = """<mujoco><compiler angle="radian"/><worldbody><body name="base">
+  <geom size="0.1" mass="1"/>
+  <body name="upper" pos="0 0 0.1" gravcomp="0.5"><geom size="0.1" mass="1"/>
+    <joint name="a" axis="0 1 0" stiffness="3" springref="0.2" damping="1"/>
+    <site name="s"/>
+    <body name="lower" pos="0.3 0 0"><geom size="0.1" mass="1"/>
+      <joint name="b" axis="0 1 0"/><site name="t"/>
+      <body name="hand" pos="0.3 0 0"><geom type="box" size="0.1 0.05 0.02" mass="1"/>
+        <joint name="c" type="ball" pos="0 0 0.05" damping="0.1" stiffness="2"/>
+      </body></body></body></body></worldbody>
+  <tendon>
+    <fixed name="sum" stiffness="5" damping="0.3" range="-1 1" limited="true">
+      <joint joint="a" coef="0.5"/><joint joint="b" coef="-1"/></fixed>
+    <spatial name="string" frictionloss="0.1"><site site="s"/><site site="t"/></spatial>
+  </tendon>
+  <equality><tendon tendon1="sum"/><weld body1="base" body2="lower"/>
+  </equality></mujoco>"""
+
+
+def test_springs_tendons_and_gravity_compensation_act_as_in_the_file(tmp_path):
+    path = write(tmp_path, SPRUNG)
+    (tmp_path / "again.toml").write_text(read_mjcf(path).to_toml(), encoding="utf-8")
+    robot = wbc_suite.load_robot(tmp_path / "again.toml")
+    ours, theirs = robot.to_mjspec().compile(), mujoco.MjModel.from_xml_path(str(path))
+    forces, errors = [], []
+    for model in (ours, theirs):
+        data = mujoco.MjData(model)
+        for name, value in (("a", 0.4), ("b", -0.7)):
+            data.qpos[model.joint(name).qposadr] = value
+            data.qvel[model.joint(name).dofadr] = 3 * value
+        mujoco.mj_forward(model, data)
+        own = [model.joint(name).dofadr[0] for name in "ab"]
+        range_ = model.tendon_range[0]
+        forces.append([*data.qfrc_passive[own], *data.ten_length, *range_])
+        errors.append(np.sort(data.efc_pos[: data.ne]))
+    # The ball's dummy links of 1e-10 kg add forces of 1e-9 N m.
+    np.testing.assert_allclose(forces[0], forces[1], atol=1e-8)
+    # The held tendon, and the six directions of the weld.
+    np.testing.assert_allclose(errors[0], errors[1], atol=1e-9)
+
+
+def test_a_ball_joint_becomes_three_hinges_that_reach_its_orientations(tmp_path):
+    path = write(tmp_path, SPRUNG)
+    robot = read_mjcf(path)
+    ours, theirs = robot.to_mjspec().compile(), mujoco.MjModel.from_xml_path(str(path))
+    turn = Rotation.from_euler("XYZ", [0.4, -0.3, 0.9])
+    data, other = mujoco.MjData(ours), mujoco.MjData(theirs)
+    for axis, angle in zip("xyz", turn.as_euler("XYZ"), strict=True):
+        data.qpos[ours.joint(f"c_{axis}").qposadr] = angle
+    start = theirs.joint("c").qposadr[0]
+    other.qpos[start : start + 4] = turn.as_quat(scalar_first=True)
+    for m, d in ((ours, data), (theirs, other)):
+        mujoco.mj_forward(m, d)
+    found, wanted = data.body("hand"), other.body("hand")
+    np.testing.assert_allclose(found.xmat, wanted.xmat, atol=1e-12)
+    np.testing.assert_allclose(found.xipos, wanted.xipos, atol=1e-12)
+
+
+def test_free_objects_of_a_scene_are_left_out(tmp_path, caplog):
+    text = (
+        '<mujoco><worldbody><body name="ball"><freejoint/><geom size="1"/></body>'
+        '<body name="arm"><geom size="1"/><joint name="a"/></body></worldbody></mujoco>'
+    )
+    robot = read_mjcf(write(tmp_path, text))
+    assert robot.joint_names == ("a",)
+    assert "objects beside the robot are left out: ['ball']" in caplog.text
+
+
+def test_a_plane_on_a_body_is_no_shape_of_the_robot(tmp_path):
+    text = body('<joint name="j"/>').replace(
+        "<geom", '<geom type="plane" size="1 1 1"/><geom', 1
+    )
+    robot = read_mjcf(write(tmp_path, text))
+    shapes = [shape.shape for link in robot.links for shape in link.visual]
+    assert shapes == ["sphere", "sphere"]
+
+
+def test_size_hints_of_older_files_are_ignored(tmp_path):
+    text = body("<joint/>").replace("<mujoco>", '<mujoco><size nstack="5000000"/>')
+    assert read_mjcf(write(tmp_path, text)).dof == 1

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import wbc_suite
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.robot.mesh_files import read_points
-from wbc_suite.robot.shape_geometry import support_points
+from wbc_suite.robot.shape_geometry import shape_bounds, support_points
 from wbc_suite.robot.urdf_export import write_urdf
 
 ROBOTS = Catalogue().names("robots")
@@ -152,7 +152,28 @@ def test_shapes_that_urdf_lacks_become_meshes(bag, tmp_path: Path):
         points = read_points(tmp_path / file)
         np.testing.assert_allclose(points.min(0), vertices.min(0), atol=1e-6)
         np.testing.assert_allclose(points.max(0), vertices.max(0), atol=1e-6)
-    assert len(list((tmp_path / "meshes").iterdir())) == 3
+    assert len(list((tmp_path / "meshes").iterdir())) == 4
+    points = read_points(tmp_path / "meshes" / "bag_visual3.stl")
+    np.testing.assert_allclose(points.max(0), [0.1, 0.2, 0.3], atol=2e-3)
+
+
+def test_engines_read_the_meshes_of_an_exported_robot(bag, tmp_path: Path):
+    solid = bag.links[0].model_copy(update={"collision": bag.links[0].visual})
+    robot = bag.model_copy(update={"links": (solid,)})
+    path = tmp_path / "bag.urdf"
+    path.write_text(robot.to_urdf(mesh_dir=tmp_path / "meshes"), encoding="utf-8")
+    model = mujoco.MjModel.from_xml_path(str(path))
+    assert (model.geom_type == mujoco.mjtGeom.mjGEOM_MESH).sum() == 4
+    tree = pin.buildModelFromUrdf(str(path))
+    kind = pin.GeometryType.VISUAL
+    shapes = pin.buildGeomFromUrdf(tree, str(path), kind, [str(tmp_path)])
+    names = [g.meshPath for g in shapes.geometryObjects if g.meshPath.endswith(".stl")]
+    assert len(names) == 4
+    again = wbc_suite.load_robot(path)
+    hull = again.links[0].visual[0]
+    low, high = shape_bounds(hull)
+    wanted = shape_bounds(bag.links[0].visual[0])
+    np.testing.assert_allclose([low, high], wanted, atol=5e-3)
 
 
 def test_shapes_that_urdf_lacks_become_bounding_boxes(bag):

@@ -2,6 +2,7 @@
 
 import itertools
 import logging
+import re
 from pathlib import Path
 
 import mujoco
@@ -11,7 +12,7 @@ import pytest
 
 import wbc_suite
 from wbc_suite.catalogue import Catalogue
-from wbc_suite.errors import ConfigError
+from wbc_suite.errors import ConfigError, DescriptionError
 from wbc_suite.robot.mesh_files import write_stl
 from wbc_suite.robot.shape_geometry import support_points
 from wbc_suite.robot.shapes import Box, Cylinder, Hull
@@ -376,21 +377,62 @@ def test_a_visual_that_cannot_be_read_is_drawn_as_it_collides(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["../secret.stl", "/etc/passwd", "file:///etc/hosts"])
-def test_meshes_outside_the_folder_are_refused(tmp_path, name):
+def test_meshes_outside_the_folder_are_not_read(tmp_path, name, caplog):
     folder = tmp_path / "robot"
     folder.mkdir()
     write_stl(tmp_path / "secret.stl", *tetrahedron())
-    with pytest.raises(ConfigError, match="lies outside the folder"):
-        read_urdf(write(folder, mesh_robot(name)))
+    path = write(folder, mesh_robot(name))
+    assert read_urdf(path).links[0].visual == ()
+    assert f"1 of 1 meshes are not in {folder}: {name}" in caplog.text
 
 
-def test_a_link_out_of_the_folder_is_refused(tmp_path):
+def test_a_mesh_root_allows_more_files(tmp_path):
+    folder = tmp_path / "robot"
+    folder.mkdir()
+    write_stl(tmp_path / "secret.stl", *tetrahedron())
+    path = write(folder, mesh_robot("../secret.stl"))
+    robot = wbc_suite.load_robot(path, mesh_root=tmp_path)
+    assert isinstance(robot.links[0].visual[0], Hull)
+
+
+def test_a_link_out_of_the_folder_is_not_followed(tmp_path):
     folder = tmp_path / "robot"
     folder.mkdir()
     write_stl(tmp_path / "secret.stl", *tetrahedron())
     (folder / "part.stl").symlink_to(tmp_path / "secret.stl")
-    with pytest.raises(ConfigError, match="lies outside the folder"):
-        read_urdf(write(folder, mesh_robot("part.stl")))
+    assert read_urdf(write(folder, mesh_robot("part.stl"))).links[0].visual == ()
+
+
+@pytest.mark.parametrize(
+    ("file", "mesh", "reference"),
+    [
+        (
+            "pack/urdf/a/r.urdf",
+            "pack/meshes/part.stl",
+            "package://pack/meshes/part.stl",
+        ),
+        ("pack/urdf/r.urdf", "pack/parts/part.stl", "../parts/part.stl"),
+        ("pack/r.urdf", "pack/meshes/part.stl", "package://other/meshes/part.stl"),
+        ("pack/x/y/r.urdf", "pack/meshes/part.stl", "../../meshes/part.stl"),
+        (
+            "pack/x/y/r.urdf",
+            "pack/x/parts/part.stl",
+            "package:///pack/x/parts/part.stl",
+        ),
+        ("pack/robots/r.urdf", "pack/part.stl", "model://pack/part.stl"),
+    ],
+)
+def test_meshes_are_found_in_the_package_around_the_file(
+    tmp_path, file, mesh, reference
+):
+    write_stl(tmp_path / mesh, *tetrahedron())
+    path = tmp_path / file
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(mesh_robot(reference), encoding="utf-8")
+    robot = read_urdf(path, skin=True)
+    assert isinstance(robot.links[0].visual[0], Hull)
+    (skin,) = robot.skins[robot.links[0].name]
+    assert Path(skin.file) == tmp_path / mesh
 
 
 def test_chains_of_followers_follow_the_first(tmp_path):
@@ -431,29 +473,6 @@ FAULTS = {
     "duplicated joint": (
         one_arm(TWO, joint("a", "base", "l0") + joint("a", "l0", "l1")),
         "two joints are named 'a'",
-    ),
-    "unphysical inertia": (
-        one_arm(f'<link name="l0">{BAD}</link>', joint("a", "base", "l0")),
-        "link 'l0': the principal moments .* violate the triangle inequality",
-    ),
-    "no mass": (
-        one_arm('<link name="l0"/>', joint("a", "base", "l0")),
-        "the links 'l0' move but have no mass",
-    ),
-    "point mass that turns": (
-        one_arm(
-            '<link name="l0"/><link name="l1"><inertial><mass value="1"/>'
-            '<inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/></inertial>'
-            "</link>",
-            joint("a", "base", "l0") + joint("b", "l0", "l1", kind="fixed"),
-        ),
-        "link 'l0' moves and needs an inertia",
-    ),
-    "revolute without limit": (
-        one_arm(
-            f'<link name="l0">{BODY}</link>', joint("a", "base", "l0", kind="revolute")
-        ),
-        "joint 'a': a revolute joint needs <limit>",
     ),
     "floating in the middle": (
         one_arm(
@@ -503,14 +522,131 @@ def test_a_faulty_file_gets_one_clear_error(tmp_path, text, message):
     assert str(caught.value).count(str(path)) == 1
 
 
-def test_unphysical_inertias_can_be_mended(tmp_path, caplog):
-    text, _ = FAULTS["unphysical inertia"]
-    robot = read_urdf(write(tmp_path, text), mend_inertias=True)
+POINT = (
+    '<inertial><mass value="1"/>'
+    '<inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/></inertial>'
+)
+MENDED = {
+    "unphysical inertia": (
+        one_arm(f'<link name="l0">{BAD}</link>', joint("a", "base", "l0")),
+        "link 'l0': the principal moments .* violate the triangle inequality",
+    ),
+    "no mass": (
+        one_arm('<link name="l0"/>', joint("a", "base", "l0")),
+        "the links 'l0' move but have no mass",
+    ),
+    "point mass that turns": (
+        one_arm(
+            f'<link name="l0"/><link name="l1">{POINT}</link>',
+            joint("a", "base", "l0") + joint("b", "l0", "l1", kind="fixed"),
+        ),
+        "link 'l1': it turns, and its mass has no extent",
+    ),
+    "empty shape": (
+        one_arm(
+            f'<link name="l0">{BODY}<visual><geometry><sphere radius="0"/></geometry>'
+            "</visual></link>",
+            joint("a", "base", "l0"),
+        ),
+        "link 'l0', visual: <sphere> has the radius 0",
+    ),
+    "follower of nothing": (
+        one_arm(
+            f'<link name="l0">{BODY}</link>',
+            joint("a", "base", "l0", inner='<mimic joint="b"/>'),
+        ),
+        "joint 'a' follows 'b', which is no moving joint",
+    ),
+}
+
+
+@pytest.mark.parametrize(("text", "message"), MENDED.values(), ids=MENDED.keys())
+def test_faults_are_mended_with_a_warning_or_refused(tmp_path, text, message, caplog):
+    path = write(tmp_path, text)
+    robot = read_urdf(path)
+    assert re.search(message, caplog.text)
+    model = robot.to_mjspec().compile()
+    assert np.isfinite(model.dof_invweight0).all()
+    with pytest.raises(DescriptionError, match=message):
+        read_urdf(path, strict=True)
+
+
+def test_unphysical_inertias_are_mended(tmp_path):
+    text, _ = MENDED["unphysical inertia"]
+    robot = read_urdf(write(tmp_path, text))
     xx, yy, zz, *_ = robot.link("l0").inertia
     # The nearest moments without negative mass along z: 0.15 + 0.15 >= 0.3 (+ 1 mm).
     np.testing.assert_allclose([xx, yy, zz], [0.15, 0.15, 0.3], atol=3e-6)
-    assert "link 'l0'" in caplog.text
-    assert "corrected" in caplog.text
+
+
+LIMIT = '<limit lower="-1" upper="1" effort="1" velocity="1"/>'
+
+
+def test_massless_links_between_masses_hardly_change_the_mass_matrix(tmp_path):
+    text = one_arm(
+        f'<link name="l0"/><link name="l1">{BODY}</link>',
+        joint("a", "base", "l0", kind="revolute", inner=LIMIT)
+        + joint("b", "l0", "l1", kind="revolute", inner=LIMIT),
+    )
+    path = write(tmp_path, text)
+    ours, theirs = read_urdf(path).to_pinocchio(), pin.buildModelFromUrdf(str(path))
+    q = np.array([0.3, -0.4])
+    found = pin.crba(ours, ours.createData(), q)
+    wanted = pin.crba(theirs, theirs.createData(), q)
+    np.testing.assert_allclose(np.triu(found), np.triu(wanted), atol=1e-9)
+
+
+def test_a_tensor_without_mass_is_kept(tmp_path):
+    tensor = POINT.replace('mass value="1"', 'mass value="0"').replace(
+        'ixx="0" iyy="0" izz="0"', 'ixx="0.2" iyy="0.2" izz="0.3"'
+    )
+    text = one_arm(
+        f'<link name="l0">{BODY}</link><link name="l1">{tensor}</link>',
+        joint("a", "base", "l0", kind="revolute", inner=LIMIT)
+        + joint("b", "l0", "l1", kind="fixed"),
+    )
+    path = write(tmp_path, text)
+    robot = read_urdf(path)
+    theirs = pin.buildModelFromUrdf(str(path))
+    wanted = pin.crba(theirs, theirs.createData(), np.zeros(1))
+    ours = robot.to_pinocchio()
+    assert pin.crba(ours, ours.createData(), np.zeros(1)) == pytest.approx(wanted)
+    model = robot.to_mjspec().compile()
+    assert model.dof_M0 == pytest.approx(wanted[0])
+    (tmp_path / "again.urdf").write_text(robot.to_urdf(), encoding="utf-8")
+    assert read_urdf(tmp_path / "again.urdf").link("l1").inertia[2] == 0.3
+
+
+@pytest.mark.parametrize(
+    "limit", ["", '<limit effort="1" velocity="1"/>', '<limit lower="1" upper="-1"/>']
+)
+def test_joints_without_a_range_are_endless(tmp_path, limit, caplog):
+    own = joint("a", "base", "l0", kind="revolute", inner=limit)
+    path = write(tmp_path, one_arm(f'<link name="l0">{BODY}</link>', own))
+    assert read_urdf(path).joint("a").range is None
+    assert "no range for these joints, which are endless: a" in caplog.text
+
+
+def test_a_floating_joint_below_a_solid_link_is_the_root(tmp_path, caplog):
+    text = one_arm(
+        TWO,
+        joint("free", "base", "l0", kind="floating") + joint("a", "l0", "l1"),
+    )
+    text = text.replace('<link name="base"/>', f'<link name="base">{BODY}</link>')
+    robot = read_urdf(write(tmp_path, text))
+    assert (robot.root.kind, robot.links[0].name) == ("free", "l0")
+    assert "'base' is the world, and left out" in caplog.text
+
+
+def test_a_free_robot_collides_with_its_visuals_or_is_refused(tmp_path, caplog):
+    ball = '<visual><geometry><sphere radius="0.1"/></geometry></visual>'
+    text = f'<robot name="r"><link name="base">{BODY}{{}}</link></robot>'
+    path = write(tmp_path, text.format(ball))
+    robot = wbc_suite.load_robot(path, root="free")
+    assert [shape.shape for shape in robot.links[0].collision] == ["sphere"]
+    assert "collides with its visual shapes: 'base'" in caplog.text
+    with pytest.raises(DescriptionError, match="stands on its collision shapes"):
+        wbc_suite.load_robot(write(tmp_path, text.format("")), root="free")
 
 
 def test_implausible_inertias_are_taken_with_a_warning(tmp_path, caplog):

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, TypeAlias, get_args
 
 import typer
 
-from wbc_suite.cli.options import CatalogueOption
+from wbc_suite.cli.options import CatalogueOption, MeshRootOption, StrictOption
 
 Kind = Literal["robots", "grippers", "bases", "benchmarks", "controllers"]
 Row: TypeAlias = tuple[str, ...]
@@ -108,13 +108,16 @@ def check_file(
         str | None,
         typer.Option(metavar="ROBOT", help="Check a controller's names against it."),
     ] = None,
+    mesh_root: MeshRootOption = None,
+    strict: StrictOption = False,
     catalogue: CatalogueOption = None,
 ) -> None:
     """Check a robot, benchmark or controller file, and print a summary.
 
     The file is read as loading reads it, and a robot's models are built for both
-    engines. The first error names the file, the key, the value and the rule. A JSON
-    file is a controller of robosuite, which needs its robot.
+    engines. A URDF or MJCF file is also simulated for a second at `ready`, and what
+    moves is named. The first error names the file, the key, the value and the rule. A
+    JSON file is a controller of robosuite, which needs its robot.
     """
     from wbc_suite.tomlfile import read_toml
 
@@ -139,14 +142,17 @@ def check_file(
             f"Skin of {len(skin.link)} links with {meshes} meshes of {skin.provider}."
         )
     else:
-        found = _robot(file)
+        found = _robot(file, mesh_root, strict=strict)
     print(f"{file}: fine. {found}")
 
 
-def _robot(file: Path) -> str:
+def _robot(file: Path, mesh_root: Path | None, *, strict: bool) -> str:
+    from wbc_suite.envs.hold_check import hold_faults
     from wbc_suite.robot import load_robot
 
-    robot = load_robot(file)
+    robot = load_robot(file, mesh_root=mesh_root, strict=strict)
+    for fault in hold_faults(robot) if file.suffix != ".toml" else ():
+        print(f"Warning: {fault}")
     simulated = robot.to_mjspec().compile()
     computed = robot.to_pinocchio()
     return (

@@ -46,6 +46,19 @@ SkinOption = Annotated[
         help="Draw with real meshes, from installed packages or from a folder.",
     ),
 ]
+MeshRootOption = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="DIR",
+        help="Where a URDF or MJCF file may read meshes from; else its own package.",
+    ),
+]
+StrictOption = Annotated[
+    bool,
+    typer.Option(
+        "--strict", help="Refuse a URDF or MJCF file with faults instead of mending it."
+    ),
+]
 RobotsOption = Annotated[
     list[str] | None,
     typer.Option(help="Robot; several with commas between them: Panda,Panda."),

@@ -17,6 +17,7 @@ def view(
     gripper: options.GripperOption = None,
     base: options.BaseOption = None,
     skin: options.SkinOption = None,
+    mesh_root: options.MeshRootOption = None,
     host: options.HostOption = "127.0.0.1",
     port: options.PortOption = None,
     catalogue: options.CatalogueOption = None,
@@ -27,7 +28,9 @@ def view(
     from wbc_suite.viewers.robot_page import RobotPage
 
     chosen = options.chosen(gripper)
-    description = load_robot(robot, gripper=chosen, base=base, skin=skin)
+    description = load_robot(
+        robot, gripper=chosen, base=base, skin=skin, mesh_root=mesh_root
+    )
     page = RobotPage(description, PageServer(host, port))
     options.serve_until_interrupted(page.site, description.title or description.name)
     page.stop()
@@ -75,25 +78,33 @@ def export_robot(
         Path | None,
         typer.Option("--output", "-o", help="File to write; otherwise it is printed."),
     ] = None,
-    mend_inertias: Annotated[
-        bool, typer.Option(help="Replace inertias that no body has (of a URDF file).")
-    ] = False,
+    mesh_root: options.MeshRootOption = None,
+    strict: options.StrictOption = False,
     gripper: options.GripperOption = None,
     base: options.BaseOption = None,
     catalogue: options.CatalogueOption = None,
 ) -> None:
-    """Write a robot for other programs, or a URDF or MJCF file as a TOML to edit."""
-    from wbc_suite.robot import load_robot
-    from wbc_suite.robot.urdf_import import read_urdf
+    """Write a robot for other programs, or a URDF or MJCF file as a TOML to edit.
 
-    if mend_inertias and robot.endswith(".urdf"):
-        description = read_urdf(robot, mend_inertias=True)
-    else:
-        description = load_robot(robot, gripper=options.chosen(gripper), base=base)
-    text = getattr(description, f"to_{to}")()
+    A URDF gets a folder with meshes beside it for shapes that URDF lacks.
+    """
+    from wbc_suite.robot import load_robot
+
+    description = load_robot(
+        robot,
+        gripper=options.chosen(gripper),
+        base=base,
+        mesh_root=mesh_root,
+        strict=strict,
+    )
     if output is None:
-        print(text)
+        print(getattr(description, f"to_{to}")())
         return
+    if to == "urdf":
+        meshes = output.with_name(f"{output.stem}_meshes")
+        text = description.to_urdf(mesh_dir=meshes)
+    else:
+        text = getattr(description, f"to_{to}")()
     options.write_file(output, lambda path: path.write_text(text, encoding="utf-8"))
     print(f"Wrote {output} ({len(text) / 1000:.0f} kB).")
 

@@ -7,6 +7,7 @@ from typing import Any
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.errors import ConfigError, DescriptionError, UnknownNameError
 from wbc_suite.robot.assembly_steps import (
+    LISTS,
     depth_first,
     locked,
     prefixed,
@@ -29,8 +30,6 @@ from wbc_suite.robot.shapes import SkinMesh
 from wbc_suite.robot.skins import SkinFinder
 from wbc_suite.tomlfile import parse_model
 
-LISTS = ("frames", "cameras", "actuators", "sensors", "connects")
-"""Lists of a component that are joined in an assembly."""
 TABLES = ("groups", "keyframes", "materials", "synergies", "skins")
 """Fields of a robot that are joined by name."""
 

@@ -1,7 +1,7 @@
 """Steps of an assembly: order links, prefix names, rename colours, lock joints."""
 
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 from pydantic import BaseModel
@@ -10,6 +10,9 @@ from wbc_suite.errors import look_up
 from wbc_suite.robot.elements import Link
 from wbc_suite.robot.poses import joint_motion, pose_fields, se3_of
 from wbc_suite.robot.shapes import Shape, SkinMesh
+
+LISTS = ("frames", "cameras", "actuators", "sensors", "connects", "tendons")
+"""Lists of a component that are joined in an assembly."""
 
 if TYPE_CHECKING:
     from wbc_suite.robot.robot_file import Component
@@ -70,7 +73,7 @@ def prefixed(
         ),
     }
     elsewhere |= {"name": items, "frame": items}
-    for field in ("frames", "cameras", "sensors", "actuators", "connects"):
+    for field in LISTS:
         own = getattr(component, field)
         update[field] = tuple(_prefixed(item, elsewhere) for item in own)
     return component.model_copy(update=update)
@@ -82,6 +85,9 @@ def _prefixed(item: M, prefixes: Mapping[str, str]) -> M:
     for key, value in item:
         if isinstance(value, BaseModel):
             update[key] = _prefixed(value, prefixes)
+        elif key == "path":  # of a tendon
+            steps = cast("tuple[BaseModel, ...]", value)
+            update[key] = tuple(_prefixed(step, prefixes) for step in steps)
         elif isinstance(value, str) and key in prefixes:
             update[key] = prefixes[key] + value
     return item.model_copy(update=update)

@@ -12,6 +12,8 @@ from wbc_suite.robot.validation import check_description
 from wbc_suite.tomlfile import parse_model
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     import mujoco
 
 _SIDES = {"right", "left"}
@@ -149,11 +151,15 @@ class RobotDescription(Elements):
 
         return build_pinocchio(self)
 
-    def to_urdf(self) -> str:
-        """Return the robot as URDF text; `write_urdf` lists what is converted."""
+    def to_urdf(self, *, mesh_dir: "Path | None" = None) -> str:
+        """Return the robot as URDF text; `write_urdf` lists what is converted.
+
+        Shapes that URDF lacks become boxes, or STL files in `mesh_dir`, which the text
+        names relative to the folder's parent.
+        """
         from wbc_suite.robot.urdf_export import write_urdf
 
-        return write_urdf(self)
+        return write_urdf(self, mesh_dir=mesh_dir)
 
     def to_toml(self) -> str:
         """Return the robot as one component file (TOML), without loss."""

@@ -16,7 +16,7 @@ from pydantic import (
     model_validator,
 )
 
-from wbc_suite.robot.shapes import Axis, Posed, Real, Shape, Vector3
+from wbc_suite.robot.shapes import Axis, Posed, Quaternion, Real, Shape, Vector3
 from wbc_suite.tomlfile import FROZEN, FrozenModel
 
 Name: TypeAlias = Annotated[
@@ -83,6 +83,7 @@ class Joint(FrozenModel):
         armature: Rotor inertia seen at the joint, kg m^2 or kg.
         damping: Viscous friction (MuJoCo only).
         frictionloss: Dry friction (MuJoCo only).
+        stiffness: Of a spring that acts towards `springref` (MuJoCo only).
         passive: A joint without motor that belongs to no group, such as a caster.
     """
 
@@ -96,6 +97,8 @@ class Joint(FrozenModel):
     armature: NotNegative = 0.0
     damping: NotNegative = 0.0
     frictionloss: NotNegative = 0.0
+    stiffness: NotNegative = 0.0
+    springref: Real = 0.0
     mimic: Mimic | None = None
     passive: bool = False
 
@@ -116,6 +119,7 @@ class Link(Posed):
             order xx yy zz xy xz yz.
         joint: Joint to the parent; absent for a fixed link.
         collision: Shapes to collide with (primitives and hulls).
+        gravcomp: Part of the weight that MuJoCo cancels (MuJoCo only).
         accept: Plausibility rules (`com`, `inertia`) that this link may violate, each
             with the reason.
     """
@@ -128,6 +132,7 @@ class Link(Posed):
     joint: Joint | None = None
     visual: tuple[Shape, ...] = ()
     collision: tuple[Shape, ...] = ()
+    gravcomp: Real = 0.0
     accept: dict[Literal["com", "inertia"], str] = {}
 
 
@@ -206,11 +211,49 @@ class Synergy(FrozenModel):
 
 
 class Connect(FrozenModel):
-    """A ball joint between two links that closes a loop (MuJoCo only)."""
+    """A ball joint between two links that closes a loop (MuJoCo only).
+
+    With `quat`, the orientation of `other` in `link`, the two are welded, and `anchor`
+    is the position of `other` in `link`.
+    """
 
     link: Name
     other: Name
     anchor: Vector3
+    quat: Quaternion | None = None
+
+
+class TendonStep(FrozenModel):
+    """A joint with its coefficient, or a frame that a tendon passes."""
+
+    joint: Name | None = None
+    coef: Real = 1.0
+    frame: Name | None = None
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> "TendonStep":
+        if (self.joint is None) == (self.frame is None):
+            raise ValueError("give either 'joint' or 'frame'")
+        return self
+
+
+class Tendon(FrozenModel):
+    """A weighted sum of joints, or a string through frames (MuJoCo only).
+
+    Attributes:
+        range: Smallest and largest length, m or rad.
+        springlength: Lengths between which the spring has no force.
+        held: Where given, the length is constant: this much more than at zero.
+    """
+
+    name: Name
+    path: tuple[TendonStep, ...] = Field(min_length=1)
+    range: Limits | None = None
+    stiffness: NotNegative = 0.0
+    damping: NotNegative = 0.0
+    frictionloss: NotNegative = 0.0
+    springlength: Range | None = None
+    held: Real | None = None
 
 
 class Contacts(FrozenModel):
@@ -268,6 +311,7 @@ class Elements(BaseModel):
     actuators: tuple[Actuator, ...] = Field(default=(), alias="actuator")
     sensors: tuple[Sensor, ...] = Field(default=(), alias="sensor")
     connects: tuple[Connect, ...] = Field(default=(), alias="connect")
+    tendons: tuple[Tendon, ...] = Field(default=(), alias="tendon")
     groups: dict[Name, tuple[Name, ...]] = {}
     keyframes: dict[Name, dict[Name, float]] = Field(default={}, alias="keyframe")
     contacts: Contacts = Contacts()

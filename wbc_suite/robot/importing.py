@@ -18,6 +18,7 @@ from wbc_suite.robot.group_inference import (
     infer_role,
 )
 from wbc_suite.robot.inertia import implausible, nearest_physical, unphysical
+from wbc_suite.robot.shapes import Shape
 from wbc_suite.robot.standing_posture import standing_legs
 from wbc_suite.robot.validation import RESERVED
 from wbc_suite.tomlfile import parse_model
@@ -32,6 +33,9 @@ OVERLAP = 1e-3  # smallest penetration in m that counts as an overlap
 MAX_JOINTS_BETWEEN = 3
 """Largest number of joints between overlapping links that are excluded from contact.
 Links farther apart, such as an arm and the trunk, overlap because of the posture."""
+CARRIER_MASS, END_MASS = 1e-10, 1e-3
+"""Mass in kg of a moving link for which the file has none, if it carries others."""
+GYRATION = 0.03  # radius of gyration of such a link, m
 MAX_MESSAGE = 800  # largest number of characters of a list in a message
 
 
@@ -67,23 +71,25 @@ def describe_import(
     links: Sequence[LinkFields],
     frames: Sequence[dict[str, Any]],
     names: NameTable,
-    mend_inertias: bool = False,
+    strict: bool = False,
     **others: Any,
 ) -> RobotDescription:
     """Check imported links and frames, and infer what the file does not define.
 
     Groups, end effectors and a `ready` posture are inferred unless `others` has them.
-    An implausible inertia is only a warning, since some meshes may not be read.
+    Inertias that no body can have are replaced by the nearest possible ones with a
+    warning, or refused if the import is `strict`. An implausible inertia is only a
+    warning, since some meshes may not be read.
 
     Raises:
-        DescriptionError: If the robot is inconsistent or unphysical.
+        DescriptionError: If the robot is inconsistent, or unphysical and `strict`.
     """
     checked: list[Link] = []
     for fields in _without_chains(links):
         where = f"{source}: link '{fields['name']}'"
         checked.append(parse_model(Link, fields, source=where, error=DescriptionError))
-    _check_masses(checked, source)
-    checked = _physical(checked, source, mend=mend_inertias)
+    checked = _with_masses(checked, source, strict=strict)
+    checked = _physical(checked, source, strict=strict)
     checked = _accept_implausible(checked, source)
     given = [
         parse_model(
@@ -136,31 +142,63 @@ def _without_chains(links: Sequence[LinkFields]) -> Sequence[LinkFields]:
     return links
 
 
-def _check_masses(links: Sequence[Link], source: Path) -> None:
-    """Refuse moving links without mass, with advice for the file."""
+def _with_masses(links: Sequence[Link], source: Path, *, strict: bool) -> list[Link]:
+    """Give moving links without mass a negligible one, or refuse them if `strict`.
+
+    MuJoCo needs a mass on each. One that carries other masses gets `CARRIER_MASS`.
+    """
     rigid = rigid_bodies(links)
     heavy = {rigid[link.name] for link in links if link.mass > 0.0}
-    empty = [f"'{x.name}'" for x in links if x.joint and x.name not in heavy]
-    if empty:
+    empty = [x.name for x in links if x.joint and x.name not in heavy]
+    shown = join_first([f"'{name}'" for name in empty], limit=len(links))
+    if empty and strict:
         raise DescriptionError(
-            f"{source}: the links {join_first(empty)} move but have no mass. Give each "
-            "a mass and an inertia (1e-3 kg and 1e-6 kg m^2 are enough for a dummy), "
-            "or make its joint fixed."
+            f"{source}: the links {shown} move but have no mass. Give each a mass and "
+            "an inertia (1e-3 kg and 1e-6 kg m^2 are enough for a dummy), or make its "
+            "joint fixed."
         )
+    if empty:
+        LOG.warning(
+            "%s: the links %s move but have no mass; mended: 1e-3 kg for those at the "
+            "ends, 1e-10 kg for those that carry others.",
+            *(source, shown),
+        )
+    carrying: set[str | None] = set()
+    for link in reversed(links):
+        if link.mass > 0.0 or link.name in carrying:
+            carrying.add(link.parent)
+
+    def weighted(link: Link) -> Link:
+        mass = CARRIER_MASS if link.name in carrying else END_MASS
+        own = (mass * GYRATION**2,) * 3 + (0.0,) * 3
+        inertia = link.inertia if any(link.inertia) else own
+        return link.model_copy(update={"mass": mass, "inertia": inertia})
+
+    return [weighted(link) if link.name in empty else link for link in links]
 
 
-def _physical(links: Sequence[Link], source: Path, *, mend: bool) -> list[Link]:
-    """Refuse or correct the inertias that no rigid body can have."""
-    faults = {link.name: fault for link in links if (fault := unphysical(link))}
-    if faults and not mend:
-        shown = "; ".join(f"link '{n}': {fault}" for n, fault in faults.items())
+def _physical(links: Sequence[Link], source: Path, *, strict: bool) -> list[Link]:
+    """Correct the inertias that no rigid body can have, or refuse them if `strict`."""
+    rigid = rigid_bodies(links)
+    turning = {rigid[link.name] for link in links if any(link.inertia)}
+    moving = {link.name for link in links if link.joint} - turning
+    faults = {
+        link.name: "it turns, and its mass has no extent"
+        for link in links
+        if rigid[link.name] in moving and link.mass > 0.0
+    }
+    faults |= {link.name: fault for link in links if (fault := unphysical(link))}
+    shown = "; ".join(f"link '{n}': {fault}" for n, fault in faults.items())
+    if faults and strict:
         raise DescriptionError(
             f"{source}: {shortened(shown, MAX_MESSAGE)}. Correct these links in the "
-            "file, or take the nearest physical tensors: wbc-suite export FILE "
-            "--mend-inertias --to toml, or read_urdf(path, mend_inertias=True)."
+            "file, or leave out --strict to take the nearest possible inertias."
         )
-    for name, fault in faults.items():
-        LOG.warning("%s: link '%s': %s; corrected.", source, name, fault)
+    if faults:
+        LOG.warning(
+            "%s: %d inertias are mended to the nearest that a body can have: %s.",
+            *(source, len(faults), shown),
+        )
     return [nearest_physical(x) if x.name in faults else x for x in links]
 
 
@@ -176,6 +214,42 @@ def _accept_implausible(links: Sequence[Link], source: Path) -> list[Link]:
         link.model_copy(update={"accept": dict.fromkeys(faults[link.name], reason)})
         for link in links
     ]
+
+
+def with_soles(robot: RobotDescription) -> RobotDescription:
+    """Return a free robot whose feet collide: with their visual shapes if need be.
+
+    Without frames of feet these are all links.
+
+    Raises:
+        DescriptionError: If it has no shape to stand on.
+    """
+    rigid = rigid_bodies(robot.links)
+    feet = {rigid[frame.link] for frame in robot.frames if frame.role == "foot"}
+    standing = [x for x in robot.links if not feet or rigid[x.name] in feet]
+    solid = {rigid[link.name] for link in standing if link.collision}
+    bare = [x for x in standing if x.visual and rigid[x.name] not in solid]
+    if solid >= feet and solid:
+        return robot
+    if not bare:
+        names = ", ".join(sorted(feet)) or "its links"
+        raise DescriptionError(
+            f"{robot.name}: a free robot stands on its collision shapes, but there are "
+            f"neither these nor visual ones on {names}. Meshes that were not found "
+            "count as none."
+        )
+    shown = join_first([f"'{link.name}'" for link in bare])
+    LOG.warning("%s: collides with its visual shapes: %s.", robot.name, shown)
+    update = {
+        link.name: link.model_copy(update={"collision": _solid(link.visual)})
+        for link in bare
+    }
+    links = tuple(update.get(link.name, link) for link in robot.links)
+    return robot.model_copy(update={"links": links})
+
+
+def _solid(shapes: Sequence[Shape]) -> tuple[Shape, ...]:
+    return tuple(shape.model_copy(update={"color": "grey"}) for shape in shapes)
 
 
 def overlapping_links(robot: RobotDescription) -> tuple[tuple[str, str], ...]:

@@ -16,7 +16,7 @@ INERTIA_SLACK = 1e-6
 """Relative slack of the triangle inequality; vendors round their tensors."""
 GYRATION_RANGE = (0.08, 1.1)
 """Plausible radius of gyration over half the diagonal of the link's shapes."""
-SMALLEST_MASS = 1e-9  # smallest accepted mass in kg; MuJoCo refuses masses below 1e-15
+SMALLEST_MASS = 1e-10  # smallest accepted mass in kg; MuJoCo refuses masses below 1e-15
 SMALLEST_MOMENT = 1e-14  # principal moments below count as not positive, kg m^2
 COM_SLACK = 0.10
 """Part of the bounding box by which the centre of mass may lie outside it."""
@@ -43,11 +43,8 @@ def inertia_fields(tensor: Matrix) -> tuple[float, ...]:
 def unphysical(link: "Link") -> str | None:
     """Return why no rigid body has a link's inertia; None if one can have it."""
     if 0.0 < link.mass < SMALLEST_MASS:
-        return (
-            f"the mass {link.mass:.3g} kg is below {SMALLEST_MASS:g} kg; leave it out"
-        )
-    point = link.joint is None and not any(link.inertia)
-    if link.mass == 0.0 or point:
+        return f"the mass {link.mass:.3g} kg is below {SMALLEST_MASS:g} kg"
+    if not any(link.inertia) and (link.joint is None or link.mass == 0.0):
         return None  # a point mass is fixed to a body that has a tensor
     moments: Vector = np.linalg.eigvalsh(inertia_matrix(link.inertia))
     if moments[0] <= SMALLEST_MOMENT:
@@ -74,10 +71,11 @@ def nearest_physical(link: "Link") -> "Link":
     """
     inertia = inertia_matrix(link.inertia)
     moments, axes = np.linalg.eigh(np.trace(inertia) / 2 * np.eye(3) - inertia)
-    raised = np.maximum(moments, link.mass * MIN_GYRATION**2)
+    mass = max(link.mass, SMALLEST_MASS) if link.mass > 0.0 else 0.0
+    raised = np.maximum(moments, max(mass * MIN_GYRATION**2, SMALLEST_MOMENT))
     second = (axes * raised) @ axes.T
     fields = inertia_fields(np.trace(second) * np.eye(3) - second)
-    return link.model_copy(update={"inertia": fields})
+    return link.model_copy(update={"mass": mass, "inertia": fields})
 
 
 def implausible(link: "Link") -> Iterator[tuple[Literal["com", "inertia"], str]]:

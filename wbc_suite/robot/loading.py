@@ -22,6 +22,8 @@ def load_robot(
     base: Choice = None,
     root: Literal["fixed", "planar", "free"] | None = None,
     skin: str | Path | None = None,
+    mesh_root: str | Path | None = None,
+    strict: bool = False,
     catalogue: Catalogue | None = None,
 ) -> RobotDescription:
     """Load a robot by its catalogue name, or from a TOML, URDF or MJCF file.
@@ -35,8 +37,13 @@ def load_robot(
         base: Another base with its own root and height; "none" leaves it out. A robot
             with legs or wheels accepts only a base without body (`NullMobileBase`).
         root: Another root: `fixed`, `planar` or `free`.
-        skin: "meshes" draws the robot with meshes of installed packages, a folder
-            with those found there; see `robot.skins`. Physics does not change.
+        skin: "meshes" draws the robot with meshes of installed packages, or of its
+            URDF; a folder with those found there, see `robot.skins`. Physics does not
+            change.
+        mesh_root: Folder that a URDF or MJCF file may read meshes from; by default the
+            package or model folder around it.
+        strict: Refuse a URDF or MJCF file with faults that are mended with a warning
+            otherwise.
         catalogue: Where names are looked up; by default the package's catalogue.
 
     Raises:
@@ -53,11 +60,22 @@ def load_robot(
     if not isinstance(name, str | Path):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise UnknownNameError("robot", name, catalogue.called("robots"))
     path = _locate(str(name), catalogue)
-    skins = None if skin is None else SkinFinder(skin, catalogue)
-    robot = _read(path, catalogue, gripper=gripper, base=base, skins=skins)
-    if skins is not None:
-        skins.report_missing()
-    return robot if root in (None, robot.root.kind) else robot.with_root(root)
+    if path.suffix == ".toml":
+        skins = None if skin is None else SkinFinder(skin, catalogue)
+        robot = _read(path, catalogue, gripper=gripper, base=base, skins=skins)
+        if skins is not None:
+            skins.report_missing()
+    elif gripper is not None or base is not None:
+        raise ConfigError(f"{path}: 'gripper' and 'base' need an assembly file.")
+    else:
+        robot = _import(path, skin is not None, mesh_root=mesh_root, strict=strict)
+    if root not in (None, robot.root.kind):
+        robot = robot.with_root(root)
+    if path.suffix == ".toml" or robot.root.kind != "free":
+        return robot
+    from wbc_suite.robot.importing import with_soles
+
+    return with_soles(robot)
 
 
 def _locate(name: str, catalogue: Catalogue) -> Path:
@@ -87,21 +105,27 @@ def _read(
     base: Choice,
     skins: SkinFinder | None,
 ) -> RobotDescription:
-    if path.suffix == ".toml":
-        content = read_robot_file(path)
-        if not isinstance(content, Component):
-            return assemble(
-                path, catalogue=catalogue, gripper=gripper, base=base, skins=skins
-            )
-        robot = describe_component(content, source=str(path), skins=skins)
-    elif path.suffix == ".urdf":
+    content = read_robot_file(path)
+    if not isinstance(content, Component):
+        return assemble(
+            path, catalogue=catalogue, gripper=gripper, base=base, skins=skins
+        )
+    if gripper is not None or base is not None:
+        raise ConfigError(f"{path}: 'gripper' and 'base' need an assembly file.")
+    return describe_component(content, source=str(path), skins=skins)
+
+
+def _import(
+    path: Path, skin: bool, *, mesh_root: str | Path | None, strict: bool
+) -> RobotDescription:
+    if path.suffix == ".urdf":
         from wbc_suite.robot.urdf_import import read_urdf
 
-        robot = read_urdf(path)
+        robot = read_urdf(path, mesh_root=mesh_root, strict=strict, skin=skin)
     else:
         from wbc_suite.robot.mjcf_import import read_mjcf
 
-        robot = read_mjcf(path)
-    if gripper is not None or base is not None:
-        raise ConfigError(f"{path}: 'gripper' and 'base' need an assembly file.")
+        robot = read_mjcf(path, mesh_root=mesh_root, strict=strict)
+    if skin and not robot.skins:
+        raise ConfigError(f"{path}: skin: no link is drawn by meshes that were found.")
     return robot

@@ -1,7 +1,7 @@
 """Mesh files (STL, OBJ): write, read points, and read the meshes of skins."""
 
 import hashlib
-import importlib
+import importlib.util
 import os
 from contextlib import suppress
 from pathlib import Path
@@ -14,7 +14,8 @@ from wbc_suite.errors import ConfigError, DescriptionError
 from wbc_suite.robot.shapes import SkinMesh, Vector3, cached_by_shape
 from wbc_suite.typing import Indices, Matrix
 
-READABLE = (".stl", ".obj")  # suffixes of the files that `read_points` can read
+READABLE = (".stl", ".obj")  # suffixes of the files that need no extra
+COLLADA = ".dae"
 MAX_BYTES = 100_000_000  # largest mesh file that is read
 
 TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("tag", "<u2")])
@@ -41,13 +42,31 @@ def write_stl(path: Path, vertices: Matrix, faces: Indices) -> None:
     path.write_bytes(b"\0" * (HEADER - len(count)) + count + records.tobytes())
 
 
+def can_read(path: Path) -> bool:
+    """Whether `read_points` can read a file, by its suffix and the installed extra."""
+    suffix = path.suffix.lower()
+    readers = ("trimesh", "collada")
+    return suffix in READABLE or (
+        suffix == COLLADA and all(importlib.util.find_spec(name) for name in readers)
+    )
+
+
 def read_points(path: Path) -> Matrix:
-    """Read the vertices (n, 3) of an STL or OBJ file; raises DescriptionError."""
+    """Read the vertices (n, 3) of an STL, OBJ or COLLADA file.
+
+    Raises:
+        DescriptionError: If it is not a mesh.
+    """
     size = path.stat().st_size
     if size > MAX_BYTES:
         raise DescriptionError(
             f"{path}: the mesh has {size} bytes; at most {MAX_BYTES} are read."
         )
+    if path.suffix.lower() == COLLADA:
+        try:
+            return np.unique(_read_mesh(path, (1.0, 1.0, 1.0))[0], axis=0)
+        except ConfigError as error:
+            raise DescriptionError(str(error)) from error
     try:
         data = path.read_bytes()
         count = int.from_bytes(data[HEADER - 4 : HEADER], "little")  # in a binary STL
@@ -109,7 +128,9 @@ def _read_mesh(path: Path, scale: Vector3) -> tuple[Matrix, Indices]:
     except Exception as error:  # trimesh raises anything for a malformed file
         raise ConfigError(f"{path}: not a readable mesh: {error}.") from error
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
-    vertices, faces = np.asarray(mesh.vertices) * scale, np.asarray(mesh.faces)
+    factor, times, _ = str(mesh.units).partition(" * ")  # "0.0254 * meters"
+    metres = float(factor) if times else 1.0
+    vertices, faces = np.asarray(mesh.vertices) * scale * metres, np.asarray(mesh.faces)
     if np.prod(scale) < 0.0:  # a reflection turns the faces inside out
         faces = faces[:, ::-1]
     if not len(faces) or not np.isfinite(vertices).all():

@@ -11,7 +11,7 @@ from pathlib import Path
 import mujoco
 
 from wbc_suite.errors import ConfigError, DescriptionError
-from wbc_suite.robot.xml_files import Element, inside, read_xml
+from wbc_suite.robot.xml_files import Element, inside, model_root, read_xml
 
 MAX_FILES = 50  # largest number of XML files that include one another
 MAX_ELEMENTS = 20_000
@@ -21,8 +21,7 @@ MAX_COPIES = 10_000
 """Largest number of elements that one `replicate`, `composite` or `flexcomp` makes."""
 MAX_POINTS = 20_000_000
 """Largest number of points of a height field, texture, camera or sensor: 160 MB."""
-MAX_ROWS = 100_000  # largest number of contacts, constraints, keys, or user numbers
-MAX_MEMORY = 1 << 32  # largest value of `memory`, bytes
+MAX_ROWS = 100_000  # largest number of keys or user numbers
 MAX_MESH_PARAMETER = 500
 """Largest parameter of a builtin mesh: the number of faces grows with its square."""
 MAX_FILE = 200_000_000  # largest mesh or picture file, bytes
@@ -32,46 +31,57 @@ _POINTS = (
     *("nrow", "ncol", "width", "height", "resolution"),
     *("dim", "num", "actdim", "nsample"),
 )
-_ROWS = ("nkey", "njmax", "nconmax", "nstack", "nuserdata")
-_UNITS = {"K": 10, "M": 20, "G": 30, "T": 40, "P": 50, "E": 60}
+_ROWS = ("nkey", "nuserdata")
+_HINTS = ("memory", "njmax", "nconmax", "nstack")
+"""Sizes that MuJoCo chooses itself; those of a file are ignored."""
 _PNG = b"\x89PNG\r\n\x1a\n"
 
 
-def compile_mjcf(path: Path) -> tuple[mujoco.MjModel, mujoco.MjSpec]:
+def compile_mjcf(
+    path: Path, *, root: Path | str | None = None
+) -> tuple[mujoco.MjModel, mujoco.MjSpec]:
     """Compile an MJCF file and what it includes to a model and its specification.
 
+    Args:
+        path: The file.
+        root: Folder that all files must lie in; by default the package or model folder
+            that encloses the file.
+
     Raises:
-        ConfigError: If it is not MJCF, or names a file outside its folder.
+        ConfigError: If it is not MJCF, or names a file outside the folder.
         DescriptionError: If it exceeds a limit, or MuJoCo refuses it.
     """
-    roots = _included(path)
+    folder = Path(root) if root else model_root(path, ())
+    roots = _included(path, folder)
     total = sum(_element_count(root, path) for root in roots)
     if total > MAX_ELEMENTS:
         raise DescriptionError(
             f"{path}: {total:.6g} elements, including generated ones; at most "
             f"{MAX_ELEMENTS} are allowed."
         )
-    for root in roots:
-        if root.find("extension") is not None or root.find(".//plugin") is not None:
+    for top in roots:
+        if top.find("extension") is not None or top.find(".//plugin") is not None:
             raise DescriptionError(f"{path}: plugins run code and are not loaded.")
-        _check_referenced_files(root, path)
-        for element in root.iter():
+        _check_referenced_files(top, path, folder)
+        for element in top.iter():
             _check_size(element, path)
             _check_numbers(element, path)
     try:
         spec = mujoco.MjSpec.from_file(str(path))
+        for hint in _HINTS:
+            setattr(spec, hint, -1)
         return spec.compile(), spec
     except (ValueError, RuntimeError, MemoryError) as error:  # MuJoCo raises all three
         raise DescriptionError(f"{path}: MuJoCo refuses it: {error}") from error
 
 
-def _included(path: Path) -> list[Element]:
+def _included(path: Path, folder: Path) -> list[Element]:
     """Return the root elements of a file and of the files that it includes."""
     roots: dict[Path, Element] = {}
     waiting = [path]
     while waiting:
         file = waiting.pop()
-        resolved = inside(path.parent, file, source=path)
+        resolved = inside(folder, file, source=path)
         if resolved in roots:
             continue
         root = read_xml(resolved)
@@ -88,8 +98,8 @@ def _included(path: Path) -> list[Element]:
     return list(roots.values())
 
 
-def _check_referenced_files(root: Element, path: Path) -> None:
-    """Refuse meshes, textures and the like from outside the folder."""
+def _check_referenced_files(root: Element, path: Path, outer: Path) -> None:
+    """Refuse meshes, textures and the like from outside the outer folder."""
     keys = ("meshdir", "texturedir", "assetdir")
     folders = [e.get(key, "") for e in root.iter("compiler") for key in keys]
     for element in root.iter():
@@ -97,7 +107,8 @@ def _check_referenced_files(root: Element, path: Path) -> None:
             if key.startswith("file") and name:
                 for folder in ("", *filter(None, folders)):
                     file = path.parent / folder / name
-                    _check_file(inside(path.parent, file, source=path), source=path)
+                    if file.exists():  # MuJoCo reports a missing file
+                        _check_file(inside(outer, file, source=path), source=path)
 
 
 def _check_file(file: Path, *, source: Path) -> None:
@@ -146,8 +157,6 @@ def _check_size(element: Element, path: Path) -> None:
     ]
     if element.tag == "numeric":
         sizes.append(("size", _product(element.get("size", "1")), MAX_ROWS))
-    if element.tag == "size":
-        sizes.append(("memory", _bytes(element.get("memory", "0")), MAX_MEMORY))
     if element.get("builtin") and element.tag == "mesh":
         largest = max(map(_product, element.get("params", "0").split()), default=0.0)
         sizes.append(("params", largest, MAX_MESH_PARAMETER))
@@ -175,9 +184,3 @@ def _product(text: str) -> float:
         return math.prod(abs(float(word)) for word in text.split())
     except ValueError:
         return 1.0
-
-
-def _bytes(text: str) -> float:
-    word = text.strip()
-    unit = _UNITS.get(word[-1:].upper(), 0)
-    return _product(word[:-1] if unit else word) * 2.0**unit

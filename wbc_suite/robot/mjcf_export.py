@@ -58,6 +58,7 @@ def build_mjspec(robot: RobotDescription, *, merged: bool = True) -> mujoco.MjSp
         body = bodies[link.parent or "world"].add_body(
             name=link.name, pos=placed.pos, quat=placed.quat
         )
+        body.gravcomp = link.gravcomp
         bodies[link.name] = body
         if link.parent is None and robot.root.kind == "free":
             body.add_joint(name="root", type=mujoco.mjtJoint.mjJNT_FREE)
@@ -83,6 +84,7 @@ def build_mjspec(robot: RobotDescription, *, merged: bool = True) -> mujoco.MjSp
     _add_actuators(spec, robot)
     _add_sensors(spec, robot)
     _add_constraints(spec, robot)
+    _add_tendons(spec, robot)
     _add_keyframes(spec, robot)
     return spec
 
@@ -105,6 +107,7 @@ def _add_joint(body: mujoco.MjsBody, joint: Joint, *, limb: bool) -> None:
         frictionloss=joint.frictionloss,
     )
     added.damping[0] = joint.damping
+    added.stiffness[0], added.springref = joint.stiffness, joint.springref
     added.limited = mujoco.mjtLimited.mjLIMITED_FALSE
     if joint.range is not None:
         added.limited = mujoco.mjtLimited.mjLIMITED_TRUE
@@ -130,7 +133,8 @@ def _inertias(robot: RobotDescription) -> dict[str, pin.Inertia]:
             continue
         placement[link.name] = placement[str(link.parent)] * se3_of(link)
         moves = owner != robot.links[0].name or robot.root.kind != "fixed"
-        if moves and robot.link(owner).mass == 0.0 and link.mass > 0.0:
+        light = robot.link(owner).mass == 0.0 or link.mass == 0.0
+        if moves and light and any((link.mass, *link.inertia)):
             inertias[owner] += placement[link.name].act(inertias[link.name])
             inertias[link.name] = pin.Inertia.Zero()
     return inertias
@@ -207,18 +211,44 @@ def _add_constraints(spec: mujoco.MjSpec, robot: RobotDescription) -> None:
         equality.data[:5] = (joint.mimic.offset, joint.mimic.ratio, 0, 0, 0)
         equality.solref[:2] = STIFF
     for index, connect in enumerate(robot.connects):
+        welded = connect.quat is not None
         equality = spec.add_equality(
-            type=mujoco.mjtEq.mjEQ_CONNECT,
+            type=mujoco.mjtEq.mjEQ_WELD if welded else mujoco.mjtEq.mjEQ_CONNECT,
             objtype=mujoco.mjtObj.mjOBJ_BODY,
             name=f"connect{index}_{connect.link}_{connect.other}",
             name1=connect.link,
             name2=connect.other,
         )
-        equality.data[:3] = connect.anchor
+        equality.data[:3] = (0.0, 0.0, 0.0) if welded else connect.anchor
+        if connect.quat is not None:
+            equality.data[3:11] = (*connect.anchor, *connect.quat, 1.0)
         equality.solref[:2] = STIFF
     pairs = {*robot.contacts.exclude, *_welded_neighbours(robot)}
     for first, second in sorted(pairs):
         spec.add_exclude(name=f"{first}_{second}", bodyname1=first, bodyname2=second)
+
+
+def _add_tendons(spec: mujoco.MjSpec, robot: RobotDescription) -> None:
+    for tendon in robot.tendons:
+        added = spec.add_tendon(name=tendon.name, frictionloss=tendon.frictionloss)
+        added.stiffness[0], added.damping[0] = tendon.stiffness, tendon.damping
+        if tendon.springlength is not None:
+            added.springlength = tendon.springlength
+        if tendon.range is not None:
+            added.limited, added.range = mujoco.mjtLimited.mjLIMITED_TRUE, tendon.range
+        for step in tendon.path:
+            if step.joint is not None:
+                added.wrap_joint(step.joint, step.coef)
+            else:
+                added.wrap_site(step.frame)
+        if tendon.held is not None:
+            equality = spec.add_equality(
+                type=mujoco.mjtEq.mjEQ_TENDON,
+                objtype=mujoco.mjtObj.mjOBJ_TENDON,
+                name=f"{tendon.name}_held",
+                name1=tendon.name,
+            )
+            equality.data[:5] = (tendon.held, 0, 0, 0, 0)
 
 
 def _welded_neighbours(robot: RobotDescription) -> Iterable[tuple[str, str]]:

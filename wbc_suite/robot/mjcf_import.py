@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -15,13 +15,25 @@ from wbc_suite.robot.importing import LinkFields, NameTable, describe_import
 from wbc_suite.robot.inertia import inertia_fields
 from wbc_suite.robot.mjcf_compile import compile_mjcf
 from wbc_suite.robot.mjcf_export import SENSOR_TYPES
-from wbc_suite.robot.mjcf_import_elements import read_actuators, read_shapes
+from wbc_suite.robot.mjcf_import_constraints import (
+    not_represented,
+    read_connects,
+    read_followers,
+    read_tendons,
+    zero_of,
+)
+from wbc_suite.robot.mjcf_import_elements import (
+    read_actuators,
+    read_excludes,
+    read_keyframes,
+    read_shapes,
+)
 from wbc_suite.robot.poses import joint_motion, pose_at, pose_fields
 from wbc_suite.typing import Vector
 
 LOG = logging.getLogger(__name__)
 
-DUMMY = {"mass": 1e-9, "inertia": (1e-13, 1e-13, 1e-13, 0.0, 0.0, 0.0)}
+DUMMY = {"mass": 1e-10, "inertia": (1e-13, 1e-13, 1e-13, 0.0, 0.0, 0.0)}
 """Negligible mass and inertia of the links between the joints of one body."""
 FREE, BALL = mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_BALL
 SLIDE, HINGE = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
@@ -29,71 +41,46 @@ SENSOR_KINDS = {int(code): kind for kind, code in SENSOR_TYPES.items()}
 """Kinds of sensors by the numbers of a compiled model."""
 
 
-def read_mjcf(path: Path | str) -> RobotDescription:
+def read_mjcf(
+    path: Path | str, *, mesh_root: Path | str | None = None, strict: bool = False
+) -> RobotDescription:
     """Read an MJCF file.
 
     MuJoCo compiles it. Bodies become links, sites become frames, joint equalities
     become mimic joints, meshes become convex hulls. A body with several joints becomes
-    a chain with links of a microgram. Items of the world body (floors, lights) are
-    ignored. Groups and end effectors are inferred; `to_toml()` writes the result for
+    a chain with links of 1e-10 kg; a ball joint becomes three hinges about x, y and
+    z. Springs, tendons, gravity compensation and closed loops act in MuJoCo only. Items
+    of the world body (floors, lights) are ignored, and so are free objects beside a
+    robot. Groups and end effectors are inferred; `to_toml()` writes the result for
     editing.
 
+    Args:
+        path: The file.
+        mesh_root: Folder that all files must lie in; by default the package or model
+            folder that encloses the file.
+        strict: Refuse what is left out or mended with a warning otherwise.
+
     Raises:
-        ConfigError: If the file is not MJCF, or refers to files outside its folder.
-        DescriptionError: If it has elements that our format does not support, such as
-            ball joints, springs or flexible parts, or is unphysical.
+        ConfigError: If the file is not MJCF, or refers to files outside the folder.
+        DescriptionError: If it has no body, or is unphysical, or if it has elements
+            that are left out (flexible parts, wrapping tendons) and `strict`.
     """
     path = Path(path)
-    m, _ = compile_mjcf(path)
-    faults = list(_faults(m))
-    if faults:
-        shown = join_first(faults, separator="; ")
-        raise DescriptionError(f"{path}: not supported: {shown}.")
-    return _Importer(m).robot(path)
+    m, _ = compile_mjcf(path, root=mesh_root)
+    if not _world_children(m):
+        raise DescriptionError(f"{path}: the model has no body.")
+    return _Importer(m, path, strict=strict).robot()
 
 
-def _faults(m: mujoco.MjModel) -> Iterator[str]:
-    """Yield elements that the format does not support and that change the dynamics."""
+def _robot_roots(m: mujoco.MjModel) -> list[int]:
+    """Return the root bodies of the robot: in a scene, without the free objects."""
     roots = _world_children(m)
-    for j in range(m.njnt):
-        name, kind = f"joint '{_joint_name(m, j)}'", m.jnt_type[j]
-        if kind == BALL:
-            yield f"{name} is a ball joint (use three hinges)"
-        elif kind == FREE and len(roots) > 1:
-            yield f"{name} is free, but there are several root bodies"
-        elif m.jnt_stiffness[j].any():
-            yield f"{name} has a spring (stiffness)"
-    if m.nflex:
-        yield "the model has flexible parts (flex)"
-    if not roots:
-        yield "the model has no body"
-    if m.body_gravcomp.any():
-        yield "the model has gravity compensation (gravcomp)"
-    yield from _tendon_faults(m)
-    yield from _equality_faults(m)
-
-
-def _tendon_faults(m: mujoco.MjModel) -> Iterator[str]:
-    acting = ("stiffness", "damping", "frictionloss", "limited", "armature")
-    for t in range(m.ntendon):
-        name = m.tendon(t).name or f"number {t}"
-        if any(np.any(getattr(m, f"tendon_{key}")[t]) for key in acting):
-            yield f"tendon '{name}' has forces"
-        else:
-            LOG.warning("Tendon '%s' is ignored.", name)
-
-
-def _equality_faults(m: mujoco.MjModel) -> Iterator[str]:
-    for e in range(m.neq):
-        name = f"equality '{m.equality(e).name or e}'"
-        kind, data = m.eq_type[e], m.eq_data[e]
-        if kind == mujoco.mjtEq.mjEQ_JOINT:
-            if m.eq_obj2id[e] < 0 or data[2:5].any():
-                yield f"{name} is not linear in another joint"
-        elif kind != mujoco.mjtEq.mjEQ_CONNECT or (
-            m.eq_objtype[e] != mujoco.mjtObj.mjOBJ_BODY
-        ):
-            yield f"{name} is neither a joint equality nor a connect of two bodies"
+    free = [int(m.jnt_bodyid[j]) for j in range(m.njnt) if m.jnt_type[j] == FREE]
+    if not free or len(roots) == 1:
+        return roots
+    moving = m.body_rootid[m.jnt_bodyid[m.jnt_type != FREE]].tolist()
+    most = max(roots, key=moving.count)
+    return [most] if most in free else [b for b in roots if b not in free]
 
 
 def _world_children(m: mujoco.MjModel) -> list[int]:
@@ -104,63 +91,124 @@ def _joint_name(m: mujoco.MjModel, j: int) -> str:
     return m.joint(j).name or f"joint{j}"
 
 
+class _Step(NamedTuple):
+    """One degree of freedom of a joint: a ball joint has three."""
+
+    joint: int
+    name: str
+    axis: Vector
+    zero: float
+
+
 class _Importer:
     """Converts one compiled model to the fields of a description."""
 
-    def __init__(self, m: mujoco.MjModel) -> None:
-        self._m = m
+    def __init__(self, m: mujoco.MjModel, path: Path, *, strict: bool) -> None:
+        self._m, self._path, self._strict = m, path, strict
         self._names = NameTable()
         self._bodies: dict[int, str] = {}
         self._joints: dict[int, str] = {}
+        self._balls: dict[int, list[str]] = {}
         self._sites: dict[int, str] = {}
         self._offsets: dict[int, Vector] = {0: np.zeros(3)}
-        self._mimics = dict(self._followers())
+        self._mimics = dict(read_followers(m))
+        self._roots = _robot_roots(m)
 
-    def robot(self, path: Path) -> RobotDescription:
-        m = self._m
+    def robot(self) -> RobotDescription:
+        m, names = self._m, NameTable()
         root, rooted = self._root()
-        for b in range(1, m.nbody):
-            original = m.body(b).name or f"body{b}"
-            self._bodies[b] = self._names.take(original, "link")
-        # The joints of the root come first.
-        for j in range(int(m.body_jntnum[rooted or 0]), m.njnt):
-            self._joints[j] = self._names.take(_joint_name(m, j), "joint")
+        self._name_items(rooted)
         efforts, actuators = read_actuators(m, self._joints)
         links: list[LinkFields] = []
         if rooted is None:
             self._bodies[0] = self._names.take("base_link", "link")
             links.append({"name": self._bodies[0]})
-        for b in range(1, m.nbody):
-            links += self._links(b, first=b == rooted, efforts=efforts)
-        keyframes = self._keyframes()
+        for b in list(self._bodies):
+            links += self._links(b, first=b == rooted, efforts=efforts) if b else []
+        keyframes = read_keyframes(m, self._joints, self._balls, set(self._mimics))
         if "home" in keyframes:
             keyframes.setdefault("ready", keyframes["home"])
+        frames = list(self._frames())
+        self._report()
         return describe_import(
-            name=m.names[: m.names.index(b"\0")].decode() or path.stem,
-            source=path,
+            name=m.names[: m.names.index(b"\0")].decode() or self._path.stem,
+            source=self._path,
             root=root,
             links=links,
-            frames=list(self._frames()),
+            frames=frames,
             names=self._names,
+            strict=self._strict,
             keyframes=keyframes,
             cameras=list(self._cameras()),
             sensors=list(self._sensors()),
             actuators=actuators,
-            connects=list(self._connects()),
-            contacts={"exclude": list(self._excludes())},
+            connects=list(read_connects(m, self._bodies, self._offsets)),
+            tendons=list(
+                read_tendons(
+                    m, self._joints, self._sites, lambda n: names.take(n, "tendon")
+                )
+            ),
+            contacts={"exclude": list(read_excludes(m, self._bodies))},
         )
+
+    def _name_items(self, rooted: int | None) -> None:
+        """Name the bodies and joints of the robot; those of the root have no name."""
+        m = self._m
+        for b in range(1, m.nbody):
+            if m.body_rootid[b] in self._roots:
+                original = m.body(b).name or f"body{b}"
+                self._bodies[b] = self._names.take(original, "link")
+        for j in range(m.njnt):
+            body = int(m.jnt_bodyid[j])
+            if body not in self._bodies or body == rooted:
+                continue
+            original = _joint_name(m, j)
+            if m.jnt_type[j] == BALL:
+                own = (f"{original}_{axis}" for axis in "xyz")
+                self._balls[j] = [self._names.take(name, "joint") for name in own]
+            else:
+                self._joints[j] = self._names.take(original, "joint")
+
+    def _report(self) -> None:
+        """Log what MuJoCo alone simulates, and what is left out."""
+        m, path = self._m, self._path
+        others = [
+            m.body(b).name or f"body{b}"
+            for b in _world_children(m)
+            if b not in self._roots
+        ]
+        if others:
+            LOG.warning("%s: objects beside the robot are left out: %s.", path, others)
+        if self._balls:
+            balls = join_first([_joint_name(m, j) for j in self._balls])
+            LOG.warning("%s: ball joints become three hinges each: %s.", path, balls)
+        springs = sum(bool(np.any(m.jnt_stiffness[j])) for j in range(m.njnt))
+        compensated = int(np.count_nonzero(m.body_gravcomp))
+        for count, what in (
+            (springs, "joints with springs"),
+            (compensated, "bodies with gravity compensation"),
+            (m.ntendon, "tendons"),
+        ):
+            if count:
+                LOG.warning("%s: %d %s act in MuJoCo only.", path, count, what)
+        faults = list(not_represented(m, self._joints, self._sites))
+        if faults and self._strict:
+            shown = join_first(faults, separator="; ")
+            raise DescriptionError(f"{path}: not supported: {shown}.")
+        if faults:
+            LOG.warning("%s: left out: %s.", path, "; ".join(faults))
 
     def _root(self) -> tuple[dict[str, Any], int | None]:
         """Return the fields of the root and its body; None if the world is the root."""
-        m, bodies = self._m, _world_children(self._m)
+        m, bodies = self._m, self._roots
         b = bodies[0]
-        count = int(m.body_jntnum[b])
+        start, count = int(m.body_jntadr[b]), int(m.body_jntnum[b])
         pose = pose_fields(pose_at(m.body_pos[b], m.body_quat[b]))
         if len(bodies) == 1 and count == 0:
             return {"kind": "fixed", **pose}, b
-        if len(bodies) == 1 and m.jnt_type[0] == FREE:
+        if len(bodies) == 1 and m.jnt_type[start] == FREE:
             return {"kind": "free", **pose}, b
-        if len(bodies) == 1 and count == 3 and self._is_planar():
+        if len(bodies) == 1 and start == 0 and count == 3 and self._is_planar():
             damping = [float(m.dof_damping[0]), float(m.dof_damping[2])]
             driven = {int(j) for j in m.actuator_trnid[:, 0]}
             fields = {"kind": "planar", "damping": damping, "actuated": 0 in driven}
@@ -184,50 +232,65 @@ class _Importer:
         parent = int(m.body_parentid[b])
         pose = pose_at(m.body_pos[b] + self._offsets[parent], m.body_quat[b])
         start, count = int(m.body_jntadr[b]), int(m.body_jntnum[b])
-        joints = [] if first else list(range(start, start + count))
+        joints = range(start, start + (0 if first else count))
+        steps = [step for j in joints for step in self._steps(j)]
         above, origin = self._bodies.get(parent), np.zeros(3)
-        for j in joints:
+        for step in steps:
+            j = step.joint
             anchor = np.array(m.jnt_pos[j])
             motion = joint_motion(
-                m.jnt_axis[j], -_zero(m, j), slide=bool(m.jnt_type[j] == SLIDE)
+                step.axis, -step.zero, slide=bool(m.jnt_type[j] == SLIDE)
             )
-            step = pin.SE3(np.eye(3), anchor - origin) * motion
-            last = j == joints[-1]
+            moved = pin.SE3(np.eye(3), anchor - origin) * motion
+            last = step is steps[-1]
             name = body["name"]
             if not last:
-                name = self._names.take(f"{name}_{self._joints[j]}", "link")
+                name = self._names.take(f"{name}_{step.name}", "link")
             fields = {
                 "name": name,
                 "parent": above,
-                **pose_fields(pose * step),
-                "joint": self._joint(j, efforts),
+                **pose_fields(pose * moved),
+                "joint": self._joint(step, efforts),
             }
             pose, above, origin = pin.SE3.Identity(), name, anchor
             if last:
                 body |= fields
             else:
                 yield fields | DUMMY
-        if not joints and not first:
+        if not steps and not first:
             body |= {"parent": above, **pose_fields(pose)}
         self._offsets[b] = -origin
+        body["gravcomp"] = float(m.body_gravcomp[b])
         yield body | self._inertia(b) | read_shapes(m, b, -origin)
 
-    def _joint(self, j: int, efforts: dict[int, float]) -> dict[str, Any]:
-        m = self._m
+    def _steps(self, j: int) -> Iterator[_Step]:
+        if j in self._balls:
+            for name, axis in zip(self._balls[j], np.eye(3), strict=True):
+                yield _Step(j, name, axis, 0.0)
+        else:
+            axis = np.array(self._m.jnt_axis[j])
+            yield _Step(j, self._joints[j], axis, zero_of(self._m, j))
+
+    def _joint(self, step: _Step, efforts: dict[int, float]) -> dict[str, Any]:
+        m, j = self._m, step.joint
         v = int(m.jnt_dofadr[j])
         fields: dict[str, Any] = {
-            "name": self._joints[j],
+            "name": step.name,
             "type": "slide" if m.jnt_type[j] == SLIDE else "hinge",
-            "axis": m.jnt_axis[j].tolist(),
+            "axis": step.axis.tolist(),
             "armature": float(m.dof_armature[v]),
             "damping": float(m.dof_damping[v].ravel()[0]),
             "frictionloss": float(m.dof_frictionloss[v]),
+            "stiffness": float(np.ravel(m.jnt_stiffness[j])[0]),
         }
+        if fields["stiffness"] > 0.0 and j not in self._balls:
+            fields["springref"] = float(m.qpos_spring[m.jnt_qposadr[j]])
         if m.jnt_limited[j]:
-            fields["range"] = m.jnt_range[j].tolist()
+            low, high = m.jnt_range[j].tolist()
+            fields["range"] = (-high, high) if j in self._balls else (low, high)
         if efforts.get(j, 0.0) > 0.0:
             fields["effort"] = efforts[j]
-        if j in self._mimics:
+        if j in self._mimics and self._mimics[j][0] in self._joints:
             leader, ratio, offset = self._mimics[j]
             fields["mimic"] = {
                 "joint": self._joints[leader],
@@ -235,16 +298,6 @@ class _Importer:
                 "offset": offset,
             }
         return fields
-
-    def _followers(self) -> Iterator[tuple[int, tuple[int, float, float]]]:
-        """Yield joint, leader, ratio, offset: q - q0 = c0 + c1 (p - p0)."""
-        m = self._m
-        for e in range(m.neq):
-            if m.eq_type[e] == mujoco.mjtEq.mjEQ_JOINT and m.eq_active0[e]:
-                own, leader = int(m.eq_obj1id[e]), int(m.eq_obj2id[e])
-                shift, ratio = (float(c) for c in m.eq_data[e, :2])
-                offset = shift + _zero(m, own) - ratio * _zero(m, leader)
-                yield own, (leader, ratio, offset)
 
     def _inertia(self, b: int) -> dict[str, Any]:
         m = self._m
@@ -287,40 +340,3 @@ class _Importer:
             if kind and site in self._sites:
                 name = names.take(m.sensor(s).name or f"sensor{s}", "sensor")
                 yield {"name": name, "kind": kind, "frame": self._sites[site]}
-
-    def _connects(self) -> Iterator[dict[str, Any]]:
-        m = self._m
-        for e in range(m.neq):
-            if m.eq_type[e] == mujoco.mjtEq.mjEQ_CONNECT:
-                first, second = int(m.eq_obj1id[e]), int(m.eq_obj2id[e])
-                anchor = m.eq_data[e, :3] + self._offsets[first]
-                yield {
-                    "link": self._bodies[first],
-                    "other": self._bodies[second],
-                    "anchor": anchor.tolist(),
-                }
-
-    def _excludes(self) -> Iterator[tuple[str, str]]:
-        for signature in self._m.exclude_signature:
-            pair = divmod(int(signature), 1 << 16)
-            if all(b in self._bodies for b in pair):
-                yield self._bodies[pair[0]], self._bodies[pair[1]]
-
-    def _keyframes(self) -> dict[str, dict[str, float]]:
-        """Return the postures, with values clipped to their ranges."""
-        m, found, names = self._m, dict[str, dict[str, float]](), NameTable()
-        for k in range(m.nkey):
-            values: dict[str, float] = {}
-            for j, name in self._joints.items():
-                if j not in self._mimics:
-                    value = float(m.key_qpos[k, m.jnt_qposadr[j]])
-                    low, high = m.jnt_range[j].tolist()
-                    limited = bool(m.jnt_limited[j])
-                    values[name] = min(max(value, low), high) if limited else value
-            found[names.take(m.key(k).name or f"key{k}", "keyframe")] = values
-        return found
-
-
-def _zero(m: mujoco.MjModel, j: int) -> float:
-    """Return the joint value at which the body poses are defined (`ref`)."""
-    return float(m.qpos0[m.jnt_qposadr[j]])

@@ -1,12 +1,15 @@
 """Read geoms and actuators of a compiled MuJoCo model as fields of a description."""
 
 import logging
+from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
 import mujoco
 import numpy as np
 import pinocchio as pin
+from scipy.spatial.transform import Rotation
 
+from wbc_suite.robot.importing import NameTable
 from wbc_suite.robot.poses import pose_at, pose_fields
 from wbc_suite.robot.shape_geometry import fit_hull
 from wbc_suite.typing import Vector
@@ -30,7 +33,7 @@ def read_shapes(
     visual: list[dict[str, Any]] = []
     collision: list[dict[str, Any]] = []
     for g in np.flatnonzero(m.geom_bodyid == body).tolist():
-        if m.geom_type[g] in TERRAINS:
+        if int(m.geom_type[g]) in TERRAINS:
             continue
         shape = _shape(m, g)
         own = pin.SE3(np.eye(3), np.asarray(shape.pop("pos", np.zeros(3))))
@@ -142,3 +145,42 @@ def _actuator_kind(m: mujoco.MjModel, a: int) -> dict[str, Any]:
     if stiffness < 0.0:
         return {"kind": "position", "kp": -stiffness * gear**2, "kd": kd}
     return {"kind": "velocity", "kd": kd}
+
+
+def read_excludes(
+    m: mujoco.MjModel, bodies: Mapping[int, str]
+) -> Iterator[tuple[str, str]]:
+    """Yield the pairs of bodies of the robot that never collide."""
+    for signature in m.exclude_signature:
+        first, second = divmod(int(signature), 1 << 16)
+        if first in bodies and second in bodies:
+            yield bodies[first], bodies[second]
+
+
+def read_keyframes(
+    m: mujoco.MjModel,
+    joints: Mapping[int, str],
+    balls: Mapping[int, list[str]],
+    followers: Collection[int],
+) -> dict[str, dict[str, float]]:
+    """Return the postures by name, with values clipped to their ranges.
+
+    Ball joints have three names of hinges about x, y and z.
+    """
+    found, names = dict[str, dict[str, float]](), NameTable()
+    for k in range(m.nkey):
+        values: dict[str, float] = {}
+        for j, name in joints.items():
+            if j not in followers:
+                value = float(m.key_qpos[k, m.jnt_qposadr[j]])
+                low, high = m.jnt_range[j].tolist()
+                limited = bool(m.jnt_limited[j])
+                values[name] = min(max(value, low), high) if limited else value
+        for j, own in balls.items():
+            start = int(m.jnt_qposadr[j])
+            quat = m.key_qpos[k, start : start + 4]
+            limit = float(m.jnt_range[j, 1]) if m.jnt_limited[j] else np.inf
+            angles = Rotation.from_quat(quat, scalar_first=True).as_euler("XYZ")
+            values |= dict(zip(own, angles.clip(-limit, limit).tolist(), strict=True))
+        found[names.take(m.key(k).name or f"key{k}", "keyframe")] = values
+    return found

@@ -35,7 +35,7 @@ def build_pinocchio(robot: RobotDescription) -> Any:
             joint = _add_joint(model, link.joint, joint, pose)
             pose = pin.SE3.Identity()
         joint_of[link.name], pose_in_joint[link.name] = joint, pose
-        if link.mass > 0.0:
+        if link.mass > 0.0 or any(link.inertia):
             model.appendBodyToJoint(joint, inertia_of(link), pose)
         kind = pin.FrameType.JOINT
         parent = model.getFrameId(model.names[joint], kind) if joint else -1

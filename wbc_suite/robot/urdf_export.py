@@ -16,7 +16,16 @@ from wbc_suite.robot.elements import Joint, Link
 from wbc_suite.robot.mesh_files import write_stl
 from wbc_suite.robot.poses import HasPose, pose_fields, se3_of
 from wbc_suite.robot.shape_geometry import along_z, mesh_of, shape_bounds
-from wbc_suite.robot.shapes import Box, Capsule, Cylinder, Posed, Shape, Sphere
+from wbc_suite.robot.shapes import (
+    Box,
+    Capsule,
+    Cylinder,
+    Ellipsoid,
+    Posed,
+    Shape,
+    Sphere,
+)
+from wbc_suite.robot.triangle_meshes import ellipsoid_mesh
 
 UNLIMITED = 1e6
 """Written for limits that URDF requires and the robot lacks; read as no limit."""
@@ -40,7 +49,9 @@ def write_urdf(robot: RobotDescription, *, mesh_dir: Path | None = None) -> str:
     root = Element("robot", name=robot.name)
     # For MuJoCo, which would infer a mass for links without one.
     extension = SubElement(root, "mujoco")
-    SubElement(extension, "compiler", inertiafromgeom="false")
+    compiler = SubElement(extension, "compiler", inertiafromgeom="false")
+    if mesh_dir is not None:
+        compiler.set("strippath", "false")
     for name, rgba in robot.materials.items():
         material = SubElement(root, "material", name=name)
         SubElement(material, "color", rgba=_numbers(rgba))
@@ -116,7 +127,7 @@ def _limit(joint: Joint) -> Element:
 
 def _link(robot: RobotDescription, link: Link, mesh_dir: Path | None) -> Element:
     element = Element("link", name=link.name)
-    if link.mass > 0.0:
+    if link.mass > 0.0 or any(link.inertia):
         inertial = SubElement(element, "inertial")
         inertial.append(_origin(pin.SE3(np.eye(3), np.asarray(link.com))))
         SubElement(inertial, "mass", value=_numbers(link.mass))
@@ -154,6 +165,9 @@ def _primitives(
     """Yield the poses and geometries that represent one shape."""
     own = se3_of(shape)
     mesh = None if mesh_dir is None else mesh_of(shape)
+    if isinstance(shape, Ellipsoid):
+        round_mesh = ellipsoid_mesh(np.asarray(shape.size))
+        mesh = round_mesh.vertices, round_mesh.faces
     if mesh_dir is not None and mesh is not None:
         write_stl(mesh_dir / f"{stem}.stl", *mesh)
         yield own, Element("mesh", filename=f"{mesh_dir.name}/{stem}.stl")

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.errors import DescriptionError, join_first
+from wbc_suite.errors import DescriptionError, did_you_mean, join_first
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.elements import Contacts
 from wbc_suite.robot.importing import (
@@ -18,6 +18,7 @@ from wbc_suite.robot.importing import (
 )
 from wbc_suite.robot.inertia import inertia_fields, inertia_matrix
 from wbc_suite.robot.poses import pose_fields
+from wbc_suite.robot.shapes import SkinMesh
 from wbc_suite.robot.urdf_elements import (
     Branch,
     number,
@@ -27,7 +28,7 @@ from wbc_suite.robot.urdf_elements import (
 )
 from wbc_suite.robot.urdf_export import ROOT_TYPES, UNLIMITED
 from wbc_suite.robot.urdf_import_shapes import MeshFolder, UrdfShapes
-from wbc_suite.robot.xml_files import Element
+from wbc_suite.robot.xml_files import Element, model_root
 
 LOG = logging.getLogger(__name__)
 
@@ -38,7 +39,11 @@ ROOT_KINDS = {urdf: kind for kind, urdf in ROOT_TYPES.items()}
 
 
 def read_urdf(
-    path: Path | str, *, mesh_root: Path | None = None, mend_inertias: bool = False
+    path: Path | str,
+    *,
+    mesh_root: Path | str | None = None,
+    strict: bool = False,
+    skin: bool = False,
 ) -> RobotDescription:
     """Read a URDF file.
 
@@ -51,25 +56,31 @@ def read_urdf(
     Args:
         path: The file.
         mesh_root: Folder that meshes are read from, and that `package://` refers to;
-            by default the ROS package of the file, or its folder.
-        mend_inertias: Replace unphysical inertias by the nearest physical ones.
+            by default the ROS package or model folder that encloses the file.
+        strict: Refuse what is mended with a warning otherwise: inertias that no body
+            can have, moving links without mass, faulty shapes.
+        skin: Draw links with their meshes instead of hulls; needs the extra `skins`.
 
     Raises:
-        ConfigError: If the file is not URDF, or refers to files outside the folder.
-        DescriptionError: If the robot is inconsistent or unphysical.
+        ConfigError: If the file is not URDF.
+        DescriptionError: If the robot is inconsistent, or faulty and `strict`.
     """
     path = Path(path)
     element, branches = read_tree(path)
-    meshes = MeshFolder(path, mesh_root)
+    names = (mesh.get("filename", "") for mesh in element.iter("mesh"))
+    meshes = MeshFolder(path, mesh_root or model_root(path, names))
     try:
-        importer = _Importer(branches, UrdfShapes(element, meshes))
+        shapes = UrdfShapes(element, meshes, strict=strict)
+        importer = _Importer(branches, shapes, strict=strict)
         name = element.get("name", "") or path.stem
-        robot = importer.robot(name, path, mend_inertias=mend_inertias)
+        robot = importer.robot(name, path)
     except DescriptionError as error:
         if str(error).startswith(str(path)):
             raise
         raise DescriptionError(f"{path}: {error}") from error
-    meshes.report_missing()
+    shapes.report(path)
+    if skin:
+        robot = robot.model_copy(update={"skins": importer.skins()})
     pairs = overlapping_links(robot)
     if not pairs:
         return robot
@@ -85,13 +96,16 @@ def read_urdf(
 class _Importer:
     """Converts the elements of one file to the fields of a description."""
 
-    def __init__(self, branches: tuple[Branch, ...], shapes: UrdfShapes) -> None:
-        self._branches, self._shapes = branches, shapes
+    def __init__(
+        self, branches: tuple[Branch, ...], shapes: UrdfShapes, *, strict: bool
+    ) -> None:
+        self._branches, self._shapes, self._strict = branches, shapes, strict
         self._names = NameTable()
         self._links: dict[str, str] = {}
         self._joints: dict[str, str] = {}
+        self._endless: list[str] = []
 
-    def robot(self, name: str, path: Path, *, mend_inertias: bool) -> RobotDescription:
+    def robot(self, name: str, path: Path) -> RobotDescription:
         root, branches = self._root()
         frames = _frame_names(branches)
         kept = [branch for branch in branches if branch.name not in frames]
@@ -101,24 +115,39 @@ class _Importer:
             if branch.joint is not None and branch.kind in JOINT_TYPES:
                 original = branch.joint.get("name", "")
                 self._joints[original] = self._names.take(original, "joint")
-        first = kept[0]
+        links = [self._link(branch, first=branch is kept[0]) for branch in kept]
+        if self._endless:
+            LOG.warning(
+                "%s: the file has no range for these joints, which are endless: %s.",
+                *(path, join_first(self._endless, limit=12)),
+            )
         return describe_import(
             name=name,
             source=path,
             root=root,
-            links=[self._link(branch, first=branch is first) for branch in kept],
+            links=links,
             frames=self._frames(branches, frames),
             materials=self._shapes.colors,
             names=self._names,
-            mend_inertias=mend_inertias,
+            strict=self._strict,
         )
+
+    def skins(self) -> dict[str, tuple[SkinMesh, ...]]:
+        """Return the meshes that draw each link, by its name."""
+        found = {self._links[name]: s for name, s in self._shapes.skins.items()}
+        return {name: tuple(meshes) for name, meshes in found.items()}
 
     def _root(self) -> tuple[dict[str, Any], tuple[Branch, ...]]:
         """Return the fields of the root, and the branches without the world."""
         world, *rest = self._branches
         below = [b for b in rest if b.parent == world.name]
         moving = [b for b in rest if b.kind in ("floating", "planar")]
-        first = below[0] if len(below) == 1 and _is_bare(world) else None
+        first = below[0] if len(below) == 1 else None
+        if first is not None and not _is_bare(world):
+            if first.kind != "floating":
+                first = None
+            else:
+                LOG.warning("Link '%s' is the world, and left out.", world.name)
         if first is None or first.kind not in ROOT_KINDS:
             _refuse_roots(moving)
             return {"kind": "fixed"}, self._branches
@@ -155,19 +184,30 @@ class _Importer:
             "axis": _axis(joint, where),
             **_limits(joint, kind, where),
         }
+        if kind != "continuous" and "range" not in fields:
+            self._endless.append(fields["name"])
         dynamics = joint.find("dynamics")
         if dynamics is not None:
             for ours, key in (("damping", "damping"), ("frictionloss", "friction")):
                 fields[ours] = number(dynamics, key, where=where, default=0.0)
         mimic = joint.find("mimic")
-        if mimic is not None:
-            leader = mimic.get("joint", "")
+        if mimic is not None and (leader := self._leader(mimic, where)):
             fields["mimic"] = {
-                "joint": self._joints.get(leader, leader or "nothing"),
+                "joint": leader,
                 "ratio": number(mimic, "multiplier", where=where, default=1.0),
                 "offset": number(mimic, "offset", where=where, default=0.0),
             }
         return fields
+
+    def _leader(self, mimic: Element, where: str) -> str | None:
+        """Return the joint that another follows; None if it does not move."""
+        name = mimic.get("joint", "")
+        if name not in self._joints:
+            fault = f"{where} follows '{name}', which is no moving joint"
+            if self._strict:
+                raise DescriptionError(f"{fault}.{did_you_mean(name, self._joints)}")
+            LOG.warning("%s; it is independent.", fault)
+        return self._joints.get(name)
 
     def _frames(
         self, branches: tuple[Branch, ...], frames: set[str]
@@ -221,15 +261,13 @@ def _axis(joint: Element, where: str) -> list[float]:
 
 
 def _limits(joint: Element, kind: str, where: str) -> dict[str, Any]:
-    """Read `<limit>`; zero effort or velocity, and huge limits, mean no limit."""
+    """Read `<limit>`; zero effort or velocity, and huge limits, mean no limit.
+
+    A range that is missing, empty at zero or reversed means an endless joint.
+    """
     limit = joint.find("limit")
     if limit is None:
-        if kind == "continuous":
-            return {}
-        raise DescriptionError(
-            f"{where}: a {kind} joint needs <limit>; an unlimited hinge is "
-            "'continuous'."
-        )
+        return {}
     fields: dict[str, Any] = {}
     for key in ("effort", "velocity"):
         value = number(limit, key, where=where, default=0.0)
@@ -237,12 +275,12 @@ def _limits(joint: Element, kind: str, where: str) -> dict[str, Any]:
             fields[key] = value
     low = number(limit, "lower", where=where, default=0.0)
     high = number(limit, "upper", where=where, default=0.0)
-    if kind != "continuous" and max(-low, high) < UNLIMITED_RANGE:
-        if not low < high:
-            raise DescriptionError(
-                f"{where}: it cannot move from {low} to {high}. Correct 'lower' and "
-                "'upper', or make it fixed, or continuous if it is unlimited."
-            )
+    if low == high != 0.0:
+        raise DescriptionError(
+            f"{where}: it cannot move from {low} to {high}. Correct 'lower' and "
+            "'upper', or make it fixed, or continuous if it is unlimited."
+        )
+    if kind != "continuous" and low < high and max(-low, high) < UNLIMITED_RANGE:
         fields["range"] = (low, high)
     return fields
 
@@ -263,9 +301,7 @@ def _inertial(link: Element, where: str) -> dict[str, Any]:
     R = pose.rotation
     turned = own if np.array_equal(R, np.eye(3)) else R @ own @ R.T
     kilograms = number(mass, "value", where=where)
-    if kilograms == 0.0:
-        if own.any():
-            LOG.warning("%s has no mass; its inertia tensor is ignored.", where)
+    if kilograms == 0.0 and not own.any():
         return {}
     return {
         "mass": kilograms,

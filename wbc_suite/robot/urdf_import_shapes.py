@@ -10,78 +10,95 @@ import pinocchio as pin
 
 from wbc_suite.errors import DescriptionError, join_first
 from wbc_suite.robot.importing import NameTable
-from wbc_suite.robot.mesh_files import READABLE, read_points
+from wbc_suite.robot.mesh_files import can_read, read_points
 from wbc_suite.robot.poses import pose_fields
 from wbc_suite.robot.shape_geometry import fit_hull
-from wbc_suite.robot.urdf_elements import number, numbers, pose_of
-from wbc_suite.robot.xml_files import Element, inside
+from wbc_suite.robot.shapes import SkinMesh
+from wbc_suite.robot.urdf_elements import numbers, pose_of
+from wbc_suite.robot.xml_files import MAX_ABOVE, Element
 from wbc_suite.typing import Vector
 
 LOG = logging.getLogger(__name__)
 
+MIN_SIZE = 2e-6  # smallest size of a shape in m; smaller ones are left out
+
 
 class MeshFolder:
-    """Finds mesh files in one folder, and never outside it.
+    """Finds mesh files in one folder, and never outside it."""
 
-    By default it is the ROS package of the URDF file, or its folder.
-    """
-
-    def __init__(self, urdf: Path, root: Path | None) -> None:
-        self._urdf = urdf
-        self._root = (root or _package_of(urdf)).resolve()
+    def __init__(self, urdf: Path, root: Path | str) -> None:
+        self._urdf, self._root = urdf, Path(root).resolve()
         self._shapes: dict[tuple[str | float, ...], dict[str, Any] | None] = {}
 
     def hull(self, filename: str, scale: Vector) -> dict[str, Any] | None:
-        """Return the fields of a mesh's hull; None if it is missing or unsupported."""
+        """Return the fields of a mesh's hull; None if it is missing or unreadable."""
         key = (filename, *scale.tolist())
         if key not in self._shapes:
-            path = self._find(filename)
-            known = path is not None and path.suffix.lower() in READABLE
-            self._shapes[key] = (
-                fit_hull(read_points(path) * scale) if path and known else None
-            )
+            path = self.find(filename)
+            self._shapes[key] = None
+            if path is not None and can_read(path):
+                self._shapes[key] = fit_hull(read_points(path) * scale)
         return self._shapes[key]
 
-    def report_missing(self) -> None:
-        """Log one warning with all meshes that could not be read."""
-        absent = sorted({str(key[0]) for key, s in self._shapes.items() if s is None})
-        if absent:
-            LOG.warning(
-                "%s: %d meshes are ignored, because they are not in %s or are not STL "
-                "or OBJ files: %s.",
-                *(self._urdf, len(absent), self._root, join_first(absent)),
-            )
-
-    def _find(self, filename: str) -> Path | None:
+    def find(self, filename: str) -> Path | None:
+        """Return the file of a reference, if there is one in the folder."""
         scheme, separator, rest = filename.partition("://")
-        candidates: list[Path] = []
-        if not separator:
-            candidates = [self._urdf.parent / filename]
-        elif scheme == "file":
-            candidates = [Path(rest)]
-        elif scheme in ("package", "model"):
-            candidates = [self._root / rest, self._root / rest.partition("/")[2]]
-        paths = (inside(self._root, c, source=self._urdf) for c in candidates)
-        return next((path for path in paths if path.is_file()), None)
+        folder = self._urdf.resolve().parent
+        candidates = [folder / (rest or filename)]
+        if scheme in ("package", "model") and separator:
+            whole = Path(rest.lstrip("/"))
+            above = (folder, *folder.parents[:MAX_ABOVE], self._root)
+            short = Path(*whole.parts[1:])
+            candidates = [start / path for path in (whole, short) for start in above]
+        for candidate in candidates:
+            path = candidate.resolve()
+            if path.is_relative_to(self._root) and path.is_file():
+                return path
+        return None
 
-
-def _package_of(urdf: Path) -> Path:
-    """Return the ROS package that contains a file, or else the file's folder.
-
-    A package has a `package.xml`, or a folder `urdf` with the file.
-    """
-    folder = urdf.resolve().parent
-    for parent in (folder, *folder.parents[:3]):
-        if (parent / "package.xml").is_file():
-            return parent
-    return folder.parent if folder.name in ("urdf", "robots") else folder
+    def report(self) -> None:
+        """Log one line with the number of meshes, and a warning about absent ones."""
+        files = {
+            name: self.find(name) for name in {str(key[0]) for key in self._shapes}
+        }
+        missing = sorted(name for name, path in files.items() if path is None)
+        unread = sorted(
+            name for name, path in files.items() if path and not can_read(path)
+        )
+        found = len(files) - len(missing)
+        LOG.info("%s: %d of %d meshes found.", self._urdf, found, len(files))
+        if missing:
+            LOG.warning(
+                "%s: %d of %d meshes are not in %s: %s. Another folder is given by "
+                "--mesh-root.",
+                *(
+                    self._urdf,
+                    len(missing),
+                    len(files),
+                    self._root,
+                    join_first(missing),
+                ),
+            )
+        if unread:
+            LOG.warning(
+                "%s: %d meshes are not read, STL and OBJ are; COLLADA needs: "
+                "pip install 'wbc-suite[skins]': %s.",
+                *(self._urdf, len(unread), join_first(unread)),
+            )
 
 
 class UrdfShapes:
-    """Reads shapes of links; `colors` are those of the materials, by valid name."""
+    """Reads shapes of links.
 
-    def __init__(self, robot: Element, meshes: MeshFolder) -> None:
-        self._meshes = meshes
+    Attributes:
+        colors: Those of the materials, by valid name.
+        skins: Meshes of links that are drawn by meshes alone, by the name in the file.
+    """
+
+    def __init__(self, robot: Element, meshes: MeshFolder, *, strict: bool) -> None:
+        self._meshes, self._strict = meshes, strict
+        self._dropped: list[str] = []
+        self.skins: dict[str, list[SkinMesh]] = {}
         self._materials: dict[str, str] = {}
         self.colors: dict[str, tuple[float, ...]] = {}
         names = NameTable()
@@ -108,7 +125,32 @@ class UrdfShapes:
         first = link.find("visual")
         if not visual and first is not None:
             visual = [shape | {"color": self._color(first)} for shape in collision]
+        self._keep_skin(link)
         return {"visual": visual, "collision": collision}
+
+    def report(self, path: Path) -> None:
+        """Log which meshes are absent, and which shapes were left out."""
+        self._meshes.report()
+        if self._dropped:
+            LOG.warning("%s: shapes left out: %s.", path, "; ".join(self._dropped))
+
+    def _keep_skin(self, link: Element) -> None:
+        meshes: list[SkinMesh] = []
+        for item in link.findall("visual"):
+            form = item.find("geometry/mesh")
+            file = None if form is None else self._meshes.find(form.get("filename", ""))
+            if form is None or file is None:
+                return
+            where = f"link '{link.get('name')}'"
+            try:
+                scale = tuple(_scale(form, where).tolist())
+                pose = pose_fields(pose_of(item, where=where))
+            except DescriptionError:
+                return  # the shape is left out and reported
+            own = {"shape": "skin", "file": str(file), "color": self._color(item)}
+            meshes.append(SkinMesh.model_validate(own | {"scale": scale} | pose))
+        if meshes:
+            self.skins[link.get("name", "")] = meshes
 
     def _color(self, visual: Element) -> str:
         """Return the name of a visual's material, grey if it has none."""
@@ -117,39 +159,63 @@ class UrdfShapes:
         return self._materials.get(name, "grey")
 
     def _shapes(self, item: Element, link: Element) -> Iterator[dict[str, Any]]:
-        """Yield the shape of an item, or nothing for a mesh that is ignored."""
+        """Yield the shape of an item, or nothing for one that is left out."""
         where = f"link '{link.get('name')}', {item.tag}"
+        try:
+            shape = self._shape(item, where)
+        except DescriptionError as error:
+            if self._strict:
+                raise
+            self._dropped.append(str(error).removesuffix("."))
+            return
+        if shape is not None:
+            yield shape
+
+    def _shape(self, item: Element, where: str) -> dict[str, Any] | None:
         geometry = item.find("geometry")
         if geometry is None or len(geometry) == 0:
             raise DescriptionError(f"{where}: <geometry> is missing.")
         form = geometry[0]
         pose = pose_of(item, where=where)
         if form.tag != "mesh":
-            yield _primitive(form, where) | pose_fields(pose)
-            return
-        scale = numbers(form, "scale", 3, where=where, default=(1.0, 1.0, 1.0))
-        shape = self._meshes.hull(form.get("filename", ""), scale)
+            return _primitive(form, where) | pose_fields(pose)
+        shape = self._meshes.hull(form.get("filename", ""), _scale(form, where))
         if shape is None:
-            return
+            return None
         if "pos" in shape:  # a thin box has its own centre
             pose = pose * pin.SE3(np.eye(3), np.asarray(shape["pos"]))
-        yield shape | pose_fields(pose)
+        return shape | pose_fields(pose)
+
+
+def _scale(form: Element, where: str) -> Vector:
+    return numbers(form, "scale", 3, where=where, default=(1.0, 1.0, 1.0))
+
+
+def _sizes(form: Element, key: str, count: int, where: str) -> Vector:
+    """Read positive sizes; raises DescriptionError."""
+    sizes = numbers(form, key, count, where=where)
+    if sizes.min() < MIN_SIZE:
+        raise DescriptionError(f"{where}: <{form.tag}> has the {key} {sizes.min():g}.")
+    return sizes
 
 
 def _primitive(form: Element, where: str) -> dict[str, Any]:
     match form.tag:
         case "box":
-            size = numbers(form, "size", 3, where=where) / 2
+            size = _sizes(form, "size", 3, where) / 2
             return {"shape": "box", "size": size.tolist()}
         case "sphere":
-            return {"shape": "sphere", "radius": number(form, "radius", where=where)}
+            return {
+                "shape": "sphere",
+                "radius": float(_sizes(form, "radius", 1, where)[0]),
+            }
         case "cylinder" | "capsule":
-            half = number(form, "length", where=where) / 2
+            half = float(_sizes(form, "length", 1, where)[0]) / 2
             return {
                 "shape": form.tag,
                 "from": [0.0, 0.0, -half],
                 "to": [0.0, 0.0, half],
-                "radius": number(form, "radius", where=where),
+                "radius": float(_sizes(form, "radius", 1, where)[0]),
             }
         case _:
             raise DescriptionError(f"{where}: unknown geometry <{form.tag}>.")

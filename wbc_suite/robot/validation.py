@@ -84,6 +84,7 @@ def _name_faults(robot: "RobotDescription") -> Iterator[str]:
         ("camera", robot.cameras),
         ("sensor", robot.sensors),
         ("mount", robot.mounts),
+        ("tendon", robot.tendons),
     ):
         names = [item.name for item in own]
         for name in sorted({n for n in names if names.count(n) > 1}):
@@ -124,10 +125,12 @@ def _references(robot: "RobotDescription") -> Iterator[tuple[str, str, str]]:
         yield "contacts.exclude", "link", name
     for name in itertools.chain(*((c.link, c.other) for c in robot.connects)):
         yield "a connect", "link", name
+    for name, step in ((t.name, step) for t in robot.tendons for step in t.path):
+        kind = "frame" if step.joint is None else "joint"
+        yield f"tendon '{name}'", kind, str(step.joint or step.frame)
     for gripper, synergies in robot.synergies.items():
-        for synergy in synergies:
-            for joint in synergy.open:
-                yield f"synergy '{synergy.name}' of '{gripper}'", "joint", joint
+        for synergy, joint in ((s.name, joint) for s in synergies for joint in s.open):
+            yield f"synergy '{synergy}' of '{gripper}'", "joint", joint
 
 
 def _shape_faults(robot: "RobotDescription") -> Iterator[str]:

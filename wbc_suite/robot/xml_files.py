@@ -1,5 +1,7 @@
 """Read XML files from untrusted sources: no entities, limited size and depth."""
 
+import re
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TypeAlias
 from xml.etree import ElementTree
@@ -11,6 +13,11 @@ from wbc_suite.tomlfile import read_bytes
 MAX_BYTES = 8_000_000
 """Largest XML file that is read; large humanoids have about 200 kB."""
 MAX_DEPTH = 400  # largest nesting depth; MJCF nests one body per link of a chain
+
+ROBOT_FOLDERS = ("urdf", "urdfs", "robots", "mjcf", "xml")
+MESH_FOLDERS = ("meshes", "mesh", "assets")
+MAX_ABOVE = 6  # folders above a file that are looked at
+PACKAGE = re.compile(r"^(?:package|model):///?([^/]+)/.*$", re.DOTALL)
 
 Element: TypeAlias = ElementTree.Element
 
@@ -49,10 +56,32 @@ def read_xml(path: Path) -> Element:
     parser.StartElementHandler, parser.EndElementHandler = start, end
     parser.StartDoctypeDeclHandler = refuse
     try:
-        parser.Parse(read_bytes(path, most=MAX_BYTES), True)
+        parser.Parse(read_bytes(path, most=MAX_BYTES).lstrip(), True)
     except expat.ExpatError as error:
         raise ConfigError(f"{path}: not well-formed XML: {error}.") from error
     return builder.close()
+
+
+def model_root(file: Path, references: Iterable[str]) -> Path:
+    """Return the folder whose files a robot file may refer to.
+
+    This is the ROS package around the file, or else a close folder with meshes, or the
+    folder above `urdf` and the like; or the outer folder of that name if a reference
+    `package://NAME/...` has one.
+    """
+    folder, *above = file.resolve().parents
+    close = (folder, *above[:3])
+    named = {p for p in close if p.name.lower() in ROBOT_FOLDERS}
+    root = (
+        next((p for p in close if (p / "package.xml").is_file()), None)
+        or next((p for p in close if any((p / m).is_dir() for m in MESH_FOLDERS)), None)
+        or next(
+            (p.parent for p in close if p in named and p.parent not in named), folder
+        )
+    )
+    packages = {PACKAGE.sub(r"\1", name) for name in references if PACKAGE.match(name)}
+    outer = (p for p in above[:MAX_ABOVE] if p.name in packages)
+    return next((p for p in outer if root.is_relative_to(p)), root)
 
 
 def inside(root: Path, path: Path, *, source: Path) -> Path:
@@ -61,6 +90,7 @@ def inside(root: Path, path: Path, *, source: Path) -> Path:
     if not resolved.is_relative_to(root.resolve()):
         raise ConfigError(
             f"{source}: the file '{path}' lies outside the folder {root.resolve()} and "
-            "is not read. Copy it into that folder."
+            "is not read. Copy it into that folder, or give a folder that encloses "
+            "both by --mesh-root."
         )
     return resolved
