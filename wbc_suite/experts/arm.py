@@ -30,6 +30,7 @@ class Arm:
     Attributes:
         hand: The hand, with its contacts.
         grasp: The present kind of grasp.
+        home: Pose of the hand at the start.
     """
 
     def __init__(
@@ -53,7 +54,7 @@ class Arm:
         self._look_ahead = cache(self._make_look_ahead)
         self._offset = cache(self._measure_offset)
         self._closing = 0
-        self._goal = self._target = self.pose
+        self.home = self._goal = self._target = self.pose
         self._speed, self._turn, self._exact = SPEED, TURN, True
         self._correction, self._turn_correction = np.zeros(3), np.zeros(3)
         self._moves, self._grips = False, False
@@ -63,9 +64,18 @@ class Arm:
         """Measured pose T_wh of the frame of the present grasp."""
         return self._port.measure() * self._offset(self.grasp)
 
-    def look_ahead(self, poses: Sequence[pin.SE3], grasp: str | None = None) -> Outlook:
-        """Look along a chain of poses of a grasp's frame, by default the present."""
-        return self._look_ahead(grasp or self.grasp).along(poses)
+    def look_ahead(
+        self,
+        poses: Sequence[pin.SE3],
+        grasp: str | None = None,
+        *,
+        after: Outlook | None = None,
+    ) -> Outlook:
+        """Look along a chain of poses of a grasp's frame, by default the present.
+
+        See `LookAhead.along`.
+        """
+        return self._look_ahead(grasp or self.grasp).along(poses, after)
 
     def configuration(self, q: Vector) -> Vector:
         """Return the robot's configuration with joints as an outlook has them."""
