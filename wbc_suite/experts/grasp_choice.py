@@ -30,6 +30,7 @@ class Approach:
         upright: Greatest angle of the approach to the wanted direction, rad.
         direction: Wanted direction of approach, a unit vector in the world.
         place: Name of the place to grasp, where the object has several.
+        leave: How far the hand withdraws along its approach in the end, m.
     """
 
     raised: float = 0.1
@@ -37,6 +38,7 @@ class Approach:
     upright: float = 0.8
     direction: Vector = field(default_factory=DOWN.copy)
     place: str = ""
+    leave: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,6 +126,8 @@ def _choices(
     angle = math.acos(min(1.0, along))
     for way, extra in ways:
         poses = [pose * grasp for pose in way]
+        if approach.leave > 0.0:
+            poses.append(poses[-1] * pin.SE3(np.eye(3), approach.leave * DOWN))
         outlook = arm.look_ahead(poses, site.grasp, after=first)
         yield Choice(
             arm=arm,

@@ -68,13 +68,20 @@ def travel(arm: Arm, target: pin.SE3, *, height: float, **options: Any) -> Steps
 
 
 def go_home(arm: Arm) -> Steps[bool]:
-    """Return to where the hand was at the start, over what is below its way."""
-    height = max(arm.pose.translation[2], arm.home.translation[2]) + 0.05
-    return (
-        yield from travel(
-            arm, arm.home, height=height, tolerance=0.02, turn_tolerance=0.2, most=40
-        )
-    )
+    """Return to where the hand was at the start, first without turning.
+
+    Where a joint is in the way, the hand is turned about its approach by quarters.
+    """
+    height = max(arm.pose.translation[2], arm.home.translation[2])
+    inward = pin.SE3(arm.pose.rotation, at_height(arm.home, height).translation)
+    quarters = [pin.SE3(pin.exp3(k * np.pi / 2 * UP), np.zeros(3)) for k in range(4)]
+    homes = [arm.home * quarter for quarter in quarters]
+    costs = [
+        arm.look_ahead([inward, home]).cost + (k > 0) for k, home in enumerate(homes)
+    ]
+    home = homes[int(np.argmin(costs))]
+    yield from move(arm, inward, tolerance=PASSING, most=40)
+    return (yield from move(arm, home, tolerance=0.02, turn_tolerance=0.2, most=40))
 
 
 def at_height(pose: pin.SE3, height: float) -> pin.SE3:
