@@ -2,29 +2,29 @@
 
 Episodes are those of seeds that no tuning saw, from 7000 on. An episode counts as a
 success if the benchmark is solved within 500 steps, or 1000 for those with several
-objects. Results are added to artifacts/benchmarks/experts.json, and the table in
-docs/experts.md is written from that file.
+objects. Results are added to artifacts/benchmarks/experts_table.json; `--table` writes
+that into docs/experts.md, and measures nothing.
 
 Usage: python benchmarks/experts.py [BENCHMARK ...] [--robots R[,R]] [--controller C]
-    [--seeds 100] [--base 7000] [--write]
+    [--seeds 100] [--base 7000] [--quick] [--json FILE]
+       python benchmarks/experts.py --table
 """
 
-import argparse
 import datetime
 import json
-import os
-import platform
 import statistics
 import sys
 from pathlib import Path
 from typing import Any
+
+from harness.report import Report, machine, options
 
 import wbc_suite
 from wbc_suite.evaluation import summarise
 from wbc_suite.evaluation.rollouts import run_episode
 
 ROOT = Path(__file__).parent.parent
-FOUND = ROOT / "artifacts" / "benchmarks" / "experts.json"
+FOUND = ROOT / "artifacts" / "benchmarks" / "experts_table.json"
 PAGE = ROOT / "docs" / "experts.md"
 BEGIN, END = "<!-- results -->", "<!-- end of results -->"
 LONG = ("TwoArmTransport", "ToolHang", "NutAssembly", "PickPlace")
@@ -64,8 +64,7 @@ def measure(
         "failed": [e["seed"] for e in played if not e["succeeded"]],
         "base": seeds.start,
         "date": datetime.datetime.now(tz=datetime.UTC).date().isoformat(),
-        "machine": f"{platform.processor() or platform.machine()}, "
-        f"{os.cpu_count()} processors",
+        "machine": machine(),
         "command": "python " + " ".join(["benchmarks/experts.py", *sys.argv[1:]]),
     }
 
@@ -97,30 +96,40 @@ def write_page(rows: list[dict[str, Any]]) -> None:
     PAGE.write_text(f"{before}{BEGIN}\n\n{table(rows)}\n\n{END}{after}", "utf-8")
 
 
+def add(row: dict[str, Any]) -> None:
+    """Add a result to those known, in place of an earlier one of the same case."""
+    known = json.loads(FOUND.read_text("utf-8")) if FOUND.exists() else []
+    key = ("benchmark", "robots", "controller")
+    others = [r for r in known if any(r[k] != row[k] for k in key)]
+    FOUND.parent.mkdir(parents=True, exist_ok=True)
+    FOUND.write_text(json.dumps([*others, row], indent=1), "utf-8")
+
+
 def main() -> None:
-    """Measure what the arguments name, and add it to what is known."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("benchmarks", nargs="*", default=list(ALL))
+    """Measure what the arguments name."""
+    parser = options(__doc__, "three seeds of five benchmarks")
+    parser.add_argument("benchmarks", nargs="*")
     parser.add_argument("--robots")
     parser.add_argument("--controller")
     parser.add_argument("--seeds", type=int, default=100)
     parser.add_argument("--base", type=int, default=7000)
-    parser.add_argument("--write", action="store_true", help="write docs/experts.md")
+    parser.add_argument("--table", action="store_true", help="write docs/experts.md")
     given = parser.parse_args()
-    known = json.loads(FOUND.read_text("utf-8")) if FOUND.exists() else []
-    seeds = range(given.base, given.base + given.seeds)
-    for name in given.benchmarks:
+    if given.table:
+        write_page(json.loads(FOUND.read_text("utf-8")))
+        return
+    report = Report()
+    count = 3 if given.quick else given.seeds
+    for name in given.benchmarks or (ALL[:2] + ALL[8:11] if given.quick else ALL):
+        seeds = range(given.base, given.base + count)
         row = measure(name, given.robots, given.controller, seeds)
-        key = [row[k] for k in ("benchmark", "robots", "controller")]
-        known = [
-            r for r in known if [r["benchmark"], r["robots"], r["controller"]] != key
-        ]
-        known.append(row)
-        FOUND.parent.mkdir(parents=True, exist_ok=True)
-        FOUND.write_text(json.dumps(known, indent=1), "utf-8")
+        if not given.quick:
+            add(row)
+        report.rows.append(row | {"case": name, "side": row["robots"]})
         print(table([row]).splitlines()[2], row["failed"] or "", flush=True)
-    if given.write:
-        write_page(known)
+    columns = ("case", "side", "successes", "episodes", "median_steps", "most_steps")
+    report.show("Successes of experts", columns)
+    report.write(given.json)
 
 
 if __name__ == "__main__":
