@@ -18,7 +18,6 @@ LEAD = 0.08  # m; a goal waits for a hand that lags farther behind
 CORRECTION, MOST = 0.3, 0.02  # share of a resting error; greatest correction, m
 MOST_TURN = 0.15  # rad, likewise
 SETTLED = 0.03  # m; errors are resting errors below it
-OPEN, CLOSED = (-1.0, 1.0), 1
 
 
 class Arm:
@@ -50,6 +49,8 @@ class Arm:
         name = state.prefix + gripper if several else gripper
         self._gripper: ActionSlice | None = layout[name] if name in layout else None  # noqa: SIM401
         self._synergies = state.robot.synergies.get(gripper, ())
+        driven = [joint for synergy in self._synergies for joint in synergy.open]
+        self._fingers = state.joint_addresses(tuple(driven))[0]
         self.grasp = "pinch"
         self._look_ahead = cache(self._make_look_ahead)
         self._offset = cache(self._measure_offset)
@@ -82,9 +83,9 @@ class Arm:
         return self._look_ahead(self.grasp).full(q)
 
     @property
-    def is_open(self) -> bool:
-        """Whether the gripper is commanded to be open."""
-        return self._closing == 0
+    def fingers(self) -> Vector:
+        """Positions of the joints that the gripper drives, rad or m."""
+        return self.state.data.qpos[self._fingers]
 
     def aim(
         self,

@@ -13,6 +13,7 @@ from wbc_suite.typing import Vector
 
 UP = np.array([0.0, 0.0, 1.0])
 STALLED = 8  # control periods without progress end a motion
+STOPPED = 2e-4  # rad or m per control period, of fingers
 OPENING = 8  # control periods until a gripper is open
 OUT_OF_REACH = 0.008  # m, error of outlooks; from the start more may be in reach
 PASSING = 0.03  # m, tolerance of poses on the way
@@ -96,15 +97,21 @@ def settle(cell: Workcell, name: str, *, most: int = 20) -> Steps[bool]:
     return (yield from wait_until(lambda: cell.speed(name) < 0.02, most=most))
 
 
-def grip(cell: Workcell, arm: Arm, name: str, *, most: int = 16) -> Steps[bool]:
-    """Close the gripper until it holds an object; return whether it does."""
+def grip(cell: Workcell, arm: Arm, name: str, *, most: int = 60) -> Steps[bool]:
+    """Close the gripper until it holds an object; return whether it does.
+
+    It ends without success when the fingers have stopped.
+    """
     arm.close()
-    held = 0
+    held = still = 0
+    fingers = arm.fingers
     for _ in range(most):
         yield
         held = held + 1 if cell.holds(arm, name) else 0
-        if held >= 2:
-            return True
+        moved = float(np.abs(arm.fingers - fingers).max(initial=0.0))
+        still, fingers = still + 1 if moved < STOPPED else 0, arm.fingers
+        if held >= 2 or still >= STALLED:
+            break
     return cell.holds(arm, name)
 
 
