@@ -54,8 +54,8 @@ HEAD = """# Benchmarks
 
 Each is `wbc_suite.make(NAME, robots=...)`, or an
 [id](environments.md#the-benchmarks) for gymnasium, and works with every robot that has
-enough hands, or feet where it walks. Parameters are in `tasks/`, formulas of success and
-reward in `wbc_suite/benchmark/`. Written by `make gallery`.
+enough hands, or feet where it walks. Parameters are in `tasks/`, formulas of success
+and reward in `wbc_suite/benchmark/`. Written by `make gallery`.
 """
 
 

@@ -9,6 +9,7 @@ import pinocchio as pin
 from wbc_suite.control import ActionLayout, RobotState
 from wbc_suite.control.action import ActionSlice
 from wbc_suite.devices.action_ports import LimbPort
+from wbc_suite.experts.finger_reach import finger_reach
 from wbc_suite.experts.look_ahead import LookAhead, Outlook
 from wbc_suite.sensing.hands import Hand
 from wbc_suite.typing import Vector
@@ -30,6 +31,7 @@ class Arm:
         hand: The hand, with its contacts.
         grasp: The present kind of grasp.
         home: Pose of the hand at the start.
+        finger_reach: Returns how far fingers reach beyond the frame of a grasp, m.
     """
 
     def __init__(
@@ -54,6 +56,7 @@ class Arm:
         self.grasp = "pinch"
         self._look_ahead = cache(self._make_look_ahead)
         self._offset = cache(self._measure_offset)
+        self.finger_reach = cache(self._measure_fingers)
         self._closing = 0
         self.home = self._goal = self._target = self.pose
         self._speed, self._turn, self._exact = SPEED, TURN, True
@@ -188,6 +191,10 @@ class Arm:
         site = self.state.data.site(self.state.prefix + self._frame(grasp))
         pose = pin.SE3(site.xmat.reshape(3, 3).copy(), site.xpos.copy())
         return self._port.measure().actInv(pose)
+
+    def _measure_fingers(self, grasp: str) -> float:
+        frame = self._frame(grasp)
+        return finger_reach(self.state, self.hand, self._synergies, grasp, frame)
 
     def _make_look_ahead(self, grasp: str) -> LookAhead:
         return LookAhead(self.state, self._joints, self._frame(grasp))

@@ -17,6 +17,9 @@ DOWN = np.array([0.0, 0.0, -1.0])
 TILTS = (0.0, 0.25, -0.25, 0.5, -0.5)  # rad, about the closing axis
 COLLISION = 5.0  # cost
 ANGLE = 0.4  # cost of an approach that deviates from the wanted one, 1/rad
+CLEAR = 0.001  # m, between fingers and what an object lies on
+MOST_LIFT = 0.03  # m, by which hands stay back for that
+STEEP = 0.7  # cosine, of approaches from above
 GOOD = 1.0  # of outlooks; tilted grasps are looked at if none is so good
 
 
@@ -120,6 +123,9 @@ def _choices(
     along = float(at.rotation[:, 2] @ approach.direction)
     if along < math.cos(approach.upright):
         return
+    back = _needed_lift(cell, name, arm, site.grasp, at)
+    grasp = grasp * pin.SE3(np.eye(3), back * DOWN)
+    at = cell.pose(name) * grasp
     before = pin.SE3(at.rotation, at.translation - approach.away * at.rotation[:, 2])
     up = pin.SE3(at.rotation, at.translation - approach.raised * DOWN)
     first = arm.look_ahead([before, at, up], site.grasp)
@@ -138,6 +144,15 @@ def _choices(
             outlook=outlook,
             cost=outlook.cost + ANGLE * angle + extra,
         )
+
+
+def _needed_lift(cell: Workcell, name: str, arm: Arm, grasp: str, at: pin.SE3) -> float:
+    """Return how far a hand must stay back for its fingers to clear the support, m."""
+    down = -at.rotation.item(2, 2)
+    if down < STEEP:
+        return 0.0
+    room = (at.translation[2] - cell.bottom(name)) / down
+    return min(max(arm.finger_reach(grasp) + CLEAR - room, 0.0), MOST_LIFT)
 
 
 def _first_clear(cell: Workcell, name: str, choices: Sequence[Choice]) -> Choice:
