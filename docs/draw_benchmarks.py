@@ -52,10 +52,10 @@ ROBOTS: dict[str, str | list[str]] = {
 
 HEAD = """# Benchmarks
 
-Each is `wbc_suite.make(NAME, robots=...)`, or `wbc_suite/NAME-v0` for gymnasium, and
-works with every robot that has enough hands, or feet where it walks. Parameters are in
-`tasks/`, formulas of success and reward in `wbc_suite/benchmark/`. Written by
-`make gallery`.
+Each is `wbc_suite.make(NAME, robots=...)`, or an
+[id](environments.md#the-benchmarks) for gymnasium, and works with every robot that has
+enough hands, or feet where it walks. Parameters are in `tasks/`, formulas of success
+and reward in `wbc_suite/benchmark/`. Written by `make gallery`.
 """
 
 

@@ -29,10 +29,15 @@ ORDER = (
     "cameras",
 )
 ALWAYS = {"tracking": ["--plot", str(FOUND / "tracking.png")]}
-FULL = {"simulation_accuracy": ["--trials", "50"], "long_runs": ["--quick"]}
+FULL = {
+    "simulation_accuracy": ["--trials", "50"],
+    "long_runs": ["--quick"],
+    "experts": ["--quick"],
+}
 """More arguments of some scripts: in every run, and in full ones.
 
-All of `long_runs` takes an hour, so a full run takes its quick form.
+All of `long_runs` takes an hour, and `experts` half of one, so a full run takes their
+quick form.
 """
 
 HEAD = """# Measurements

@@ -23,7 +23,7 @@ def replayed(tmp_path):
     made = wbc_suite.make("Lift", robots="Panda", horizon=70, terminate_on_success=True)
     env = DataCollection(made, path)
     for seed in range(2):
-        driver = make_policy("scripted", made, seed)
+        driver = make_policy("expert", made, seed)
         seen, _ = env.reset(seed=seed)
         over = False
         while not over:

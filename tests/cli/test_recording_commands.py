@@ -59,13 +59,19 @@ def test_a_film_that_cannot_be_written_is_said_before_anything_is_played(
 
 
 @pytest.mark.slow
-def test_a_scripted_hand_says_what_it_knows(command, tmp_path):
+def test_a_benchmark_without_an_expert_is_refused(command, tmp_path):
     code, _, err = command(
-        "record", "Stack", "--robots", "Panda", "--out", tmp_path / "a.hdf5"
+        "record", "Reach", "--robots", "SpotWithArm", "--out", tmp_path / "a.hdf5"
     )
     assert code == 2
-    assert "picks up the cube of Lift" in err
-    assert not list(tmp_path.iterdir())
+    assert "No expert named 'Reach'" in err
+
+
+@pytest.mark.slow
+def test_the_expert_counts_its_successes(command):
+    code, out, err = command("expert", "Lift", "--robots", "UR5e", "--episodes", 2)
+    assert (code, err) == (0, "")
+    assert "Lift, UR5e: 2 of 2 succeeded" in out
 
 
 @pytest.mark.slow

@@ -35,10 +35,6 @@ def make(name, env, seed=0):
     return make_policy(name, env, seed)
 
 
-def observe(cube, hand):
-    return {"cube_pos": np.array(cube), "robot0_eef_pos": np.array(hand)}
-
-
 def test_hold_keeps_all_targets():
     env = Lift()
     np.testing.assert_array_equal(make("hold", env)({}), env.hold_action)
@@ -57,36 +53,6 @@ def test_random_actions_fill_the_action_space_and_follow_the_seed():
     again = make("random", env, seed=4)
     np.testing.assert_array_equal(drawn[0], again({}))
     assert not np.array_equal(drawn[0], make("random", env, seed=5)({}))
-
-
-def test_the_scripted_policy_goes_above_the_cube_then_down_then_lifts():
-    policy = make("scripted", Lift())
-    above = policy(observe([0.1, 0.0, 0.8], [0.0, 0.0, 0.8]))
-    assert above[0] > 0.0  # towards the cube
-    assert above[2] > 0.0  # and above it
-    assert above[6] == -1.0  # open
-    down = policy(observe([0.0, 0.0, 0.8], [0.001, 0.0, 0.88]))
-    assert down[2] < 0.0
-    assert down[6] == -1.0
-    closing = [policy(observe([0.0, 0.0, 0.8], [0.0, 0.0, 0.8])) for _ in range(25)]
-    assert all(action[6] == 1.0 for action in closing)
-    np.testing.assert_array_equal(closing[-1][:3], 0.0)
-    lift = policy(observe([0.0, 0.0, 0.8], [0.0, 0.0, 0.8]))
-    assert lift[2] > 0.0
-
-
-def test_scripted_actions_stay_within_their_bounds():
-    policy = make("scripted", Lift())
-    action = policy(observe([5.0, -5.0, 0.8], [0.0, 0.0, 0.8]))
-    np.testing.assert_array_equal(action[:2], [1.0, -1.0])
-
-
-@pytest.mark.parametrize(
-    "env", [Lift(name="Door"), Lift(parts=("right", "left")), Lift(parts=("right",))]
-)
-def test_the_scripted_policy_refuses_other_environments(env):
-    with pytest.raises(ConfigError, match=f"cannot drive {env.benchmark.name}"):
-        make("scripted", env)
 
 
 def test_a_policy_of_a_users_module_gets_environment_and_generator(monkeypatch):
@@ -108,4 +74,4 @@ def test_modules_and_functions_that_do_not_exist_are_named(name):
 
 
 def test_every_policy_is_a_factory():
-    assert set(POLICIES) == {"hold", "random", "scripted"}
+    assert set(POLICIES) == {"expert", "hold", "random"}

@@ -16,7 +16,7 @@ def lift_recording(tmp_path_factory):
     path = tmp_path_factory.mktemp("lift") / "lift.hdf5"
     made = wbc_suite.make("Lift", robots="Panda", horizon=70, terminate_on_success=True)
     with_file = DataCollection(made, path)
-    for seed, device in enumerate(["scripted", "random"]):
+    for seed, device in enumerate(["expert", "random"]):
         driver = make_policy(device, made, seed)
         seen, _ = with_file.reset(seed=seed)
         for _ in range(70 if seed == 0 else 12):

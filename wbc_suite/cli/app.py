@@ -16,6 +16,7 @@ from wbc_suite.cli import (
     datasets,
     demo,
     doctor,
+    expert,
     record,
     replay,
     robots,
@@ -48,6 +49,7 @@ app.command("extract")(datasets.extract)
 app.command("convert")(datasets.convert)
 app.command("list")(catalogue.list_catalogue)
 app.command("render")(robots.render)
+app.command("expert")(expert.expert)
 app.command("rollout")(rollout.rollout)
 app.command("bench")(bench.bench)
 app.command("check")(catalogue.check_file)

@@ -28,7 +28,7 @@ OutOption = Annotated[
 PolicyOption = Annotated[
     str,
     typer.Option(
-        help="Policy: scripted, random, hold, or yours: module:function; or an input "
+        help="Policy: expert, random, hold, or yours: module:function; or an input "
         "device: keyboard, stream, spacemouse, gamepad, dualsense, mjgui, or yours: "
         "module:Class."
     ),
@@ -54,7 +54,7 @@ def record(
     *,
     out: OutOption,
     robots: options.RobotsOption = None,
-    device: PolicyOption = "scripted",
+    device: PolicyOption = "expert",
     episodes: Annotated[int, typer.Option(min=1, help="How many to keep.")] = 10,
     controller: options.ControllerOption = None,
     horizon: HorizonOption = None,

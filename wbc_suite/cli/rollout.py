@@ -30,7 +30,7 @@ def rollout(
         typer.Option(help="Controller, by name or file. Repeat it to compare."),
     ] = None,
     policy: Annotated[
-        str, typer.Option(help="random, hold, scripted (Lift), or module:function.")
+        str, typer.Option(help="expert, random, hold, or module:function.")
     ] = "random",
     episodes: Annotated[int, typer.Option(min=1, help="Per case.")] = 10,
     first_seed: Annotated[int, typer.Option(min=0, help="Seed of the first.")] = 0,

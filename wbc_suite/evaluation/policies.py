@@ -1,4 +1,4 @@
-"""Policies by name: `hold`, `random`, `scripted`, and a user's own functions."""
+"""Policies by name: `expert`, `hold`, `random`, and a user's own functions."""
 
 import importlib
 from collections.abc import Callable, Mapping
@@ -14,10 +14,6 @@ from wbc_suite.typing import Vector
 Policy: TypeAlias = Callable[[Mapping[str, Any]], Vector]
 """From an observation to an action of `env.action_space`; made for each episode."""
 
-GAIN = 8.0  # of the full action, per metre
-ABOVE = 0.08  # m over the cube, for the approach
-NEAR, CLOSED = 0.008, 25  # m; actions until the fingers are closed
-
 
 def hold(env: RobotEnv, rng: np.random.Generator) -> Policy:
     """Make a policy that keeps all targets where they are."""
@@ -31,42 +27,9 @@ def random(env: RobotEnv, rng: np.random.Generator) -> Policy:
     return lambda _: rng.uniform(low, high)
 
 
-def scripted(env: RobotEnv, rng: np.random.Generator) -> Policy:
-    """Make a policy that picks up the cube of Lift: above it, down, close, up.
-
-    It commands differences of position, as `OSC_POSE` takes them, for one arm. Raises
-    ConfigError in other environments.
-    """
-    names = [part.name for part in env.action_layout.slices]
-    if env.benchmark.name != "Lift" or names != ["right", "right_gripper"]:
-        raise ConfigError(
-            "The scripted policy picks up the cube of Lift, with one arm by OSC_POSE; "
-            f"it cannot drive {env.benchmark.name} with {', '.join(names)}."
-        )
-    del rng
-    grasped = 0
-
-    def drive(observation: Mapping[str, Any]) -> Vector:
-        nonlocal grasped
-        action = env.hold_action
-        offset = observation["cube_pos"] - observation["robot0_eef_pos"]
-        sideways = float(np.linalg.norm(offset[:2]))
-        if grasped == 0 and sideways > NEAR:
-            offset[2] += ABOVE
-        elif grasped > 0 or abs(offset[2]) <= NEAR:
-            grasped += 1
-            offset = np.array([0.0, 0.0, 0.1 if grasped > CLOSED else 0.0])
-        action[:3] = np.clip(GAIN * offset, -1.0, 1.0)
-        action[env.action_layout.slices[1].start :] = 1.0 if grasped else -1.0
-        return action
-
-    return drive
-
-
 POLICIES: Mapping[str, Callable[[RobotEnv, np.random.Generator], Policy]] = {
     "hold": hold,
     "random": random,
-    "scripted": scripted,
     "expert": expert,
 }
 

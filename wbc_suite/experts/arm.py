@@ -9,6 +9,7 @@ import pinocchio as pin
 from wbc_suite.control import ActionLayout, RobotState
 from wbc_suite.control.action import ActionSlice
 from wbc_suite.devices.action_ports import LimbPort
+from wbc_suite.experts.finger_reach import finger_reach
 from wbc_suite.experts.look_ahead import LookAhead, Outlook
 from wbc_suite.sensing.hands import Hand
 from wbc_suite.typing import Vector
@@ -18,7 +19,6 @@ LEAD = 0.08  # m; a goal waits for a hand that lags farther behind
 CORRECTION, MOST = 0.3, 0.02  # share of a resting error; greatest correction, m
 MOST_TURN = 0.15  # rad, likewise
 SETTLED = 0.03  # m; errors are resting errors below it
-OPEN, CLOSED = (-1.0, 1.0), 1
 
 
 class Arm:
@@ -30,6 +30,8 @@ class Arm:
     Attributes:
         hand: The hand, with its contacts.
         grasp: The present kind of grasp.
+        home: Pose of the hand at the start.
+        finger_reach: Returns how far fingers reach beyond the frame of a grasp, m.
     """
 
     def __init__(
@@ -49,11 +51,14 @@ class Arm:
         name = state.prefix + gripper if several else gripper
         self._gripper: ActionSlice | None = layout[name] if name in layout else None  # noqa: SIM401
         self._synergies = state.robot.synergies.get(gripper, ())
+        driven = [joint for synergy in self._synergies for joint in synergy.open]
+        self._fingers = state.joint_addresses(tuple(driven))[0]
         self.grasp = "pinch"
         self._look_ahead = cache(self._make_look_ahead)
         self._offset = cache(self._measure_offset)
+        self.finger_reach = cache(self._measure_fingers)
         self._closing = 0
-        self._goal = self._target = self.pose
+        self.home = self._goal = self._target = self.pose
         self._speed, self._turn, self._exact = SPEED, TURN, True
         self._correction, self._turn_correction = np.zeros(3), np.zeros(3)
         self._moves, self._grips = False, False
@@ -63,18 +68,27 @@ class Arm:
         """Measured pose T_wh of the frame of the present grasp."""
         return self._port.measure() * self._offset(self.grasp)
 
-    def look_ahead(self, poses: Sequence[pin.SE3], grasp: str | None = None) -> Outlook:
-        """Look along a chain of poses of a grasp's frame, by default the present."""
-        return self._look_ahead(grasp or self.grasp).along(poses)
+    def look_ahead(
+        self,
+        poses: Sequence[pin.SE3],
+        grasp: str | None = None,
+        *,
+        after: Outlook | None = None,
+    ) -> Outlook:
+        """Look along a chain of poses of a grasp's frame, by default the present.
+
+        See `LookAhead.along`.
+        """
+        return self._look_ahead(grasp or self.grasp).along(poses, after)
 
     def configuration(self, q: Vector) -> Vector:
         """Return the robot's configuration with joints as an outlook has them."""
         return self._look_ahead(self.grasp).full(q)
 
     @property
-    def is_open(self) -> bool:
-        """Whether the gripper is commanded to be open."""
-        return self._closing == 0
+    def fingers(self) -> Vector:
+        """Positions of the joints that the gripper drives, rad or m."""
+        return self.state.data.qpos[self._fingers]
 
     def aim(
         self,
@@ -177,6 +191,10 @@ class Arm:
         site = self.state.data.site(self.state.prefix + self._frame(grasp))
         pose = pin.SE3(site.xmat.reshape(3, 3).copy(), site.xpos.copy())
         return self._port.measure().actInv(pose)
+
+    def _measure_fingers(self, grasp: str) -> float:
+        frame = self._frame(grasp)
+        return finger_reach(self.state, self.hand, self._synergies, grasp, frame)
 
     def _make_look_ahead(self, grasp: str) -> LookAhead:
         return LookAhead(self.state, self._joints, self._frame(grasp))

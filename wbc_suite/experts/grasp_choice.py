@@ -1,9 +1,8 @@
 """Choice of a grasp: among all sites and arms, by a look-ahead over what follows."""
 
-import itertools
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 import pinocchio as pin
@@ -18,7 +17,31 @@ DOWN = np.array([0.0, 0.0, -1.0])
 TILTS = (0.0, 0.25, -0.25, 0.5, -0.5)  # rad, about the closing axis
 COLLISION = 5.0  # cost
 ANGLE = 0.4  # cost of an approach that deviates from the wanted one, 1/rad
+CLEAR = 0.001  # m, between fingers and what an object lies on
+MOST_LIFT = 0.03  # m, by which hands stay back for that
+STEEP = 0.7  # cosine, of approaches from above
 GOOD = 1.0  # of outlooks; tilted grasps are looked at if none is so good
+
+
+@dataclass(frozen=True, kw_only=True)
+class Approach:
+    """How an object may be approached.
+
+    Attributes:
+        raised: How far it is raised once it is grasped, m.
+        away: Distance from which the hand approaches, m.
+        upright: Greatest angle of the approach to the wanted direction, rad.
+        direction: Wanted direction of approach, a unit vector in the world.
+        place: Name of the place to grasp, where the object has several.
+        leave: How far the hand withdraws along its approach in the end, m.
+    """
+
+    raised: float = 0.1
+    away: float = 0.08
+    upright: float = 0.8
+    direction: Vector = field(default_factory=DOWN.copy)
+    place: str = ""
+    leave: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,62 +72,87 @@ def choose_grasp(
     cell: Workcell,
     name: str,
     *,
+    arms: Sequence[Arm],
+    approach: Approach,
     then: Sequence[Sequence[pin.SE3]] = ((),),
     costs: Sequence[float] | None = None,
-    arms: Sequence[Arm],
-    raised: float = 0.1,
-    away: float = 0.08,
-    upright: float = 0.8,
-    direction: Vector = DOWN,
-    place: str = "",
 ) -> Choice | None:
-    """Return the best grasp of an object; None if it has none along the direction.
+    """Return the best grasp of an object; None if no site lies along the direction.
 
     Args:
         cell: The workcell.
         name: The object.
+        arms: The arms that may do it.
+        approach: How it may be approached.
         then: Alternatives of where it will be carried, each a chain of its poses.
         costs: Cost of each alternative beside its outlook, s.
-        arms: The arms that may do it.
-        raised: How far it is raised, m.
-        away: Distance from which the hand approaches, m.
-        upright: Greatest angle of the approach to the wanted direction, rad.
-        direction: Wanted direction of approach, a unit vector in the world.
-        place: Name of the place to grasp, where the object has several.
     """
-    T_wo = cell.pose(name)
-    least = math.cos(upright)
+    ways = [*zip(map(tuple, then), costs or [0.0] * len(then), strict=True)]
     found: list[Choice] = []
     for tilt in TILTS:
         if found and min(choice.cost for choice in found) < GOOD:
             break
-        ways = zip(then, costs or [0.0] * len(then), strict=True)
-        for arm, site, (way, extra) in itertools.product(
-            arms, cell.grasps(name), list(ways)
-        ):
-            if abs(tilt) > site.tilt or site.name != place:
-                continue
-            grasp = tilted(site, tilt)
-            along = float((T_wo * grasp).rotation[:, 2] @ direction)
-            if along < least:
-                continue
-            found.append(
-                _outlook(
-                    cell,
-                    name,
-                    arm,
-                    site,
-                    grasp,
-                    tuple(way),
-                    raised=raised,
-                    away=away,
-                    direction=direction,
-                    extra=extra,
-                )
-            )
+        for arm in arms:
+            for site in cell.grasps(name):
+                if abs(tilt) <= site.tilt and site.name == approach.place:
+                    grasp = tilted(site, tilt)
+                    found += _choices(cell, name, arm, site, grasp, ways, approach)
     if not found:
         return None
     return _first_clear(cell, name, sorted(found, key=lambda choice: choice.cost))
+
+
+def tilted(site: GraspSite, tilt: float) -> pin.SE3:
+    """Return a site's pose turned about its closing axis by an angle, rad."""
+    pose = site.pose
+    turn = pin.exp3(tilt * np.array(site.closing))
+    return pin.SE3(turn @ pose.rotation, pose.translation)
+
+
+def _choices(
+    cell: Workcell,
+    name: str,
+    arm: Arm,
+    site: GraspSite,
+    grasp: pin.SE3,
+    ways: Sequence[tuple[tuple[pin.SE3, ...], float]],
+    approach: Approach,
+) -> Iterator[Choice]:
+    """Yield what follows a grasp, by each way; nothing if its direction is wrong."""
+    at = cell.pose(name) * grasp
+    along = float(at.rotation[:, 2] @ approach.direction)
+    if along < math.cos(approach.upright):
+        return
+    back = _needed_lift(cell, name, arm, site.grasp, at)
+    grasp = grasp * pin.SE3(np.eye(3), back * DOWN)
+    at = cell.pose(name) * grasp
+    before = pin.SE3(at.rotation, at.translation - approach.away * at.rotation[:, 2])
+    up = pin.SE3(at.rotation, at.translation - approach.raised * DOWN)
+    first = arm.look_ahead([before, at, up], site.grasp)
+    angle = math.acos(min(1.0, along))
+    for way, extra in ways:
+        poses = [pose * grasp for pose in way]
+        if approach.leave > 0.0:
+            poses.append(poses[-1] * pin.SE3(np.eye(3), approach.leave * DOWN))
+        outlook = arm.look_ahead(poses, site.grasp, after=first)
+        yield Choice(
+            arm=arm,
+            site=site,
+            before=before,
+            grasp=grasp,
+            then=way,
+            outlook=outlook,
+            cost=outlook.cost + ANGLE * angle + extra,
+        )
+
+
+def _needed_lift(cell: Workcell, name: str, arm: Arm, grasp: str, at: pin.SE3) -> float:
+    """Return how far a hand must stay back for its fingers to clear the support, m."""
+    down = -at.rotation.item(2, 2)
+    if down < STEEP:
+        return 0.0
+    room = (at.translation[2] - cell.bottom(name)) / down
+    return min(max(arm.finger_reach(grasp) + CLEAR - room, 0.0), MOST_LIFT)
 
 
 def _first_clear(cell: Workcell, name: str, choices: Sequence[Choice]) -> Choice:
@@ -116,41 +164,3 @@ def _first_clear(cell: Workcell, name: str, choices: Sequence[Choice]) -> Choice
         if all(cell.is_clear(choice.arm, q, but=name) for q in (at, before)):
             return choice
     return choices[0]
-
-
-def tilted(site: GraspSite, tilt: float) -> pin.SE3:
-    """Return a site's pose turned about its closing axis by an angle, rad."""
-    pose = site.pose
-    turn = pin.exp3(tilt * np.array(site.closing))
-    return pin.SE3(turn @ pose.rotation, pose.translation)
-
-
-def _outlook(
-    cell: Workcell,
-    name: str,
-    arm: Arm,
-    site: GraspSite,
-    grasp: pin.SE3,
-    then: tuple[pin.SE3, ...],
-    *,
-    raised: float,
-    away: float,
-    direction: Vector,
-    extra: float,
-) -> Choice:
-    """Look along a grasp and what follows."""
-    at = cell.pose(name) * grasp
-    before = pin.SE3(at.rotation, at.translation - away * at.rotation[:, 2])
-    up = pin.SE3(at.rotation, at.translation - raised * DOWN)
-    chain = [before, at, up, *(pose * grasp for pose in then)]
-    outlook = arm.look_ahead(chain, site.grasp)
-    angle = math.acos(min(1.0, max(-1.0, float(at.rotation[:, 2] @ direction))))
-    return Choice(
-        arm=arm,
-        site=site,
-        before=before,
-        grasp=grasp,
-        then=then,
-        outlook=outlook,
-        cost=outlook.cost + ANGLE * angle + extra,
-    )

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.experts.arm import Arm
-from wbc_suite.experts.grasp_choice import choose_grasp
+from wbc_suite.experts.grasp_choice import Approach, choose_grasp
 from wbc_suite.experts.skills import UP, carry, grip, move, pick, release, shifted
 from wbc_suite.experts.workcell import Steps, Workcell
 from wbc_suite.typing import Vector
@@ -46,7 +46,6 @@ def hand_over(
     Returns:
         Whether the taker alone holds it.
     """
-    home = taker.pose
     for _ in range(tries):
         if not cell.holds(giver, name):
             meetings = _meetings(cell, name, giver, taker, places[1], height)
@@ -68,7 +67,7 @@ def hand_over(
         if (yield from _receive(cell, name, giver, taker, places[1])):
             return True
         taker.open()
-        yield from move(taker, home, tolerance=0.05, most=40)
+        yield from move(taker, taker.home, tolerance=0.05, most=40)
     return False
 
 
@@ -78,16 +77,10 @@ def _receive(
     """Grasp with the taker what the giver holds, and let the giver go."""
     towards = giver.pose.translation - taker.pose.translation
     direction = towards / np.linalg.norm(towards)
-    choice = choose_grasp(
-        cell,
-        name,
-        arms=[taker],
-        raised=0.0,
-        away=0.1,
-        upright=FACING,
-        direction=direction,
-        place=place,
+    approach = Approach(
+        raised=0.0, away=0.1, upright=FACING, direction=direction, place=place
     )
+    choice = choose_grasp(cell, name, arms=[taker], approach=approach)
     if choice is None:
         return False
     taker.open(choice.site.grasp)

@@ -23,14 +23,19 @@ class Outlook:
     Attributes:
         error: Largest error at a pose, m, with 0.1 m for each rad.
         margin: Least distance of a joint from its limits at a pose, rad or m.
-        duration: Time of the slowest joint at its greatest velocity, s.
+        times: Time of each joint at its greatest velocity, s.
         q: Configurations at the poses.
     """
 
     error: float
     margin: float
-    duration: float
+    times: Vector
     q: tuple[Vector, ...]
+
+    @property
+    def duration(self) -> float:
+        """Time of the slowest joint, s."""
+        return float(self.times.max(initial=0.0))
 
     @property
     def cost(self) -> float:
@@ -82,16 +87,29 @@ class LookAhead:
         whole[self._index] = q
         return whole
 
-    def along(self, poses: Sequence[pin.SE3]) -> Outlook:
-        """Follow a chain of poses of the frame in the world from where the hand is."""
+    def along(self, poses: Sequence[pin.SE3], after: Outlook | None = None) -> Outlook:
+        """Follow a chain of poses of the frame in the world.
+
+        It begins where the hand is, or goes on `after` another outlook.
+        """
         configuration = self._configuration
-        configuration.update(self._state.q[self._index])
-        error, margin, travel = 0.0, np.inf, np.zeros(configuration.nv)
-        found: list[Vector] = []
+        if after is None:
+            after = Outlook(
+                error=0.0,
+                margin=np.inf,
+                times=np.zeros(configuration.nv),
+                q=(self._state.q[self._index],),
+            )
+            begun: tuple[Vector, ...] = ()
+        else:
+            begun = after.q
+        configuration.update(after.q[-1])
+        error, margin, times = after.error, after.margin, after.times
+        found = [*begun]
         for pose in poses:
             self._task.set_target(pose)
             left, moved = self._descend()
-            travel = travel + moved
+            times = times + moved / self._speed
             error = max(error, left)
             q = configuration.q.copy()
             found.append(q)
@@ -101,7 +119,7 @@ class LookAhead:
         return Outlook(
             error=error,
             margin=margin,
-            duration=float((travel / self._speed).max(initial=0.0)),
+            times=times,
             q=tuple(found),
         )
 

@@ -11,6 +11,7 @@ from wbc_suite.experts.workcell import Steps, Workcell
 
 TURNS = {"SquareNut": 4, "RoundNut": 8}
 """Equivalent turns of a nut about its peg."""
+AWAY = 0.1  # m, to withdraw
 ABOVE, DOWN_TO = 0.03, 0.03  # m, over the peg's end; over the table
 
 
@@ -43,10 +44,10 @@ def _put_over_peg(cell: Workcell[NutAssembly], name: str) -> Steps[None]:
             ]
         )
     high = config.pegs.height + ABOVE - 0.02
-    choice = yield from pick(cell, name, then=plans, raised=high)
+    choice = yield from pick(cell, name, then=plans, raised=high, leave=AWAY)
     if choice is None:
         return
     arm, (above, down) = choice.arm, choice.then
     yield from carry(cell, arm, name, shifted(above, (0, 0, 0)), tolerance=0.003)
     yield from carry(cell, arm, name, down, tolerance=0.006, speed=0.2)
-    yield from release(arm, back=0.1)
+    yield from release(arm, back=AWAY)

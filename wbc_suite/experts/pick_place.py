@@ -11,6 +11,7 @@ from wbc_suite.experts.workcell import Steps, Workcell
 
 TURNS = tuple(pin.exp3(k * math.pi / 2 * UP) for k in range(4))
 ASIDE = 0.04  # m, from the middle of a quadrant
+AWAY = 0.12  # m, to withdraw
 TALLEST = 0.16  # m, of the objects, with some room for fingers
 CLEAR = 0.03  # m, above the walls of the bins
 
@@ -43,7 +44,12 @@ def _place(cell: Workcell[PickPlace], name: str) -> Steps[None]:
     ]
     plans = [(shifted(way, over * UP), way) for way in ways]
     choice = yield from pick(
-        cell, name, then=plans, raised=over, over=config.source.center[2] + TALLEST
+        cell,
+        name,
+        then=plans,
+        raised=over,
+        leave=AWAY,
+        over=config.source.center[2] + TALLEST,
     )
     if choice is None:
         return
@@ -51,4 +57,4 @@ def _place(cell: Workcell[PickPlace], name: str) -> Steps[None]:
     arm = choice.arm
     yield from carry(cell, arm, name, above, tolerance=0.02, turn_tolerance=0.1)
     yield from carry(cell, arm, name, at, tolerance=0.01, turn_tolerance=0.1, speed=0.3)
-    yield from release(arm, back=0.12)
+    yield from release(arm, back=AWAY)

@@ -7,13 +7,15 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.experts.arm import SPEED, TURN, Arm
-from wbc_suite.experts.grasp_choice import Choice, choose_grasp
+from wbc_suite.experts.grasp_choice import Approach, Choice, choose_grasp
 from wbc_suite.experts.workcell import Steps, Workcell, wait_until
 from wbc_suite.typing import Vector
 
 UP = np.array([0.0, 0.0, 1.0])
 STALLED = 8  # control periods without progress end a motion
+STOPPED = 2e-4  # rad or m per control period, of fingers
 OPENING = 8  # control periods until a gripper is open
+OUT_OF_REACH = 0.008  # m, error of outlooks; from the start more may be in reach
 PASSING = 0.03  # m, tolerance of poses on the way
 
 
@@ -66,6 +68,23 @@ def travel(arm: Arm, target: pin.SE3, *, height: float, **options: Any) -> Steps
     return (yield from move(arm, target, **options))
 
 
+def go_home(arm: Arm) -> Steps[bool]:
+    """Return to where the hand was at the start, first without turning.
+
+    Where a joint is in the way, the hand is turned about its approach by quarters.
+    """
+    height = max(arm.pose.translation[2], arm.home.translation[2])
+    inward = pin.SE3(arm.pose.rotation, at_height(arm.home, height).translation)
+    quarters = [pin.SE3(pin.exp3(k * np.pi / 2 * UP), np.zeros(3)) for k in range(4)]
+    homes = [arm.home * quarter for quarter in quarters]
+    costs = [
+        arm.look_ahead([inward, home]).cost + (k > 0) for k, home in enumerate(homes)
+    ]
+    home = homes[int(np.argmin(costs))]
+    yield from move(arm, inward, tolerance=PASSING, most=40)
+    return (yield from move(arm, home, tolerance=0.02, turn_tolerance=0.2, most=40))
+
+
 def at_height(pose: pin.SE3, height: float) -> pin.SE3:
     """Return a pose at another height in the world, m."""
     x, y, _ = pose.translation
@@ -78,15 +97,21 @@ def settle(cell: Workcell, name: str, *, most: int = 20) -> Steps[bool]:
     return (yield from wait_until(lambda: cell.speed(name) < 0.02, most=most))
 
 
-def grip(cell: Workcell, arm: Arm, name: str, *, most: int = 16) -> Steps[bool]:
-    """Close the gripper until it holds an object; return whether it does."""
+def grip(cell: Workcell, arm: Arm, name: str, *, most: int = 60) -> Steps[bool]:
+    """Close the gripper until it holds an object; return whether it does.
+
+    It ends without success when the fingers have stopped.
+    """
     arm.close()
-    held = 0
+    held = still = 0
+    fingers = arm.fingers
     for _ in range(most):
         yield
         held = held + 1 if cell.holds(arm, name) else 0
-        if held >= 2:
-            return True
+        moved = float(np.abs(arm.fingers - fingers).max(initial=0.0))
+        still, fingers = still + 1 if moved < STOPPED else 0, arm.fingers
+        if held >= 2 or still >= STALLED:
+            break
     return cell.holds(arm, name)
 
 
@@ -104,37 +129,46 @@ def pick(
     cell: Workcell,
     name: str,
     *,
-    then: Sequence[Sequence[pin.SE3]] = ((),),
     arms: Sequence[Arm] | None = None,
-    raised: float = 0.1,
+    then: Sequence[Sequence[pin.SE3]] = ((),),
+    costs: Sequence[float] | None = None,
     over: float | None = None,
     tries: int = 3,
-    **options: Any,
+    **approach: Any,
 ) -> Steps[Choice | None]:
     """Grasp an object and raise it; return how, or None if all tries fail.
 
     Args:
         cell: The workcell.
         name: The object.
-        then: Where the object will be carried: alternatives, each a chain of poses.
         arms: The arms that may do it; all by default.
-        raised: How far to raise it, m.
+        then: Where it will be carried, see `choose_grasp`.
+        costs: See `choose_grasp`.
         over: Height in the world at which to come, m; on a straight line if None.
         tries: How often.
-        options: Further arguments of `choose_grasp`.
+        approach: Fields of `Approach`.
     """
-    for _ in range(tries):
-        choice = choose_grasp(
-            cell, name, then=then, arms=arms or cell.arms, raised=raised, **options
+    way, candidates = Approach(**approach), arms or cell.arms
+
+    def choose() -> Choice | None:
+        return choose_grasp(
+            cell, name, arms=candidates, approach=way, then=then, costs=costs
         )
+
+    for _ in range(tries):
+        choice = choose()
+        if choice is not None and choice.outlook.error > OUT_OF_REACH:
+            yield from go_home(choice.arm)
+            choice = choose()
         if choice is None:
             return None
-        if (yield from take(cell, name, choice, raised=raised, over=over)):
+        if (yield from take(cell, name, choice, raised=way.raised, over=over)):
             return choice
         choice.arm.open()
         for _ in range(OPENING):
             yield
-        yield from move(choice.arm, shifted(choice.arm.pose, raised * UP), most=20)
+        up = shifted(choice.arm.pose, max(way.raised, 0.05) * UP)
+        yield from move(choice.arm, up, most=20)
         yield from settle(cell, name)
     return None
 

@@ -36,7 +36,7 @@ def _over(cell: Workcell[ToolHang]) -> float:
 
 def _insert(cell: Workcell[ToolHang]) -> Steps[None]:
     """Stand the frame up in its socket."""
-    arm, home = cell.arms[0], cell.arms[0].pose
+    arm = cell.arms[0]
     floor, socket = cell.point(f"{STAND}_floor"), cell.point(f"{STAND}_socket")
     length = cell.point(f"{FRAME}_corner") - cell.point(f"{FRAME}_tip")
     half = float(np.linalg.norm(length)) / 2
@@ -51,7 +51,7 @@ def _insert(cell: Workcell[ToolHang]) -> Steps[None]:
     yield from carry(cell, arm, FRAME, above, tolerance=0.003, turn_tolerance=0.03)
     yield from carry(cell, arm, FRAME, inside, tolerance=0.006, speed=0.12)
     yield from release(arm, back=0.12)
-    yield from travel(arm, home, height=_over(cell), tolerance=0.05, most=40)
+    yield from travel(arm, arm.home, height=_over(cell), tolerance=0.05, most=40)
 
 
 def _hang(cell: Workcell[ToolHang]) -> Steps[None]:

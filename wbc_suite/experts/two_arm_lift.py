@@ -4,7 +4,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.benchmark.two_arm_lift import HANDLES, POT, TwoArmLift
-from wbc_suite.experts.grasp_choice import Choice, choose_grasp
+from wbc_suite.experts.grasp_choice import Approach, Choice, choose_grasp
 from wbc_suite.experts.skills import UP, move, shifted, take
 from wbc_suite.experts.two_arms import carry_together
 from wbc_suite.experts.workcell import Steps, Workcell, together
@@ -35,8 +35,9 @@ def two_arm_lift(cell: Workcell[TwoArmLift]) -> Steps[None]:
 def _choose(cell: Workcell[TwoArmLift], k: int, goal: pin.SE3) -> Choice:
     """Choose how arm k grasps its handle."""
     handle = HANDLES[k].removeprefix(f"{POT}_")
+    approach = Approach(raised=0.0, place=handle)
     choice = choose_grasp(
-        cell, POT, then=[(goal,)], arms=[cell.arms[k]], raised=0.0, place=handle
+        cell, POT, arms=[cell.arms[k]], approach=approach, then=[(goal,)]
     )
     assert choice is not None, "a bar has grasps from all around"
     return choice

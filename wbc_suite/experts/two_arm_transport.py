@@ -13,7 +13,7 @@ from wbc_suite.benchmark.two_arm_transport import (
 )
 from wbc_suite.experts.arm import Arm
 from wbc_suite.experts.handover import hand_over
-from wbc_suite.experts.skills import UP, move, pick, put_down, travel
+from wbc_suite.experts.skills import UP, pick, put_down, travel
 from wbc_suite.experts.workcell import Steps, Workcell, together
 from wbc_suite.typing import Vector
 
@@ -27,7 +27,7 @@ def two_arm_transport(cell: Workcell[TwoArmTransport]) -> Steps[None]:
     giver, taker = cell.arms
     config = cell.benchmark.config
     clear = config.bin.size[2] + CLEAR
-    yield from together(_open(cell, giver, clear), _clear(cell, taker, clear))
+    yield from together(_open(cell, giver), _clear(cell, taker, clear))
     for _ in range(3):
         handed = yield from hand_over(
             cell,
@@ -47,9 +47,8 @@ def two_arm_transport(cell: Workcell[TwoArmTransport]) -> Steps[None]:
             return
 
 
-def _open(cell: Workcell[TwoArmTransport], arm: Arm, clear: float) -> Steps[None]:
+def _open(cell: Workcell[TwoArmTransport], arm: Arm) -> Steps[None]:
     """Put the lid on the table beside its bin."""
-    home = arm.pose
     choice = yield from pick(cell, LID, arms=[arm], raised=0.1)
     if choice is None:
         return
@@ -57,12 +56,11 @@ def _open(cell: Workcell[TwoArmTransport], arm: Arm, clear: float) -> Steps[None
     at[0] -= 2 * cell.benchmark.config.bin.near
     at[2] = cell.benchmark.config.table.center[2] + 0.02
     yield from put_down(cell, arm, LID, at, over=0.15)
-    yield from move(arm, home, tolerance=0.05, turn_tolerance=0.3, most=40)
+    yield from travel(arm, arm.home, height=_over(cell), tolerance=0.05, most=40)
 
 
 def _clear(cell: Workcell[TwoArmTransport], arm: Arm, clear: float) -> Steps[None]:
     """Throw the trash into its bin."""
-    home = arm.pose
     for _ in range(3):
         choice = yield from pick(
             cell, TRASH, arms=[arm], raised=clear, over=_over(cell)
@@ -73,7 +71,7 @@ def _clear(cell: Workcell[TwoArmTransport], arm: Arm, clear: float) -> Steps[Non
         yield from put_down(cell, arm, TRASH, floor + DROP * UP, over=clear)
         if cell.benchmark.inside(TRASH, TRASH_BIN):
             break
-    yield from travel(arm, home, height=_over(cell), tolerance=0.05, most=40)
+    yield from travel(arm, arm.home, height=_over(cell), tolerance=0.05, most=40)
 
 
 def _over(cell: Workcell[TwoArmTransport]) -> float:

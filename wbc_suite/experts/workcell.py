@@ -89,6 +89,16 @@ class Workcell(Generic[B]):
         """Return where and how hands can hold an object."""
         return self.benchmark.grasps[name]
 
+    def bottom(self, name: str) -> float:
+        """Return the height of the lowest point of an object, m."""
+        state = self.object(name)
+        geoms = [g for g in state.geoms if self.model.geom_bodyid[g] == state.body]
+        rows = self.data.geom_xmat[geoms].reshape(-1, 3, 3)[:, 2]
+        middle = self.data.geom_xpos[geoms, 2]
+        middle = middle + np.sum(rows * self.model.geom_aabb[geoms, :3], axis=1)
+        half = np.sum(np.abs(rows) * self.model.geom_aabb[geoms, 3:], axis=1)
+        return float((middle - half).min(initial=np.inf))
+
     def holds(self, arm: Arm, name: str) -> bool:
         """Whether the fingers of an arm touch an object from two sides."""
         return arm.hand.grasps(self.object(name).geoms)

@@ -1,0 +1,136 @@
+"""Successes of the experts: benchmark by benchmark, robot by robot.
+
+Episodes are those of seeds that no tuning saw, from 7000 on. An episode counts as a
+success if the benchmark is solved within 500 steps, or 1000 for those with several
+objects. Results are added to artifacts/benchmarks/experts_table.json; `--table` writes
+that into docs/experts.md, and measures nothing.
+
+Usage: python benchmarks/experts.py [BENCHMARK ...] [--robots R[,R]] [--controller C]
+    [--seeds 100] [--base 7000] [--quick] [--json FILE]
+       python benchmarks/experts.py --table
+"""
+
+import datetime
+import json
+import statistics
+import sys
+from pathlib import Path
+from typing import Any
+
+from harness.report import Report, machine, options
+
+import wbc_suite
+from wbc_suite.evaluation import summarise
+from wbc_suite.evaluation.rollouts import run_episode
+
+ROOT = Path(__file__).parent.parent
+FOUND = ROOT / "artifacts" / "benchmarks" / "experts_table.json"
+PAGE = ROOT / "docs" / "experts.md"
+BEGIN, END = "<!-- results -->", "<!-- end of results -->"
+LONG = ("TwoArmTransport", "ToolHang", "NutAssembly", "PickPlace")
+ALL = (
+    *("Lift", "Stack"),
+    *("PickPlaceMilk", "PickPlaceBread", "PickPlaceCereal", "PickPlaceCan"),
+    *("NutAssemblySquare", "NutAssemblyRound", "Door", "Wipe"),
+    *("TwoArmLift", "TwoArmPegInHole", "TwoArmHandover"),
+    *LONG,
+)
+
+
+def measure(
+    name: str, robots: str | None, controller: str | None, seeds: range
+) -> dict[str, Any]:
+    """Run the expert of a benchmark, and return what it came to."""
+    arguments: dict[str, Any] = {"horizon": 1000 if name in LONG else 500}
+    if robots:
+        each = robots.split(",")
+        arguments["robots"] = each if len(each) > 1 else robots
+    if controller:
+        arguments["controller_configs"] = controller
+    env = wbc_suite.make(name, terminate_on_success=True, **arguments)
+    played = [run_episode(env, env, seed, "expert") for seed in seeds]
+    env.close()
+    found = summarise(played)
+    steps = [e["steps"] for e in played if e["succeeded"]]
+    return {
+        "benchmark": name,
+        "robots": " and ".join(robot.name for robot in env.robots),
+        "controller": controller or "default",
+        "successes": len(steps),
+        "episodes": len(played),
+        "interval": found.interval,
+        "median_steps": statistics.median(steps) if steps else None,
+        "most_steps": max(steps, default=None),
+        "failed": [e["seed"] for e in played if not e["succeeded"]],
+        "base": seeds.start,
+        "date": datetime.datetime.now(tz=datetime.UTC).date().isoformat(),
+        "machine": machine(),
+        "command": "python " + " ".join(["benchmarks/experts.py", *sys.argv[1:]]),
+    }
+
+
+def table(rows: list[dict[str, Any]]) -> str:
+    """Return the results as a table in Markdown."""
+    lines = [
+        "| benchmark | robots | controller | successes | 95 % interval "
+        "| steps: median, most | seeds from | date |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for row in rows:
+        low, high = (100 * share for share in row["interval"])
+        median, most = row["median_steps"], row["most_steps"]
+        steps = "" if median is None else f"{median:.0f}, {most}"
+        lines.append(
+            f"| {row['benchmark']} | {row['robots']} | {row['controller']} "
+            f"| {row['successes']} of {row['episodes']} | {low:.0f} to {high:.0f} % "
+            f"| {steps} | {row['base']} | {row['date']} |"
+        )
+    machines = ", ".join(sorted({row["machine"] for row in rows}))
+    return "\n".join([*lines, "", f"Machine: {machines}."])
+
+
+def write_page(rows: list[dict[str, Any]]) -> None:
+    """Write the table into the page of the documentation."""
+    text = PAGE.read_text(encoding="utf-8")
+    before, after = text.split(BEGIN)[0], text.split(END)[1]
+    PAGE.write_text(f"{before}{BEGIN}\n\n{table(rows)}\n\n{END}{after}", "utf-8")
+
+
+def add(row: dict[str, Any]) -> None:
+    """Add a result to those known, in place of an earlier one of the same case."""
+    known = json.loads(FOUND.read_text("utf-8")) if FOUND.exists() else []
+    key = ("benchmark", "robots", "controller")
+    others = [r for r in known if any(r[k] != row[k] for k in key)]
+    FOUND.parent.mkdir(parents=True, exist_ok=True)
+    FOUND.write_text(json.dumps([*others, row], indent=1), "utf-8")
+
+
+def main() -> None:
+    """Measure what the arguments name."""
+    parser = options(__doc__, "three seeds of five benchmarks")
+    parser.add_argument("benchmarks", nargs="*")
+    parser.add_argument("--robots")
+    parser.add_argument("--controller")
+    parser.add_argument("--seeds", type=int, default=100)
+    parser.add_argument("--base", type=int, default=7000)
+    parser.add_argument("--table", action="store_true", help="write docs/experts.md")
+    given = parser.parse_args()
+    if given.table:
+        write_page(json.loads(FOUND.read_text("utf-8")))
+        return
+    report = Report()
+    count = 3 if given.quick else given.seeds
+    for name in given.benchmarks or (ALL[:2] + ALL[8:11] if given.quick else ALL):
+        seeds = range(given.base, given.base + count)
+        row = measure(name, given.robots, given.controller, seeds)
+        if not given.quick:
+            add(row)
+        report.rows.append(row | {"case": name, "side": row["robots"]})
+        print(table([row]).splitlines()[2], row["failed"] or "", flush=True)
+    columns = ("case", "side", "successes", "episodes", "median_steps", "most_steps")
+    report.show("Successes of experts", columns)
+    report.write(given.json)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,93 @@
+"""Each expert solves its benchmark."""
+
+import numpy as np
+import pytest
+
+import wbc_suite
+from wbc_suite.errors import ConfigError, UnknownNameError
+from wbc_suite.evaluation import make_policy
+from wbc_suite.experts import expert, expert_names, register_expert
+
+SINGLE = (
+    *("Lift", "Stack", "Door", "Wipe"),
+    *("PickPlaceMilk", "PickPlaceBread", "PickPlaceCereal", "PickPlaceCan"),
+    *("NutAssemblySquare", "NutAssemblyRound"),
+    *("TwoArmLift", "TwoArmPegInHole", "TwoArmHandover"),
+)
+LONG = ("TwoArmTransport", "ToolHang", "NutAssembly", "PickPlace")
+
+
+def solve(env, seed):
+    """Return the rewards of an episode up to its first success, and whether it is."""
+    observation, _ = env.reset(seed=seed)
+    policy, rewards = make_policy("expert", env, seed), []
+    for _ in range(env.horizon):
+        observation, reward, _, _, info = env.step(policy(observation))
+        rewards.append(reward)
+        if info["success"]:
+            return rewards, True
+    return rewards, False
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [*SINGLE, *LONG])
+def test_the_expert_solves_its_benchmark(name):
+    horizon = 500 if name in SINGLE else 1000
+    env = wbc_suite.make(name, horizon=horizon, reward_shaping=True)
+    for seed in (1, 2, 3):
+        rewards, success = solve(env, seed)
+        assert success, f"seed {seed}"
+        assert min(rewards) >= 0.0
+        assert rewards[-1] == 1.0 > max(rewards[:-1])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", ["UR5e", "Sawyer", "Kinova3", "PandaOmron"])
+def test_other_robots_take_the_same_expert(robot):
+    for name in ("Lift", "Stack"):
+        env = wbc_suite.make(name, robots=robot, horizon=500)
+        assert solve(env, 1)[1], name
+
+
+@pytest.mark.slow
+def test_an_expert_is_the_same_each_time():
+    env = wbc_suite.make("Stack", reward_shaping=True)
+    assert solve(env, 7) == solve(env, 7)
+
+
+@pytest.mark.slow
+def test_letting_go_over_the_target_does_not_lower_the_reward():
+    for name in ("PickPlaceCan", "NutAssemblySquare"):
+        rewards, success = solve(wbc_suite.make(name, reward_shaping=True), 1)
+        assert success
+        reached = next(k for k, r in enumerate(rewards) if r > 0.6)
+        assert min(rewards[reached:]) > 0.5, name
+
+
+def test_a_benchmark_without_an_expert_is_named():
+    env = wbc_suite.make("Reach", robots="SpotWithArm")
+    env.reset(seed=0)
+    with pytest.raises(UnknownNameError, match="No expert named 'Reach'"):
+        expert(env, np.random.default_rng(0))
+
+
+def test_an_action_without_poses_of_hands_is_refused():
+    parts = {"right": {"type": "JOINT_POSITION"}}
+    config = {"type": "BASIC", "body_parts": parts}
+    env = wbc_suite.make("Lift", controller_configs=config)
+    env.reset(seed=0)
+    with pytest.raises(ConfigError, match="moves hands by their poses"):
+        expert(env, np.random.default_rng(0))
+
+
+def test_an_expert_of_your_own_is_found_by_its_benchmark(monkeypatch):
+    class MyLift(wbc_suite.benchmark.Lift):
+        pass
+
+    def wave(cell):
+        cell.arms[0].open()
+        yield
+
+    monkeypatch.setattr("wbc_suite.experts.registry._EXPERTS", {})
+    register_expert(MyLift, wave)
+    assert expert_names() == ("MyLift",)

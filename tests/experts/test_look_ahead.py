@@ -1,0 +1,82 @@
+"""The look-ahead against the robot's own kinematics."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wbc_suite
+from wbc_suite.evaluation import make_policy
+from wbc_suite.experts.workcell import Workcell
+from wbc_suite.kinematics import Configuration
+
+
+@pytest.fixture(scope="module")
+def cell():
+    env = wbc_suite.make("Lift", robots="Panda")
+    env.reset(seed=0)
+    return Workcell(env, env.benchmark, np.random.default_rng(0))
+
+
+def shifted(pose, offset):
+    return pin.SE3(pose.rotation, pose.translation + np.asarray(offset))
+
+
+def test_poses_in_reach_are_met_by_the_configurations_found(cell):
+    (arm,) = cell.arms
+    poses = [shifted(arm.pose, o) for o in ((0.1, 0.0, 0.0), (0.1, 0.1, -0.1))]
+    outlook = arm.look_ahead(poses)
+    assert outlook.error < 1e-3
+    robot = Configuration(arm.state.robot.to_pinocchio())
+    for q, pose in zip(outlook.q, poses, strict=True):
+        robot.update(arm.configuration(q))
+        found = robot.frame_pose(arm.hand.frame)
+        assert np.linalg.norm(found.translation - pose.translation) < 1e-3
+        low, high = robot.model.lowerPositionLimit, robot.model.upperPositionLimit
+        assert ((robot.q >= low - 1e-9) & (robot.q <= high + 1e-9)).all()
+
+
+def test_a_pose_out_of_reach_costs_more_than_any_other(cell):
+    (arm,) = cell.arms
+    near = arm.look_ahead([shifted(arm.pose, (0.1, 0.0, 0.0))])
+    far = arm.look_ahead([shifted(arm.pose, (1.5, 0.0, 0.0))])
+    assert far.error > 0.5
+    assert far.cost > near.cost + 50.0
+
+
+def test_a_chain_in_two_parts_is_the_chain(cell):
+    (arm,) = cell.arms
+    a, b = (shifted(arm.pose, o) for o in ((0.05, 0.0, 0.0), (0.0, 0.1, 0.0)))
+    whole, parts = (
+        arm.look_ahead([a, b]),
+        arm.look_ahead([b], after=arm.look_ahead([a])),
+    )
+    np.testing.assert_allclose(parts.q[-1], whole.q[-1], atol=1e-6)
+    assert parts.duration == pytest.approx(whole.duration, rel=1e-6)
+    assert parts.error == pytest.approx(whole.error, abs=1e-9)
+
+
+@pytest.mark.slow
+def test_a_configuration_in_the_table_is_not_clear(cell):
+    (arm,) = cell.arms
+    into = shifted(arm.pose, (0.0, 0.0, -0.3))
+    q = arm.configuration(arm.look_ahead([into]).q[-1])
+    assert not cell.is_clear(arm, q, but="cube")
+    here = arm.configuration(arm.look_ahead([arm.pose]).q[-1])
+    assert cell.is_clear(arm, here, but="cube")
+
+
+@pytest.mark.slow
+def test_a_cube_that_slips_away_is_grasped_again():
+    env = wbc_suite.make("Lift", robots="Panda", horizon=300)
+    env.reset(seed=3)
+    policy, cube = make_policy("expert", env, 3), env.benchmark.states["cube"]
+    moved = False
+    for _ in range(300):
+        *_, info = env.step(policy({}))
+        if not moved and env.benchmark.grasped("cube"):
+            moved = True
+            cube.move((0.06, -0.05, 0.83))
+        if info["success"] and moved:
+            break
+    assert moved
+    assert info["success"]
