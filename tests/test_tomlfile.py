@@ -1,5 +1,6 @@
 """TOML files become frozen models, or errors that name file, key, value and rule."""
 
+import time
 from typing import Annotated, Literal
 
 import pytest
@@ -131,3 +132,66 @@ def test_files_that_cannot_be_read_are_named(tmp_path, monkeypatch):
     monkeypatch.setattr(tomlfile, "MAX_BYTES", 9)
     with pytest.raises(ConfigError, match="has 10 bytes; at most 9 are read"):
         load_model(File, path)
+
+
+LINES = """format = 1
+[[item]]
+title = "a"
+[[item]]
+# [[item]]
+title = "b"
+siz = 3
+[item.form]
+shape = "round"
+radius = -1.0
+[table.x]
+mode = "slwo"
+"quoted" = 3
+"""
+
+
+def test_every_fault_has_its_line(tmp_path):
+    path = tmp_path / "f.toml"
+    path.write_text(LINES)
+    with pytest.raises(ConfigError) as caught:
+        load_model(File, path)
+    text = str(caught.value)
+    assert "unknown key 'item[1].siz' (line 7). Did you mean 'size'?" in text
+    assert "key 'item[1].form.radius' = -1.0 (line 10): " in text
+    assert "'table.x.mode' = 'slwo' (line 12): " in text
+    assert "Did you mean 'slow'?" in text
+    assert "unknown key 'table.x.quoted' (line 13)" in text
+
+
+def test_a_key_that_is_missing_has_the_line_of_its_table(tmp_path):
+    path = tmp_path / "f.toml"
+    path.write_text('format = 1\n\n[table.x.form]\nshape = "square"\n')
+    with pytest.raises(
+        ConfigError, match=r"missing key 'table.x.form.size' \(line 3\)"
+    ):
+        load_model(File, path)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        ".".join(["a"] * 20_000) + " = 1",
+        "[" + " . ".join(["a"] * 10_000) + "]",
+        ".".join(['"a b"'] * 5_000) + " = 1",
+        "\n".join(f"k{i} = 1" for i in range(4_000)),
+        "a" * 40_000 + " = 1",
+    ],
+)
+def test_a_hostile_file_of_40_kb_is_refused_within_a_second(text, tmp_path):
+    path = tmp_path / "f.toml"
+    path.write_text(text)
+    begun = time.process_time()
+    with pytest.raises(ConfigError, match=r"30 parts|unknown key"):
+        load_model(File, path)
+    assert time.process_time() - begun < 1.0
+
+
+def test_dotted_keys_of_a_usual_depth_are_read():
+    key = ".".join(["a"] * 20)
+    text = f"{key} = 1\n# {'.'.join(['b'] * 25)}\n"
+    assert list(parse_toml(text, source="f")) == ["a"]

@@ -15,6 +15,15 @@ from wbc_suite.errors import ConfigError, did_you_mean, join_first, shortened
 MAX_BYTES = 4_000_000
 """Largest file that is read; the largest in the catalogue has about 60 kB."""
 
+MAX_DEPTH = 30  # parts of a dotted key
+SHOWN = 8  # faults in a message
+
+_PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
+_DOTTED = rf"{_PART}(?:[ \t]*\.[ \t]*{_PART})*"
+_DEEP_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*\.[ \t]*{_PART}){{{MAX_DEPTH}}}")
+_TABLE = re.compile(rf"\s*(\[\[?)\s*({_DOTTED})\s*\]\]?\s*(?:#.*)?$")
+_VALUE = re.compile(rf"\s*({_DOTTED})\s*=")
+
 M = TypeVar("M", bound=BaseModel)
 
 FROZEN = ConfigDict(
@@ -58,6 +67,8 @@ def read_text(path: Path) -> str:
 
 def parse_toml(text: str, *, source: str) -> dict[str, Any]:
     """Parse TOML text; raises ConfigError."""
+    if _DEEP_KEY.search(text):  # which costs tomllib a time that is quadratic
+        raise ConfigError(f"{source}: a key has more than {MAX_DEPTH} parts.")
     try:
         return tomllib.loads(text)
     except RecursionError as error:
@@ -105,28 +116,69 @@ def parse_model(
     try:
         return model.model_validate(data)
     except ValidationError as failure:
-        faults = [_explain(model, item, within) for item in failure.errors()]
-        shown = join_first(faults, limit=8, separator="; ")
+        lines, found = _lines(source), failure.errors()
+        faults = [_explain(model, item, within, lines) for item in found[:SHOWN]]
+        faults += [""] * (len(found) - len(faults))
+        shown = join_first(faults, limit=SHOWN, separator="; ")
         raise error(f"{source}: {shown}") from failure
 
 
-def _explain(model: type[BaseModel], item: Any, within: str) -> str:
+def _lines(source: str) -> dict[str, int]:
+    """Return where keys stand in a TOML file, by keys as `_resolve` writes them."""
+    path = Path(source)
+    if path.suffix != ".toml" or not path.is_file():
+        return {}
+    table, counts, lines = "", dict[str, int](), dict[str, int]()
+    for number, line in enumerate(read_text(path).splitlines(), 1):
+        if header := _TABLE.match(line):
+            table = ""
+            *parents, last = _parts(header[2])
+            for part in parents:
+                table += f".{part}" if table else part
+                table += f"[{counts[table] - 1}]" if table in counts else ""
+            table += f".{last}" if table else last
+            if header[1] == "[[":
+                counts[table] = counts.get(table, 0) + 1
+                table += f"[{counts[table] - 1}]"
+            lines.setdefault(table, number)
+        elif value := _VALUE.match(line):
+            key = ".".join(filter(None, (table, *_parts(value[1]))))
+            lines.setdefault(key, number)
+    return lines
+
+
+def _parts(key: str) -> list[str]:
+    return [part.strip("\"'") for part in re.findall(_PART, key)]
+
+
+def _line(key: str, lines: dict[str, int]) -> str:
+    """Return " (line 3)" for a key, or for the nearest one that holds it."""
+    while key and key not in lines:
+        key = key[: max(key.rfind("."), key.rfind("["), 0)]
+    return f" (line {lines[key]})" if key else ""
+
+
+def _explain(
+    model: type[BaseModel], item: Any, within: str, lines: dict[str, int]
+) -> str:
     """Return one of pydantic's `ErrorDetails` as a sentence with the nearest name."""
     loc: tuple[int | str, ...] = item["loc"]
     own, _ = _resolve(loc, model)
     key = ".".join(filter(None, (within, own)))
+    line = _line(key, lines)
     if item["type"] == "extra_forbidden":
         _, tables = _resolve(loc[:-1], model)
         known = [f.alias or n for m in tables for n, f in m.model_fields.items()]
         hint = did_you_mean(str(loc[-1]), known)
-        return f"unknown key '{key}'.{hint} Known: {', '.join(sorted(known))}"
+        return f"unknown key '{key}'{line}.{hint} Known: {', '.join(sorted(known))}"
     if item["type"] == "missing":
-        return f"missing key '{key}'"
+        return f"missing key '{key}'{line}"
     message, hint = str(item["msg"]).removeprefix("Value error, "), ""
     if item["type"] in ("literal_error", "enum") and isinstance(item["input"], str):
         options = str(item["ctx"]["expected"]).replace("'", "").replace(" or ", ", ")
         hint = did_you_mean(item["input"], options.split(", "))
-    where = f"key '{key}' = {shortened(repr(item['input']))}: " if key else ""
+    value = shortened(repr(item["input"]))
+    where = f"key '{key}' = {value}{line}: " if key else ""
     return f"{where}{message}.{hint}"
 
 

@@ -39,9 +39,9 @@ def test_what_physics_makes_of_good_numbers_is_checked_too():
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e12, -1e12])
 def test_only_numbers_that_mujoco_takes_are_usable(value):
-    assert is_usable(np.array([LARGEST, -LARGEST, 0.0]))
-    assert is_usable(np.zeros(0))
-    assert not is_usable(np.array([0.0, value, 0.0]))
+    assert is_usable(np.array([LARGEST, -LARGEST, 0.0]), LARGEST)
+    assert is_usable(np.zeros(0), LARGEST)
+    assert not is_usable(np.array([0.0, value, 0.0]), LARGEST)
 
 
 def test_a_huge_force_on_what_cannot_move_is_named_too():

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from wbc_suite.errors import DatasetError
 from wbc_suite.recording import Dataset, EnvSource
+from wbc_suite.recording.editing import merge
 from wbc_suite.recording.episode import fingerprint
 
 EXAMPLES = int(os.environ.get("WBC_SUITE_FUZZ", "25"))
@@ -101,6 +102,14 @@ def list_attribute(file, tmp_path):
     file["data/demo_1"].attrs["seed"] = np.zeros(50)
 
 
+def many_samples(file, tmp_path):
+    file["data/demo_1"].attrs["num_samples"] = 10**15
+
+
+def name_that_is_not_utf8(file, tmp_path):
+    file["data/demo_1"].create_dataset(b"\xff\xfe", data=np.zeros(5))
+
+
 def no_data(file, tmp_path):
     del file["data"]
 
@@ -112,7 +121,7 @@ def names_that_are_numbers(file, tmp_path):
 LIES = [
     outside, soft_link, stored_outside, virtual, endless, objects, references,
     a_group, other_length, flat, not_finite, many_attributes, list_attribute, no_data,
-    names_that_are_numbers,
+    names_that_are_numbers, many_samples, name_that_is_not_utf8,
 ]  # fmt: skip
 
 
@@ -140,6 +149,33 @@ def test_a_file_that_lies_is_refused(small_recording, tmp_path, lie):
         sums_of_pieces(small_recording)
     grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
     assert grown < 100_000  # kB
+
+
+def test_text_that_is_not_utf8_is_written_again(small_recording, tmp_path):
+    with h5py.File(small_recording, "r+") as file:
+        bad = np.array(b"<mujoco>\xff", dtype=h5py.string_dtype())
+        file["data/demo_1"].attrs["model_file"] = bad
+        file["data"].attrs["note"] = bad
+    assert merge([small_recording], tmp_path / "out.hdf5") == 4
+    with Dataset(tmp_path / "out.hdf5") as dataset:
+        assert dataset.facts("demo_1")["model_file"] == "<mujoco>\ufffd"
+        assert dataset.header["note"] == "<mujoco>\ufffd"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"control_freq": 1e-6}, r"control_freq.*1e-06.*greater than or equal to 0\.1"),
+        ({"control_freq": 1e300}, "control_freq"),
+        ({"use_camera_obs": True, "camera_heights": 8192}, "8192 pixels"),
+        ({"use_camera_obs": True, "camera_widths": [64, 8192]}, "8192"),
+        ({"use_camera_obs": True, "camera_widths": [64] * 1000}, "pixels"),
+    ],
+)
+def test_an_environment_that_costs_too_much_is_refused(arguments, message):
+    source = EnvSource(benchmark="Lift", arguments={"robots": "Panda"} | arguments)
+    with pytest.raises(DatasetError, match=message):
+        source.build()
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt
+from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from wbc_suite.benchmark.base import load_config
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
@@ -38,7 +38,7 @@ class StrokeConfig(FrozenModel):
         bend: Standard deviation of its turn from each mark to the next, rad.
     """
 
-    marks: PositiveInt
+    marks: int = Field(gt=0, le=1000)
     step: PositiveFloat
     width: PositiveFloat
     coverage: PositiveFloat

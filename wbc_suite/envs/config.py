@@ -107,7 +107,7 @@ class EnvConfig(FrozenModel):
         skin: "meshes" draws robots with the meshes of installed packages, a folder with
             those found there.
         initialization_noise: "default", None, or `{"type": ..., "magnitude": ...}`.
-        control_freq: Actions per second.
+        control_freq: Actions per second; an action may last 10 s.
         lite_physics: Whether contacts, accelerations and sensors are those of MuJoCo's
             last step, one step behind the positions; otherwise they are computed
             again, which costs one more step.
@@ -147,7 +147,7 @@ class EnvConfig(FrozenModel):
     base_types: Any = "default"
     skin: str | Path | None = None
     initialization_noise: NoiseConfig | Literal["default"] | None = "default"
-    control_freq: PositiveFloat = 20.0
+    control_freq: float = Field(default=20.0, ge=0.1, le=1e5)
     lite_physics: bool = True
     compiled: bool = True
     horizon: PositiveInt | None = None

@@ -1,9 +1,11 @@
 """The environment: robots, controllers, a benchmark and physics behind Gymnasium."""
 
 import copy
+import os
 from collections import deque
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from threading import RLock
 from typing import Any, Unpack
 
 import gymnasium
@@ -25,6 +27,7 @@ from wbc_suite.envs.building import (
 )
 from wbc_suite.envs.config import EnvArguments, checked_seed, parse_env_config
 from wbc_suite.envs.states import EnvState, write_physics, write_scene
+from wbc_suite.envs.watch import one_thread_at_a_time
 from wbc_suite.errors import ConfigError, PhysicsError
 from wbc_suite.scene import Push
 from wbc_suite.scene.pushes import PushSchedule
@@ -48,6 +51,7 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
     Attributes:
         robots: Descriptions of the robots at their places.
         controllers: One composite controller per robot.
+        lock: Held by the thread that uses the environment; others wait.
         action_layout: Slices of the action.
         simulation: Model, data and `tick`.
         observables: Observations but pictures; changes, adds and removes them.
@@ -66,7 +70,7 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         benchmark: str | Path | Callable[[], Benchmark] = "Lift",
         **arguments: Unpack[EnvArguments],
     ) -> None:
-        self._given = benchmark, dict(arguments)
+        self._given, self.lock = (benchmark, dict(arguments)), RLock()
         self.benchmark = load_benchmark(benchmark)
         robots = list(self.benchmark.robots)
         self.config = parse_env_config({"robots": robots, **arguments})
@@ -88,10 +92,13 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         self.horizon = self.config.horizon or self.benchmark.horizon
         self._steps, self._broken, self.latency = 0, "", 0
         self.pushes: tuple[Push, ...] = ()
+        self._begun, self._process = False, os.getpid()
         given = self.config.randomisation
         self._randomiser = None if given is None else given.bind(self)
         self._start(np.random.default_rng(0))
+        self._begun = False
 
+    @one_thread_at_a_time
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
@@ -108,6 +115,7 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
             self.render()
         return self.observation(), info
 
+    @one_thread_at_a_time
     def step(
         self, action: Any
     ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
@@ -116,7 +124,7 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         Raises:
             ActionError: If the action has a wrong shape or type, or is not finite; then
                 nothing has changed.
-            PhysicsError: If the last step ended in one and `reset` was not called.
+            PhysicsError: If `reset` was never called, or not after such an error.
 
         Where the benchmark says that it has failed, such as by a fall, the episode is
         terminated, and `info["failure"]` says why.
@@ -126,17 +134,23 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
             self.render()
         return self.observation(), reward, terminated, truncated, info
 
+    @one_thread_at_a_time
     def begin(self, seed: int | None = None) -> dict[str, Any]:
         """Do what `reset` does, but leave the observation in its buffer."""
+        if seed is None and self._process != os.getpid():  # copies draw their own
+            self._np_random, self._process = None, os.getpid()
         super().reset(seed=checked_seed(seed))
         self._start(self.np_random)
         return self._info(0, self.benchmark.success())
 
+    @one_thread_at_a_time
     def advance(self, action: Any) -> tuple[float, bool, bool, dict[str, Any]]:
         """Do what `step` does, but leave the observation in its buffer."""
         vector, clipped = self.action_layout.take(action)
         if self._broken:
             raise PhysicsError(f"Call reset() first: {self._broken}")
+        if not self._begun:
+            raise PhysicsError("Call reset() first: no episode has begun.")
         self._taken.append(vector)
         self._steps += 1
         try:
@@ -160,6 +174,7 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         truncated = self._steps >= self.horizon
         return reward * self.config.reward_scale, terminated, truncated, info
 
+    @one_thread_at_a_time
     def observation(self) -> Observation:
         """Return the present observation; after a physics error pictures are black."""
         pictures = self.cameras.black() if self._broken else self.cameras.observation()
@@ -183,6 +198,7 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         """The action that keeps all present goals."""
         return np.concatenate([c.hold_action for c in self.controllers])
 
+    @one_thread_at_a_time
     def render(self) -> Any:
         """Return a picture in the form of `render_mode`; see `Display.render`.
 
@@ -264,8 +280,10 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         self.observables.prepare(state["state"].observables)
         self.set_state(state["state"])
 
+    @one_thread_at_a_time
     def _start(self, rng: np.random.Generator, given: ArrayLike | None = None) -> None:
         """Bring robots, objects and controllers to the start of an episode."""
+        self._begun = True
         placed = None if given is None else np.array(given, dtype=np.float64)
         self.beginning: tuple[Mapping[str, Any], Vector | None]
         self.beginning = rng.bit_generator.state, placed

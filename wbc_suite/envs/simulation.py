@@ -27,7 +27,7 @@ from wbc_suite.control.loop.inverse_dynamics import (
 from wbc_suite.control.loop.mujoco_functions import addresses
 from wbc_suite.control.loop.physics import bind_physics
 from wbc_suite.control.loop.records import gather
-from wbc_suite.envs.watch import PhysicsWatch
+from wbc_suite.envs.watch import PhysicsWatch, check_model
 
 
 class Simulation:
@@ -133,7 +133,12 @@ class Simulation:
             mujoco.mj_forward(self.model, self.data)
 
     def start(self) -> None:
-        """Compute what follows from the state, and let controllers start from there."""
+        """Compute what follows from the state, and let controllers start from there.
+
+        Raises:
+            PhysicsError: If the state or the model has numbers that cannot be.
+        """
+        check_model(self.model)
         self.forward()
         for state, controller in self.pairs:
             controller.reset(state)
@@ -148,6 +153,8 @@ class Simulation:
             PhysicsError: If MuJoCo warns, or the state is not finite; names the
                 warning. The state is left as it was found, for inspection.
         """
+        if not self.timestep > 0.0:
+            check_model(self.model)
         with nullcontext() if self._prepared else announced("the controllers"):
             self._advance(n)
         self._prepared = True

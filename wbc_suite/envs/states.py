@@ -9,8 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wbc_suite.arguments import check_array
+from wbc_suite.control.loop.state_checks import FASTEST
 from wbc_suite.errors import ConfigError
 from wbc_suite.typing import Vector
+
+_QUATERNION = {
+    int(mujoco.mjtJoint.mjJNT_FREE): slice(3, 7),
+    int(mujoco.mjtJoint.mjJNT_BALL): slice(0, 4),
+}
+"""Where the quaternion is among the positions of a joint, by type."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -60,14 +67,23 @@ def write_physics(model: mujoco.MjModel, data: mujoco.MjData, state: ArrayLike) 
     """Write a physics state: time, qpos and qvel, as in datasets.
 
     Raises:
-        ConfigError: If its size is wrong or a value is not finite.
+        ConfigError: If its size is wrong, a value is not finite, a speed is beyond
+            `FASTEST`, or a quaternion is not of length 1 within 10 %.
     """
     size = 1 + model.nq + model.nv
     values = check_array("A physics state", state, (size,))
     if not np.isfinite(values).all():
         raise ConfigError("A physics state must be finite.")
-    data.time = values[0]
-    data.qpos[:], data.qvel[:] = np.split(values[1:], [model.nq])
+    qpos, qvel = np.split(values[1:], [model.nq])
+    if np.abs(qvel).max(initial=0.0) > FASTEST:
+        raise ConfigError(f"A physics state has a speed above {FASTEST:g}.")
+    for joint in map(model.joint, range(model.njnt)):
+        quat = qpos[joint.qposadr[0] :][_QUATERNION.get(joint.type[0], slice(0))]
+        if quat.size and abs(np.linalg.norm(quat) - 1.0) > 0.1:
+            raise ConfigError(
+                f"A physics state has the quaternion {quat} for joint '{joint.name}'."
+            )
+    data.time, data.qpos[:], data.qvel[:] = values[0], qpos, qvel
 
 
 def write_scene(spec: mujoco.MjSpec) -> str:

@@ -1,14 +1,18 @@
 """Errors for what goes wrong inside MuJoCo."""
 
+import functools
 import logging
 import math
+from collections.abc import Callable
 from types import TracebackType
+from typing import Any, TypeVar, cast
 
 import mujoco
 import numpy as np
 
 from wbc_suite.compiling import as_argument
 from wbc_suite.control.loop.state_checks import (
+    FASTEST,
     LARGEST,
     check_after,
     check_before,
@@ -23,6 +27,22 @@ _NAMES = [
     for name, value in mujoco.mjtWarning.__members__.items()
     if value != mujoco.mjtWarning.mjNWARNING
 ]
+
+Method = TypeVar("Method", bound=Callable[..., Any])
+
+
+def one_thread_at_a_time(method: Method) -> Method:
+    """Let other threads wait for the `lock` of a method's object.
+
+    MuJoCo's state is shared: two threads that step it would crash the process.
+    """
+
+    @functools.wraps(method)
+    def locked(owner: Any, *arguments: Any, **named: Any) -> Any:
+        with owner.lock:
+            return method(owner, *arguments, **named)
+
+    return cast("Method", locked)
 
 
 class PhysicsWatch:
@@ -96,9 +116,10 @@ class PhysicsWatch:
 
     def _raise_numbers(self) -> None:
         for name, values in (*self._arrays.items(), ("time", self._data.time)):
-            if not np.all(np.abs(values) <= LARGEST):
+            most = FASTEST if name.startswith("qvel") else LARGEST
+            if not np.all(np.abs(values) <= most):
                 finite = np.isfinite(values).all()
-                what = f"Beyond {LARGEST:g}" if finite else "Not finite"
+                what = f"Beyond {most:g}" if finite else "Not finite"
                 raise PhysicsError(
                     f"{what}: {name} at {self._time}. Reset, and look at what was "
                     "written into the simulation."
@@ -107,3 +128,18 @@ class PhysicsWatch:
     @property
     def _time(self) -> str:
         return f"t = {self._data.time:.3f} s"
+
+
+def check_model(model: mujoco.MjModel) -> None:
+    """Raise a `PhysicsError` for numbers that no compiled model has."""
+    if not 0.0 < model.opt.timestep < math.inf:
+        raise PhysicsError(f"The time step is {model.opt.timestep:g} s, not above 0.")
+    for name in ("geom_size", "site_size", "body_mass", "body_inertia"):
+        values = getattr(model, name)
+        if not np.all(values >= 0.0):  # not so for NaN
+            row = int(np.argwhere(~(values >= 0.0))[0, 0])
+            part = name.partition("_")[0]
+            owner = getattr(model, part)(row).name or f"number {row}"
+            raise PhysicsError(
+                f"{name} of the {part} '{owner}' is {values[row]}, below 0."
+            )

@@ -136,7 +136,12 @@ class Dataset:
             _check_columns(name, columns)
             facts = _facts(group)
             written = facts.pop("sha256", None)
-            facts.pop("num_samples", None)
+            claimed = facts.pop("num_samples", len(columns["actions"]))
+            if claimed != len(columns["actions"]):
+                raise DatasetError(
+                    f"'{name}' claims {claimed} samples, and has "
+                    f"{len(columns['actions'])} actions."
+                )
             if written is not None and written != fingerprint(columns, final):
                 raise DatasetError(
                     f"'{name}' is damaged: its numbers are not those recorded."

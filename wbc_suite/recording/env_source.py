@@ -23,6 +23,8 @@ _SHOWN = {"render_mode", "render_camera", "render_size", "render_preset", "skin"
 """Arguments of rendering, which do not change an episode."""
 _PATH = re.compile(r"[/\\]|\.(toml|json|xml|urdf|py)\Z", re.IGNORECASE)
 _NAMES = ("robots", "controller_configs", "gripper_types", "base_types")
+_SIZES = ("camera_heights", "camera_widths")
+MAX_PIXELS = 2048  # of a camera's side, unless the dataset is trusted
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -106,6 +108,7 @@ class EnvSource:
         known = {k: v for k, v in self.arguments.items() if k in taken}
         if not trust_files:
             _refuse_paths([self.benchmark, *(known.get(k) for k in _NAMES)])
+            _refuse_sizes([known.get(k) for k in _SIZES if k not in changes])
         try:
             return RobotEnv(self.benchmark, **{**known, **changes})
         except WbcError as error:
@@ -197,4 +200,17 @@ def _refuse_paths(values: list[Any]) -> None:
             raise DatasetError(
                 f"The dataset names a file, '{value[:80]}'. If you trust it, use "
                 "--trust-files."
+            )
+
+
+def _refuse_sizes(values: list[Any]) -> None:
+    """Refuse pictures that fill the memory."""
+    for value in values:
+        sides = value if isinstance(value, list) else [value]
+        if len(sides) > 100 or any(
+            isinstance(side, int | float) and side > MAX_PIXELS for side in sides
+        ):
+            raise DatasetError(
+                f"The dataset asks for pictures of {value!s:.60} pixels; at most "
+                f"{MAX_PIXELS} are taken. If you trust it, use --trust-files."
             )

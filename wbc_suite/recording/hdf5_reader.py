@@ -31,7 +31,7 @@ ERRORS = (
     *(AttributeError, OverflowError),
 )
 """What h5py raises for damaged files."""
-_PLAIN = re.compile(r"[^/\x00]+\Z")
+_PLAIN = re.compile(r"[^/\x00\ud800-\udfff]+\Z")  # also no bytes that are not UTF-8
 
 Node = TypeVar("Node", bound=h5py.HLObject)
 
@@ -108,6 +108,8 @@ def attribute(
     value: Any = node.attrs[name]
     if isinstance(value, np.ndarray):
         value = value.reshape(-1)[0]
+    if isinstance(value, str):  # h5py keeps bytes that are not UTF-8 as surrogates
+        value = value.encode("utf-8", errors="surrogateescape")
     if isinstance(value, bytes):
         value = value.decode("utf-8", errors="replace")
     if isinstance(value, np.generic):

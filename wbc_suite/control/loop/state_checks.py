@@ -10,6 +10,8 @@ from wbc_suite.typing import Indices, Vector
 
 LARGEST = float(mujoco.mjMAXVAL)
 """MuJoCo calls larger numbers bad, as it does NaN."""
+FASTEST = 1e5
+"""Greatest speed of a joint, m/s or rad/s; nothing that moves so is simulated well."""
 
 
 @struct
@@ -57,15 +59,16 @@ def check_after(state: CheckedState) -> bool:
 
 @compiled
 def _all_usable(state: CheckedState) -> bool:
-    if not (is_usable(state.qpos) and is_usable(state.qvel)):
+    if not (is_usable(state.qpos, LARGEST) and is_usable(state.qvel, FASTEST)):
         return False
-    return is_usable(state.qfrc_applied) and is_usable(state.xfrc_applied)
+    forces = is_usable(state.qfrc_applied, LARGEST)
+    return forces and is_usable(state.xfrc_applied, LARGEST)
 
 
 @compiled
-def is_usable(values: Vector) -> bool:
-    """Return whether MuJoCo accepts all numbers: finite, none too large."""
+def is_usable(values: Vector, most: float) -> bool:
+    """Return whether all numbers are finite and not larger than `most`."""
     usable = True
     for value in values:
-        usable &= abs(value) <= LARGEST  # not so for NaN
+        usable &= abs(value) <= most  # not so for NaN
     return usable

@@ -248,7 +248,7 @@ class MjcfObject:
     """
 
     name: str
-    path: Path
+    path: Path | str
     motion: Literal["free", "fixed"] = "free"
     pos: Vector3 = (0.0, 0.0, 0.0)
     quat: Quat = STANDING
@@ -258,9 +258,14 @@ class MjcfObject:
         """Yield it: it has no children of its own."""
         yield self
 
+    def __post_init__(self) -> None:
+        if not isinstance(self.path, str | Path):
+            raise DescriptionError(f"'path' is a path, not {self.path!r:.60}.")
+        object.__setattr__(self, "path", Path(self.path))
+
     def add_to(self, spec: mujoco.MjSpec) -> None:
         """Add it to a scene; raises as `compile_mjcf`, and unless it is one body."""
-        _, own = compile_mjcf(self.path)
+        _, own = compile_mjcf(Path(self.path))
         bodies = own.worldbody.bodies
         if len(bodies) != 1:
             raise DescriptionError(
