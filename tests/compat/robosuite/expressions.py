@@ -42,7 +42,7 @@ EXPRESSIONS = (
     ("env.sim.data.get_body_xmat('cube_main')", None),
     ("env.sim.data.get_site_xpos('gripper0_right_grip_site')", 0.02),
     ("env.sim.data.get_site_xmat('gripper0_right_grip_site')", None),
-    ("env.sim.data.get_joint_qpos('cube_joint0')", 0.05),
+    ("env.sim.data.get_joint_qpos('cube_joint0')[:3]", 0.05),
     ("env.sim.data.get_joint_qpos('robot0_joint1')", 0.01),
     ("env.sim.data.get_camera_xpos('agentview')", None),
     ("env.sim.data.get_site_jacp('gripper0_right_grip_site')", None),
@@ -144,7 +144,7 @@ def kind_of(value):
         return "bool"
     if isinstance(value, int | np.integer):
         return "int"
-    if isinstance(value, float | np.floating) or isinstance(value, np.ndarray):
+    if isinstance(value, float | np.floating | np.ndarray):
         return "float"
     if isinstance(value, dict):
         return "dict"
@@ -168,9 +168,6 @@ def plain(value):
 
 def evaluate(suite):
     """Return type and value of each expression after three actions."""
-    import os
-
-    os.environ.setdefault("MUJOCO_GL", "osmesa")
     env = suite.make(
         "Lift",
         robots="Panda",
@@ -192,7 +189,7 @@ def evaluate(suite):
         try:
             value = eval(expression, {"env": env, "np": np})
             found[expression] = [kind_of(value), plain(value)]
-        except Exception as error:
+        except Exception as error:  # noqa: BLE001 - told as the answer
             found[expression] = ["error", f"{type(error).__name__}: {error}"]
     env.close()
     return found

@@ -68,10 +68,10 @@ def _robot(robot: Any, found: dict[str, Any]) -> None:
 def _gripper(robot: Any, arm: str, found: dict[str, Any]) -> None:
     gripper = robot.gripper[arm]
     start = f"gripper{robot.idn}_{arm}_"
-    for role, site in gripper.important_sites.items():
-        found["site"][f"{start}{role}"] = site
-    for role, sensor in gripper.important_sensors.items():
-        found["sensor"][f"{start}{role}"] = sensor
+    for name in gripper.important_sites.values():
+        found["site"][name] = gripper.site
+    for role, name in gripper.important_sensors.items():
+        found["sensor"][name] = gripper.sensor(role)
     for k, joint in enumerate(gripper.joints, 1):
         found["joint"][f"{start}finger_joint{k}"] = joint
         found["actuator"][f"{start}gripper_finger_joint{k}"] = joint

@@ -8,6 +8,7 @@ import numpy as np
 
 from wbc_suite.compat.robosuite.utils.observables import Observable, sensor
 from wbc_suite.compat.robosuite.utils.transform_utils import mat2quat
+from wbc_suite.sensing.cameras import CameraRequest
 from wbc_suite.sensing.proprioception import proprioception
 from wbc_suite.sensing.reading import Reading
 
@@ -110,6 +111,19 @@ def object_observables(
         _observable(name, reading.bind(data), "object", rate)
         for name, reading in readings.items()
     ]
+
+
+def picture_keys(requests: Iterable[CameraRequest]) -> dict[str, str]:
+    """Return robosuite's keys of the observed pictures, and ours."""
+    found: dict[str, str] = {}
+    for request in requests:
+        found[f"{request.name}_image"] = f"{request.name}_image"
+        if request.depth:
+            found[f"{request.name}_depth"] = f"{request.name}_depth"
+        for level in request.segmentations:
+            theirs = f"{request.name}_segmentation_{level}"
+            found[theirs] = request.segmentation_key(level)
+    return found
 
 
 def camera_observables(

@@ -17,6 +17,7 @@ from wbc_suite.compat.robosuite.environments.observations import (
     PolledObservables,
     camera_observables,
     object_observables,
+    picture_keys,
     robot_observables,
 )
 from wbc_suite.compat.robosuite.models.tasks import TaskBenchmark
@@ -129,12 +130,13 @@ class RobotEnv(MujocoEnv):
                 found += own
             readings = core.benchmark.observables()
             found += object_observables(readings, core.simulation.data, rate)
-        if core.config.use_camera_obs:
-            found += camera_observables(core.cameras.space, self._picture, rate)
+        self._picture_keys = picture_keys(core.config.cameras)
+        if self._picture_keys:
+            found += camera_observables(self._picture_keys, self._picture, rate)
         return OrderedDict((o.name, o) for o in found)
 
     def _picture(self, key: str) -> Any:
-        observables = self.env.observables
+        observables, key = self.env.observables, self._picture_keys[key]
         if isinstance(observables, PolledObservables):
             return observables.picture(key)
         return self.env.cameras.black()[key]  # while the scene is built
@@ -238,7 +240,8 @@ class ManipulationEnv(RobotEnv):
 
     @property
     def _eef_xpos(self) -> Vector:
-        return self.robots[0]._hand_pos[self.robots[0].arms[0]]
+        robot = self.robots[0]
+        return self.sim.data.site_xpos[robot.eef_site_id[robot.arms[0]]].copy()
 
 
 class TwoArmEnv(ManipulationEnv):
@@ -258,25 +261,25 @@ class TwoArmEnv(ManipulationEnv):
         robot, arm = self._arm(1)
         return self._gripper_to_target(robot.gripper[arm], target, target_type, **kw)
 
-    def _hand(self, k: int, what: str) -> Any:
+    def _hand(self, k: int, field: str) -> Any:
         robot, arm = self._arm(k)
-        return getattr(robot, what)[arm]
+        return getattr(self.sim.data, field)[robot.eef_site_id[arm]].copy()
 
     @property
     def _eef0_xpos(self) -> Vector:
-        return self._hand(0, "_hand_pos")
+        return self._hand(0, "site_xpos")
 
     @property
     def _eef1_xpos(self) -> Vector:
-        return self._hand(1, "_hand_pos")
+        return self._hand(1, "site_xpos")
 
     @property
     def _eef0_xmat(self) -> Any:
-        return self._hand(0, "_hand_orn")
+        return self._hand(0, "site_xmat").reshape(3, 3)
 
     @property
     def _eef1_xmat(self) -> Any:
-        return self._hand(1, "_hand_orn")
+        return self._hand(1, "site_xmat").reshape(3, 3)
 
     @property
     def _eef0_xquat(self) -> Vector:

@@ -1,6 +1,5 @@
 """Measured state of a robot: joints, hands, wrists and base."""
 
-from collections.abc import Callable
 from typing import Any
 
 import mujoco
@@ -37,42 +36,36 @@ class Measured:
         force = self.sim.data._data.qfrc_actuator[self._ref_joint_vel_indexes]
         return np.abs(force) / self.control_freq
 
-    def _by_arm(self, measure: Callable[[int], Any]) -> dict[str, Any]:
-        return {arm: measure(site) for arm, site in self.eef_site_id.items()}
+    @property
+    def _hand_pose(self) -> dict[str, Array]:
+        """Pose of the last body of each arm in the base's frame, shape (4, 4)."""
+        names = self.robot_model.eef_name
+        return {arm: self.pose_in_base_from_name(n) for arm, n in names.items()}
 
     @property
     def _hand_pos(self) -> dict[str, Vector]:
-        data = self.sim.data._data
-        return self._by_arm(lambda site: data.site_xpos[site].copy())
+        return {arm: pose[:3, 3] for arm, pose in self._hand_pose.items()}
 
     @property
     def _hand_orn(self) -> dict[str, Array]:
-        data = self.sim.data._data
-        return self._by_arm(lambda site: data.site_xmat[site].reshape(3, 3).copy())
+        return {arm: pose[:3, :3] for arm, pose in self._hand_pose.items()}
 
     @property
     def _hand_quat(self) -> dict[str, Vector]:
         return {arm: mat2quat(R) for arm, R in self._hand_orn.items()}
 
     @property
-    def _hand_pose(self) -> dict[str, Array]:
-        poses: dict[str, Array] = {}
-        for arm, R in self._hand_orn.items():
-            poses[arm] = np.eye(4)
-            poses[arm][:3, :3], poses[arm][:3, 3] = R, self._hand_pos[arm]
-        return poses
-
-    @property
     def _hand_total_velocity(self) -> dict[str, Vector]:
-        model, data = self._state.model, self.sim.data._data
-
-        def velocity(site: int) -> Vector:
-            found = np.zeros(6)
-            kind = mujoco.mjtObj.mjOBJ_SITE
-            mujoco.mj_objectVelocity(model, data, kind, site, found, 0)
-            return found[[3, 4, 5, 0, 1, 2]]
-
-        return self._by_arm(velocity)
+        """Linear and angular velocity of that body, in the base's axes, shape (6,)."""
+        model, data, R = self._state.model, self.sim.data._data, self.base_ori
+        found: dict[str, Vector] = {}
+        for arm, name in self.robot_model.eef_name.items():
+            twist = np.zeros(6)
+            body = self.sim.model.index("body", name)
+            kind = mujoco.mjtObj.mjOBJ_BODY
+            mujoco.mj_objectVelocity(model, data, kind, body, twist, 0)
+            found[arm] = np.concatenate([R.T @ twist[3:], R.T @ twist[:3]])
+        return found
 
     @property
     def _hand_vel(self) -> dict[str, Vector]:

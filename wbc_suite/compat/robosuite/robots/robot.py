@@ -128,8 +128,8 @@ class Robot(Measured):
 
     @property
     def dof(self) -> int:
-        """Number of its joints, those of grippers included."""
-        return self.robot_model.dof + sum(g.dof for g in self.gripper.values())
+        """Number of its joints, without grippers."""
+        return self.robot_model.dof
 
     @property
     def has_gripper(self) -> dict[str, bool]:

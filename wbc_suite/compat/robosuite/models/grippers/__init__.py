@@ -22,6 +22,8 @@ __all__ = [
 SPEEDS = {"JacoThreeFingerGripper": 0.01, "JacoThreeFingerDexterousGripper": 0.01}
 """Change of the grasp at a full action in a control period; 0.2 for all others."""
 
+SITE_ROLES = ("grip_site", "grip_cylinder", "ee", "ee_x", "ee_y", "ee_z")
+
 
 class GripperModel(MujocoModel):
     """A gripper, alone or at the end of a robot's arm.
@@ -136,17 +138,22 @@ class GripperModel(MujocoModel):
 
     @property
     def important_sites(self) -> dict[str, str]:
-        """The site between its fingers, under all of robosuite's roles."""
-        site = self.prefix + self._frame
-        return dict.fromkeys(
-            ("grip_site", "grip_cylinder", "ee", "ee_x", "ee_y", "ee_z"), site
-        )
+        """Robosuite's names of the site between its fingers, by role."""
+        return {role: self.naming_prefix + role for role in SITE_ROLES}
+
+    @property
+    def site(self) -> str:
+        """Name of the site between its fingers in the scene."""
+        return self.prefix + self._frame
 
     @property
     def important_sensors(self) -> dict[str, str]:
-        """Force and torque at the wrist."""
-        start = f"{self.prefix}{self._arm}_wrist"
-        return {"force_ee": f"{start}_force", "torque_ee": f"{start}_torque"}
+        """Robosuite's names of force and torque at the wrist, by role."""
+        return {role: self.naming_prefix + role for role in ("force_ee", "torque_ee")}
+
+    def sensor(self, role: str) -> str:
+        """Return the name of a sensor in the scene."""
+        return f"{self.prefix}{self._arm}_wrist_{role.removesuffix('_ee')}"
 
     @property
     def init_qpos(self) -> Vector:

@@ -15,17 +15,14 @@ class TaskObject(MujocoModel):
 
     @property
     def root_body(self) -> str:
-        """Name of its body."""
-        return self.name
+        """Name of its body, robosuite's."""
+        return f"{self.name}_main"
 
     @property
     def joints(self) -> list[str]:
-        """Names of its joints."""
-        body = self._state.model.body(self._state.body)
-        first = int(body.jntadr[0])
-        return [
-            self._state.model.joint(first + k).name for k in range(int(body.jntnum[0]))
-        ]
+        """Names of its joints, robosuite's."""
+        count = int(self._state.model.body_jntnum[self._state.body])
+        return [f"{self.name}_joint{k}" for k in range(count)]
 
     @property
     def contact_geoms(self) -> list[str]:

@@ -71,8 +71,8 @@ class RobotModel(MujocoModel):
 
     @property
     def name(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride] - its class's
-        """Name of its class."""
-        return type(self).__name__
+        """Name of its class and its number."""
+        return f"{type(self).__name__}{self.idn}"
 
     @property
     def naming_prefix(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride] - its number's
