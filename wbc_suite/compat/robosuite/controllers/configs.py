@@ -6,6 +6,7 @@ keys of its type.
 
 import copy
 import json
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -133,8 +134,8 @@ def load_composite_controller_config(
 ) -> dict[str, Any]:
     """Return a composite's config, complete, in robosuite's layout.
 
-    A whole-body controller's config is ours. BASIC without a robot has all parts that
-    there are; the robot takes those that it has.
+    A robot's default has its parts. BASIC and HYBRID_MOBILE_BASE have all that there
+    are, and a robot takes those that it has. A whole-body controller's config is ours.
     """
     name = None if controller is None else str(controller)
     if name is not None and name.endswith(".json"):
@@ -146,7 +147,8 @@ def load_composite_controller_config(
     if kind in PARTS:
         return _composite("BASIC", description, kind)
     if kind in ("BASIC", "HYBRID_MOBILE_BASE"):
-        return _composite(kind, description, "OSC_POSE")
+        own = description if controller is None else None
+        return _composite(kind, own, "OSC_POSE")
     return load_ours(name, robot)
 
 
@@ -158,16 +160,19 @@ def _read(path: str | Path) -> dict[str, Any]:
 
 
 def _composite(kind: str, robot: RobotDescription | None, arm: str) -> dict[str, Any]:
-    """Return a composite with the same controller in all arms."""
-    names = ("right", "left", "torso", "head", "base", "legs")
-    hands = ("right", "left")
+    """Return a composite with the same controller in all arms.
+
+    Parts are those of a robot, or without one all that there are.
+    """
+    names: tuple[str, ...] = ("right", "left", "torso", "head", "base", "legs")
+    hands: Collection[str] = ("right", "left")
     if robot is not None:
-        names, hands = tuple(parts_of(robot)), tuple(hands_of(robot))
-    parts: dict[str, Any] = {"arms": {}}
+        names, hands = tuple(parts_of(robot)), hands_of(robot)
+    parts: dict[str, Any] = {}
     for name in names:
         if name in hands:
             given = load_part_controller_config(default_controller=arm)
-            parts["arms"][name] = given | {"gripper": {"type": "GRIP"}}
+            parts[name] = given | {"gripper": {"type": "GRIP"}}
         else:
             parts[name] = copy.deepcopy(BASE if name == "base" else BODY)
     return {"type": kind, "body_parts": parts}

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from wbc_suite.benchmark import load_benchmark
 from wbc_suite.compat.robosuite.environments.aliases import aliases_of
 from wbc_suite.compat.robosuite.environments.arguments import (
     controller_of,
@@ -96,15 +97,13 @@ class RobotEnv(MujocoEnv):
         grippers = self.arguments.get("gripper_types", "default")
         if isinstance(grippers, list | tuple):
             grippers = grippers[0]
-        if grippers == "default":  # the benchmark's own, such as a wiping tool
-            arguments["robots"] = [
-                robot.robot_model.robot or robot.robot_model.description
-                for robot in self.robots
-            ]
-            bases = self.arguments.get("base_types", "default")
-            base = bases[0] if isinstance(bases, list | tuple) else bases
-            if base != "default":
-                arguments["base_types"] = base
+        own = load_benchmark(str(self.benchmark)).gripper
+        if grippers == "default" and own is not None:  # such as a wiping tool
+            for robot in self.robots:
+                if robot.robot_model.description.hands:
+                    robot.robot_model.load(own, None)
+            models = [robot.robot_model for robot in self.robots]
+            arguments["robots"] = [model.description for model in models]
         return arguments
 
     def _make_sim(self, core: Core) -> MjSim:

@@ -15,7 +15,7 @@ from wbc_suite.compat.robosuite.models.grippers import (
     GripperModel,
     NullGripper,
 )
-from wbc_suite.compat.robosuite.models.robots import create_robot
+from wbc_suite.compat.robosuite.models.robots import changed, create_robot
 from wbc_suite.compat.robosuite.robots.measured import Measured
 from wbc_suite.compat.robosuite.utils.binding_utils import MjSim
 from wbc_suite.control import RobotState
@@ -69,7 +69,7 @@ class Robot(Measured):
         robot = model.description
         ready = {**robot.keyframes["ready"], **dict(zip(names, qpos, strict=True))}
         keyframes = {**robot.keyframes, "ready": ready}
-        model.description = robot.model_copy(update={"keyframes": keyframes})
+        model.description = changed(robot, keyframes=keyframes)
 
     def _adopt_grippers(self) -> None:
         robot, prefix = self.robot_model.description, self.robot_model.naming_prefix

@@ -81,13 +81,13 @@ class MjModel:
 
     def get_joint_qpos_addr(self, name: str) -> Any:
         """Return the index of a joint in qpos; a pair (begin, end) for free joints."""
-        return self._address(name, "qposadr", {0: 7, 1: 4})
+        return self._place_of(name, "qposadr", {0: 7, 1: 4})
 
     def get_joint_qvel_addr(self, name: str) -> Any:
         """Return the index of a joint in qvel; a pair (begin, end) for free joints."""
-        return self._address(name, "dofadr", {0: 6, 1: 3})
+        return self._place_of(name, "dofadr", {0: 6, 1: 3})
 
-    def _address(self, name: str, field: str, sizes: Mapping[int, int]) -> Any:
+    def _place_of(self, name: str, field: str, sizes: Mapping[int, int]) -> Any:
         joint = self.index("joint", name)
         first = int(getattr(self._model, f"jnt_{field}")[joint])
         size = sizes.get(int(self._model.jnt_type[joint]), 1)

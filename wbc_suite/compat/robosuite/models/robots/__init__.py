@@ -16,6 +16,15 @@ from wbc_suite.robot import RobotDescription, load_robot
 from wbc_suite.robot.poses import pose_fields
 from wbc_suite.typing import Vector
 
+ARMATURE = 5.0
+"""kg m^2; the k-th joint of an arm on a fixed base has 5 / k in robosuite."""
+FRICTION = {"UR5e": 0.01, "Jaco": 0.01, "XArm7": 1.0}
+"""Dry friction of all joints of an arm in robosuite, N m; 0.1 for all others."""
+DAMPING = {"UR5e": (0.001,) * 6, "Sawyer": (*(0.1,) * 5, 0.2, 0.1)} | dict.fromkeys(
+    ("Panda", "Jaco", "Kinova3", "XArm7"), (*(0.1,) * 5, 0.01, 0.01)
+)
+"""Damping of the joints of an arm in robosuite, N m s; 0.1 for all others."""
+
 __all__ = [
     "REGISTERED_ROBOTS",
     "ManipulatorModel",
@@ -55,7 +64,8 @@ class RobotModel(MujocoModel):
 
     def __init__(self, fname: str | None = None, idn: int = 0) -> None:
         self.idn = idn
-        self.description: RobotDescription = load_robot(fname or self.robot)
+        own = load_robot(fname or self.robot)
+        self.description: RobotDescription = with_passive_joints(own)
         self.base: Any = None
         self.grippers: dict[str, Any] = {}
 
@@ -64,8 +74,8 @@ class RobotModel(MujocoModel):
         root = self.description.root
         own = type(self).robot or self.description.source
         if own and (gripper not in (None, "default") or base is not None):
-            self.description = load_robot(own, gripper=gripper, base=base)
-            self.description = self.description.with_root(
+            changed = load_robot(own, gripper=gripper, base=base)
+            self.description = with_passive_joints(changed).with_root(
                 self.description.root.kind, pos=root.pos, quat=root.quat
             )
 
@@ -208,6 +218,35 @@ class ManipulatorModel(RobotModel):
         """Name of the body at the end of each arm."""
         prefix, robot = self.naming_prefix, self.description
         return {arm: prefix + robot.link_of(f) for arm, f in robot.hands.items()}
+
+
+def with_passive_joints(robot: RobotDescription) -> RobotDescription:
+    """Return a robot on a fixed base with robosuite's passive values in its arms."""
+    if robot.root.kind != "fixed" or any(f.role == "foot" for f in robot.frames):
+        return robot
+    links, rests = list(robot.links), DAMPING.get(robot.name, (0.1,) * 9)
+    friction = FRICTION.get(robot.name, 0.1)
+    arms = [name for name in robot.groups if name.endswith("arm")]
+    if len(arms) != 1:  # Baxter has an armature of 0.01
+        return robot
+    for name, joints in robot.groups.items():
+        for k, joint in enumerate(joints if name.endswith("arm") else (), 1):
+            changes = {"armature": ARMATURE / k, "frictionloss": friction}
+            changes["damping"] = rests[k - 1]
+            at = next(
+                i for i, x in enumerate(links) if x.joint and x.joint.name == joint
+            )
+            own = links[at]
+            assert own.joint is not None
+            moved = own.joint.model_copy(update=changes)
+            links[at] = own.model_copy(update={"joint": moved})
+    return changed(robot, links=tuple(links))
+
+
+def changed(robot: RobotDescription, **fields: Any) -> RobotDescription:
+    """Return a description with other values of some fields."""
+    data = {key: getattr(robot, key) for key in type(robot).model_fields}
+    return type(robot).model_validate(data | fields)
 
 
 def register_robot(target_class: type[RobotModel]) -> type[RobotModel]:
