@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from wbc_suite.catalogue import Catalogue
     from wbc_suite.control import load_composite_controller_config
     from wbc_suite.envs import make
+    from wbc_suite.envs.exporting import export_model
     from wbc_suite.robot import RobotDescription, load_robot
 
 __version__ = "0.1.0"
@@ -20,6 +21,7 @@ __version__ = "0.1.0"
 _HOME = {
     "Catalogue": "catalogue",
     "RobotDescription": "robot",
+    "export_model": "envs.exporting",
     "load_composite_controller_config": "control",
     "load_robot": "robot",
     "make": "envs",
@@ -29,6 +31,7 @@ __all__ = [
     "Catalogue",
     "RobotDescription",
     "errors",
+    "export_model",
     "kinematics",
     "load_composite_controller_config",
     "load_robot",

@@ -135,7 +135,7 @@ def test_a_trainer_steps_records_and_goes_back(driver):
 
 
 def test_old_controllers_mean_what_they_did(driver):
-    right = driver.env.robots[0].composite_controller.config.body_parts["right"]
+    right = driver.env.env.controllers[0].config.body_parts["right"]
     assert (right.input_ref_frame, right.input_type) == ("world", "delta")
     assert np.all(np.asarray(right.kp) == 150)
 

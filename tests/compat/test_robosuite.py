@@ -93,8 +93,8 @@ def test_states_go_out_and_in_as_in_datasets(env):
 @pytest.mark.parametrize(("robot", "size"), [("Panda", 7), ("Tiago", 20)])
 def test_basic_without_a_robot_fits_any(robot, size):
     config = robosuite.load_composite_controller_config(controller="BASIC")
-    config["body_parts"]["arms"]["right"]["kp"] = 100.0
-    assert config["body_parts"]["arms"]["left"]["kp"] != 100.0
+    config["body_parts"]["right"]["kp"] = 100.0
+    assert config["body_parts"]["left"]["kp"] != 100.0
     env = robosuite.make(
         "Lift", robots=robot, controller_configs=config, use_camera_obs=False
     )

@@ -48,7 +48,7 @@ class CompositeKind(NamedTuple):
 
 _KINDS: dict[str, CompositeKind] = {}
 
-_CONVERTERS = ["wbc_suite.compat.robosuite_json:convert"]
+_CONVERTERS = ["wbc_suite.compat.robosuite.json_configs:convert"]
 """Functions that read configs in other projects' layouts, imported when needed."""
 
 

@@ -14,6 +14,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from wbc_suite.compat.robosuite.controllers.uncoupled_osc import UNCOUPLED
 from wbc_suite.control.part.registry import is_part_controller, part_models
 from wbc_suite.control.robot_parts import hands_of, parts_of
 from wbc_suite.errors import ConfigError, UnknownNameError, did_you_mean
@@ -26,7 +27,7 @@ PARTS = ("right", "left", "torso", "head", "base", "legs")
 KEYS = ("type", SPECIFIC, "body_parts", "body_part_ordering")
 
 IGNORED_OF_PARTS = {
-    *("uncouple_pos_ori", "lite_physics", "policy_freq", "damping_ratio_limits"),
+    *("lite_physics", "policy_freq", "damping_ratio_limits"),
     *("control_ori", "ik_pos_limit", "ik_ori_limit", "ik_integration_dt", "ki", "kv"),
     *("ik_pseudo_inverse_damping", "ik_step_limit", "converge_steps", "ref_name"),
     *("use_action_scaling", "use_torque_compensation", "actuator_range", "eef_name"),
@@ -37,6 +38,10 @@ IGNORED_OF_PARTS = {
     *("input_min", "input_max", "output_min", "output_max", "gripper"),
 }
 """Keys of robosuite's parts; a warning lists those that our controller lacks."""
+
+JOINTS = "JOINT_POSITION"
+"""Its goals are not interpolated: our references move with a velocity, which robosuite's
+do not, so that steps from where the joints are would be twice as long."""
 
 OTHER_UNITS = {"JOINT_VELOCITY": {"kp", "ki", "kd"}, "BASE_VELOCITY": {"kp", "kd"}}
 """Gains with other units in robosuite, or without effect there."""
@@ -162,17 +167,20 @@ class _Conversion:
         if kind == "OSC_POSE" and given.get("control_ori") is False:
             kind = "OSC_POSITION"
         kind = self._check_name("part controller", kind, models, f"{where}type")
+        if kind in UNCOUPLED and given.get("uncouple_pos_ori") is not False:
+            kind = UNCOUPLED[kind]
         fields = set(models[kind].model_fields) - OTHER_UNITS.get(kind, set())
-        self._check_keys(given, fields | {"type"}, IGNORED_OF_PARTS, where)
+        own = fields | {"type", "uncouple_pos_ori"}
+        self._check_keys(given, own, IGNORED_OF_PARTS, where)
         ours: dict[str, Any] = {"type": kind}
         for key, value in given.items():
             if key == "gripper":
                 ours["gripper"] = self._gripper(value, where)
             elif key == "control_delta":
                 ours["input_type"] = "delta" if value else "absolute"
-            elif value is None or key in ("type", "control_ori"):
+            elif value is None or key in ("type", "control_ori", "uncouple_pos_ori"):
                 continue
-            elif key not in fields:
+            elif key not in fields or (key, kind) == ("interpolation", JOINTS):
                 self.ignored.append(where + key)
             elif value != "null":
                 ours[key] = value

@@ -1,0 +1,25 @@
+"""Controllers: robosuite's default configs, its registries, and classes of users."""
+
+from wbc_suite.compat.robosuite.controllers.configs import (
+    ALL_PART_CONTROLLERS,
+    PART_CONTROLLER_INFO,
+    load_composite_controller_config,
+    load_part_controller_config,
+)
+from wbc_suite.compat.robosuite.controllers.user_controllers import (
+    ALL_COMPOSITE_CONTROLLERS,
+    REGISTERED_COMPOSITE_CONTROLLERS_DICT,
+    CompositeController,
+    register_composite_controller,
+)
+
+__all__ = [
+    "ALL_COMPOSITE_CONTROLLERS",
+    "ALL_PART_CONTROLLERS",
+    "PART_CONTROLLER_INFO",
+    "REGISTERED_COMPOSITE_CONTROLLERS_DICT",
+    "CompositeController",
+    "load_composite_controller_config",
+    "load_part_controller_config",
+    "register_composite_controller",
+]

@@ -1,0 +1,178 @@
+"""robosuite's default configs, as dictionaries that scripts edit.
+
+Numbers are those of robosuite 1.5.2's configs. A part's config is complete: it has all
+keys of its type.
+"""
+
+import copy
+import json
+from collections.abc import Collection
+from pathlib import Path
+from typing import Any
+
+from wbc_suite.control import load_composite_controller_config as load_ours
+from wbc_suite.control.composite.registry import default_composite
+from wbc_suite.control.robot_parts import hands_of, parts_of
+from wbc_suite.errors import ConfigError, UnknownNameError
+from wbc_suite.robot import RobotDescription, load_robot
+
+PART_CONTROLLER_INFO = {
+    "JOINT_VELOCITY": "Joint Velocity",
+    "JOINT_TORQUE": "Joint Torque",
+    "JOINT_POSITION": "Joint Position",
+    "OSC_POSITION": "Operational Space Control (Position Only)",
+    "OSC_POSE": "Operational Space Control (Position + Orientation)",
+    "IK_POSE": "Inverse Kinematics Control (Position + Orientation)",
+}
+ALL_PART_CONTROLLERS = PART_CONTROLLER_INFO.keys()
+
+_INPUT = {"input_max": 1, "input_min": -1}
+_RAMP = {"interpolation": None, "ramp_ratio": 0.2}
+_GAINS = {
+    "damping_ratio": 1,
+    "impedance_mode": "fixed",
+    "kp_limits": [0, 300],
+    "damping_ratio_limits": [0, 10],
+}
+_FRAME = {"input_type": "delta", "input_ref_frame": "base"}
+_STEP = [0.05, 0.05, 0.05, 0.5, 0.5, 0.5]
+
+PARTS: dict[str, dict[str, Any]] = {
+    "OSC_POSE": {
+        "type": "OSC_POSE",
+        **_INPUT,
+        "output_max": _STEP,
+        "output_min": [-x for x in _STEP],
+        "kp": 150,
+        **_GAINS,
+        "position_limits": None,
+        "orientation_limits": None,
+        "uncouple_pos_ori": True,
+        **_FRAME,
+        **_RAMP,
+    },
+    "OSC_POSITION": {
+        "type": "OSC_POSITION",
+        **_INPUT,
+        "output_max": _STEP[:3],
+        "output_min": [-x for x in _STEP[:3]],
+        "kp": 150,
+        **_GAINS,
+        "position_limits": None,
+        **_FRAME,
+        **_RAMP,
+    },
+    "IK_POSE": {"type": "IK_POSE", "ik_pos_limit": 0.02, "ik_ori_limit": 0.05, **_RAMP},
+    "JOINT_POSITION": {
+        "type": "JOINT_POSITION",
+        **_INPUT,
+        "output_max": 0.05,
+        "output_min": -0.05,
+        "kp": 50,
+        **_GAINS,
+        "qpos_limits": None,
+        **_RAMP,
+    },
+    "JOINT_VELOCITY": {
+        "type": "JOINT_VELOCITY",
+        **_INPUT,
+        "output_max": 0.5,
+        "output_min": -0.5,
+        "kp": 3.0,
+        "velocity_limits": [-1, 1],
+        **_RAMP,
+    },
+    "JOINT_TORQUE": {
+        "type": "JOINT_TORQUE",
+        **_INPUT,
+        "output_max": 0.1,
+        "output_min": -0.1,
+        "torque_limits": None,
+        **_RAMP,
+    },
+}
+"""Default config of each part controller."""
+
+BODY = {
+    "type": "JOINT_POSITION",
+    **_INPUT,
+    "output_max": 0.5,
+    "output_min": -0.5,
+    "kd": 200,
+    "kv": 200,
+    "kp": 1000,
+    "velocity_limits": [-1, 1],
+    "kp_limits": [0, 1000],
+    **_RAMP,
+}
+"""Default config of torso, head and legs."""
+
+BASE = {"type": "JOINT_VELOCITY", "interpolation": "null"}
+
+
+def load_part_controller_config(
+    custom_fpath: str | Path | None = None, default_controller: str | None = None
+) -> dict[str, Any]:
+    """Return the config of a part controller: a JSON file's, or a type's defaults.
+
+    Raises:
+        ConfigError: If neither is given, or the file cannot be read.
+        UnknownNameError: If there is no such type.
+    """
+    if default_controller is not None:
+        kind = str(default_controller).upper()
+        if kind not in PARTS:
+            raise UnknownNameError("part controller", default_controller, PARTS)
+        return copy.deepcopy(PARTS[kind])
+    if custom_fpath is None:
+        raise ConfigError("load_part_controller_config: name a file or a type.")
+    return _read(custom_fpath)
+
+
+def load_composite_controller_config(
+    controller: str | Path | None = None, robot: str | None = None
+) -> dict[str, Any]:
+    """Return a composite's config, complete, in robosuite's layout.
+
+    A robot's default has its parts. BASIC and HYBRID_MOBILE_BASE have all that there
+    are, and a robot takes those that it has. A whole-body controller's config is ours.
+    """
+    name = None if controller is None else str(controller)
+    if name is not None and name.endswith(".json"):
+        return _read(name)
+    description = None if robot is None else load_robot(robot)
+    if name is None and description is not None:
+        name = default_composite(description)
+    kind = str(name or "BASIC").upper()
+    if kind in PARTS:
+        return _composite("BASIC", description, kind)
+    if kind in ("BASIC", "HYBRID_MOBILE_BASE"):
+        own = description if controller is None else None
+        return _composite(kind, own, "OSC_POSE")
+    return load_ours(name, robot)
+
+
+def _read(path: str | Path) -> dict[str, Any]:
+    try:
+        return json.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise ConfigError(f"{path}: no controller in it: {error}") from error
+
+
+def _composite(kind: str, robot: RobotDescription | None, arm: str) -> dict[str, Any]:
+    """Return a composite with the same controller in all arms.
+
+    Parts are those of a robot, or without one all that there are.
+    """
+    names: tuple[str, ...] = ("right", "left", "torso", "head", "base", "legs")
+    hands: Collection[str] = ("right", "left")
+    if robot is not None:
+        names, hands = tuple(parts_of(robot)), hands_of(robot)
+    parts: dict[str, Any] = {}
+    for name in names:
+        if name in hands:
+            given = load_part_controller_config(default_controller=arm)
+            parts[name] = given | {"gripper": {"type": "GRIP"}}
+        else:
+            parts[name] = copy.deepcopy(BASE if name == "base" else BODY)
+    return {"type": kind, "body_parts": parts}

@@ -1,0 +1,117 @@
+"""robosuite's law in operational space: position and orientation apart.
+
+With F and T the accelerations that the errors of position and orientation ask for, and
+Lp, Lo, L the inertias at the site for linear motion, for rotation and for both,
+
+    tau = J^T [Lp F; Lo T] + N^T M a0 + h,     N = I - M^-1 J^T L J.
+
+Each motion has the inertia of the hand that is free in the other one, so that they
+disturb each other: 0.05 m sideways turn a Panda's hand by some degrees.
+"""
+
+from typing import Any, Literal
+
+import numpy as np
+
+from wbc_suite.compiling import compiled
+from wbc_suite.control.law.custom import register_law
+from wbc_suite.control.law.osc import (
+    OscLaw,
+    _write_site_jacobian,
+    _write_task_acceleration,
+)
+from wbc_suite.control.loop.physics import Physics
+from wbc_suite.control.loop.records import CompiledRecords
+from wbc_suite.control.loop.rigid_body import write_inertia
+from wbc_suite.control.part.osc_controller import OscConfig, OscController
+from wbc_suite.control.part.registry import register_part_controller
+from wbc_suite.linear_algebra import cholesky, dot, solve_lower, solve_upper
+
+UNCOUPLED = {"OSC_POSE": "UNCOUPLED_OSC_POSE", "OSC_POSITION": "UNCOUPLED_OSC_POSITION"}
+"""Types of this law for those of robosuite's configs."""
+
+TINY = 1e-12
+"""Least independent mobility, relative to the largest; see `cholesky`."""
+
+
+@compiled
+def uncoupled_osc_law(
+    physics: Physics, law: CompiledRecords, drives: CompiledRecords
+) -> None:
+    """Write the joint accelerations M^-1 (tau - h); see the module.
+
+    With `M = C C^T` and `Y = J C^-T` they are `a0 + C^-T Y^T (w - L J a0)`, where w is
+    `[Lp F; Lo T]` and L the inverse of `Y Y^T`, as Lp and Lo are of its blocks.
+    """
+    n, work = law.last - law.first, physics.osc
+    J, C, posture, z = work.J, work.C, work.posture, work.z
+    for j in range(n):
+        drive = drives[law.first + j]
+        work.dofs[j] = drive.dof
+        error = drive.position - physics.qpos[drive.qpos]
+        posture[j] = drive.kp * error - drive.kd * physics.qvel[drive.dof]
+    _write_task_acceleration(physics, law)
+    _write_site_jacobian(physics, law, n)
+    null = np.empty(6)
+    for i in range(6):
+        null[i] = dot(J[i], posture, n)
+    write_inertia(physics, work.dofs, n, C)
+    cholesky(C, n, 0.0)
+    for i in range(6):
+        solve_lower(C, J[i], n)
+    wrench = np.empty(6)
+    for half in range(2):
+        _times_inertia(J, n, 3 * half, 3, work.wanted[3 * half :], wrench[3 * half :])
+    pull = np.empty(6)
+    _times_inertia(J, n, 0, 6, null, pull)
+    for j in range(n):
+        z[j] = 0.0
+        for i in range(6):
+            z[j] += J[i, j] * (wrench[i] - pull[i])
+    solve_upper(C, z, n)
+    for j in range(n):
+        physics.acceleration[work.dofs[j]] = posture[j] + z[j]
+
+
+@compiled
+def _times_inertia(
+    Y: Any, n: int, first: int, size: int, given: Any, result: Any
+) -> None:
+    """Write `(Y Y^T)^-1 given` for some rows of Y."""
+    mobility = np.empty((size, size))
+    for i in range(size):
+        result[i] = given[i]
+        for k in range(size):
+            mobility[i, k] = dot(Y[first + i], Y[first + k], n)
+    cholesky(mobility, size, TINY)
+    solve_lower(mobility, result, size)
+    solve_upper(mobility, result, size)
+
+
+class UncoupledOscConfig(OscConfig):
+    """Config of the law; joints' torques are clipped one by one, as robosuite does."""
+
+    type: Literal["UNCOUPLED_OSC_POSE", "UNCOUPLED_OSC_POSITION"] = "UNCOUPLED_OSC_POSE"  # pyright: ignore[reportIncompatibleVariableOverride] - types of its own
+    saturation: Literal["clip", "qp"] = "clip"
+
+    @property
+    def size(self) -> int:
+        """How many values of the action move the goal."""
+        return 6 if self.type == "UNCOUPLED_OSC_POSE" else 3
+
+
+class UncoupledOscController(OscController):
+    """`OscController` with the uncoupled law."""
+
+    def _make_law(self, joints: tuple[str, ...], site: str) -> OscLaw:
+        law = super()._make_law(joints, site)
+        law.record["kind"] = register_law(uncoupled_osc_law)
+        law.record["keep_direction"] = 0.0
+        drives = law.drives
+        drives["position_min"], drives["position_max"] = -np.inf, np.inf
+        drives["velocity_max"] = np.inf
+        return law
+
+
+for _name in UNCOUPLED.values():
+    register_part_controller(_name, UncoupledOscController, UncoupledOscConfig)

@@ -1,0 +1,332 @@
+"""Composite controllers: robosuite's view of ours, and base of users' classes."""
+
+from collections.abc import Callable, Mapping
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from wbc_suite.control import RobotState, composite_names
+from wbc_suite.control.composite.basic import BasicController, default_basic_config
+from wbc_suite.control.composite.registry import register_composite
+from wbc_suite.typing import Vector
+
+REGISTERED_COMPOSITE_CONTROLLERS_DICT: dict[str, type["CompositeController"]] = {}
+"""Classes of users by name, and ours."""
+
+SPECIFIC = "composite_controller_specific_configs"
+
+
+class PartController:
+    """One part of a composite controller, as robosuite's scripts see it.
+
+    Attributes:
+        name: Type of the controller.
+        control_dim: Number of its action values.
+    """
+
+    def __init__(self, name: str, part: Any, state: RobotState) -> None:
+        self.part_name, self._part, self._state = name, part, state
+        config = getattr(part, "config", None)
+        self.name = getattr(config, "type", "GRIP").removeprefix("UNCOUPLED_")
+        self.control_dim = sum(len(s.labels) for s in part.slices)
+        self.joint_index = {
+            "joints": state.joint_addresses(part.law.joints)[1].tolist(),
+            "qpos": state.joint_addresses(part.law.joints)[0].tolist(),
+            "qvel": state.joint_addresses(part.law.joints)[1].tolist(),
+        }
+
+    def __getattr__(self, name: str) -> Any:
+        config = getattr(self.__dict__["_part"], "config", None)
+        if name.startswith("__") or not hasattr(config, name):
+            raise AttributeError(f"{self.name} has no attribute '{name}'.")
+        return getattr(config, name)
+
+    @property
+    def control_limits(self) -> tuple[Vector, Vector]:
+        """Least and greatest values of its slices of the action."""
+        slices = self._part.slices
+        low = np.concatenate([np.zeros(0), *(s.low for s in slices)])
+        return low, np.concatenate([np.zeros(0), *(s.high for s in slices)])
+
+    @property
+    def joint_pos(self) -> Vector:
+        """Positions of its joints."""
+        return self._state.data.qpos[self.joint_index["qpos"]]
+
+    @property
+    def joint_vel(self) -> Vector:
+        """Velocities of its joints."""
+        return self._state.data.qvel[self.joint_index["qvel"]]
+
+    @property
+    def kp(self) -> Vector:
+        """Present stiffness."""
+        return np.array(self._part.law.record["kp"]).ravel()
+
+    @property
+    def kd(self) -> Vector:
+        """Present damping."""
+        return np.array(self._part.law.record["kd"]).ravel()
+
+    @property
+    def goal_pos(self) -> Vector | None:
+        """Goal of the hand, in the axes of the goal, m; None without a hand."""
+        goal = self._part.goal
+        return None if isinstance(goal, np.ndarray) else np.array(goal.translation)
+
+    @property
+    def goal_ori(self) -> Any:
+        """Goal orientation of the hand as a matrix; None without a hand."""
+        goal = self._part.goal
+        return None if isinstance(goal, np.ndarray) else np.array(goal.rotation)
+
+    @property
+    def goal_qpos(self) -> Vector | None:
+        """Goal of the joints; None of a hand."""
+        goal = self._part.goal
+        return goal if isinstance(goal, np.ndarray) else None
+
+    @property
+    def ref_pos(self) -> Vector:
+        """Position of the hand in the world, m."""
+        return self._site("site_xpos")
+
+    @property
+    def ref_ori_mat(self) -> Any:
+        """Orientation of the hand in the world, shape (3, 3)."""
+        return self._site("site_xmat").reshape(3, 3)
+
+    def _site(self, field: str) -> Any:
+        state = self._state
+        frame = state.robot.hands[self.part_name]
+        site = state.model.site(state.prefix + frame).id
+        return np.array(getattr(state.data, field)[site])
+
+    def set_goal(self, action: Any) -> None:
+        """Take values of its slices of the action."""
+        self._part.set_goal(np.asarray(action, np.float64), 0.05)
+
+    def reset_goal(self) -> None:
+        """Hold the part where it is."""
+        self._part.reset(self._state)
+
+    def update(self, force: bool = False) -> None:
+        """Do nothing: values are read when they are asked for."""
+
+    @property
+    def interpolator(self) -> Any:
+        """Whether it interpolates: None where it does not."""
+        ramp = getattr(self._part.config, "interpolation", None)
+        return None if ramp is None else SimpleNamespace(order=1)
+
+
+class CompositeController:
+    """A composite controller; parts of the robot are driven by ours.
+
+    A subclass with a `name`, registered by `register_composite_controller`, is made for
+    configs of that `type`. It may override `set_goal`, which takes a whole action, and
+    `run_controller`, which returns the commands of each enabled part at every physics
+    step: torques of joints, and setpoints of grippers.
+    """
+
+    name = "BASIC"
+
+    def __init__(self, sim: Any, robot_model: Any, grippers: Any) -> None:
+        self.sim, self.robot_model, self.grippers = sim, robot_model, grippers
+        self.lite_physics = True
+        self.arms = tuple(grippers)
+        self.part_controllers: dict[str, PartController] = {}
+        self.part_controller_config: dict[str, Any] = {}
+        self.composite_controller_specific_config: dict[str, Any] = {}
+
+    def load_controller_config(
+        self,
+        part_controller_config: Any,
+        composite_controller_specific_config: Any = None,
+    ) -> None:
+        """Store the configs and make the parts' controllers."""
+        self.part_controller_config = dict(part_controller_config)
+        self.composite_controller_specific_config = dict(
+            composite_controller_specific_config or {}
+        )
+        self._validate_composite_controller_specific_config()
+        self._init_controllers()
+        self.setup_action_split_idx()
+
+    def bind(self, inner: Any, state: RobotState) -> None:
+        """Drive the parts of one of our controllers."""
+        self._inner, self._state = inner, state
+        self.layout = inner.layout
+        parts = getattr(inner, "parts", {})
+        self.part_controllers = {
+            n: PartController(n, p, state) for n, p in parts.items()
+        }
+
+    def _validate_composite_controller_specific_config(self) -> None:
+        """Check the specific config; by default anything is right."""
+
+    def _init_controllers(self) -> None:
+        """Make more controllers; by default there are those of the parts."""
+
+    def setup_action_split_idx(self) -> None:
+        """Do nothing: `_action_split_indexes` follows from the parts."""
+
+    @property
+    def _action_split_indexes(self) -> dict[str, tuple[int, int]]:
+        """Begin and end of each part of the action."""
+        return {part.name: (part.start, part.stop) for part in self.layout.slices}
+
+    def set_goal(self, all_action: Any) -> None:
+        """Take an action."""
+        self._inner.set_goal(np.asarray(all_action, np.float64))
+
+    def reset(self) -> None:
+        """Hold all parts where they are."""
+        self._inner.reset(self._state)
+
+    def run_controller(self, enabled_parts: Any = None) -> dict[str, Vector]:
+        """Return the present commands of each part, by name."""
+        data, found = self._state.data, {}
+        places = {
+            n: i
+            for n, i in zip(
+                self._state.actuators, self._state.actuator_ids, strict=True
+            )
+        }
+        for name, part in self.part_controllers.items():
+            own = [places[j] for j in part._part.law.joints if j in places]
+            found[name] = data.ctrl[own].copy()
+        return found
+
+    def update_state(self) -> None:
+        """Do nothing: states are read when they are asked for."""
+
+    def get_control_dim(self, part_name: str) -> int:
+        """Return the number of action values of a part."""
+        return self.part_controllers[part_name].control_dim
+
+    def get_controller(self, part_name: str) -> PartController:
+        """Return the controller of a part."""
+        return self.part_controllers[part_name]
+
+    def get_controller_base_pose(self, controller_name: str) -> tuple[Vector, Any]:
+        """Return position and orientation matrix of the robot's base in the world."""
+        pose = self._state.root_pose
+        return np.array(pose.translation), np.array(pose.rotation)
+
+    @property
+    def action_limits(self) -> tuple[Vector, Vector]:
+        """Least and greatest actions."""
+        return self.layout.low.copy(), self.layout.high.copy()
+
+    def create_action_vector(self, action_dict: Mapping[str, ArrayLike]) -> Vector:
+        """Return an action from values of parts, and zeros for the others."""
+        return self.layout.pack(action_dict, base=np.zeros(self.layout.size))
+
+    def create_action_dict_from_action_vector(self, action_vector: Any) -> Any:
+        """Return the values of each part."""
+        split = self._action_split_indexes
+        return {name: np.asarray(action_vector)[a:b] for name, (a, b) in split.items()}
+
+    def get_action_info(self) -> Any:
+        """Return the splits of the action by part."""
+        return self._action_split_indexes
+
+    def get_action_info_dict(self) -> dict[str, Any]:
+        """Return dimension and indices by part."""
+        split = self._action_split_indexes
+        found: dict[str, Any] = {"Action Dimension": (self.layout.size,)}
+        return found | {name: list(range(a, b)) for name, (a, b) in split.items()}
+
+
+def register_composite_controller(
+    target_class: type[CompositeController],
+) -> type[CompositeController]:
+    """Make a class known under its `name`, also to our `make`."""
+    name = target_class.name.upper()
+    if name not in REGISTERED_COMPOSITE_CONTROLLERS_DICT:
+        register_composite(
+            name,
+            lambda config, state: _Adapter(name, config, state),
+            family="basic",
+            default=default_basic_config,
+        )
+    REGISTERED_COMPOSITE_CONTROLLERS_DICT[name] = target_class
+    return target_class
+
+
+BIND: Callable[[RobotState], tuple[Any, Any, Any]] | None = None
+
+
+class _Adapter:
+    """A user's composite controller in our control loop; see `SteppedController`."""
+
+    def __init__(self, name: str, config: Mapping[str, Any], state: RobotState) -> None:
+        from wbc_suite.compat.robosuite.robots import models_of
+
+        basic = {k: v for k, v in config.items() if k in ("format", "body_parts")}
+        self._inner = BasicController({"type": "BASIC", **basic}, state)
+        self.layout, self.laws = self._inner.layout, self._inner.laws
+        sim, robot_model, grippers = models_of(state)
+        cls = REGISTERED_COMPOSITE_CONTROLLERS_DICT[name]
+        self.user = cls(sim, robot_model, grippers)
+        self.user.bind(self._inner, state)
+        specific = config.get(SPECIFIC, {})
+        self.user.load_controller_config(basic["body_parts"], specific)
+        places = dict(zip(state.actuators, range(len(state.actuators)), strict=True))
+        self._places = {
+            part: [places[j] for j in p.law.joints if j in places]
+            for part, p in self._inner.parts.items()
+        }
+
+    @property
+    def hold_action(self) -> Vector:
+        return self._inner.hold_action
+
+    def info(self, state: RobotState) -> dict[str, Any]:
+        return self._inner.info(state)
+
+    def reset(self, state: RobotState) -> None:
+        self._inner.reset(state)
+
+    def set_goal(self, action: Vector, period: float = 0.05) -> None:
+        self.user.set_goal(action)
+
+    def prepare(self, state: RobotState) -> int:
+        return self._inner.prepare(state)
+
+    def compute(self, state: RobotState) -> Vector:
+        """Return the user's commands; see `SteppedController`."""
+        commands = state.data.ctrl[state.actuator_ids].copy()
+        given = self.user.run_controller(dict.fromkeys(self._places, True))
+        for part, values in given.items():
+            commands[self._places[part]] = values
+        return commands
+
+
+def view_of(controller: Any, state: RobotState, models: Any) -> CompositeController:
+    """Return robosuite's view of one of our controllers, or the user's own."""
+    if isinstance(controller, _Adapter):
+        return controller.user
+    view = CompositeController(*models)
+    view.bind(controller, state)
+    view.name = str(getattr(getattr(controller, "config", None), "type", "BASIC"))
+    return view
+
+
+class _Names:
+    """Names of composite controllers, in the form of a dictionary's keys."""
+
+    def __iter__(self) -> Any:
+        return iter(composite_names())
+
+    def __contains__(self, name: object) -> bool:
+        return name in composite_names()
+
+    def __len__(self) -> int:
+        return len(composite_names())
+
+
+ALL_COMPOSITE_CONTROLLERS = _Names()

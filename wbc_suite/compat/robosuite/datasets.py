@@ -1,0 +1,31 @@
+"""Environments of robomimic's datasets."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from wbc_suite.compat.robosuite.environments.base import make
+from wbc_suite.errors import DatasetError
+
+
+def make_from_env_args(env_args: str | dict[str, Any]) -> Any:
+    """Make the environment of a dataset's `env_args`, JSON text or a dictionary."""
+    data = json.loads(env_args) if isinstance(env_args, str) else env_args
+    if "env_name" not in data:
+        raise DatasetError("env_args has no 'env_name'.")
+    return make(**{**data.get("env_kwargs", {}), "env_name": data["env_name"]})
+
+
+def make_from_dataset(path: str | Path) -> Any:
+    """Make the environment of an HDF5 dataset, by its attribute `env_args`."""
+    import h5py
+
+    from wbc_suite.recording import hdf5_reader
+    from wbc_suite.recording.hdf5_check import open_safely
+
+    with open_safely(Path(path)) as file, hdf5_reader.reading(Path(path)):
+        data = hdf5_reader.child(file, "data", h5py.Group)
+        env_args = None if data is None else hdf5_reader.attribute(data, "env_args")
+    if env_args is None:
+        raise DatasetError(f"{path}: no env_args in it.")
+    return make_from_env_args(str(env_args))

@@ -1,0 +1,73 @@
+"""robosuite's arguments of environments, as ours."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from wbc_suite.compat.robosuite.controllers.configs import (
+    load_composite_controller_config,
+)
+from wbc_suite.control.part import registry
+from wbc_suite.errors import UnknownNameError
+from wbc_suite.robot import RobotDescription
+
+IGNORED = (
+    *("has_offscreen_renderer", "render_collision_mesh", "render_visual_mesh"),
+    *("render_gpu_device_id", "renderer", "renderer_config", "robot_configs"),
+    *("render_camera_size", "reward_normalised", "camera_renderer", "env_version"),
+)
+"""Arguments without a meaning here."""
+
+SCENE = (
+    *("table_full_size", "table_friction", "table_offset", "single_object_mode"),
+    *("nut_type", "object_type", "bin1_pos", "bin2_pos", "z_offset", "z_rotation"),
+    *("use_latch", "task_config", "peg_radius", "peg_length", "prehensile"),
+    *("tables_boundary", "bin_size"),
+)
+"""Arguments of single tasks, whose numbers are in `tasks/*.toml` here."""
+
+_RENAMED = {"damping": "damping_ratio", "damping_limits": "damping_ratio_limits"}
+"""Keys of controllers that robosuite 1.5 renamed."""
+
+
+def ours(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return our arguments for robosuite's."""
+    kwargs = {"use_camera_obs": True} | {
+        key: value for key, value in given.items() if key not in IGNORED
+    }
+    if kwargs.pop("has_renderer", False):
+        kwargs["render_mode"] = "human"
+    kwargs.setdefault("render_camera", "frontview")
+    configuration = str(kwargs.get("env_configuration") or "default")
+    kwargs["env_configuration"] = configuration.removeprefix("single-arm-")
+    for key in ("env_name", "type"):
+        kwargs.pop(key, None)
+    return kwargs
+
+
+def controller_of(config: Any, robot: RobotDescription, name: str) -> Any:
+    """Return the controller of one robot: the given one, or robosuite's default."""
+    if config is None:
+        return load_composite_controller_config(robot=name)
+    return updated(config) if isinstance(config, dict) else config
+
+
+def updated(config: dict[str, Any]) -> dict[str, Any]:
+    """Return a config of robosuite 1.2 to 1.4, of one arm, in the form of 1.5."""
+    if not registry.is_part_controller(config.get("type")):
+        return config
+    if "control_delta" not in config:
+        return config
+    new = {_RENAMED.get(key, key): value for key, value in config.items()}
+    new["input_type"] = "delta" if new.pop("control_delta") else "absolute"
+    return {"input_ref_frame": "world"} | new
+
+
+def one_each(given: Any, count: int, kind: str) -> list[Any]:
+    """Return one value for each robot, of one for all or a list."""
+    if not isinstance(given, list | tuple):
+        return [given] * count
+    if len(given) == 1:
+        return list(given) * count
+    if len(given) != count:
+        raise UnknownNameError(kind, given, (f"{count} values, or one for all",))
+    return list(given)

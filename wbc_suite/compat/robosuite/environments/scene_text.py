@@ -1,0 +1,86 @@
+"""Scenes as MJCF text: written as they are now, and read back."""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from wbc_suite.benchmark import load_benchmark
+from wbc_suite.envs import RobotEnv
+from wbc_suite.envs.building import compose
+from wbc_suite.envs.states import write_scene
+from wbc_suite.errors import DatasetError
+
+WRITTEN = (
+    *("body_pos", "body_quat", "body_mass", "body_inertia", "body_ipos", "body_iquat"),
+    *("body_subtreemass", "body_invweight0", "dof_invweight0", "dof_M0"),
+    *("dof_damping", "dof_armature", "dof_frictionloss", "jnt_range", "jnt_pos"),
+    *("jnt_axis", "geom_pos", "geom_quat", "geom_size", "geom_aabb", "geom_rgba"),
+    *("geom_friction", "geom_solref", "geom_solimp", "site_pos", "site_quat"),
+    *("site_size", "site_rgba", "cam_pos", "cam_quat", "cam_fovy", "light_pos"),
+    *("light_dir", "light_diffuse", "mat_rgba", "bvh_aabb", "mesh_vert", "qpos0"),
+)
+"""Arrays of a model that a scene's text decides."""
+
+COUNTED = ("nq", "nv", "nu", "nbody", "ngeom", "nsite", "njnt", "ncam", "nmesh")
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A scene that was read from a text, with the elements of the environment's."""
+
+    model: mujoco.MjModel
+
+    def write(self, model: mujoco.MjModel) -> None:
+        """Write sizes, places, masses and looks into the environment's model."""
+        for field in WRITTEN:
+            given, own = getattr(self.model, field), getattr(model, field)
+            if given.shape == own.shape:
+                own[:] = given
+        collides = (model.geom_contype | model.geom_conaffinity) > 0
+        model.geom_rbound[collides] = self.model.geom_rbound[collides]
+
+
+def load_scene(text: str, model: mujoco.MjModel) -> Scene:
+    """Read a scene with the elements of a model.
+
+    Raises:
+        DatasetError: If it is no MJCF, or has other elements.
+    """
+    try:
+        found = mujoco.MjModel.from_xml_string(text)
+    except ValueError as error:
+        raise DatasetError(
+            f"The recording's scene cannot be read: {error}. Actions do not need it."
+        ) from error
+    same = all(getattr(found, n) == getattr(model, n) for n in COUNTED)
+    if not same or found.names != model.names:
+        raise DatasetError(
+            "The recording's scene is not this environment's: states of other scenes "
+            "do not fit. Actions do: play those."
+        )
+    return Scene(found)
+
+
+def scene_as_it_is(env: RobotEnv) -> str:
+    """Return the scene as MJCF text with the present sizes and places."""
+    benchmark = load_benchmark(env.made_of[0])
+    spec = compose(benchmark, env.robots, env.config)
+    model = env.simulation.model
+    for geom in (g for g in spec.geoms if g.name):
+        index = model.geom(geom.name).id
+        geom.rgba = model.geom_rgba[index]
+        geom.friction = model.geom_friction[index]
+        if geom.type != mujoco.mjtGeom.mjGEOM_MESH:
+            geom.pos, geom.quat = model.geom_pos[index], model.geom_quat[index]
+            geom.size = model.geom_size[index]
+            geom.fromto = np.full(6, np.nan)
+    for site in (s for s in spec.sites if s.name):
+        site.pos = model.site_pos[model.site(site.name).id]
+    for body in (b for b in spec.bodies if b.name and b.name != "world"):
+        index = model.body(body.name).id
+        body.pos, body.quat = model.body_pos[index], model.body_quat[index]
+    for camera in (c for c in spec.cameras if c.name):
+        index = model.camera(camera.name).id
+        camera.pos, camera.quat = model.cam_pos[index], model.cam_quat[index]
+    return write_scene(spec)

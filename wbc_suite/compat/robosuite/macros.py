@@ -1,0 +1,17 @@
+"""Settings of the process, under robosuite's names."""
+
+SIMULATION_TIMESTEP = 0.002
+"""Duration of a physics step, s."""
+USING_INSTANCE_RANDOMIZATION = False
+ENABLE_NUMBA = True
+CACHE_NUMBA = True
+IMAGE_CONVENTION = "opengl"
+"""`opengl`: row 0 of a picture is its lower edge; `opencv`: its upper edge."""
+CONCATENATE_IMAGES = False
+MUJOCO_GPU_RENDERING = True
+SPACEMOUSE_VENDOR_ID = 9583
+SPACEMOUSE_PRODUCT_ID = 50734
+DUALSENSE_VENDOR_ID = 0x054C
+DUALSENSE_PRODUCT_ID = 0x0CE6
+CONSOLE_LOGGING_LEVEL = "INFO"
+FILE_LOGGING_LEVEL = None

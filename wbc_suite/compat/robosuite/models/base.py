@@ -1,0 +1,147 @@
+"""MJCF as trees of elements, and what all models of robosuite can tell."""
+
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from wbc_suite.compat.robosuite.utils.mjcf_utils import Element, parse_file
+
+SECTIONS = (
+    *("worldbody", "asset", "actuator", "sensor", "tendon", "equality", "contact"),
+    "default",
+)
+
+
+class MujocoXML:
+    """MJCF: a file, or text that starts with `<`.
+
+    Attributes:
+        root: The tree; `worldbody`, `asset`, `actuator`, ... are its sections.
+        folder: Folder of the file.
+    """
+
+    def __init__(self, fname: str | Path) -> None:
+        text = str(fname)
+        if text.lstrip().startswith("<"):
+            self.root, self.folder = ET.fromstring(text), Path.cwd()
+            self.file = ""
+        else:
+            self.root, self.folder = parse_file(fname)
+            self.file = text
+        for section in SECTIONS:
+            setattr(self, section, self.create_default_element(section))
+        self.worldbody: Element
+        self.asset: Element
+
+    def create_default_element(self, name: str) -> Element:
+        """Return a section, a new one if there is none."""
+        found = self.root.find(name)
+        return ET.SubElement(self.root, name) if found is None else found
+
+    def merge(self, others: Any, merge_body: str | None = "default") -> None:
+        """Add bodies, assets and all other sections of other models.
+
+        Bodies are added to the world, or to the body with the given name; None adds
+        none.
+        """
+        for other in others if isinstance(others, list | tuple) else [others]:
+            place = self.worldbody
+            if merge_body not in (None, "default"):
+                named = self.worldbody.iter("body")
+                place = next(b for b in named if b.get("name") == merge_body)
+            if merge_body is not None:
+                place.extend(list(other.worldbody))
+            self.merge_assets(other)
+            for section in SECTIONS[2:]:
+                getattr(self, section).extend(list(getattr(other, section)))
+
+    def merge_assets(self, other: Any) -> None:
+        """Add the assets of another model whose names are new."""
+        known = {(a.tag, a.get("name", a.get("file"))) for a in self.asset}
+        for asset in other.asset:
+            if (asset.tag, asset.get("name", asset.get("file"))) not in known:
+                self.asset.append(asset)
+
+    def get_xml(self) -> str:
+        """Return the text."""
+        return ET.tostring(self.root, encoding="unicode")
+
+    def get_model(self, mode: str = "mujoco") -> mujoco.MjModel:
+        """Return the compiled model."""
+        return mujoco.MjModel.from_xml_string(self.get_xml())
+
+    def save_model(self, fname: str | Path, pretty: bool = False) -> None:
+        """Write a file."""
+        if pretty:
+            ET.indent(self.root)
+        Path(fname).write_text(self.get_xml(), encoding="utf-8")
+
+    def get_element_names(self, root: Element, element_type: str) -> list[str]:
+        """Return the names of all elements of a tag."""
+        named = (e.get("name") for e in root.iter(element_type))
+        return [name for name in named if name]
+
+    @property
+    def name(self) -> str:
+        """Name of the model."""
+        return self.root.get("model", "")
+
+
+class MujocoModel:
+    """What all models tell: names of their elements, in the scene, and their extent."""
+
+    name: str = ""
+    naming_prefix: str = ""
+    bottom_offset: Any = np.zeros(3)
+    top_offset: Any = np.zeros(3)
+    horizontal_radius: Any = 0.0
+
+    def correct_naming(self, names: Any) -> Any:
+        """Return names with the model's prefix: one, a list, or values of a table."""
+        if isinstance(names, str):
+            prefix = self.naming_prefix
+            own = names.startswith(prefix) or self.exclude_from_prefixing(names)
+            return names if own else prefix + names
+        if isinstance(names, dict):
+            return {key: self.correct_naming(value) for key, value in names.items()}
+        return [self.correct_naming(name) for name in names]
+
+    def exclude_from_prefixing(self, inp: Any) -> bool:
+        """Whether a name stays as it is; by default none does."""
+        return False
+
+    def set_sites_visibility(self, sim: Any, visible: bool) -> None:
+        """Show or hide the model's sites."""
+        for name in self.sites:
+            site = sim.model.site_name2id(name)
+            alpha = abs(sim.model.site_rgba[site, 3])
+            sim.model.site_rgba[site, 3] = alpha if visible else -alpha
+
+    @property
+    def sites(self) -> Any:
+        """Names of its sites."""
+        return []
+
+    @property
+    def important_geoms(self) -> dict[str, Any]:
+        """Names of geoms by role."""
+        return {}
+
+    @property
+    def important_sites(self) -> dict[str, str]:
+        """Names of sites by role."""
+        return {}
+
+    @property
+    def important_sensors(self) -> dict[str, str]:
+        """Names of sensors by role."""
+        return {}
+
+
+def element_names(elements: Iterable[Element]) -> list[str]:
+    """Return the names of elements that have one."""
+    return [e.get("name", "") for e in elements if e.get("name")]

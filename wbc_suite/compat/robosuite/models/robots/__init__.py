@@ -1,0 +1,280 @@
+"""Models of robots: those of the catalogue under robosuite's class names.
+
+A class of a user derives from `ManipulatorModel` and gives the path of its MJCF file.
+"""
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from wbc_suite.catalogue import Catalogue
+from wbc_suite.compat.robosuite.models.base import MujocoModel
+from wbc_suite.compat.robosuite.utils.transform_utils import euler2mat
+from wbc_suite.errors import UnknownNameError
+from wbc_suite.robot import RobotDescription, load_robot
+from wbc_suite.robot.poses import pose_fields
+from wbc_suite.typing import Vector
+
+ARMATURE = 5.0
+"""kg m^2; the k-th joint of an arm on a fixed base has 5 / k in robosuite."""
+FRICTION = {"UR5e": 0.01, "Jaco": 0.01, "XArm7": 1.0}
+"""Dry friction of all joints of an arm in robosuite, N m; 0.1 for all others."""
+DAMPING = {"UR5e": (0.001,) * 6, "Sawyer": (*(0.1,) * 5, 0.2, 0.1)} | dict.fromkeys(
+    ("Panda", "Jaco", "Kinova3", "XArm7"), (*(0.1,) * 5, 0.01, 0.01)
+)
+"""Damping of the joints of an arm in robosuite, N m s; 0.1 for all others."""
+
+__all__ = [
+    "REGISTERED_ROBOTS",
+    "ManipulatorModel",
+    "RobotModel",
+    "create_robot",
+    "is_robosuite_robot",
+    "register_robot",
+]
+
+REGISTERED_ROBOTS: dict[str, type["RobotModel"]] = {}
+"""Classes of robot models by name."""
+
+_NO_MODELS = ("RobotModel", "ManipulatorModel", "LeggedManipulatorModel")
+
+_LEGGED, _WHEELED = ("GR1", "Spot"), ("Tiago", "PandaOmron")
+
+BASE_X = {"default": -0.16, "GR1": -0.15, "Spot": -0.5}
+"""Place of a robot before a table of no length, m, by the begin of its name."""
+
+
+class RobotModel(MujocoModel):
+    """A robot before it is in a scene.
+
+    Attributes:
+        robot: Catalogue name, or path of an MJCF or URDF file.
+        idn: Number of the robot in its scene; `robot0_` starts its names.
+        description: Our description of it, with its place.
+    """
+
+    robot: str = ""
+    arms: Any = ()
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        if cls.__name__ not in _NO_MODELS:
+            register_robot(cls)
+
+    def __init__(self, fname: str | None = None, idn: int = 0) -> None:
+        self.idn = idn
+        own = load_robot(fname or self.robot)
+        self.description: RobotDescription = with_passive_joints(own)
+        self.base: Any = None
+        self.grippers: dict[str, Any] = {}
+
+    def load(self, gripper: Any, base: str | None) -> None:
+        """Load the robot again with other grippers, or another base."""
+        root = self.description.root
+        own = type(self).robot or self.description.source
+        if own and (gripper not in (None, "default") or base is not None):
+            changed = load_robot(own, gripper=gripper, base=base)
+            self.description = with_passive_joints(changed).with_root(
+                self.description.root.kind, pos=root.pos, quat=root.quat
+            )
+
+    @property
+    def name(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride] - its class's
+        """Name of its class and its number."""
+        return f"{type(self).__name__}{self.idn}"
+
+    @property
+    def naming_prefix(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride] - its number's
+        """Text before the names of its elements."""
+        return f"robot{self.idn}_"
+
+    @property
+    def dof(self) -> int:
+        """Number of its driven joints, without grippers."""
+        return len(self.joints)
+
+    @property
+    def joints(self) -> list[str]:
+        """Names of its joints in the scene, without those of grippers."""
+        prefix, robot = self.naming_prefix, self.description
+        fingers = {
+            j for g, js in robot.groups.items() if g.endswith("gripper") for j in js
+        }
+        own = [j.name for j in robot.joints if j.mimic is None]
+        return [prefix + name for name in own if name not in fingers]
+
+    all_joints = joints
+
+    @property
+    def arm_joints(self) -> list[str]:
+        """Names of the joints of its arms."""
+        groups = self.description.groups
+        names = [j for g, js in groups.items() if g.endswith("arm") for j in js]
+        return [self.naming_prefix + name for name in names]
+
+    @property
+    def actuators(self) -> list[str]:
+        """Names of the actuators of its joints, which are called like them."""
+        return self.joints
+
+    @property
+    def bodies(self) -> list[str]:
+        """Names of its bodies."""
+        return [self.naming_prefix + link.name for link in self.description.links]
+
+    @property
+    def root_body(self) -> str:
+        """Name of its first body."""
+        return self.bodies[0]
+
+    @property
+    def sites(self) -> list[str]:
+        """Names of its sites."""
+        return [self.naming_prefix + frame.name for frame in self.description.frames]
+
+    @property
+    def contact_geoms(self) -> list[str]:
+        """Names of its geoms that collide."""
+        return self._geoms("collision")
+
+    @property
+    def visual_geoms(self) -> list[str]:
+        """Names of its geoms that are drawn only."""
+        return self._geoms("visual")
+
+    def _geoms(self, kind: str) -> list[str]:
+        return [
+            f"{self.naming_prefix}{link.name}_{kind}{k}"
+            for link in self.description.links
+            for k in range(len(getattr(link, kind)))
+        ]
+
+    @property
+    def init_qpos(self) -> Vector:
+        """Positions of its joints at the start, without grippers."""
+        ready = self.description.keyframe("ready")
+        prefix = len(self.naming_prefix)
+        return np.array([ready[name[prefix:]] for name in self.joints])
+
+    @property
+    def base_xpos_offset(self) -> dict[str, Any]:
+        """Place of the robot, m, before a table of a length, in bins, or alone."""
+        starts = (k for k in BASE_X if self.name.startswith(k))
+        x = BASE_X[next(starts, "default")]
+
+        def table(length: float) -> tuple[float, float, float]:
+            return x - length / 2, 0.0, 0.0
+
+        return {"bins": (-0.5, -0.1, 0.0), "empty": (-0.6, 0.0, 0.0), "table": table}
+
+    def set_base_xpos(self, pos: Any) -> None:
+        """Place the robot: x, y, and the height of the floor that it stands on, m."""
+        root, own = self.description.root, load_robot(self._source()).root
+        x, y, z = (float(p) for p in pos)
+        place = (x, y, own.pos[2] + z)
+        self.description = self.description.with_root(root.kind, pos=place)
+
+    def set_base_ori(self, rot: Any) -> None:
+        """Turn the robot by roll, pitch, yaw, rad."""
+        root = self.description.root
+        turn = pose_fields(pin.SE3(euler2mat(rot), np.zeros(3)))
+        self.description = self.description.with_root(root.kind, quat=turn["quat"])
+
+    def _source(self) -> str:
+        return type(self).robot or self.description.source or self.description.name
+
+    @property
+    def default_base(self) -> str:
+        """Name of its base."""
+        return "RethinkMount"
+
+    @property
+    def default_gripper(self) -> dict[str, str]:
+        """Name of the gripper of each arm."""
+        return {arm: "default" for arm in self.description.hands}
+
+    @property
+    def default_controller_config(self) -> dict[str, str]:
+        """Name of the default config of each arm."""
+        return {arm: f"default_{self.name.lower()}" for arm in self.description.hands}
+
+
+class ManipulatorModel(RobotModel):
+    """A robot with arms; for a user's, `init_qpos` of the MJCF's first key counts."""
+
+    @property
+    def arms(self) -> tuple[str, ...]:  # pyright: ignore[reportIncompatibleVariableOverride] - read from the description
+        """Its arms: `right`, `left`."""
+        return tuple(self.description.hands)
+
+    @property
+    def arm_type(self) -> str:
+        """`bimanual` or `single`."""
+        return "bimanual" if len(self.description.hands) > 1 else "single"
+
+    @property
+    def eef_name(self) -> dict[str, str]:
+        """Name of the body at the end of each arm."""
+        prefix, robot = self.naming_prefix, self.description
+        return {arm: prefix + robot.link_of(f) for arm, f in robot.hands.items()}
+
+
+def with_passive_joints(robot: RobotDescription) -> RobotDescription:
+    """Return a robot on a fixed base with robosuite's passive values in its arms."""
+    if robot.root.kind != "fixed" or any(f.role == "foot" for f in robot.frames):
+        return robot
+    links, rests = list(robot.links), DAMPING.get(robot.name, (0.1,) * 9)
+    friction = FRICTION.get(robot.name, 0.1)
+    arms = [name for name in robot.groups if name.endswith("arm")]
+    if len(arms) != 1:  # Baxter has an armature of 0.01
+        return robot
+    for name, joints in robot.groups.items():
+        for k, joint in enumerate(joints if name.endswith("arm") else (), 1):
+            changes = {"armature": ARMATURE / k, "frictionloss": friction}
+            changes["damping"] = rests[k - 1]
+            at = next(
+                i for i, x in enumerate(links) if x.joint and x.joint.name == joint
+            )
+            own = links[at]
+            assert own.joint is not None
+            moved = own.joint.model_copy(update=changes)
+            links[at] = own.model_copy(update={"joint": moved})
+    return changed(robot, links=tuple(links))
+
+
+def changed(robot: RobotDescription, **fields: Any) -> RobotDescription:
+    """Return a description with other values of some fields."""
+    data = {key: getattr(robot, key) for key in type(robot).model_fields}
+    return type(robot).model_validate(data | fields)
+
+
+def register_robot(target_class: type[RobotModel]) -> type[RobotModel]:
+    """Make a class known by its name."""
+    REGISTERED_ROBOTS[target_class.__name__] = target_class
+    return target_class
+
+
+def create_robot(robot_name: str, *args: Any, **kwargs: Any) -> RobotModel:
+    """Make a robot's model by the name of its class; raises UnknownNameError."""
+    if robot_name not in REGISTERED_ROBOTS:
+        raise UnknownNameError("robot", robot_name, REGISTERED_ROBOTS)
+    return REGISTERED_ROBOTS[robot_name](*args, **kwargs)
+
+
+def is_robosuite_robot(robot: str) -> bool:
+    """Whether a robot is one of the catalogue's."""
+    return robot in REGISTERED_ROBOTS
+
+
+def _make(catalogue_name: str) -> type[RobotModel]:
+    def __init__(self: Any, idn: int = 0) -> None:
+        ManipulatorModel.__init__(self, catalogue_name, idn=idn)
+
+    body = {"robot": catalogue_name, "__init__": __init__, "__module__": __name__}
+    return type(catalogue_name, (ManipulatorModel,), body)
+
+
+for _name in Catalogue().called("robots"):
+    if _name not in globals():
+        globals()[_name] = _make(_name)

@@ -1,0 +1,264 @@
+"""One robot of an environment: its model, its parts, its measured state."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from wbc_suite.compat.robosuite.controllers.user_controllers import (
+    CompositeController,
+    view_of,
+)
+from wbc_suite.compat.robosuite.models.grippers import (
+    GRIPPER_MAPPING,
+    GripperModel,
+    NullGripper,
+)
+from wbc_suite.compat.robosuite.models.robots import changed, create_robot
+from wbc_suite.compat.robosuite.robots.measured import Measured
+from wbc_suite.compat.robosuite.utils.binding_utils import MjSim
+from wbc_suite.control import RobotState
+from wbc_suite.control.robot_parts import parts_of
+from wbc_suite.sensing.hands import hands_of
+from wbc_suite.typing import Indices, Vector
+
+
+class Robot(Measured):
+    """A robot by the name of its model's class.
+
+    Before the scene exists there are only its models; `bind` gives it its state.
+    Values by arm are dictionaries with the keys `right`, `left`.
+
+    Attributes:
+        robot_model: See `RobotModel`.
+        gripper: The gripper of each arm.
+        composite_controller: See `CompositeController`.
+        eef_site_id: Site between the fingers, by arm.
+    """
+
+    def __init__(
+        self,
+        robot_type: str,
+        idn: int = 0,
+        composite_controller_config: Any = None,
+        initial_qpos: Any = None,
+        initialization_noise: Any = None,
+        base_type: Any = "default",
+        gripper_type: Any = "default",
+        control_freq: float = 20,
+        lite_physics: bool = True,
+    ) -> None:
+        self.name, self.idn = robot_type, idn
+        self.composite_controller_config = composite_controller_config
+        self.initial_qpos = initial_qpos
+        self.control_freq, self.lite_physics = control_freq, lite_physics
+        self.robot_model: Any = create_robot(robot_type, idn=idn)
+        self.gripper_type, self.base_type = gripper_type, base_type
+        base = None if base_type == "default" else base_type
+        self.robot_model.load(gripper_type, base)
+        if initial_qpos is not None:
+            self._start_at(initial_qpos)
+        self.gripper: dict[str, GripperModel] = {}
+        self._adopt_grippers()
+
+    def _start_at(self, qpos: Any) -> None:
+        """Write the joints' positions at the start into the description."""
+        model, prefix = self.robot_model, len(self.robot_model.naming_prefix)
+        names = [name[prefix:] for name in model.joints]
+        robot = model.description
+        ready = {**robot.keyframes["ready"], **dict(zip(names, qpos, strict=True))}
+        keyframes = {**robot.keyframes, "ready": ready}
+        model.description = changed(robot, keyframes=keyframes)
+
+    def _adopt_grippers(self) -> None:
+        robot, prefix = self.robot_model.description, self.robot_model.naming_prefix
+        self.arms = tuple(robot.hands)
+        for arm in self.arms:
+            has_one = f"{arm}_gripper" in robot.synergies
+            given = self.gripper_type
+            given = given.get(arm) if isinstance(given, Mapping) else given
+            cls = GRIPPER_MAPPING.get(given, GripperModel) if has_one else NullGripper
+            self.gripper[arm] = _mounted(cls, robot, prefix, arm, f"{self.idn}_{arm}")
+
+    def bind(self, sim: MjSim, state: RobotState, controller: Any) -> None:
+        """Take the robot's place in a simulation."""
+        self.sim, self._state = sim, state
+        self.robot_model.description = state.robot
+        self._adopt_grippers()
+        self.init_qpos = self.robot_model.init_qpos
+        models = sim, self.robot_model, self.gripper
+        self.composite_controller: CompositeController = view_of(
+            controller, state, models
+        )
+        hands = {hand.name: hand for hand in hands_of(state)}
+        self.eef_site_id = {arm: hands[arm].site for arm in self.arms}
+        q, v = state.joint_addresses(self._joints(grippers=False))
+        self._ref_joint_pos_indexes: Indices = q
+        self._ref_joint_vel_indexes: Indices = v
+        ids = [state.model.joint(state.prefix + n).id for n in self._joints(False)]
+        self._ref_joint_indexes: Indices = np.array(ids)
+        self._ref_gripper_joint_pos_indexes = {
+            arm: [sim.model.get_joint_qpos_addr(j) for j in g.joints]
+            for arm, g in self.gripper.items()
+        }
+        self._ref_gripper_joint_vel_indexes = {
+            arm: [sim.model.get_joint_qvel_addr(j) for j in g.joints]
+            for arm, g in self.gripper.items()
+        }
+
+    def _joints(self, grippers: bool) -> tuple[str, ...]:
+        robot, prefix = self.robot_model, len(self.robot_model.naming_prefix)
+        names = [*robot.joints]
+        if grippers:
+            names += [j for g in self.gripper.values() for j in g.joints]
+        return tuple(name[prefix:] for name in names)
+
+    def __getattr__(self, name: str) -> Any:
+        if name in ("robot_model", "_state") or name.startswith("__"):
+            raise AttributeError(name)
+        return getattr(self.robot_model.description, name)
+
+    # What the robot is made of.
+
+    @property
+    def is_mobile(self) -> bool:
+        """Whether its base moves."""
+        return self.robot_model.description.root.kind != "fixed"
+
+    @property
+    def dof(self) -> int:
+        """Number of its joints, without grippers."""
+        return self.robot_model.dof
+
+    @property
+    def has_gripper(self) -> dict[str, bool]:
+        """Whether each arm has a gripper."""
+        return {arm: g.dof > 0 for arm, g in self.gripper.items()}
+
+    @property
+    def gripper_joints(self) -> dict[str, list[str]]:
+        """Names of the gripper's joints, by arm."""
+        return {arm: gripper.joints for arm, gripper in self.gripper.items()}
+
+    @property
+    def robot_joints(self) -> list[str]:
+        """Names of its joints, without grippers."""
+        return self.robot_model.joints
+
+    @property
+    def joint_indexes(self) -> list[int]:
+        """Indices of its joints in the scene, without grippers."""
+        return self._ref_joint_indexes.tolist()
+
+    @property
+    def part_controllers(self) -> dict[str, Any]:
+        """Controllers of its parts, by name."""
+        return self.composite_controller.part_controllers
+
+    def has_part(self, part_name: str) -> bool:
+        """Whether it has a part, such as `torso`."""
+        return part_name in parts_of(self.robot_model.description)
+
+    def get_gripper_name(self, arm: str) -> str:
+        """Return the name of an arm's gripper in the action."""
+        return f"{arm}_gripper"
+
+    def enabled(self, part_name: str) -> bool:
+        """Whether a part is driven: all are."""
+        return part_name in self.part_controllers
+
+    # Actions.
+
+    @property
+    def action_dim(self) -> int:
+        """Number of its action values."""
+        return self.composite_controller.layout.size
+
+    @property
+    def action_limits(self) -> tuple[Vector, Vector]:
+        """Least and greatest values of its part of an action."""
+        return self.composite_controller.action_limits
+
+    @property
+    def _action_split_indexes(self) -> dict[str, tuple[int, int]]:
+        return self.composite_controller._action_split_indexes
+
+    def create_action_vector(self, action_dict: Mapping[str, ArrayLike]) -> Vector:
+        """Return an action from values of parts, and zeros for the others."""
+        return self.composite_controller.create_action_vector(action_dict)
+
+    def print_action_info(self) -> None:
+        """Log the splits of the action."""
+        _log(self.composite_controller.get_action_info())
+
+    def print_action_info_dict(self) -> None:
+        """Log dimension and indices of the action by part."""
+        _log(self.composite_controller.get_action_info_dict())
+
+    @property
+    def torque_limits(self) -> tuple[Vector, Vector]:
+        """Least and greatest torques of its joints' actuators, N m or N."""
+        model, names = self._state.model, self.robot_model.joints
+        known = {model.actuator(i).name: i for i in range(model.nu)}
+        ids = [known[name] for name in names if name in known]
+        low, high = model.actuator_ctrlrange[ids].T
+        return low.copy(), high.copy()
+
+    # Written state.
+
+    def set_robot_joint_positions(self, jpos: Any) -> None:
+        """Write the positions of its joints, without grippers."""
+        self.sim.data._data.qpos[self._ref_joint_pos_indexes] = jpos
+        self.sim.forward()
+
+    def set_gripper_joint_positions(
+        self, jpos: Any, gripper_arm: str | None = None
+    ) -> None:
+        """Write the positions of a gripper's joints."""
+        arm = self.arms[0] if gripper_arm is None else gripper_arm
+        self.sim.data._data.qpos[self._ref_gripper_joint_pos_indexes[arm]] = jpos
+        self.sim.forward()
+
+    def get_robot_joint_positions(self) -> Vector:
+        """Return the positions of its joints, without grippers."""
+        return self._joint_positions.copy()
+
+    def get_gripper_joint_positions(self, gripper_arm: str | None = None) -> Vector:
+        """Return the positions of a gripper's joints."""
+        arm = self.arms[0] if gripper_arm is None else gripper_arm
+        return self.sim.data._data.qpos[self._ref_gripper_joint_pos_indexes[arm]]
+
+    def reset(self, deterministic: bool = False, rng: Any = None) -> None:
+        """Do nothing: the environment resets its robots."""
+
+    def visualize(self, vis_settings: Mapping[str, bool]) -> None:
+        """Do nothing: robots have no visual marks."""
+
+
+def _mounted(
+    cls: type[GripperModel], robot: Any, prefix: str, arm: str, idn: str
+) -> GripperModel:
+    """Return the model of the gripper on an arm."""
+    gripper = object.__new__(cls)
+    GripperModel.__init__(gripper, None, idn, robot=robot, prefix=prefix, arm=arm)
+    return gripper
+
+
+def models_of(state: RobotState) -> tuple[MjSim, Any, dict[str, GripperModel]]:
+    """Return simulation, robot model and grippers of a robot in a scene."""
+    index = int(state.prefix.removeprefix("robot").removesuffix("_") or 0)
+    model = create_robot("Panda", idn=index)
+    model.description = state.robot
+    grippers = {
+        arm: _mounted(GripperModel, state.robot, state.prefix, arm, f"{index}_{arm}")
+        for arm in state.robot.hands
+    }
+    return MjSim(state.model, state.data), model, grippers
+
+
+def _log(table: Mapping[str, Any]) -> None:
+    from wbc_suite.compat.robosuite.utils.log_utils import ROBOSUITE_DEFAULT_LOGGER
+
+    for name, value in table.items():
+        ROBOSUITE_DEFAULT_LOGGER.info("%s: %s", name, value)

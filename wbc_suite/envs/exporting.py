@@ -1,0 +1,56 @@
+"""Models of environments for other engines: mujoco_warp, `mujoco.rollout`, MJX."""
+
+import copy
+from typing import Any, Literal
+
+import mujoco
+import numpy as np
+
+GEOMS = mujoco.mjtGeom
+
+FLAT = 1e-3
+"""Least half length of the cylinder in a capsule, m."""
+
+
+def export_model(
+    env: Any, *, variant: Literal["exact", "accelerator"] = "exact"
+) -> mujoco.MjModel:
+    """Return the present model of an environment for engines other than ours.
+
+    It is a copy: sizes, masses and looks are those of the present episode. Controllers
+    are not part of it: `ctrl` are torques of motors and setpoints of servos.
+
+    Args:
+        env: An environment of `make` or of Gymnasium.
+        variant: `exact` is the model that we simulate, with MuJoCo's automatic reset
+            switched on again: mujoco_warp refuses models without it. `accelerator`
+            has capsules in place of long cylinders that collide, and boxes in place of
+            flat ones, since MJX does not collide cylinders with boxes. Masses and
+            inertias stay; contacts differ at the edges, by at most the radius.
+    """
+    simulation = env.unwrapped.simulation
+    model = copy.deepcopy(simulation.model)
+    model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    if variant == "accelerator":
+        _replace_cylinders(model)
+    return model
+
+
+def _replace_cylinders(model: mujoco.MjModel) -> None:
+    """Write capsules or boxes in place of the cylinders that collide."""
+    collides = (model.geom_contype | model.geom_conaffinity) > 0
+    cylinders = (model.geom_type == GEOMS.mjGEOM_CYLINDER) & collides
+    for geom in np.flatnonzero(cylinders).tolist():
+        radius, half, _ = model.geom_size[geom]
+        if half - radius >= FLAT:
+            model.geom_type[geom] = GEOMS.mjGEOM_CAPSULE
+            model.geom_size[geom] = radius, half - radius, 0.0
+        else:
+            side = radius * np.sqrt(np.pi) / 2.0  # a square of the circle's area
+            model.geom_type[geom] = GEOMS.mjGEOM_BOX
+            model.geom_size[geom] = side, side, half
+            model.geom_rbound[geom] = np.linalg.norm(model.geom_size[geom])
+        low = model.geom_size[geom].copy()
+        if model.geom_type[geom] == GEOMS.mjGEOM_CAPSULE:
+            low = np.array([radius, radius, half])
+        model.geom_aabb[geom, 3:] = low
