@@ -16,10 +16,10 @@ from wbc_suite.cli import (
     datasets,
     demo,
     doctor,
+    evaluate,
     record,
     replay,
     robots,
-    rollout,
     teleop,
 )
 from wbc_suite.errors import WbcError
@@ -48,7 +48,8 @@ app.command("extract")(datasets.extract)
 app.command("convert")(datasets.convert)
 app.command("list")(catalogue.list_catalogue)
 app.command("render")(robots.render)
-app.command("rollout")(rollout.rollout)
+app.command("evaluate")(evaluate.evaluate)
+app.command("serve-policy")(evaluate.serve_policy)
 app.command("bench")(bench.bench)
 app.command("check")(catalogue.check_file)
 app.command("export")(robots.export_robot)
