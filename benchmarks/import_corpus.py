@@ -5,8 +5,8 @@ their own; nothing of them is run. Every URDF with a moving joint that Pinocchio
 and every MJCF with one that MuJoCo compiles, is imported with default arguments and
 compared with that engine's own loader: poses of all bodies at random positions, mass
 matrix, limits and followers. Meshes count as existing if a file of the package has
-their name and folder. With `--hold` each robot holds `ready` for a second with its default
-controller; one with legs stands on its own feet.
+their name and folder. With `--hold` each robot holds `ready` for a second with its
+default controller; one with legs stands on its own feet.
 
 Usage: python benchmarks/import_corpus.py [--quick] [--folder DIR] [--unseen]
        [--hold] [--only TEXT] [--json FILE] [--table FILE]

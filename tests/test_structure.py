@@ -35,6 +35,10 @@ ADDED = (
     *("envs/hold_check", "robot/mjcf_import_constraints"),
     # robosuite, and models for accelerators
     *("compat/robosuite/", "envs/exporting"),
+    # evaluation, LeRobot
+    *("evaluation/comparison", "evaluation/films", "evaluation/policy_socket"),
+    *("evaluation/report", "evaluation/results", "evaluation/seeds"),
+    *("evaluation/svg_plots", "compat/lerobot"),
     # checks of messages and caches
     *("viewers/page_messages", "kernel_cache"),
 )

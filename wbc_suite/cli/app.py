@@ -16,11 +16,11 @@ from wbc_suite.cli import (
     datasets,
     demo,
     doctor,
+    evaluate,
     expert,
     record,
     replay,
     robots,
-    rollout,
     teleop,
 )
 from wbc_suite.errors import WbcError
@@ -50,7 +50,8 @@ app.command("convert")(datasets.convert)
 app.command("list")(catalogue.list_catalogue)
 app.command("render")(robots.render)
 app.command("expert")(expert.expert)
-app.command("rollout")(rollout.rollout)
+app.command("evaluate")(evaluate.evaluate)
+app.command("serve-policy")(evaluate.serve_policy)
 app.command("bench")(bench.bench)
 app.command("check")(catalogue.check_file)
 app.command("export")(robots.export_robot)

@@ -1,17 +1,38 @@
-"""Policies, and many episodes of them with their statistics."""
+"""Policies, many episodes of them, and statistics that can be cited."""
 
-from wbc_suite.evaluation.policies import POLICIES, Policy, make_policy
+from wbc_suite.evaluation.comparison import Comparison, compare
+from wbc_suite.evaluation.policies import POLICIES, Policy, make_policy, replicate
+from wbc_suite.evaluation.policy_socket import PolicyServer
 from wbc_suite.evaluation.rollouts import Case, plan_rollouts, run_rollouts
-from wbc_suite.evaluation.statistics import Summary, episodes_of, summarise
+from wbc_suite.evaluation.seeds import episode_seed, episode_seeds
+from wbc_suite.evaluation.statistics import (
+    Summary,
+    episodes_of,
+    interquartile_mean,
+    probability_of_improvement,
+    stratified_bootstrap,
+    success_interval,
+    summarise,
+)
 
 __all__ = [
     "POLICIES",
     "Case",
+    "Comparison",
     "Policy",
+    "PolicyServer",
     "Summary",
+    "compare",
+    "episode_seed",
+    "episode_seeds",
     "episodes_of",
+    "interquartile_mean",
     "make_policy",
     "plan_rollouts",
+    "probability_of_improvement",
+    "replicate",
     "run_rollouts",
+    "stratified_bootstrap",
+    "success_interval",
     "summarise",
 ]

@@ -1,4 +1,4 @@
-"""Policies by name: `expert`, `hold`, `random`, and a user's own functions."""
+"""Policies by name: our own, a user's own functions and classes, and served ones."""
 
 import importlib
 from collections.abc import Callable, Mapping
@@ -8,6 +8,7 @@ import numpy as np
 
 from wbc_suite.envs import RobotEnv
 from wbc_suite.errors import ConfigError, UnknownNameError
+from wbc_suite.evaluation.policy_socket import SCHEME, SocketPolicy
 from wbc_suite.experts import expert
 from wbc_suite.typing import Vector
 
@@ -37,14 +38,18 @@ POLICIES: Mapping[str, Callable[[RobotEnv, np.random.Generator], Policy]] = {
 def make_policy(name: str, env: RobotEnv, seed: int) -> Policy:
     """Make a policy for one episode of an environment that was reset.
 
-    The name is one of `POLICIES`, or `package.module:function` of your own, where the
-    function takes the environment and a generator, which follows from the seed of the
-    episode, and returns the policy.
+    The name is one of `POLICIES`, or `package.module:Name` of your own, a function or a
+    class that takes the environment and a generator, which follows from the seed of the
+    episode, and returns the policy; or `socket://HOST:PORT` of a `PolicyServer`. A
+    policy with a method `close` is closed after its episode.
 
     Raises:
         UnknownNameError: If there is no such policy.
-        ConfigError: If its function cannot be found, or it cannot drive this one.
+        ConfigError: If it cannot be found, or cannot drive this environment.
+        DeviceError: If its server cannot be reached, or fails.
     """
+    if name.startswith(SCHEME):
+        return SocketPolicy(name, describe(env, seed))
     rng = np.random.default_rng([seed, 1])
     if ":" not in name:
         if name not in POLICIES:
@@ -56,6 +61,59 @@ def make_policy(name: str, env: RobotEnv, seed: int) -> Policy:
     except (ImportError, AttributeError) as error:
         raise ConfigError(
             f"The policy '{name}' cannot be found: {error}. It reads package.module:"
-            "function; the module must be importable (PYTHONPATH) by every worker."
+            "Name; the module must be importable (PYTHONPATH) by every worker."
         ) from error
     return make(env, rng)
+
+
+def describe(env: RobotEnv, seed: int) -> dict[str, Any]:
+    """Return what a served policy is told of an episode, plain JSON data."""
+    benchmark, arguments = env.made_of
+    layout = env.action_layout
+    return {
+        "seed": seed,
+        "benchmark": str(benchmark),
+        **{key: _plain(value) for key, value in arguments.items()},
+        "action": {
+            "parts": {p.name: [p.start, p.stop] for p in layout.slices},
+            "low": layout.low.tolist(),
+            "high": layout.high.tolist(),
+        },
+    }
+
+
+def _plain(value: Any) -> Any:
+    """Return an argument of `make` as JSON data."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return value if isinstance(value, str | int | float | None) else str(value)
+
+
+def replicate(name: str) -> Callable[[Mapping[str, Any]], Policy]:
+    """Return what a `PolicyServer` begins episodes with, for a policy of this machine.
+
+    The policy acts in an environment of its own, made and stepped like the client's:
+    so policies that read the simulation can be served too, and every action is, bit by
+    bit, the one that the policy takes without a socket.
+    """
+    from wbc_suite.envs import make
+
+    def begin(episode: Mapping[str, Any]) -> Policy:
+        given = {key: value for key, value in episode.items() if key != "action"}
+        seed, benchmark = int(given.pop("seed")), str(given.pop("benchmark"))
+        env = make(benchmark, **given).unwrapped
+        assert isinstance(env, RobotEnv), "`make` made it"
+        env.reset(seed=seed)
+        policy, taken = make_policy(name, env, seed), list[Vector]()
+
+        def act(observation: Mapping[str, Any]) -> Vector:
+            if taken:
+                env.step(taken[-1])
+            taken.append(np.array(policy(observation), dtype=np.float64))
+            return taken[-1]
+
+        return act
+
+    return begin

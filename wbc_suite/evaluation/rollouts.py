@@ -3,7 +3,8 @@
 import re
 import shutil
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -40,23 +41,32 @@ class Case:
         return " ".join(p for p in parts if p)
 
 
-def plan_rollouts(cases: Iterable[Case], *, seeds: range, chunk: int) -> list[WorkItem]:
+def plan_rollouts(
+    cases: Iterable[Case], *, seeds: Sequence[int], chunk: int
+) -> list[WorkItem]:
     """Split the episodes of all cases into items of `chunk` seeds each.
 
     An item depends on its own case and seeds only, so that results are found again
     when other cases are added. Raises ConfigError if there are no seeds.
     """
-    if len(seeds) == 0 or seeds.start < 0 or seeds.step != 1 or chunk < 1:
-        raise ConfigError(f"Seeds {seeds} in chunks of {chunk}: at least one of each.")
+    if len(seeds) == 0 or chunk < 1:
+        raise ConfigError(
+            f"{len(seeds)} seeds in chunks of {chunk}: at least one of each."
+        )
     items = []
     for case in cases:
         title = re.sub(r"[^A-Za-z0-9]+", "-", case.title).strip("-")[:90]
-        payload = asdict(case) | {"arguments": dict(case.arguments)}
-        for start in range(seeds.start, seeds.stop, chunk):
-            mine = {"seeds": [start, min(start + chunk, seeds.stop)]}
+        payload = payload_of(case)
+        for start in range(0, len(seeds), chunk):
+            mine = {"seeds": list(seeds[start : start + chunk])}
             label = f"{title}-{start:06d}"
             items.append(WorkItem.with_digest(label, payload | mine))
     return items
+
+
+def payload_of(case: Case) -> dict[str, Any]:
+    """Return a case as JSON data."""
+    return asdict(case) | {"arguments": dict(case.arguments)}
 
 
 def run_rollouts(item: WorkItem, folder: Path) -> dict[str, Any]:
@@ -67,23 +77,31 @@ def run_rollouts(item: WorkItem, folder: Path) -> dict[str, Any]:
     to `episodes` in the folder, one file per item.
     """
     payload = item.payload
-    env = inner = make(
-        payload["benchmark"],
-        robots=payload["robots"],
-        controller_configs=payload["controller"] or None,
-        **payload["arguments"],
-    )
+    env = inner = make_case(payload)
     if payload["record"]:
         path = folder / "episodes" / f"{item.name}.hdf5"
         path.unlink(missing_ok=True)  # a killed worker may have left a part
         shutil.rmtree(parts_folder(path), ignore_errors=True)
         env = DataCollection(inner, path)
     try:
-        seeds = range(*payload["seeds"])
-        episodes = [run_episode(env, inner, s, payload["policy"]) for s in seeds]
+        episodes = [
+            run_episode(env, inner, seed, payload["policy"])
+            for seed in payload["seeds"]
+        ]
     finally:
         env.close()
     return {"episodes": episodes}
+
+
+def make_case(payload: Mapping[str, Any], **more: Any) -> RobotEnv:
+    """Make the environment of an item, with more arguments."""
+    return make(
+        payload["benchmark"],
+        robots=payload["robots"],
+        controller_configs=payload["controller"] or None,
+        **payload["arguments"],
+        **more,
+    )
 
 
 def run_episode(
@@ -93,24 +111,30 @@ def run_episode(
     name: str,
     *,
     begin: Callable[[], None] = lambda: None,
+    after_step: Callable[[], None] = lambda: None,
 ) -> dict[str, Any]:
     """Run an episode of a policy; `begin` is called after the reset."""
     observation, info = env.reset(seed=seed)
     begin()
     policy = make_policy(name, inner, seed)
-    start, steps, total, succeeded, over = time.perf_counter(), 0, 0.0, False, False
-    while not over:
-        action = policy(observation)
-        observation, reward, terminated, truncated, info = env.step(action)
-        steps, total = steps + 1, total + float(reward)
-        succeeded = succeeded or bool(info["success"])
-        over = terminated or truncated
+    start, succeeded, over, rewards = time.perf_counter(), False, False, list[float]()
+    with ExitStack() as stack:
+        stack.callback(getattr(policy, "close", lambda: None))
+        while not over:
+            action = policy(observation)
+            observation, reward, terminated, truncated, info = env.step(action)
+            rewards.append(float(reward))
+            succeeded = succeeded or bool(info["success"])
+            over = terminated or truncated
+            after_step()
     return {
         "seed": seed,
         "success": bool(info["success"]),
         "succeeded": succeeded,
-        "return": total,
-        "steps": steps,
+        "return": sum(rewards),
+        "max_reward": max(rewards),
+        "steps": len(rewards),
         "seconds": round(time.perf_counter() - start, 4),
         "physics_error": info.get("physics_error"),
+        "failure": info.get("failure"),
     }

@@ -1,0 +1,254 @@
+"""`wbc-suite evaluate`: success rates of policies, on all processors or a cluster."""
+
+import itertools
+import json
+import sys
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from wbc_suite.cli.options import (
+    CatalogueOption,
+    ExecutorOption,
+    HostOption,
+    progress,
+    write_file,
+)
+
+if TYPE_CHECKING:
+    from wbc_suite.evaluation import Case
+    from wbc_suite.evaluation.results import Results
+    from wbc_suite.executors import Outcome, WorkItem
+
+BenchmarksArgument = Annotated[
+    list[str], typer.Argument(help="Benchmarks, one or more.")
+]
+RobotsOption = Annotated[
+    list[str],
+    typer.Option(
+        help="Robot; a,b for two in one scene. Repeat it to compare.",
+        default_factory=lambda: ["Panda"],
+        show_default="Panda",
+    ),
+]
+ControllersOption = Annotated[
+    list[str] | None,
+    typer.Option(help="Controller, by name or file. Repeat it to compare."),
+]
+PoliciesOption = Annotated[
+    list[str],
+    typer.Option(
+        help="expert, random, hold, module:Name or socket://HOST:PORT. Repeat "
+        "it to compare others with the first, scene by scene.",
+        default_factory=lambda: ["random"],
+        show_default="random",
+    ),
+]
+BaseOption = Annotated[
+    int,
+    typer.Option(
+        "--base-seed",
+        min=0,
+        help="Seeds follow from this number, the benchmark and the episode.",
+    ),
+]
+FirstSeedOption = Annotated[
+    int | None,
+    typer.Option(min=0, help="Use seeds from this one on, in place of these."),
+]
+HorizonOption = Annotated[
+    int | None, typer.Option(min=1, help="Steps of an episode at most.")
+]
+StopOption = Annotated[
+    bool, typer.Option("--stop/--no-stop", help="End an episode at its success.")
+]
+RecordOption = Annotated[
+    bool,
+    typer.Option("--record", help="Record them: one HDF5 file per item of work."),
+]
+OutputOption = Annotated[
+    Path,
+    typer.Option("--output", "-o", help="Folder of the results; goes on there."),
+]
+WorkersOption = Annotated[
+    int | None, typer.Option(min=1, help="At once; one per processor by default.")
+]
+FilmsOption = Annotated[
+    int, typer.Option(min=0, help="Failures of each case to film for the report.")
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print figures as JSON only.")]
+
+
+def evaluate(
+    benchmarks: BenchmarksArgument,
+    *,
+    robots: RobotsOption,
+    policy: PoliciesOption,
+    controller: ControllersOption = None,
+    episodes: Annotated[int, typer.Option(min=1, help="Per case.")] = 400,
+    base_seed: BaseOption = 0,
+    first_seed: FirstSeedOption = None,
+    horizon: HorizonOption = None,
+    shaped: Annotated[bool, typer.Option(help="Shaped rewards.")] = False,
+    stop: StopOption = True,
+    record: RecordOption = False,
+    films: FilmsOption = 0,
+    output: OutputOption = Path("artifacts/evaluation"),
+    executor: ExecutorOption = "process",
+    workers: WorkersOption = None,
+    chunk: Annotated[int, typer.Option(min=1, help="Episodes per item of work.")] = 10,
+    as_json: JsonOption = False,
+    catalogue: CatalogueOption = None,
+) -> None:
+    """Play many episodes and count successes; stop and go on whenever you like.
+
+    Writes summary.json, eval_info.json (LeRobot's fields) and report.html. Example:
+    wbc-suite evaluate Lift Door --robots Panda --robots UR5e --policy my_module:Policy
+    """
+    from wbc_suite.evaluation import episode_seeds, plan_rollouts, run_rollouts
+    from wbc_suite.evaluation.films import film_failures
+    from wbc_suite.evaluation.results import collect
+    from wbc_suite.executors import make_executor, run_items
+
+    begun = time.perf_counter()
+    arguments: dict[str, str | int | float | bool] = {"reward_shaping": shaped}
+    arguments |= {"terminate_on_success": stop}
+    if horizon is not None:
+        arguments["horizon"] = horizon
+    cases = _cases(
+        benchmarks, robots, controller, policy, arguments=arguments, record=record
+    )
+    items = {}
+    for case in cases:
+        seeds: Sequence[int] = episode_seeds(case.benchmark, episodes, base=base_seed)
+        if first_seed is not None:
+            seeds = range(first_seed, first_seed + episodes)
+        items[case] = plan_rollouts([case], seeds=seeds, chunk=chunk)
+    runner = make_executor(executor, workers=workers)
+    every = [item for mine in items.values() for item in mine]
+    with progress("Episodes", sum(len(i.payload["seeds"]) for i in every)) as advance:
+        outcomes = run_items(
+            run_rollouts,
+            every,
+            folder=output,
+            executor=runner,
+            on_outcome=lambda item, outcome: _finish(item, outcome, advance),
+        )
+    results = collect(items, outcomes, seconds=time.perf_counter() - begun)
+    if films:
+        film_failures(results, most=films, folder=output, executor=runner)
+    _report(results, output, as_json=as_json)
+
+
+def serve_policy(
+    policy: Annotated[
+        str, typer.Argument(help="expert, random, hold, or module:Name.")
+    ],
+    *,
+    host: HostOption = "127.0.0.1",
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, help="0 for any free one.")
+    ] = 5555,
+) -> None:
+    """Serve a policy to `wbc-suite evaluate --policy socket://HOST:PORT`.
+
+    Anyone who reaches the port can use the policy. Your own server is
+    `wbc_suite.evaluation.PolicyServer`.
+    """
+    from wbc_suite.evaluation import PolicyServer, replicate
+
+    with PolicyServer(replicate(policy), host=host, port=port) as server:
+        print(f"{policy}: {server.address}\nCtrl-C ends it.", flush=True)
+        try:
+            server.serve_forever()
+        except KeyboardInterrupt:
+            print("Ended.")
+
+
+def _finish(
+    item: "WorkItem", outcome: "Outcome", advance: Callable[[int], None]
+) -> None:
+    if outcome.error is not None:
+        print(f"{item.name}: {outcome.error}", file=sys.stderr)
+    advance(len(item.payload["seeds"]))
+
+
+def _cases(
+    benchmarks: Sequence[str],
+    robots: Sequence[str],
+    controllers: Sequence[str] | None,
+    policies: Sequence[str],
+    *,
+    arguments: dict[str, str | int | float | bool],
+    record: bool,
+) -> "list[Case]":
+    """Return every combination; raise an error at once for an unknown robot."""
+    from wbc_suite import load_robot
+    from wbc_suite.evaluation import Case
+
+    for name in {name.strip() for together in robots for name in together.split(",")}:
+        load_robot(name)
+    every = itertools.product(policies, benchmarks, robots, controllers or [None])
+    return [
+        Case(
+            benchmark=benchmark,
+            robots=tuple(name.strip() for name in together.split(",")),
+            controller=controller,
+            policy=policy,
+            record=record,
+            arguments=tuple(sorted(arguments.items())),
+        )
+        for policy, benchmark, together, controller in every
+    ]
+
+
+def _report(results: "Results", output: Path, *, as_json: bool) -> None:
+    """Print figures and write the files; fail when an item failed."""
+    from wbc_suite.compat.lerobot import eval_info
+    from wbc_suite.evaluation.report import report_page
+
+    figures = results.figures()
+    files = {
+        "summary.json": json.dumps(figures, indent=1) + "\n",
+        "eval_info.json": json.dumps(eval_info(results), indent=2) + "\n",
+        "report.html": report_page(results, " ".join(["wbc-suite", *sys.argv[1:]])),
+    }
+    for name, text in files.items():
+        write_file(output / name, partial(Path.write_text, data=text, encoding="utf-8"))
+    if as_json:
+        print(json.dumps(figures, indent=1))
+    else:
+        _print_tables(results)
+        print(f"Written: {', '.join(files)} in {output}; every episode in results/.")
+    if results.failed:
+        count = f"{results.failed} of {results.items}"
+        text = f"{count} items failed; the same command does them again."
+        print(text, file=sys.stderr)
+        raise typer.Exit(1)
+
+
+def _print_tables(results: "Results") -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table("case", "episodes", "success", "95 %", "return", "steps", "steps/s")
+    for case, s in results.summaries.items():
+        low, high = s.wilson
+        shares = f"{s.success_rate:.1%}", f"{low:.1%} to {high:.1%}"
+        broken = f" ({s.physics_errors} broken)" if s.physics_errors else ""
+        steps = f"{s.mean_steps:.0f}{broken}", f"{s.steps_per_second:.0f}"
+        row = str(s.episodes), *shares, f"{s.mean_return:.3g}", *steps
+        table.add_row(case.title, *row)
+    console = Console()
+    console.print(table)
+    for (first, second), found in results.comparisons.items():
+        low, high = found.interval
+        print(
+            f"{second} is {found.verdict} beside {first}: {found.difference:+.1%} "
+            f"({low:+.1%} to {high:+.1%}) on {found.pairs} equal scenes, p = "
+            f"{found.p_value:.2g}; false alarms at most {found.false_alarms:.0%}."
+        )

@@ -1,0 +1,147 @@
+"""Results of an evaluation: its cases, their episodes, summaries and comparisons."""
+
+import base64
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wbc_suite.evaluation.comparison import Comparison, compare
+from wbc_suite.evaluation.rollouts import Case
+from wbc_suite.evaluation.statistics import (
+    Summary,
+    episodes_of,
+    interquartile_mean,
+    stratified_bootstrap,
+    success_interval,
+    summarise,
+)
+from wbc_suite.executors import Outcome, WorkItem
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Film:
+    """An animation of one episode, in WebP."""
+
+    seed: int
+    path: Path
+    steps: int
+
+    @property
+    def data_url(self) -> str:
+        """The animation as the address of a picture in a page."""
+        data = base64.b64encode(self.path.read_bytes()).decode("ascii")
+        return f"data:image/webp;base64,{data}"
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Results:
+    """What an evaluation found.
+
+    Attributes:
+        episodes: Of each case that has any, in order of its seeds.
+        summaries: Likewise.
+        comparisons: Of the first policy with each other one, by their names.
+        films: Of failures, by case.
+        items: Number of work items.
+        failed: Number of items without a result.
+        seconds: Wall time.
+    """
+
+    episodes: Mapping[Case, Sequence[dict[str, Any]]]
+    summaries: Mapping[Case, Summary]
+    comparisons: Mapping[tuple[str, str], Comparison]
+    items: int
+    failed: int
+    seconds: float
+    films: dict[Case, list[Film]] = field(default_factory=dict)
+
+    def figures(self) -> dict[str, Any]:
+        """Return all figures, JSON data: over all episodes, by case, comparisons.
+
+        Over several cases, `stratified` is the bootstrap interval of the success rate
+        that keeps each case's share.
+        """
+        each = list(self.summaries.values())
+        total = sum(s.episodes for s in each)
+        successes = sum(s.successes for s in each)
+        overall: dict[str, Any] = {"episodes": total, "successes": successes}
+        if total:
+            strata = [[e["succeeded"] for e in es] for es in self.episodes.values()]
+            returns = [[e["return"] for e in es] for es in self.episodes.values()]
+            overall |= {
+                "success_rate": successes / total,
+                "intervals": {
+                    "confidence": 0.95,
+                    "wilson": success_interval(successes, total, "wilson"),
+                    "exact": success_interval(successes, total, "exact"),
+                    "stratified": stratified_bootstrap(strata, _mean),
+                },
+                "iqm_return": interquartile_mean(np.concatenate(returns)),
+                "iqm_return_interval": stratified_bootstrap(
+                    returns, interquartile_mean
+                ),
+            }
+        return overall | {
+            "failed_items": self.failed,
+            "seconds": round(self.seconds, 2),
+            "cases": [_case(c) | asdict(s) for c, s in self.summaries.items()],
+            "comparisons": [
+                {"first": first, "second": second} | asdict(found)
+                for (first, second), found in self.comparisons.items()
+            ],
+        }
+
+
+def collect(
+    items: Mapping[Case, Sequence[WorkItem]],
+    outcomes: Sequence[Outcome],
+    *,
+    seconds: float,
+) -> Results:
+    """Collect the outcomes of `run_rollouts` by case."""
+    by_name = {outcome.name: outcome for outcome in outcomes}
+    played = {
+        case: episodes_of(by_name[item.name] for item in mine)
+        for case, mine in items.items()
+    }
+    played = {case: episodes for case, episodes in played.items() if episodes}
+    return Results(
+        episodes=played,
+        summaries={case: summarise(episodes) for case, episodes in played.items()},
+        comparisons=_comparisons(played),
+        items=len(outcomes),
+        failed=sum(outcome.error is not None for outcome in outcomes),
+        seconds=seconds,
+    )
+
+
+def _comparisons(
+    played: Mapping[Case, Sequence[dict[str, Any]]],
+) -> dict[tuple[str, str], Comparison]:
+    by_policy: dict[str, dict[str, Sequence[dict[str, Any]]]] = {}
+    for case, episodes in played.items():
+        scene = f"{case.benchmark} {'+'.join(case.robots)} {case.controller}"
+        by_policy.setdefault(case.policy, {})[scene] = episodes
+    first, *others = by_policy or [""]
+    return {
+        (first, other): compare(by_policy[first], by_policy[other])
+        for other in others
+        if by_policy[first].keys() & by_policy[other].keys()
+    }
+
+
+def _case(case: Case) -> dict[str, Any]:
+    return {
+        "case": case.title,
+        "benchmark": case.benchmark,
+        "robots": list(case.robots),
+        "controller": case.controller,
+        "policy": case.policy,
+    }
+
+
+def _mean(values: np.ndarray) -> float:
+    return float(values.mean())
