@@ -150,17 +150,18 @@ def creased(mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     units = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
     _, place = np.unique(np.round(mesh.vertices, 6), axis=0, return_inverse=True)
-    owners: list[list[int]] = [[] for _ in range(int(place.max(initial=-1)) + 1)]
-    for face, vertices in enumerate(mesh.faces):
-        for vertex in vertices:
-            owners[place[vertex]].append(face)
-    smooth = np.empty((len(mesh.faces), 3, 3))
-    for face, vertices in enumerate(mesh.faces):
-        for k, vertex in enumerate(vertices):
-            near = np.array(owners[place[vertex]])
-            near = near[units[near] @ units[face] > CREASE]
-            total = normals[near].sum(axis=0) if len(near) else units[face]
-            smooth[face, k] = total / max(float(np.linalg.norm(total)), 1e-12)
-    flat = np.hstack([corners.reshape(-1, 3), smooth.reshape(-1, 3)]).astype(np.float32)
+    owner = np.repeat(np.arange(len(mesh.faces)), 3)  # face of each corner
+    at = place[mesh.faces].ravel()  # place of each corner
+    order = np.argsort(at, kind="stable")
+    first, count = np.searchsorted(at[order], at), np.bincount(at)[at]
+    smooth = np.zeros((len(at), 3))
+    for k in range(int(count.max(initial=0))):  # the k-th face that meets a corner
+        corner = np.flatnonzero(count > k)
+        other = owner[order[first[corner] + k]]
+        near = (units[other] * units[owner[corner]]).sum(axis=1) > CREASE
+        smooth[corner[near]] += normals[other[near]]
+    length = np.linalg.norm(smooth, axis=1, keepdims=True)
+    smooth = np.where(length > 1e-15, smooth / np.maximum(length, 1e-15), units[owner])
+    flat = np.hstack([corners.reshape(-1, 3), smooth]).astype(np.float32)
     drawn, faces = np.unique(flat, axis=0, return_inverse=True)
     return drawn[:, :3], drawn[:, 3:], faces.reshape(-1, 3)
