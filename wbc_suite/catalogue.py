@@ -41,6 +41,12 @@ def user_cache() -> Path:
     return user_cache_root() / "wbc_suite"
 
 
+def user_config() -> Path:
+    """Return this package's folder in the user's configuration; it may not exist."""
+    folder = os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config"
+    return Path(folder) / "wbc_suite"
+
+
 def _default_root() -> Path:
     package = Path(__file__).resolve().parent
     installed = package / "_catalogue"

@@ -1,5 +1,6 @@
 """`wbc-suite teleop`, and what `record` shares with it: device, page, session."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -49,9 +50,16 @@ TargetRateOption = Annotated[
 DeviceOption = Annotated[
     str | None,
     typer.Option(
-        help="A device beside the page's handles: keyboard, stream, spacemouse, "
-        "gamepad, dualsense, mjgui, or yours: module:Class."
+        help="A device beside the page's handles: headset, keyboard, stream, "
+        "spacemouse, gamepad, dualsense, mjgui, or yours: module:Class."
     ),
+]
+TlsCertOption = Annotated[
+    Path | None,
+    typer.Option(help="Your own certificate for the headset's page, a PEM file."),
+]
+TlsKeyOption = Annotated[
+    Path | None, typer.Option(help="The key of --tls-cert, a PEM file.")
 ]
 RecordOption = Annotated[
     Path | None,
@@ -73,6 +81,8 @@ def teleop(
     port: PortOption = None,
     device: DeviceOption = None,
     device_option: DeviceOptions = None,
+    tls_cert: TlsCertOption = None,
+    tls_key: TlsKeyOption = None,
     scale: ScaleOption = 1.0,
     mirror: MirrorOption = False,
     record: RecordOption = None,
@@ -84,7 +94,8 @@ def teleop(
     from wbc_suite.wrappers import DataCollection
 
     names = robot_names([*(robots or ["GR1"]), *(others or ())])
-    make = None if device is None else device_maker(device, device_option)
+    pairs = [*(device_option or []), *tls_options(tls_cert, tls_key)]
+    make = None if device is None else device_maker(device, pairs)
     stages = stages_of(device, scale=scale, mirror=mirror)
     label = " and ".join(names)
     print(f"Building {benchmark} with {label} ...", flush=True)
@@ -146,6 +157,12 @@ def device_maker(name: str, pairs: list[str] | None) -> DeviceMaker:
     return build
 
 
+def tls_options(cert: Path | None, key: Path | None) -> list[str]:
+    """Return the options of a device for `--tls-cert` and `--tls-key`."""
+    given = {"tls_cert": cert, "tls_key": key}
+    return [f"{name}={json.dumps(str(path))}" for name, path in given.items() if path]
+
+
 def stages_of(device: str | None, *, scale: float, mirror: bool) -> "PipelineConfig":
     """Return the pipeline's stages: the defaults, but for a mouse alone."""
     from wbc_suite.devices import PipelineConfig
@@ -179,6 +196,8 @@ def drive(
         stages: Stages between inputs and the controller.
         episode_control: Starts and ends recorded episodes.
     """
+    from wbc_suite.devices.headset import Headset
+    from wbc_suite.viewers.headset_view import SessionView
     from wbc_suite.viewers.loop_timing import prepare_interpreter
     from wbc_suite.viewers.page_process import PageProcess
     from wbc_suite.viewers.teleop_session import TeleopSession
@@ -201,6 +220,8 @@ def drive(
             device.start()
         print("Compiling; this takes a few seconds the first time ...", flush=True)
         session.tick()
+        if isinstance(device, Headset):
+            device.show(SessionView(session, f"{robots} · {benchmark}"))
         if page is not None:
             page.wait()
         prepare_interpreter()

@@ -82,6 +82,7 @@ class ButtonReader:
 _DEVICES: dict[str, str | Callable[..., Device]] = {
     "dualsense": "wbc_suite.devices.gamepad:DualSense",
     "gamepad": "wbc_suite.devices.gamepad:Gamepad",
+    "headset": "wbc_suite.devices.headset:Headset",
     "keyboard": "wbc_suite.devices.keyboard:Keyboard",
     "mjgui": "wbc_suite.devices.mjgui:MjGui",
     "spacemouse": "wbc_suite.devices.spacemouse:SpaceMouse",

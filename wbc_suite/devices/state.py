@@ -113,7 +113,12 @@ def _swapped(name: str) -> str:
 
 
 def _mirror(limb: LimbInput) -> LimbInput:
-    pose, twist = limb.pose, limb.twist
+    pose, twist, fingers = limb.pose, limb.twist, limb.fingers
     if pose is not None:
         pose = pin.SE3(_FLIP @ pose.rotation @ _FLIP, _FLIP @ pose.translation)
-    return replace(limb, pose=pose, twist=None if twist is None else twist * _TWIST)
+    return replace(
+        limb,
+        pose=pose,
+        twist=None if twist is None else twist * _TWIST,
+        fingers=None if fingers is None else fingers @ _FLIP,
+    )

@@ -1,31 +1,27 @@
-"""The stream: pose frames over WebSocket, and the pages that send them."""
+"""The stream: pose frames over WebSocket, and the page that sends them."""
 
 import contextlib
 import json
-import shutil
 import ssl
-import subprocess
 import threading
 import time
 from dataclasses import replace
 from http import HTTPStatus
 from importlib import resources
-from pathlib import Path
 
 from aiohttp import WSCloseCode, WSMsgType, web
 
-from wbc_suite.catalogue import user_cache
+from wbc_suite.devices.certificate import installation_certificate, server_context
 from wbc_suite.devices.pose_frame import MAX_BUTTONS, MAX_BYTES, PoseFrame
 from wbc_suite.devices.state import DeviceState
 from wbc_suite.devices.web_server import WebServer, page_url, token_for
 from wbc_suite.errors import DeviceError
 
 SOCKET = "/frames"
-PAGES = {"/": "controls.html", "/xr": "xr.html"}
 SENDERS = 8  # connected at a time; only one of them moves the robot
 FLOOD = 2000  # messages in a second that end a connection; a headset sends 90
 HEARTBEAT = 6.0  # s; a sender that is gone is disconnected after 1.5 times this
-DAYS = 825  # of validity of a certificate; the most that browsers accept
+HOLD = 1.0  # s; a sender that is silent for so long gives way to another one
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
     "connect-src 'self'"
@@ -36,8 +32,7 @@ class Stream:
     """A device that listens: the first client that sends frames moves the robot.
 
     It listens on 127.0.0.1 by default; on any other address clients need a token. Port
-    0 is any free one. `tls` encrypts with a key made on this machine, which WebXR
-    requires.
+    0 is any free one. `tls` encrypts with the certificate of this installation.
 
     Attributes:
         token: Secret that clients need; None on a loopback address.
@@ -55,6 +50,7 @@ class Stream:
         self._pressed: set[str] = set()
         self._state = DeviceState(time=0.0)
         self._holder: web.WebSocketResponse | None = None
+        self._heard = 0.0  # when the holder sent something last, monotonic, s
         self._senders = 0
         self._server: WebServer | None = None
 
@@ -71,13 +67,22 @@ class Stream:
 
     def start(self) -> None:
         """Listen; for errors see `WebServer` and `server_context`."""
-        routes = [web.get(path, self._send_page) for path in PAGES]
-        routes.append(web.get(SOCKET, self._receive))
-        tls = server_context() if self._tls else None
         self._server = WebServer(
-            self._host, self._port, routes, token=self.token, tls=tls
+            self._host,
+            self._port,
+            self._routes(),
+            token=self.token,
+            tls=self._tls_context(),
         )
         self._port = self._server.port
+
+    def _routes(self) -> list[web.RouteDef]:
+        """Return what is served."""
+        return [web.get("/", self._send_page), web.get(SOCKET, self._receive)]
+
+    def _tls_context(self) -> ssl.SSLContext | None:
+        """Return the server side of TLS; None for plain HTTP."""
+        return server_context(*installation_certificate()) if self._tls else None
 
     def read(self) -> DeviceState:
         """Return the newest frame, with all buttons pressed since the last read."""
@@ -94,7 +99,7 @@ class Stream:
             self._server.stop()
 
     async def _send_page(self, request: web.Request) -> web.Response:
-        page = resources.files("wbc_suite.devices") / "pages" / PAGES[request.path]
+        page = resources.files("wbc_suite.devices") / "pages" / "controls.html"
         return web.Response(
             text=page.read_text("utf-8"),
             content_type="text/html",
@@ -129,10 +134,10 @@ class Stream:
             if count > FLOOD:
                 reason = f"More than {FLOOD} messages a second".encode()
                 await sender.close(code=WSCloseCode.POLICY_VIOLATION, message=reason)
-            elif self._holder not in (None, sender):
+            elif self._holder not in (None, sender) and now - self._heard < HOLD:
                 await _report(sender, "Another sender moves the robot.")
             elif message.type in (WSMsgType.TEXT, WSMsgType.BINARY):
-                self._holder = sender
+                self._holder, self._heard = sender, now
                 try:
                     self._keep(PoseFrame.parse(message.data))
                 except DeviceError as error:
@@ -149,59 +154,3 @@ class Stream:
 async def _report(sender: web.WebSocketResponse, text: str) -> None:
     with contextlib.suppress(ConnectionError):
         await sender.send_str(json.dumps({"error": text}))
-
-
-def server_context(folder: Path | None = None) -> ssl.SSLContext:
-    """Return the server side of TLS; the first call makes a key in the user's cache.
-
-    Raises:
-        DeviceError: If the key cannot be created or read.
-    """
-    folder = folder or user_cache() / "tls"
-    key, certificate = folder / "key.pem", folder / "certificate.pem"
-    if not (key.exists() and certificate.exists()):
-        make_key(key, certificate)
-    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-    context.minimum_version = ssl.TLSVersion.TLSv1_2
-    try:
-        context.load_cert_chain(certificate, key)
-    except (OSError, ssl.SSLError) as error:
-        raise DeviceError(
-            f"The key in '{folder}' cannot be used: {error}. Delete the folder; the "
-            "next start creates a new one."
-        ) from error
-    return context
-
-
-def make_key(key: Path, certificate: Path) -> None:
-    """Create a key that only this user can read, and a self-signed certificate.
-
-    Raises:
-        DeviceError: If the program `openssl` is missing or fails.
-    """
-    program = shutil.which("openssl")
-    if program is None:
-        raise DeviceError(
-            "TLS needs a key, and the program 'openssl' to create it: install it (apt "
-            f"install openssl), or put key.pem and certificate.pem into '{key.parent}'."
-        )
-    key.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-    key.touch(mode=0o600)
-    made = subprocess.run(
-        [
-            program, "req", "-x509", "-newkey", "ec", "-nodes", "-sha256",
-            "-pkeyopt", "ec_paramgen_curve:prime256v1",
-            "-days", str(DAYS), "-subj", "/CN=wbc-suite",
-            "-addext", "subjectAltName=DNS:localhost,IP:127.0.0.1",
-            "-keyout", str(key), "-out", str(certificate),
-        ],
-        capture_output=True,
-        text=True,
-        check=False,
-    )  # fmt: skip
-    key.chmod(0o600)
-    if made.returncode != 0:
-        key.unlink()
-        raise DeviceError(
-            f"openssl failed to create a key: {made.stderr.strip()[-300:]}"
-        )

@@ -49,7 +49,7 @@ def token_for(host: str) -> str | None:
 
 def page_url(host: str, port: int, token: str | None, *, scheme: str = "http") -> str:
     """Return the address that opens the pages of a server, with its token if any."""
-    name = _reachable(host)
+    name = reachable_name(host)
     name = f"[{name}]" if ":" in name else name
     query = "" if token is None else f"?token={token}"
     return f"{scheme}://{name}:{port}/{query}"
@@ -174,7 +174,7 @@ def _listen(host: str, port: int) -> socket.socket:
         ) from error
 
 
-def _reachable(host: str) -> str:
+def reachable_name(host: str) -> str:
     """Return a name for `host` under which other machines reach it."""
     if host not in ("0.0.0.0", "::"):
         return host

@@ -41,7 +41,7 @@ class ModelScene:
         self._shown = np.tile([0.0, 0, 0, 1, 0, 0, 0], (model.nbody, 1))
         self.collision_shapes: list[viser.MeshHandle] = []
         self.visual_shapes: list[viser.MeshHandle] = []
-        for (body, collision, colour), parts in _parts(model).items():
+        for (body, collision, colour), parts in body_meshes(model).items():
             shapes = self.collision_shapes if collision else self.visual_shapes
             kind = "collision" if collision else "visual"
             mesh = triangle_meshes.merge(parts)
@@ -119,7 +119,7 @@ def _node_names(model: mujoco.MjModel) -> list[str]:
     return names
 
 
-def _parts(
+def body_meshes(
     model: mujoco.MjModel,
 ) -> dict[tuple[int, bool, tuple[float, ...]], list[TriangleMesh]]:
     """Return the meshes by body, kind and colour; each group becomes one mesh."""

@@ -80,8 +80,9 @@ class PipelineConfig(FrozenModel):
         angular: Limits of orientations, rad.
         grip: Limits of grippers, whose values go from -1 to 1.
         fingers: What closes the robot's hand if a device tracks the user's: the
-            `joints` of each finger, or the `pinch` of thumb and index; None for
-            neither.
+            vectors between the `tips` of the fingers, or `joints` where the robot's
+            hand has no fingertips; the `joints` of each finger; or the `pinch` of
+            thumb and index. None for nothing.
         joint: Limits of each joint that a device commands, rad or m.
         base_speed: Greatest speed of the base or the walk, m/s and rad/s; not more
             than the action permits.
@@ -104,7 +105,7 @@ class PipelineConfig(FrozenModel):
     linear: RatesConfig = RatesConfig(speed=1.0, acceleration=10.0, jerk=300.0)
     angular: RatesConfig = RatesConfig(speed=3.0, acceleration=30.0, jerk=900.0)
     grip: RatesConfig = RatesConfig(speed=8.0, acceleration=80.0, jerk=2400.0)
-    fingers: Literal["joints", "pinch"] | None = "joints"
+    fingers: Literal["tips", "joints", "pinch"] | None = "tips"
     joint: RatesConfig = RatesConfig(speed=2.0, acceleration=15.0, jerk=450.0)
     base_speed: tuple[PositiveFloat, PositiveFloat] = (0.6, 1.0)
     rise_speed: PositiveFloat = 0.1

@@ -20,13 +20,14 @@ from wbc_suite.devices.action_ports import (
 )
 from wbc_suite.devices.pipeline.config import PipelineConfig
 from wbc_suite.devices.pipeline.drive import RobotDrive
+from wbc_suite.devices.pipeline.fingertips import fingertip_retargetings
 from wbc_suite.devices.pipeline.limb_pipeline import LimbPipeline
 from wbc_suite.devices.pipeline.part_targets import GripTarget, JointTargets
 from wbc_suite.devices.pipeline.retarget import retarget
 from wbc_suite.devices.pipeline.watchdog import Phase, Watchdog
 from wbc_suite.devices.state import DeviceState, LimbInput, mirrored
 from wbc_suite.errors import ConfigError
-from wbc_suite.typing import Vector
+from wbc_suite.typing import Matrix, Vector
 
 FIRST_PACE = 0.1  # of the speed limits, at the start of the ramp
 
@@ -63,6 +64,9 @@ class Pipeline:
             for s in self._layout.slices
             if s.kind == "gripper"
         }
+        self._by_tips = (
+            fingertip_retargetings(env) if settings.fingers == "tips" else {}
+        )
         self._joints = {
             name: JointTargets(port, settings, dt)
             for name, port in joint_ports(env).items()
@@ -108,6 +112,8 @@ class Pipeline:
             drive.reset(held)
         for name, grip in self.grips.items():
             grip.reset(held[name])
+        for hand in self._by_tips.values():
+            hand.reset()
         self._watchdog.reset()
         self._mirror, self._pressed = self._config.mirror, frozenset[str]()
         self._time, self._velocity = 0.0, np.zeros(4)
@@ -194,15 +200,20 @@ class Pipeline:
 
     def _close(self, limb: str, given: LimbInput) -> None:
         """Set the goal of a limb's gripper, by the grip or the fingers of an input."""
-        name, method = _gripper_of(limb, self.grips), self._config.fingers
+        name = _gripper_of(limb, self.grips)
         if name is None or not given.engaged:
             return
         if given.grip is not None:
             self.grips[name].aim(given.grip)
-        elif given.fingers is not None and method is not None:
-            labels, by_pinch = self.grips[name].labels, method == "pinch"
-            grip = retarget(given.fingers, labels, by_pinch=by_pinch)
-            self.grips[name].aim(grip)
+        elif given.fingers is not None and self._config.fingers is not None:
+            self.grips[name].aim(self._grip_of(name, given.fingers))
+
+    def _grip_of(self, gripper: str, fingers: Matrix) -> Vector:
+        """Return the synergies of a gripper for the joints of the user's hand."""
+        if self._config.fingers == "tips" and gripper in self._by_tips:
+            return self._by_tips[gripper](fingers)
+        labels, by_pinch = self.grips[gripper].labels, self._config.fingers == "pinch"
+        return retarget(fingers, labels, by_pinch=by_pinch)
 
     def _steer(self, drive: Vector | None) -> None:
         """Drive the robot of the selected hand; others stop."""
