@@ -26,24 +26,28 @@ POSTURE_FACTOR = 0.1
 """Further factor on the posture, which would pull frames off their targets."""
 
 
-class HeldPoint(mink.FrameTask):
-    """The position of a frame, which mink holds as an equality whatever its cost."""
+class HeldPoint(mink.Task):
+    """The position of a frame as an equality; those of a FrameTask hold turns too."""
+
+    def __init__(self, frame: str, frame_type: str, gain: float) -> None:
+        super().__init__(cost=np.ones(3), gain=gain)
+        self._frame, self._target = (frame, frame_type), np.zeros(3)
+
+    def set_target_from_configuration(self, configuration: mink.Configuration) -> None:
+        """Hold the frame where it is."""
+        pose = configuration.get_transform_frame_to_world(*self._frame)
+        self._target = pose.translation()
 
     def compute_error(self, configuration: mink.Configuration) -> Vector:
         """Return the distance from the target, world axes, m, shape (3,)."""
-        target = self.transform_target_to_world
-        assert target is not None
-        return self._pose(configuration).translation() - target.translation()
+        pose = configuration.get_transform_frame_to_world(*self._frame)
+        return pose.translation() - self._target
 
     def compute_jacobian(self, configuration: mink.Configuration) -> Matrix:
         """Return its derivative, shape (3, nv)."""
-        J_local = configuration.get_frame_jacobian(self.frame_name, self.frame_type)
-        R = self._pose(configuration).rotation().as_matrix()
-        return R @ J_local[:3]
-
-    def _pose(self, configuration: mink.Configuration) -> mink.SE3:
-        name, kind = self.frame_name, self.frame_type
-        return configuration.get_transform_frame_to_world(name, kind)
+        pose = configuration.get_transform_frame_to_world(*self._frame)
+        J_local = configuration.get_frame_jacobian(*self._frame)
+        return pose.rotation().as_matrix() @ J_local[:3]
 
 
 class MinkBackend:
@@ -161,10 +165,11 @@ class MinkBackend:
             costs[self._model.joint(joint).dofadr[0]] = cost
         return costs
 
-    def _hold(self, frame: str, contact: str) -> mink.FrameTask:
-        kind = mink.FrameTask if contact == "surface" else HeldPoint
-        gain = self._config.frames[0].gain
-        return kind(frame, self._frame_type(frame), 1.0, 1.0, gain=gain)
+    def _hold(self, frame: str, contact: str) -> mink.FrameTask | HeldPoint:
+        kind, gain = self._frame_type(frame), self._config.frames[0].gain
+        if contact == "surface":
+            return mink.FrameTask(frame, kind, 1.0, 1.0, gain=gain)
+        return HeldPoint(frame, kind, gain)
 
     def _make_limits(self, robot: RobotDescription) -> list[mink.Limit]:
         limits = self._config.limits
