@@ -27,7 +27,7 @@ ADDED += ("scene/pushes", "devices/pipeline/drive", "viewers/balance_")
 ADDED += ("viewers/camera_follower", "viewers/drive_panel", "viewers/held_keys")
 ADDED += ("viewers/step_times", "benchmark/carry", "benchmark/loco_lift")
 ADDED += ("benchmark/reach", "benchmark/stand", "benchmark/walk_to")
-ADDED += ("viewers/page_messages", "kernel_cache")
+ADDED += ("viewers/page_messages", "kernel_cache", "cli/interrupts")
 """Rooms of walking robots and of checks, which came after the bounds were set."""
 
 MAX_MODULE, MAX_FUNCTION = 350, 60  # lines
