@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, TypeAlias, get_args
 
 import typer
 
-from wbc_suite.cli.options import CatalogueOption
+from wbc_suite.cli.options import CatalogueOption, JsonOption
 
 Kind = Literal["robots", "grippers", "bases", "benchmarks", "controllers"]
 Row: TypeAlias = tuple[str, ...]
@@ -17,6 +17,7 @@ def list_catalogue(
     kind: Annotated[
         Kind | None, typer.Argument(help="Everything when left out.")
     ] = None,
+    as_json: JsonOption = False,
     catalogue: CatalogueOption = None,
 ) -> None:
     """Show the robots, grippers, bases, benchmarks and controllers there are."""
@@ -27,6 +28,15 @@ def list_catalogue(
 
     console, catalogued = Console(soft_wrap=True), Catalogue()
     kinds: tuple[Kind, ...] = (kind,) if kind else get_args(Kind)
+    if as_json:
+        found = {}
+        for listed in kinds:
+            folder, columns, rows = _LISTS[listed]
+            keys = [column or "title" for column in columns]
+            content = rows(catalogued.files(folder))
+            found[listed] = [dict(zip(keys, row, strict=True)) for row in content]
+        print(json.dumps(found))
+        return
     for listed in kinds:
         folder, columns, rows = _LISTS[listed]
         table = Table(title_justify="left", title_style="bold", box=None)
@@ -108,6 +118,7 @@ def check_file(
         str | None,
         typer.Option(metavar="ROBOT", help="Check a controller's names against it."),
     ] = None,
+    as_json: JsonOption = False,
     catalogue: CatalogueOption = None,
 ) -> None:
     """Check a robot, benchmark or controller file, and print a summary.
@@ -140,7 +151,10 @@ def check_file(
         )
     else:
         found = _robot(file)
-    print(f"{file}: fine. {found}")
+    if as_json:
+        print(json.dumps({"file": str(file), "fine": True, "summary": found}))
+    else:
+        print(f"{file}: fine. {found}")
 
 
 def _robot(file: Path) -> str:

@@ -64,6 +64,7 @@ TrustFilesOption = Annotated[
         "--trust-files", help="Let the recording name files to read robots from."
     ),
 ]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 DeviceOptions = Annotated[
     list[str] | None,
     typer.Option(
