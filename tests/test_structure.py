@@ -40,7 +40,7 @@ ADDED = (
     *("evaluation/report", "evaluation/results", "evaluation/seeds"),
     *("evaluation/svg_plots", "compat/lerobot"),
     # checks of messages and caches
-    *("viewers/page_messages", "kernel_cache"),
+    *("viewers/page_messages", "kernel_cache", "cli/interrupts"),
 )
 """Rooms that came after the bounds were set."""
 

@@ -27,7 +27,7 @@ def started(*arguments):
 
 def end(process):
     process.send_signal(signal.SIGINT)
-    assert process.wait(timeout=PATIENCE) == 0
+    assert process.wait(timeout=PATIENCE) == 130
 
 
 @pytest.mark.slow

@@ -30,7 +30,6 @@ app = typer.Typer(
     name="wbc-suite",
     help="Whole-body control of robots: describe, view, teleoperate, benchmark.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )

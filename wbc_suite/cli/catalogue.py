@@ -1,13 +1,19 @@
 """`wbc-suite list | check | schema`: what the catalogue has, and files for it."""
 
 import json
+import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias, get_args
 
 import typer
 
-from wbc_suite.cli.options import CatalogueOption, MeshRootOption, StrictOption
+from wbc_suite.cli.options import (
+    CatalogueOption,
+    JsonOption,
+    MeshRootOption,
+    StrictOption,
+)
 
 Kind = Literal["robots", "grippers", "bases", "benchmarks", "controllers"]
 Row: TypeAlias = tuple[str, ...]
@@ -17,6 +23,7 @@ def list_catalogue(
     kind: Annotated[
         Kind | None, typer.Argument(help="Everything when left out.")
     ] = None,
+    as_json: JsonOption = False,
     catalogue: CatalogueOption = None,
 ) -> None:
     """Show the robots, grippers, bases, benchmarks and controllers there are."""
@@ -27,6 +34,15 @@ def list_catalogue(
 
     console, catalogued = Console(soft_wrap=True), Catalogue()
     kinds: tuple[Kind, ...] = (kind,) if kind else get_args(Kind)
+    if as_json:
+        found = {}
+        for listed in kinds:
+            folder, columns, rows = _LISTS[listed]
+            keys = [column or "title" for column in columns]
+            content = rows(catalogued.files(folder))
+            found[listed] = [dict(zip(keys, row, strict=True)) for row in content]
+        print(json.dumps(found))
+        return
     for listed in kinds:
         folder, columns, rows = _LISTS[listed]
         table = Table(title_justify="left", title_style="bold", box=None)
@@ -110,6 +126,7 @@ def check_file(
     ] = None,
     mesh_root: MeshRootOption = None,
     strict: StrictOption = False,
+    as_json: JsonOption = False,
     catalogue: CatalogueOption = None,
 ) -> None:
     """Check a robot, benchmark or controller file, and print a summary.
@@ -143,7 +160,10 @@ def check_file(
         )
     else:
         found = _robot(file, mesh_root, strict=strict)
-    print(f"{file}: fine. {found}")
+    if as_json:
+        print(json.dumps({"file": str(file), "fine": True, "summary": found}))
+    else:
+        print(f"{file}: fine. {found}")
 
 
 def _robot(file: Path, mesh_root: Path | None, *, strict: bool) -> str:
@@ -152,7 +172,7 @@ def _robot(file: Path, mesh_root: Path | None, *, strict: bool) -> str:
 
     robot = load_robot(file, mesh_root=mesh_root, strict=strict)
     for fault in hold_faults(robot) if file.suffix != ".toml" else ():
-        print(f"Warning: {fault}")
+        print(f"Warning: {fault}", file=sys.stderr)
     simulated = robot.to_mjspec().compile()
     computed = robot.to_pinocchio()
     return (

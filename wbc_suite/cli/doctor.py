@@ -1,16 +1,18 @@
 """`wbc-suite doctor`: what this machine has, what is missing, and how to install it."""
 
 import importlib
+import json
 import platform
 import sys
 import timeit
 from collections.abc import Iterator
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, asdict, dataclass
 from importlib import metadata
 from typing import Literal
 
 import typer
 
+from wbc_suite.cli.options import JsonOption
 from wbc_suite.errors import WbcError
 
 BASE_SOLVERS = ("daqp", "proxqp", "osqp")  # of the package; names of `qpsolvers`
@@ -21,12 +23,16 @@ REPAIR_MUJOCO = "pip install --force-reinstall --no-deps " + " ".join(MUJOCO_PAR
 _MARKS = {"fine": "ok  ", "optional": "note", "broken": "BAD "}
 
 
-def doctor() -> None:
+def doctor(as_json: JsonOption = False) -> None:
     """Check this machine: packages, solvers, rendering, and what is missing.
 
     Ends with exit code 1 when something that is needed is broken.
     """
     broken = 0
+    if as_json:
+        findings = [asdict(finding) for finding in diagnose()]
+        print(json.dumps([{k: f[k] for k in f if k != "_"} for f in findings]))
+        raise typer.Exit(any(f["state"] == "broken" for f in findings))
     for finding in diagnose():
         print(f"{_MARKS[finding.state]}  {finding.topic:<11} {finding.text}")
         if finding.cure:

@@ -1,7 +1,6 @@
 """Options that several commands share."""
 
 import os
-import signal
 import threading
 import tomllib
 from collections.abc import Callable, Iterator, Sequence
@@ -79,6 +78,7 @@ TrustFilesOption = Annotated[
         "--trust-files", help="Let the recording name files to read robots from."
     ),
 ]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 DeviceOptions = Annotated[
     list[str] | None,
     typer.Option(
@@ -225,12 +225,9 @@ def tracked(items: Sequence[T], title: str) -> Iterator[T]:
 def serve_until_interrupted(
     site: "PageServer | PageProcess", title: str, until: threading.Event | None = None
 ) -> None:
-    """Print the address of a page, and wait for Ctrl-C, SIGTERM or `until`."""
-    interrupted = until or threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):  # before the address is printed
-        signal.signal(number, lambda *_: interrupted.set())
+    """Print the address of a page, and wait for `until`, or for ever."""
     print(f"{title}\n\n    {site.url}\n", flush=True)
     if site.token is not None:
         print("Anyone with this address may use the page.", flush=True)
     print("Ctrl-C ends it.", flush=True)
-    interrupted.wait()
+    (until or threading.Event()).wait()

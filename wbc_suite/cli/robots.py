@@ -1,5 +1,6 @@
 """`wbc-suite view | render | export | describe-action`: commands about one robot."""
 
+import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -128,6 +129,7 @@ def describe_action(
         typer.Option(help="Name or file of a controller; else the robot's usual one."),
     ] = None,
     benchmark: Annotated[str, typer.Option(help="Where the robot stands.")] = "Lift",
+    as_json: options.JsonOption = False,
     gripper: options.GripperOption = None,
     base: options.BaseOption = None,
     catalogue: options.CatalogueOption = None,
@@ -140,6 +142,11 @@ def describe_action(
     env = wbc_suite.make(benchmark, robots=built, controller_configs=config)
     env.reset(seed=0)
     held = env.action_layout.unpack(env.hold_action)
+    if as_json:
+        slices = [_slice(part, held[part.name]) for part in env.action_layout.slices]
+        print(json.dumps({"controller": config["type"], "slices": slices}))
+        env.close()
+        return
     print(f"{config['type']}: {env.action_layout.size} values")
     print(env.action_layout)
     print("Zeros:")
@@ -147,6 +154,20 @@ def describe_action(
     for part in env.action_layout.slices:
         print(f"  {part.name.ljust(width)}  {_zeros(part, held[part.name])}")
     env.close()
+
+
+def _slice(part: "ActionSlice", held: "Vector") -> dict[str, object]:
+    """Return a slice as plain data; `held` are values that keep its goal."""
+    return {
+        "name": part.name,
+        "kind": str(part.kind),
+        "labels": list(part.labels),
+        "units": [str(unit) for unit in part.units],
+        "low": list(map(float, part.low)),
+        "high": list(map(float, part.high)),
+        "hold": held.tolist(),
+        "zeros": _zeros(part, held),
+    }
 
 
 def _zeros(part: "ActionSlice", held: "Vector") -> str:

@@ -2,6 +2,7 @@
 
 import multiprocessing
 import os
+import signal
 from collections import deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -64,7 +65,7 @@ class Processes:
         folder: Path,
     ) -> Iterator[Outcome]:
         """Run waiting items; those without an outcome are left in `busy`."""
-        pool = ProcessPoolExecutor(min(self.workers, len(waiting)), mp_context=SPAWN)
+        pool = _pool(min(self.workers, len(waiting)))
         try:
             while waiting or busy:
                 while waiting and len(busy) < self.workers:
@@ -82,7 +83,7 @@ class Processes:
     def _run_alone(self, work: Work, item: WorkItem, folder: Path) -> Outcome:
         """Run an item beside which a worker died, or which killed it."""
         for _ in range(self.attempts):
-            with ProcessPoolExecutor(1, mp_context=SPAWN) as pool:
+            with _pool(1) as pool:
                 future = pool.submit(run_item, work, item, folder)
             if future.exception() is None:
                 return future.result()
@@ -91,3 +92,11 @@ class Processes:
             error=f"Its worker died {self.attempts} times (killed, out of memory, or a "
             "crash). Run it alone with the serial executor to see why.",
         )
+
+
+def _pool(workers: int) -> ProcessPoolExecutor:
+    """Return a pool whose workers leave Ctrl-C to this process."""
+    ignored = signal.SIGINT, signal.SIG_IGN
+    return ProcessPoolExecutor(
+        workers, mp_context=SPAWN, initializer=signal.signal, initargs=ignored
+    )

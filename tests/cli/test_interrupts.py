@@ -1,0 +1,102 @@
+"""Ctrl-C and SIGTERM at any moment: soon over, the right exit code, a whole file."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from wbc_suite.recording import Dataset
+
+TIMES = int(os.environ.get("WBC_SUITE_SIGNALS", "1"))
+"""Signals for each command and kind of signal."""
+COMMANDS = {
+    "list": ("list",),
+    "record": ("record", "Lift", "--episodes", "500", "--horizon", "20"),
+    "rollout": ("rollout", "Lift", "--episodes", "500"),
+    "teleop": ("teleop", "--robots", "Panda", "--port", "0"),
+}
+SOON = 10.0  # s; 0.7 of grace, and a machine with eight times its load
+
+
+def interrupted(arguments, number, wait):
+    """Return exit code, time from the signal to the end, and what was printed."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "wbc_suite.cli", *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+    time.sleep(wait)
+    if process.poll() is not None:
+        return None
+    sent = time.monotonic()
+    process.send_signal(number)
+    printed, _ = process.communicate(timeout=60.0)
+    return process.returncode, time.monotonic() - sent, printed
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_signal_ends_a_command(command, number, tmp_path):
+    out, rng = tmp_path / "a.hdf5", np.random.default_rng(number)
+    extra = {"record": ("--out", str(out)), "rollout": ("-o", str(tmp_path / "r"))}
+    for _ in range(TIMES):
+        arguments = (*COMMANDS[command], *extra.get(command, ()))
+        wait = rng.uniform(1.0, 12.0) if command != "list" else rng.uniform(0.8, 1.5)
+        result = interrupted(arguments, number, wait)
+        if result is None:
+            assert command == "list", "it ended by itself"
+            continue
+        code, spent, printed = result
+        assert code == 128 + number, printed
+        assert spent < SOON
+        assert "Traceback" not in printed
+        assert "wbc-suite: stopped. " in printed
+        if out.exists() or out.with_name("a.hdf5.parts").exists():
+            with Dataset(out) as dataset:
+                list(dataset)
+
+
+@pytest.mark.slow
+def test_a_command_that_does_not_listen_is_ended(tmp_path):
+    """As while a kernel is compiled: the main thread is in C."""
+    code = (
+        "import signal, sys, time; sys.argv = ['wbc-suite', 'record'];"
+        "from wbc_suite.cli.interrupts import signals_end_the_process;"
+        "block = signals_end_the_process(); block.__enter__();"
+        "signal.pthread_sigmask(signal.SIG_BLOCK, []);"
+        "print('ready', flush=True);"
+        "import re; re.match('(a*)*b', 'a' * 40)"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", code],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == "ready\n"
+    process.send_signal(signal.SIGINT)
+    sent = time.monotonic()
+    process.wait(60.0)
+    assert process.returncode == 130
+    assert time.monotonic() - sent < SOON
+
+
+def test_handlers_are_as_before_after_a_command(monkeypatch, capsys):
+    from wbc_suite.cli import main
+
+    before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
+    monkeypatch.setattr(sys, "argv", ["wbc-suite", "--version"])
+    with pytest.raises(SystemExit):
+        main()
+    assert "wbc-suite" in capsys.readouterr().out
+    assert before == (
+        signal.getsignal(signal.SIGINT),
+        signal.getsignal(signal.SIGTERM),
+    )

@@ -1,0 +1,84 @@
+"""Ctrl-C and SIGTERM: every command ends within a second, with exit code 130 or 143.
+
+Python handles a signal only when the main thread returns from C, which compiling and
+simulating delay. So a thread hears of the signal at once, and ends the process if
+cleaning up takes longer than `GRACE`. Nothing finished is lost by that: files are
+written whole or not at all, and recordings keep each episode in a file of its own.
+"""
+
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import NoReturn
+
+GRACE = 0.7  # s, for cleaning up
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+KEPT = {
+    "record": "Finished episodes are kept; the same command adds more.",
+    "teleop": "Finished episodes are kept; --record with the same file adds more.",
+    "rollout": "Finished episodes are kept; the same command goes on.",
+    "extract": "Finished parts are kept; the same command goes on.",
+    "convert": "Nothing half-finished is kept; the same command starts again, or goes "
+    "on with an executor.",
+}
+_SAID = threading.Lock()
+OTHER = "Nothing was changed; the same command starts again."
+
+
+@contextmanager
+def signals_end_the_process() -> Iterator[None]:
+    """End this process by the first Ctrl-C or SIGTERM in the block."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    earlier = signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
+    handlers = [signal.signal(number, _stop) for number in SIGNALS]
+    threading.Thread(
+        target=_end_in_time, args=(reader,), name="interrupts", daemon=True
+    ).start()
+    try:
+        yield
+    finally:
+        if signal.getsignal(signal.SIGINT) is _stop:  # no signal came
+            for number, handler in zip(SIGNALS, handlers, strict=True):
+                signal.signal(number, handler)
+            signal.set_wakeup_fd(earlier)
+            os.close(writer)
+
+
+def _stop(number: int, _: FrameType | None) -> NoReturn:
+    for each in SIGNALS:  # another one does not disturb the cleaning up
+        signal.signal(each, signal.SIG_IGN)
+    sys.unraisablehook = lambda _: None  # if it comes in a callback, which drops it
+    _say_what_is_kept()
+    raise SystemExit(128 + number)
+
+
+def _say_what_is_kept() -> None:
+    if _SAID.acquire(blocking=False):  # by the first of the two threads
+        command = sys.argv[1] if len(sys.argv) > 1 else ""
+        text = f"\nwbc-suite: stopped. {KEPT.get(command, OTHER)}\n"
+        os.write(2, text.encode())
+
+
+def _end_in_time(reader: int) -> None:
+    """End the process if it does not end by itself after a signal."""
+    number = 0
+    while number not in SIGNALS:
+        if not (received := os.read(reader, 1)):  # the block has ended
+            os.close(reader)
+            return
+        number = received[0]
+    threading.Event().wait(GRACE / 2)
+    _say_what_is_kept()
+    threading.Event().wait(GRACE / 2)
+    for child in multiprocessing.active_children():
+        child.kill()
+    os._exit(128 + number)
