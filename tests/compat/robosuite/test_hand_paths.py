@@ -24,8 +24,8 @@ FURTHER = {
     "OSC_POSE kp 300": 0.30,
     "JOINT_TORQUE": 0.30,
 }
-"""Cases that differ by more than 10 %: links have other inertias than robosuite's, which
-torques show at once, and coupled rotations by and by."""
+"""Cases that differ by more than 10 %: links have other inertias than robosuite has,
+which torques show at once, and coupled rotations by and by."""
 
 
 def run(python, *arguments, **environment):
