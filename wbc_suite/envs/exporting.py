@@ -27,9 +27,10 @@ def export_model(
         env: An environment of `make` or of Gymnasium.
         variant: `exact` is the model that we simulate, with MuJoCo's automatic reset
             switched on again, and sparse Jacobians above 60 degrees of freedom:
-            mujoco_warp refuses models without. `accelerator` has capsules in place of long cylinders that collide, and boxes in place of
-            flat ones, since MJX does not collide cylinders with boxes. Masses and
-            inertias stay; contacts differ at the edges, by at most the radius.
+            mujoco_warp refuses models without. `accelerator` has capsules in place of
+            long cylinders that collide, and boxes in place of flat ones, since MJX does
+            not collide cylinders with boxes. Masses and inertias stay; contacts differ
+            at the edges, by at most the radius.
     """
     simulation = env.unwrapped.simulation
     model = copy.deepcopy(simulation.model)
