@@ -220,7 +220,7 @@ def test_a_task_of_ours_is_a_base_class(suite):
 class Shelf(TwoArmEnv):
     """A room of a user's file with a bottle of another, for two arms."""
 
-    files = ()
+    files = ("", "")
 
     def reward(self, action=None):
         return 0.0

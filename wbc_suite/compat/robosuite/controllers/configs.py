@@ -140,8 +140,7 @@ def load_composite_controller_config(
     name = None if controller is None else str(controller)
     if name is not None and name.endswith(".json"):
         return _read(name)
-    described = robot is None or isinstance(robot, RobotDescription)
-    description = robot if described else load_robot(robot)
+    description = load_robot(robot) if isinstance(robot, str) else robot
     if name is None and description is not None:
         name = default_composite(description)
     kind = str(name or "BASIC").upper()
