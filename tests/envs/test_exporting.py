@@ -74,3 +74,18 @@ def test_accelerator_holds_still_as_the_exact_model_does(env):
             mujoco.mj_step(model, data)
         ends.append(data.qpos[:3].copy())  # the cube on the table
     np.testing.assert_allclose(ends[0], ends[1], atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "mode"),
+    [
+        ({"has_renderer": True}, "human"),
+        ({"has_renderer": False, "has_offscreen_renderer": True}, "rgb_array"),
+        ({"has_offscreen_renderer": True, "render_mode": None}, None),
+        ({"has_renderer": False, "has_offscreen_renderer": False}, None),
+    ],
+)
+def test_robosuites_renderer_arguments_are_render_modes(arguments, mode):
+    from wbc_suite.envs.config import parse_env_config
+
+    assert parse_env_config({"robots": "Panda", **arguments}).render_mode == mode

@@ -85,6 +85,8 @@ class EnvArguments(TypedDict, total=False):
     camera_segmentations: Level | Sequence[Level | Sequence[Level] | None] | None
     render_preset: Preset | None
     render_mode: RenderMode | None
+    has_renderer: bool
+    has_offscreen_renderer: bool
     render_camera: str
     render_size: tuple[int, int] | Sequence[int]
 
@@ -268,10 +270,18 @@ class EnvConfig(FrozenModel):
 def parse_env_config(arguments: Mapping[str, Any]) -> EnvConfig:
     """Check arguments.
 
+    `has_renderer` and `has_offscreen_renderer`, robosuite's, mean the render modes
+    `human` and `rgb_array` where none is given.
+
     Raises:
         ConfigError: Names the argument, its value and the nearest legal name.
     """
-    return parse_model(EnvConfig, dict(arguments), source="make()")
+    given = dict(arguments)
+    shown = given.pop("has_renderer", False)
+    drawn = given.pop("has_offscreen_renderer", False)
+    if shown or drawn:
+        given.setdefault("render_mode", "human" if shown else "rgb_array")
+    return parse_model(EnvConfig, given, source="make()")
 
 
 def checked_seed(seed: object) -> int | None:

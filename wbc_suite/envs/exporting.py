@@ -8,6 +8,9 @@ import numpy as np
 
 GEOMS = mujoco.mjtGeom
 
+MOST_DENSE = 60
+"""Degrees of freedom up to which mujoco_warp has dense Jacobians."""
+
 FLAT = 1e-3
 """Least half length of the cylinder in a capsule, m."""
 
@@ -23,14 +26,17 @@ def export_model(
     Args:
         env: An environment of `make` or of Gymnasium.
         variant: `exact` is the model that we simulate, with MuJoCo's automatic reset
-            switched on again: mujoco_warp refuses models without it. `accelerator`
-            has capsules in place of long cylinders that collide, and boxes in place of
-            flat ones, since MJX does not collide cylinders with boxes. Masses and
-            inertias stay; contacts differ at the edges, by at most the radius.
+            switched on again, and sparse Jacobians above 60 degrees of freedom:
+            mujoco_warp refuses models without. `accelerator` has capsules in place of
+            long cylinders that collide, and boxes in place of flat ones, since MJX does
+            not collide cylinders with boxes. Masses and inertias stay; contacts differ
+            at the edges, by at most the radius.
     """
     simulation = env.unwrapped.simulation
     model = copy.deepcopy(simulation.model)
     model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    if model.nv > MOST_DENSE:
+        model.opt.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
     if variant == "accelerator":
         _replace_cylinders(model)
     return model

@@ -24,7 +24,7 @@ FURTHER = {
     "OSC_POSE kp 300": 0.30,
     "JOINT_TORQUE": 0.30,
 }
-"""Cases that differ by more than 10 %: links have other inertias than robosuite's,
+"""Cases that differ by more than 10 %: links have other inertias than robosuite has,
 which torques show at once, and coupled rotations by and by."""
 
 

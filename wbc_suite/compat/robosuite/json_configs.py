@@ -40,8 +40,8 @@ IGNORED_OF_PARTS = {
 """Keys of robosuite's parts; a warning lists those that our controller lacks."""
 
 JOINTS = "JOINT_POSITION"
-"""Its goals are not interpolated: our references move with a velocity, which
-robosuite's do not, so that steps from where the joints are would be twice as long."""
+"""Its goals are not interpolated: our references move with a velocity, robosuite's
+do not, so that steps from where the joints are would be twice as long."""
 
 OTHER_UNITS = {"JOINT_VELOCITY": {"kp", "ki", "kd"}, "BASE_VELOCITY": {"kp", "kd"}}
 """Gains with other units in robosuite, or without effect there."""

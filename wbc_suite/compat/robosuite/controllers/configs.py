@@ -130,7 +130,7 @@ def load_part_controller_config(
 
 
 def load_composite_controller_config(
-    controller: str | Path | None = None, robot: str | None = None
+    controller: str | Path | None = None, robot: str | RobotDescription | None = None
 ) -> dict[str, Any]:
     """Return a composite's config, complete, in robosuite's layout.
 
@@ -140,7 +140,7 @@ def load_composite_controller_config(
     name = None if controller is None else str(controller)
     if name is not None and name.endswith(".json"):
         return _read(name)
-    description = None if robot is None else load_robot(robot)
+    description = load_robot(robot) if isinstance(robot, str) else robot
     if name is None and description is not None:
         name = default_composite(description)
     kind = str(name or "BASIC").upper()

@@ -44,10 +44,10 @@ def ours(given: Mapping[str, Any]) -> dict[str, Any]:
     return kwargs
 
 
-def controller_of(config: Any, robot: RobotDescription, name: str) -> Any:
+def controller_of(config: Any, robot: RobotDescription) -> Any:
     """Return the controller of one robot: the given one, or robosuite's default."""
     if config is None:
-        return load_composite_controller_config(robot=name)
+        return load_composite_controller_config(robot=robot)
     return updated(config) if isinstance(config, dict) else config
 
 

@@ -69,7 +69,7 @@ class RobotEnv(MujocoEnv):
                 **robot_configs[k],
             )
             robot.composite_controller_config = controller_of(
-                configs[k], robot.robot_model.description, name
+                configs[k], robot.robot_model.description
             )
             self.robots.append(robot)
 
