@@ -406,7 +406,7 @@ def measure(task: tuple[str, Path, Path, bool]) -> Row | None:
     except WbcError as error:
         row["result"] = f"refused: {error}".replace(f"{root}/", "")
     except Exception:  # noqa: BLE001 - a traceback is a fault that the table shows
-        row["result"] = f"error: {traceback.format_exc()[-600:]}"
+        row["result"] = f"error: {traceback.format_exc().splitlines()[-1]}"
     finally:
         signal.alarm(0)
     return row
@@ -532,6 +532,8 @@ def write_table(report: Report, path: Path) -> None:
         cells = (package, kind, len(rows), len(good), sum(map(agrees, good)))
         cells += (sum(row["mended"] for row in good),)
         cells += (f"{found} of {exist}" if exist else "", held(good))
+        if "hold_faults" not in rows[-1]:
+            cells = (*cells[:-1], "")
         lines.append("| " + " | ".join(map(str, cells)) + " |")
     lines += ["", "## Not loaded, or different", ""]
     for row in report.rows:
@@ -539,7 +541,8 @@ def write_table(report: Report, path: Path) -> None:
             lines.append(f"- `{row['case']}`: {row['result']}")
         elif not agrees(row):
             lines.append(f"- `{row['case']}`: disagrees in {disagreement(row)}")
-    lines += ["", "## Do not hold still", ""]
+    if any(row.get("hold_faults") for row in report.rows):
+        lines += ["", "## Do not hold still", ""]
     for row in report.rows:
         if row.get("hold_faults"):
             lines.append(f"- `{row['case']}`: {' '.join(row['hold_faults'])}")
