@@ -420,6 +420,7 @@ def test_a_link_out_of_the_folder_is_not_followed(tmp_path):
             "package:///pack/x/parts/part.stl",
         ),
         ("pack/robots/r.urdf", "pack/part.stl", "model://pack/part.stl"),
+        ("robots/arm/r.urdf", "robots/hand/meshes/part.stl", "../hand/meshes/part.stl"),
     ],
 )
 def test_meshes_are_found_in_the_package_around_the_file(
@@ -549,6 +550,13 @@ MENDED = {
             joint("a", "base", "l0"),
         ),
         "link 'l0', visual: <sphere> has the radius 0",
+    ),
+    "inertial without a tensor": (
+        one_arm(
+            '<link name="l0"><inertial><mass value="1"/></inertial></link>',
+            joint("a", "base", "l0"),
+        ),
+        "link 'l0': <inertial> (needs <mass> and|without <mass> or) <inertia>",
     ),
     "follower of nothing": (
         one_arm(

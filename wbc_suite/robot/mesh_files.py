@@ -15,7 +15,7 @@ from wbc_suite.robot.shapes import SkinMesh, Vector3, cached_by_shape
 from wbc_suite.typing import Indices, Matrix
 
 READABLE = (".stl", ".obj")  # suffixes of the files that need no extra
-COLLADA = ".dae"
+COLLADA, GLTF = ".dae", ".glb"
 MAX_BYTES = 100_000_000  # largest mesh file that is read
 
 TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("tag", "<u2")])
@@ -45,14 +45,13 @@ def write_stl(path: Path, vertices: Matrix, faces: Indices) -> None:
 def can_read(path: Path) -> bool:
     """Whether `read_points` can read a file, by its suffix and the installed extra."""
     suffix = path.suffix.lower()
-    readers = ("trimesh", "collada")
-    return suffix in READABLE or (
-        suffix == COLLADA and all(importlib.util.find_spec(name) for name in readers)
-    )
+    needed = {COLLADA: ("trimesh", "collada"), GLTF: ("trimesh",)}.get(suffix, ())
+    installed = all(importlib.util.find_spec(name) for name in needed)
+    return suffix in READABLE or (bool(needed) and installed)
 
 
 def read_points(path: Path) -> Matrix:
-    """Read the vertices (n, 3) of an STL, OBJ or COLLADA file.
+    """Read the vertices (n, 3) of an STL, OBJ, COLLADA or glTF file.
 
     Raises:
         DescriptionError: If it is not a mesh.
@@ -62,7 +61,7 @@ def read_points(path: Path) -> Matrix:
         raise DescriptionError(
             f"{path}: the mesh has {size} bytes; at most {MAX_BYTES} are read."
         )
-    if path.suffix.lower() == COLLADA:
+    if path.suffix.lower() not in READABLE:
         try:
             return np.unique(_read_mesh(path, (1.0, 1.0, 1.0))[0], axis=0)
         except ConfigError as error:

@@ -279,7 +279,7 @@ class _Importer:
             "type": "slide" if m.jnt_type[j] == SLIDE else "hinge",
             "axis": step.axis.tolist(),
             "armature": float(m.dof_armature[v]),
-            "damping": float(m.dof_damping[v].ravel()[0]),
+            "damping": max(0.0, float(m.dof_damping[v].ravel()[0])),
             "frictionloss": float(m.dof_frictionloss[v]),
             "stiffness": float(np.ravel(m.jnt_stiffness[j])[0]),
         }

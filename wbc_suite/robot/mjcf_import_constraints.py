@@ -112,9 +112,7 @@ def not_represented(
     """Yield what changes the dynamics and is left out."""
     if m.nflex:
         yield "flexible parts (flex)"
-    for j in range(m.njnt):
-        if np.ravel(m.jnt_stiffness[j])[1:].any():
-            yield f"the nonlinear part of the spring of joint '{m.joint(j).name or j}'"
+    yield from _joint_faults(m)
     for t in range(m.ntendon):
         if _path(m, t, joints, sites) is None:
             yield f"tendon '{m.tendon(t).name or t}', which wraps or leaves the robot"
@@ -126,3 +124,11 @@ def not_represented(
             yield f"{name}, which couples two tendons"
         elif int(m.eq_type[e]) in LISTED and m.eq_objtype[e] != OBJ.mjOBJ_BODY:
             yield f"{name}, which is between sites"
+
+
+def _joint_faults(m: mujoco.MjModel) -> Iterator[str]:
+    for j in range(m.njnt):
+        if np.ravel(m.jnt_stiffness[j])[1:].any():
+            yield f"the nonlinear part of the spring of joint '{m.joint(j).name or j}'"
+        if np.ravel(m.dof_damping[m.jnt_dofadr[j]])[0] < 0.0:
+            yield f"the negative damping of joint '{m.joint(j).name or j}'"

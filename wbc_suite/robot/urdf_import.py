@@ -165,7 +165,7 @@ class _Importer:
 
     def _link(self, branch: Branch, *, first: bool) -> LinkFields:
         fields: LinkFields = {"name": self._links[branch.name]}
-        fields |= _inertial(branch.link, f"link '{branch.name}'")
+        fields |= _inertial(branch.link, f"link '{branch.name}'", strict=self._strict)
         fields |= self._shapes.of(branch.link)
         if first or branch.joint is None:
             return fields
@@ -285,15 +285,19 @@ def _limits(joint: Element, kind: str, where: str) -> dict[str, Any]:
     return fields
 
 
-def _inertial(link: Element, where: str) -> dict[str, Any]:
+def _inertial(link: Element, where: str, *, strict: bool) -> dict[str, Any]:
     """Read `<inertial>`, with the tensor in the link's axes."""
     element = link.find("inertial")
     if element is None:
         return {}
     pose = pose_of(element, where=where)
     mass, tensor = element.find("mass"), element.find("inertia")
-    if mass is None or tensor is None:
+    if (mass is None or tensor is None) and strict:
         raise DescriptionError(f"{where}: <inertial> needs <mass> and <inertia>.")
+    if mass is None or tensor is None:
+        LOG.warning("%s: <inertial> without <mass> or <inertia> counts as 0.", where)
+        mass = Element("mass", value="0") if mass is None else mass
+        tensor = Element("inertia") if tensor is None else tensor
     keys = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
     own = inertia_matrix(
         tuple(number(tensor, key, where=where, default=0.0) for key in keys)

@@ -81,7 +81,7 @@ class MeshFolder:
             )
         if unread:
             LOG.warning(
-                "%s: %d meshes are not read, STL and OBJ are; COLLADA needs: "
+                "%s: %d meshes are not read, STL and OBJ are; others need: "
                 "pip install 'wbc-suite[skins]': %s.",
                 *(self._urdf, len(unread), join_first(unread)),
             )

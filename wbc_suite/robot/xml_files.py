@@ -65,23 +65,21 @@ def read_xml(path: Path) -> Element:
 def model_root(file: Path, references: Iterable[str]) -> Path:
     """Return the folder whose files a robot file may refer to.
 
-    This is the ROS package around the file, or else a close folder with meshes, or the
-    folder above `urdf` and the like; or the outer folder of that name if a reference
-    `package://NAME/...` has one.
+    This is the ROS package around the file, or else the outermost of a close folder
+    with meshes, the folder above `urdf` and the like, and a folder `robots` further up;
+    or the folder of that name around them if a reference is `package://NAME/...`.
     """
     folder, *above = file.resolve().parents
     close = (folder, *above[:3])
-    named = {p for p in close if p.name.lower() in ROBOT_FOLDERS}
-    root = (
-        next((p for p in close if (p / "package.xml").is_file()), None)
-        or next((p for p in close if any((p / m).is_dir() for m in MESH_FOLDERS)), None)
-        or next(
-            (p.parent for p in close if p in named and p.parent not in named), folder
-        )
-    )
+    package = next((p for p in close if (p / "package.xml").is_file()), None)
+    holder = (p for p in close if any((p / m).is_dir() for m in MESH_FOLDERS))
+    inside_one = folder.name.lower() in ROBOT_FOLDERS
+    outer = (p for p in close[1:] if p.name.lower() in ROBOT_FOLDERS)
+    found = (folder.parent if inside_one else folder, next(holder, folder), *outer)
+    root = package or min(found, key=lambda p: len(p.parts))
     packages = {PACKAGE.sub(r"\1", name) for name in references if PACKAGE.match(name)}
-    outer = (p for p in above[:MAX_ABOVE] if p.name in packages)
-    return next((p for p in outer if root.is_relative_to(p)), root)
+    named = (p for p in above[:MAX_ABOVE] if p.name in packages)
+    return next((p for p in named if root.is_relative_to(p)), root)
 
 
 def inside(root: Path, path: Path, *, source: Path) -> Path:
