@@ -45,8 +45,8 @@ speed* the share of physics steps in which a joint was faster than its limit, *c
 the path of the torques in full ranges per second and motor. A *tick* is a physics step
 with its control law, CPU time of the median and of the 99th percentile. Rows are in
 order of the circle's median. OSC_POSITION leaves the orientation alone; joint
-controllers are sent the joint angles of the same motion, in absolute positions, or as the velocities that reach them
-in one action. On a busy machine the 99th percentile of ticks is high.
+controllers are sent the joint angles of the same motion, in absolute positions, or as
+the velocities that reach them in one action. On a busy machine the 99th percentile of ticks is high.
 
 Machine: {machine}. Date: {date}. Versions: {versions}.
 """
