@@ -46,7 +46,8 @@ the path of the torques in full ranges per second and motor. A *tick* is a physi
 with its control law, CPU time of the median and of the 99th percentile. Rows are in
 order of the circle's median. OSC_POSITION leaves the orientation alone; joint
 controllers are sent the joint angles of the same motion, in absolute positions, or as
-the velocities that reach them in one action. On a busy machine the 99th percentile of ticks is high.
+the velocities that reach them in one action. On a busy
+machine the 99th percentile of ticks is high.
 
 Machine: {machine}. Date: {date}. Versions: {versions}.
 """
