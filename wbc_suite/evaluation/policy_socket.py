@@ -59,7 +59,7 @@ class SocketPolicy:
         host, _, port = address.removeprefix(SCHEME).rpartition(":")
         if not host or not port.isdigit():
             raise ConfigError(f"The policy '{address}' is not {SCHEME}HOST:PORT.")
-        self._address = address
+        self._place = address
         try:
             self._socket = socket.create_connection((host, int(port)), TIMEOUT)
         except OSError as error:
@@ -79,7 +79,7 @@ class SocketPolicy:
         try:
             return np.asarray(decode(answer["action"]), dtype=np.float64)
         except (KeyError, ValueError) as error:
-            text = f"The policy at {self._address} sent no action: {error}."
+            text = f"The policy at {self._place} sent no action: {error}."
             raise DeviceError(text) from error
 
     def close(self) -> None:
@@ -92,12 +92,12 @@ class SocketPolicy:
             _send(self._file, message)
             answer = _receive(self._file)
         except (OSError, ValueError) as error:
-            text = f"The policy at {self._address} is gone: {error}."
+            text = f"The policy at {self._place} is gone: {error}."
             raise DeviceError(text) from error
         if answer is None:
-            raise DeviceError(f"The policy at {self._address} closed the connection.")
+            raise DeviceError(f"The policy at {self._place} closed the connection.")
         if "error" in answer:
-            text = f"The policy at {self._address} failed: {answer['error']}"
+            text = f"The policy at {self._place} failed: {answer['error']}"
             raise DeviceError(text)
         return answer
 
