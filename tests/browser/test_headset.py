@@ -117,7 +117,9 @@ class Wearer:
         self.page.wait_for_selector("body[data-scene=loaded]")
         self.place, self.turned = np.array([0.25, 1.1, -0.35]), np.eye(3)
         self.part = "hands.right" if bare else "controllers.right"
-        self.tell("device.position.set(0, 1.6, 0)")
+        self.tell(
+            "device.position.set(0, 1.6, 0); device.quaternion.set(-0.26, 0, 0, 0.97)"
+        )
         if bare:
             self.tell("device.primaryInputMode = 'hand'")
 

@@ -174,7 +174,7 @@ class FingertipRetargeting:
 
 def fingertip_retargetings(env: Any) -> dict[str, FingertipRetargeting]:
     """Return the retargeting of each gripper that has fingertips, by action slice."""
-    states = getattr(env.unwrapped.simulation, "robots", ())
+    states: Any = getattr(env.unwrapped.simulation, "robots", ())
     found = {}
     for index, state in enumerate(states):
         prefix = f"robot{index}_" if len(states) > 1 else ""
