@@ -39,6 +39,9 @@ ADDED = (
     *("evaluation/comparison", "evaluation/films", "evaluation/policy_socket"),
     *("evaluation/report", "evaluation/results", "evaluation/seeds"),
     *("evaluation/svg_plots", "compat/lerobot"),
+    # headsets
+    *("devices/headset", "devices/qr_code", "devices/certificate"),
+    *("devices/pipeline/fingertips", "viewers/headset_view"),
     # checks of messages and caches
     *("viewers/page_messages", "kernel_cache", "cli/interrupts"),
 )

@@ -52,6 +52,17 @@ class HandOperator:
     def cube_place(self):
         return self.session.snapshot.body_positions[self.cube].copy()
 
+    def from_above(self):
+        """Return the nearest orientation of the frame `pinch` over two of its faces."""
+        quat = self.session.snapshot.body_quaternions[self.cube]
+        sides = pin.Quaternion(np.roll(quat, -1)).matrix()[:, :2].T
+        down, now, found = np.array([0.0, 0.0, -1.0]), self.site("pinch").rotation, []
+        for y in (*sides, *-sides):
+            y = y - (y @ down) * down
+            y = y / np.linalg.norm(y)
+            found.append(np.column_stack([np.cross(y, down), y, down]))
+        return min(found, key=lambda R: np.linalg.norm(pin.log3(R @ now.T)))
+
     def turn_to(self, rotation, patience):
         """Turn until the frame `pinch` has this orientation."""
         for _ in self.looks(patience):

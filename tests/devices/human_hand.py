@@ -78,3 +78,15 @@ def around(aperture):
         return np.concatenate([gaps, 0.15 * (angles - nominal)])
 
     return bent(least_squares(errors, nominal).x)
+
+
+def sign():
+    """Return a left hand whose thumb touches the little finger."""
+    nominal = np.array([0.1, 0.1, 0.1] * 3 + [0.9, 0.9, 0.5, -0.6, -0.6, 0.5, 0.5])
+
+    def errors(angles):
+        hand = bent(angles)
+        apart = hand[TIPS["thumb"], :3, 3] - hand[TIPS["pinky"], :3, 3]
+        return np.concatenate([60.0 * apart, 0.1 * (angles - nominal)])
+
+    return bent(least_squares(errors, nominal).x)

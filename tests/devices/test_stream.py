@@ -139,6 +139,19 @@ def test_first_sender_holds_until_it_leaves(stream):
         wait_for(taken_over)
 
 
+def test_a_silent_sender_gives_way(stream, monkeypatch):
+    monkeypatch.setattr("wbc_suite.devices.stream.HOLD", 0.2)
+    with StreamClient(stream.url) as lost, StreamClient(stream.url) as back:
+        lost.send(frame(1.0))
+        said_at(stream, 1.0)
+
+        def taken_up():
+            back.send(frame(2.0))
+            return stream.read().time == 2.0
+
+        wait_for(taken_up)
+
+
 @pytest.mark.slow
 def test_hundred_connects_and_disconnects_and_a_flood_leave_it_working(
     stream, monkeypatch
@@ -181,10 +194,9 @@ def _connected(stream):
 
 
 def test_pages_are_served_and_others_are_not(stream):
-    for path in ("", "xr"):
-        page = urllib.request.urlopen(stream.url + path, timeout=PATIENCE)
-        assert b"wbc-pose-frame/1" in page.read()
-        assert "default-src 'none'" in page.headers["Content-Security-Policy"]
+    page = urllib.request.urlopen(stream.url, timeout=PATIENCE)
+    assert b"wbc-pose-frame/1" in page.read()
+    assert "default-src 'none'" in page.headers["Content-Security-Policy"]
     with pytest.raises(urllib.error.HTTPError, match="404"):
         urllib.request.urlopen(stream.url + "../frame.py", timeout=PATIENCE)
 
@@ -213,17 +225,15 @@ def test_beyond_this_machine_it_asks_for_the_token():
 
 @pytest.mark.skipif(not shutil.which("openssl"), reason="no openssl to make a key")
 def test_tls_key_is_made_once_and_is_this_users_own(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     stream = Stream(port=0, tls=True)
     stream.start()
     key = tmp_path / "wbc_suite" / "tls" / "key.pem"
     assert key.stat().st_mode & 0o077 == 0
     trust = ssl.create_default_context(cafile=key.with_name("certificate.pem"))
     try:
-        page = urllib.request.urlopen(
-            stream.url + "xr", timeout=PATIENCE, context=trust
-        )
-        assert b"requestSession" in page.read()
+        page = urllib.request.urlopen(stream.url, timeout=PATIENCE, context=trust)
+        assert b"wbc-pose-frame/1" in page.read()
     finally:
         stream.stop()
     made = key.read_bytes()
@@ -234,7 +244,7 @@ def test_tls_key_is_made_once_and_is_this_users_own(tmp_path, monkeypatch):
 
 
 def test_without_openssl_it_says_what_to_do(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(DeviceError, match="install it"):
         Stream(port=0, tls=True).start()

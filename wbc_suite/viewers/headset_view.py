@@ -162,6 +162,7 @@ def creased(mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         smooth[corner[near]] += normals[other[near]]
     length = np.linalg.norm(smooth, axis=1, keepdims=True)
     smooth = np.where(length > 1e-15, smooth / np.maximum(length, 1e-15), units[owner])
-    flat = np.hstack([corners.reshape(-1, 3), smooth]).astype(np.float32)
+    flat = np.hstack([corners.reshape(-1, 3), np.round(smooth, 3)])
+    flat = np.round(flat, 6).astype(np.float32) + 0.0  # no -0, which is another number
     drawn, faces = np.unique(flat, axis=0, return_inverse=True)
     return drawn[:, :3], drawn[:, 3:], faces.reshape(-1, 3)

@@ -41,19 +41,20 @@ class FingertipRetargeting:
     Args:
         robot: Robot with the hand.
         gripper: Name of its gripper; it has frames of the role `tip`, named after the
-            thumb and at least the index and the little or ring finger.
+            thumb and at least two fingers.
+        side: `right` or `left`, of the user's hand as well.
 
     Raises:
         LookupError: If it has none.
     """
 
-    def __init__(self, robot: RobotDescription, gripper: str) -> None:
+    def __init__(self, robot: RobotDescription, gripper: str, *, side: str) -> None:
         synergies = robot.synergies[gripper]
         self._labels = tuple(s.name for s in synergies)
         self._model, self._middle, self._span = _hand_model(robot, synergies)
         self._data = self._model.createData()
         self._frames = _tips(robot, self._model)
-        self._left = side_of(gripper) == "left"
+        self._left = side == "left"
         self._others = tuple(f for f in OTHERS if f in self._frames)
         if "thumb" not in self._frames or len(self._others) < 2:
             raise LookupError(f"'{gripper}' has no tips of a thumb and two fingers.")
@@ -152,8 +153,8 @@ class FingertipRetargeting:
                for f in ("thumb", *self._others)]  # fmt: skip
         pinches = [(tips[f] - tips["thumb"], jacobians[f] - jacobians["thumb"])
                    for f in self._others]  # fmt: skip
-        vectors, J = zip(*own, *pinches, strict=True)
-        return np.array(vectors), np.array(J)
+        both = own + pinches
+        return np.array([v for v, _ in both]), np.array([J for _, J in both])
 
     def _measure(self) -> tuple[dict[str, Vector], dict[str, float]]:
         """Return root, m, and length of each finger of the open hand, m."""
@@ -173,13 +174,15 @@ class FingertipRetargeting:
 
 def fingertip_retargetings(env: Any) -> dict[str, FingertipRetargeting]:
     """Return the retargeting of each gripper that has fingertips, by action slice."""
-    states = getattr(env.unwrapped.simulation, "robots", ())
+    states: Any = getattr(env.unwrapped.simulation, "robots", ())
     found = {}
     for index, state in enumerate(states):
         prefix = f"robot{index}_" if len(states) > 1 else ""
         for gripper in state.robot.synergies:
             try:
-                found[prefix + gripper] = FingertipRetargeting(state.robot, gripper)
+                found[prefix + gripper] = FingertipRetargeting(
+                    state.robot, gripper, side=side_of(gripper)
+                )
             except LookupError:  # a gripper of another kind
                 continue
     return found
