@@ -15,6 +15,7 @@ from wbc_suite.viewers.session_state import LimbStatus, Snapshot
 from wbc_suite.viewers.teleop_session import TeleopSession
 
 CREASE = np.cos(np.deg2rad(40.0))  # faces that meet at a larger angle have an edge
+AWAY, TURNED = 0.02, 0.15  # m, rad; a hand that holds an object is nearer than that
 EYES = ("head", "robotview")  # in names of cameras
 BEHIND = (-0.45, 0.0, 0.35)  # m, from hands to the eyes of a robot without camera
 RED, AMBER, GREEN, GREY = "#b3362b", "#a86f00", "#1b7a49", "#3c4956"
@@ -78,7 +79,8 @@ def _state(snapshot: Snapshot, limb: LimbStatus) -> str:
     """Return a word for how a hand follows, the name of a colour of the page."""
     if snapshot.device or "clutch disengaged" in limb.acting:
         return "released"
-    if not limb.reached or "limited by the leash" in limb.acting:
+    away = limb.position_error > AWAY or limb.orientation_error > TURNED
+    if (not limb.reached and away) or "limited by the leash" in limb.acting:
         return "unreachable"
     return "limited" if limb.acting else "following"
 
