@@ -20,20 +20,24 @@ ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 INTERNAL = ("wbc_suite.cli", "wbc_suite.control.loop")
 """Packages whose names are no part of the API."""
+ROBOSUITE = "wbc_suite.compat.robosuite."
+"""Its modules have the names of robosuite's, and its documentation."""
 
 
 def public_packages():
     """Return the packages that list public names, found by walking."""
     found = pkgutil.walk_packages(wbc_suite.__path__, "wbc_suite.")
     names = ["wbc_suite", *(info.name for info in found if info.ispkg)]
-    packages = (importlib.import_module(n) for n in names if n not in INTERNAL)
+    names = [n for n in names if not n.startswith((*INTERNAL, ROBOSUITE))]
+    packages = (importlib.import_module(n) for n in names)
     return [package for package in packages if not is_shown_by_parent(package)]
 
 
 def is_shown_by_parent(package):
     """Whether all public names of a package are those of the one above as well."""
     parent, names = package.__name__.rpartition(".")[0], getattr(package, "__all__", [])
-    above = importlib.import_module(parent).__all__ if parent.count(".") else []
+    above = importlib.import_module(parent) if parent.count(".") else None
+    above = getattr(above, "__all__", [])
     return set(names) <= set(above)
 
 

@@ -184,7 +184,7 @@ def test_a_json_controller_is_checked_against_its_robot(wbc_suite_command, tmp_p
     file.write_text('{"type": "OSC_POSE", "kp": 100}')
     code, out, _ = wbc_suite_command("check", file, "--robot", "Baxter")
     assert code == 0
-    assert "BASIC of right: OSC_POSE, left: OSC_POSE" in out
+    assert "BASIC of right: UNCOUPLED_OSC_POSE, left: UNCOUPLED_OSC_POSE" in out
     code, _, err = wbc_suite_command("check", file)
     assert code == 2
     assert "name the robot" in err

@@ -163,7 +163,8 @@ def test_registration_is_checked(swing, name, config, message):
 
 
 def test_the_type_of_names_lists_the_built_in_controllers():
-    assert get_args(PartControllerName) == tuple(part_models())
+    names = get_args(PartControllerName)
+    assert tuple(part_models())[: len(names)] == names  # then those of other modules
 
 
 @pytest.mark.parametrize("name", get_args(PartControllerName))

@@ -46,5 +46,5 @@ def test_an_edited_copy_is_checked_like_any_file(tmp_path):
     text = wbc_suite.load_robot("panda").to_toml()
     path = tmp_path / "copy.toml"
     path.write_text(text.replace("effort = 87", "efort = 87"))
-    with pytest.raises(ConfigError, match=r"joint\.efort'. Did you mean 'effort'"):
+    with pytest.raises(ConfigError, match=r"joint\.efort'.*Did you mean 'effort'"):
         wbc_suite.load_robot(path)

@@ -151,6 +151,7 @@ def test_a_users_mjcf_becomes_a_thing(tmp_path):
     ],
 )
 def test_dangerous_or_unclear_files_are_refused(tmp_path, old, new, told):
+    (tmp_path.parent / "x.stl").touch()
     path = written(tmp_path, MUG.replace(old, new, 1))
     with pytest.raises((ConfigError, DescriptionError), match=told):
         MjcfObject(name="cup", path=path).add_to(empty_arena())

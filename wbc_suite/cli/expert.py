@@ -57,7 +57,7 @@ def expert(
             if not played[-1]["succeeded"]:
                 print(f"  seed {each}: no success in {played[-1]['steps']} steps")
     found = summarise(played)
-    low, high = (100 * share for share in found.interval)
+    low, high = (100 * share for share in found.wilson)
     steps = [episode["steps"] for episode in played if episode["succeeded"]]
     names = " and ".join(robot.name for robot in env.robots)
     print(

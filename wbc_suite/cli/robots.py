@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from wbc_suite.cli import options
+from wbc_suite.errors import ConfigError
 
 if TYPE_CHECKING:
     from wbc_suite.control import ActionSlice
@@ -101,6 +102,8 @@ def export_robot(
     if output is None:
         print(getattr(description, f"to_{to}")())
         return
+    if not output.parent.is_dir():
+        raise ConfigError(f"'{output}' cannot be written: no folder '{output.parent}'.")
     if to == "urdf":
         meshes = output.with_name(f"{output.stem}_meshes")
         text = description.to_urdf(mesh_dir=meshes)

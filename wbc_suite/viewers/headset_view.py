@@ -150,10 +150,13 @@ def creased(mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """
     corners = mesh.vertices[mesh.faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    units = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    area = np.linalg.norm(normals, axis=1, keepdims=True)
+    kept = area[:, 0] > 1e-12  # others cannot be seen, and have no normal
+    faces, corners, normals = mesh.faces[kept], corners[kept], normals[kept]
+    units = normals / area[kept]
     _, place = np.unique(np.round(mesh.vertices, 6), axis=0, return_inverse=True)
-    owner = np.repeat(np.arange(len(mesh.faces)), 3)  # face of each corner
-    at = place[mesh.faces].ravel()  # place of each corner
+    owner = np.repeat(np.arange(len(faces)), 3)  # face of each corner
+    at = place[faces].ravel()  # place of each corner
     order = np.argsort(at, kind="stable")
     first, count = np.searchsorted(at[order], at), np.bincount(at)[at]
     smooth = np.zeros((len(at), 3))
@@ -166,5 +169,5 @@ def creased(mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     smooth = np.where(length > 1e-15, smooth / np.maximum(length, 1e-15), units[owner])
     flat = np.hstack([corners.reshape(-1, 3), np.round(smooth, 3)])
     flat = np.round(flat, 6).astype(np.float32) + 0.0  # no -0, which is another number
-    drawn, faces = np.unique(flat, axis=0, return_inverse=True)
-    return drawn[:, :3], drawn[:, 3:], faces.reshape(-1, 3)
+    drawn, index = np.unique(flat, axis=0, return_inverse=True)
+    return drawn[:, :3], drawn[:, 3:], index.reshape(-1, 3)

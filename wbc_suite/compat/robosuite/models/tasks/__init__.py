@@ -81,7 +81,8 @@ class TaskBenchmark:
                 "ManipulationTask, or the class must derive from one of our tasks."
             )
         self._env, self._task = env, env.model
-        self.name, self.horizon = type(env).__name__, 1000
+        self.name = self.title = type(env).__name__
+        self.horizon = 1000
 
     def arrange(
         self, robots: Sequence[RobotDescription], configuration: str
