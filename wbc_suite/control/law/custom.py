@@ -1,5 +1,6 @@
 """Registered laws of users."""
 
+from functools import cache
 from typing import Any
 
 import numba
@@ -30,9 +31,14 @@ def register_law(kernel: Any) -> int:
 
 def custom_kernel(kinds: Indices) -> Any:
     """Return one kernel for all registered laws among these kinds, None without any."""
-    own = np.unique(kinds[kinds >= int(LawKind.CUSTOM)]).tolist()
-    run: Any = _no_law if own else None
-    for kind in own:
+    return _chain(tuple(np.unique(kinds[kinds >= int(LawKind.CUSTOM)]).tolist()))
+
+
+@cache
+def _chain(kinds: tuple[int, ...]) -> Any:
+    """Return one kernel for laws of these kinds; it lives on, as its machine code."""
+    run: Any = _no_law if kinds else None
+    for kind in kinds:
         run = _linked(kind, _KERNELS[kind - int(LawKind.CUSTOM)], run)
     return run
 
