@@ -36,7 +36,7 @@ _KERNELS: list[Any] = []
 """All kernels of imported modules, to report how many are compiled."""
 
 
-def compiled(function: Function, *, nogil: bool = False) -> Function:
+def compiled(function: Function, *, nogil: bool = False, kept: bool = True) -> Function:
     """Compile a function on its first call, and keep its machine code on disk.
 
     The function also runs as plain Python: see `plain`, or everything under
@@ -46,11 +46,13 @@ def compiled(function: Function, *, nogil: bool = False) -> Function:
         function: Takes numbers, arrays, tuples, and what `as_argument` returns.
         nogil: Whether it releases the interpreter's lock while it runs. For long calls
             only: a thread needs up to 50 us to get the lock back.
+        kept: Whether the machine code is kept on disk; not where an argument is a
+            kernel that is made at run time, whose type no other process knows.
     """
     previous = _numba.CACHE_DIR
     _numba.CACHE_DIR = str(cache_folder())
     try:
-        kernel = _njit(cache=True, error_model="numpy", nogil=nogil)(function)
+        kernel = _njit(cache=kept, error_model="numpy", nogil=nogil)(function)
     finally:
         _numba.CACHE_DIR = previous
     if not _numba.DISABLE_JIT:
@@ -59,6 +61,7 @@ def compiled(function: Function, *, nogil: bool = False) -> Function:
 
 
 compiled_nogil = partial(compiled, nogil=True)
+compiled_each_time = partial(compiled, kept=False)
 
 
 def is_compiling() -> bool:

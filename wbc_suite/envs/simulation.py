@@ -19,7 +19,7 @@ from wbc_suite.control.dynamics.state_source import (
     source_for_plain_python,
     use_all_feet,
 )
-from wbc_suite.control.loop.advance import advance
+from wbc_suite.control.loop.advance import advance, advance_custom_laws
 from wbc_suite.control.loop.inverse_dynamics import (
     needed_kernels,
     write_commands,
@@ -99,6 +99,7 @@ class Simulation:
         states = *addresses(model, data), addresses(model, believed)[1]
         sources = tuple(map(as_argument, self._sources)) or None
         self._loop_arguments = (*states, *views, *records, ticks, sources)
+        self._has_custom_laws = kernels[1] is not None
         self._write_commands = write_commands if compiled else plain(write_commands)
         self._law_arguments = views[0], *records
         if not compiled:
@@ -195,7 +196,8 @@ class Simulation:
         done = -1
         if math.isfinite(self.data.time):
             if self.compiled:
-                done = advance(*self._loop_arguments, steps)
+                run = advance_custom_laws if self._has_custom_laws else advance
+                done = run(*self._loop_arguments, steps)
             elif self._watch.is_usable():
                 done = steps if self._step_in_python(steps) else -1
         if done < 0:

@@ -31,8 +31,7 @@ from wbc_suite.control.loop.state_checks import (
 )
 
 
-@compiled_nogil
-def advance(
+def _advance(
     model: Any,
     data: Any,
     believed: Any,
@@ -91,6 +90,11 @@ def advance(
     mj_kinematics(model, data)
     mj_comPos(model, data)
     return done if check_after(state) else -1
+
+
+advance = compiled_nogil(_advance)
+advance_custom_laws = compiled_nogil(_advance, kept=False)
+"""The same where there are registered laws."""
 
 
 @compiled

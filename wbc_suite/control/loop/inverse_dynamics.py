@@ -9,7 +9,7 @@ forces of robots on their feet.
 
 from typing import Any, TypeAlias
 
-from wbc_suite.compiling import compiled
+from wbc_suite.compiling import compiled, compiled_each_time
 from wbc_suite.control.dynamics.arrays import Stage
 from wbc_suite.control.dynamics.solve_tick import solve_whole_body, write_whole_body
 from wbc_suite.control.law.custom import custom_kernel
@@ -38,7 +38,7 @@ Needed: TypeAlias = bool | None
 depends on an argument that is None, which halves the time to compile."""
 
 
-@compiled
+@compiled_each_time
 def write_commands(
     physics: Physics,
     laws: CompiledRecords,
@@ -82,7 +82,7 @@ def solve_bodies(physics: Physics, bodies: WholeBodies) -> bool:
     return done
 
 
-@compiled
+@compiled_each_time
 def ask_accelerations(
     physics: Physics,
     laws: CompiledRecords,
