@@ -116,4 +116,4 @@ def test_a_served_policy_is_evaluated(tmp_path):
         assert json.loads(found.stdout)["episodes"] == 1
     finally:
         server.send_signal(signal.SIGINT)
-        assert server.wait(timeout=60) == 0
+        assert server.wait(timeout=60) == 130
