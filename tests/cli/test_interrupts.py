@@ -16,7 +16,7 @@ TIMES = int(os.environ.get("WBC_SUITE_SIGNALS", "1"))
 COMMANDS = {
     "list": ("list",),
     "record": ("record", "Lift", "--episodes", "500", "--horizon", "20"),
-    "rollout": ("rollout", "Lift", "--episodes", "500"),
+    "evaluate": ("evaluate", "Lift", "--episodes", "500"),
     "teleop": ("teleop", "--robots", "Panda", "--port", "0"),
 }
 SOON = 10.0  # s; 0.7 of grace, and a machine with eight times its load
@@ -44,7 +44,7 @@ def interrupted(arguments, number, wait):
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_signal_ends_a_command(command, number, tmp_path):
     out, rng = tmp_path / "a.hdf5", np.random.default_rng(number)
-    extra = {"record": ("--out", str(out)), "rollout": ("-o", str(tmp_path / "r"))}
+    extra = {"record": ("--out", str(out)), "evaluate": ("-o", str(tmp_path / "r"))}
     for _ in range(TIMES):
         arguments = (*COMMANDS[command], *extra.get(command, ()))
         wait = rng.uniform(1.0, 12.0) if command != "list" else rng.uniform(0.8, 1.5)
