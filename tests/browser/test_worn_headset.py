@@ -1,6 +1,7 @@
 """An emulated headset in a real Chromium, worn by somebody who moves as people do."""
 
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -59,6 +60,12 @@ EMULATION = """
         return session
     }
 """
+
+
+on_request = pytest.mark.skipif(
+    "WBC_SUITE_HEADSET" not in os.environ,
+    reason="drawn by software it may take minutes: set WBC_SUITE_HEADSET=1",
+)
 
 
 @pytest.fixture(scope="session")
@@ -257,6 +264,7 @@ def test_squeeze_engages_without_a_jump_and_the_hand_repeats_the_users(room, wea
     np.testing.assert_allclose(measured(session) - start, [0, 0, 0.08], atol=2e-3)
 
 
+@on_request
 def test_hand_that_cannot_follow_is_red_and_pulses(room, wearer):
     session, _ = room
     wearer.press("squeeze", 1)
@@ -273,6 +281,7 @@ def test_hand_that_cannot_follow_is_red_and_pulses(room, wearer):
     wearer.page.screenshot(path=str(ARTIFACTS / "headset_unreachable.png"))
 
 
+@on_request
 def test_hand_that_is_not_seen_lets_go(room, wearer):
     session, _ = room
     wearer.press("squeeze", 1)
@@ -288,6 +297,7 @@ def test_hand_that_is_not_seen_lets_go(room, wearer):
     assert np.linalg.norm(measured(session) - start) < 1e-3
 
 
+@on_request
 def test_lost_connection_stops_the_robot_and_is_taken_up_again(room, wearer):
     session, device = room
     wearer.press("squeeze", 1)
@@ -309,6 +319,7 @@ def test_lost_connection_stops_the_robot_and_is_taken_up_again(room, wearer):
     wait_until(lambda: measured(session)[2] > start[2] + 0.045, "it goes on")
 
 
+@on_request
 def test_cube_is_lifted_with_a_tracked_hand(context, room, packages):
     session, device = room
     session.reset()
