@@ -32,7 +32,7 @@ def demonstrations(tmp_path_factory):
     from wbc_suite.cli.app import app
 
     path = tmp_path_factory.mktemp("demos") / "lift.hdf5"
-    command = ["record", "Lift", "--device", "scripted", "--episodes", "2"]
+    command = ["record", "Lift", "--device", "expert", "--episodes", "2"]
     found = CliRunner().invoke(app, [*command, "--out", str(path)])
     assert found.exit_code == 0, found.output
     return path

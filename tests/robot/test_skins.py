@@ -22,6 +22,14 @@ COMPONENTS = [
 ]
 
 
+@pytest.fixture(autouse=True)
+def _no_alias_of_robosuite(monkeypatch):
+    """Other tests give our own package the name of the one with meshes."""
+    for name in list(sys.modules):
+        if name.split(".")[0] == "robosuite":
+            monkeypatch.delitem(sys.modules, name)
+
+
 def files_of(name):
     table = tomllib.loads(
         Catalogue().find("robots/skin", name, kind="skin").read_text()

@@ -43,7 +43,7 @@ def test_episodes_of_a_session_are_kept_discarded_taken_back_and_replay(
     assert (status.recording, status.length) == (True, 3)
     assert _buttons(session.snapshot)[2:] == ("Keep", "Discard")
     assert "Recording episode 1: 3 actions" in status_html(
-        session.snapshot, session.info.limbs, limb_colours(session.limbs)
+        session.snapshot, session.info, limb_colours(session.limbs)
     )
     hand = session.snapshot.limbs["right_hand"].target
     session.grab("right_hand", 1, hand)
