@@ -21,7 +21,7 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM)
 KEPT = {
     "record": "Finished episodes are kept; the same command adds more.",
     "teleop": "Finished episodes are kept; --record with the same file adds more.",
-    "rollout": "Finished episodes are kept; the same command goes on.",
+    "evaluate": "Finished episodes are kept; the same command goes on.",
     "extract": "Finished parts are kept; the same command goes on.",
     "convert": "Nothing half-finished is kept; the same command starts again, or goes "
     "on with an executor.",
