@@ -224,18 +224,18 @@ def test_remote_session_asks_for_what_the_session_does_and_stands_a_loss(session
     asked = []
 
     def answer():
-        for _ in range(9):
+        for _ in range(10):
             asked.append(ours.recv())
             match asked[-1][0]:
-                case "snapshot":
-                    ours.send(session.snapshot)
+                case "info" | "snapshot" as name:
+                    ours.send(getattr(session, name))
                 case "grab":
                     ours.send(True)
         ours.close()
 
     thread = threading.Thread(target=answer)
     thread.start()
-    remote, here = RemoteSession(theirs, session.info), pin.SE3.Identity()
+    remote, here = RemoteSession(theirs), pin.SE3.Identity()
     assert remote.grab(HAND, 3, here)
     remote.release(HAND, 3)
     remote.leave(3)
@@ -247,10 +247,11 @@ def test_remote_session_asks_for_what_the_session_does_and_stands_a_loss(session
     thread.join()
     names = [name for name, _ in asked]
     assert names == [
-        *("snapshot", "grab", "release", "leave", "enable", "set_gripper"),
+        *("info", "snapshot", "grab", "release", "leave", "enable", "set_gripper"),
         *("pause", "reset", "command_episode"),
     ]
-    assert asked[5][1] == ("right_gripper", 1, 0.5)
+    assert asked[6][1] == ("right_gripper", 1, 0.5)
+    assert remote.info.limbs.keys() == session.info.limbs.keys()
     assert not remote.lost.is_set()
     remote.drag(HAND, 3, here)
     assert remote.lost.is_set()

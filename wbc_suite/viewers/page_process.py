@@ -13,7 +13,7 @@ import multiprocessing
 import signal
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from multiprocessing.connection import Connection
 from typing import Any, TypeAlias
 
@@ -26,10 +26,11 @@ from wbc_suite.viewers.teleop_session import TeleopSession
 
 log = logging.getLogger(__name__)
 
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
 POLL_PERIOD = 0.05  # s
 EXIT_TIMEOUT = 10.0  # s; a page that has not ended by then is killed
 
-QUERIES = ("snapshot", "grab")
+QUERIES = ("info", "snapshot", "grab")
 """Requests that have an answer, for which the page waits."""
 
 COMMANDS = (
@@ -63,11 +64,12 @@ class PageProcess:
         self._opened, self._stopping = threading.Event(), threading.Event()
         context = multiprocessing.get_context("spawn")
         self._pipe, remote = context.Pipe()
-        arguments = remote, session.info, host, port, label
+        arguments = remote, host, port, label
         self._process = context.Process(
             target=_serve, args=arguments, name="page", daemon=True
         )
-        self._process.start()
+        with _signals_wait():
+            self._process.start()
         remote.close()
         self._thread = threading.Thread(target=self._run, name="page", daemon=True)
         self._thread.start()
@@ -123,8 +125,8 @@ class PageProcess:
                 self._opened.set()
             case "failed":
                 (self._error,) = arguments
-            case "snapshot":
-                return self._session.snapshot
+            case "info" | "snapshot":
+                return getattr(self._session, request)
             case _:
                 return getattr(self._session, request)(*arguments)
 
@@ -147,10 +149,10 @@ class RemoteSession:
         lost: Set when the session has ended; requests do nothing from then on.
     """
 
-    def __init__(self, pipe: Connection, info: SessionInfo) -> None:
-        self.info = info
+    def __init__(self, pipe: Connection) -> None:
         self.lost = threading.Event()
         self._pipe, self._lock = pipe, threading.Lock()
+        self.info: SessionInfo = self.call("info")
         self._last: Snapshot = self.call("snapshot")
 
     @property
@@ -189,16 +191,37 @@ Session: TypeAlias = TeleopSession | RemoteSession
 """What a page displays and commands. Clients are numbers, one for each open page."""
 
 
-def _serve(
-    pipe: Connection, info: SessionInfo, host: str, port: int | None, label: str
-) -> None:
+@contextlib.contextmanager
+def _signals_wait() -> Iterator[None]:
+    """Handle Ctrl-C and SIGTERM after the block; a process that it starts has neither.
+
+    A process that is half started when its parent ends, or when Ctrl-C in a terminal
+    reaches both, prints a traceback.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    waiting: list[int] = []
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+    handlers = [signal.signal(n, lambda k, _: waiting.append(k)) for n in SIGNALS]
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        for number, handler in zip(SIGNALS, handlers, strict=True):
+            signal.signal(number, handler)
+    for number in waiting:
+        signal.raise_signal(number)
+
+
+def _serve(pipe: Connection, host: str, port: int | None, label: str) -> None:
     """Serve the page until the session ends: the main function of the process."""
     from wbc_suite.viewers.page_server import PageServer
     from wbc_suite.viewers.teleop_page import TeleopPage
 
-    for number in (signal.SIGINT, signal.SIGTERM):  # the session ends this process
+    for number in SIGNALS:  # the session ends this process
         signal.signal(number, signal.SIG_IGN)
-    session = RemoteSession(pipe, info)
+    session = RemoteSession(pipe)
     if session.lost.is_set():
         return
     try:
