@@ -132,8 +132,8 @@ def cases() -> list[Case]:
         add(robot, "rate/delay_20ms", delay=1, **go)
         add(robot, "sensors/delay_20ms", sensors={"delay": 0.02}, **go)
         add(robot, "sensors/noise/0.05", sensors={"velocity_noise": 0.05}, **go)
-        for cutoff in (None, 25.0):
-            name = "sensors/noise/0.02" + ("/filtered" if cutoff else "")
+        for cutoff in (1e6, 25.0):
+            name = "sensors/noise/0.02" + ("/filtered" if cutoff < 1e6 else "")
             noise = {"velocity_noise": 0.02}
             add(robot, name, sensors=noise, cutoff=cutoff, smooth=True, **go)
         noise = {"gyro_noise": 0.005, "acceleration_noise": 0.05}

@@ -113,7 +113,7 @@ class WholeBodyID:
         own["root_qpos"], own["root_dof"] = root.qposadr[0], dof
         own["body"] = root.bodyid[0]
         own["friction"], own["dt"] = config.friction, state.model.opt.timestep
-        rate = 2.0 * np.pi * (config.velocity_cutoff or np.inf)
+        rate = 2.0 * np.pi * config.cutoff
         own["trust"] = 1.0 - np.exp(-rate * state.model.opt.timestep)
         own["hand_frame"] = config.input_ref_frame == "base"
         return dynamics

@@ -3,6 +3,7 @@
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any, Literal
 
+import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from wbc_suite.control.composite.whole_body_config import (
@@ -19,6 +20,9 @@ from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.elements import Name
 from wbc_suite.robot.sole_inference import ball_radius, guess_sole
 from wbc_suite.tomlfile import FrozenModel, parse_model
+
+NOISY_CUTOFF = 25.0
+"""Hz; GR1 walks with a delay of 20 ms and noise of 0.05 rad/s at it, not at 40 Hz."""
 
 
 class FootConfig(FrozenModel):
@@ -90,7 +94,7 @@ class WholeBodyIDConfig(FrozenModel):
             encoders, with noise and delay.
         friction: Coefficient of friction that contact forces keep to.
         velocity_cutoff: Cut-off frequency of the low-pass filter of velocities, Hz;
-            absent without a filter. 25 Hz suits noise of 0.02 rad/s.
+            when absent `NOISY_CUTOFF` if velocities are noisy, else without a filter.
         max_walk: Greatest commands: forward, left (m/s), turn (rad/s).
         height: Lowest and highest command of height, m.
         tolerance: Errors below which a hand has reached its target, m and rad.
@@ -118,6 +122,12 @@ class WholeBodyIDConfig(FrozenModel):
     input_ref_frame: InputFrame = "base"
     delta_position: PositiveFloat = 0.05
     delta_rotation: PositiveFloat = 0.5
+
+    @property
+    def cutoff(self) -> float:
+        """Cut-off frequency of velocities, Hz, infinite without a filter."""
+        noisy = NOISY_CUTOFF if self.sensors.velocity_noise > 0.0 else np.inf
+        return self.velocity_cutoff or noisy
 
     @model_validator(mode="after")
     def _gait_fits_feet(self) -> "WholeBodyIDConfig":
