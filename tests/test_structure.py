@@ -273,6 +273,11 @@ def test_the_package_is_small():
     )
 
 
+@pytest.mark.xfail(reason="0.67 of everything", strict=False)
+def test_the_tests_are_many_for_everything():
+    assert lines_of(sorted(TESTS.rglob("*.py"))) >= MIN_TESTS * lines_of(list(TREES))
+
+
 def test_the_tests_are_many():
     own = [path for path in TREES if not place(path).startswith(PEER_TREES)]
     share = lines_of(sorted(TESTS.rglob("*.py"))) / lines_of(own)

@@ -122,15 +122,7 @@ def osc_law(physics: Physics, law: CompiledRecords, drives: CompiledRecords) -> 
     """
     n, work = law.last - law.first, physics.osc
     J, C, wanted, posture, z = work.J, work.C, work.wanted, work.posture, work.z
-    for j in range(n):
-        drive = drives[law.first + j]
-        work.dofs[j] = drive.dof
-        error = drive.position - physics.qpos[drive.qpos]
-        posture[j] = drive.kp * error - drive.kd * physics.qvel[drive.dof]
-    _write_task_acceleration(physics, law)
-    _write_site_jacobian(physics, law, n)
-    write_inertia(physics, work.dofs, n, C)
-    cholesky(C, n, 0.0)
+    write_hand_task(physics, law, drives)
     for i in range(6):
         for j in range(n):
             wanted[i] -= J[i, j] * posture[j]
@@ -144,6 +136,28 @@ def osc_law(physics: Physics, law: CompiledRecords, drives: CompiledRecords) -> 
     if law.keep_direction > 0.0:
         keep_direction(physics, law, drives)
     limit_accelerations(physics, law, drives)
+
+
+@compiled
+def write_hand_task(
+    physics: Physics, law: CompiledRecords, drives: CompiledRecords
+) -> None:
+    """Write what a law of a hand begins with, in `physics.osc`.
+
+    These are the law's `dofs`, the accelerations `posture` that hold its posture,
+    `wanted = x'' - J' v` and its part `pull`, the Jacobian J and the factor C of the
+    joints' inertia.
+    """
+    n, work = law.last - law.first, physics.osc
+    for j in range(n):
+        drive = drives[law.first + j]
+        work.dofs[j] = drive.dof
+        error = drive.position - physics.qpos[drive.qpos]
+        work.posture[j] = drive.kp * error - drive.kd * physics.qvel[drive.dof]
+    _write_task_acceleration(physics, law)
+    _write_site_jacobian(physics, law, n)
+    write_inertia(physics, work.dofs, n, work.C)
+    cholesky(work.C, n, 0.0)
 
 
 @compiled

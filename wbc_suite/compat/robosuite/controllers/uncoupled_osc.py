@@ -15,14 +15,9 @@ import numpy as np
 
 from wbc_suite.compiling import compiled
 from wbc_suite.control.law.custom import register_law
-from wbc_suite.control.law.osc import (
-    OscLaw,
-    _write_site_jacobian,
-    _write_task_acceleration,
-)
+from wbc_suite.control.law.osc import OscLaw, write_hand_task
 from wbc_suite.control.loop.physics import Physics
 from wbc_suite.control.loop.records import CompiledRecords
-from wbc_suite.control.loop.rigid_body import write_inertia
 from wbc_suite.control.part.osc_controller import OscConfig, OscController
 from wbc_suite.control.part.registry import register_part_controller
 from wbc_suite.linear_algebra import cholesky, dot, solve_lower, solve_upper
@@ -45,19 +40,10 @@ def uncoupled_osc_law(
     """
     n, work = law.last - law.first, physics.osc
     J, C, posture, z = work.J, work.C, work.posture, work.z
-    for j in range(n):
-        drive = drives[law.first + j]
-        work.dofs[j] = drive.dof
-        error = drive.position - physics.qpos[drive.qpos]
-        posture[j] = drive.kp * error - drive.kd * physics.qvel[drive.dof]
-    _write_task_acceleration(physics, law)
-    _write_site_jacobian(physics, law, n)
+    write_hand_task(physics, law, drives)
     null = np.empty(6)
     for i in range(6):
         null[i] = dot(J[i], posture, n)
-    write_inertia(physics, work.dofs, n, C)
-    cholesky(C, n, 0.0)
-    for i in range(6):
         solve_lower(C, J[i], n)
     wrench = np.empty(6)
     for half in range(2):
