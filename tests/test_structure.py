@@ -263,7 +263,9 @@ def test_inheritance_is_shallow():
     assert not deep, listing(deep)
 
 
-@pytest.mark.xfail(reason="about 100 lines too many", strict=False)
+@pytest.mark.xfail(
+    reason="about 650 lines too many, with later changes of older rooms", strict=False
+)
 def test_the_package_is_small():
     counted = [path for path in TREES if not place(path).startswith(ADDED)]
     modules, lines = len(counted), lines_of(counted)
