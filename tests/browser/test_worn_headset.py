@@ -1,7 +1,6 @@
 """An emulated headset in a real Chromium, worn by somebody who moves as people do."""
 
 import json
-import os
 import shutil
 import subprocess
 import sys
@@ -58,12 +57,6 @@ COUNT_PULSES = """() => {
     for (const motor of motors) motor.pulse = async () => { window.pulses += 1 }
     return motors.length > 0
 }"""
-
-
-on_request = pytest.mark.skipif(
-    "WBC_SUITE_HEADSET" not in os.environ,
-    reason="drawn by software it may take minutes: set WBC_SUITE_HEADSET=1",
-)
 
 
 @pytest.fixture(scope="session")
@@ -173,6 +166,7 @@ def wearer(context, room, packages):
     session.reset()
     wearer = Wearer(context, device, packages)
     wearer.enter()
+    wait_until(lambda: not follows(session), "the frames of this page are read")
     yield wearer
     assert wearer.faults == []
     assert device.refused == ""
@@ -262,7 +256,6 @@ def test_squeeze_engages_without_a_jump_and_the_hand_repeats_the_users(room, wea
     np.testing.assert_allclose(measured(session) - start, [0, 0, 0.08], atol=2e-3)
 
 
-@on_request
 def test_hand_that_cannot_follow_is_red_and_pulses(room, wearer):
     session, _ = room
     wearer.press("squeeze", 1)
@@ -280,7 +273,6 @@ def test_hand_that_cannot_follow_is_red_and_pulses(room, wearer):
     wearer.page.screenshot(path=str(ARTIFACTS / "headset_unreachable.png"))
 
 
-@on_request
 def test_hand_that_is_not_seen_lets_go(room, wearer):
     session, _ = room
     wearer.press("squeeze", 1)
@@ -296,7 +288,6 @@ def test_hand_that_is_not_seen_lets_go(room, wearer):
     assert np.linalg.norm(measured(session) - start) < 1e-3
 
 
-@on_request
 def test_lost_connection_stops_the_robot_and_is_taken_up_again(room, wearer):
     session, device = room
     wearer.press("squeeze", 1)
@@ -318,12 +309,12 @@ def test_lost_connection_stops_the_robot_and_is_taken_up_again(room, wearer):
     wait_until(lambda: measured(session)[2] > start[2] + 0.045, "it goes on")
 
 
-@on_request
 def test_cube_is_lifted_with_a_tracked_hand(context, room, packages):
     session, device = room
     session.reset()
     wearer = Wearer(context, device, packages, bare=True)
     wearer.enter()
+    wait_until(lambda: not follows(session), "the frames of this page are read")
     wait_until(lambda: not session.snapshot.device, "the headset is heard")
     wearer.tell("device.hands.right.poseId = 'sign'")
     wait_until(lambda: follows(session), "thumb on little finger: it follows")
