@@ -46,10 +46,31 @@ def test_an_encoded_target_is_the_goal_after_the_action(make, kind, limb, settin
     target = port.measure()
     target.translation += np.array([0.01, 0.02, -0.01])
     values = port.encode(target)
+    decoded = port.decode(values).translation
+    np.testing.assert_allclose(decoded, target.translation, atol=1e-9)
     env.step(env.action_layout.pack({"right": values}, base=env.hold_action))
     arm = env.controllers[0].parts["right"]
     goal = env.simulation.robots[0].root_pose * arm.goal
     np.testing.assert_allclose(goal.translation, target.translation, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("robot", "controller"),
+    [
+        ("Panda", "BASIC"),
+        ("Panda", basic(right={"type": "OSC_POSE", "input_type": "absolute"})),
+        ("Panda", "WHOLE_BODY_IK"),
+        ("GR1FreeBody", "WHOLE_BODY_ID"),
+    ],
+)
+def test_decoded_values_are_the_target_that_was_encoded(make, robot, controller):
+    env = make(robot, controller)
+    for port in limb_ports(env).values():
+        if port.kind is not LimbKind.POSE:
+            continue
+        target = port.measure() * pin.exp6(np.array([0.01, 0, -0.02, 0.1, -0.2, 0.1]))
+        found = port.decode(port.encode(target))
+        np.testing.assert_allclose(found.homogeneous, target.homogeneous, atol=1e-9)
 
 
 def test_ik_parts_and_joints_have_no_limb(make):

@@ -28,6 +28,7 @@ def limb(name, kind, T):
         body=-1,
         measure=lambda: T,
         encode=lambda target: values(kind, target),
+        decode=lambda values: T,
     )
     return LimbTarget(LimbPipeline(port, PipelineConfig(), dt=0.01), Ownership())
 

@@ -35,6 +35,7 @@ class LimbPort:
         body: Body that the frame is fixed to; -1 for none.
         measure: Returns the pose of the simulated frame in the world.
         encode: Returns the values of the slice for a target in the world.
+        decode: Returns the target of values of the slice in the present state.
         ground: Returns the pose of the base that targets move with; None if there is
             none.
     """
@@ -44,6 +45,7 @@ class LimbPort:
     body: int
     measure: Callable[[], pin.SE3]
     encode: Callable[[pin.SE3], Vector]
+    decode: Callable[[Vector], pin.SE3]
     ground: Callable[[], pin.SE3] | None = None
 
 
@@ -218,6 +220,7 @@ def _whole_body(
             body=body,
             measure=measure,
             encode=partial(_encode_in_base, kind, heading) if in_base else kind.values,
+            decode=partial(_decode, kind, measure, heading if in_base else None),
             ground=heading if walks else None,
         )
 
@@ -227,6 +230,17 @@ def _encode_in_base(
 ) -> Vector:
     """Return the values of a slice whose targets are given in a moving base."""
     return kind.values(base().actInv(T_world_target))
+
+
+def _decode(
+    kind: FrameKind,
+    measure: Callable[[], pin.SE3],
+    base: Callable[[], pin.SE3] | None,
+    values: Vector,
+) -> pin.SE3:
+    """Return the target of a slice's values; the frame has the other components."""
+    T_wb = pin.SE3.Identity() if base is None else base()
+    return T_wb * kind.pose(values, T_wb.actInv(measure()))
 
 
 def _limb_kind(kind: FrameKind) -> LimbKind:
@@ -266,6 +280,7 @@ def _parts(
                 body=given.body,
                 measure=given.measure,
                 encode=given.encode,
+                decode=given.decode,
                 ground=given.reference,
             )
 

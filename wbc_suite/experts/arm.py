@@ -129,6 +129,16 @@ class Arm:
         shift = self._target.translation - pose.translation
         return float(np.linalg.norm(shift)), float(np.linalg.norm(turn))
 
+    def read(self, action: Vector) -> tuple[pin.SE3, bool]:
+        """Return the goal that an action gives the hand, and whether it closes."""
+        target = self._port.decode(action[self._slice.start : self._slice.stop])
+        closes = False
+        if self._gripper is not None:
+            ends = [s.grasps.get(self.grasp, (-1.0, 1.0)) for s in self._synergies]
+            values = action[self._gripper.start : self._gripper.stop]
+            closes = bool(np.mean([v - sum(e) / 2 for v, e in zip(values, ends)]) > 0)
+        return target * self._offset(self.grasp), closes
+
     def write(self, action: Vector, period: float) -> None:
         """Write the arm's values for the next control period, s, into an action."""
         if self._moves:

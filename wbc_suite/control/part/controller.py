@@ -28,6 +28,7 @@ class PoseInput:
         body: Body of the simulation that the frame is fixed to.
         measure: Returns the frame's pose in the world.
         encode: Returns the values of the slice for a target in the world.
+        decode: Returns the target of values of the slice in the present state.
         reference: Returns the pose of the body that goals move with; None where they
             stay in the world.
     """
@@ -36,6 +37,7 @@ class PoseInput:
     body: int
     measure: Callable[[], pin.SE3]
     encode: Callable[[pin.SE3], Vector]
+    decode: Callable[[Vector], pin.SE3]
     reference: Callable[[], pin.SE3] | None = None
 
 

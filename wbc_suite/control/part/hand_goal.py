@@ -85,16 +85,19 @@ class HandGoal:
 
     def step(self, step: Vector, hand: pin.SE3) -> None:
         """Move the goal by a step, shape (6,): linear, m, then a rotation vector."""
+        if (np.abs(step) > ROUNDING).any():
+            self.set(self.after(step, hand))
+
+    def after(self, step: Vector, hand: pin.SE3) -> pin.SE3:
+        """Return the goal after a step, without limits."""
         moves = np.abs(step) > ROUNDING
-        if not moves.any():
-            return
         start, axes = self.pose, self._axes()
         if self._from_hand and moves.all():
             start = hand
         elif self._from_hand:
             to_hand = _step_between(start, hand, axes)
             start = _moved(start, np.where(moves, to_hand, 0.0), axes)
-        self.set(_moved(start, step, axes))
+        return _moved(start, step, axes)
 
     def step_to(self, target: pin.SE3, hand: pin.SE3) -> Vector:
         """Return the step that moves the goal to a target, shape (6,)."""

@@ -193,12 +193,21 @@ class OscController(PartController[OscLaw]):
                 values = self._absolute(goal)
             return np.clip(values, action.low, action.high)
 
+        def decode(values: Vector) -> pin.SE3:
+            if self._input.scaled:
+                step = np.zeros(6)
+                step[: self.config.size] = self._input.scaling(values)
+                return reference() * self._goal.after(step, self._hand())
+            turn = pin.exp3(values[3:]) if len(values) == 6 else self._goal.start
+            return reference() * pin.SE3(turn, values[:3])
+
         fixed = self._state.robot.root.kind == "fixed"
         return PoseInput(
             action=action,
             body=int(self._state.model.site_bodyid[site]),
             measure=measure,
             encode=encode,
+            decode=decode,
             reference=None if fixed else reference,
         )
 
