@@ -168,7 +168,9 @@ def _track(
         path = np.array([pose.translation for pose in objects[name][begin:end]])
         states = cell.benchmark.states
         moves = name in states and states[name].is_free
-        carried = _shares(path[:, :2], CARRIED, least=STRAIGHT_UP)
+        onto = under[min(end, len(under) - 1)].get(name, "")
+        least = 0.0 if onto else STRAIGHT_UP
+        carried = _shares(path[:, :2], CARRIED, least=least)
         start = segments[-1].stop if segments else 0
         approach = np.array([pose.translation for pose in hands[start:begin]])
         segments += [
@@ -185,7 +187,7 @@ def _track(
                 stop=stop,
                 name=name,
                 held=True,
-                onto=under[min(end, len(under) - 1)].get(name, ""),
+                onto=onto,
                 shares=np.append(
                     carried * moves, np.full(stop - end, carried[-1] * moves)
                 ),
@@ -227,3 +229,8 @@ def _shares(path: Vector, complete: float, *, least: float = 0.0) -> Vector:
     lengths = np.linalg.norm(np.diff(path, axis=0), axis=1)
     behind = np.append(0.0, np.cumsum(lengths))
     return np.minimum(behind / max(complete * behind[-1], 1e-9), 1.0)
+
+
+def shares_of_path(poses: Sequence[pin.SE3]) -> Vector:
+    """Return the share of a path that lies behind each of its poses; it ends with 1."""
+    return _shares(np.array([pose.translation for pose in poses]), 1.0)

@@ -22,6 +22,7 @@ from wbc_suite.experts.demonstrations import (
     Segment,
     Track,
     read_demonstrations,
+    shares_of_path,
     workcell,
 )
 from wbc_suite.experts.workcell import Steps, Workcell
@@ -29,9 +30,11 @@ from wbc_suite.typing import Vector
 
 FAST, QUICK = 1.5, 4.0  # m/s, rad/s of goals
 LAG, LAG_TURN = 0.06, 0.4  # m, rad; the next goal waits for a hand that lags so far
-PATIENCE = 10  # control periods that it waits at most
+PATIENCE = 40  # control periods that it waits in a stage at most
+CLOSING = 10  # control periods that another gripper may need more
 ENDING = 10  # control periods after the last goal
-SAMPLES = 4  # of each segment, that a look-ahead passes
+SAMPLES = (0.4, 0.7, 0.85, 1.0)  # of the path of a segment, where it is looked at
+COLLISION = 5.0  # s, cost of a grasp that is not clear
 SPREAD = 0.3  # s, beside the best outlook, of which sources are drawn
 
 
@@ -74,20 +77,31 @@ class Multiplied:
 
 
 def multiply(cell: Workcell[Any], demos: Sequence[Demonstration]) -> Steps[None]:
-    """Do what demonstrations did, each stage as the one that fits the scene best."""
-    order = demos[cell.rng.integers(len(demos))].stages
-    for k, (_, _, name) in enumerate(order):
+    """Do what demonstrations did, each stage as the source that fits the scene best.
+
+    Objects are taken in any order in which a demonstration takes them.
+    """
+    done: list[str] = []
+    while names := _next_names(demos, done):
         found = [
-            (demo, start, demo.length if k + 1 == len(order) and stop else stop)
+            (demo, start, stop)
             for demo in demos
-            for start, stop, of in demo.stages
-            if of == name
+            for start, stop, name in demo.stages
+            if name in names
         ]
         demo, start, stop = _choose(cell, found)
         if not (yield from _play(cell, demo, start, stop)):
             return
+        done.append(next(name for first, _, name in demo.stages if first == start))
     for _ in range(ENDING):
         yield
+
+
+def _next_names(demos: Sequence[Demonstration], done: Sequence[str]) -> set[str]:
+    """Return the objects that come next in demonstrations that began with others."""
+    orders = ([name for _, _, name in demo.stages] for demo in demos)
+    k = len(done)
+    return {o[k] for o in orders if len(o) > k and sorted(o[:k]) == sorted(done)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,47 +109,57 @@ class Motion:
     """A segment in the present scene, from transform A of source poses to B.
 
     Attributes:
+        B: Returns the transform at an action.
         grip: Returns what follows a pose of the source's hand, so that the object has
             its place.
     """
 
     segment: Segment
     A: pin.SE3
-    B: pin.SE3
+    B: Callable[[int], pin.SE3]
     grip: Callable[[], pin.SE3]
 
     def pose(self, source: pin.SE3, k: int) -> pin.SE3:
         """Return the pose for a pose of the source at action k."""
+        A, B = self.A, self.B(k)
         w = float(self.segment.shares[k - self.segment.start])
-        turn = pin.log3(self.A.rotation.T @ self.B.rotation)
-        R = self.A.rotation @ pin.exp3(w * turn) @ source.rotation
-        a, b = (T.act(source.translation) for T in (self.A, self.B))
-        return pin.SE3(R, (1.0 - w) * a + w * b) * self.grip()
+        R = A.rotation @ pin.exp3(w * pin.log3(A.rotation.T @ B.rotation))
+        a, b = A.act(source.translation), B.act(source.translation)
+        return pin.SE3(R @ source.rotation, (1.0 - w) * a + w * b) * self.grip()
 
 
 def _motion(
-    cell: Workcell[Any], arm: Arm, demo: Demonstration, track: Track, segment: Segment
+    cell: Workcell[Any],
+    arm: Arm,
+    demo: Demonstration,
+    track: Track,
+    segment: Segment,
+    *,
+    begun: bool = True,
 ) -> Motion:
-    """Return the motion of a segment that begins now."""
+    """Return the motion of a segment that begins now, or may come later."""
     at, name = segment.start, segment.name
-    T_ws, T_wo = demo.objects[name][at], cell.pose(name)
+    source = demo.objects[name]
     if not segment.held:
         A = arm.pose * track.hands[at].inverse()
-        return Motion(
-            segment=segment, A=A, B=T_wo * T_ws.inverse(), grip=pin.SE3.Identity
-        )
-    B = pin.SE3.Identity()
+        fixed = cell.pose(name) * source[at].inverse()
+
+        def follow(k: int) -> pin.SE3:
+            return cell.pose(name) * source[k].inverse() if begun else fixed
+
+        return Motion(segment=segment, A=A, B=follow, grip=pin.SE3.Identity)
+    A, B = cell.pose(name) * source[at].inverse(), pin.SE3.Identity()
     if segment.onto:
         B = cell.pose(segment.onto) * demo.objects[segment.onto][at].inverse()
-    in_source = track.hands[at].actInv(T_ws)
+    in_source = track.hands[at].actInv(source[at])
     last = [in_source.inverse()]
 
     def grip() -> pin.SE3:
-        if cell.holds(arm, name):
+        if begun and cell.holds(arm, name):
             last[0] = cell.pose(name).actInv(arm.pose)
         return in_source * last[0]
 
-    return Motion(segment=segment, A=T_wo * T_ws.inverse(), B=B, grip=grip)
+    return Motion(segment=segment, A=A, B=lambda _: B, grip=grip)
 
 
 def _choose(
@@ -152,14 +176,21 @@ def _cost(cell: Workcell[Any], demo: Demonstration, start: int, stop: int) -> fl
     total = 0.0
     for arm, track in zip(cell.arms, demo.tracks, strict=True):
         poses: list[pin.SE3] = []
+        near: list[tuple[int, str]] = []
         for segment in track.segments:
             if not start <= segment.start < stop:
                 continue
-            motion = _motion(cell, arm, demo, track, segment)
-            first, last = segment.start, segment.stop - 1
-            for k in np.linspace(first, last, SAMPLES + 1).astype(int)[1:]:
-                poses.append(motion.pose(track.goals[k], k))
-        total += arm.look_ahead(poses).cost
+            motion = _motion(cell, arm, demo, track, segment, begun=False)
+            if not segment.held and not near:
+                near = [(len(poses) + k, segment.name) for k in range(1, len(SAMPLES))]
+            goals = track.goals[segment.start : segment.stop]
+            for k in np.searchsorted(shares_of_path(goals), SAMPLES):
+                poses.append(motion.pose(goals[k], segment.start + k))
+        outlook = arm.look_ahead(poses)
+        total += outlook.cost
+        for k, name in near:
+            q = arm.configuration(outlook.q[k])
+            total += COLLISION * (not cell.is_clear(arm, q, but=name))
     return total
 
 
@@ -168,9 +199,9 @@ def _play(
 ) -> Steps[bool]:
     """Give the goals of a stage; return whether each object was held where it was."""
     motions: dict[Arm, Motion] = {}
-    pairs = list(zip(cell.arms, demo.tracks, strict=True))
+    patience = PATIENCE
     for k in range(start, stop):
-        for arm, track in pairs:
+        for arm, track in zip(cell.arms, demo.tracks, strict=True):
             segment = next((s for s in track.segments if s.start <= k < s.stop), None)
             if segment is None:  # a hand that holds nothing
                 continue
@@ -182,17 +213,20 @@ def _play(
             arm.aim(goal, speed=FAST, turn=QUICK, exact=False)
             (arm.close if track.closes[k] else arm.open)()
         yield
-        for _ in range(PATIENCE):
-            errors = [arm.error() for arm in motions]
-            if all(far < LAG and turn < LAG_TURN for far, turn in errors):
-                break
+        while patience and any(_lags(arm) for arm in motions):
+            patience -= 1
             yield
     return True
 
 
+def _lags(arm: Arm) -> bool:
+    far, turn = arm.error()
+    return far > LAG or turn > LAG_TURN
+
+
 def _held(cell: Workcell[Any], arm: Arm, name: str) -> Steps[bool]:
     """Wait until fingers hold an object, as long as another hand may need."""
-    for _ in range(PATIENCE):
+    for _ in range(CLOSING):
         if cell.holds(arm, name):
             return True
         yield
