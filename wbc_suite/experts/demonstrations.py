@@ -135,6 +135,7 @@ def _read(env: RobotEnv, episode: Episode) -> Demonstration:
             held.append(next((n for n in names if cell.holds(arm, n)), ""))
         under.append(dict(_supports(cell, names)))
         env.advance(action)
+    under.append(dict(_supports(cell, names)))  # an object may have just been released
     tracks = [
         _track(cell, row, held, objects, under)
         for row, held in zip(rows, holds, strict=True)
@@ -168,7 +169,7 @@ def _track(
         path = np.array([pose.translation for pose in objects[name][begin:end]])
         states = cell.benchmark.states
         moves = name in states and states[name].is_free
-        onto = under[min(end, len(under) - 1)].get(name, "")
+        onto = next((u[name] for u in under[end - 1 : stop + 1] if name in u), "")
         least = 0.0 if onto else STRAIGHT_UP
         carried = _shares(path[:, :2], CARRIED, least=least)
         start = segments[-1].stop if segments else 0
