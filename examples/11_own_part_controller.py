@@ -75,10 +75,14 @@ class CylinderController(PartController[OscLaw]):
     def set_goal(self, values: np.ndarray, period: float) -> None:
         """Move the goal evenly in the time until the next action."""
         self.values = values.copy()
+        goal = self.pose(values)
+        self.law.set_goal(goal, start=self.law.target_pose()[0], duration=period)
+
+    def pose(self, values: np.ndarray) -> pin.SE3:
+        """Return the hand's pose in the base for values of the action."""
         radius, angle, height = values
         place = np.array([radius * np.cos(angle), radius * np.sin(angle), height])
-        goal = pin.SE3(pin.exp3(np.array([0, 0, angle])) @ self.grasp, place)
-        self.law.set_goal(goal, start=self.law.target_pose()[0], duration=period)
+        return pin.SE3(pin.exp3(np.array([0, 0, angle])) @ self.grasp, place)
 
     @property
     def hold_action(self) -> np.ndarray:
@@ -98,6 +102,9 @@ class CylinderController(PartController[OscLaw]):
             body=int(self.state.model.site_bodyid[int(self.law.record["site"][0])]),
             measure=lambda: pin.SE3(R_wh.reshape(3, 3).copy(), p_wh.copy()),
             encode=encode,
+            decode=lambda values: (
+                pin.SE3(R_wb.reshape(3, 3).copy(), p_wb.copy()) * self.pose(values)
+            ),
         )
 
 

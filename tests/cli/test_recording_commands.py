@@ -30,7 +30,7 @@ def test_a_recording_is_made_inspected_and_replayed(command, tmp_path):
     arguments = ("Lift", "--robots", "Panda", "--horizon", 70, "--out", file)
     code, out, err = command("record", *arguments, "--episodes", 1)
     assert (code, err) == (0, "")
-    assert "success (1 of 1)" in out
+    assert "1 episodes, 1 of them new. 1 of 1 succeeded" in out
     code, out, _ = command(
         "inspect", file, "--columns", "--plots", tmp_path / "p.png",
         "--sheet", tmp_path / "s.png",
@@ -84,6 +84,28 @@ def test_random_actions_of_any_robot_are_recorded(command, tmp_path):
     assert "4 episodes" in out
     shutil.rmtree(tmp_path / "a.hdf5.parts", ignore_errors=True)
     assert "4 episodes, 12 actions" in command("inspect", file)[1]
+
+
+@pytest.mark.slow
+def test_few_demonstrations_are_multiplied_on_two_robots(command, tmp_path):
+    few, many, other = (tmp_path / f"{name}.hdf5" for name in ("few", "many", "other"))
+    code, _, err = command(
+        "record", "Lift", "--episodes", 2, "--only-success", "--recoveries", 5,
+        "-o", few,
+    )  # fmt: skip
+    assert (code, err) == (0, "")
+    code, out, err = command("multiply", few, "--episodes", 3, "-o", many)
+    assert (code, err) == (0, "")
+    assert "3 episodes, 3 of them new." in out
+    with Dataset(many) as dataset:
+        assert all(dataset.facts(name)["success"] for name in dataset.names)
+        assert dataset.facts("demo_0")["policy"] == "few.hdf5"
+        assert dataset.facts("demo_0")["noise"] == 0.05
+    assert "3 of 3 episodes replay bit by bit" in command("replay", many)[1]
+    arguments = ("--robots", "UR5e", "--episodes", 1, "-o", other)
+    code, out, err = command("multiply", few, *arguments)
+    assert (code, err) == (0, "")
+    assert "UR5e" in command("inspect", other)[1]
 
 
 HAND = '''

@@ -31,7 +31,7 @@ class Run:
             source=self.source,
             out=self.out,
             executor=None,
-            on_piece=lambda item: finished.append(item.payload["name"]),
+            on_piece=lambda item, _: finished.append(item.payload["name"]),
         )
         return [result["upper"] for _, result in done], finished
 

@@ -18,6 +18,7 @@ from wbc_suite.cli import (
     doctor,
     evaluate,
     expert,
+    multiply,
     record,
     replay,
     robots,
@@ -37,6 +38,7 @@ app.command("teleop")(teleop.teleop)
 app.command("view")(robots.view)
 app.command("demo")(demo.demo)
 app.command("record")(record.record)
+app.command("multiply")(multiply.multiply)
 app.command("replay")(replay.replay)
 app.command("inspect")(datasets.inspect)
 app.command("verify")(datasets.verify)

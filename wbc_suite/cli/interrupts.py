@@ -19,7 +19,8 @@ from typing import NoReturn
 GRACE = 0.7  # s, for cleaning up
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 KEPT = {
-    "record": "Finished episodes are kept; the same command adds more.",
+    "record": "Finished episodes are kept; the same command goes on.",
+    "multiply": "Finished episodes are kept; the same command goes on.",
     "teleop": "Finished episodes are kept; --record with the same file adds more.",
     "evaluate": "Finished episodes are kept; the same command goes on.",
     "extract": "Finished parts are kept; the same command goes on.",

@@ -3,7 +3,7 @@
 import sys
 from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -17,9 +17,13 @@ from wbc_suite.cli.teleop import (
 )
 
 if TYPE_CHECKING:
-    from wbc_suite.wrappers import DataCollection
+    from collections.abc import Callable
+
+    from wbc_suite.evaluation.generation import Plan
+    from wbc_suite.recording.episode_control import RecordingPlan
 
 BY_POLICY, BY_HAND = 20.0, 100.0  # Hz; an operator notices a latency of 50 ms
+SHOWN = 10  # episodes without success
 
 
 OutOption = Annotated[
@@ -28,9 +32,9 @@ OutOption = Annotated[
 PolicyOption = Annotated[
     str,
     typer.Option(
-        help="Policy: expert, random, hold, or yours: module:function; or an input "
-        "device: keyboard, stream, spacemouse, gamepad, dualsense, mjgui, or yours: "
-        "module:Class."
+        help="Policy: expert, random, hold, FILE.hdf5 (see multiply), or yours: "
+        "module:function; or an input device: keyboard, stream, spacemouse, gamepad, "
+        "dualsense, mjgui, or yours: module:Class."
     ),
 ]
 HorizonOption = Annotated[
@@ -45,6 +49,26 @@ OnlySuccessOption = Annotated[
 ]
 NextObsOption = Annotated[
     bool, typer.Option("--next-obs", help="Store observations after actions too.")
+]
+NoiseOption = Annotated[
+    float,
+    typer.Option(
+        min=0.0,
+        help="Standard deviation of noise on actions, in full steps (5 cm, 0.5 rad); "
+        "what the policy meant is recorded as `intended`.",
+    ),
+]
+RecoveriesOption = Annotated[
+    float,
+    typer.Option(
+        min=0.0,
+        max=100.0,
+        help="Pushes of hands in 100 actions, which the policy corrects; recorded as "
+        "`disturbed`.",
+    ),
+]
+WorkersOption = Annotated[
+    int | None, typer.Option(min=1, help="At once; one per processor by default.")
 ]
 PageOption = Annotated[bool, typer.Option(help="Serve a page that shows the scene.")]
 
@@ -62,6 +86,10 @@ def record(
     seed: Annotated[int, typer.Option(min=0, help="Of the first episode.")] = 0,
     only_success: OnlySuccessOption = False,
     next_obs: NextObsOption = False,
+    noise: NoiseOption = 0.0,
+    recoveries: RecoveriesOption = 0.0,
+    executor: options.ExecutorOption = "process",
+    workers: WorkersOption = None,
     camera: options.CamerasOption = None,
     size: options.PictureSizeOption = 84,
     device_option: options.DeviceOptions = None,
@@ -74,11 +102,15 @@ def record(
     base: options.BaseOption = None,
     catalogue: options.CatalogueOption = None,
 ) -> None:
-    """Record episodes in robomimic's HDF5 layout; each is safe once it is kept."""
-    import wbc_suite
+    """Record episodes in robomimic's HDF5 layout; each is safe once it is kept.
+
+    Episodes of a policy are divided among processes or a cluster. A command that was
+    stopped goes on when it is given again. Example: wbc-suite record Lift --episodes
+    1000 --only-success --noise 0.1 --recoveries 3 -o lift.hdf5
+    """
     from wbc_suite.devices import is_device
-    from wbc_suite.recording.episode_control import EpisodeControl, RecordingPlan
-    from wbc_suite.wrappers import DataCollection
+    from wbc_suite.evaluation.generation import Plan
+    from wbc_suite.recording.episode_control import RecordingPlan
 
     by_hand, named = is_device(device), options.robot_names(robots or ["Panda"])
     rate = rate or (BY_HAND if by_hand else BY_POLICY)
@@ -86,55 +118,106 @@ def record(
     arguments = options.environment_arguments(
         robots=robots, controller=controller, gripper=gripper, base=base
     )
-    arguments |= options.camera_arguments(camera, size) | {"control_freq": rate}
+    arguments |= options.camera_arguments(camera, size)
+    arguments |= {"control_freq": rate, "terminate_on_success": not by_hand}
     if horizon or by_hand:
         arguments["horizon"] = round(ONE_DAY * rate) if by_hand else horizon
-    make = device_maker(device, device_option) if by_hand else None
-    env = wbc_suite.make(benchmark, terminate_on_success=not by_hand, **arguments)
+    if not by_hand:
+        plan = Plan(
+            benchmark=benchmark,
+            arguments=arguments,
+            policy=device,
+            noise=noise,
+            pushes=recoveries,
+            only_success=only_success,
+            next_obs=next_obs,
+        )
+        record_policy(plan, out, episodes, seed, executor=executor, workers=workers)
+        return
+    _record_by_hand(
+        benchmark,
+        out,
+        arguments,
+        RecordingPlan(episodes=episodes, horizon=horizon, only_success=only_success),
+        device=device_maker(device, device_option),
+        next_obs=next_obs,
+        names=(" and ".join(named), benchmark),
+        rate=rate,
+        seed=seed,
+        address=(host, port) if page else None,
+        stages=stages_of(device, scale=scale, mirror=mirror),
+    )
+
+
+def record_policy(
+    plan: "Plan",
+    out: Path,
+    episodes: int,
+    seed: int,
+    *,
+    executor: str,
+    workers: int | None,
+) -> None:
+    """Record episodes of a policy; print how many succeeded, and which did not."""
+    from wbc_suite.evaluation import success_interval
+    from wbc_suite.evaluation.generation import generate
+    from wbc_suite.executors import make_executor
+
+    with options.progress("Episodes", episodes) as advance:
+        found = generate(
+            plan,
+            out,
+            episodes=episodes,
+            first_seed=seed,
+            executor=make_executor(executor, workers=workers),
+            on_kept=advance,
+        )
+    failed = [each for each in found.played if not each["success"]]
+    for each in failed[:SHOWN]:
+        reason = each["physics_error"] or each["failure"] or "no success"
+        print(f"  seed {each['seed']}: {reason} in {each['steps']} actions")
+    if len(failed) > SHOWN:
+        print(f"  and {len(failed) - SHOWN} more")
+    wins, played = found.successes, len(found.played)
+    low, high = (100.0 * share for share in success_interval(wins, played))
+    print(
+        f"{out}: {found.total} episodes, {found.kept} of them new. {wins} of {played} "
+        f"succeeded ({wins / played:.1%}, 95 % interval {low:.1f} to {high:.1f} %)."
+    )
+    if found.kept < episodes:
+        print(f"Gave up: {found.kept} of {episodes} are kept.", file=sys.stderr)
+
+
+def _record_by_hand(
+    benchmark: str,
+    out: Path,
+    arguments: dict[str, Any],
+    plan: "RecordingPlan",
+    *,
+    device: "Callable[[Any], Any]",
+    next_obs: bool,
+    seed: int,
+    **driving: Any,
+) -> None:
+    """Record what an operator does; `driving` are arguments of `drive`."""
+    import wbc_suite
+    from wbc_suite.recording.episode_control import EpisodeControl
+    from wbc_suite.wrappers import DataCollection
+
+    env = wbc_suite.make(benchmark, **arguments)
     collected = DataCollection(env, out, automatic=False, next_obs=next_obs)
-    plan = RecordingPlan(episodes=episodes, horizon=horizon, only_success=only_success)
     with closing(collected):
-        if make is None:
-            _collect(collected, device, episodes, seed, only_success=only_success)
-        else:
-            drive(
-                collected,
-                names=(" and ".join(named), benchmark),
-                rate=rate,
-                seed=seed,
-                address=(host, port) if page else None,
-                device=make(env),
-                stages=stages_of(device, scale=scale, mirror=mirror),
-                episode_control=EpisodeControl(
-                    collected.recorder, seed=seed, plan=plan, report=_print_message
-                ),
-            )
+        drive(
+            collected,
+            seed=seed,
+            device=device(env),
+            episode_control=EpisodeControl(
+                collected.recorder, seed=seed, plan=plan, report=_print_message
+            ),
+            **driving,
+        )
     print(f"{out}: {collected.recorder.kept} episodes.")
 
 
 def _print_message(message: str) -> None:
     print(f"  {message}", flush=True)
-
-
-def _collect(
-    env: "DataCollection", device: str, episodes: int, seed: int, *, only_success: bool
-) -> None:
-    """Drive episodes until so many are kept, or twenty times as many were tried."""
-    from wbc_suite.envs import RobotEnv
-    from wbc_suite.evaluation.rollouts import run_episode
-
-    inner, recorder, kept = env.unwrapped, env.recorder, 0
-    assert isinstance(inner, RobotEnv), "`make` made it"
-    for each in range(seed, seed + 20 * episodes):
-        played = run_episode(env, inner, each, device, begin=recorder.begin)
-        length, success = played["steps"], played["success"]
-        if only_success and not success:
-            recorder.discard()
-            print(f"  seed {each}: discarded, no success in {length} actions")
-            continue
-        name, kept = recorder.keep(), kept + 1
-        result = "success" if success else "no success"
-        print(f"  {name}: {length} actions, {result} ({kept} of {episodes})")
-        if kept == episodes:
-            return
-    print(f"Gave up: {kept} of {episodes} episodes succeeded.", file=sys.stderr)

@@ -2,6 +2,7 @@
 
 import importlib
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -9,11 +10,13 @@ import numpy as np
 from wbc_suite.envs import RobotEnv
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.evaluation.policy_socket import SCHEME, SocketPolicy
-from wbc_suite.experts import expert
+from wbc_suite.experts import Multiplied, expert
 from wbc_suite.typing import Vector
 
 Policy: TypeAlias = Callable[[Mapping[str, Any]], Vector]
 """From an observation to an action of `env.action_space`; made for each episode."""
+
+RECORDING = ".hdf5"
 
 
 def hold(env: RobotEnv, rng: np.random.Generator) -> Policy:
@@ -40,20 +43,27 @@ def make_policy(name: str, env: RobotEnv, seed: int) -> Policy:
 
     The name is one of `POLICIES`, or `package.module:Name` of your own, a function or a
     class that takes the environment and a generator, which follows from the seed of the
-    episode, and returns the policy; or `socket://HOST:PORT` of a `PolicyServer`. A
-    policy with a method `close` is closed after its episode.
+    episode, and returns the policy; `socket://HOST:PORT` of a `PolicyServer`; or a
+    recording, `FILE.hdf5`, whose episodes are moved to the scene, see `Multiplied`. A
+    policy with a method `close` is closed after its episode, and one whose attribute
+    `finished` becomes true ends it.
 
     Raises:
         UnknownNameError: If there is no such policy.
         ConfigError: If it cannot be found, or cannot drive this environment.
+        DatasetError: If the recording cannot be used here.
         DeviceError: If its server cannot be reached, or fails.
     """
     if name.startswith(SCHEME):
         return SocketPolicy(name, describe(env, seed))
     rng = np.random.default_rng([seed, 1])
+    if name.endswith(RECORDING):
+        return Multiplied(Path(name), env, rng)
     if ":" not in name:
         if name not in POLICIES:
-            raise UnknownNameError("policy", name, (*POLICIES, "package.module:name"))
+            raise UnknownNameError(
+                "policy", name, (*POLICIES, "package.module:name", "FILE.hdf5")
+            )
         return POLICIES[name](env, rng)
     module, _, function = name.partition(":")
     try:

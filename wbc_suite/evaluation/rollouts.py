@@ -113,7 +113,10 @@ def run_episode(
     begin: Callable[[], None] = lambda: None,
     after_step: Callable[[], None] = lambda: None,
 ) -> dict[str, Any]:
-    """Run an episode of a policy; `begin` is called after the reset."""
+    """Run an episode of a policy; `begin` is called after the reset.
+
+    It ends as the environment says, or where the policy is `finished`.
+    """
     observation, info = env.reset(seed=seed)
     begin()
     policy = make_policy(name, inner, seed)
@@ -125,7 +128,7 @@ def run_episode(
             observation, reward, terminated, truncated, info = env.step(action)
             rewards.append(float(reward))
             succeeded = succeeded or bool(info["success"])
-            over = terminated or truncated
+            over = terminated or truncated or getattr(policy, "finished", False)
             after_step()
     return {
         "seed": seed,

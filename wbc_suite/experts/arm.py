@@ -136,7 +136,8 @@ class Arm:
         if self._gripper is not None:
             ends = [s.grasps.get(self.grasp, (-1.0, 1.0)) for s in self._synergies]
             values = action[self._gripper.start : self._gripper.stop]
-            closes = bool(np.mean([v - sum(e) / 2 for v, e in zip(values, ends)]) > 0)
+            middles = np.mean(ends, axis=1)
+            closes = bool(np.mean(values - middles) > 0.0)
         return target * self._offset(self.grasp), closes
 
     def write(self, action: Vector, period: float) -> None:

@@ -16,7 +16,6 @@ import pinocchio as pin
 from wbc_suite.benchmark import ObjectBenchmark
 from wbc_suite.envs import RobotEnv
 from wbc_suite.errors import DatasetError
-from wbc_suite.experts.arm import Arm
 from wbc_suite.experts.workcell import Workcell
 from wbc_suite.recording import Dataset, Episode, rebuild
 from wbc_suite.recording.replaying import start_as

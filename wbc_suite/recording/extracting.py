@@ -56,7 +56,7 @@ def extract(
         source=path,
         out=out,
         executor=executor,
-        on_piece=lambda item: on_progress(len(item.payload["names"])),
+        on_piece=lambda item, _: on_progress(len(item.payload["names"])),
     )
     folder = work_folder(out)
     parts = [folder / f"{item.name}.hdf5" for item, _ in done]

@@ -23,6 +23,11 @@ class Recorder:
 
     With `next_obs`, observations after each action are stored too. `succeeded` says
     whether the benchmark counts as solved at the last action. For the file see `Store`.
+    Of an environment with `Disturbance`, actions are recorded as they were taken, and
+    `intended` and `disturbed` beside them.
+
+    Attributes:
+        notes: Further facts of each episode.
     """
 
     def __init__(self, env: Any, path: str | Path, *, next_obs: bool = False) -> None:
@@ -35,6 +40,7 @@ class Recorder:
         self._rows = StepBuffer(env, self._store.path.parent)
         self._facts: dict[str, Fact] | None = None
         self._clipped, self.succeeded = 0, False
+        self.notes: dict[str, Fact] = {}
 
     @property
     def kept(self) -> int:
@@ -61,6 +67,7 @@ class Recorder:
             "began": datetime.now(UTC).isoformat(timespec="milliseconds"),
             "rng_state": json.dumps(state),
             "model_file": self._model_file,
+            **self.notes,
         }
         if seed is not None and seed >= 0:
             self._facts["seed"] = int(seed)
@@ -85,7 +92,7 @@ class Recorder:
         stamp = time.monotonic() - self._began
         outcome = float(reward), int(done or success), clipped, step_time, stamp
         try:
-            self._rows.add(action, observation, outcome)
+            self._rows.add(info.get("executed", action), observation, outcome, info)
         except DatasetError:
             self.discard()
             raise

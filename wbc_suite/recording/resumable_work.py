@@ -22,12 +22,13 @@ def run_pieces(
     source: Path,
     out: Path,
     executor: Executor | None,
-    on_piece: Callable[[WorkItem], None],
+    on_piece: Callable[[WorkItem, Mapping[str, Any]], None],
 ) -> list[tuple[WorkItem, Mapping[str, Any]]]:
     """Run the pieces that are not finished; return all, in order, with their results.
 
     Results of another source, or of one that changed, are not used. The source is in
-    every payload. `on_piece` is called with every finished piece.
+    every payload. `on_piece` is called with every finished piece
+    and its result.
 
     Raises:
         DatasetError: If a piece fails; results of the others are kept.
@@ -44,7 +45,7 @@ def run_pieces(
 
     def report(item: WorkItem, outcome: Outcome) -> None:
         if outcome.error is None:
-            on_piece(item)
+            on_piece(item, outcome.result)
 
     outcomes = run_items(
         work, items, folder=folder, executor=executor or Serial(), on_outcome=report

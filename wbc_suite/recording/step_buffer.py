@@ -92,6 +92,8 @@ class StepBuffer:
 
     def __init__(self, env: Any, folder: Path) -> None:
         self._env: RobotEnv = env.unwrapped
+        labelled = env.has_wrapper_attr("labels_actions")
+        self._labels = ("intended", "disturbed") if labelled else ()
         self._rows = RowBuffer(folder)
 
     def __len__(self) -> int:
@@ -113,6 +115,9 @@ class StepBuffer:
         fields += [(f"obs/{key}", a.dtype, a.shape) for key, a in apart.items()]
         fields += [("actions", "f8", (env.action_layout.size,))]
         fields += [(name, kind, ()) for name, kind in OUTCOME.items()]
+        if self._labels:
+            fields += [("intended", "f8", (env.action_layout.size,))]
+            fields += [("disturbed", "i8", ())]
         self._rows.begin(np.dtype(fields, align=True))
         pair = self._rows.pair
         self._states, self._vectors = pair["states"], pair["vectors"]
@@ -126,13 +131,19 @@ class StepBuffer:
         action: ArrayLike,
         observation: Mapping[str, Any],
         outcome: tuple[float, int, int, float, float],
+        info: Mapping[str, Any],
     ) -> None:
-        """Complete a step with the values of `OUTCOME`, and begin the next one."""
+        """Complete a step with the values of `OUTCOME`, and begin the next one.
+
+        The labels of `Disturbance` are in `info`.
+        """
         at = self._rows.at
         try:
             self._actions[at] = action
             for column, value in zip(self._outcome, outcome, strict=True):
                 column[at] = value
+            for name in self._labels:
+                self._rows.pair[name][at] = info[name]
             self._write_state(1 - at, observation)
         except KeyError as error:
             raise DatasetError(
@@ -148,7 +159,8 @@ class StepBuffer:
         """Return columns by name, read-only, and the state after the last action."""
         rows = self._rows.rows()
         before, after = rows[:-1], rows[1:]
-        columns = {name: before[name] for name in ("states", "actions", *OUTCOME)}
+        names = ("states", "actions", *OUTCOME, *self._labels)
+        columns = {name: before[name] for name in names}
         for group, some in (("obs", before), ("next_obs", after))[: 1 + next_obs]:
             columns |= {f"{group}/{key}": self._column(some, key) for key in self._keys}
         return columns, rows["states"][-1].copy()

@@ -78,7 +78,7 @@ def convert(
             source=source,
             out=out,
             executor=executor,
-            on_piece=lambda item: on_progress(len(item.payload["piece"]["names"])),
+            on_piece=lambda item, _: on_progress(len(item.payload["piece"]["names"])),
         )
         written = work_folder(out) / "written" / out.name
         chosen.finish(dataset, written, [result for _, result in done])

@@ -1,0 +1,73 @@
+"""`wbc-suite multiply`: many demonstrations from few."""
+
+from typing import Annotated, Any
+
+import typer
+
+from wbc_suite.cli import options
+from wbc_suite.cli.record import (
+    HorizonOption,
+    NextObsOption,
+    NoiseOption,
+    OutOption,
+    WorkersOption,
+    record_policy,
+)
+
+OF_ROBOTS = ("robots", "controller_configs", "gripper_types", "base_types")
+
+
+def multiply(
+    file: options.RecordingArgument,
+    *,
+    out: OutOption,
+    episodes: Annotated[int, typer.Option(min=1, help="How many to keep.")] = 1000,
+    robots: options.RobotsOption = None,
+    controller: options.ControllerOption = None,
+    gripper: options.GripperOption = None,
+    base: options.BaseOption = None,
+    benchmark: Annotated[
+        str | None,
+        typer.Option(help="Another variant of the benchmark, by name or file."),
+    ] = None,
+    horizon: HorizonOption = None,
+    noise: NoiseOption = 0.05,
+    seed: Annotated[int, typer.Option(min=0, help="Of the first scene.")] = 100_000,
+    next_obs: NextObsOption = False,
+    executor: options.ExecutorOption = "process",
+    workers: WorkersOption = None,
+    catalogue: options.CatalogueOption = None,
+) -> None:
+    """Make many demonstrations from few, in new scenes, in the manner of MimicGen.
+
+    Recorded episodes are divided where fingers begin and cease to hold an object. Each
+    piece is moved with its object to a new scene, the pieces are joined, and the result
+    is played, with noise on actions. Only episodes that succeed are kept; the share of
+    them is printed. With --robots, the hands of other robots do the same. A command
+    that was stopped goes on when it is given again.
+
+    Example: wbc-suite record Stack --episodes 10 --only-success -o ten.hdf5; wbc-suite
+    multiply ten.hdf5 --episodes 1000 -o thousand.hdf5
+    """
+    from wbc_suite.evaluation.generation import Plan
+    from wbc_suite.recording import Dataset, EnvSource, rebuild
+
+    with Dataset(file) as dataset:
+        source = EnvSource.parse(str(dataset.header.get("env_args", "")))
+        rebuild(dataset).close()  # refuses what must not be made
+    given: dict[str, Any] = options.environment_arguments(
+        robots=robots, controller=controller, gripper=gripper, base=base
+    )
+    recorded = dict(source.arguments)
+    if robots:
+        recorded = {k: v for k, v in recorded.items() if k not in OF_ROBOTS}
+    if horizon:
+        given["horizon"] = horizon
+    plan = Plan(
+        benchmark=benchmark or source.benchmark,
+        arguments=recorded | given | {"terminate_on_success": True},
+        policy=str(file.resolve()),
+        noise=noise,
+        next_obs=next_obs,
+    )
+    record_policy(plan, out, episodes, seed, executor=executor, workers=workers)
