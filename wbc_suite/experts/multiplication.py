@@ -28,6 +28,7 @@ from wbc_suite.experts.demonstrations import (
 from wbc_suite.experts.workcell import Steps, Workcell
 from wbc_suite.typing import Vector
 
+QUARTER = np.array([0.0, 0.0, np.pi / 2])  # rad
 FAST, QUICK = 1.5, 4.0  # m/s, rad/s of goals
 LAG, LAG_TURN = 0.06, 0.4  # m, rad; the next goal waits for a hand that lags so far
 PATIENCE = 40  # control periods that it waits in a stage at most
@@ -76,6 +77,21 @@ class Multiplied:
         return self._cell.action()
 
 
+@dataclass(frozen=True, kw_only=True)
+class Source:
+    """A stage of a demonstration, see `Demonstration.stages`.
+
+    Attributes:
+        turn: Turn of the object in its frame that makes no difference.
+    """
+
+    demo: Demonstration
+    start: int
+    stop: int
+    name: str
+    turn: pin.SE3
+
+
 def multiply(cell: Workcell[Any], demos: Sequence[Demonstration]) -> Steps[None]:
     """Do what demonstrations did, each stage as the source that fits the scene best.
 
@@ -84,15 +100,16 @@ def multiply(cell: Workcell[Any], demos: Sequence[Demonstration]) -> Steps[None]
     done: list[str] = []
     while names := _next_names(demos, done):
         found = [
-            (demo, start, stop)
+            Source(demo=demo, start=start, stop=stop, name=name, turn=turn)
             for demo in demos
             for start, stop, name in demo.stages
             if name in names
+            for turn in _symmetries(cell, name)
         ]
-        demo, start, stop = _choose(cell, found)
-        if not (yield from _play(cell, demo, start, stop)):
+        source = _choose(cell, found)
+        if not (yield from _play(cell, source)):
             return
-        done.append(next(name for first, _, name in demo.stages if first == start))
+        done.append(source.name)
     for _ in range(ENDING):
         yield
 
@@ -102,6 +119,19 @@ def _next_names(demos: Sequence[Demonstration], done: Sequence[str]) -> set[str]
     orders = ([name for _, _, name in demo.stages] for demo in demos)
     k = len(done)
     return {o[k] for o in orders if len(o) > k and sorted(o[:k]) == sorted(done)}
+
+
+def _symmetries(cell: Workcell[Any], name: str) -> list[pin.SE3]:
+    """Return quarter turns about an object's z axis after which it can be held alike."""
+    sites = [site.pose for site in cell.grasps(name)] if name else []
+    turns = [pin.SE3(pin.exp3(k * QUARTER), np.zeros(3)) for k in range(4)]
+
+    def is_site(pose: pin.SE3) -> bool:
+        return any(pose.isApprox(site, 1e-6) for site in sites)
+
+    if not sites:
+        return turns[:1]
+    return [turn for turn in turns if all(is_site(turn * site) for site in sites)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,56 +161,63 @@ class Motion:
 def _motion(
     cell: Workcell[Any],
     arm: Arm,
-    demo: Demonstration,
     track: Track,
     segment: Segment,
+    source: Source,
     *,
     begun: bool = True,
 ) -> Motion:
     """Return the motion of a segment that begins now, or may come later."""
-    at, name = segment.start, segment.name
-    source = demo.objects[name]
+    at, objects = segment.start, source.demo.objects
+    recorded = objects[segment.name]
+
+    def pose() -> pin.SE3:
+        return cell.pose(segment.name) * source.turn
+
     if not segment.held:
         A = arm.pose * track.hands[at].inverse()
-        fixed = cell.pose(name) * source[at].inverse()
+        fixed = pose() * recorded[at].inverse()
 
         def follow(k: int) -> pin.SE3:
-            return cell.pose(name) * source[k].inverse() if begun else fixed
+            return pose() * recorded[k].inverse() if begun else fixed
 
         return Motion(segment=segment, A=A, B=follow, grip=pin.SE3.Identity)
-    A, B = cell.pose(name) * source[at].inverse(), pin.SE3.Identity()
+    A, B = pose() * recorded[at].inverse(), pin.SE3.Identity()
     if segment.onto:
-        B = cell.pose(segment.onto) * demo.objects[segment.onto][at].inverse()
-    in_source = track.hands[at].actInv(source[at])
+        lower, before = cell.pose(segment.onto), objects[segment.onto][at].inverse()
+        turns = _symmetries(cell, segment.onto)
+        ways = [lower * turn * before for turn in turns]
+        B = min(
+            ways, key=lambda way: np.linalg.norm(pin.log3((A.inverse() * way).rotation))
+        )
+    in_source = track.hands[at].actInv(recorded[at])
     last = [in_source.inverse()]
 
     def grip() -> pin.SE3:
-        if begun and cell.holds(arm, name):
-            last[0] = cell.pose(name).actInv(arm.pose)
+        if begun and cell.holds(arm, segment.name):
+            last[0] = pose().actInv(arm.pose)
         return in_source * last[0]
 
     return Motion(segment=segment, A=A, B=lambda _: B, grip=grip)
 
 
-def _choose(
-    cell: Workcell[Any], found: Sequence[tuple[Demonstration, int, int]]
-) -> tuple[Demonstration, int, int]:
+def _choose(cell: Workcell[Any], found: Sequence[Source]) -> Source:
     """Draw one of the sources whose goals the hands follow about as well as any."""
-    costs = np.array([_cost(cell, *each) for each in found])
+    costs = np.array([_cost(cell, each) for each in found])
     good = np.flatnonzero(costs <= costs.min() + SPREAD)
     return found[int(cell.rng.choice(good))]
 
 
-def _cost(cell: Workcell[Any], demo: Demonstration, start: int, stop: int) -> float:
+def _cost(cell: Workcell[Any], source: Source) -> float:
     """Return the cost of the outlooks of all hands along a stage."""
     total = 0.0
-    for arm, track in zip(cell.arms, demo.tracks, strict=True):
+    for arm, track in zip(cell.arms, source.demo.tracks, strict=True):
         poses: list[pin.SE3] = []
         near: list[tuple[int, str]] = []
         for segment in track.segments:
-            if not start <= segment.start < stop:
+            if not source.start <= segment.start < source.stop:
                 continue
-            motion = _motion(cell, arm, demo, track, segment, begun=False)
+            motion = _motion(cell, arm, track, segment, source, begun=False)
             if not segment.held and not near:
                 near = [(len(poses) + k, segment.name) for k in range(1, len(SAMPLES))]
             goals = track.goals[segment.start : segment.stop]
@@ -194,21 +231,19 @@ def _cost(cell: Workcell[Any], demo: Demonstration, start: int, stop: int) -> fl
     return total
 
 
-def _play(
-    cell: Workcell[Any], demo: Demonstration, start: int, stop: int
-) -> Steps[bool]:
+def _play(cell: Workcell[Any], source: Source) -> Steps[bool]:
     """Give the goals of a stage; return whether each object was held where it was."""
     motions: dict[Arm, Motion] = {}
     patience = PATIENCE
-    for k in range(start, stop):
-        for arm, track in zip(cell.arms, demo.tracks, strict=True):
+    for k in range(source.start, source.stop):
+        for arm, track in zip(cell.arms, source.demo.tracks, strict=True):
             segment = next((s for s in track.segments if s.start <= k < s.stop), None)
             if segment is None:  # a hand that holds nothing
                 continue
             if arm not in motions or motions[arm].segment is not segment:
                 if segment.held and not (yield from _held(cell, arm, segment.name)):
                     return False
-                motions[arm] = _motion(cell, arm, demo, track, segment)
+                motions[arm] = _motion(cell, arm, track, segment, source)
             goal = motions[arm].pose(track.goals[k], k)
             arm.aim(goal, speed=FAST, turn=QUICK, exact=False)
             (arm.close if track.closes[k] else arm.open)()
