@@ -30,7 +30,7 @@ from wbc_suite.typing import Vector
 
 QUARTER = np.array([0.0, 0.0, np.pi / 2])  # rad
 FAST, QUICK = 1.5, 4.0  # m/s, rad/s of goals
-LAG, LAG_TURN = 0.06, 0.4  # m, rad; the next goal waits for a hand that lags so far
+LAG, LAG_TURN = 0.01, 0.1  # m, rad; a goal waits for hands that lag so much more
 PATIENCE = 40  # control periods that it waits in a stage at most
 CLOSING = 10  # control periods that another gripper may need more
 ENDING = 10  # control periods after the last goal
@@ -122,7 +122,7 @@ def _next_names(demos: Sequence[Demonstration], done: Sequence[str]) -> set[str]
 
 
 def _symmetries(cell: Workcell[Any], name: str) -> list[pin.SE3]:
-    """Return quarter turns about an object's z axis after which it can be held alike."""
+    """Return quarter turns about an object's z axis that keep its grasp sites."""
     sites = [site.pose for site in cell.grasps(name)] if name else []
     turns = [pin.SE3(pin.exp3(k * QUARTER), np.zeros(3)) for k in range(4)]
 
@@ -248,15 +248,22 @@ def _play(cell: Workcell[Any], source: Source) -> Steps[bool]:
             arm.aim(goal, speed=FAST, turn=QUICK, exact=False)
             (arm.close if track.closes[k] else arm.open)()
         yield
-        while patience and any(_lags(arm) for arm in motions):
+        while patience and any(
+            _lags(arm, track, k)
+            for arm, track in zip(cell.arms, source.demo.tracks, strict=True)
+            if arm in motions
+        ):
             patience -= 1
             yield
     return True
 
 
-def _lags(arm: Arm) -> bool:
+def _lags(arm: Arm, track: Track, k: int) -> bool:
+    """Whether a hand is farther from its goal than the source's was after action k."""
+    error = track.hands[min(k + 1, len(track.hands) - 1)].actInv(track.goals[k])
     far, turn = arm.error()
-    return far > LAG or turn > LAG_TURN
+    more = far - float(np.linalg.norm(error.translation))
+    return more > LAG or turn - np.linalg.norm(pin.log3(error.rotation)) > LAG_TURN
 
 
 def _held(cell: Workcell[Any], arm: Arm, name: str) -> Steps[bool]:
