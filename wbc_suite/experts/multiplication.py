@@ -262,8 +262,9 @@ def _lags(arm: Arm, track: Track, k: int) -> bool:
     """Whether a hand is farther from its goal than the source's was after action k."""
     error = track.hands[min(k + 1, len(track.hands) - 1)].actInv(track.goals[k])
     far, turn = arm.error()
-    more = far - float(np.linalg.norm(error.translation))
-    return more > LAG or turn - np.linalg.norm(pin.log3(error.rotation)) > LAG_TURN
+    far -= float(np.linalg.norm(error.translation))
+    turn -= float(np.linalg.norm(pin.log3(error.rotation)))
+    return far > LAG or turn > LAG_TURN
 
 
 def _held(cell: Workcell[Any], arm: Arm, name: str) -> Steps[bool]:
