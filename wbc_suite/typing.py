@@ -49,6 +49,7 @@ RobotName: TypeAlias = Literal[
     "Tiago",
     "TiagoDifferential",
     "UR5e",
+    "VX300S",
     "XArm7",
 ]
 """Robots of the catalogue, as editors complete them; case is ignored."""
