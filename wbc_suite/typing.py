@@ -28,6 +28,7 @@ CompiledRecords: TypeAlias = Any
 """Such an array, or one of its records, in a kernel: fields are attributes."""
 
 RobotName: TypeAlias = Literal[
+    "Arx5",
     "Baxter",
     "GR1",
     "GR1ArmsOnly",
@@ -51,5 +52,6 @@ RobotName: TypeAlias = Literal[
     "UR5e",
     "VX300S",
     "XArm7",
+    "Z1",
 ]
 """Robots of the catalogue, as editors complete them; case is ignored."""
