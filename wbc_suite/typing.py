@@ -28,6 +28,7 @@ CompiledRecords: TypeAlias = Any
 """Such an array, or one of its records, in a kernel: fields are attributes."""
 
 RobotName: TypeAlias = Literal[
+    "Aloha",
     "Arx5",
     "Baxter",
     "GR1",
