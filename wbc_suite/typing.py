@@ -53,6 +53,7 @@ RobotName: TypeAlias = Literal[
     "UR5e",
     "VX300S",
     "XArm7",
+    "Yumi",
     "Z1",
 ]
 """Robots of the catalogue, as editors complete them; case is ignored."""
