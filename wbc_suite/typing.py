@@ -40,6 +40,7 @@ RobotName: TypeAlias = Literal[
     "IIWA14",
     "Jaco",
     "Kinova3",
+    "PR2",
     "Panda",
     "PandaDexLH",
     "PandaDexRH",
