@@ -20,7 +20,7 @@ IN_STRIP = (
     *("UR5e", "Jaco", "InspireRightHand", "RobotiqThreeFingerGripper"),
 )
 DOWN = (0.0, 1.0, 0.0, 0.0)  # grippers reach along +z, and are shown reaching down
-SHORT = {"bd": "BD", "pal": "PAL", "xarm7": "XArm7"}
+SHORT = {"bd": "BD", "pal": "PAL", "pr2": "PR2", "umi": "UMI", "xarm7": "XArm7"}
 HEAD = """# Gallery
 
 Any gripper goes on any arm, and any arm on any base:

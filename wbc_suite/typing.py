@@ -28,6 +28,8 @@ CompiledRecords: TypeAlias = Any
 """Such an array, or one of its records, in a kernel: fields are attributes."""
 
 RobotName: TypeAlias = Literal[
+    "Aloha",
+    "Arx5",
     "Baxter",
     "GR1",
     "GR1ArmsOnly",
@@ -38,17 +40,28 @@ RobotName: TypeAlias = Literal[
     "IIWA14",
     "Jaco",
     "Kinova3",
+    "Kinova3Omron",
+    "PR2",
     "Panda",
     "PandaDexLH",
     "PandaDexRH",
+    "PandaDexRHOmron",
     "PandaOmron",
     "Sawyer",
+    "SawyerOmron",
     "Spot",
     "SpotWithArm",
     "SpotWithArmFloating",
     "Tiago",
     "TiagoDifferential",
     "UR5e",
+    "UR5eDexRH",
+    "UR5eDexRHOmron",
+    "UR5eOmron",
+    "VX300S",
+    "VX300SMobile",
     "XArm7",
+    "Yumi",
+    "Z1",
 ]
 """Robots of the catalogue, as editors complete them; case is ignored."""

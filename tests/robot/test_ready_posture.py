@@ -193,4 +193,4 @@ def test_capsules_are_apart_at_every_keyframe(name):
     configuration = sampler.configuration
     for keyframe in sampler.lone.robot.keyframes:
         configuration.update(configuration.model.referenceConfigurations[keyframe])
-        assert sampler.distance() > 0.0, f"{keyframe}: {sampler.limit.label(0)}"
+        assert sampler.distance() > 0.0, f"{keyframe}: {sampler.limit.subject(0)}"
