@@ -29,6 +29,7 @@ import wbc_suite
 from wbc_suite.evaluation import success_interval
 from wbc_suite.evaluation.generation import Plan, generate
 from wbc_suite.evaluation.rollouts import run_episode
+from wbc_suite.scene.placement import Region, UniformSampler
 from wbc_suite.wrappers import Disturbance
 
 ROOT = Path(__file__).parent.parent
@@ -50,6 +51,11 @@ CASES = (
     *("Stack:Sawyer", "Stack:UR5e", "Stack:IIWA"),
     *("TwoArmLift", "TwoArmHandover", "TwoArmTransport"),
 )
+SQUARES = {
+    "SquareD1": Region(x=(-0.115, 0.115), y=(-0.255, 0.255)),
+    "SquareD2": Region(x=(-0.2, 0.13), y=(-0.32, 0.32)),
+}
+"""Regions of the nut, m from the middle of the table; that of D0 is 0.5 x 11.5 cm."""
 SOURCES, NOISE, FIRST = 10, 0.05, 100_000
 LONG = ("TwoArmTransport", "ToolHang", "NutAssembly", "PickPlace")
 
@@ -70,16 +76,22 @@ def sources(benchmark: str) -> Path:
     return path
 
 
+def placement(region: Region) -> UniformSampler:
+    """Return what places the square nut in another region of the table."""
+    return UniformSampler(names=["SquareNut"], region=region, origin=(0.0, 0.0, 0.82))
+
+
 def measure(case: str, attempts: int) -> dict[str, Any]:
     """Return how many attempts of a case succeed, and what they cost."""
     benchmark, _, robot = case.partition(":")
-    variant = Path(__file__).parent / "square" / f"square_{benchmark[-2:].lower()}.toml"
-    known = "NutAssemblySquare" if variant.exists() else benchmark
+    region = SQUARES.get(benchmark)
+    known = "NutAssemblySquare" if region else benchmark
     robots = ["Panda", "Panda"] if benchmark[:6] == "TwoArm" else robot or "Panda"
     policy, horizon = str(sources(known)), 1000 if benchmark in LONG else 500
     env = wbc_suite.make(
-        variant if variant.exists() else benchmark,
+        known,
         robots=robots,
+        placement_initializer=region and placement(region),
         horizon=horizon,
         terminate_on_success=True,
     )

@@ -109,6 +109,8 @@ class Run:
 class Demonstrations:
     """Observations and actions of recorded episodes, normalised.
 
+    Where actions were disturbed, those that were intended are imitated.
+
     Attributes:
         observations: Of each episode, shape (steps, observation size).
         actions: Of each episode, shape (steps, action size), between -1 and 1.
@@ -128,7 +130,10 @@ class Demonstrations:
                 np.concatenate([e.columns[f"obs/{key}"] for key in keys], axis=1)
                 for e in played
             ]
-            acted = [np.asarray(e.columns["actions"]) for e in played]
+            acted = [
+                np.asarray(e.columns.get("intended", e.columns["actions"]))
+                for e in played
+            ]
         every, moves = np.concatenate(seen), np.concatenate(acted)
         self.scales = {
             "mean": every.mean(axis=0),
