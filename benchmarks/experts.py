@@ -20,7 +20,7 @@ from typing import Any
 from harness.report import Report, machine, options
 
 import wbc_suite
-from wbc_suite.evaluation import summarise
+from wbc_suite.evaluation import success_interval
 from wbc_suite.evaluation.rollouts import run_episode
 
 ROOT = Path(__file__).parent.parent
@@ -50,7 +50,6 @@ def measure(
     env = wbc_suite.make(name, terminate_on_success=True, **arguments)
     played = [run_episode(env, env, seed, "expert") for seed in seeds]
     env.close()
-    found = summarise(played)
     steps = [e["steps"] for e in played if e["succeeded"]]
     return {
         "benchmark": name,
@@ -58,7 +57,7 @@ def measure(
         "controller": controller or "default",
         "successes": len(steps),
         "episodes": len(played),
-        "interval": found.interval,
+        "interval": success_interval(len(steps), len(played)),
         "median_steps": statistics.median(steps) if steps else None,
         "most_steps": max(steps, default=None),
         "failed": [e["seed"] for e in played if not e["succeeded"]],

@@ -119,26 +119,18 @@ def record(
         robots=robots, controller=controller, gripper=gripper, base=base
     )
     arguments |= options.camera_arguments(camera, size)
-    arguments |= {"control_freq": rate, "terminate_on_success": not by_hand}
-    if horizon or by_hand:
-        arguments["horizon"] = round(ONE_DAY * rate) if by_hand else horizon
+    arguments |= _timing(rate, horizon, by_hand=by_hand)
+    common: dict[str, Any] = {"benchmark": benchmark, "arguments": arguments}
     if not by_hand:
-        plan = Plan(
-            benchmark=benchmark,
-            arguments=arguments,
-            policy=device,
-            noise=noise,
-            pushes=recoveries,
-            only_success=only_success,
-            next_obs=next_obs,
-        )
+        kept: dict[str, Any] = {"only_success": only_success, "next_obs": next_obs}
+        disturbed: dict[str, Any] = {"noise": noise, "pushes": recoveries}
+        plan = Plan(**common, policy=device, **kept, **disturbed)
         record_policy(plan, out, episodes, seed, executor=executor, workers=workers)
         return
     _record_by_hand(
-        benchmark,
         out,
-        arguments,
         RecordingPlan(episodes=episodes, horizon=horizon, only_success=only_success),
+        **common,
         device=device_maker(device, device_option),
         next_obs=next_obs,
         names=(" and ".join(named), benchmark),
@@ -188,12 +180,20 @@ def record_policy(
         print(f"Gave up: {found.kept} of {episodes} are kept.", file=sys.stderr)
 
 
+def _timing(rate: float, horizon: int | None, *, by_hand: bool) -> dict[str, Any]:
+    """Return the arguments of `make` that say how fast and how long episodes are."""
+    timing: dict[str, Any] = {"control_freq": rate, "terminate_on_success": not by_hand}
+    if horizon or by_hand:
+        timing["horizon"] = round(ONE_DAY * rate) if by_hand else horizon
+    return timing
+
+
 def _record_by_hand(
-    benchmark: str,
     out: Path,
-    arguments: dict[str, Any],
     plan: "RecordingPlan",
     *,
+    benchmark: str,
+    arguments: dict[str, Any],
     device: "Callable[[Any], Any]",
     next_obs: bool,
     seed: int,
