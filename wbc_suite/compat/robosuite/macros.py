@@ -1,4 +1,9 @@
-"""Settings of the process, under robosuite's names."""
+"""Settings of the process, under robosuite's names.
+
+A `macros_private.py` beside this file, as `setup_macros` writes it, comes after these.
+"""
+
+import contextlib
 
 SIMULATION_TIMESTEP = 0.002
 """Duration of a physics step, s."""
@@ -15,3 +20,6 @@ DUALSENSE_VENDOR_ID = 0x054C
 DUALSENSE_PRODUCT_ID = 0x0CE6
 CONSOLE_LOGGING_LEVEL = "INFO"
 FILE_LOGGING_LEVEL = None
+
+with contextlib.suppress(ImportError):
+    from wbc_suite.compat.robosuite.macros_private import *  # noqa: F403  # pyright: ignore[reportMissingImports, reportWildcardImportFromLibrary]
