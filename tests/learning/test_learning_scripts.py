@@ -39,7 +39,7 @@ def demonstrations(tmp_path_factory):
 
 
 def test_every_script_has_its_settings():
-    scripts = {path.stem for path in SCRIPTS.glob("*.py")} - {"training"}
+    scripts = {path.stem for path in SCRIPTS.glob("*.py")} - {"training", "imitation"}
     assert scripts == {path.stem for path in SCRIPTS.glob("*.toml")}
     assert scripts == {"sac", *CLONING}
 
@@ -68,6 +68,7 @@ def test_cloning_trains_goes_on_and_is_evaluated(name, demonstrations, tmp_path)
     rows = [json.loads(line) for line in (tmp_path / "log.jsonl").open()]
     losses = [row["loss"] for row in rows if "loss" in row]
     assert losses[-1] < losses[0]
+    assert [row["step"] for row in rows if "success" in row][-3:] == [20, 40, 60]
     assert (tmp_path / "curves.png").stat().st_size > 1000
     assert list((tmp_path / "tensorboard").iterdir())
 
