@@ -100,7 +100,8 @@ class _Search:
 
     def candidates(self, arm: _Arm, earlier: Sequence[_Arm]) -> Iterator[Vector]:
         """Yield postures of an arm, best first: mirror images, then random ones."""
-        yield from filter(None.__ne__, (self._mirrored(arm, x) for x in earlier))
+        images = (self._mirrored(arm, x) for x in earlier)
+        yield from (values for values in images if values is not None)
         rng, half = np.random.default_rng(0), (arm.high - arm.low) / 2
         drawn = rng.uniform(arm.low, arm.high, size=(DRAWS, len(arm.q)))
         drawn += rng.uniform(0.0, 0.8, size=(DRAWS, 1)) * (self.q[arm.q] - drawn)
