@@ -11,7 +11,7 @@ Run it where learning is installed:
     .venv-learning/bin/python benchmarks/learning.py --table
 
 Usage: learning.py [BENCHMARK ...] [--robots Panda Sawyer] [--controllers C ...]
-    [--seeds 5] [--steps 1250000] [--quick] [--json FILE]
+    [--seeds 5] [--steps 1250000] [--evaluate 50] [--quick] [--json FILE]
        learning.py --published FOLDER
 
 The last one reads the logs of github.com/ARISE-Initiative/robosuite-benchmark (2020,
@@ -23,6 +23,7 @@ import datetime
 import itertools
 import json
 import sys
+import tempfile
 import time
 from pathlib import Path
 from typing import Any
@@ -76,9 +77,10 @@ def published(benchmark: str, robots: str, controller: str) -> dict[str, Any] | 
 
 
 def measure(
-    benchmark: str, robots: str, controller: str, seed: int, steps: int
+    case: tuple[str, str, str, int, int], evaluate: int, folder: Path
 ) -> dict[str, Any]:
-    """Train from the last checkpoint on; return the curve and what it came to."""
+    """Train a case from the last checkpoint in a folder on, and evaluate episodes."""
+    benchmark, robots, controller, seed, steps = case
     sys.path.insert(0, str(SCRIPTS))
     import sac
     from training import Settings, read_settings
@@ -86,20 +88,22 @@ def measure(
     name = f"{benchmark}-{robots.replace(',', '')}-{controller}-seed{seed}"
     settings = read_settings(SCRIPTS / "sac.toml")
     settings |= {
-        "folder": str(ROOT / "artifacts" / "learning" / name),
+        "folder": str(folder / name),
         "benchmark": benchmark,
         "robots": robots.split(",") if "," in robots else robots,
         "controller": controller,
         "seed": seed,
         "steps": steps,
+        "evaluate": evaluate,
     }
     settings = Settings(settings)
     begun = time.perf_counter()
-    model, folder = sac.train(settings)
+    model, run = sac.train(settings)
     found = sac.evaluate(settings, lambda o: model.predict(o, deterministic=True)[0])
-    lines = (folder / "curve.jsonl").read_text("utf-8").splitlines()
+    curve = run / "curve.jsonl"
+    lines = curve.read_text("utf-8").splitlines() if curve.exists() else []
     return {
-        **dict(zip(KEY, (benchmark, robots, controller, seed, steps), strict=True)),
+        **dict(zip(KEY, case, strict=True)),
         "return": round(float(np.mean([total for total, _ in found])), 1),
         "success": float(np.mean([solved for _, solved in found])),
         "evaluated": len(found),
@@ -202,6 +206,7 @@ def main() -> None:
     parser.add_argument("--controllers", nargs="+", default=CONTROLLERS)
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--steps", type=int, default=1_250_000)
+    parser.add_argument("--evaluate", type=int, default=50, help="episodes")
     parser.add_argument("--table", action="store_true", help=f"write {PAGE.name}")
     parser.add_argument("--published", type=Path, metavar="FOLDER")
     given = parser.parse_args()
@@ -212,10 +217,12 @@ def main() -> None:
     if given.table:
         write_page(known_rows())
         return
+    folder = ROOT / "artifacts" / "learning"
     report, seen = Report(), {tuple(row[k] for k in KEY) for row in known_rows()}
     if given.quick:
         given.benchmarks, given.robots = ["Lift"], ["Panda"]
         given.controllers, given.seeds, given.steps = CONTROLLERS[:1], 1, 800
+        given.evaluate, folder = 1, Path(tempfile.mkdtemp())
     for benchmark, robot, controller, seed in itertools.product(
         given.benchmarks or BENCHMARKS,
         given.robots,
@@ -225,7 +232,7 @@ def main() -> None:
         robots = f"{robot},{robot}" if benchmark.startswith("TwoArm") else robot
         case = (benchmark, robots, controller, seed, given.steps)
         if case not in seen:
-            row = measure(*case)
+            row = measure(case, given.evaluate, folder)
             if not given.quick:
                 add(row)
             print(table([row]).splitlines()[2], flush=True)
