@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from fnmatch import fnmatch
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -45,17 +46,21 @@ class Demonstrations:
     Attributes:
         observations: Of each episode, shape (steps, observation size).
         actions: Of each episode, shape (steps, action size), between -1 and 1.
+        keys: Of what is observed.
         scales: Means and deviations of observations, and bounds of actions; part of a
             checkpoint.
     """
 
-    def __init__(self, path: str, keys: Sequence[str], episodes: int) -> None:
+    def __init__(self, path: str, patterns: Sequence[str], episodes: int) -> None:
         seen, acted = [], []
         with Dataset(Path(path)) as dataset:
             for name in dataset.names[:episodes]:
                 columns = dataset.episode(name).columns
-                each = [columns[f"obs/{key}"] for key in keys]
-                seen.append(np.concatenate(each, axis=1))
+                known = {k[4:]: v for k, v in columns.items() if k[:4] == "obs/"}
+                self.keys = [
+                    key for p in patterns for key in sorted(known) if fnmatch(key, p)
+                ]
+                seen.append(observe(known, self.keys))
                 acted.append(np.asarray(columns.get("intended", columns["actions"])))
         if not seen:
             raise SystemExit(f"{path} has no episodes: wbc-suite record makes some.")
@@ -109,8 +114,31 @@ def _range(scales: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def observe(observation: Mapping[str, Any], keys: Sequence[str]) -> np.ndarray:
-    """Return the observed vectors in one."""
-    return np.concatenate([np.ravel(observation[key]) for key in keys])
+    """Return the observed vectors in one, along the last axis.
+
+    Of orientations it has two columns of the rotation matrix: a quaternion and its
+    negative are the same, and a network should not see them jump.
+    """
+    parts = [np.asarray(observation[key]) for key in keys]
+    return np.concatenate(
+        [
+            _columns(part) if key.endswith("_quat") else part
+            for key, part in zip(keys, parts, strict=True)
+        ],
+        axis=-1,
+    )
+
+
+def _columns(quat_xyzw: np.ndarray) -> np.ndarray:
+    """Return two columns of rotation matrices, shape (..., 6).
+
+    Source: Zhou et al. (2019), "On the Continuity of Rotation Representations in Neural
+    Networks", CVPR.
+    """
+    x, y, z, w = np.moveaxis(quat_xyzw, -1, 0)
+    first = 1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)
+    second = 2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)
+    return np.stack([*first, *second], axis=-1)
 
 
 def train(settings: Settings, method: Method) -> Run:
@@ -128,7 +156,8 @@ def train(settings: Settings, method: Method) -> Run:
         rows = torch.as_tensor(rng.integers(len(seen), size=settings.batch))
         return method.loss(model, seen[rows], acted[rows], rng)
 
-    fit(run, model, batch_loss, {"sizes": sizes, "scales": data.scales})
+    facts = {"sizes": sizes, "scales": data.scales, "keys": data.keys}
+    fit(run, model, batch_loss, facts)
     return run
 
 
@@ -143,6 +172,7 @@ class Policies:
         self.model.load_state_dict(saved["model"])
         self.model.eval()
         self.settings, self.scales = Settings(saved["settings"]), saved["scales"]
+        self.keys = saved["keys"]
         torch.set_num_threads(self.settings.threads)
 
     def __call__(self, env: Any, rng: np.random.Generator) -> Act:
@@ -152,7 +182,7 @@ class Policies:
         waiting: list[Tensor] = []
 
         def act(observation: Mapping[str, Any]) -> np.ndarray:
-            now = normalised(observe(observation, self.settings.observed), self.scales)
+            now = normalised(observe(observation, self.keys), self.scales)
             past.extend([now] * (1 if past else self.settings.history))
             del past[: -self.settings.history]
             if not waiting:
