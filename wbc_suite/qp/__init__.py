@@ -16,6 +16,7 @@ from wbc_suite.qp.joint_limits import AccelerationLimit, PositionLimit, Velocity
 from wbc_suite.qp.kernel import Kernel
 from wbc_suite.qp.limit import BoxLimit, Limit, LimitKind, RowLimit
 from wbc_suite.qp.look_at_task import LookAtTask
+from wbc_suite.qp.motion import Approach, Escaping, Motion, Overshoot, Relaxed
 from wbc_suite.qp.posture_task import DampingTask, PostureTask
 from wbc_suite.qp.problem import Problem
 from wbc_suite.qp.report import (
@@ -36,6 +37,7 @@ from wbc_suite.qp.task import JointTask, RowTask, Task
 __all__ = [
     "AccelerationLimit",
     "ActiveLimit",
+    "Approach",
     "BoxLimit",
     "ComTask",
     "Conflict",
@@ -44,6 +46,7 @@ __all__ = [
     "DynamicsSolution",
     "DynamicsStack",
     "Equality",
+    "Escaping",
     "Fallback",
     "FloorLimit",
     "FrameEquality",
@@ -57,12 +60,15 @@ __all__ = [
     "LinkPair",
     "LookAtTask",
     "MomentumTask",
+    "Motion",
     "OutOfReach",
+    "Overshoot",
     "PositionLimit",
     "PostureTask",
     "Problem",
     "Reason",
     "RelativeFrameTask",
+    "Relaxed",
     "RowLimit",
     "RowTask",
     "SelfCollisionLimit",

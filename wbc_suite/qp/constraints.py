@@ -92,7 +92,7 @@ class Constraints:
                 self.rate[rows] = equality.rate
             else:
                 self._python_equalities.append((equality, rows))
-        held = HeldFrames.of(configuration, frames)
+        held = self.held_arrays = HeldFrames.of(configuration, frames)
         self.held = as_argument(held)
         self._targets = list(held.target)  # copies live as long as these views
         for (equality, _), target in zip(frames, self._targets, strict=True):

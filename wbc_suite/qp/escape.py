@@ -64,6 +64,11 @@ class Escape:
         self._targets: Vector | None = None  # of the search or drive
         self._simulated: Vector | None = None  # targets that have been simulated
 
+    @property
+    def driven(self) -> Sequence[int]:
+        """Velocity indices that are driven now."""
+        return () if self._drive is None else self._drive.joints.tolist()
+
     def update(self, dt: float) -> None:
         """Write the bias of the next tick to the tasks of the stack's first level."""
         v = self._stack.v_previous

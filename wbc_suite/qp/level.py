@@ -151,6 +151,8 @@ def tick_layout(
         ("v", float, (nv,)),
         ("residual", float, (1,)),
         ("all_finite", float, (1,)),
+        ("overshoot_damping", float, (1,)),
+        ("before", float, (2, nv)),
     ]
     for k, own in enumerate(by_level(tasks)):
         level, m = with_rows([task for task in own if isinstance(task, RowTask)])

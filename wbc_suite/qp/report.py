@@ -169,6 +169,7 @@ class TickRecord(NamedTuple):
     held: tuple[tuple[str, ...], ...]
     pressed: tuple[tuple[Indices, Matrix], ...]
     subjects: Mapping[int, tuple[LimitKind, object, str]]  # by row, with its unit
+    driven: Sequence[int]  # velocity indices that an escape drives
 
     @property
     def levels(self) -> list[LevelRecord]:

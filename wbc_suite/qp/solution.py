@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wbc_suite.qp.motion import Motion, reasons_to_move
 from wbc_suite.qp.report import ActiveLimit, TaskReport, TickRecord
 from wbc_suite.typing import Vector
 
@@ -76,6 +77,15 @@ class Solution(NamedTuple):
         """Whether the problem was solved as stated."""
         return self.fallback is Fallback.NONE and not self.held
 
+    @property
+    def motion(self) -> tuple[Motion, ...]:
+        """Why the robot moves; empty while all joints stand.
+
+        A joint that stands is no faster than 0.005 rad/s or m/s, so that between ticks
+        with an empty `motion` no speed changes by more than 0.01.
+        """
+        return tuple(reasons_to_move(self.record, self.conflicts))
+
     def explain(
         self, *, position_tolerance: float = 1e-3, orientation_tolerance: float = 5e-3
     ) -> dict[str, TaskReport]:
@@ -94,6 +104,7 @@ class Solution(NamedTuple):
             speed = f"{abs(self.v[k]):.3g} {layout.units[k]}/s"
             lines.append(f"  fastest joint: {layout.joints[k]}, {speed}")
         lines += [f"  {report}" for report in self.explain().values()]
+        lines += [f"  moves: {reason}" for reason in self.motion]
         lines += [f"  active: {limit}" for limit in self.active]
         lines += [f"  not kept: {name}" for name in self.conflicts]
         lines += [f"  target not finite: {name}" for name in self.held]

@@ -17,6 +17,7 @@ from wbc_suite.qp.joint_limits import AccelerationLimit, PositionLimit, Velocity
 from wbc_suite.qp.kernel import Kernel
 from wbc_suite.qp.level import Level, by_level, tick_layout
 from wbc_suite.qp.limit import BoxLimit, Limit, LimitKind, unlimited_bounds
+from wbc_suite.qp.overshoot import OvershootArrays
 from wbc_suite.qp.problem import Problem
 from wbc_suite.qp.report import TaskReport, TickRecord
 from wbc_suite.qp.solution import Fallback, Solution
@@ -134,6 +135,15 @@ class TaskStack:
     def _make_arrays(self, results: Records) -> TickArrays:
         """Gather what the kernel reads and writes."""
         rows, nv = self._constraints, self.configuration.nv
+        targets = [level.tasks.target.size for level in self.levels]
+        targets += [level.tasks.joint_target.size for level in self.levels]
+        targets.append(rows.held_arrays.target.size)
+        self._overshoot = OvershootArrays(
+            damping=results["overshoot_damping"],
+            before=results["before"],
+            targets=np.zeros(sum(targets)),
+            at_rest=np.zeros(1),
+        )
         levels = tuple(as_argument(level.arrays) for level in self.levels)
         return TickArrays(
             robot=self.configuration.robot,
@@ -148,6 +158,7 @@ class TaskStack:
             solved=np.zeros(1, dtype=np.int64),
             relax_speed=rows.relax_speed,
             pressure_damping=np.zeros(1),
+            overshoot=as_argument(self._overshoot),
             held=rows.held,
             rate=rows.rate,
             capsules=rows.collision.argument,
@@ -171,6 +182,8 @@ class TaskStack:
             if part is not None:
                 part.reset()
         self._tick.pressure_damping[:] = 0.0
+        for values in self._overshoot:
+            values[:] = 0.0
         self._last = None
 
     def prepare(self, dt: float) -> None:
@@ -259,7 +272,10 @@ class TaskStack:
             if fallback >= Fallback.LIMITS and solved:
                 conflicts = rows.violated(self.levels[0].qp, tick.x, TOLERANCE)
         kinds = tick.kinds.copy()
-        record = TickRecord(self._layout, values, kinds, held, pressed, subjects)
+        driven = self._escape.driven if self._escape is not None else ()
+        record = TickRecord(
+            self._layout, values, kinds, held, pressed, subjects, driven
+        )
         return Solution(
             values[:nv],
             values[nv : 2 * nv],

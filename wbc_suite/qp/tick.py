@@ -17,6 +17,7 @@ from wbc_suite.qp.active_set import QpArrays, solve_warm
 from wbc_suite.qp.equality import HeldFrames, hold_frames
 from wbc_suite.qp.floor_limit import SphereArrays, floor_rows
 from wbc_suite.qp.limit import JointBounds, merge_bounds
+from wbc_suite.qp.overshoot import OvershootArrays, damp_overshoot
 from wbc_suite.qp.problem import UNBOUNDED, worst_violation
 from wbc_suite.qp.self_collision_rows import CapsuleArrays, self_collision_rows
 from wbc_suite.qp.strict_level import LevelArrays, restrict_level
@@ -61,6 +62,7 @@ class TickArrays(NamedTuple):
     solved: Indices  # (1,), output: number of solved levels
     relax_speed: Vector  # (p,), `RowLimit.relax_speed` of each inequality row
     pressure_damping: Vector  # (1,), damping by the rows that tasks press against
+    overshoot: OvershootArrays
     held: HeldFrames  # frames of equality rows
     rate: Vector  # (k,), right-hand side of constant equality rows per second, else NaN
     capsules: CapsuleArrays  # of the self-collision limit
@@ -89,7 +91,9 @@ def solve_tick(tick: TickArrays, dt: float, start: int) -> tuple[int, int]:
         if k == 0:
             if not _begin_tick(tick, dt):
                 return TickStatus.BAD_POSITION.value, 0
+            past, held = tick.overshoot, tick.held
             damping += tick.pressure_damping[0]
+            damping += damp_overshoot(past, levels, tick.level_count, held, tick.v, dt)
         else:
             restrict_level(levels, k, tick.x)
             damping = levels[k - 1].tasks.mu[0]
