@@ -1,8 +1,10 @@
 """A real Chromium, and a GR1 to drive in it."""
 
+import fcntl
 import json
 import os
 import shutil
+import subprocess
 import sys
 import time
 from pathlib import Path
@@ -184,6 +186,23 @@ def browser(tmp_path_factory):
         browser = playwright.chromium.launch(executable_path=gentle, args=FLAGS)
         yield browser
         browser.close()
+
+
+@pytest.fixture(scope="session")
+def packages():
+    """The folder of the npm packages that these tests load."""
+    here = Path(__file__).parent
+    folder = here / "node_modules"
+    with (here / "package-lock.json").open() as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # other workers want them too
+        names = json.loads((here / "package.json").read_text())["dependencies"]
+        if not all((folder / name).exists() for name in names):
+            npm = shutil.which("npm")
+            if npm is None:
+                pytest.skip("There is no npm: apt-get install npm")
+            command = [npm, "ci", "--ignore-scripts", "--no-audit", "--no-fund"]
+            subprocess.run(command, cwd=here, check=True, timeout=300)
+    return folder
 
 
 @pytest.fixture

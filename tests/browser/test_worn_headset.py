@@ -1,8 +1,6 @@
 """An emulated headset in a real Chromium, worn by somebody who moves as people do."""
 
 import json
-import shutil
-import subprocess
 import sys
 import time
 from pathlib import Path
@@ -26,7 +24,6 @@ from human_hand import NAMES, TO_FRAME, around, sign
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
-HERE = Path(__file__).parent
 OPEN, CLOSED = 0.09, 0.02  # m, between the user's thumb and fingers
 INTO = np.array([0.0, 0.0, 0.005])  # m, where the cube is held, above its centre
 STEADY = PipelineConfig(hold_after=3.0)  # software draws a picture in up to a second
@@ -57,19 +54,6 @@ COUNT_PULSES = """() => {
     for (const motor of motors) motor.pulse = async () => { window.pulses += 1 }
     return motors.length > 0
 }"""
-
-
-@pytest.fixture(scope="session")
-def packages():
-    """The folder of the npm packages that these tests load."""
-    folder = HERE / "node_modules"
-    if not folder.exists():
-        npm = shutil.which("npm")
-        if npm is None:
-            pytest.skip("There is no npm: apt-get install npm")
-        command = [npm, "ci", "--ignore-scripts", "--no-audit", "--no-fund"]
-        subprocess.run(command, cwd=HERE, check=True, timeout=300)
-    return folder
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ from wbc_suite.cli.teleop import stages_of
 from wbc_suite.devices import DeviceState, LimbInput, Scripted
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.viewers.scene_setup import limb_colours
-from wbc_suite.viewers.status_text import limbs_html, status_html
+from wbc_suite.viewers.status_text import limbs_html, status_html, task_html
 from wbc_suite.viewers.teleop_session import TeleopSession
 
 ALICE, BOB = 1, 2
@@ -400,7 +400,8 @@ def test_the_status_says_task_and_first_gesture_until_a_limb_was_moved():
     session = TeleopSession(env, period=0.02)
     colours = limb_colours(session.limbs)
     text = status_html(session.snapshot, session.info, colours)
-    assert "Lift &lt;a&gt; cube" in text
+    assert "Lift &lt;a&gt; cube" in task_html(session.info.task)
+    assert "Not solved yet" in text
     assert "Drag an arrow" in text
     session.grab("left_hand", 1, session.snapshot.limbs["left_hand"].target)
     session.tick()

@@ -67,8 +67,14 @@ def _show_version(asked: bool) -> None:
         raise typer.Exit
 
 
+LOADS = ("teleop", "view", "demo", "record", "multiply", "replay", "render", "expert")
+LOADS += ("evaluate", "serve-policy", "bench")
+"""Commands that import for a second before they have something to say."""
+
+
 @app.callback()
 def _options(
+    context: typer.Context,
     *,
     version: Annotated[
         bool,
@@ -78,6 +84,9 @@ def _options(
     ] = False,
 ) -> None:
     del version  # its callback has answered
+    asks_help = not {"-h", "--help"}.isdisjoint(sys.argv)
+    if context.invoked_subcommand in LOADS and sys.stderr.isatty() and not asks_help:
+        print("Loading ...", file=sys.stderr, flush=True)
 
 
 def run() -> None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wbc_suite.typing import Vector
-from wbc_suite.viewers.status_text import plain
+from wbc_suite.viewers.session_state import plain
 
 if TYPE_CHECKING:
     import viser

@@ -54,6 +54,7 @@ class PageProcess:
     Attributes:
         url: The address that opens the page.
         token: Secret that clients need; None on a loopback address.
+        pid: Number of the process.
     """
 
     def __init__(
@@ -70,6 +71,7 @@ class PageProcess:
         )
         with _signals_wait():
             self._process.start()
+        self.pid = self._process.pid
         remote.close()
         self._thread = threading.Thread(target=self._run, name="page", daemon=True)
         self._thread.start()

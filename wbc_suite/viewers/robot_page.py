@@ -12,7 +12,7 @@ from wbc_suite.typing import Vector
 from wbc_suite.viewers.model_scene import ModelScene, robot_box
 from wbc_suite.viewers.page_server import PageServer
 from wbc_suite.viewers.scene_setup import set_camera, set_up_scene
-from wbc_suite.viewers.status_text import plain
+from wbc_suite.viewers.session_state import plain
 
 if TYPE_CHECKING:
     import viser

@@ -1,5 +1,6 @@
 """State of a teleoperation session as its page displays it."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -13,6 +14,16 @@ from wbc_suite.typing import Matrix, Vector
 from wbc_suite.viewers.balance_status import BalanceStatus
 
 
+def plain(name: str) -> str:
+    """Return the name of a joint, link or limb as words.
+
+    `right_elbow_joint` becomes `right elbow`, `robot0_right_hand` becomes
+    `robot 0 right hand`.
+    """
+    name = re.sub(r"^robot(\d+)_", r"robot \1 ", name)
+    return name.removesuffix("_joint").removesuffix("_link").replace("_", " ").strip()
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LimbInfo:
     """Constant properties of a limb: as those of its `LimbPort`."""
@@ -24,9 +35,7 @@ class LimbInfo:
     @property
     def title(self) -> str:
         """The name as it is displayed: `right_hand` becomes `Right hand`."""
-        if self.name == "com":
-            return "Centre of mass"
-        return self.name.replace("_", " ").capitalize()
+        return "Centre of mass" if self.name == "com" else plain(self.name).capitalize()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -20,6 +20,7 @@ from wbc_suite.viewers.session_state import (
     LimbStatus,
     SessionInfo,
     Snapshot,
+    plain,
 )
 
 BLUE, GREEN, YELLOW, RED = "#3f7fbf", "#2f9e56", "#b08a2e", "#c8553d"
@@ -27,11 +28,6 @@ FIRST_DRAG = "Drag an arrow of a handle: the limb follows."
 FIRST_GRIP = "The sliders below open and close grippers."
 FIRST_WALK = "Hold W A S D to move, Q E to turn."
 FIRST_KEY = "Key ? shows all keys."
-
-
-def plain(name: str) -> str:
-    """Return a joint or link name as words: `right_elbow_joint`, `right elbow`."""
-    return name.removesuffix("_joint").removesuffix("_link").replace("_", " ").strip()
 
 
 def describe_reason(reason: Reason) -> str:
@@ -76,7 +72,7 @@ def explain(status: LimbStatus, *, at_most: int = 3) -> str:
 def status_html(
     snapshot: Snapshot, info: SessionInfo, colours: Mapping[str, Colour]
 ) -> str:
-    """Return task and state, with reasons of limbs that miss their target."""
+    """Return the state of a session, with reasons of limbs that miss their target."""
     figures = (
         ("input to joint target", _or_dash(1e3 * snapshot.latency, "ms")),
         ("step time", _or_dash(1e3 * snapshot.step_time, "ms", digits=1)),
@@ -103,15 +99,23 @@ def status_html(
         else ""
     )
     return (
-        "<div style='padding:.5em .7em .6em'>"
-        f"{_task_html(snapshot, info)}"
+        "<div style='padding:0 .7em .6em'>"
+        f"{_state_html(snapshot, info)}"
         f"<div style='display:flex;gap:.4em'>{cells}</div>"
         f"{_recording_html(snapshot)}{fall}{reasons}</div>"
     )
 
 
-def _task_html(snapshot: Snapshot, info: SessionInfo) -> str:
-    """Return the task, the state of the attempt, and the first thing to do."""
+def task_html(task: str) -> str:
+    """Return the task as the heading of the page."""
+    return (
+        "<h1 style='font-weight:600;font-size:1.1em;margin:0;padding:.5em .64em 0'>"
+        f"{html.escape(task)}</h1>"
+    )
+
+
+def _state_html(snapshot: Snapshot, info: SessionInfo) -> str:
+    """Return the state of the attempt, and the first thing to do."""
     state, colour = _state(snapshot, info)
     attempts = f"attempt {snapshot.epoch + 1}, {snapshot.solved} solved"
     hint = ""
@@ -125,8 +129,6 @@ def _task_html(snapshot: Snapshot, info: SessionInfo) -> str:
         text = " ".join(text for text, is_possible in hints.items() if is_possible)
         hint = f"<div style='margin-bottom:.5em;font-size:.88em'>{text}</div>"
     return (
-        "<h1 style='font-weight:600;font-size:1.1em;margin:0'>"
-        f"{html.escape(info.task)}</h1>"
         "<div style='display:flex;justify-content:space-between;margin:.3em 0 .5em;"
         f"padding:.2em .5em;border-left:.3em solid {colour};background:{colour}22'>"
         f"<span style='font-weight:600'>{html.escape(state)}</span>"

@@ -64,6 +64,8 @@ class TeleopPage:
         )
         if self.panel.drive is not None:
             site.keys.listen(self.panel.drive.receive)
+        several = any(name.startswith("robot1_") for name in limbs)
+        self._names = {n: k.title for n, k in limbs.items()} if several else {}
         self._epoch = snapshot.epoch
         set_camera(self.server, (low, high))
         self.server.on_client_connect(self._connect)
@@ -83,12 +85,12 @@ class TeleopPage:
         snapshot = self.session.snapshot
         self.scene.update(snapshot.body_positions, snapshot.body_quaternions)
         with self.server.atomic():
-            notes = {
-                name: explain(status, at_most=1)
+            reasons = {
+                name: text
                 for name, status in snapshot.limbs.items()
-                if status.holder is not None
+                if status.holder is not None and (text := explain(status, at_most=1))
             }
-            self.markers.update(snapshot, notes)
+            self.markers.update(snapshot, self._names | reasons)
         self.handles.update(snapshot)
         self.overlays.update(snapshot.balance)
         self.pictures.update(snapshot)

@@ -19,7 +19,7 @@ from wbc_suite.viewers.scene_setup import (
     set_dark,
 )
 from wbc_suite.viewers.session_state import SessionInfo, Snapshot
-from wbc_suite.viewers.status_text import limbs_html, status_html
+from wbc_suite.viewers.status_text import limbs_html, status_html, task_html
 from wbc_suite.viewers.tracking_plots import TrackingPlots
 
 if TYPE_CHECKING:
@@ -81,6 +81,8 @@ class TeleopPanel:
         self._box, self._pictures = box, pictures
         self._info = info = session.info
         self._adding = threading.Lock()
+        if info.task:
+            server.gui.add_html(task_html(info.task))
         self._status = server.gui.add_html("")
         self._stand_up = server.gui.add_button(
             "Reset after the fall", color="red", visible=False

@@ -87,6 +87,7 @@ class Plot:
             scales={"x": {"time": False}, "y": {"range": (0.0, LEAST_TOP)}},
             legend={"show": False},
             height=130,
+            padding=(10, 24, 0, 0),
             visible=visible,
         )
 
