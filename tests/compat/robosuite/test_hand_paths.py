@@ -17,15 +17,9 @@ _spec = importlib.util.spec_from_file_location("hand_paths", HERE)
 hand_paths = importlib.util.module_from_spec(_spec)
 _spec.loader.exec_module(hand_paths)
 
-FURTHER = {
-    "OSC_POSE": 0.12,
-    "OSC_POSE world": 0.12,
-    "OSC_POSE coupled": 0.12,
-    "OSC_POSE kp 300": 0.30,
-    "JOINT_TORQUE": 0.30,
-}
-"""Cases that differ by more than 10 %: links have other inertias than robosuite has,
-which torques show at once, and coupled rotations by and by."""
+AWAY = 0.05
+"""Greatest distance of the two paths, as a share of their length; measured: 1.7 % for
+torques in operational space and of joints, 3.7 % for positions of joints."""
 
 
 def run(python, *arguments, **environment):
@@ -59,7 +53,7 @@ def theirs():
 def test_path_is_that_of_robosuite(ours, theirs, case):
     length = np.linalg.norm(np.diff(theirs[case], axis=0), axis=1).sum()
     away = np.linalg.norm(ours[case] - theirs[case], axis=1).max()
-    assert away / length < FURTHER.get(case, 0.10)
+    assert away / length < AWAY
 
 
 @pytest.mark.slow
@@ -72,7 +66,7 @@ def test_paths_move_as_the_actions_say(ours):
 
 
 @pytest.mark.slow
-def test_uncoupled_motion_is_disturbed_by_rotation_and_coupled_is_not(ours):
+def test_uncoupled_motion_is_disturbed_more_by_rotation_than_coupled(ours):
     wanted = np.array(hand_paths.ARM[:3])
     wanted /= np.linalg.norm(wanted)
 
@@ -80,4 +74,4 @@ def test_uncoupled_motion_is_disturbed_by_rotation_and_coupled_is_not(ours):
         end = ours[case][-1]
         return np.linalg.norm(end - (end @ wanted) * wanted) / np.linalg.norm(end)
 
-    assert aside("OSC_POSE coupled") < 0.1 < aside("OSC_POSE")
+    assert aside("OSC_POSITION") < aside("OSC_POSE coupled") < aside("OSC_POSE")

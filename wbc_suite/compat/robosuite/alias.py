@@ -101,7 +101,6 @@ REEXPORTS = {
     "renderers.base": "renderers",
     "renderers.viewer": "renderers",
     "models.grippers.gripper_tester": "models.grippers.tester",
-    "utils.sim_utils": "utils.binding_utils",
     "utils.usd": "utils.usd_export",
     "utils.usd.exporter": "utils.usd_export",
 }

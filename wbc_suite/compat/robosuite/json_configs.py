@@ -167,10 +167,9 @@ class _Conversion:
         if kind == "OSC_POSE" and given.get("control_ori") is False:
             kind = "OSC_POSITION"
         kind = self._check_name("part controller", kind, models, f"{where}type")
-        if kind in UNCOUPLED and given.get("uncouple_pos_ori") is not False:
-            kind = UNCOUPLED[kind]
+        kind = UNCOUPLED.get(kind, kind)
         fields = set(models[kind].model_fields) - OTHER_UNITS.get(kind, set())
-        own = fields | {"type", "uncouple_pos_ori"}
+        own = fields | {"type"}
         self._check_keys(given, own, IGNORED_OF_PARTS, where)
         ours: dict[str, Any] = {"type": kind}
         for key, value in given.items():
@@ -178,7 +177,7 @@ class _Conversion:
                 ours["gripper"] = self._gripper(value, where)
             elif key == "control_delta":
                 ours["input_type"] = "delta" if value else "absolute"
-            elif value is None or key in ("type", "control_ori", "uncouple_pos_ori"):
+            elif value is None or key in ("type", "control_ori"):
                 continue
             elif key not in fields or (key, kind) == ("interpolation", JOINTS):
                 self.ignored.append(where + key)

@@ -6,7 +6,9 @@ Lp, Lo, L the inertias at the site for linear motion, for rotation and for both,
     tau = J^T [Lp F; Lo T] + N^T M a0 + h,     N = I - M^-1 J^T L J.
 
 Each motion has the inertia of the hand that is free in the other one, so that they
-disturb each other: 0.05 m sideways turn a Panda's hand by some degrees.
+disturb each other: 0.05 m sideways turn a Panda's hand by some degrees. Without
+`uncouple_pos_ori` the wrench is L [F; T]. Neither makes up for `J' v` or for passive
+forces of the joints.
 """
 
 from typing import Any, Literal
@@ -18,6 +20,7 @@ from wbc_suite.control.law.custom import register_law
 from wbc_suite.control.law.osc import OscLaw, write_hand_task
 from wbc_suite.control.loop.physics import Physics
 from wbc_suite.control.loop.records import CompiledRecords
+from wbc_suite.control.loop.rigid_body import point_velocity_and_drift
 from wbc_suite.control.part.osc_controller import OscConfig, OscController
 from wbc_suite.control.part.registry import register_part_controller
 from wbc_suite.linear_algebra import cholesky, dot, solve_lower, solve_upper
@@ -33,7 +36,23 @@ TINY = 1e-12
 def uncoupled_osc_law(
     physics: Physics, law: CompiledRecords, drives: CompiledRecords
 ) -> None:
-    """Write the joint accelerations M^-1 (tau - h); see the module.
+    """Write the joint accelerations of the law with `uncouple_pos_ori`."""
+    _write_accelerations(physics, law, drives, 3)
+
+
+@compiled
+def coupled_osc_law(
+    physics: Physics, law: CompiledRecords, drives: CompiledRecords
+) -> None:
+    """Write the joint accelerations of the law without `uncouple_pos_ori`."""
+    _write_accelerations(physics, law, drives, 6)
+
+
+@compiled
+def _write_accelerations(
+    physics: Physics, law: CompiledRecords, drives: CompiledRecords, size: int
+) -> None:
+    """Write the joint accelerations M^-1 (tau - h); blocks of the wrench have a size.
 
     With `M = C C^T` and `Y = J C^-T` they are `a0 + C^-T Y^T (w - L J a0)`, where w is
     `[Lp F; Lo T]` and L the inverse of `Y Y^T`, as Lp and Lo are of its blocks.
@@ -41,19 +60,29 @@ def uncoupled_osc_law(
     n, work = law.last - law.first, physics.osc
     J, C, posture, z = work.J, work.C, work.posture, work.z
     write_hand_task(physics, law, drives)
+    body, p = int(physics.site_bodyid[law.site]), physics.site_xpos[law.site]
+    drift = np.empty(6)
+    point_velocity_and_drift(physics, body, p, work.column, drift)
+    for i in range(6):
+        work.wanted[i] += drift[i]
     null = np.empty(6)
     for i in range(6):
         null[i] = dot(J[i], posture, n)
         solve_lower(C, J[i], n)
     wrench = np.empty(6)
-    for half in range(2):
-        _times_inertia(J, n, 3 * half, 3, work.wanted[3 * half :], wrench[3 * half :])
+    for first in range(0, 6, size):
+        _times_inertia(J, n, first, size, work.wanted[first:], wrench[first:])
     pull = np.empty(6)
     _times_inertia(J, n, 0, 6, null, pull)
+    passive = np.empty(n)
     for j in range(n):
         z[j] = 0.0
         for i in range(6):
             z[j] += J[i, j] * (wrench[i] - pull[i])
+        passive[j] = physics.qfrc_passive[work.dofs[j]]
+    solve_lower(C, passive, n)
+    for j in range(n):
+        z[j] += passive[j]  # the loop cancels passive forces; robosuite does not
     solve_upper(C, z, n)
     for j in range(n):
         physics.acceleration[work.dofs[j]] = posture[j] + z[j]
@@ -79,6 +108,7 @@ class UncoupledOscConfig(OscConfig):
 
     type: Literal["UNCOUPLED_OSC_POSE", "UNCOUPLED_OSC_POSITION"] = "UNCOUPLED_OSC_POSE"  # pyright: ignore[reportIncompatibleVariableOverride] - types of its own
     saturation: Literal["clip", "qp"] = "clip"
+    uncouple_pos_ori: bool = True
 
     @property
     def size(self) -> int:
@@ -91,7 +121,10 @@ class UncoupledOscController(OscController):
 
     def _make_law(self, joints: tuple[str, ...], site: str) -> OscLaw:
         law = super()._make_law(joints, site)
-        law.record["kind"] = register_law(uncoupled_osc_law)
+        uncoupled = getattr(self.config, "uncouple_pos_ori", True)
+        law.record["kind"] = register_law(
+            uncoupled_osc_law if uncoupled else coupled_osc_law
+        )
         law.record["keep_direction"] = 0.0
         drives = law.drives
         drives["position_min"], drives["position_max"] = -np.inf, np.inf

@@ -15,10 +15,12 @@ from wbc_suite.compat.robosuite.environments.scene_text import (
 from wbc_suite.compat.robosuite.renderers import Viewer, load_renderer_config
 from wbc_suite.compat.robosuite.utils.binding_utils import (
     MjSim,
+)
+from wbc_suite.compat.robosuite.utils.observables import Observable
+from wbc_suite.compat.robosuite.utils.sim_utils import (
     check_contact,
     get_contacts,
 )
-from wbc_suite.compat.robosuite.utils.observables import Observable
 from wbc_suite.envs import RobotEnv as Core
 from wbc_suite.errors import UnknownNameError
 from wbc_suite.typing import Vector

@@ -69,6 +69,7 @@ def gripper_file(gripper: Any) -> str:
         name=name,
         frames=(tcp,),
         cameras=(eye,),
+        sensors=(),  # those of the wrist are the arm's
         groups={"gripper": joints},
         synergies={"gripper": _synergies(gripper, ranges)},
         keyframes={"ready": ready},

@@ -168,8 +168,9 @@ class GripperModel(DescribedModel):
     def important_geoms(self) -> dict[str, list[str]]:
         """Geoms of the fingers by side; by default the first half is left."""
         if self._important_geoms:
+            own = self.geom_names
             return {
-                role: [self.geom_names[name] for name in names]
+                role: [own[name] for name in names if name in own]
                 for role, names in self._important_geoms.items()
             }
         fingers = [
