@@ -8,6 +8,7 @@ changes of the posture at the start.
 Usage:
     python benchmarks/whole_body_dynamics.py --quick
     python benchmarks/whole_body_dynamics.py --only GR1FreeBody/push --trials 20
+    python benchmarks/whole_body_dynamics.py --only hand/far --trials 200
 """
 
 import time
@@ -21,6 +22,7 @@ import numpy as np
 from harness.report import Report, options
 from harness.stand import Stand
 
+import wbc_suite
 from wbc_suite.control import load_composite_controller_config
 
 GR1, SPOT, ARM = "GR1FreeBody", "Spot", "SpotWithArm"
@@ -28,8 +30,11 @@ TILTED, DROPPED = 0.6, 0.25  # cosine; m
 PUSH = 0.1  # s
 ACTION = 0.02  # s between two actions
 SETTLED = 1.0  # s after which errors count
+LIMIT_TICKS = 100_000
+OVER_CUBE = 0.08  # m
 COLUMNS = ("trials", "survived", "travelled_m", "drift_m", "turned_deg", "slip_mm")
 COLUMNS += ("hand_median_mm", "hand_worst_mm", "torque_change_nm", "unsolved_per_s")
+COLUMNS += ("false_alarms", "late_alarms", "unnamed")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +47,7 @@ class Case:
     walk: tuple[float, float, float] = (0.0, 0.0, 0.0)
     height: float = 0.0
     start: float = 0.5  # s; when it begins to walk
-    stop: float = np.inf
+    stop: float = np.inf  # trials spread it over a second
     push: tuple[float, float, float] | None = None  # N
     at: float = 3.0  # s; trials spread it over a second
     pushes: tuple[float, float] | None = None  # N; every 3 s, from any side
@@ -50,6 +55,9 @@ class Case:
     lissajous: float = 0.0  # m
     load: float = 0.0  # kg in each hand
     far_goals: bool = False
+    tied: bool = False  # the feet, to each other
+    effort: float = 1.0  # part of the motors' torques that there is
+    table: bool = False  # in the way
     in_world: bool = False
     recover: bool = True
     friction: float | None = None
@@ -126,6 +134,13 @@ def cases() -> list[Case]:
             add(robot, "hand/march", walk=(0.0, 0.0, 0.0011), in_world=True)
             add(robot, "hand/far", far_goals=True, seconds=5.0)
         go = {"walk": (0.5 * v, 0.0, 0.0)}
+        for side, (x, y) in directions.items():
+            push = (1000.0 * x, 1000.0 * y, 0.0)
+            add(robot, f"hostile/push/{side}/1000", push=push, seconds=5.0)
+        walk = {"walk": (0.5 * v, 0.0, 0.0), "seconds": 6.0}
+        add(robot, "hostile/feet_tied", tied=True, **walk)
+        add(robot, "hostile/effort_0.15", effort=0.15, **walk)
+        add(robot, "hostile/table", table=True, **walk)
         add(robot, "rate/action_1khz", period=0.001, timestep=0.001, **go)
         add(robot, "rate/step_1ms", timestep=0.001, **go)
         add(robot, "rate/step_4ms", timestep=0.004, **go)
@@ -157,7 +172,7 @@ class Trial:
             config["velocity_cutoff"] = case.cutoff
         self.stand = Stand(case.robot, config, self._edit)
         self._change_model()
-        self.at = case.at + seed % 8 / 8.0
+        self.at, self.stop = case.at + seed % 8 / 8.0, case.stop + seed % 8 / 8.0
         self.stand.start()
         self._jitter()
         self.stand.simulation.start()
@@ -172,9 +187,19 @@ class Trial:
         self.changes: list[float] = []
         self.waiting = [self.goals] * case.delay
         self.yaw, self.slip = 0.0, 0.0
+        self.drop, self.told, self.finite = 0.0, np.nan, True
 
     def _edit(self, spec: mujoco.MjSpec) -> None:
         spec.option.timestep = self.case.timestep
+        if self.case.table:
+            size, place = [0.3, 0.6, 0.4], [1.0, 0.0, 0.4]
+            box = mujoco.mjtGeom.mjGEOM_BOX
+            spec.worldbody.add_geom(type=box, size=size, pos=place)
+        if self.case.tied:
+            config = load_composite_controller_config("WHOLE_BODY_ID", self.case.robot)
+            first, second = (f"robot0_{x['frame']}" for x in config["foot"][:2])
+            weld, site = mujoco.mjtEq.mjEQ_WELD, mujoco.mjtObj.mjOBJ_SITE
+            spec.add_equality(type=weld, objtype=site, name1=first, name2=second)
         if self.case.boxes:
             rng = np.random.default_rng(0)
             for x in np.arange(0.8, 16.0, 0.25):
@@ -195,6 +220,9 @@ class Trial:
         model.opt.gravity[:] = 9.81 * np.array([-np.sin(angle), 0.0, -np.cos(angle)])
         drives = self.stand.controller.laws[0].drives
         model.dof_damping[drives["dof"]] += case.damping
+        for limits in ("command_min", "command_max"):
+            drives[limits] *= case.effort
+        self.stand.controller.dynamics.limits[3:] *= case.effort
 
     def _jitter(self) -> None:
         drives, data = self.stand.controller.laws[0].drives, self.stand.data
@@ -212,7 +240,7 @@ class Trial:
             most = np.array([0.3, 0.15, 0.4] if case.robot == GR1 else [0.8, 0.3, 0.8])
             self.command = self.rng.uniform(-most, most)
         walk = layout["walk"]
-        if case.start <= t < case.stop:
+        if case.start <= t < self.stop:
             command = self.command if case.random_commands else case.walk
             action[walk.start : walk.stop] = command
         action[layout["height"].start] = case.height
@@ -268,6 +296,10 @@ class Trial:
     def _observe(self, t: float) -> None:
         case, data = self.case, self.stand.data
         R = data.xmat[self.body].reshape(3, 3)
+        self.finite = self.finite and bool(np.isfinite(data.ctrl).all())
+        self.drop = self.first[2] + min(case.height, 0.0) - data.xpos[self.body][2]
+        if np.isnan(self.told) and self.arrays.state["fell"][0] >= 0.0:
+            self.told = self.drop
         yaw = np.arctan2(R[1, 0], R[0, 0])
         self.yaw += (yaw - self.yaw + np.pi) % (2.0 * np.pi) - np.pi
         if t < SETTLED or not len(self.hands):
@@ -278,7 +310,7 @@ class Trial:
                 start = self.stand.controller.layout[frame.name].start
                 goal[k] = self.action[start : start + 3]
         elif case.load:
-            state, com = self.arrays.gait.state[0], self.arrays.measured.com
+            state, com = self.arrays.gait.state[0], self.arrays.terms.com
             c, s = np.cos(state["yaw"]), np.sin(state["yaw"])
             for k in range(len(goal)):
                 p = self.arrays.goal[k].reshape(3, 4)[:, 3]
@@ -300,9 +332,7 @@ class Trial:
             self._disturb(t)
             self._advance(steps)
             self._observe(t)
-            trunk = stand.data.xpos[self.body]
-            low = trunk[2] < self.first[2] + min(case.height, 0.0) - DROPPED
-            if case.slope == 0.0 and case.boxes == 0.0 and low:
+            if case.slope == 0.0 and case.boxes == 0.0 and self.drop > DROPPED:
                 break
             if stand.data.xmat[self.body][8] < TILTED:
                 break
@@ -320,8 +350,10 @@ class Trial:
         errors = 1e3 * np.array(self.errors or [np.nan])
         slip = np.linalg.norm((self._feet() - self.feet)[:, :2], axis=1).max()
         steps = int(self.arrays.gait.state["steps"][0])
+        survived = seconds >= case.seconds - 1e-9
+        frames = self.stand.controller.info(self.stand.state)["ik"]["frames"]
         return {
-            "survived": seconds >= case.seconds - 1e-9,
+            "survived": survived and self.finite,
             "seconds": seconds,
             "along": along,
             "across": across,
@@ -330,6 +362,11 @@ class Trial:
             "hand": errors,
             "change": float(np.median(self.changes)) if self.changes else np.nan,
             "reported": self.arrays.state["fell"][0] >= 0.0,
+            "late": not survived and not self.told < 0.2,
+            "unnamed": sum(
+                not hand["reached"] and not list(hand["reasons"])
+                for hand in frames.values()
+            ),
             "unsolved": int(self.arrays.state["unsolved"][0]) / max(seconds, 1e-9),
         }
 
@@ -348,12 +385,15 @@ def summary(case: Case, trials: list[dict[str, Any]]) -> dict[str, Any]:
         values = [abs(trial[key]) for trial in survived]
         return float(np.max(values)) if values and np.isfinite(values).all() else None
 
+    moves = np.linalg.norm(case.walk[:2]) > 0.0 or case.push is not None
     return {
         "case": case.case,
         "side": "WHOLE_BODY_ID",
         "trials": len(trials),
         "survived": len(survived),
-        "travelled_m": worst("along"),
+        "travelled_m": (
+            min(trial["along"] for trial in survived) if survived and moves else None
+        ),
         "drift_m": worst("across"),
         "turned_deg": worst("turned"),
         "slip_mm": worst("slip"),
@@ -361,6 +401,10 @@ def summary(case: Case, trials: list[dict[str, Any]]) -> dict[str, Any]:
         "hand_worst_mm": float(hands.max()) if np.isfinite(hands).all() else None,
         "torque_change_nm": worst("change"),
         "false_alarms": sum(trial["reported"] for trial in survived),
+        "late_alarms": sum(trial["late"] for trial in trials),
+        "unnamed": sum(trial["unnamed"] for trial in trials)
+        if case.far_goals
+        else None,
         "unsolved_per_s": float(np.median([trial["unsolved"] for trial in trials])),
     }
 
@@ -389,10 +433,104 @@ def tick_cost(report: Report, robot: str, walk: float, seconds: float) -> None:
     report.add(f"{robot}/tick", name, ticks)
 
 
+def real_time_factor(report: Report, robot: str, walk: float) -> None:
+    """Measure simulated time over the time of one core, in actions at 50 Hz."""
+    stand = Stand(robot, "WHOLE_BODY_ID")
+    stand.reset()
+    controller, seconds = stand.controller, 5.0
+    action = controller.hold_action
+    action[controller.layout["walk"].start] = walk
+    steps, begin = round(ACTION / stand.model.opt.timestep), 0
+    for i in range(-100, round(seconds / ACTION)):
+        if i == 0:
+            begin = time.thread_time_ns()
+        controller.set_goal(action, ACTION)
+        stand.simulation.tick(steps)
+    factor = 1e9 * seconds / (time.thread_time_ns() - begin)
+    report.rows.append({"case": f"{robot}/tick", "side": "walking", "factor": factor})
+
+
+def limits_kept(report: Report, robot: str, ticks: int) -> None:
+    """Measure by how much limits are passed under random commands.
+
+    Forces and torques are those that are planned and commanded; positions are those of
+    the simulation; what is inside counts as zero.
+    """
+    stand, rng = Stand(robot, "WHOLE_BODY_ID"), np.random.default_rng(0)
+    stand.reset()
+    controller, own = stand.controller, stand.controller.dynamics
+    drives, edges = controller.laws[0].drives, len(own.terms.B)
+    low, high, _, least, most = own.limits
+    worst, action = np.zeros(3), controller.hold_action
+    walk, data = controller.layout["walk"], stand.data
+    for tick in range(ticks):
+        if tick % 1000 == 0:
+            speed = np.array([0.3, 0.15, 0.4]) * rng.uniform(-1.0, 1.0, 3)
+            action[walk.start : walk.stop] = speed
+        if tick % 10 == 0:
+            controller.set_goal(action, ACTION)
+        stand.simulation.tick(1)
+        q, tau = data.qpos[own.qpos], data.ctrl[drives["ctrl"]]
+        beyond = (
+            -own.qp.x[:edges],
+            np.r_[least - tau, tau - most],
+            np.r_[low - q, q - high],
+        )
+        worst = np.maximum(worst, [part.max() for part in beyond])
+    names = ("friction_n", "torque_nm", "position_rad")
+    found = dict(zip(names, worst.tolist(), strict=True))
+    report.rows.append({"case": f"{robot}/limits", "ticks": ticks, **found})
+
+
+def reach_cube(report: Report, controller: str, seed: int) -> None:
+    """Send the hand of SpotWithArm over the cube of Lift; measure what is missing."""
+    config = load_composite_controller_config(controller, ARM)
+    config["input_ref_frame"] = "world"
+    env = wbc_suite.make("Lift", robots=ARM, controller_configs=config)
+    env.reset(seed=seed)
+    action, data = env.hold_action, env.simulation.data
+    start = env.action_layout["right_hand"].start
+    action[start : start + 3] = data.body("cube").xpos
+    action[start + 2] += OVER_CUBE
+    hand: dict[str, Any] = {}
+    for _ in range(160):
+        *_, info = env.step(action)
+        hand = info["ik"]["frames"]["right_hand"]
+    row = {"case": f"{ARM}/hand/cube", "side": controller, "seed": seed}
+    error = 1e3 * hand["position_error"], hand["orientation_error"]
+    report.rows.append(row | {"missing_mm": error[0], "missing_rad": error[1]})
+    env.close()
+
+
+def show_ticks(report: Report, quick: bool) -> None:
+    """Measure what a tick costs, and what limits are passed."""
+    for robot in (GR1, SPOT, ARM):
+        for walk in (0.0, 0.2):
+            tick_cost(report, robot, walk, 2.0)
+        real_time_factor(report, robot, 0.3)
+    report.show("A tick of the QP", ("case", "side", "median_us", "p99_us", "n"))
+    report.show("Simulated time over time", ("case", "side", "factor"))
+    for robot in (GR1, SPOT, ARM):
+        limits_kept(report, robot, 2000 if quick else LIMIT_TICKS)
+    columns = ("case", "ticks", "friction_n", "torque_nm", "position_rad")
+    report.show("Greatest violation of limits", columns)
+
+
+def show_reach(report: Report, trials: int) -> None:
+    """Measure how near a hand comes under each whole-body controller."""
+    for controller in ("WHOLE_BODY_ID", "WHOLE_BODY_IK", "WHOLE_BODY_MINK_IK"):
+        for seed in range(min(trials, 3)):
+            reach_cube(report, controller, seed)
+    columns = ("case", "side", "seed", "missing_mm", "missing_rad")
+    report.show("Hand over the cube of Lift", columns)
+
+
 def main(make: Callable[[], list[Case]] = cases) -> None:
     """Run the cases, and show a table."""
-    parser = options(__doc__, "2 trials of a few cases")
-    parser.add_argument("--only", default="", help="cases whose name contains this")
+    parser = options(__doc__, "1 trial of a few cases")
+    parser.add_argument(
+        "--only", default="", help="cases whose name contains this; also tick, cube"
+    )
     parser.add_argument("--trials", type=int, default=8)
     parser.add_argument("--processes", type=int, default=2)
     arguments = parser.parse_args()
@@ -403,11 +541,10 @@ def main(make: Callable[[], list[Case]] = cases) -> None:
         chosen = [replace(case, seconds=min(case.seconds, 6.0)) for case in chosen]
     trials = 1 if arguments.quick else arguments.trials
     report = Report()
-    if "tick" in arguments.only or not arguments.only:
-        for robot in (GR1, SPOT, ARM):
-            for walk in (0.0, 0.2):
-                tick_cost(report, robot, walk, 2.0)
-        report.show("A tick of the QP", ("median_us", "p99_us", "n"))
+    if arguments.only in ("", "tick"):
+        show_ticks(report, arguments.quick)
+    if arguments.only == "cube" or not (arguments.only or arguments.quick):
+        show_reach(report, trials)
     with ProcessPoolExecutor(arguments.processes) as pool:
         waiting = [
             (case, [pool.submit(run_trial, case, seed) for seed in range(trials)])
@@ -417,7 +554,7 @@ def main(make: Callable[[], list[Case]] = cases) -> None:
             row = summary(case, [future.result() for future in futures])
             report.rows.append(row)
             print(case.case, {k: v for k, v in row.items() if k in COLUMNS}, flush=True)
-    report.show("Robustness", COLUMNS)
+    report.show("Robustness", ("case", *COLUMNS))
     report.write(arguments.json)
 
 

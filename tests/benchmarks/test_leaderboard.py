@@ -54,7 +54,7 @@ def test_every_part_controller_brings_the_hand_to_its_goal(controller):
 def test_what_does_not_fit_is_left_out_with_its_reason(tmp_path):
     path = tmp_path / "out.json"
     command = [sys.executable, str(ROOT / "benchmarks/leaderboard.py")]
-    command += ["--robots", "UR5e", "--controllers", "OSC_POSE", "WHOLE_BODY_ID"]
+    command += ["--robots", "UR5e", "--controllers", "OSC_POSE", "HYBRID_MOBILE_BASE"]
     subprocess.run(
         [*command, "--json", path], check=True, capture_output=True, cwd=ROOT
     )

@@ -367,6 +367,8 @@ def test_configs_are_refused_in_words():
 
     with pytest.raises(ConfigError, match="fixed root"):
         load("GR1")
+    with pytest.raises(ConfigError, match="free to fall"):
+        load_composite_controller_config({"type": "WHOLE_BODY_ID"}, "GR1FreeBody")
     with pytest.raises(ConfigError, match="two feet"):
         load("GR1FreeBody", foot=[{"frame": "left_foot"}, {"frame": "right_foot"}])
     with pytest.raises(ConfigError, match="four feet"):
@@ -402,6 +404,80 @@ def test_an_environment_walks(alone):
     assert info["balance"]["fell"] is None
     assert EDGES == 4
     env.close()
+
+
+@pytest.mark.parametrize("name", ["Panda", "PandaOmron"])
+def test_hands_reach_their_goals_without_feet_and_within_torques(alone, name):
+    arm = alone(name, "WHOLE_BODY_ID", input_ref_frame="world")
+    arm.simulation.start()
+    own, data = arm.controller.dynamics, arm.state.data
+    before, worst = data.site_xpos[own.hand[0]].copy(), 0.0
+    way = np.array([0.08, -0.05, 0.06])
+    action = arm.controller.hold_action
+    start = arm.controller.layout["right_hand"].start
+    action[start : start + 3] += way
+    arm.controller.set_goal(action)
+    for _ in range(1500):
+        arm.simulation.tick(1)
+        tau = data.ctrl[arm.controller.laws[0].drives["ctrl"]]
+        worst = max(worst, *(own.limits[3] - tau), *(tau - own.limits[4]))
+    assert worst <= 1e-9
+    np.testing.assert_allclose(data.site_xpos[own.hand[0]] - before, way, atol=1e-3)
+    assert "balance" not in arm.controller.info(arm.state)
+    assert arm.controller.info(arm.state)["ik"]["reached"]
+    assert ("walk" in [part.name for part in arm.controller.layout.slices]) == (
+        name == "PandaOmron"
+    )
+
+
+@pytest.mark.parametrize("frame", ["world", "base"])
+def test_a_base_drives_as_commanded_while_its_hand_stays_where_it_is(alone, frame):
+    robot = alone("PandaOmron", "WHOLE_BODY_ID", input_ref_frame=frame)
+    robot.simulation.start()
+    own, data = robot.controller.dynamics, robot.state.data
+    body = int(own.state["body"][0])
+
+    def hand():
+        p, R = data.xpos[body], data.xmat[body].reshape(3, 3)
+        point = data.site_xpos[own.hand[0]]
+        return point.copy() if frame == "world" else R.T @ (point - p)
+
+    walk = [-0.1, 0.05, 0.1] if frame == "world" else [0.3, 0.1, 0.5]
+    before, start = hand(), data.xpos[body].copy()
+    layout = robot.controller.layout
+    robot.controller.set_goal(
+        layout.pack({"walk": walk}, base=robot.controller.hold_action)
+    )
+    robot.simulation.tick(1000)
+    R = data.xmat[body].reshape(3, 3)
+    assert np.arctan2(R[1, 0], R[0, 0]) == pytest.approx(2.0 * walk[2], abs=0.15)
+    assert np.linalg.norm(data.xpos[body] - start) > 0.15
+    np.testing.assert_allclose(hand(), before, atol=5e-3)
+
+
+@pytest.mark.parametrize("name", ["GR1FreeBody", "Spot"])
+def test_robots_walk_up_slopes(alone, name):
+    """Gravity is turned instead of the ground: 5 degrees."""
+    walker, angle = Walker(alone, name), np.deg2rad(5.0)
+    walker.model.opt.gravity[:] = -9.81 * np.array([np.sin(angle), 0.0, np.cos(angle)])
+    walker.simulation.start()
+    walker.act(1.5)
+    start = walker.data.qpos[:3].copy()
+    walker.act(5.0, (0.25, 0.0, 0.0))
+    way = walker.data.qpos[:3] - start
+    np.testing.assert_allclose(way[:2], [1.1, 0.0], atol=0.25)
+    assert walker.balance["fell"] is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("wait", [2.25, 2.75])
+def test_gr1_does_not_put_weight_on_a_foot_in_the_air(alone, wait):
+    """Pushed as a step begins, a foot is late: it was loaded 6 cm over the ground."""
+    walker = Walker(alone, "GR1FreeBody").act(0.5)
+    walker.act(wait, (0.2, 0.0, 0.0)).act(0.1, (0.2, 0.0, 0.0), push=(500, 0, 0))
+    walker.act(4.0, (0.2, 0.0, 0.0))
+    assert walker.balance["fell"] is None
+    assert walker.data.xmat[walker.link][8] > 0.98
 
 
 @pytest.mark.slow

@@ -119,6 +119,23 @@ def test_a_biped_steps_by_itself_when_pushed_and_then_stands():
     assert fixed.gait.state["steps"][0] == 0
 
 
+def test_a_step_waits_for_a_foot_that_is_late():
+    robot = biped().run(2.0, (0.2, 0.0, 0.0))
+    state, foot, steps = robot.gait.state[0], robot.measured.foot, []
+    while state["progress"] < 0.9:
+        robot.run(DT, (0.2, 0.0, 0.0))
+    stance = int(state["stance"])
+    robot.measured.rise[:] = -0.5  # it sinks
+    for _ in range(100):
+        foot[1 - stance, 2] = 0.05
+        robot.planner(robot.gait, robot.measured, np.zeros(4), DT, robot.plan)
+        steps.append(state["since"] - state["duration"])
+        if state["stance"] != stance:
+            break
+    assert state["stance"] != stance  # not for ever
+    assert max(steps) == pytest.approx(0.1, abs=2 * DT)
+
+
 @pytest.mark.parametrize("walk", [(1.0, 0, 0), (-0.5, 0, 0), (0, 0.4, 0)])
 def test_a_trot_takes_the_commanded_velocity(walk):
     robot = quadruped().run(3.0, walk)

@@ -142,11 +142,12 @@ class Measured(NamedTuple):
     """Where the robot is; world axes.
 
     Attributes:
-        com: Centre of mass, m, shape (3,).
+        com: Centre of mass, m, shape (3,); on a slope see `control.dynamics.terms`.
         com_velocity: Its velocity, m/s, shape (3,).
         foot: Middle of the contact of each foot, m, shape (n, 3).
         foot_yaw: Heading of each foot, rad, shape (n,).
         slip: Horizontal speed of each foot, m/s, shape (n,).
+        rise: Vertical velocity of each foot, m/s, shape (n,).
     """
 
     com: Vector
@@ -154,6 +155,7 @@ class Measured(NamedTuple):
     foot: Matrix
     foot_yaw: Vector
     slip: Vector
+    rise: Vector
 
 
 @struct
@@ -241,9 +243,8 @@ def make_gait(config: TrotConfig | WalkConfig, soles: Matrix) -> Gait:
 
 def make_measured(n: int) -> Measured:
     """Return what a planner reads, for n feet, all zero."""
-    return Measured(
-        np.zeros(3), np.zeros(3), np.zeros((n, 3)), np.zeros(n), np.zeros(n)
-    )
+    feet = np.zeros((n, 3)), np.zeros(n), np.zeros(n), np.zeros(n)
+    return Measured(np.zeros(3), np.zeros(3), *feet)
 
 
 def make_plan(n: int) -> Plan:

@@ -55,6 +55,9 @@ COMMITTED = 0.06
 FIXED = 0.85
 """Part of the swing after which the place is fixed."""
 
+LANDED, SINKING, LATEST = 0.012, 0.1, 0.1
+"""m, m/s, s; a step waits for a foot that is higher and sinks faster, for so long."""
+
 CANDIDATES = 9
 """Step times that are tried."""
 
@@ -171,7 +174,7 @@ def _step(
     state, settings = gait.state[0], gait.settings[0]
     state.since += dt
     state.yaw += state.velocity[2] * dt
-    if state.since >= state.duration:
+    if state.since >= state.duration and _has_landed(gait, measured):
         at_rest = not moving and state.steps > 2 and state.time > state.until
         for i in range(3):
             at_rest = at_rest and abs(state.velocity[i]) < 0.02
@@ -205,6 +208,16 @@ def _step(
     _landing_place(gait, measured, dcm, zmp, landing, omega, state.duration, goal)
     plan.footstep[0], plan.footstep[1] = goal[0], goal[1]
     _swing(gait, measured, goal, dt, plan)
+
+
+@compiled
+def _has_landed(gait: Gait, measured: Measured) -> bool:
+    """Return whether the weight may go to the foot that swings, or has to."""
+    state = gait.state[0]
+    swing, stance = measured.foot[1 - state.stance], measured.foot[state.stance]
+    late = state.since - state.duration > LATEST
+    rests = measured.rise[1 - state.stance] > -SINKING
+    return late or rests or swing[2] - stance[2] < LANDED
 
 
 @compiled

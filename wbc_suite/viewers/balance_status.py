@@ -76,7 +76,8 @@ class BalanceReader:
     ) -> None:
         self._model, self._data = model, data
         self._controller, self._clients = controller, set[int]()
-        self.walks = hasattr(controller, "dynamics")
+        config = getattr(controller, "config", None)
+        self.walks = bool(getattr(config, "feet", ()))
         self.report: Mapping[str, Any] = {}
         self.fell = ""
 

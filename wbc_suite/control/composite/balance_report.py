@@ -99,8 +99,12 @@ class BalanceReport:
         self._law, self._moves, self._links = law, moves, links
 
     def info(self, state: RobotState) -> dict[str, Any]:
-        """Return `{"balance": ..., "ik": ...}`."""
+        """Return `{"balance": ..., "ik": ...}`; no balance without feet."""
         own, hands = self._dynamics, self._hands(state)
+        reached = all(hand["reached"] for hand in hands.values())
+        ik = {"reached": reached, "frames": hands}
+        if not self._config.feet:
+            return {"ik": ik}
         feet = [foot.frame for foot in self._config.feet]
         names = [frame.name for frame in self._config.frames]
         loads = dict(zip(names, own.load[:, :3].copy(), strict=True))
@@ -115,8 +119,7 @@ class BalanceReport:
             "unsolved": int(own.state["unsolved"][0]),
             "fell": fall_of(own),
         }
-        reached = all(hand["reached"] for hand in hands.values())
-        return {"balance": balance, "ik": {"reached": reached, "frames": hands}}
+        return {"balance": balance, "ik": ik}
 
     def _contact_forces(self, state: RobotState) -> list[Vector]:
         """Return the force of contacts on each foot, world axes, N, shape (3,)."""
@@ -159,7 +162,7 @@ class BalanceReport:
         goal = pin.SE3(given[:, :3].copy(), given[:, 3].copy())
         if self._config.input_ref_frame != "base":
             return goal
-        gait, com = own.gait.state[0], own.measured.com
+        gait, com = own.gait.state[0], own.terms.com
         origin = np.array([*com[:2], gait["ground"] + gait["height"]])
         return pin.SE3(pin.utils.rotate("z", float(gait["yaw"])), origin) * goal
 

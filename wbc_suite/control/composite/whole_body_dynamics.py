@@ -1,4 +1,4 @@
-"""Whole-body inverse dynamics for robots on their feet: stand, walk, use hands."""
+"""Whole-body inverse dynamics: robots stand, walk or drive, and use their hands."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -19,30 +19,41 @@ from wbc_suite.control.dynamics.qp_fallback import QpFallback
 from wbc_suite.control.dynamics.standing import chain, limits_of, make_foot
 from wbc_suite.control.law.law import Law
 from wbc_suite.control.loop.records import LawKind
+from wbc_suite.control.part.base_velocity import (
+    BaseVelocityConfig,
+    BaseVelocityController,
+)
 from wbc_suite.control.part.gripper import GripperController
+from wbc_suite.control.robot_parts import RobotPart
 from wbc_suite.control.state import RobotState
 from wbc_suite.kinematics import Configuration
-from wbc_suite.locomotion import begin_gait, make_gait
+from wbc_suite.locomotion import TrotConfig, begin_gait, make_gait
+from wbc_suite.locomotion.gait import Mode
 from wbc_suite.qp.solution import Fallback
 from wbc_suite.typing import Indices, Vector
 
 UNTIL_NEXT_ACTION = 1_000_000
 """Physics steps; the loop needs no Python."""
 
+BASE_WEIGHT = 100.0
+"""Of the accelerations of a base, above those of hands: it drives as commanded."""
+
 
 class WholeBodyID:
-    """Moves a robot on its feet by one QP for contact forces and joint accelerations.
+    """Moves a robot by one QP for contact forces and joint accelerations.
 
     At every physics step the gait planner says which feet stand, where the others swing
     and how the centre of mass accelerates; the QP finds forces and accelerations, and
-    the loop turns them into torques. All of it is compiled.
+    the loop turns them into torques. All of it is compiled. A robot with a fixed or
+    planar root has no feet; its base, if it has one, follows `walk` as BASE_VELOCITY.
 
     Args:
         config: Plain data of a `WholeBodyIDConfig`.
         state: The robot in the simulation.
 
     Attributes:
-        layout: Slices of the action: hands, `walk`, `height`, grippers.
+        layout: Slices of the action: hands, `walk` unless the root is fixed, `height`
+            of a robot on its feet, grippers.
         dynamics: What the law reads and writes.
         sensors: Where the state of the robot comes from.
         fallback: What the last QP took whose active set was not found.
@@ -58,9 +69,11 @@ class WholeBodyID:
             GripperController(gripper, synergies, state)
             for gripper, synergies in state.robot.synergies.items()
         ]
+        self._base = _driven_base(state)
         hands = [f.behaviour.action_part(f, self.config) for f in self.config.frames]
         grippers = [part for gripper in self._grippers for part in gripper.slices]
-        self.layout = ActionLayout([*hands, *_walk_parts(self.config), *grippers])
+        base = self._base.slices if self._base else _walk_parts(self.config)
+        self.layout = ActionLayout([*hands, *base, *grippers])
         self._goals = FrameGoals(
             self.config,
             self.layout,
@@ -78,26 +91,32 @@ class WholeBodyID:
         )
         self._fallback = QpFallback(self.dynamics.qp)
         self.fallback = Fallback.NONE
-        self.laws: tuple[Law, ...] = (self._law, *(g.law for g in self._grippers))
+        others = [g.law for g in self._grippers]
+        if self._base is not None:  # it asks; the torques are those of the QP
+            others = [self._base.law, *others]
+        self.laws: tuple[Law, ...] = (self._law, *others)
         self.reset(state)
 
     def _make_dynamics(self, state: RobotState) -> Any:
         config, drives = self.config, self._law.drives
-        root = state.model.joint(f"{state.prefix}root")
+        root, place = np.full(6, -1), 0
+        if config.feet:
+            joint = state.model.joint(f"{state.prefix}root")
+            root, place = joint.dofadr[0] + np.arange(6), joint.qposadr[0]
         feet = [
             make_foot(state, x.frame, x.sole, height=x.height, radius=x.radius)
             for x in config.feet
         ]
         edges = np.array([foot.sole or (0.0,) * 4 for foot in feet])
-        dof = int(root.dofadr[0])
+        is_base = np.isin(self._law.joints, self._base.law.joints if self._base else ())
         dynamics = make_dynamics(
             feet=feet,
-            gait=make_gait(config.gait, edges),
+            gait=make_gait(config.gait or TrotConfig(), edges.reshape(-1, 4)),
             qpos=drives["qpos"],
-            dofs=np.concatenate([np.arange(dof, dof + 6), drives["dof"]]),
+            dofs=np.concatenate([root, drives["dof"]]),
             nv=state.model.nv,
             hands=_sites(state, [str(f.frame) for f in config.frames]),
-            is_arm=self._arms(state),
+            is_arm=self._arms(state) * ~is_base,
             hand_weight=np.array(
                 [(f.position_cost, f.orientation_cost) for f in config.frames]
             ).reshape(-1, 2),
@@ -106,12 +125,13 @@ class WholeBodyID:
                 [_link(state, u.frame) for u in config.upright], dtype=np.int64
             ),
             upright_weight=np.array([u.weight for u in config.upright]),
-            posture_weight=self._posture_weights(),
+            posture_weight=np.where(is_base, BASE_WEIGHT, self._posture_weights()),
+            follows=is_base.astype(np.int64),
             limits=limits_of(drives),
         )
         own = dynamics.state
-        own["root_qpos"], own["root_dof"] = root.qposadr[0], dof
-        own["body"] = root.bodyid[0]
+        own["root_qpos"], own["root_dof"] = place, root[0]
+        own["body"] = _link(state, state.robot.links[0].name)
         own["friction"], own["dt"] = config.friction, state.model.opt.timestep
         rate = 2.0 * np.pi * config.cutoff
         own["trust"] = 1.0 - np.exp(-rate * state.model.opt.timestep)
@@ -159,18 +179,19 @@ class WholeBodyID:
         record = own.state[0]
         record["ticks"] = record["unsolved"] = record["stage"] = 0
         record["fell"] = -1.0
-        root = state.root_pose
-        yaw = float(np.arctan2(root.rotation[1, 0], root.rotation[0, 0]))
-        measured = own.measured
-        measured.com[:] = data.subtree_com[int(record["body"])]
-        for k, site in enumerate(own.site):
-            R = data.site_xmat[site].reshape(3, 3)
-            middle = R @ own.middle[k] if own.is_sole[k] else own.middle[k]
-            measured.foot[k] = data.site_xpos[site] + middle
-            measured.foot_yaw[k] = np.arctan2(R[1, 0], R[0, 0])
-        begin_gait(own.gait, measured, yaw)
-        ground = float(own.gait.state["ground"][0])
-        record["trunk_height"] = data.xpos[int(record["body"]), 2] - ground
+        body = int(record["body"])
+        R = data.xmat[body].reshape(3, 3)
+        yaw = float(np.arctan2(R[1, 0], R[0, 0]))
+        if self.config.feet:
+            self._begin_standing(state, yaw)
+        else:
+            gait = own.gait.state[0]
+            own.terms.com[:] = data.xpos[body]
+            gait["yaw"], gait["ground"], gait["mode"] = (
+                yaw,
+                data.xpos[body, 2],
+                Mode.STEP,
+            )
         own.command[:] = 0.0
         own.load[:] = 0.0
         own.qp.side[:] = 0
@@ -182,21 +203,37 @@ class WholeBodyID:
         own.posture[:] = [
             ready.get(j, q) for j, q in zip(self._law.joints, now, strict=True)
         ]
-        origin = np.array([*measured.com[:2], measured.com[2]])
         poses = [
             pin.SE3(data.site_xmat[i].reshape(3, 3).copy(), data.site_xpos[i].copy())
             for i in own.hand
         ]
-        self._goals.reset(poses, pin.SE3(heading, origin))
+        self._goals.reset(poses, pin.SE3(heading, own.terms.com.copy()))
         own.start[:] = own.reference[:] = own.goal
-        for gripper in self._grippers:
-            gripper.reset(state)
+        for part in (*self._grippers, *([self._base] if self._base else [])):
+            part.reset(state)
+
+    def _begin_standing(self, state: RobotState, yaw: float) -> None:
+        """Stand on the feet where they are, with a heading, rad."""
+        own, data = self.dynamics, state.data
+        record, measured = own.state[0], own.measured
+        measured.com[:] = own.terms.com[:] = data.subtree_com[int(record["body"])]
+        for k, site in enumerate(own.site):
+            R = data.site_xmat[site].reshape(3, 3)
+            middle = R @ own.middle[k] if own.is_sole[k] else own.middle[k]
+            measured.foot[k] = data.site_xpos[site] + middle
+            measured.foot_yaw[k] = np.arctan2(R[1, 0], R[0, 0])
+        begin_gait(own.gait, measured, yaw)
+        ground = float(own.gait.state["ground"][0])
+        record["trunk_height"] = data.xpos[int(record["body"]), 2] - ground
 
     def set_goal(self, action: Vector, period: float = 0.05) -> None:
         """Move hands' goals, and take commands; see `layout`."""
         self._goals.set(action)
         self._time_references(period)
-        for name, first in (("walk", 0), ("height", 3)):
+        if self._base is not None:
+            part = self.layout["walk"]
+            self._base.set_goal(action[part.start : part.stop], period)
+        for name, first in (("walk", 0), ("height", 3)) if self.config.feet else ():
             part = self.layout[name]
             values = action[part.start : part.stop]
             self.dynamics.command[first : first + len(values)] = values
@@ -231,9 +268,9 @@ class WholeBodyID:
         """The frame of hands' goals with `input_ref_frame = "base"`, in the world.
 
         Its x axis is the heading of the robot, its origin the centre of mass, at the
-        commanded height.
+        commanded height; without feet the origin of the base.
         """
-        gait, com = self.dynamics.gait.state[0], self.dynamics.measured.com
+        gait, com = self.dynamics.gait.state[0], self.dynamics.terms.com
         height = float(gait["ground"] + gait["height"])
         return pin.SE3(
             pin.utils.rotate("z", float(gait["yaw"])), np.array([*com[:2], height])
@@ -244,7 +281,8 @@ class WholeBodyID:
         """The action that keeps the hands' goals and stands still."""
         action = np.zeros(self.layout.size)
         self._goals.hold(action)
-        action[self.layout["height"].start] = self.dynamics.command[3]
+        if self.config.feet:
+            action[self.layout["height"].start] = self.dynamics.command[3]
         for gripper in self._grippers:
             part = self.layout[gripper.name]
             action[part.start : part.stop] = gripper.goal
@@ -257,12 +295,24 @@ class WholeBodyID:
         the capture point from the edge of what the robot stands on, m; `loads`, the
         observed forces on hands and feet, N; `footstep`, where the next foot lands, m;
         `fell`, a `Fall` or None. `ik` has errors and reasons of hands, as that of
-        WHOLE_BODY_IK.
+        WHOLE_BODY_IK, and all that there is without feet.
         """
         return self._report.info(state)
 
 
+def _driven_base(state: RobotState) -> BaseVelocityController | None:
+    """Return what drives the base of a robot with a planar root."""
+    if state.robot.root.kind != "planar":
+        return None
+    part = RobotPart(name="walk", joints=state.robot.root_joint_names)
+    config = BaseVelocityConfig(input_type="absolute")
+    return BaseVelocityController(part, config, state)
+
+
 def _walk_parts(config: WholeBodyIDConfig) -> list[ActionPart]:
+    """Return the slices of a robot on its feet; none without feet."""
+    if not config.feet:
+        return []
     low, high = config.height
     walk = ActionPart(
         name="walk",

@@ -108,8 +108,8 @@ class WholeBodyIDConfig(FrozenModel):
     format: Literal[1] = 1
     type: str = "WHOLE_BODY_ID"
     frames: tuple[ControlledFrame, ...] = Field(default=(), alias="frame")
-    feet: tuple[FootConfig, ...] = Field(alias="foot", min_length=2, max_length=8)
-    gait: GaitConfig
+    feet: tuple[FootConfig, ...] = Field(default=(), alias="foot", max_length=8)
+    gait: GaitConfig | None = None
     upright: tuple[UprightConfig, ...] = ()
     posture: StanceConfig = StanceConfig()
     sensors: StateSourceConfig = StateSourceConfig()
@@ -132,6 +132,10 @@ class WholeBodyIDConfig(FrozenModel):
     @model_validator(mode="after")
     def _gait_fits_feet(self) -> "WholeBodyIDConfig":
         check_goals(self)
+        if self.gait is None:
+            if self.feet:
+                raise ValueError("feet need a [gait]: type 'walk' or 'trot'")
+            return self
         if self.gait.type == "walk" and (
             len(self.feet) != 2 or any(foot.sole is None for foot in self.feet)
         ):
@@ -148,9 +152,17 @@ def default_dynamics_config(robot: RobotDescription) -> dict[str, Any]:
     """Return a config for a robot without a file: four feet trot.
 
     Raises:
-        ConfigError: If the robot has no four feet; soles of a biped are not known.
+        ConfigError: If a robot with a free root has no four feet; soles of a biped are
+            not known.
     """
-    _require_free_root(robot)
+    hands = [
+        {"name": x["name"], "frame": x["frame"]}
+        for x in default_whole_body_config(robot)["frame"]
+        if x["frame"] in robot.hands.values()
+    ]
+    if robot.root.kind != "free":
+        weights = {"position_cost": 6.0, "orientation_cost": 2.0}  # as SpotWithArm's
+        return {"format": 1, "frame": [hand | weights for hand in hands]}
     feet = [frame.name for frame in robot.frames if frame.role == "foot"]
     if len(feet) < 2:
         raise ConfigError(
@@ -163,25 +175,26 @@ def default_dynamics_config(robot: RobotDescription) -> dict[str, Any]:
             "over. Write a controller file with [[foot]] for the left and right one. "
             f"See docs/locomotion.md.{_suggested(robot, feet)}"
         )
-    hands = [
-        frame
-        for frame in default_whole_body_config(robot)["frame"]
-        if frame["frame"] in robot.hands.values()
-    ]
     return {
         "format": 1,
-        "frame": [{"name": x["name"], "frame": x["frame"]} for x in hands],
+        "frame": hands,
         "foot": [{"frame": x, "radius": ball_radius(robot, x)} for x in feet],
         "gait": TrotConfig().model_dump(),
         "upright": [{"frame": robot.links[0].name}],
     }
 
 
-def _require_free_root(robot: RobotDescription) -> None:
-    if robot.root.kind != "free":
+def _check_root(
+    config: WholeBodyIDConfig, robot: RobotDescription, source: str
+) -> None:
+    """Raise ConfigError unless a free root, and no other, has feet and sensors."""
+    stands = robot.root.kind == "free"
+    if stands and len(config.feet) < 2:
+        raise ConfigError(f"{source}: {robot.name} is free to fall: name its [[foot]].")
+    if not stands and (config.feet or not config.sensors.is_exact):
         raise ConfigError(
-            f"{robot.name} has a {robot.root.kind} root, and WHOLE_BODY_ID moves "
-            "robots on their feet. Use WHOLE_BODY_IK, or give it a free root."
+            f"{source}: {robot.name} has a {robot.root.kind} root: it needs no "
+            "[[foot]] and no [gait], and [sensors] are for robots on their feet."
         )
 
 
@@ -219,10 +232,10 @@ def read_dynamics(
 
     Raises:
         ConfigError: If it breaks a rule of the format, names what the robot does not
-            have, or the robot's root is not free.
+            have, or has feet where the root is not free.
     """
-    _require_free_root(robot)
     read = parse_model(WholeBodyIDConfig, config, source=source)
+    _check_root(read, robot, source)
     for key, kind, name, known in _names(read, robot):
         if name not in known:
             unknown = UnknownNameError(kind, name, known)

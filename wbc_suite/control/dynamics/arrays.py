@@ -28,6 +28,7 @@ EDGES = 4
 
 STATE = np.dtype(
     [
+        ("is_free", "i8"),  # 1: the root is free, and the robot stands on its feet
         ("root_qpos", "i8"),  # index of the free root in qpos
         ("root_dof", "i8"),  # and in qvel
         ("body", "i8"),  # its link
@@ -149,7 +150,8 @@ class WholeBodyDynamics(NamedTuple):
 
     Attributes:
         state: `STATE` record, shape (1,).
-        dofs: Degrees of freedom of root and joints, shape (6 + n,).
+        dofs: Degrees of freedom of root and joints, shape (6 + n,); -1 for those of a
+            root that is not free, whose columns stay zero.
         qpos: Index of each joint in qpos, shape (n,).
         place: Column of each degree of freedom of the scene, -1 for others, (nv,).
         terms: Terms of the equations of motion.
@@ -171,6 +173,7 @@ class WholeBodyDynamics(NamedTuple):
         upright_weight: Their weights, shape (u,).
         posture: Positions that joints return to, rad or m, shape (n,).
         posture_weight: Weight of each joint, shape (n,).
+        follows: Joints that follow what other laws ask for instead, shape (n,).
         limits: Position low and high, velocity, torque low and high, shape (5, n).
         command: Forward, left (m/s), turn (rad/s), height (m), shape (4,).
         torque: Torques of contact forces and loads at the joints, J^T f, shape (n,).
@@ -205,6 +208,7 @@ class WholeBodyDynamics(NamedTuple):
     upright_weight: Vector
     posture: Vector
     posture_weight: Vector
+    follows: Indices
     limits: Matrix
     command: Vector
     torque: Vector
@@ -231,29 +235,34 @@ def make_dynamics(
     upright_weight: Vector,
     posture_weight: Vector,
     limits: Limits,
+    follows: Indices | None = None,
     tracked: Tracked | None = None,
 ) -> WholeBodyDynamics:
     """Return the arrays of a robot; see `WholeBodyDynamics`."""
     n, f, h, u = len(qpos), len(feet), len(hands), len(upright)
+    is_free = dofs[0] >= 0
     points = [len(foot.corners) for foot in feet]
     edges = EDGES * sum(points)
-    rows = sum(6 if foot.sole else 3 for foot in feet) + 6 + 3 * u + 6 * h
+    rows = sum(6 if foot.sole else 3 for foot in feet) + 3 * u + 6 * h
+    rows += 6 if is_free else 0
     rows += 0 if tracked is None else 6
     place = np.full(nv, -1, dtype=np.int64)
-    place[dofs] = np.arange(6 + n)
+    place[dofs[dofs >= 0]] = np.arange(0 if is_free else 6, 6 + n)
     W, diagonal = np.zeros((rows, edges + n)), np.zeros((2, edges + n))
     rest = np.zeros(rows), diagonal, np.zeros(1)
+    state = readable(np.zeros(1, STATE))
+    state["is_free"] = is_free
     return WholeBodyDynamics(
-        state=readable(np.zeros(1, STATE)),
+        state=state,
         dofs=np.array(dofs, dtype=np.int64),
         qpos=np.array(qpos, dtype=np.int64),
         place=place,
         terms=_make_terms(n, edges),
         site=np.array([foot.site for foot in feet], dtype=np.int64),
-        middle=np.array([foot.middle for foot in feet]),
+        middle=np.array([foot.middle for foot in feet]).reshape(-1, 3),
         is_sole=np.array([foot.sole is not None for foot in feet], dtype=np.int64),
         first_edge=EDGES * np.cumsum([0, *points], dtype=np.int64),
-        corner=np.concatenate([foot.corners for foot in feet]),
+        corner=np.concatenate([np.zeros((0, 2)), *(foot.corners for foot in feet)]),
         hand=np.array(hands, dtype=np.int64),
         goal=goal,
         start=np.zeros((h, 12)),
@@ -267,6 +276,7 @@ def make_dynamics(
         upright_weight=upright_weight,
         posture=np.zeros(n),
         posture_weight=posture_weight,
+        follows=np.zeros(n, dtype=np.int64) if follows is None else follows,
         limits=np.array([getattr(limits, name) for name in Limits.__slots__]),
         command=np.zeros(4),
         torque=np.zeros(n),

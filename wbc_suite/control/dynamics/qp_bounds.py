@@ -43,16 +43,17 @@ def write_bounds(physics: Physics, body: WholeBodyDynamics) -> None:
 def _write_costs(physics: Physics, body: WholeBodyDynamics) -> None:
     """Write the cost of forces, and of joints away from their posture.
 
-    Joints of a robot that tracks a motion follow what other laws ask for instead.
+    Joints of a robot that tracks a motion, and those of a base, follow what other laws
+    ask for instead.
     """
-    qp, terms, tracks = body.qp, body.terms, body.state[0].tracks
+    qp, terms = body.qp, body.terms
     edges, kd = terms.B.shape[0], 2.0 * np.sqrt(POSTURE_KP)
     for k in range(edges):
         qp.diagonal[0, k], qp.diagonal[1, k] = FORCE_COST**2, 0.0
     for j in range(body.qpos.shape[0]):
         error = body.posture[j] - physics.qpos[body.qpos[j]]
         wanted = POSTURE_KP * error - kd * terms.v[6 + j]
-        if tracks == 1:
+        if body.follows[j] == 1:
             wanted = physics.acceleration[body.dofs[6 + j]]
         cost = body.posture_weight[j] ** 2
         qp.diagonal[0, edges + j] = cost + MOTION_COST

@@ -12,7 +12,7 @@ from wbc_suite.control.dynamics.terms import (
 )
 from wbc_suite.control.loop.physics import Physics
 from wbc_suite.control.loop.rigid_body import matrix_product, rotated, rotation
-from wbc_suite.locomotion.gait import GRAVITY, GaitKind, Mode
+from wbc_suite.locomotion.gait import GaitKind, Mode
 from wbc_suite.qp.lie import exp3, log3, saturate
 from wbc_suite.typing import Matrix, Vector
 
@@ -60,11 +60,13 @@ def state_qp(physics: Physics, body: WholeBodyDynamics) -> None:
     for k in range(body.site.shape[0]):
         _write_foot_jacobian(physics, body, k)
         write_edges(physics, body, k)
-    eliminate_root(body)
+    if body.state[0].is_free == 1:
+        eliminate_root(body)
     row = 0
     for k in range(body.site.shape[0]):
         row = _add_foot(physics, body, k, row)
-    row = _add_momentum(physics, body, row)
+    if body.state[0].is_free == 1:
+        row = _add_momentum(physics, body, row)
     if body.state[0].tracks == 1:
         row = _add_tracked_root(body, row)
     for k in range(body.upright.shape[0]):
@@ -177,8 +179,9 @@ def _add_momentum(physics: Physics, body: WholeBodyDynamics, row: int) -> int:
         qp.W[row + 4, k] = turning * (m[1] - (z * f[0] - x * f[2]))
         qp.W[row + 5, k] = turning * (m[2] - (x * f[1] - y * f[0]))
     for i in range(3):
-        fall = GRAVITY if i == 2 else 0.0
-        wanted = plan.com_acceleration[i] + fall - terms.held[i] / state.mass
+        wanted = (
+            plan.com_acceleration[i] - physics.gravity[i] - terms.held[i] / state.mass
+        )
         qp.e[row + i] = weight[i] * wanted
         qp.e[row + 3 + i] = -turning * (SPIN[1] * terms.spin[i] + terms.held[3 + i])
     return row + 6
@@ -242,10 +245,13 @@ def _add_hand(physics: Physics, body: WholeBodyDynamics, k: int, row: int) -> in
         p_goal[:] = rotated(heading, p_goal)
         twist[:3], twist[3:] = rotated(heading, twist[:3]), rotated(heading, twist[3:])
         for i in range(2):
-            p_goal[i] += body.measured.com[i]
+            p_goal[i] += terms.com[i]
             lead[i] = body.measured.com_velocity[i]
+        turn = gait.velocity[2] if gait.mode == 1 else 0.0
+        lead[0] -= turn * (p_goal[1] - terms.com[1])
+        lead[1] += turn * (p_goal[0] - terms.com[0])
         p_goal[2] += gait.ground + gait.height
-        lead[5] = gait.velocity[2] if gait.mode == 1 else 0.0
+        lead[5] = turn
     R_error, error = np.empty((3, 3)), np.empty(6)
     matrix_product(R_goal, rotation(physics.site_xmat, site).T, R_error)
     log3(R_error, error[3:])

@@ -36,6 +36,9 @@ STRONGEST_CHANGE = 200.0
 HEAVIEST, HEAVIEST_MOMENT = 120.0, 8.0
 """N and N m; greatest load."""
 
+AT_STOP = 0.01
+"""rad or m; so near to its limit a joint's stop may act, and loads are not observed."""
+
 DAMPING = 1e-3
 """m^2; damps the wrench in directions that the arm does not feel."""
 
@@ -64,13 +67,15 @@ def solve_whole_body(physics: Physics, body: WholeBodyDynamics) -> bool:
         _hold_joints(physics, body)
         return True
     _observe_loads(physics, body)
-    if state.tracks == 1:
+    if state.is_free == 0:
+        body.plan.margin[0] = 1.0
+    elif state.tracks == 1:
         track_motion(physics, body)
     elif body.gait.settings[0].kind == _WALK:
         plan_walk(body.gait, body.measured, body.command, state.dt, body.plan)
     else:
         plan_trot(body.gait, body.measured, body.command, state.dt, body.plan)
-    if state.tracks == 0:
+    if state.is_free == 1 and state.tracks == 0:
         _watch_fall(physics, body)
     state_qp(physics, body)
     state.ticks += 1
@@ -112,7 +117,7 @@ def write_whole_body(physics: Physics, body: WholeBodyDynamics) -> None:
         for k in range(edges):
             held += terms.B[k, 6 + j] * qp.x[k]
         body.torque[j] = held
-    for i in range(body.dofs.shape[0]):
+    for i in range(0 if body.state[0].is_free == 1 else 6, body.dofs.shape[0]):
         physics.acceleration[body.dofs[i]] = terms.a[i]
         body.last_velocity[i] = physics.qvel[body.dofs[i]]
 
@@ -133,7 +138,7 @@ def _observe_loads(physics: Physics, body: WholeBodyDynamics) -> None:
     size = body.dofs.shape[0]
     missed, residual = np.zeros(size), np.empty(size)
     if state.ticks > 0:
-        for i in range(size):
+        for i in range(0 if state.is_free == 1 else 6, size):
             change = physics.qvel[body.dofs[i]] - body.last_velocity[i]
             missed[i] = change / state.dt - terms.a[i]
     for i in range(size):
@@ -144,6 +149,8 @@ def _observe_loads(physics: Physics, body: WholeBodyDynamics) -> None:
         p, load = physics.site_xpos[body.hand[k]], body.load[k]
         write_frame_terms(physics, body, int(physics.site_bodyid[body.hand[k]]), p)
         change = _missing_wrench(body, k, residual)
+        if _is_at_stop(physics, body, k):
+            change[:] = 0.0
         for r in range(6):
             part = min(max(change[r], -STRONGEST_CHANGE), STRONGEST_CHANGE)
             most = HEAVIEST if r < 3 else HEAVIEST_MOMENT
@@ -161,9 +168,20 @@ def _observe_loads(physics: Physics, body: WholeBodyDynamics) -> None:
         for i in range(2):
             moment[i] += held * (p[i] - terms.com[i])
             rate[i] += held * (terms.velocity[i] - measured.com_velocity[i])
-    for i in range(2):
+    for i in range(2 if state.is_free == 1 else 0):
         measured.com[i] += moment[i] / mass
         measured.com_velocity[i] += rate[i] / mass
+
+
+@compiled
+def _is_at_stop(physics: Physics, body: WholeBodyDynamics, k: int) -> bool:
+    """Return whether the stop of a joint may act on the arm of a hand."""
+    low, high, at_stop = body.limits[0], body.limits[1], False
+    for j in range(body.qpos.shape[0]):
+        q = physics.qpos[body.qpos[j]]
+        outside = q < low[j] + AT_STOP or q > high[j] - AT_STOP
+        at_stop = at_stop or (outside and body.is_arm[k, j] == 1)
+    return at_stop
 
 
 @compiled

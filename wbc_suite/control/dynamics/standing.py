@@ -126,6 +126,7 @@ def _make_dynamics(
         upright=none,
         upright_weight=np.zeros(0),
         posture_weight=np.where(is_leg, LEG_WEIGHT, ARM_WEIGHT),
+        follows=np.ones(n, dtype=np.int64),
         limits=limits_of(drives),
         tracked=motion or still_motion(np.zeros(7), np.zeros(n)),
     )

@@ -26,7 +26,7 @@ def write_terms(physics: Physics, body: WholeBodyDynamics) -> None:
     """
     terms, dofs, state = body.terms, body.dofs, body.state[0]
     write_inertia(physics, dofs, dofs.shape[0], terms.M)
-    for i in range(dofs.shape[0]):
+    for i in range(0 if state.is_free == 1 else 6, dofs.shape[0]):
         measured = physics.qvel[dofs[i]]
         if state.trust < 1.0 and state.ticks > 0:
             predicted = terms.v[i] + state.dt * terms.a[i]
@@ -37,8 +37,16 @@ def write_terms(physics: Physics, body: WholeBodyDynamics) -> None:
 
 @compiled
 def measure(physics: Physics, body: WholeBodyDynamics) -> None:
-    """Write what the planner reads, and the angular momentum."""
+    """Write what the planner reads, and the angular momentum.
+
+    The planner is told where gravity's line through the centre of mass meets the
+    ground, so that it walks on slopes as on level ground. Hands of a robot whose root
+    is not free are carried by its base, in place of the centre of mass.
+    """
     state, terms, measured = body.state[0], body.terms, body.measured
+    if state.is_free == 0:
+        _measure_base(physics, body)
+        return
     size = body.dofs.shape[0]
     state.mass, momentum = terms.M[0, 0], np.empty(6)
     for i in range(6):
@@ -52,6 +60,9 @@ def measure(physics: Physics, body: WholeBodyDynamics) -> None:
     terms.spin[2] = spin[2] - (x * momentum[1] - y * momentum[0])
     for i in range(3):
         measured.com[i] = terms.com[i] = com[i]
+        if i < 2:
+            way = (com[2] - body.gait.state[0].ground) / min(physics.gravity[2], -1.0)
+            measured.com[i] -= way * physics.gravity[i]
         measured.com_velocity[i] = momentum[i] / state.mass
     for k in range(body.site.shape[0]):
         R = rotation(physics.site_xmat, body.site[k])
@@ -62,6 +73,19 @@ def measure(physics: Physics, body: WholeBodyDynamics) -> None:
             physics, link, measured.foot[k], terms.velocity, terms.drift
         )
         measured.slip[k] = np.sqrt(terms.velocity[0] ** 2 + terms.velocity[1] ** 2)
+        measured.rise[k] = terms.velocity[2]
+
+
+@compiled
+def _measure_base(physics: Physics, body: WholeBodyDynamics) -> None:
+    """Write place and motion of the base as those of the centre of mass and heading."""
+    gait, terms, measured = body.gait.state[0], body.terms, body.measured
+    link = int(body.state[0].body)
+    R, p = rotation(physics.xmat, link), physics.xpos[link]
+    point_velocity_and_drift(physics, link, p, terms.velocity, terms.drift)
+    gait.yaw, gait.ground = np.arctan2(R[1, 0], R[0, 0]), p[2]
+    gait.velocity[2] = terms.velocity[5]
+    terms.com[:], measured.com_velocity[:] = p, terms.velocity[:3]
 
 
 @compiled

@@ -11,7 +11,6 @@ from wbc_suite.control.dynamics.arrays import WholeBodyDynamics
 from wbc_suite.control.loop.physics import Physics
 from wbc_suite.control.loop.rigid_body import matrix_product, rotated, rotation
 from wbc_suite.linear_algebra import cross
-from wbc_suite.locomotion.gait import GRAVITY
 from wbc_suite.qp.lie import exp3, log3
 from wbc_suite.typing import Matrix, Vector
 
@@ -39,8 +38,7 @@ def track_motion(physics: Physics, body: WholeBodyDynamics) -> None:
         wanted[i] += kp * error[i] + 2.0 * np.sqrt(kp) * rate[i]
     for i in range(3):  # the root's linear rows of M are m J of the centre of mass
         force = np.sum(terms.M[i] * wanted) + terms.h[i]
-        plan.com_acceleration[i] = force / state.mass
-    plan.com_acceleration[2] -= GRAVITY
+        plan.com_acceleration[i] = force / state.mass + physics.gravity[i]
     plan.margin[0] = 1.0
 
 

@@ -67,9 +67,12 @@ class Law:
     def keep_limits(self, state: RobotState) -> None:
         """Keep the robot's position and velocity limits; see `acceleration_limits`.
 
-        Positions end where the joint's stop begins to act.
+        Positions end where the joint's stop begins to act. Joints of a planar root have
+        none.
         """
         for drive, name in zip(self.drives, self.joints, strict=True):
+            if name in state.robot.root_joint_names:
+                continue
             joint = state.robot.joint(name)
             margin = state.model.joint(state.prefix + name).margin.item()
             low, high = joint.range or (-np.inf, np.inf)

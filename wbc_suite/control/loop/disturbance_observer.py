@@ -38,7 +38,7 @@ def observe_disturbances(
     physics.acceleration[:] = 0.0
     if bodies is not None:
         for body in bodies:
-            for i in range(6):
+            for i in range(6 if body.state[0].is_free == 1 else 0):
                 change = physics.qvel[body.dofs[i]] - body.last_velocity[i]
                 rate = change / physics.timestep
                 physics.acceleration[body.dofs[i]] = rate - body.terms.a[i]

@@ -50,6 +50,8 @@ class Physics(NamedTuple):
     """
 
     timestep: float
+    gravity: Vector
+    """m/s^2, shape (3,)."""
     qpos: Vector
     qvel: Vector
     ctrl: Vector
@@ -103,6 +105,7 @@ def bind_physics(model: mujoco.MjModel, data: mujoco.MjData) -> Physics:
     """Return the view of a simulation for kernels."""
     computed = {
         "timestep": float(model.opt.timestep),
+        "gravity": model.opt.gravity,
         "body_last_dof": _last_dofs(model),
         "acceleration": np.zeros(model.nv),
         "force": np.zeros(model.nv),

@@ -97,15 +97,19 @@ def moves_body(physics: Physics, dof: int, body: int) -> bool:
 def write_inertia(physics: Physics, dofs: Indices, n: int, block: Matrix) -> None:
     """Write the inertia of the first n of some degrees of freedom, shape (n, n).
 
+    Those below zero do not exist, and have none.
     MuJoCo keeps the lower triangle of M by rows; columns are ancestors of their row.
     """
     place = physics.place
     place[:] = -1
     for i in range(n):
-        place[dofs[i]] = i
+        if dofs[i] >= 0:
+            place[dofs[i]] = i
         for j in range(n):
             block[i, j] = 0.0
     for i in range(n):
+        if dofs[i] < 0:
+            continue
         first = physics.M_rowadr[dofs[i]]
         for k in range(first, first + physics.M_rownnz[dofs[i]]):
             j = place[physics.M_colind[k]]
