@@ -26,6 +26,18 @@ def test_list(monkeypatch, capsys):
     assert "Lift" in [row["name"] for row in found["benchmarks"]]
 
 
+@pytest.mark.slow
+def test_robots_are_listed_with_and_without_their_base(monkeypatch, capsys):
+    found = printed(["list", "robots"], monkeypatch, capsys)["robots"]
+    robots = {row["name"]: row for row in found}
+    panda, mobile = robots["Panda"], robots["PandaOmron"]
+    assert float(panda["kg"]) > 250  # the pedestal is of steel
+    assert panda["bare kg"] == mobile["bare kg"]
+    assert 15 < float(panda["bare kg"]) < 20  # Franka: 18 kg with its hand
+    assert (mobile["dof"], mobile["bare dof"]) == ("9", "8")
+    assert robots["GR1"]["kg"] == robots["GR1"]["bare kg"]
+
+
 def test_check(monkeypatch, capsys):
     found = printed(["check", str(LIFT)], monkeypatch, capsys)
     assert found["fine"]

@@ -49,7 +49,7 @@ def list_catalogue(
         table = Table(title_justify="left", title_style="bold", box=None)
         table.title = listed.capitalize()
         for column in columns:
-            side = "right" if column in ("dof", "kg") else "left"
+            side = "right" if column.endswith(("dof", "kg")) else "left"
             table.add_column(column, justify=side, no_wrap=column == "name")
         for row in rows(catalogued.files(folder)):
             table.add_row(*row)
@@ -59,9 +59,11 @@ def list_catalogue(
 def _robots(files: Sequence[Path]) -> Iterator[Row]:
     from wbc_suite.robot import load_robot
 
-    for robot in map(load_robot, files):
-        numbers = str(robot.dof), f"{robot.mass:.1f}"
-        yield robot.name, robot.title, *numbers, robot.root.kind
+    for file in files:
+        robot, bare = load_robot(file), load_robot(file, base="NullMount")
+        numbers = (str(robot.dof), f"{robot.mass:.1f}")
+        alone = (str(bare.dof), f"{bare.mass:.1f}")
+        yield robot.name, robot.title, *numbers, *alone, robot.root.kind
 
 
 def _components(files: Sequence[Path]) -> Iterator[Row]:
@@ -99,8 +101,9 @@ def _controllers(files: Sequence[Path]) -> Iterator[Row]:
         yield file.stem, _controlled(read_toml(file))
 
 
+ALONE = ("bare dof", "bare kg")  # without base or pedestal
 _LISTS = {
-    "robots": ("robots", ("name", "", "dof", "kg", "root"), _robots),
+    "robots": ("robots", ("name", "", "dof", "kg", *ALONE, "root"), _robots),
     "grippers": ("robots/gripper", ("name", "", "side", "kg"), _components),
     "bases": ("robots/base", ("name", "", "root", "kg"), _components),
     "benchmarks": ("tasks", ("name", ""), _benchmarks),

@@ -6,7 +6,7 @@
                     "arrow-back": "Back to the panel" };  // of Tabler's icons
 
   addEventListener("keydown", e => {
-    if (e.key !== "?" || e.target.closest?.("input, textarea")) return;
+    if (e.key !== "?" || e.target.closest?.("input:not([type=checkbox]), textarea")) return;
     const buttons = [...document.querySelectorAll("button")];
     buttons.find(b => b.textContent.trim() === HELP)?.click();
   });
