@@ -73,7 +73,8 @@ def alone(robot: RobotDescription, **options: Any) -> RobotEnv:
     """
     feet = any(frame.role == "foot" for frame in robot.frames)
     benchmark = _unpushed if feet and robot.root.kind == "free" else _Floor
-    return RobotEnv(benchmark, robots=robot, **{"horizon": 100_000} | options)
+    options.setdefault("horizon", 100_000)
+    return RobotEnv(benchmark, robots=robot, **options)
 
 
 def hold_faults(robot: RobotDescription, *, seconds: float = SECONDS) -> list[str]:

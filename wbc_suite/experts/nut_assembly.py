@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.benchmark.nut_assembly import NutAssembly
-from wbc_suite.experts.skills import UP, carry, pick, release, settle, shifted
+from wbc_suite.experts.skills import UP, carry, pick, release, settle
 from wbc_suite.experts.workcell import Steps, Workcell
 
 TURNS = {"SquareNut": 4, "RoundNut": 8}

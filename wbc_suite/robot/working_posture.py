@@ -165,7 +165,7 @@ class _Search:
         if len(arm.joints) != len(other.joints):
             return None
         pin.forwardKinematics(self._model, self._data, pin.neutral(self._model))
-        signs = []
+        signs: list[float] = []
         for name, twin in zip(arm.joints, other.joints, strict=True):
             own, image = self._axis(name), self._axis(twin)
             # An axis of rotation is a pseudovector: it is reflected, and turned.
@@ -175,7 +175,7 @@ class _Search:
             cosine = float(own @ image)
             if abs(cosine) < PARALLEL:
                 return None
-            signs.append(np.sign(cosine))
+            signs.append(float(np.sign(cosine)))
         values = np.array(signs) * self.q[other.q]
         inside = (values > arm.low - 1e-9) & (values < arm.high + 1e-9)
         return values if inside.all() else None
@@ -192,5 +192,7 @@ class _Search:
         mujoco.mj_kinematics(m, data)
         mujoco.mj_comPos(m, data)
         mujoco.mj_collision(m, data)
-        pairs = m.geom_bodyid[data.contact.geom].tolist() if data.ncon else []
-        return {(min(pair), max(pair)) for pair in pairs}
+        if not data.ncon:
+            return set()
+        bodies = m.geom_bodyid[data.contact.geom]
+        return {(int(i), int(k)) for i, k in np.sort(bodies, axis=1)}

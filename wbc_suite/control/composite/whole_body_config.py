@@ -230,7 +230,7 @@ def default_whole_body_config(robot: RobotDescription) -> dict[str, Any]:
     for side, frame in robot.hands.items():
         name = _hand_name(side, len(robot.hands))
         frames.append({"name": name, "frame": frame, "kind": "pose"})
-        if _joints_to(robot, frame) < 6:
+        if robot.root.kind == "fixed" and _joints_to(robot, frame) < 6:
             frames[-1]["orientation_cost"] = FEW_JOINTS
     if robot.root.kind == "planar":
         frames.append(_gliding_base(robot))
@@ -250,12 +250,12 @@ def default_whole_body_config(robot: RobotDescription) -> dict[str, Any]:
 
 
 def _joints_to(robot: RobotDescription, frame: str) -> int:
-    """Return how many joints move a frame; six and more if its root moves."""
+    """Return how many joints move a frame."""
     count, link = 0, robot.link(robot.link_of(frame))
     while link.parent is not None:
         count += link.joint is not None and link.joint.independent
         link = robot.link(link.parent)
-    return count + 6 * (robot.root.kind != "fixed")
+    return count
 
 
 def _hand_name(side: str, count: int) -> str:

@@ -240,23 +240,15 @@ def make_dynamics(
 ) -> WholeBodyDynamics:
     """Return the arrays of a robot; see `WholeBodyDynamics`."""
     n, f, h, u = len(qpos), len(feet), len(hands), len(upright)
-    is_free = dofs[0] >= 0
     points = [len(foot.corners) for foot in feet]
     edges = EDGES * sum(points)
     rows = sum(6 if foot.sole else 3 for foot in feet) + 3 * u + 6 * h
-    rows += 6 if is_free else 0
-    rows += 0 if tracked is None else 6
-    place = np.full(nv, -1, dtype=np.int64)
-    place[dofs[dofs >= 0]] = np.arange(0 if is_free else 6, 6 + n)
-    W, diagonal = np.zeros((rows, edges + n)), np.zeros((2, edges + n))
-    rest = np.zeros(rows), diagonal, np.zeros(1)
-    state = readable(np.zeros(1, STATE))
-    state["is_free"] = is_free
+    rows += 6 * (int(dofs[0] >= 0) + int(tracked is not None))
     return WholeBodyDynamics(
-        state=state,
+        state=_make_state(is_free=bool(dofs[0] >= 0)),
         dofs=np.array(dofs, dtype=np.int64),
         qpos=np.array(qpos, dtype=np.int64),
-        place=place,
+        place=_columns(dofs, nv),
         terms=_make_terms(n, edges),
         site=np.array([foot.site for foot in feet], dtype=np.int64),
         middle=np.array([foot.middle for foot in feet]).reshape(-1, 3),
@@ -285,8 +277,27 @@ def make_dynamics(
         measured=make_measured(f),
         plan=make_plan(f),
         tracked=tracked or still_motion(np.zeros(7), np.zeros(n)),
-        qp=make_qp_arrays(W, *rest, inequalities=2 * n),
+        qp=_make_qp(rows, edges, n),
     )
+
+
+def _make_state(*, is_free: bool) -> Records:
+    state = readable(np.zeros(1, STATE))
+    state["is_free"] = is_free
+    return state
+
+
+def _make_qp(rows: int, edges: int, n: int) -> QpArrays:
+    W, diagonal = np.zeros((rows, edges + n)), np.zeros((2, edges + n))
+    return make_qp_arrays(W, np.zeros(rows), diagonal, np.zeros(1), inequalities=2 * n)
+
+
+def _columns(dofs: Indices, nv: int) -> Indices:
+    """Return the column of each degree of freedom of the scene, or -1, shape (nv,)."""
+    place = np.full(nv, -1, dtype=np.int64)
+    own = np.flatnonzero(dofs >= 0)
+    place[dofs[own]] = own
+    return place
 
 
 def still_motion(start: Vector, joints: Vector) -> Tracked:
