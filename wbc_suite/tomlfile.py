@@ -147,6 +147,11 @@ def _lines(source: str) -> dict[str, int]:
     return lines
 
 
+def located(key: str, source: str) -> str:
+    """Return `key 'a.b' (line 3)`, the line of a key in a TOML file, if it is one."""
+    return f"key '{key}'{_line(key, _lines(source))}"
+
+
 def _parts(key: str) -> list[str]:
     return [part.strip("\"'") for part in re.findall(_PART, key)]
 

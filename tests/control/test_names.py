@@ -59,3 +59,32 @@ def test_another_layout_is_read_by_its_converter():
         _CONVERTERS.remove("test_names:convert")
     assert found["body_parts"] == {"right": {"type": "JOINT_TORQUE"}}
     assert plain["body_parts"]["right"]["type"] == "OSC_POSE"
+
+
+CONTROLLERS = {
+    ("kp = 400", "kpp = 400"): (r"'body_parts.torso.kpp' \(line 13\)", "'kp'"),
+    ('"OSC_POSE"', '"OSC_POS"'): (r"'body_parts.right.type' \(line 6\)", "'OSC_POSE'"),
+    ('"BASIC"', '"BASICC"'): (r"'type' \(line 3\)", "'BASIC'"),
+    ("format = 1", "formt = 1"): (r"'formt' \(line 2\)", "'format'"),
+    ("parts.torso", "parts.torsoo"): (r"'body_parts.torsoo' \(line 9\)", "'torso'"),
+}
+
+
+@pytest.mark.parametrize(("typing", "told"), CONTROLLERS.items())
+def test_a_typing_error_in_a_controller_has_its_line_and_the_nearest_name(
+    typing, told, tmp_path
+):
+    text = Catalogue().find("controllers", "pandaomron_basic", kind="c").read_text()
+    file = tmp_path / "mine.toml"
+    file.write_text(text.replace(*typing, 1))
+    line, nearest = told
+    with pytest.raises(ConfigError, match=f"{line}.*Did you mean {nearest}"):
+        load_composite_controller_config(file, "PandaOmron")
+
+
+def test_a_typing_error_in_a_frame_has_its_line(tmp_path):
+    text = Catalogue().find("controllers", "gr1_whole_body_ik", kind="c").read_text()
+    file = tmp_path / "mine.toml"
+    file.write_text(text.replace('"right_tcp"', '"right_tpc"'))
+    with pytest.raises(ConfigError, match=r"'frame\[0\].frame' \(line 7\): GR1: No "):
+        load_composite_controller_config(file, "GR1")

@@ -14,7 +14,7 @@ from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.robot import RobotDescription
 from wbc_suite.scene import Push
 from wbc_suite.sensing.reading import Reading
-from wbc_suite.tomlfile import parse_model, read_toml
+from wbc_suite.tomlfile import located, parse_model, read_toml
 
 C = TypeVar("C", bound=BaseModel)
 
@@ -134,7 +134,8 @@ def load_benchmark(
         try:
             known = _find(str(read_toml(path).get("name")))
         except UnknownNameError as error:
-            raise ConfigError(f"{path}: key 'name': {error}") from error
+            where = f"{path}: {located('name', str(path))}"
+            raise ConfigError(f"{where}: {error}") from error
         return _BUILDERS[known](path)
     known = _find(str(name))
     path = (catalogue or Catalogue()).find("tasks", known, kind="benchmark file")

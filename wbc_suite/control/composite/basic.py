@@ -27,7 +27,7 @@ from wbc_suite.control.state import RobotState
 from wbc_suite.errors import ConfigError
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.elements import Name
-from wbc_suite.tomlfile import FrozenModel, parse_model
+from wbc_suite.tomlfile import FrozenModel, located, parse_model
 from wbc_suite.typing import Vector
 
 
@@ -168,7 +168,8 @@ def check_basic(
         try:
             check_part(name, part, robot)
         except ConfigError as error:
-            raise ConfigError(f"{source}: key 'body_parts.{name}': {error}") from error
+            where = f"{source}: {located(f'body_parts.{name}', source)}"
+            raise ConfigError(f"{where}: {error}") from error
     kinds = [part_controller(part) for part in read.body_parts.values()]
     stands = any(kind.holds_root for kind in kinds)
     if robot.root.kind == "free" and not (stands or read.may_fall):

@@ -17,7 +17,7 @@ from wbc_suite.control.robot_parts import hands_of
 from wbc_suite.control.state import RobotState
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.robot import RobotDescription, load_robot
-from wbc_suite.tomlfile import read_json, read_toml
+from wbc_suite.tomlfile import located, read_json, read_toml
 from wbc_suite.typing import RobotName
 
 log = logging.getLogger(__name__)
@@ -120,7 +120,13 @@ def load_composite_controller_config(
     if robot is not None and not isinstance(robot, RobotDescription):
         robot = load_robot(robot, catalogue=catalogue)
     config, source = _read(controller, robot, catalogue)
-    _kind_of(config).check(config, robot, source)
+    try:
+        kind = _kind_of(config)
+    except UnknownNameError as error:
+        if Path(source).suffix != ".toml":
+            raise
+        raise ConfigError(f"{source}: {located('type', source)}: {error}") from error
+    kind.check(config, robot, source)
     return config
 
 

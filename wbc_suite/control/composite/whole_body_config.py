@@ -20,7 +20,7 @@ from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.elements import Name
 from wbc_suite.robot.mjcf_export import STOP_MARGIN
-from wbc_suite.tomlfile import FrozenModel, parse_model
+from wbc_suite.tomlfile import FrozenModel, located, parse_model
 
 __all__ = [
     "ControlledFrame",
@@ -313,7 +313,8 @@ def read_whole_body(
     for key, kind, name, known in _names(read, robot):
         if name not in known:
             unknown = UnknownNameError(kind, name, known)
-            raise ConfigError(f"{source}: key '{key}': {robot.name}: {unknown}")
+            where = f"{source}: {located(key, source)}"
+            raise ConfigError(f"{where}: {robot.name}: {unknown}")
     return read
 
 

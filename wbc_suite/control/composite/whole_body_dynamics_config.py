@@ -19,7 +19,7 @@ from wbc_suite.locomotion import GaitConfig, TrotConfig
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.elements import Name
 from wbc_suite.robot.sole_inference import ball_radius, guess_sole
-from wbc_suite.tomlfile import FrozenModel, parse_model
+from wbc_suite.tomlfile import FrozenModel, located, parse_model
 
 NOISY_CUTOFF = 25.0
 """Hz; GR1 walks with a delay of 20 ms and noise of 0.05 rad/s at it, not at 40 Hz."""
@@ -239,7 +239,8 @@ def read_dynamics(
     for key, kind, name, known in _names(read, robot):
         if name not in known:
             unknown = UnknownNameError(kind, name, known)
-            raise ConfigError(f"{source}: key '{key}': {robot.name}: {unknown}")
+            where = f"{source}: {located(key, source)}"
+            raise ConfigError(f"{where}: {robot.name}: {unknown}")
     return read
 
 

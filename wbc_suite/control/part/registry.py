@@ -10,7 +10,7 @@ from wbc_suite.control.robot_parts import hands_of, robot_part
 from wbc_suite.control.state import RobotState
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.robot import RobotDescription
-from wbc_suite.tomlfile import parse_model
+from wbc_suite.tomlfile import located, parse_model
 
 PartControllerName: TypeAlias = Literal[
     "OSC_POSE",
@@ -94,13 +94,16 @@ def parse_part(name: str, given: object, source: str) -> BaseModel:
     if isinstance(given, BaseModel):
         return given
     if not isinstance(given, Mapping):
-        raise ConfigError(f"{source}: key '{key}' = {given!r:.80}: not a table.")
+        raise ConfigError(
+            f"{source}: {located(key, source)} = {given!r:.80}: not a table."
+        )
     if "type" not in given:
-        raise ConfigError(f"{source}: missing key '{key}.type'")
+        raise ConfigError(f"{source}: missing {located(f'{key}.type', source)}")
     try:
         _, model = _find(given["type"])
     except UnknownNameError as error:
-        raise ConfigError(f"{source}: key '{key}.type': {error}") from error
+        where = located(f"{key}.type", source)
+        raise ConfigError(f"{source}: {where}: {error}") from error
     return parse_model(model, given, source=source, within=key)
 
 
