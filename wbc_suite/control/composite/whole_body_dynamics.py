@@ -85,7 +85,14 @@ class WholeBodyID:
         config, drives = self.config, self._law.drives
         root = state.model.joint(f"{state.prefix}root")
         feet = [
-            make_foot(state, x.frame, x.sole, height=x.height, radius=x.radius)
+            make_foot(
+                state,
+                x.frame,
+                x.sole,
+                height=x.height,
+                radius=x.radius,
+                rolls=x.rolls,
+            )
             for x in config.feet
         ]
         edges = np.array([foot.sole or (0.0,) * 4 for foot in feet])
