@@ -107,7 +107,8 @@ def arms():
 
     Those that stand on their feet have the arms of others, and settle into the ground.
     """
-    standing = ("g1_free_body", "gr1_free_body", "spot", "spot_with_arm")
+    standing = ("spot", "spot_with_arm", "b1_z1", "go2_arx5")
+    standing += ("g1_free_body", "gr1_free_body", "h1_free_body")
     return [r for r in Catalogue().names("robots") if r not in ("panda", *standing)]
 
 

@@ -222,6 +222,17 @@ def test_a_robot_walks_as_commanded_and_stands_again(alone, name, speed):
     np.testing.assert_allclose(walker.data.qvel[:3], 0.0, atol=0.02)
 
 
+def test_h1_walks_on_blades_that_roll(alone):
+    """Legs of five joints hold no sole flat while the weight shifts: it fell so."""
+    walker = Walker(alone, "H1FreeBody").act(2.5, (0.3, 0.0, 0.0))
+    start = walker.data.qpos[:3].copy()
+    walker.act(2.0, (0.3, 0.0, 0.0))
+    way = walker.data.qpos[:3] - start
+    assert way[0] == pytest.approx(0.6, abs=0.06)
+    walker.act(3.0)
+    assert walker.balance["fell"] is None
+
+
 @pytest.mark.parametrize("push", [(400, 0, 0), (-400, 0, 0), (0, 300, 0), (0, -300, 0)])
 def test_gr1_steps_when_it_is_pushed(alone, push):
     walker = Walker(alone, "GR1FreeBody").act(1.0)

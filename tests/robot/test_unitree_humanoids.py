@@ -6,9 +6,10 @@ import pytest
 
 import wbc_suite
 
-MASSES = {"G1": 34.4}  # kg, the vendor's URDF with hands; its data sheet says 35
+MASSES = {"G1": 34.4, "H1": 61.1}  # kg, the vendor's URDFs with hands
 JOINTS = {  # of the body, of legs, of waist and head
     "G1": (29, 12, 3),
+    "H1": (19, 10, 1),
 }
 FEET = ("left_foot", "right_foot")
 

@@ -167,8 +167,9 @@ class MinkBackend:
 
     def _hold(self, frame: str, contact: str) -> mink.FrameTask | HeldPoint:
         kind, gain = self._frame_type(frame), self._config.frames[0].gain
-        if contact == "surface":
-            return mink.FrameTask(frame, kind, 1.0, 1.0, gain=gain)
+        if contact != "point":
+            turning = [float(contact == "surface"), 1.0, 1.0]
+            return mink.FrameTask(frame, kind, 1.0, turning, gain=gain)
         return HeldPoint(frame, kind, gain)
 
     def _make_limits(self, robot: RobotDescription) -> list[mink.Limit]:

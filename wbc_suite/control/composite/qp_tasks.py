@@ -52,7 +52,8 @@ def held_equality(held: HeldFrame) -> FrameEquality:
     """Return the rows that hold a frame."""
     if held.contact == "surface":
         return FrameEquality(held.frame)
-    return FrameEquality(held.frame, directions=("x", "y", "z"))
+    turning = ("pitch", "yaw") if held.contact == "line" else ()
+    return FrameEquality(held.frame, directions=("x", "y", "z", *turning))
 
 
 def make_limits(robot: RobotDescription, config: WholeBodyIKConfig) -> list[Limit]:

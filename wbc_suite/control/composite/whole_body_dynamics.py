@@ -104,7 +104,14 @@ class WholeBodyID:
             joint = state.model.joint(f"{state.prefix}root")
             root, place = joint.dofadr[0] + np.arange(6), joint.qposadr[0]
         feet = [
-            make_foot(state, x.frame, x.sole, height=x.height, radius=x.radius)
+            make_foot(
+                state,
+                x.frame,
+                x.sole,
+                height=x.height,
+                radius=x.radius,
+                rolls=x.rolls,
+            )
             for x in config.feet
         ]
         edges = np.array([foot.sole or (0.0,) * 4 for foot in feet])

@@ -34,12 +34,15 @@ class FootConfig(FrozenModel):
             left (along y); absent for a foot that touches the ground in a point.
         height: Of the frame over the sole, m, as in a file whose foot is the ankle.
         radius: Of a foot that is a ball about the frame, m.
+        rolls: Whether a sole may turn about its x axis, as the blade of a leg whose
+            ankle does not roll.
     """
 
     frame: Name
     sole: tuple[float, float, float, float] | None = None
     height: float = 0.0
     radius: NonNegativeFloat = 0.0
+    rolls: bool = False
 
     @model_validator(mode="after")
     def _sole_is_a_rectangle(self) -> "FootConfig":

@@ -63,11 +63,13 @@ class Foot:
             to its lowest point, world axes.
         sole: Edges of a sole about its middle: heel, toes, right, left, m; None for a
             ball.
+        rolls: Whether a sole may turn about its x axis.
     """
 
     site: int
     middle: Vector
     sole: tuple[float, float, float, float] | None = None
+    rolls: bool = False
 
     @property
     def corners(self) -> Matrix:
@@ -158,6 +160,7 @@ class WholeBodyDynamics(NamedTuple):
         site: Site of each foot, shape (f,).
         middle: See `Foot`, shape (f, 3).
         is_sole: Whether a foot is a sole, shape (f,).
+        rolls: Whether it may turn about its x axis, shape (f,).
         first_edge: First pyramid edge of each foot, and the end, shape (f + 1,).
         corner: Points in contact about the middle of their foot, m, shape (points, 2).
         hand: Site of each hand, shape (h,).
@@ -193,6 +196,7 @@ class WholeBodyDynamics(NamedTuple):
     site: Indices
     middle: Matrix
     is_sole: Indices
+    rolls: Indices
     first_edge: Indices
     corner: Matrix
     hand: Indices
@@ -253,6 +257,7 @@ def make_dynamics(
         site=np.array([foot.site for foot in feet], dtype=np.int64),
         middle=np.array([foot.middle for foot in feet]).reshape(-1, 3),
         is_sole=np.array([foot.sole is not None for foot in feet], dtype=np.int64),
+        rolls=np.array([foot.rolls for foot in feet], dtype=np.int64),
         first_edge=EDGES * np.cumsum([0, *points], dtype=np.int64),
         corner=np.concatenate([np.zeros((0, 2)), *(foot.corners for foot in feet)]),
         hand=np.array(hands, dtype=np.int64),

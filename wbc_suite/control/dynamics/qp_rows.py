@@ -119,6 +119,8 @@ def _add_foot(physics: Physics, body: WholeBodyDynamics, k: int, row: int) -> in
         R_goal[0, 1], R_goal[2, 2] = -R_goal[1, 0], 1.0
         matrix_product(R_goal, R.T, R_error)
         log3(R_error, turn)
+    if body.rolls[k] == 1:
+        _free_roll(physics, body, k, turn)
     kd = 2.0 * np.sqrt(SWING[2])
     for i in range(count):
         wanted = -terms.drift[i]
@@ -135,6 +137,26 @@ def _add_foot(physics: Physics, body: WholeBodyDynamics, k: int, row: int) -> in
             weight = SWING[1]
         _add_row(body, row + i, terms.J[i], wanted, weight)
     return row + count
+
+
+@compiled
+def _free_roll(physics: Physics, body: WholeBodyDynamics, k: int, turn: Vector) -> None:
+    """Take rotations about a foot's x axis out of its Jacobian, motion and error."""
+    terms, x = body.terms, rotation(physics.site_xmat, body.site[k])[:, 0]
+    J, about = terms.J, np.zeros(terms.J.shape[1])
+    speed = drift = error = 0.0
+    for i in range(3):
+        for j in range(about.shape[0]):
+            about[j] += x[i] * J[3 + i, j]
+        speed += x[i] * terms.velocity[3 + i]
+        drift += x[i] * terms.drift[3 + i]
+        error += x[i] * turn[i]
+    for i in range(3):
+        for j in range(about.shape[0]):
+            J[3 + i, j] -= x[i] * about[j]
+        terms.velocity[3 + i] -= x[i] * speed
+        terms.drift[3 + i] -= x[i] * drift
+        turn[i] -= x[i] * error
 
 
 @compiled

@@ -155,6 +155,7 @@ def make_foot(
     *,
     height: float = 0.0,
     radius: float = 0.0,
+    rolls: bool = False,
 ) -> Foot:
     """Return a foot in the simulation.
 
@@ -164,6 +165,7 @@ def make_foot(
         sole: Heel, toes, right, left in its axes, m; None for a ball.
         height: Of the frame over the sole, m.
         radius: Of the ball, m.
+        rolls: Whether a sole may turn about its x axis.
     """
     site = int(state.model.site(state.prefix + frame).id)
     if sole is None:
@@ -171,7 +173,8 @@ def make_foot(
     heel, toes, right, left = sole
     x, y = 0.5 * (heel + toes), 0.5 * (right + left)
     edges = (heel - x, toes - x, right - y, left - y)
-    return Foot(site=site, middle=np.array([x, y, -height]), sole=edges)
+    middle = np.array([x, y, -height])
+    return Foot(site=site, middle=middle, sole=edges, rolls=rolls)
 
 
 def chain(model: mujoco.MjModel, link: int) -> set[int]:

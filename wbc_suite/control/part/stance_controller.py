@@ -29,23 +29,24 @@ class HeldFrame(FrozenModel):
 
     Attributes:
         frame: Frame or link of the robot.
-        contact: `point` resists forces, `surface` torques as well.
-        sole: Edges of a surface in the frame's axes, m: heel, toes (along x), right,
+        contact: `point` resists forces, `surface` torques as well, `line` all but that
+            about its x axis: the blade of a leg whose ankle does not roll.
+        sole: Edges of these two in the frame's axes, m: heel, toes (along x), right,
             left (along y). With all soles known the robot is kept from tipping over.
     """
 
     frame: Name
-    contact: Literal["point", "surface"] = "point"
+    contact: Literal["point", "line", "surface"] = "point"
     sole: tuple[float, float, float, float] | None = None
 
     @model_validator(mode="after")
     def _sole_is_a_rectangle(self) -> "HeldFrame":
         if self.sole is not None:
             heel, toes, right, left = self.sole
-            if self.contact != "surface" or not (heel < toes and right < left):
+            if self.contact == "point" or not (heel < toes and right < left):
                 raise ValueError(
-                    "'sole' is [heel, toes, right, left] of a 'surface', with heel < "
-                    "toes and right < left"
+                    "'sole' is [heel, toes, right, left] of a 'surface' or 'line', "
+                    "with heel < toes and right < left"
                 )
         return self
 
@@ -113,9 +114,8 @@ def _foot(held: HeldFrame, state: RobotState) -> Foot:
         return make_foot(state, name)
     heel, toes, right, left = edges
     x, y = min(INSET, 0.25 * (toes - heel)), min(INSET, 0.25 * (left - right))
-    return make_foot(
-        state, name, (heel + x, toes - x, right + y, left - y), height=height
-    )
+    sole = heel + x, toes - x, right + y, left - y
+    return make_foot(state, name, sole, height=height, rolls=held.contact == "line")
 
 
 class StanceController(PartController[JointLaw]):
