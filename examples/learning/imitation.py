@@ -71,6 +71,8 @@ class Demonstrations:
             "low": moves.min(axis=0),
             "high": moves.max(axis=0),
         }
+        ends = (moves == self.scales["low"]) | (moves == self.scales["high"])
+        self.scales["binary"] = ends.all(axis=0)
         self.observations = [normalised(s, self.scales) for s in seen]
         self.actions = [scaled(a, self.scales) for a in acted]
 
@@ -102,9 +104,14 @@ def scaled(action: np.ndarray, scales: Mapping[str, np.ndarray]) -> Tensor:
 
 
 def unscaled(action: Tensor, scales: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Return an action between -1 and 1 as one of the environment."""
+    """Return an action between -1 and 1 as one of the environment.
+
+    A value that was always one of two, such as a gripper's, is one of them.
+    """
     middle, half = _range(scales)
-    return middle + half * np.clip(action.numpy().astype(np.float64), -1.0, 1.0)
+    value = np.clip(action.numpy().astype(np.float64), -1.0, 1.0)
+    value = np.where(scales["binary"], np.where(value > 0.0, 1.0, -1.0), value)
+    return middle + half * value
 
 
 def _range(scales: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:

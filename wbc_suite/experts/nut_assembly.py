@@ -51,6 +51,7 @@ def _put_over_peg(cell: Workcell[NutAssembly], name: str) -> Steps[None]:
     arm, (above, down) = choice.arm, choice.then
     for _ in range(TRIES):
         yield from carry(cell, arm, name, above, tolerance=0.003)
-        if (yield from carry(cell, arm, name, down, tolerance=0.006, speed=0.2)):
+        yield from carry(cell, arm, name, down, tolerance=0.006, speed=0.2)
+        if cell.pose(name).translation[2] < foot[2] + config.height:
             break
     yield from release(arm, back=AWAY)
