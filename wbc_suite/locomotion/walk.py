@@ -217,7 +217,7 @@ def _has_landed(gait: Gait, measured: Measured) -> bool:
     swing, stance = measured.foot[1 - state.stance], measured.foot[state.stance]
     late = state.since - state.duration > LATEST
     rests = measured.rise[1 - state.stance] > -SINKING
-    return late or rests or swing[2] - stance[2] < LANDED
+    return bool(late or rests or swing[2] - stance[2] < LANDED)
 
 
 @compiled
