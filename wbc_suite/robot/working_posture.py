@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
+from wbc_suite.robot.contact_pairs import contacts
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.typing import Indices, Matrix, Vector
 
@@ -100,7 +101,8 @@ class _Search:
 
     def candidates(self, arm: _Arm, earlier: Sequence[_Arm]) -> Iterator[Vector]:
         """Yield postures of an arm, best first: mirror images, then random ones."""
-        yield from filter(None.__ne__, (self._mirrored(arm, x) for x in earlier))
+        mirrored = (self._mirrored(arm, other) for other in earlier)
+        yield from (values for values in mirrored if values is not None)
         rng, half = np.random.default_rng(0), (arm.high - arm.low) / 2
         drawn = rng.uniform(arm.low, arm.high, size=(DRAWS, len(arm.q)))
         drawn += rng.uniform(0.0, 0.8, size=(DRAWS, 1)) * (self.q[arm.q] - drawn)
@@ -164,7 +166,7 @@ class _Search:
         if len(arm.joints) != len(other.joints):
             return None
         pin.forwardKinematics(self._model, self._data, pin.neutral(self._model))
-        signs = []
+        signs: list[float] = []
         for name, twin in zip(arm.joints, other.joints, strict=True):
             own, image = self._axis(name), self._axis(twin)
             # An axis of rotation is a pseudovector: it is reflected, and turned.
@@ -174,7 +176,7 @@ class _Search:
             cosine = float(own @ image)
             if abs(cosine) < PARALLEL:
                 return None
-            signs.append(np.sign(cosine))
+            signs.append(float(np.sign(cosine)))
         values = np.array(signs) * self.q[other.q]
         inside = (values > arm.low - 1e-9) & (values < arm.high + 1e-9)
         return values if inside.all() else None
@@ -188,8 +190,4 @@ class _Search:
         for name, address in self._addresses.items():
             joint = self._model.joints[self._model.getJointId(name)]
             data.qpos[address] = q[joint.idx_q]
-        mujoco.mj_kinematics(m, data)
-        mujoco.mj_comPos(m, data)
-        mujoco.mj_collision(m, data)
-        pairs = m.geom_bodyid[data.contact.geom].tolist() if data.ncon else []
-        return {(min(pair), max(pair)) for pair in pairs}
+        return contacts(m, data)
