@@ -99,7 +99,11 @@ REEXPORTS = {
     "devices.keyboard": "devices",
     "devices.spacemouse": "devices",
     "renderers.base": "renderers",
+    "renderers.viewer": "renderers",
+    "models.grippers.gripper_tester": "models.grippers.tester",
     "utils.sim_utils": "utils.binding_utils",
+    "utils.usd": "utils.usd_export",
+    "utils.usd.exporter": "utils.usd_export",
 }
 """Modules that re-export the names of another, and that other; both below `ROOT`."""
 

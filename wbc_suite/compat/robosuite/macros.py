@@ -1,4 +1,10 @@
-"""Settings of the process, under robosuite's names."""
+"""Settings of the process, under robosuite's names.
+
+A `macros_private.py` beside this file, as `setup_macros` writes it, comes after these.
+"""
+
+import contextlib
+import importlib
 
 SIMULATION_TIMESTEP = 0.002
 """Duration of a physics step, s."""
@@ -15,3 +21,7 @@ DUALSENSE_VENDOR_ID = 0x054C
 DUALSENSE_PRODUCT_ID = 0x0CE6
 CONSOLE_LOGGING_LEVEL = "INFO"
 FILE_LOGGING_LEVEL = None
+
+with contextlib.suppress(ImportError):
+    _private = vars(importlib.import_module(f"{__package__}.macros_private"))
+    globals().update({name: _private[name] for name in _private if name.isupper()})

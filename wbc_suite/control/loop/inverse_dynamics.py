@@ -131,8 +131,9 @@ def write_law_commands(
     """Write `M a + h - d - J^T f` within the limits of actuators, or setpoints.
 
     `physics.force` holds `M a - J^T f`. A torque law adds its torques to Coriolis,
-    centrifugal and gravity forces; passive forces stay. Actuators that are servos get
-    the setpoint at which they exert that force.
+    centrifugal and gravity forces, less what `gravcomp` of the model cancels already;
+    other passive forces stay. Actuators that are servos get the setpoint at which they
+    exert that force.
     """
     for j in range(law.first, law.last):
         drive = drives[j]
@@ -141,6 +142,7 @@ def write_law_commands(
         if law.kind == _SERVO:
             command = reference_at(law, drive)[0]
         elif law.kind == _TORQUE:
+            bias -= law.compensation * physics.qfrc_gravcomp[dof]
             command = reference_at(law, drive)[0] + bias
         else:
             bias -= law.compensation * physics.qfrc_passive[dof]

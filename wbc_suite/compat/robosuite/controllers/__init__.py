@@ -1,15 +1,20 @@
 """Controllers: robosuite's default configs, its registries, and classes of users."""
 
 from wbc_suite.compat.robosuite.controllers.configs import (
+    ALL_COMPOSITE_CONTROLLERS,
     ALL_PART_CONTROLLERS,
     PART_CONTROLLER_INFO,
+    is_part_controller_config,
     load_composite_controller_config,
     load_part_controller_config,
+    refactor_composite_controller_config,
 )
 from wbc_suite.compat.robosuite.controllers.user_controllers import (
-    ALL_COMPOSITE_CONTROLLERS,
     REGISTERED_COMPOSITE_CONTROLLERS_DICT,
     CompositeController,
+    HybridMobileBase,
+    WholeBody,
+    WholeBodyIK,
     register_composite_controller,
 )
 
@@ -19,7 +24,12 @@ __all__ = [
     "PART_CONTROLLER_INFO",
     "REGISTERED_COMPOSITE_CONTROLLERS_DICT",
     "CompositeController",
+    "HybridMobileBase",
+    "WholeBody",
+    "WholeBodyIK",
+    "is_part_controller_config",
     "load_composite_controller_config",
     "load_part_controller_config",
+    "refactor_composite_controller_config",
     "register_composite_controller",
 ]

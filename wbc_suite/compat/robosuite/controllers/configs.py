@@ -10,6 +10,7 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
+from wbc_suite.control import composite_names
 from wbc_suite.control import load_composite_controller_config as load_ours
 from wbc_suite.control.composite.registry import default_composite
 from wbc_suite.control.robot_parts import hands_of, parts_of
@@ -140,7 +141,7 @@ def load_composite_controller_config(
     name = None if controller is None else str(controller)
     if name is not None and name.endswith(".json"):
         return _read(name)
-    description = load_robot(robot) if isinstance(robot, str) else robot
+    description = described(robot) if isinstance(robot, str) else robot
     if name is None and description is not None:
         name = default_composite(description)
     kind = str(name or "BASIC").upper()
@@ -149,7 +150,40 @@ def load_composite_controller_config(
     if kind in ("BASIC", "HYBRID_MOBILE_BASE"):
         own = description if controller is None else None
         return _composite(kind, own, "OSC_POSE")
-    return load_ours(name, robot)
+    return load_ours(name, description)
+
+
+def described(robot: str) -> RobotDescription | None:
+    """Return the robot of a model's class, or of the catalogue, by name.
+
+    None for another name, as robosuite has it: its scripts ask for `args.robots[0]`.
+    """
+    from wbc_suite.compat.robosuite.models.robots import REGISTERED_ROBOTS
+
+    named = {name.casefold(): cls for name, cls in REGISTERED_ROBOTS.items()}
+    cls = named.get(robot.casefold())
+    try:
+        return load_robot(robot) if cls is None else cls().description
+    except UnknownNameError:
+        return None
+
+
+def is_part_controller_config(config: dict[str, Any]) -> bool:
+    """Whether a config is that of a part alone."""
+    return "body_parts" not in config and config.get("type") in PARTS
+
+
+def refactor_composite_controller_config(
+    controller_config: dict[str, Any], robot_type: str, arms: Collection[str]
+) -> dict[str, Any]:
+    """Return a robot's default config with the config of one part in its arms."""
+    if not is_part_controller_config(controller_config):
+        return controller_config
+    config = load_composite_controller_config(robot=robot_type)
+    for arm in arms:
+        own = copy.deepcopy(controller_config) | {"gripper": {"type": "GRIP"}}
+        config["body_parts"][arm] = own
+    return config
 
 
 def _read(path: str | Path) -> dict[str, Any]:
@@ -176,3 +210,19 @@ def _composite(kind: str, robot: RobotDescription | None, arm: str) -> dict[str,
         else:
             parts[name] = copy.deepcopy(BASE if name == "base" else BODY)
     return {"type": kind, "body_parts": parts}
+
+
+class _Names:
+    """Names of composite controllers, in the form of a dictionary's keys."""
+
+    def __iter__(self) -> Any:
+        return iter(composite_names())
+
+    def __contains__(self, name: object) -> bool:
+        return name in composite_names()
+
+    def __len__(self) -> int:
+        return len(composite_names())
+
+
+ALL_COMPOSITE_CONTROLLERS = _Names()

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wbc_suite.control import RobotState, composite_names
+from wbc_suite.control import RobotState
 from wbc_suite.control.composite.basic import BasicController, default_basic_config
 from wbc_suite.control.composite.registry import register_composite
 from wbc_suite.typing import Vector
@@ -222,8 +222,12 @@ class CompositeController:
         return self.layout.low.copy(), self.layout.high.copy()
 
     def create_action_vector(self, action_dict: Mapping[str, ArrayLike]) -> Vector:
-        """Return an action from values of parts, and zeros for the others."""
-        return self.layout.pack(action_dict, base=np.zeros(self.layout.size))
+        """Return an action from values of parts, and zeros for the others.
+
+        Keys that are no parts, such as those of devices, are left out.
+        """
+        own = {k: v for k, v in action_dict.items() if k in self._action_split_indexes}
+        return self.layout.pack(own, base=np.zeros(self.layout.size))
 
     def create_action_dict_from_action_vector(self, action_vector: Any) -> Any:
         """Return the values of each part."""
@@ -239,6 +243,23 @@ class CompositeController:
         split = self._action_split_indexes
         found: dict[str, Any] = {"Action Dimension": (self.layout.size,)}
         return found | {name: list(range(a, b)) for name, (a, b) in split.items()}
+
+
+class WholeBody(CompositeController):
+    """A composite whose solver moves all joints to targets of the hands."""
+
+    @property
+    def joint_action_policy(self) -> Any:
+        """The solver's settings that scripts read: `input_type`, `input_ref_frame`."""
+        return self._inner.config
+
+
+class WholeBodyIK(WholeBody):
+    """WHOLE_BODY_IK."""
+
+
+class HybridMobileBase(CompositeController):
+    """HYBRID_MOBILE_BASE."""
 
 
 def register_composite_controller(
@@ -310,23 +331,12 @@ def view_of(controller: Any, state: RobotState, models: Any) -> CompositeControl
     """Return robosuite's view of one of our controllers, or the user's own."""
     if isinstance(controller, _Adapter):
         return controller.user
-    view = CompositeController(*models)
+    name = str(getattr(getattr(controller, "config", None), "type", "BASIC"))
+    cls = _VIEWS.get(name, WholeBody if name.startswith("WHOLE") else None)
+    view = (cls or CompositeController)(*models)
     view.bind(controller, state)
-    view.name = str(getattr(getattr(controller, "config", None), "type", "BASIC"))
+    view.name = name
     return view
 
 
-class _Names:
-    """Names of composite controllers, in the form of a dictionary's keys."""
-
-    def __iter__(self) -> Any:
-        return iter(composite_names())
-
-    def __contains__(self, name: object) -> bool:
-        return name in composite_names()
-
-    def __len__(self) -> int:
-        return len(composite_names())
-
-
-ALL_COMPOSITE_CONTROLLERS = _Names()
+_VIEWS = {"WHOLE_BODY_IK": WholeBodyIK, "HYBRID_MOBILE_BASE": HybridMobileBase}

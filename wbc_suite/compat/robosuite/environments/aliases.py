@@ -75,6 +75,8 @@ def _gripper(robot: Any, arm: str, found: dict[str, Any]) -> None:
     for k, joint in enumerate(gripper.joints, 1):
         found["joint"][f"{start}finger_joint{k}"] = joint
         found["actuator"][f"{start}gripper_finger_joint{k}"] = joint
+    for name, geom in gripper.geom_names.items():
+        found["geom"][start + name] = geom
     found["body"][f"{start}eef"] = robot.robot_model.eef_name[arm]
     for role, geoms in gripper.important_geoms.items():
         for k, geom in enumerate(geoms):

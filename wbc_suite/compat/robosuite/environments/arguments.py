@@ -36,7 +36,10 @@ def ours(given: Mapping[str, Any]) -> dict[str, Any]:
     }
     if kwargs.pop("has_renderer", False):
         kwargs["render_mode"] = "human"
-    kwargs.setdefault("render_camera", "frontview")
+    camera = kwargs.get("render_camera")
+    if isinstance(camera, list | tuple):
+        camera = camera[0]
+    kwargs["render_camera"] = "frontview" if camera in (None, "free") else camera
     configuration = str(kwargs.get("env_configuration") or "default")
     kwargs["env_configuration"] = configuration.removeprefix("single-arm-")
     for key in ("env_name", "type"):

@@ -2,7 +2,6 @@
 
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from wbc_suite.compat.robosuite.environments.scene_text import (
     load_scene,
     scene_as_it_is,
 )
+from wbc_suite.compat.robosuite.renderers import Viewer, load_renderer_config
 from wbc_suite.compat.robosuite.utils.binding_utils import (
     MjSim,
     check_contact,
@@ -27,11 +27,16 @@ REGISTERED_ENVS: dict[str, type["MujocoEnv"]] = {}
 """Classes of environments by name."""
 
 _BASES = ("MujocoEnv", "RobotEnv", "ManipulationEnv", "TwoArmEnv")
+OURS_ALONE: dict[str, type["MujocoEnv"]] = {}
+"""Our tasks that robosuite does not have; `make` knows them, listings do not."""
+_OURS_ALONE = ("Carry", "LocoLift", "Reach", "Stand", "WalkTo")
 
 
 def register_env(target_class: type["MujocoEnv"]) -> None:
     """Make a class known to `make` by its name; subclasses are known by themselves."""
-    REGISTERED_ENVS[target_class.__name__] = target_class
+    name = target_class.__name__
+    own = name in _OURS_ALONE and target_class.benchmark == name
+    (OURS_ALONE if own else REGISTERED_ENVS)[name] = target_class
 
 
 def make(env_name: str, *args: Any, **kwargs: Any) -> Any:
@@ -43,9 +48,10 @@ def make(env_name: str, *args: Any, **kwargs: Any) -> Any:
     """
     import wbc_suite.compat.robosuite.environments.manipulation  # noqa: F401 - registers
 
-    if env_name not in REGISTERED_ENVS:
-        raise UnknownNameError("environment", env_name, REGISTERED_ENVS)
-    return REGISTERED_ENVS[env_name](*args, **kwargs)
+    known = OURS_ALONE | REGISTERED_ENVS
+    if env_name not in known:
+        raise UnknownNameError("environment", env_name, known)
+    return known[env_name](*args, **kwargs)
 
 
 class MujocoEnv(Observing):
@@ -93,9 +99,9 @@ class MujocoEnv(Observing):
         self.control_timestep = 1.0 / control_freq
         self.arguments = arguments
         self.name, self.unwrapped = type(self).__name__, self
-        self.viewer: Any = SimpleNamespace(
-            set_camera=lambda camera_id: None, update=lambda: None
-        )
+        self.renderer = str(arguments.get("renderer", "mjviewer"))
+        load_renderer_config(self.renderer)  # raises for unknown ones
+        self.viewer = Viewer()
         self.timestep, self.done, self.deterministic_reset = 0, False, False
         self._ep_meta: dict[str, Any] = {}
         self._xml_processor: Callable[[str], str] | None = None
@@ -181,11 +187,15 @@ class MujocoEnv(Observing):
             raise ValueError("executing action in terminated episode")
         self.timestep += 1
         self._pre_action(action, True)
-        self._last_info = self.env.advance(action)[3]
+        self._last_info = self.env.advance(self._of_enabled_parts(action))[3]
         reward, done, info = self._post_action(action)
         if "physics_error" in self._last_info:
             done = self.done = True
         return self._get_observations(), reward, done, self._last_info | info
+
+    def _of_enabled_parts(self, action: Any) -> Any:
+        """Return the action without that of parts that are switched off."""
+        return action
 
     def _pre_action(self, action: Any, policy_step: bool = False) -> None:
         """Do something before each control period; by default nothing."""

@@ -134,6 +134,18 @@ class RobotEnv(MujocoEnv):
             found += camera_observables(self._picture_keys, self._picture, rate)
         return OrderedDict((o.name, o) for o in found)
 
+    def _of_enabled_parts(self, action: Any) -> Any:
+        """Return the action with zeros for parts that are switched off; they hold."""
+        if not any(robot.disabled for robot in self.robots):
+            return action
+        given, start = np.array(action, np.float64), 0
+        for robot in self.robots:
+            for part, (first, last) in robot._action_split_indexes.items():
+                if part.removesuffix("_gripper") in robot.disabled:
+                    given[start + first : start + last] = 0.0
+            start += robot.action_dim
+        return given
+
     def _picture(self, key: str) -> Any:
         observables, key = self.env.observables, self._picture_keys[key]
         if isinstance(observables, PolledObservables):

@@ -36,6 +36,7 @@ class MujocoXML:
             setattr(self, section, self.create_default_element(section))
         self.worldbody: Element
         self.asset: Element
+        self.actuator: Element
 
     def create_default_element(self, name: str) -> Element:
         """Return a section, a new one if there is none."""

@@ -2,6 +2,8 @@
 
 from typing import Any
 
+RENDERERS = ("mjviewer", "mujoco")
+
 
 def load_renderer_config(renderer: str) -> dict[str, Any]:
     """Return no settings: renderers have none here.
@@ -9,6 +11,39 @@ def load_renderer_config(renderer: str) -> dict[str, Any]:
     Raises:
         ValueError: If there is no such renderer.
     """
-    if renderer not in ("mjviewer", "mujoco"):
+    if renderer.lower() not in RENDERERS:
         raise ValueError(f"'{renderer}' is no renderer: 'mjviewer' or 'mujoco'.")
     return {}
+
+
+class Viewer:
+    """`env.viewer`: what scripts ask of a window; ours is a page with its own camera.
+
+    Attributes:
+        callbacks: Functions that take pressed keys; a test or a window may call them.
+    """
+
+    def __init__(self, sim: Any = None) -> None:
+        self.sim = sim
+        self.callbacks: list[Any] = []
+
+    def set_camera(
+        self,
+        camera_id: Any = None,
+        camera_name: Any = None,
+        width: int | None = None,
+        height: int | None = None,
+    ) -> None:
+        """Do nothing: the page shows the scene from where its user looks."""
+
+    def add_keypress_callback(self, keypress_callback: Any) -> None:
+        """Remember a function that takes keys."""
+        self.callbacks.append(keypress_callback)
+
+    def render(self) -> None:
+        """Do nothing: `env.render` draws."""
+
+    reset = update = close = render
+
+
+OpenCVViewer = MjviewerRenderer = Viewer

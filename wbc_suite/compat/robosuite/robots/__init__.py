@@ -26,6 +26,10 @@ class FixedBaseRobot(Robot):
 class MobileRobot(Robot):
     """A robot whose base moves."""
 
+    def enable_parts(self, **parts: bool) -> None:
+        """Switch parts on or off by name; those that are not named are on."""
+        self.disabled = {part for part, on in parts.items() if not on}
+
 
 class WheeledRobot(MobileRobot):
     """A robot on wheels."""

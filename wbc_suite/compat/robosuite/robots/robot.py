@@ -56,10 +56,12 @@ class Robot(Measured):
         self.robot_model: Any = create_robot(robot_type, idn=idn)
         self.gripper_type, self.base_type = gripper_type, base_type
         base = None if base_type == "default" else base_type
+        gripper_type = "none" if gripper_type is None else gripper_type
         self.robot_model.load(gripper_type, base)
         if initial_qpos is not None:
             self._start_at(initial_qpos)
         self.gripper: dict[str, GripperModel] = {}
+        self.disabled: set[str] = set()
         self._adopt_grippers()
 
     def _start_at(self, qpos: Any) -> None:
@@ -165,8 +167,11 @@ class Robot(Measured):
         return f"{arm}_gripper"
 
     def enabled(self, part_name: str) -> bool:
-        """Whether a part is driven: all are."""
-        return part_name in self.part_controllers
+        """Whether a part is driven."""
+        return part_name in self.part_controllers and part_name not in self.disabled
+
+    def load_model(self) -> None:
+        """Do nothing: its models are loaded when it is made."""
 
     # Actions.
 

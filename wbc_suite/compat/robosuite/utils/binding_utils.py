@@ -286,6 +286,10 @@ class MjSim:
         """
         view = {"width": width or 256, "height": height or 256}
         cameras, camera = self._cameras, camera_name or "frontview"
+        if cameras is None:  # a world of the user's own, without segmentation
+            with mujoco.Renderer(self.model._model, view["height"], view["width"]) as r:
+                r.update_scene(self.data._data, camera_name or -1)
+                return r.render()[::-1]
         if segmentation:
             geoms = cameras.segmentation(camera, level="element", **view)[::-1] - 1
             kind = np.where(geoms < 0, -1, int(mujoco.mjtObj.mjOBJ_GEOM))
@@ -303,8 +307,18 @@ class MjSim:
         scaled = np.maximum(distance / model.stat.extent, near)
         return (1.0 - near / scaled) / (1.0 - near / far)
 
+    def add_render_context(self, render_context: Any) -> None:
+        """Do nothing: renderers are made when pictures are asked for."""
+
     def free(self) -> None:
         """Do nothing: memory is freed when nothing refers to it."""
+
+
+class MjRenderContextOffscreen:
+    """Nothing: `sim.render` makes its renderer itself."""
+
+    def __init__(self, sim: MjSim, device_id: int = -1, **kwargs: Any) -> None:
+        self.sim = sim
 
 
 def contact_names(sim: MjSim) -> list[tuple[str | None, str | None]]:

@@ -3,6 +3,40 @@
 from collections.abc import Callable, Iterable
 from typing import Any
 
+import numpy as np
+
+import wbc_suite.compat.robosuite as suite
+import wbc_suite.compat.robosuite.utils.transform_utils as T
+from wbc_suite.compat.robosuite.robots import (
+    ROBOT_CLASS_MAPPING,
+    FixedBaseRobot,
+    LeggedRobot,
+    MobileRobot,
+    WheeledRobot,
+)
+
+__all__ = [  # scripts import all of it
+    "ROBOT_CLASS_MAPPING",
+    "FixedBaseRobot",
+    "LeggedRobot",
+    "MobileRobot",
+    "T",
+    "WheeledRobot",
+    "choose_controller",
+    "choose_environment",
+    "choose_multi_arm_config",
+    "choose_robots",
+    "np",
+    "suite",
+]
+
+
+SINGLE = (
+    *("Sawyer", "Panda", "Jaco", "Kinova3", "IIWA", "UR5e", "XArm7"),
+    "SpotWithArmFloating",
+)
+"""Robots with one arm that scripts offer."""
+
 
 def _choose(kind: str, options: Iterable[Any], ask: Callable[[str], str]) -> Any:
     """Return the chosen option: a number or a name; the first for anything else."""
@@ -36,7 +70,7 @@ def choose_controller(part_controllers: bool = False) -> str:
 
 def choose_multi_arm_config() -> str:
     """Return an arrangement of two arms."""
-    known = ("single-robot", "opposed", "parallel")
+    known = ("opposed", "parallel", "single-robot")
     return _choose("Configuration", known, input)
 
 
@@ -46,11 +80,9 @@ def choose_robots(
     exclude_single_arm: bool = False,
 ) -> str:
     """Return the name of a robot."""
-    from wbc_suite.robot import load_robot
-
-    single = ("Panda", "Sawyer", "IIWA", "Jaco", "Kinova3", "UR5e")
-    double = ("Baxter", "Tiago") + (("GR1",) if use_humanoids else ())
-    names = (() if exclude_single_arm else single) + (
-        () if exclude_bimanual else double
-    )
-    return _choose("Robot", (n for n in names if load_robot(n).hands), input)
+    names = set() if exclude_single_arm else {*SINGLE}
+    if not exclude_bimanual:
+        names |= {"Baxter", "GR1ArmsOnly", "Tiago"}
+    if use_humanoids:
+        names.add("GR1ArmsOnly")
+    return _choose("Robot", sorted(names), input)

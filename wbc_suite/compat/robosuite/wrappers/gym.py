@@ -56,6 +56,10 @@ class GymWrapper(gymnasium.Env[Any, Any]):
         observation, reward, done, info = self.env.step(action)
         return self._chosen(observation), reward, False, done, info
 
+    def render(self) -> Any:
+        """Show the environment."""
+        return self.env.render()
+
     def close(self) -> None:
         """Close the environment."""
         self.env.close()

@@ -5,7 +5,9 @@ from typing import Any
 import numpy as np
 
 from wbc_suite.catalogue import Catalogue
-from wbc_suite.compat.robosuite.models.base import MujocoModel
+from wbc_suite.compat.robosuite.models.described import DescribedModel
+from wbc_suite.compat.robosuite.models.own_files import changed, collision_names
+from wbc_suite.compat.robosuite.utils.mjcf_utils import array_to_string
 from wbc_suite.robot import RobotDescription, load_robot
 from wbc_suite.sensing.hands import gripper_links
 from wbc_suite.typing import Vector
@@ -22,14 +24,18 @@ __all__ = [
 SPEEDS = {"JacoThreeFingerGripper": 0.01, "JacoThreeFingerDexterousGripper": 0.01}
 """Change of the grasp at a full action in a control period; 0.2 for all others."""
 
+STILL = 1e-9
+"""Least width of an actuator's range, rad or m, for joints that a grasp holds still."""
+
 SITE_ROLES = ("grip_site", "grip_cylinder", "ee", "ee_x", "ee_y", "ee_z")
 
 
-class GripperModel(MujocoModel):
+class GripperModel(DescribedModel):
     """A gripper, alone or at the end of a robot's arm.
 
     Names in the scene are those of the robot's description. A class of a user gives
-    the path of its MJCF file, and is mounted by `gripper_types=` under its name.
+    the path of its MJCF file, and is mounted by `gripper_types=` under its name; its
+    actuators are position servos, and `format_action` says where they go.
 
     Attributes:
         dof: Number of its action values.
@@ -46,9 +52,16 @@ class GripperModel(MujocoModel):
         prefix: str = "",
         arm: str = "right",
     ) -> None:
-        self.idn, self.file, self.prefix = idn, fname, prefix
-        name = fname or f"gripper/{self.gripper}"
-        self.description = load_robot(name) if robot is None else robot
+        self.idn, self.own_file, self.prefix = idn, fname, prefix
+        if robot is None:
+            robot_alone = load_robot(fname or f"gripper/{self.gripper}")
+            self.description = _with_own_motors(robot_alone)
+            self.prefix = self.naming_prefix
+        else:
+            self.description = robot
+        own = self.description.synergies
+        alone = () if robot is not None else tuple(own.values())
+        self._synergies = own.get(f"{arm}_gripper", sum(alone, ()))
         self.current_action = np.zeros(self.dof)
         frame = next(iter(self.description.hands.values()), "")
         if robot is not None:
@@ -76,12 +89,40 @@ class GripperModel(MujocoModel):
     @property
     def dof(self) -> int:
         """Number of its action values."""
-        synergies = self.description.synergies
-        return sum(len(s) for s in synergies.values()) if synergies else 0
+        return len(self._synergies)
 
     def format_action(self, action: Any) -> Vector:
-        """Return the action within -1 and 1."""
-        return np.clip(np.asarray(action, np.float64), -1.0, 1.0)
+        """Return the position of each actuator in its range, -1 to 1.
+
+        The grasp moves by `speed` towards the sign of each action value.
+        """
+        step = self.speed * np.sign(np.asarray(action, np.float64))
+        self.current_action = np.clip(self.current_action + step, -1.0, 1.0)
+        grasp: dict[str, float] = {}
+        for synergy, value in zip(self._synergies, self.current_action, strict=True):
+            for joint, opened in synergy.open.items():
+                closes = synergy.closed[joint] > opened
+                grasp[joint] = value if closes else -value
+        return np.array([grasp.get(name, 0.0) for name in self._driven()])
+
+    def _driven(self) -> tuple[str, ...]:
+        groups = self.description.groups
+        own = groups.get(f"{self._arm}_gripper", groups.get("gripper", ()))
+        return tuple(own)
+
+    def _write(self) -> None:
+        super()._write()
+        if self.own_file is not None:
+            return
+        ends = {
+            self.prefix + joint: sorted((opened, synergy.closed[joint] + STILL))
+            for synergy in self._synergies
+            for joint, opened in synergy.open.items()
+        }
+        for actuator in self.actuator:
+            if actuator.get("joint") in ends:
+                text = array_to_string(ends[actuator.get("joint", "")])
+                actuator.attrib |= {"ctrlrange": text, "ctrllimited": "true"}
 
     @property
     def joints(self) -> list[str]:
@@ -102,8 +143,7 @@ class GripperModel(MujocoModel):
     @property
     def actuators(self) -> list[str]:
         """Names of its actuators, which are called like joints."""
-        group = self.description.groups.get(f"{self._arm}_gripper", ())
-        return [self.prefix + name for name in group]
+        return [self.prefix + name for name in self._driven()]
 
     @property
     def sites(self) -> list[str]:
@@ -120,8 +160,18 @@ class GripperModel(MujocoModel):
         return [f"{self.prefix}{name}_collision{k}" for k in range(count)]
 
     @property
+    def _important_geoms(self) -> dict[str, list[str]]:
+        """Names of geoms in a user's file, by role; by default none."""
+        return {}
+
+    @property
     def important_geoms(self) -> dict[str, list[str]]:
         """Geoms of the fingers by side; by default the first half is left."""
+        if self._important_geoms:
+            return {
+                role: [self.geom_names[name] for name in names]
+                for role, names in self._important_geoms.items()
+            }
         fingers = [
             link.name
             for link in self.description.links
@@ -135,6 +185,14 @@ class GripperModel(MujocoModel):
         found = {k: [g for f in v for g in self._geoms(f)] for k, v in sides.items()}
         pads = {f"{k}pad": geoms[-1:] for k, geoms in found.items()}
         return found | pads
+
+    @property
+    def geom_names(self) -> dict[str, str]:
+        """Names in the scene of the geoms of a user's file."""
+        if self.own_file is None:
+            return {}
+        names = collision_names(self.own_file)
+        return {name: self.prefix + own for name, own in names.items()}
 
     @property
     def important_sites(self) -> dict[str, str]:
@@ -163,6 +221,41 @@ class GripperModel(MujocoModel):
         )
         names = [name.removeprefix(self.prefix) for name in self.joints]
         return np.array([ready[n] if ready else 0.0 for n in names])
+
+
+def _with_own_motors(robot: RobotDescription) -> RobotDescription:
+    """Return a gripper whose sliding fingers have one motor each, as robosuite's."""
+    kinds = {actuator.joint: actuator for actuator in robot.actuators}
+    links, groups = list(robot.links), {k: list(v) for k, v in robot.groups.items()}
+    synergies = {k: list(v) for k, v in robot.synergies.items()}
+    for k, link in enumerate(links):
+        joint = link.joint
+        mimic = None if joint is None else joint.mimic
+        if joint is None or mimic is None or joint.type != "slide":
+            continue
+        leader = kinds.get(mimic.joint)
+        group = next((g for g, js in groups.items() if mimic.joint in js), None)
+        if leader is None or group is None:
+            continue
+        free = joint.model_copy(update={"mimic": None})
+        links[k] = link.model_copy(update={"joint": free})
+        kinds[joint.name] = leader.model_copy(update={"joint": joint.name})
+        groups[group].append(joint.name)
+        synergies[group] = [_with_follower(s, joint) for s in synergies[group]]
+    fields = {"links": links, "actuators": tuple(kinds.values()), "groups": groups}
+    return changed(robot, **fields, synergies=synergies)
+
+
+def _with_follower(synergy: Any, joint: Any) -> Any:
+    """Return a synergy that moves a follower as its leader did."""
+    own, mimic = {}, joint.mimic
+    for end in ("open", "closed"):
+        values = getattr(synergy, end)
+        if mimic.joint not in values:
+            return synergy
+        value = mimic.ratio * values[mimic.joint] + mimic.offset
+        own[end] = values | {joint.name: value}
+    return synergy.model_copy(update=own)
 
 
 def _make(name: str) -> type[GripperModel]:
@@ -203,3 +296,11 @@ def register_gripper(target_class: type[GripperModel]) -> type[GripperModel]:
 def gripper_factory(name: str | None, idn: Any = 0) -> GripperModel:
     """Make a gripper by the name of its class; None is NullGripper."""
     return GRIPPER_MAPPING[name](idn=idn)
+
+
+def __getattr__(name: str) -> Any:
+    if name == "GripperTester":  # imports grippers
+        from wbc_suite.compat.robosuite.models.grippers.tester import GripperTester
+
+        return GripperTester
+    raise AttributeError(f"module '{__name__}' has no attribute '{name}'")

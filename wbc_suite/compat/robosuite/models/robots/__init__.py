@@ -3,18 +3,23 @@
 A class of a user derives from `ManipulatorModel` and gives the path of its MJCF file.
 """
 
+import logging
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from wbc_suite.catalogue import Catalogue
-from wbc_suite.compat.robosuite.models.base import MujocoModel
+from wbc_suite.compat.robosuite.models.described import DescribedModel
+from wbc_suite.compat.robosuite.models.own_files import arm_file, changed, gripper_file
 from wbc_suite.compat.robosuite.utils.transform_utils import euler2mat
 from wbc_suite.errors import UnknownNameError
 from wbc_suite.robot import RobotDescription, load_robot
 from wbc_suite.robot.poses import pose_fields
 from wbc_suite.typing import Vector
+
+log = logging.getLogger(__name__)
 
 ARMATURE = 5.0
 """kg m^2; the k-th joint of an arm on a fixed base has 5 / k in robosuite."""
@@ -45,7 +50,7 @@ BASE_X = {"default": -0.16, "GR1": -0.15, "Spot": -0.5}
 """Place of a robot before a table of no length, m, by the begin of its name."""
 
 
-class RobotModel(MujocoModel):
+class RobotModel(DescribedModel):
     """A robot before it is in a scene.
 
     Attributes:
@@ -64,20 +69,58 @@ class RobotModel(MujocoModel):
 
     def __init__(self, fname: str | None = None, idn: int = 0) -> None:
         self.idn = idn
-        own = load_robot(fname or self.robot)
-        self.description: RobotDescription = with_passive_joints(own)
+        name = fname or self.robot
+        own = load_robot(name)
+        if name.endswith((".xml", ".mjcf")):  # a user's
+            self.own_file = name
+            self.description = own
+            self.robot = arm_file(self, own)
+            self.description = load_robot(self.robot)
+        else:
+            self.description: RobotDescription = with_passive_joints(own)
         self.base: Any = None
         self.grippers: dict[str, Any] = {}
 
     def load(self, gripper: Any, base: str | None) -> None:
         """Load the robot again with other grippers, or another base."""
-        root = self.description.root
-        own = type(self).robot or self.description.source
+        root, own = self.description.root, self._source()
+        if gripper == "default" and _is_overridden(self, "default_gripper"):
+            gripper = self.default_gripper
+        if base is None and self.own_file is None:
+            own_base = _is_overridden(self, "default_base")
+            base = self.default_base if own_base else None
         if own and (gripper not in (None, "default") or base is not None):
-            changed = load_robot(own, gripper=gripper, base=base)
-            self.description = with_passive_joints(changed).with_root(
+            chosen = self._choice(gripper)
+            loaded = load_robot(own, gripper=chosen, base=base)
+            if self.own_file is None:
+                loaded = with_passive_joints(loaded)
+            self.description = loaded.with_root(
                 self.description.root.kind, pos=root.pos, quat=root.quat
             )
+
+    def _choice(self, gripper: Any) -> Any:
+        """Return our choice of grippers: files of users' classes, hands of the side."""
+        if isinstance(gripper, Mapping):
+            own = {arm: self._choice_of(g, arm) for arm, g in gripper.items()}
+            return {arm: g for arm, g in own.items() if g is not None}
+        if gripper in (None, "default", "none"):
+            return None if gripper == "default" else gripper
+        arms = self.description.hands
+        return {arm: self._choice_of(gripper, arm) for arm in arms} or gripper
+
+    def _choice_of(self, gripper: Any, arm: str) -> Any:
+        from wbc_suite.compat.robosuite.models.grippers import GRIPPER_MAPPING
+
+        if gripper in (None, "default"):
+            return "none" if gripper is None else None
+        cls = GRIPPER_MAPPING.get(gripper)
+        if cls is not None and not cls.__module__.startswith("wbc_suite."):
+            return gripper_file(cls())
+        other = "Left" if arm == "right" else "Right"
+        if gripper.endswith(f"{other}Hand"):
+            log.warning("'%s' is of the other side; its mirror image is used.", gripper)
+            return gripper.replace(other, arm.capitalize())
+        return gripper
 
     @property
     def name(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride] - its class's
@@ -182,7 +225,7 @@ class RobotModel(MujocoModel):
         self.description = self.description.with_root(root.kind, quat=turn["quat"])
 
     def _source(self) -> str:
-        return type(self).robot or self.description.source or self.description.name
+        return self.robot or self.description.source or self.description.name
 
     @property
     def default_base(self) -> str:
@@ -200,6 +243,11 @@ class RobotModel(MujocoModel):
         return {arm: f"default_{self.name.lower()}" for arm in self.description.hands}
 
 
+def _is_overridden(model: RobotModel, name: str) -> bool:
+    """Whether a class of a user defines a property of ours anew."""
+    return getattr(type(model), name) is not getattr(RobotModel, name)
+
+
 class ManipulatorModel(RobotModel):
     """A robot with arms; for a user's, `init_qpos` of the MJCF's first key counts."""
 
@@ -212,6 +260,14 @@ class ManipulatorModel(RobotModel):
     def arm_type(self) -> str:
         """`bimanual` or `single`."""
         return "bimanual" if len(self.description.hands) > 1 else "single"
+
+    @property
+    def _eef_name(self) -> dict[str, str]:
+        """Bodies that grippers are mounted on; in a user's file the default is this."""
+        if self.own_file is not None:
+            return {"right": "right_hand", "left": "left_hand"}
+        robot = self.description
+        return {arm: robot.link_of(frame) for arm, frame in robot.hands.items()}
 
     @property
     def eef_name(self) -> dict[str, str]:
@@ -241,12 +297,6 @@ def with_passive_joints(robot: RobotDescription) -> RobotDescription:
             moved = own.joint.model_copy(update=changes)
             links[at] = own.model_copy(update={"joint": moved})
     return changed(robot, links=tuple(links))
-
-
-def changed(robot: RobotDescription, **fields: Any) -> RobotDescription:
-    """Return a description with other values of some fields."""
-    data = {key: getattr(robot, key) for key in type(robot).model_fields}
-    return type(robot).model_validate(data | fields)
 
 
 def register_robot(target_class: type[RobotModel]) -> type[RobotModel]:

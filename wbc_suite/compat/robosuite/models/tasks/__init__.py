@@ -20,7 +20,7 @@ class MujocoWorldBase(MujocoXML):
     """An empty world."""
 
     def __init__(self) -> None:
-        super().__init__('<mujoco model="scene"/>')
+        super().__init__('<mujoco model="scene"><compiler angle="radian"/></mujoco>')
 
 
 class Task(MujocoWorldBase):
