@@ -176,16 +176,17 @@ def random_goals(
 ) -> Iterator[dict[str, Vector]]:
     """Yield poses of all hands in postures that touch nothing, by name of the slice."""
     m = copy.copy(env.simulation.model)
-    m.geom_margin[:] = np.maximum(m.geom_margin, CLEARANCE)
     data, rng, found = mujoco.MjData(m), np.random.default_rng(0), 0
     data.qpos[:] = env.simulation.data.qpos
     moving = [j for j in robot.joints if j.mimic is None and in_chain(robot, j, frames)]
     addresses = [int(m.joint(f"robot0_{j.name}").qposadr[0]) for j in moving]
     ranges = [j.range or (-ENDLESS, ENDLESS) for j in moving]
-    touching = contacts(m, data)
+    m.geom_margin[:] = CLEARANCE
+    near = distances(m, data)
     for _ in range(DRAWS):
         data.qpos[addresses] = [rng.uniform(*r) for r in ranges]
-        if contacts(m, data) - touching:
+        found_near = distances(m, data).items()
+        if any(pair not in near or d < min(0.0, near[pair]) for pair, d in found_near):
             continue
         found += 1
         sites = {name: data.site(f"robot0_{f}") for name, f in frames.items()}
@@ -207,11 +208,14 @@ def in_chain(robot: RobotDescription, joint: Any, frames: dict[str, str]) -> boo
     return False
 
 
-def contacts(m: mujoco.MjModel, data: mujoco.MjData) -> set[tuple[int, int]]:
-    """Return the pairs of bodies that touch."""
+def distances(m: mujoco.MjModel, data: mujoco.MjData) -> dict[frozenset[int], float]:
+    """Return the least distance of each pair of bodies that are near, m."""
     mujoco.mj_fwdPosition(m, data)
-    pairs = m.geom_bodyid[data.contact.geom] if data.ncon else []
-    return {(min(pair), max(pair)) for pair in np.asarray(pairs).tolist()}
+    found: dict[frozenset[int], float] = {}
+    for geoms, distance in zip(data.contact.geom, data.contact.dist, strict=True):
+        pair = frozenset(m.geom_bodyid[geoms].tolist())
+        found[pair] = min(float(distance), found.get(pair, np.inf))
+    return found
 
 
 def pose_of(site: Any) -> Vector:
@@ -225,6 +229,8 @@ def approach(env: RobotEnv, goal: dict[str, Vector]) -> float:
     end, error = env.simulation.data.time + PATIENCE, np.inf
     while env.simulation.data.time < end:
         *_, info = env.step(action)
+        if "ik" not in info:
+            raise WbcError(str(info["physics_error"]))
         found = [info["ik"]["frames"][name] for name in goal]
         error = max(frame["position_error"] for frame in found)
         if error < REACHED / 2 and all(frame["reached"] for frame in found):

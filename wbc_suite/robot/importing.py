@@ -2,11 +2,9 @@
 
 import logging
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
-
-import mujoco
 
 from wbc_suite.errors import DescriptionError, join_first, shortened
 from wbc_suite.robot.description import RobotDescription
@@ -30,10 +28,6 @@ LinkFields: TypeAlias = dict[str, Any]  # fields of one `Link`, before validatio
 
 MAX_NAME = 70
 """Characters kept of a name in the file; our limit of 80 leaves room for a suffix."""
-OVERLAP = 1e-3  # smallest penetration in m that counts as an overlap
-MAX_JOINTS_BETWEEN = 3
-"""Largest number of joints between overlapping links that are excluded from contact.
-Links farther apart, such as an arm and the trunk, overlap because of the posture."""
 CARRIER_MASS, END_MASS = 1e-10, 1e-3
 """Mass in kg of a moving link for which the file has none, if it carries others."""
 GYRATION = 0.03  # radius of gyration of such a link, m
@@ -258,38 +252,3 @@ def with_soles(robot: RobotDescription) -> RobotDescription:
 
 def _solid(shapes: Sequence[Shape]) -> tuple[Shape, ...]:
     return tuple(shape.model_copy(update={"color": "grey"}) for shape in shapes)
-
-
-def overlapping_links(robot: RobotDescription) -> tuple[tuple[str, str], ...]:
-    """Return pairs of links that overlap in the posture `ready`, few joints apart.
-
-    Hulls of meshes can reach past the next link; such links would push each other
-    apart.
-    """
-    model = robot.to_mjspec().compile()
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, model.key("ready").id)
-    mujoco.mj_kinematics(model, data)
-    mujoco.mj_comPos(model, data)
-    mujoco.mj_collision(model, data)
-    contacts = data.contact
-    names = {model.body(link.name).id: link.name for link in robot.links}
-    deep = contacts.geom[contacts.dist < -OVERLAP]
-    pairs = {tuple(sorted(pair)) for pair in model.geom_bodyid[deep].tolist()}
-    return tuple(
-        (names[first], names[second])
-        for first, second in sorted(pairs)
-        if _joints_between(robot, names[first], names[second]) <= MAX_JOINTS_BETWEEN
-    )
-
-
-def _joints_between(robot: RobotDescription, first: str, second: str) -> int:
-    parent = {link.name: link.parent for link in robot.links}
-    moving = {link.name for link in robot.links if link.joint}
-
-    def ancestors(name: str | None) -> Iterator[str]:
-        while name is not None:
-            yield name
-            name = parent[name]
-
-    return len(({*ancestors(first)} ^ {*ancestors(second)}) & moving)

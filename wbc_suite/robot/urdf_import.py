@@ -8,13 +8,13 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.errors import DescriptionError, did_you_mean, join_first
+from wbc_suite.robot.contact_pairs import overlapping_links, without_idle_pairs
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.elements import Contacts
 from wbc_suite.robot.importing import (
     LinkFields,
     NameTable,
     describe_import,
-    overlapping_links,
 )
 from wbc_suite.robot.inertia import inertia_fields, inertia_matrix
 from wbc_suite.robot.poses import pose_fields
@@ -88,15 +88,14 @@ def read_urdf(
     if skin:
         robot = robot.model_copy(update={"skins": importer.skins()})
     pairs = overlapping_links(robot)
-    if not pairs:
-        return robot
-    shown = [f"'{first}' and '{second}'" for first, second in pairs]
-    LOG.warning(
-        "%s: these links overlap in the posture ready and will not collide: %s.",
-        path,
-        join_first(shown, limit=12),
-    )
-    return robot.model_copy(update={"contacts": Contacts(exclude=pairs)})
+    if pairs:
+        shown = [f"'{first}' and '{second}'" for first, second in pairs]
+        LOG.warning(
+            "%s: these links overlap in the posture ready and will not collide: %s.",
+            *(path, join_first(shown, limit=12)),
+        )
+        robot = robot.model_copy(update={"contacts": Contacts(exclude=pairs)})
+    return without_idle_pairs(robot)
 
 
 class _Importer:

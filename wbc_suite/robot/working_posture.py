@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
+from wbc_suite.robot.contact_pairs import contacts
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.typing import Indices, Matrix, Vector
 
@@ -100,8 +101,8 @@ class _Search:
 
     def candidates(self, arm: _Arm, earlier: Sequence[_Arm]) -> Iterator[Vector]:
         """Yield postures of an arm, best first: mirror images, then random ones."""
-        images = (self._mirrored(arm, x) for x in earlier)
-        yield from (values for values in images if values is not None)
+        mirrored = (self._mirrored(arm, other) for other in earlier)
+        yield from (values for values in mirrored if values is not None)
         rng, half = np.random.default_rng(0), (arm.high - arm.low) / 2
         drawn = rng.uniform(arm.low, arm.high, size=(DRAWS, len(arm.q)))
         drawn += rng.uniform(0.0, 0.8, size=(DRAWS, 1)) * (self.q[arm.q] - drawn)
@@ -189,10 +190,4 @@ class _Search:
         for name, address in self._addresses.items():
             joint = self._model.joints[self._model.getJointId(name)]
             data.qpos[address] = q[joint.idx_q]
-        mujoco.mj_kinematics(m, data)
-        mujoco.mj_comPos(m, data)
-        mujoco.mj_collision(m, data)
-        if not data.ncon:
-            return set()
-        bodies = m.geom_bodyid[data.contact.geom]
-        return {(int(i), int(k)) for i, k in np.sort(bodies, axis=1)}
+        return contacts(m, data)

@@ -20,7 +20,7 @@ def lock_groups(robot: RobotDescription, groups: Sequence[str]) -> RobotDescript
     """
     fixed = tuple(dict.fromkeys((*groups, *gripper_groups(robot))))
     given = {key: getattr(robot, key) for key in RobotDescription.model_fields}
-    fields = locked(given, fixed) | {"connects": (), "sensors": ()}
+    fields = locked(given, fixed) | {"connects": (), "sensors": (), "tendons": ()}
     return RobotDescription.model_validate(fields)
 
 

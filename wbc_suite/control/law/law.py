@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+import mujoco
 import numpy as np
 
 from wbc_suite.control.loop.records import DRIVE, LAW, LawKind, Records, new_records
@@ -12,6 +13,9 @@ from wbc_suite.typing import Indices, Vector
 DECELERATION = 10.0
 """rad/s^2 or m/s^2; joints stop at their limits with it unless the robot's description
 gives another. Arms of the catalogue can do so carrying themselves."""
+
+NOTICED = 0.1
+"""Part of a joint's inertia above which implicit damping counts."""
 
 FOREVER = np.inf
 """s; a reference that moves until it is replaced."""
@@ -54,9 +58,33 @@ class Law:
         limited = state.model.actuator_ctrllimited[drives["ctrl"]].astype(bool)
         drives["command_min"] = np.where(limited, limits[:, 0], -np.inf)
         drives["command_max"] = np.where(limited, limits[:, 1], np.inf)
+        drives["gain"] = 1.0
+        if kind != LawKind.SERVO:
+            self._see_through_servos(state.model)
         drives["position_min"], drives["position_max"] = -np.inf, np.inf
         drives["velocity_max"], drives["deceleration"] = np.inf, DECELERATION
         drives["windup_max"], drives["correction_max"] = np.inf, np.inf
+
+    def _see_through_servos(self, m: mujoco.MjModel) -> None:
+        """Read how servos make forces, and the damping that a step treats implicitly.
+
+        In a step h, a joint of damping D moves as if it had h D more inertia. That is
+        left out where it is small beside the joint's own.
+        """
+        drives = self.drives
+        ctrl, dof = drives["ctrl"], drives["dof"]
+        servo = m.actuator_biastype[ctrl] == mujoco.mjtBias.mjBIAS_AFFINE
+        bias = np.where(servo[:, None], -m.actuator_biasprm[ctrl, 1:3], 0.0)
+        drives["stiffness"], drives["damping"] = bias.T
+        drives["gain"] = np.where(servo, m.actuator_gainprm[ctrl, 0], 1.0)
+        limits = m.actuator_forcerange[ctrl]
+        limits[m.actuator_forcelimited[ctrl] == 0] = -np.inf, np.inf
+        low, high = drives["command_min"], drives["command_max"]
+        drives["command_min"] = np.where(servo, limits[:, 0], low)
+        drives["command_max"] = np.where(servo, limits[:, 1], high)
+        damping = m.dof_damping.reshape(m.nv, -1)[dof, 0] + drives["damping"]
+        lag = m.opt.timestep * damping
+        drives["lag"] = np.where(lag > NOTICED * m.dof_M0[dof], lag, 0.0)
 
     def reset(self, state: RobotState) -> None:
         """Reset the disturbance observer."""

@@ -132,7 +132,8 @@ def write_law_commands(
 
     `physics.force` holds `M a - J^T f`. A torque law adds its torques to Coriolis,
     centrifugal and gravity forces, less what `gravcomp` of the model cancels already;
-    other passive forces stay.
+    other passive forces stay. Actuators that are servos get the setpoint at which they
+    exert that force.
     """
     for j in range(law.first, law.last):
         drive = drives[j]
@@ -145,12 +146,15 @@ def write_law_commands(
             command = reference_at(law, drive)[0] + bias
         else:
             bias -= law.compensation * physics.qfrc_passive[dof]
-            command = physics.force[dof] + bias - drive.disturbance
+            force = physics.force[dof] + drive.lag * physics.acceleration[dof]
+            command = force + bias - drive.disturbance
         drive.command = min(max(command, drive.command_min), drive.command_max)
         drive.saturation = drive.command - command
         drive.desired = physics.acceleration[dof]
         drive.last_velocity = physics.qvel[dof]
-        physics.ctrl[drive.ctrl] = drive.command
+        servo = drive.stiffness * physics.qpos[drive.qpos]
+        servo += drive.damping * physics.qvel[dof]
+        physics.ctrl[drive.ctrl] = (drive.command + servo) / drive.gain
 
 
 def needed_kernels(laws: Records) -> tuple[Needed, CustomLaw]:

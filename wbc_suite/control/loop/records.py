@@ -60,6 +60,11 @@ DRIVE = np.dtype(
         ("ctrl", "i8"),  # its actuator
         ("command_min", "f8"),
         ("command_max", "f8"),
+        # the actuator's force is gain u - stiffness q - damping v
+        ("gain", "f8"),
+        ("stiffness", "f8"),  # N m/rad or N/m; 0 of a motor
+        ("damping", "f8"),  # N m s/rad or N s/m
+        ("lag", "f8"),  # inertia that implicit damping adds in a step, kg m^2 or kg
         ("position", "f8"),  # reference after s seconds:
         ("velocity", "f8"),  #   position + velocity s + acceleration s^2 / 2
         ("acceleration", "f8"),  # + jerk s^3 / 6
@@ -68,7 +73,7 @@ DRIVE = np.dtype(
         ("kd", "f8"),  # 1/s
         ("correction_max", "f8"),  # feedback acceleration, rad/s^2 or m/s^2
         ("windup_max", "f8"),  # distance of an integrated reference from its joint
-        ("command", "f8"),  # last command of the actuator
+        ("command", "f8"),  # last force of the actuator, or setpoint of a servo law
         # joint limits, see `loop.acceleration_limits`
         ("position_min", "f8"),  # rad or m
         ("position_max", "f8"),

@@ -1,0 +1,98 @@
+"""Find pairs of links that need not collide, by sampling postures."""
+
+from collections.abc import Iterator
+from itertools import combinations
+
+import mujoco
+import numpy as np
+
+from wbc_suite.robot.description import RobotDescription
+from wbc_suite.robot.elements import Contacts
+
+OVERLAP = 1e-3  # smallest penetration in m that counts as an overlap
+NEAR = 0.01  # m; links that never come nearer never touch
+POSTURES = 2000
+MAX_JOINTS_BETWEEN = 3
+"""Largest number of joints between links that are excluded from contact. Links farther
+apart, such as an arm and the trunk, overlap because of the posture."""
+ENDLESS = np.pi  # rad; range of a joint without one
+Pair = tuple[str, str]
+
+
+def without_idle_pairs(robot: RobotDescription) -> RobotDescription:
+    """Return the robot with further pairs excluded from contact.
+
+    These are links few joints apart that are apart in all of 2000 random postures.
+    Physics does not change. Controllers keep links apart by capsules, which are larger
+    than hulls, and would take room from the arm.
+    """
+    near, excluded = set(_near_pairs(robot)), {*map(frozenset, robot.contacts.exclude)}
+    solid = [link.name for link in robot.links if link.collision]
+    idle = tuple(
+        pair
+        for pair in combinations(solid, 2)
+        if tuple(sorted(pair)) not in near
+        and frozenset(pair) not in excluded
+        and 2 <= _joints_between(robot, *pair) <= MAX_JOINTS_BETWEEN
+    )
+    exclude = (*robot.contacts.exclude, *idle)
+    return robot.model_copy(update={"contacts": Contacts(exclude=exclude)})
+
+
+def _near_pairs(robot: RobotDescription) -> Iterator[Pair]:
+    """Yield sorted pairs of links that come near to each other in random postures."""
+    m = robot.to_mjspec().compile()
+    data, rng = mujoco.MjData(m), np.random.default_rng(0)
+    m.geom_margin[:] = NEAR
+    names = {m.body(link.name).id: link.name for link in robot.links}
+    index = [m.joint(joint.name).qposadr[0] for joint in robot.joints]
+    ranges = [joint.range or (-ENDLESS, ENDLESS) for joint in robot.joints]
+    low, high = np.array(ranges).reshape(-1, 2).T
+    found: set[tuple[int, int]] = set()
+    for _ in range(POSTURES):
+        data.qpos[index] = rng.uniform(low, high)
+        found |= contacts(m, data, NEAR)
+    for first, second in found:
+        a, b = sorted((names[first], names[second]))
+        yield a, b
+
+
+def overlapping_links(robot: RobotDescription) -> tuple[Pair, ...]:
+    """Return pairs of links that overlap in the posture `ready`, few joints apart.
+
+    Hulls of meshes can reach past the next link; such links would push each other
+    apart.
+    """
+    m = robot.to_mjspec().compile()
+    data = mujoco.MjData(m)
+    mujoco.mj_resetDataKeyframe(m, data, m.key("ready").id)
+    names = {m.body(link.name).id: link.name for link in robot.links}
+    return tuple(
+        (names[first], names[second])
+        for first, second in sorted(contacts(m, data, -OVERLAP))
+        if _joints_between(robot, names[first], names[second]) <= MAX_JOINTS_BETWEEN
+    )
+
+
+def contacts(
+    m: mujoco.MjModel, data: mujoco.MjData, nearer: float = np.inf
+) -> set[tuple[int, int]]:
+    """Return the bodies, by number, that are nearer than a distance, m, at `qpos`."""
+    mujoco.mj_kinematics(m, data)
+    mujoco.mj_comPos(m, data)
+    mujoco.mj_collision(m, data)
+    deep = data.contact.geom[data.contact.dist < nearer]
+    pairs = np.sort(m.geom_bodyid[deep].reshape(-1, 2), axis=1)
+    return {(int(first), int(second)) for first, second in pairs}
+
+
+def _joints_between(robot: RobotDescription, first: str, second: str) -> int:
+    parent = {link.name: link.parent for link in robot.links}
+    moving = {link.name for link in robot.links if link.joint}
+
+    def ancestors(name: str | None) -> Iterator[str]:
+        while name is not None:
+            yield name
+            name = parent[name]
+
+    return len(({*ancestors(first)} ^ {*ancestors(second)}) & moving)
