@@ -1,7 +1,7 @@
 """What data teach: success of cloned policies by noise, history and number of episodes.
 
 Episodes of the expert are recorded plain, with noise on actions, with recoveries from
-pushes, and with both. The scripts of examples/learning imitate some of them. Success is
+pushes, with both, and with pushes and four times the noise. The scripts of examples/learning imitate some of them. Success is
 that of the last checkpoint, of the mean of the last five and of the best of them, over
 the same unseen scenes for all. Results are added to docs/learning.json; cases that it
 has are not repeated. `--table` writes docs/learning.md and its plot from it.
@@ -36,12 +36,12 @@ FOUND, PAGE = ROOT / "docs" / "learning.json", ROOT / "docs" / "learning.md"
 PLOT = ROOT / "docs" / "images" / "cloning.png"
 BEGIN, END = "<!-- results -->", "<!-- end of results -->"
 KINDS = {"plain": (0.0, 0.0), "noise": (1.0, 0.0), "recoveries": (0.0, 1.0)}
-KINDS |= {"both": (1.0, 1.0)}
+KINDS |= {"both": (1.0, 1.0), "strong": (4.0, 1.0)}
 """Shares of a benchmark's noise, and of its pushes."""
 BENCHMARKS = {
-    "Lift": {"noise": 0.2, "pushes": 4.0, "horizon": 100, "steps": 2000},
-    "PickPlaceCan": {"noise": 0.1, "pushes": 2.0, "horizon": 400, "steps": 6000},
-    "NutAssemblySquare": {"noise": 0.1, "pushes": 2.0, "horizon": 300, "steps": 6000},
+    "Lift": {"noise": 0.05, "pushes": 4.0, "horizon": 100, "steps": 2000},
+    "PickPlaceCan": {"noise": 0.05, "pushes": 2.0, "horizon": 400, "steps": 6000},
+    "NutAssemblySquare": {"noise": 0.05, "pushes": 2.0, "horizon": 300, "steps": 6000},
 }
 """Noise in full steps, pushes in 100 actions; horizon and gradient steps."""
 METHODS = ("bc", "bc_history", "diffusion")

@@ -2,7 +2,7 @@
 
 Record first, then train; a stopped run goes on where it stopped:
 
-    wbc-suite record Lift --only-success --episodes 200 --noise 0.2 --recoveries 4
+    wbc-suite record Lift --only-success --episodes 200 --noise 0.05 --recoveries 4
         --out artifacts/lift.hdf5
     .venv-learning/bin/python examples/learning/bc.py
     wbc-suite evaluate Lift --policy bc:Policy        # PYTHONPATH=examples/learning
