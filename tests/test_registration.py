@@ -48,7 +48,7 @@ print(gymnasium.spec("wbc_suite/Lift-v1").entry_point)
 @pytest.mark.parametrize(
     "first_use",
     [
-        "gymnasium.spec('wbc_suite/Stack-v0')",
+        "gymnasium.spec('wbc_suite/Stack-v1')",
         "gymnasium.spaces.Box(0, 1)",
         "print(gymnasium.__version__, file=sys.stderr)",
         "isinstance(gymnasium, object) and gymnasium.Env",
@@ -60,7 +60,7 @@ import sys, wbc_suite
 assert "gymnasium.core" not in sys.modules
 import gymnasium
 {first_use}
-print("wbc_suite/Stack-v0" in gymnasium.registry, gymnasium.__spec__.name)
+print("wbc_suite/Stack-v1" in gymnasium.registry, gymnasium.__spec__.name)
 """
     assert run(code) == "True gymnasium"
 

@@ -31,8 +31,8 @@ BENCHMARKS = (
 """Benchmarks with an id."""
 
 _CHANGED = (
-    *("Door", "Lift", "NutAssembly", "PickPlace", "ToolHang"),
-    *("TwoArmPegInHole", "Wipe"),
+    *("Door", "Lift", "NutAssembly", "PickPlace", "Stack", "ToolHang"),
+    *("TwoArmHandover", "TwoArmPegInHole", "TwoArmTransport", "Wipe"),
 )
 """Beginnings of the names whose reward, success or scene has changed: version 1."""
 

@@ -23,7 +23,7 @@ from wbc_suite.robot import RobotDescription
 from wbc_suite.scene import Push
 from wbc_suite.scene.objects import ObjectState, SceneObject
 from wbc_suite.scene.placement import Placed, Sampler
-from wbc_suite.sensing.hands import hands_of, pairs_in_contact
+from wbc_suite.sensing.hands import Hand, hands_of, pairs_in_contact
 from wbc_suite.sensing.reading import (
     Reading,
     body_position,
@@ -275,11 +275,21 @@ class ObjectBenchmark(ABC):
         return any(hand.grasps(geoms) for hand in self.hands)
 
     def held(self, name: str) -> bool:
-        """Whether a hand grasps an object, which moves with it."""
+        """Whether a hand clamps an object, which moves with it."""
+        geoms = self.states[name].geoms
+        return any(self.holds(hand, name, geoms) for hand in self.hands)
+
+    def holds(self, hand: Hand, name: str, geoms: Collection[int]) -> bool:
+        """Whether a hand clamps geoms of an object, which moves with it."""
+        return hand.clamps(geoms) and hand.slip(self.states[name].body) < SLIP
+
+    def rests(self, name: str) -> bool:
+        """Whether an object lies still on something that is no robot."""
         state = self.states[name]
-        return any(
-            hand.grasps(state.geoms) and hand.slip(state.body) < SLIP
-            for hand in self.hands
+        return state.is_still and any(
+            len(state.geoms.intersection(pair)) == 1
+            and self._robot_geoms.isdisjoint(pair)
+            for pair in pairs_in_contact(self.data)
         )
 
     def touching(self, first: str, second: str) -> bool:

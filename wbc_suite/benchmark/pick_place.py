@@ -58,7 +58,7 @@ class PickPlace(ObjectBenchmark):
     """Each object is to lie in its own quadrant of the second bin, the hand withdrawn.
 
     Source of geometry and reward: robosuite 1.5, see `Lift`. Unlike there, an
-    object that a hand still holds is not placed.
+    object that a hand still holds is not placed, nor one that flies or rolls.
     """
 
     def __init__(self, path: Path) -> None:

@@ -75,7 +75,7 @@ class Sorting:
         return readings | {"obj_id": computed(1, lambda: self.number)}
 
     def is_placed(self, name: str) -> bool:
-        """Whether an object lies at its place, and no hand is near or grasps it."""
+        """Whether an object lies still at its place, no hand near it or grasping it."""
         dx, dy, above = self._offset(name)
         return (
             0.0 < above < self._height
@@ -83,6 +83,7 @@ class Sorting:
             and self._lies(name)
             and self._stages.has_left(self._benchmark.distance(self._grip(name)))
             and not self._benchmark.grasped(name)
+            and self._benchmark.rests(name)
         )
 
     def success(self) -> bool:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import mujoco
+import numpy as np
 from pydantic import NonNegativeFloat, PositiveFloat
 
 from wbc_suite.benchmark.base import load_config
@@ -18,6 +19,8 @@ from wbc_suite.sensing.reading import Reading, body_position, offset
 from wbc_suite.tomlfile import FrozenModel
 
 A, B = "cubeA", "cubeB"
+FLAT = 0.05
+"""rad, between faces of cubes that lie flat on another, at most."""
 
 
 class BlockConfig(FrozenModel):
@@ -52,7 +55,8 @@ class StackConfig(ObjectBenchmarkConfig):
 class Stack(ObjectBenchmark):
     """The smaller cube A is to rest on the larger cube B.
 
-    Source of geometry and reward: robosuite 1.5, see `Lift`.
+    Source of geometry and reward: robosuite 1.5, see `Lift`. Unlike there, a cube that
+    flies, slides past or tips over does not count.
     """
 
     def __init__(self, path: Path) -> None:
@@ -81,12 +85,14 @@ class Stack(ObjectBenchmark):
         return {**self.poses_of([A, B]), "cubeA_to_cubeB": offset(b, a)}
 
     def success(self) -> bool:
-        """Whether A touches B, its middle above B's top face, and no hand holds it."""
-        a, b = self.states[A].position.tolist(), self.states[B].position.tolist()
-        half = self.config.cube_b.half_size
-        over = math.hypot(a[0] - b[0], a[1] - b[1]) < math.sqrt(2.0) * half
-        on_top = over and a[2] - b[2] > half
-        return on_top and self.touching(A, B) and not self.grasped(A)
+        """Whether A lies flat and still on the top of B, and no hand holds it."""
+        a, b, half = self.states[A], self.states[B], self.config.cube_b.half_size
+        up = b.rotation[:, 2]
+        x, y, z = ((a.position - b.position) @ b.rotation).tolist()
+        over = max(abs(x), abs(y)) < half < z
+        flat = float(np.abs(up @ a.rotation).max()) > math.cos(FLAT)
+        rests = a.is_still and self.touching(A, B)
+        return over and flat and rests and not self.grasped(A)
 
     def progress(self) -> float:
         """Return the shaped reward.

@@ -60,7 +60,8 @@ class TwoArmHandover(ObjectBenchmark):
     `data.userdata[0]` is 1 once both have held it in the air. Otherwise an arm that
     takes the hammer from the table by itself would succeed.
 
-    Source of geometry and reward: robosuite 1.5, see `Lift`.
+    Source of geometry and reward: robosuite 1.5, see `Lift`. Unlike there, a hand holds
+    the hammer only if two fingers clamp it and it moves with the hand.
     """
 
     robots: Sequence[str] = ("Panda", "Panda")
@@ -145,12 +146,12 @@ class TwoArmHandover(ObjectBenchmark):
     @property
     def held_by_first(self) -> bool:
         """Whether arm 0 holds the hammer anywhere."""
-        return self.hands[0].grasps(self.states[HAMMER].geoms)
+        return self.holds(self.hands[0], HAMMER, self.states[HAMMER].geoms)
 
     @property
     def held_by_second(self) -> bool:
         """Whether arm 1 holds the handle."""
-        return self.hands[1].grasps(self._handle)
+        return self.holds(self.hands[1], HAMMER, self._handle)
 
     def observables(self) -> dict[str, Reading]:
         """Return the pose of the hammer, its handle, and its offset from each hand."""

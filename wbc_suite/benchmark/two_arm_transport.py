@@ -101,6 +101,7 @@ class TwoArmTransport(ObjectBenchmark):
     target bin, with the trash in it, and the trash bin are in front of arm 1.
 
     Source of geometry and success: robosuite 1.5, see `Lift`; no shaped reward there.
+    Unlike there, things that bounce in their bins do not count.
     """
 
     robots: Sequence[str] = ("Panda", "Panda")
@@ -203,8 +204,8 @@ class TwoArmTransport(ObjectBenchmark):
         return between and self.in_contact({self._floors[where]}, item.geoms)
 
     def success(self) -> bool:
-        """Whether the payload is in the target bin and the trash in the trash bin."""
-        return all(map(self._is_done, GOALS))
+        """Whether the payload lies still in the target bin, the trash in its own."""
+        return all(self._is_done(n) and self.states[n].is_still for n in GOALS)
 
     def progress(self) -> float:
         """Return the shaped reward, which robosuite does not have.

@@ -1,5 +1,6 @@
 """Hands of a robot in a scene: positions and grasps."""
 
+import itertools
 from collections.abc import Collection, Sequence
 
 import mujoco
@@ -8,6 +9,9 @@ import numpy as np
 from wbc_suite.control import RobotState
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Vector
+
+OPPOSED = -0.5
+"""Greatest product of the normals of contacts from opposite sides."""
 
 
 def pairs_in_contact(data: mujoco.MjData) -> list[list[int]]:
@@ -53,6 +57,20 @@ class Hand:
             if a in geoms or b in geoms
         }
         return len(touching - {None}) >= 2
+
+    def clamps(self, geoms: Collection[int]) -> bool:
+        """Whether two links touch an object from sides at least 120 degrees apart."""
+        touching: list[tuple[int, Vector]] = []
+        for pair, frame in zip(
+            pairs_in_contact(self._data), self._data.contact.frame, strict=True
+        ):
+            for own, other, side in ((*pair, 1.0), (*pair[::-1], -1.0)):
+                if own in self._body_of and other in geoms:
+                    touching.append((self._body_of[own], side * frame[:3]))
+        return any(
+            a != b and float(n @ m) < OPPOSED
+            for (a, n), (b, m) in itertools.combinations(touching, 2)
+        )
 
     def slip(self, body: int) -> float:
         """Return the speed of a body's centre of mass relative to the hand, m/s.

@@ -1,5 +1,6 @@
 """An object in a simulation: its pose, size and bounding cylinder."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -13,6 +14,9 @@ from wbc_suite.typing import Matrix, Vector
 
 DIRECTIONS = 64
 """Horizontal directions along which an object is measured; 0.1 % below the circle."""
+
+STILL, STILL_TURN = 0.05, 0.5
+"""m/s and rad/s, of things that lie still."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -55,6 +59,12 @@ class ObjectState:
     def is_free(self) -> bool:
         """Whether it has a free joint."""
         return self._q >= 0
+
+    @property
+    def is_still(self) -> bool:
+        """Whether it moves less than 0.05 m/s and 0.5 rad/s; fixed ones do not move."""
+        v = self.data.qvel[self._v : self._v + 6] if self.is_free else np.zeros(6)
+        return math.hypot(*v[:3]) < STILL and math.hypot(*v[3:]) < STILL_TURN
 
     def move(self, position: Sequence[float], quat: Quat = STANDING) -> None:
         """Write its pose, at rest; the simulation is not updated."""
