@@ -30,6 +30,8 @@ CompiledRecords: TypeAlias = Any
 RobotName: TypeAlias = Literal[
     "Aloha",
     "Arx5",
+    "B1Z1",
+    "B1Z1Floating",
     "Baxter",
     "G1",
     "G1ArmsOnly",
@@ -37,6 +39,8 @@ RobotName: TypeAlias = Literal[
     "G1FloatingBody",
     "G1FreeBody",
     "Go2",
+    "Go2Arx5",
+    "Go2Arx5Floating",
     "GR1",
     "GR1ArmsOnly",
     "GR1FixedLowerBody",

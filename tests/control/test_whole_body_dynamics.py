@@ -208,6 +208,7 @@ def test_standing_feet_do_not_slip(standing):
     [
         *(("GR1FreeBody", 0.3), ("G1FreeBody", 0.3)),
         *(("Spot", 0.8), ("SpotWithArm", 0.8), ("Go2", 0.6)),
+        *(("Go2Arx5", 0.6), ("B1Z1", 0.6)),
     ],
 )
 def test_a_robot_walks_as_commanded_and_stands_again(alone, name, speed):
