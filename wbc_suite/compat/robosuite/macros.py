@@ -4,6 +4,7 @@ A `macros_private.py` beside this file, as `setup_macros` writes it, comes after
 """
 
 import contextlib
+import importlib
 
 SIMULATION_TIMESTEP = 0.002
 """Duration of a physics step, s."""
@@ -22,4 +23,5 @@ CONSOLE_LOGGING_LEVEL = "INFO"
 FILE_LOGGING_LEVEL = None
 
 with contextlib.suppress(ImportError):
-    from wbc_suite.compat.robosuite.macros_private import *  # noqa: F403  # pyright: ignore[reportMissingImports, reportWildcardImportFromLibrary]
+    _own = importlib.import_module("wbc_suite.compat.robosuite.macros_private")
+    globals().update({k: v for k, v in vars(_own).items() if k.isupper()})

@@ -15,7 +15,8 @@ from wbc_suite.compat.robosuite.models.grippers import (
     GripperModel,
     NullGripper,
 )
-from wbc_suite.compat.robosuite.models.robots import changed, create_robot
+from wbc_suite.compat.robosuite.models.own_files import changed
+from wbc_suite.compat.robosuite.models.robots import create_robot
 from wbc_suite.compat.robosuite.robots.measured import Measured
 from wbc_suite.compat.robosuite.utils.binding_utils import MjSim
 from wbc_suite.control import RobotState
@@ -247,6 +248,8 @@ def _mounted(
     """Return the model of the gripper on an arm."""
     gripper = object.__new__(cls)
     GripperModel.__init__(gripper, None, idn, robot=robot, prefix=prefix, arm=arm)
+    if not cls.__module__.startswith("wbc_suite."):
+        gripper.own_file = cls().own_file
     return gripper
 
 

@@ -13,6 +13,7 @@ import pinocchio as pin
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.compat.robosuite.models.described import DescribedModel
 from wbc_suite.compat.robosuite.models.own_files import arm_file, changed, gripper_file
+from wbc_suite.compat.robosuite.models.robots.passive import with_passive_joints
 from wbc_suite.compat.robosuite.utils.transform_utils import euler2mat
 from wbc_suite.errors import UnknownNameError
 from wbc_suite.robot import RobotDescription, load_robot
@@ -20,41 +21,6 @@ from wbc_suite.robot.poses import pose_fields
 from wbc_suite.typing import Vector
 
 log = logging.getLogger(__name__)
-
-ARMATURE = 5.0
-"""kg m^2; the k-th joint of an arm on a fixed base has 5 / k in robosuite."""
-FRICTION = {"UR5e": 0.01, "Jaco": 0.01, "XArm7": 1.0}
-"""Dry friction of all joints of an arm in robosuite, N m; 0.1 for all others."""
-DAMPING = {"UR5e": (0.001,) * 6, "Sawyer": (*(0.1,) * 5, 0.2, 0.1)} | dict.fromkeys(
-    ("Panda", "Jaco", "Kinova3", "XArm7"), (*(0.1,) * 5, 0.01, 0.01)
-)
-"""Damping of the joints of an arm in robosuite, N m s; 0.1 for all others."""
-
-EFFORTS = {
-    "Panda": (*(80.0,) * 5, 12.0, 12.0),
-    "Jaco": (*(30.5,) * 5, 6.8, 6.8),
-    "Kinova3": (*(32.0,) * 5, 13.0, 13.0),
-    "XArm7": (80.0,) * 7,
-}
-"""Greatest torques of an arm in robosuite, N m, where they are not ours."""
-
-INERTIAS: dict[str, tuple[float, tuple[float, ...], tuple[float, ...]]] = {
-    "panda_link1": (3.0, (0, 0, -0.07), (0.3, 0.3, 0.3)),
-    "panda_link2": (3.0, (0, -0.1, 0), (0.3, 0.3, 0.3)),
-    "panda_link3": (2.0, (0.04, 0, -0.05), (0.2, 0.2, 0.2)),
-    "panda_link4": (2.0, (-0.04, 0.05, 0), (0.2, 0.2, 0.2)),
-    "panda_link5": (2.0, (0, 0, -0.15), (0.2, 0.2, 0.2)),
-    "panda_link6": (1.5, (0.06, 0, 0), (0.1, 0.1, 0.1)),
-    "panda_link7": (1.0, (0, 0, 0.093), (0.1, 0.1, 0.1)),  # with its `right_hand`
-    "panda_hand": (0.48, (0, 0, 0.15), (0.09, 0.05, 0.07)),
-    "panda_leftfinger": (0.02, (0, 0, 0.05), (0.02, 0.02, 0.02)),
-    "panda_rightfinger": (0.02, (0, 0, 0.05), (0.02, 0.02, 0.02)),
-}
-"""Mass, kg, its centre, m, and moments of inertia, kg m^2, of links whose values in
-robosuite are invented; those of other arms are the manufacturers', as ours. Its finger
-tips have 0.01 kg m^2 at 10 g: the air drags them as cubes of 2.4 m. So it does ours."""
-
-ACCEPTED = dict.fromkeys(("com", "inertia"), "robosuite's; no such link can have it")
 
 __all__ = [
     "REGISTERED_ROBOTS",
@@ -167,9 +133,7 @@ class RobotModel(DescribedModel):
     def joints(self) -> list[str]:
         """Names of its joints in the scene, without those of grippers."""
         prefix, robot = self.naming_prefix, self.description
-        fingers = {
-            j for g, js in robot.groups.items() if g.endswith("gripper") for j in js
-        }
+        fingers = set(self._fingers())
         own = [j.name for j in robot.joints if j.mimic is None]
         return [prefix + name for name in own if name not in fingers]
 
@@ -206,6 +170,37 @@ class RobotModel(DescribedModel):
     def contact_geoms(self) -> list[str]:
         """Names of its geoms that collide."""
         return self._geoms("collision")
+
+    _contact_geoms = contact_geoms
+
+    def set_joint_attribute(self, attrib: str, values: Any, force: bool = True) -> None:
+        """Write armature, damping or frictionloss of its joints, one value or each.
+
+        Without `force` values other than 0 stay. Other attributes have no effect.
+        """
+        if attrib not in ("armature", "damping", "frictionloss"):
+            return
+        fingers, links = set(self._fingers()), self.description.links
+        joined = [x for x in links if x.joint and x.joint.mimic is None]
+        moved = [x for x in joined if x.joint and x.joint.name not in fingers]
+        given = dict(
+            zip(
+                (x.name for x in moved),
+                np.broadcast_to(values, len(moved)),
+                strict=True,
+            )
+        )
+        changes = {link.name: link for link in links}
+        for link in moved:
+            if link.joint and (force or not getattr(link.joint, attrib)):
+                value = {attrib: float(given[link.name])}
+                update = {"joint": link.joint.model_copy(update=value)}
+                changes[link.name] = link.model_copy(update=update)
+        self.description = changed(self.description, links=tuple(changes.values()))
+
+    def _fingers(self) -> list[str]:
+        groups = self.description.groups.items()
+        return [j for g, js in groups if g.endswith("gripper") for j in js]
 
     @property
     def visual_geoms(self) -> list[str]:
@@ -299,34 +294,9 @@ class ManipulatorModel(RobotModel):
     def eef_name(self) -> dict[str, str]:
         """Name of the body at the end of each arm."""
         prefix, robot = self.naming_prefix, self.description
+        if self.own_file is not None:
+            return {arm: prefix + self._eef_name[arm] for arm in robot.hands}
         return {arm: prefix + robot.link_of(f) for arm, f in robot.hands.items()}
-
-
-def with_passive_joints(robot: RobotDescription) -> RobotDescription:
-    """Return a robot on a fixed base with robosuite's passive values in its arm."""
-    if robot.root.kind != "fixed" or any(f.role == "foot" for f in robot.frames):
-        return robot
-    arms = [js for name, js in robot.groups.items() if name.endswith("arm")]
-    if len(arms) != 1:  # Baxter has an armature of 0.01
-        return robot
-    rests = DAMPING.get(robot.name, (0.1,) * 9)
-    friction = FRICTION.get(robot.name, 0.1)
-    links = []
-    for link in robot.links:
-        update: dict[str, Any] = {}
-        if link.joint is not None and link.joint.name in arms[0]:
-            k = arms[0].index(link.joint.name)
-            changes = {"armature": ARMATURE / (k + 1), "damping": rests[k]}
-            changes["frictionloss"] = friction
-            if robot.name in EFFORTS:
-                changes["effort"] = EFFORTS[robot.name][k]
-            update["joint"] = link.joint.model_copy(update=changes)
-        if link.name in INERTIAS:
-            mass, com, moments = INERTIAS[link.name]
-            update |= {"mass": mass, "com": com, "accept": ACCEPTED}
-            update["inertia"] = (*moments, 0.0, 0.0, 0.0)
-        links.append(link.model_copy(update=update) if update else link)
-    return changed(robot, links=tuple(links))
 
 
 def register_robot(target_class: type[RobotModel]) -> type[RobotModel]:
