@@ -108,7 +108,7 @@ class InStep:
 
         self.case, self.seeds = case, seeds
         self.envs = gymnasium.make_vec(
-            "wbc_suite/Lift-v0",
+            "wbc_suite/Lift-v1",
             num_envs=len(seeds),
             vectorization_mode="vector_entry_point",
             threads=2,

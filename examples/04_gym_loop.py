@@ -4,7 +4,7 @@ import gymnasium
 
 import wbc_suite  # noqa: F401 - registers the environments
 
-env = gymnasium.make("wbc_suite/Lift-v0", robots="Panda", reward_shaping=True)
+env = gymnasium.make("wbc_suite/Lift-v1", robots="Panda", reward_shaping=True)
 observation, info = env.reset(seed=1)
 env.action_space.seed(1)
 

@@ -6,7 +6,7 @@ import numpy as np
 import wbc_suite  # noqa: F401 - registers the environments
 
 envs = gymnasium.make_vec(
-    "wbc_suite/Lift-v0",
+    "wbc_suite/Lift-v1",
     num_envs=8,
     vectorization_mode="vector_entry_point",
     robots="Panda",

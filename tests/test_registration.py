@@ -38,9 +38,9 @@ def test_registering_twice_changes_nothing(recwarn):
 def test_a_users_entry_of_the_same_name_is_kept():
     code = """
 import gymnasium
-gymnasium.register("wbc_suite/Lift-v0", entry_point="mine:Env")
+gymnasium.register("wbc_suite/Lift-v1", entry_point="mine:Env")
 import wbc_suite
-print(gymnasium.spec("wbc_suite/Lift-v0").entry_point)
+print(gymnasium.spec("wbc_suite/Lift-v1").entry_point)
 """
     assert run(code) == "mine:Env"
 
@@ -70,7 +70,7 @@ def test_submodules_can_be_imported_first():
 import wbc_suite
 from gymnasium.envs.registration import registry
 import gymnasium.wrappers, gymnasium
-print("wbc_suite/Lift-v0" in registry, gymnasium.registry is registry)
+print("wbc_suite/Lift-v1" in registry, gymnasium.registry is registry)
 """
     assert run(code) == "True True"
 
@@ -116,6 +116,6 @@ found = []
 threads = [threading.Thread(target=lambda: found.append(gymnasium.Env)) for _ in "1234"]
 for thread in threads: thread.start()
 for thread in threads: thread.join()
-print(len(found), "wbc_suite/Lift-v0" in gymnasium.registry)
+print(len(found), "wbc_suite/Lift-v1" in gymnasium.registry)
 """
     assert run(code) == "4 True"

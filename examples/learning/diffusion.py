@@ -10,27 +10,15 @@ Denoising Diffusion Probabilistic Models", ICML (the schedule).
 """
 
 import math
-from collections.abc import Callable, Mapping
-from typing import Any
 
 import numpy as np
 import torch
+from imitation import Method, last_policy, main
 from torch import Tensor, nn
-from training import (
-    Act,
-    Demonstrations,
-    Run,
-    Settings,
-    arguments,
-    fit,
-    last_policy,
-    normalised,
-    observe,
-    tell,
-    unscaled,
-)
+from training import arguments
 
 LEVELS = 100  # of noise
+DENOISING = 10  # steps that remove it
 
 
 def signal_shares() -> Tensor:
@@ -40,115 +28,64 @@ def signal_shares() -> Tensor:
     return (share / math.cos(0.008 / 1.008 * math.pi / 2.0) ** 2).clamp(1e-4, 1.0)
 
 
+SHARES = signal_shares()
+
+
 class Denoiser(nn.Module):
     """Predicts the noise in a chunk of actions from the observations before it."""
 
-    def __init__(self, *, inputs: int, outputs: int, width: int) -> None:
+    def __init__(
+        self, *, inputs: int, outputs: int, history: int, chunk: int, width: int
+    ) -> None:
         super().__init__()
+        self.shape = (chunk, outputs)
         self.register_buffer("rates", torch.exp(torch.linspace(0.0, -6.0, 16)))
-        self.first = nn.Linear(inputs + outputs + 32, width)
+        self.first = nn.Linear(inputs * history + outputs * chunk + 32, width)
         self.blocks = nn.ModuleList(
             nn.Sequential(nn.LayerNorm(width), nn.Linear(width, width), nn.Mish())
-            for _ in range(4)
+            for _ in range(3)
         )
-        self.last = nn.Linear(width, outputs)
+        self.last = nn.Linear(width, outputs * chunk)
 
     def forward(self, noisy: Tensor, level: Tensor, seen: Tensor) -> Tensor:
-        """Return the noise, shape (batch, outputs); `level` has shape (batch,)."""
+        """Return the noise, of the shape of `noisy`; `level` has shape (batch,)."""
         phase = level[:, None] * self.get_buffer("rates")
-        known = torch.cat([noisy, seen, phase.sin(), phase.cos()], dim=1)
-        hidden = nn.functional.mish(self.first(known))
+        known = [noisy.flatten(1), seen.flatten(1), phase.sin(), phase.cos()]
+        hidden = nn.functional.mish(self.first(torch.cat(known, dim=1)))
         for block in self.blocks:
             hidden = hidden + block(hidden)
-        return self.last(hidden)
+        return self.last(hidden).view_as(noisy)
 
 
-def sample(
-    model: Denoiser, seen: Tensor, *, size: int, steps: int, seed: int
+def loss(
+    model: nn.Module, seen: Tensor, acted: Tensor, rng: np.random.Generator
 ) -> Tensor:
-    """Return a chunk of actions, shape (size,), by DDIM in so many steps."""
-    shares, generator = signal_shares(), torch.Generator().manual_seed(seed)
-    chunk = torch.randn(1, size, generator=generator)
-    levels = torch.linspace(LEVELS - 1, 0, steps).round().long()
+    """Return the mean squared error of the noise, at levels drawn at random."""
+    level = torch.as_tensor(rng.integers(LEVELS, size=len(seen)))
+    noise = torch.as_tensor(rng.standard_normal(acted.shape, dtype=np.float32))
+    share = SHARES[level][:, None, None]
+    noisy = share.sqrt() * acted + (1.0 - share).sqrt() * noise
+    return nn.functional.mse_loss(model(noisy, level.float(), seen), noise)
+
+
+def draw(model: nn.Module, seen: Tensor, rng: np.random.Generator) -> Tensor:
+    """Return a chunk of actions, by DDIM in a few steps from noise."""
+    assert isinstance(model, Denoiser)
+    start = rng.standard_normal((len(seen), *model.shape), dtype=np.float32)
+    chunk, one = torch.as_tensor(start), torch.ones(1)
+    levels = torch.linspace(LEVELS - 1, 0, DENOISING).round().long()
     for k, level in enumerate(levels):
-        noise = model(chunk, level[None].float(), seen[None])
-        share = shares[level]
+        noise = model(chunk, level.expand(len(seen)).float(), seen)
+        share = SHARES[level]
         clean = ((chunk - (1.0 - share).sqrt() * noise) / share.sqrt()).clamp(-1.0, 1.0)
-        after = shares[levels[k + 1]] if k + 1 < steps else torch.tensor(1.0)
+        after = SHARES[levels[k + 1]] if k + 1 < DENOISING else one
         noise = (chunk - share.sqrt() * clean) / (1.0 - share).sqrt()
         chunk = after.sqrt() * clean + (1.0 - after).sqrt() * noise
-    return chunk[0]
+    return chunk
 
 
-def chunks(data: Demonstrations, settings: Settings) -> tuple[Tensor, Tensor]:
-    """Return every moment's last observations, and its next actions, one row each."""
-    seen, acted = [], []
-    for before, after in zip(data.observations, data.actions, strict=True):
-        first = before[:1].expand(settings.history - 1, -1)
-        last = after[-1:].expand(settings.chunk - 1, -1)
-        past, future = torch.cat([first, before]), torch.cat([after, last])
-        for k in range(len(before)):
-            seen.append(past[k : k + settings.history].flatten())
-            acted.append(future[k : k + settings.chunk].flatten())
-    return torch.stack(seen), torch.stack(acted)
-
-
-def train(settings: Settings) -> Run:
-    """Train until `steps`, from the last checkpoint on."""
-    torch.manual_seed(settings.seed)
-    run = Run(settings)
-    data = Demonstrations(settings.demonstrations, settings.observed, settings.episodes)
-    seen, acted = chunks(data, settings)
-    sizes = {"inputs": seen.shape[1], "outputs": acted.shape[1]}
-    sizes["width"] = settings.width
-    model, shares = Denoiser(**sizes), signal_shares()
-
-    def batch_loss(rng: np.random.Generator) -> Tensor:
-        rows = torch.as_tensor(rng.integers(len(seen), size=settings.batch))
-        level = torch.as_tensor(rng.integers(LEVELS, size=settings.batch))
-        noise = torch.as_tensor(rng.standard_normal(acted[rows].shape)).float()
-        share = shares[level][:, None]
-        noisy = share.sqrt() * acted[rows] + (1.0 - share).sqrt() * noise
-        return nn.functional.mse_loss(model(noisy, level.float(), seen[rows]), noise)
-
-    fit(run, model, batch_loss, policy_of, sizes=sizes, scales=data.scales)
-    return run
-
-
-def policy_of(saved: Mapping[str, Any]) -> Callable[[Any, Any], Act]:
-    """Return what makes the policy of a checkpoint for an episode."""
-    model = Denoiser(**saved["sizes"])
-    model.load_state_dict(saved["model"])
-    model.eval()
-    settings, scales = Settings(saved["settings"]), saved["scales"]
-    size = saved["sizes"]["outputs"]
-
-    def make(env: Any, rng: Any) -> Act:
-        del env
-        past: list[Tensor] = []
-        waiting: list[Tensor] = []
-
-        def act(observation: Mapping[str, Any]) -> np.ndarray:
-            past.append(normalised(observe(observation, settings.observed), scales))
-            del past[: -settings.history]
-            if not waiting:
-                first = [past[0]] * (settings.history - len(past))
-                seen, seed = torch.cat([*first, *past]), int(rng.integers(2**31))
-                with torch.inference_mode():
-                    drawn = sample(
-                        model, seen, size=size, steps=settings.denoising, seed=seed
-                    )
-                waiting.extend(drawn.reshape(settings.chunk, -1)[: settings.taken])
-            return unscaled(waiting.pop(0), scales)
-
-        return act
-
-    return make
-
-
-Policy = last_policy(policy_of, "artifacts/learning/diffusion")
+METHOD = Method(network=Denoiser, loss=loss, draw=draw)
+Policy = last_policy(METHOD, "artifacts/learning/diffusion")
 
 if __name__ == "__main__":
-    finished = train(arguments(__file__))
-    tell(finished, policy_of)
-    print(finished.plot("loss", "success", "final_success"))
+    main(arguments(__file__), METHOD)

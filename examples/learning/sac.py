@@ -8,6 +8,7 @@ checkpoint and replay buffer. TensorBoard files and a curve are in the folder.
 """
 
 import json
+import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -58,6 +59,7 @@ class Curve(BaseCallback):
     def __init__(self, path: Path, every: int) -> None:
         super().__init__()
         self.path, self.every, self.last = path, every, 0
+        self.begun = time.perf_counter()
 
     def _on_step(self) -> bool:
         buffer = self.model.ep_info_buffer
@@ -67,6 +69,7 @@ class Curve(BaseCallback):
                 "step": self.num_timesteps,
                 "return": float(np.mean([e["r"] for e in buffer])),
                 "success": float(np.mean([e["is_success"] for e in buffer])),
+                "seconds": round(time.perf_counter() - self.begun, 1),
             }
             with self.path.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(row) + "\n")

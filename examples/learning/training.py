@@ -1,29 +1,21 @@
-"""What the learning scripts share: settings, demonstrations, checkpoints and curves."""
+"""What the learning scripts share: settings, checkpoints, curves, gradient steps."""
 
 import copy
 import json
+import math
 import os
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 from torch.utils.tensorboard import SummaryWriter
 
-import wbc_suite
-from wbc_suite.evaluation import episode_seeds, success_interval
-from wbc_suite.recording import Dataset
-
 CHECKPOINTS = "checkpoint_*.pt"
-
-Act: TypeAlias = Callable[[Mapping[str, Any]], np.ndarray]
-"""From an observation to an action of the environment."""
-PolicyOf: TypeAlias = Callable[[Mapping[str, Any]], Callable[[Any, Any], Act]]
-"""From a checkpoint to a function of environment and generator, called per episode."""
+WARM_UP = 100  # gradient steps
 
 
 class Settings(dict[str, Any]):
@@ -106,135 +98,22 @@ class Run:
         return path
 
 
-class Demonstrations:
-    """Observations and actions of recorded episodes, normalised.
-
-    Where actions were disturbed, those that were intended are imitated.
-
-    Attributes:
-        observations: Of each episode, shape (steps, observation size).
-        actions: Of each episode, shape (steps, action size), between -1 and 1.
-        scales: Means and deviations of observations, and bounds of actions; part of a
-            checkpoint.
-    """
-
-    def __init__(self, path: str, keys: Sequence[str], episodes: int) -> None:
-        with Dataset(Path(path)) as dataset:
-            names = dataset.names[:episodes]
-            if not names:
-                raise SystemExit(
-                    f"{path} has no episodes: wbc-suite record makes some."
-                )
-            played = [dataset.episode(name) for name in names]
-            seen = [
-                np.concatenate([e.columns[f"obs/{key}"] for key in keys], axis=1)
-                for e in played
-            ]
-            acted = [
-                np.asarray(e.columns.get("intended", e.columns["actions"]))
-                for e in played
-            ]
-        every, moves = np.concatenate(seen), np.concatenate(acted)
-        self.scales = {
-            "mean": every.mean(axis=0),
-            "deviation": every.std(axis=0) + 1e-3,
-            "low": moves.min(axis=0),
-            "high": moves.max(axis=0),
-        }
-        self.observations = [normalised(s, self.scales) for s in seen]
-        self.actions = [scaled(a, self.scales) for a in acted]
-
-
-def normalised(observation: np.ndarray, scales: Mapping[str, np.ndarray]) -> Tensor:
-    """Return an observation with zero mean and unit deviation, at most 10."""
-    value = (observation - scales["mean"]) / scales["deviation"]
-    return torch.as_tensor(np.clip(value, -10.0, 10.0), dtype=torch.float32)
-
-
-def scaled(action: np.ndarray, scales: Mapping[str, np.ndarray]) -> Tensor:
-    """Return an action of the environment as one between -1 and 1."""
-    middle, half = _range(scales)
-    return torch.as_tensor((action - middle) / half, dtype=torch.float32)
-
-
-def unscaled(action: Tensor, scales: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Return an action between -1 and 1 as one of the environment."""
-    middle, half = _range(scales)
-    return middle + half * np.clip(action.numpy().astype(np.float64), -1.0, 1.0)
-
-
-def _range(scales: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    half = 0.5 * (scales["high"] - scales["low"])
-    middle = 0.5 * (scales["high"] + scales["low"])
-    return middle, np.where(half > 1e-6, half, 1.0)
-
-
-def observe(observation: Mapping[str, Any], keys: Sequence[str]) -> np.ndarray:
-    """Return the observed vectors in one."""
-    return np.concatenate([np.ravel(observation[key]) for key in keys])
-
-
-def success_rate(make_policy: Any, settings: Settings, *, base: int = 1) -> float:
-    """Return the share of evaluation episodes that succeed, seeds of a base."""
-    env = wbc_suite.make(
-        settings.benchmark,
-        robots=settings.robots,
-        horizon=settings.horizon,
-        terminate_on_success=True,
-    )
-    wins = 0
-    for seed in episode_seeds(settings.benchmark, settings.evaluate, base=base):
-        observation, _ = env.reset(seed=seed)
-        policy, over, info = make_policy(env, np.random.default_rng(seed)), False, {}
-        while not over:
-            step = env.step(policy(observation))
-            observation, _, terminated, truncated, info = step
-            over = terminated or truncated
-        wins += bool(info["success"])
-    env.close()
-    return wins / settings.evaluate
-
-
-def tell(run: Run, policy_of: PolicyOf) -> None:
-    """Evaluate the checkpoints that are kept; print the best, the last and the mean.
-
-    The best of several is too good by chance: cite the last, or the mean.
-    """
-    settings, rates = run.settings, []
-    for path in run.checkpoints():
-        saved = torch.load(path, weights_only=False)
-        rates.append(success_rate(policy_of(saved), settings, base=2))
-        run.log(saved["step"], final_success=rates[-1])
-    wins, n = round(rates[-1] * settings.evaluate), settings.evaluate
-    low, high = success_interval(wins, n)
-    print(
-        f"Success of the last checkpoint {rates[-1]:.1%} ({low:.1%} to {high:.1%}), "
-        f"mean of the last {len(rates)} {np.mean(rates):.1%}, best {max(rates):.1%}; "
-        f"{n} episodes each."
-    )
-
-
 def fit(
     run: Run,
     model: nn.Module,
     batch_loss: Callable[[np.random.Generator], Tensor],
-    policy_of: PolicyOf,
-    *,
-    sizes: Mapping[str, int],
-    scales: Mapping[str, np.ndarray],
+    facts: Mapping[str, Any],
 ) -> None:
     """Train a model until `steps`, from the last checkpoint of the run on.
 
-    The policy acts with an average of the weights: `average` of it is kept in each
-    step, and 0 is none.
+    The rate of learning falls to zero as half a cosine. Checkpoints hold an average of
+    the weights as `model`: `average` of it is kept in each step.
 
     Args:
         run: Where checkpoints and curves go.
-        model: The network; `sizes` are the arguments that make it again.
+        model: The network.
         batch_loss: Returns the loss of a batch that it draws with the generator.
-        policy_of: See `tell`.
-        sizes: Part of each checkpoint.
-        scales: Likewise; see `Demonstrations`.
+        facts: Further parts of each checkpoint.
     """
     settings, first, average = run.settings, 0, copy.deepcopy(model)
     optimiser = torch.optim.AdamW(model.parameters(), lr=settings.learning_rate)
@@ -243,43 +122,38 @@ def fit(
         average.load_state_dict(saved["model"])
         optimiser.load_state_dict(saved["optimiser"])
         first = saved["step"]
-    rng = np.random.default_rng([settings.seed, first])
+    rng, losses = np.random.default_rng([settings.seed, first]), list[float]()
     for step in range(first + 1, settings.steps + 1):
+        share = min(
+            step / WARM_UP, 0.5 + 0.5 * math.cos(math.pi * step / settings.steps)
+        )
+        for group in optimiser.param_groups:
+            group["lr"] = settings.learning_rate * share
         loss = batch_loss(rng)
         optimiser.zero_grad()
         loss.backward()
         optimiser.step()
+        losses.append(loss.item())
         _blend(average, model, min(settings.average, step / (step + 10.0)))
         if step % settings.save_every == 0 or step == settings.steps:
             state = {
                 "model": average.state_dict(),
                 "training": model.state_dict(),
                 "optimiser": optimiser.state_dict(),
-                "sizes": dict(sizes),
-                "scales": dict(scales),
                 "settings": dict(settings),
             }
-            run.save(step, state)
-            success = success_rate(policy_of(state), settings)
-            run.log(step, loss=loss.item(), success=success)
-            print(f"step {step}: loss {loss.item():.4f}, success {success:.1%}")
+            run.save(step, state | dict(facts))
+            run.log(step, loss=float(np.mean(losses)))
+            print(f"step {step}: loss {np.mean(losses):.4f}", flush=True)
+            losses.clear()
 
 
-def last_policy(policy_of: PolicyOf, folder: str) -> Callable[[Any, Any], Act]:
-    """Return a policy for `wbc-suite evaluate`: of the last checkpoint of a run.
-
-    The run is the folder `WBC_RUN` of the environment, or else the given one.
-    """
-
-    @cache
-    def load() -> Callable[[Any, Any], Act]:
-        path = sorted(Path(os.environ.get("WBC_RUN", folder)).glob(CHECKPOINTS))[-1]
-        return policy_of(torch.load(path, weights_only=False))
-
-    def make(env: Any, rng: Any) -> Act:
-        return load()(env, rng)
-
-    return make
+def last_checkpoint(folder: str) -> Path:
+    """Return the last checkpoint of a folder, or of `WBC_RUN` of the environment."""
+    found = sorted(Path(os.environ.get("WBC_RUN", folder)).glob(CHECKPOINTS))
+    if not found:
+        raise SystemExit(f"No checkpoint in {folder}: train first, or set WBC_RUN.")
+    return found[-1]
 
 
 def _blend(average: nn.Module, model: nn.Module, keep: float) -> None:

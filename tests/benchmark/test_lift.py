@@ -1,6 +1,7 @@
 import mujoco
 import numpy as np
 import pytest
+from posing import fingers
 
 import wbc_suite
 from wbc_suite.catalogue import Catalogue
@@ -23,11 +24,37 @@ def put_cube(env, position):
     return env.benchmark
 
 
+def grip_cube(env):
+    """Put the cube between the fingers, which touch it from both sides."""
+    data, half = env.simulation.data, env.simulation.model.geom("cube").size[0]
+    hand = data.site("robot0_right_tcp")
+    mujoco.mju_mat2Quat(data.joint("cube_joint").qpos[3:], hand.xmat)
+    put_cube(env, hand.xpos)
+    fingers(env, 0, half - 0.0005)
+    return env.benchmark
+
+
 def test_a_lifted_cube_is_a_success(env):
     env.reset(seed=0)
-    lift = put_cube(env, [0.0, 0.0, 0.8 + 0.0401])
+    lift = grip_cube(env)
+    assert lift.cube_position[2] > 0.8 + 0.04
     assert lift.success()
     assert lift.reward(shaped=False) == lift.reward(shaped=True) == 1.0
+
+
+@pytest.mark.parametrize(("speed", "held"), [(0.1, True), (0.3, False)])
+def test_a_cube_that_flies_through_a_hand_is_not_lifted(env, speed, held):
+    env.reset(seed=0)
+    lift = grip_cube(env)
+    env.simulation.data.joint("cube_joint").qvel[2] = speed
+    mujoco.mj_forward(env.simulation.model, env.simulation.data)
+    assert lift.grasped("cube")
+    assert lift.success() == held
+
+
+def test_a_cube_in_the_air_that_no_hand_holds_is_not_lifted(env):
+    env.reset(seed=0)
+    assert not put_cube(env, [0.0, 0.0, 0.9]).success()
 
 
 @pytest.mark.parametrize(

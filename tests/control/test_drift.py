@@ -107,7 +107,7 @@ def arms():
 
     Those that stand on their feet have the arms of others, and settle into the ground.
     """
-    standing = ("gr1_free_body", "spot", "spot_with_arm")
+    standing = ("g1_free_body", "gr1_free_body", "spot", "spot_with_arm")
     return [r for r in Catalogue().names("robots") if r not in ("panda", *standing)]
 
 

@@ -205,7 +205,10 @@ def test_standing_feet_do_not_slip(standing):
 
 @pytest.mark.parametrize(
     ("name", "speed"),
-    [("GR1FreeBody", 0.3), ("Spot", 0.8), ("SpotWithArm", 0.8), ("Go2", 0.6)],
+    [
+        *(("GR1FreeBody", 0.3), ("G1FreeBody", 0.3)),
+        *(("Spot", 0.8), ("SpotWithArm", 0.8), ("Go2", 0.6)),
+    ],
 )
 def test_a_robot_walks_as_commanded_and_stands_again(alone, name, speed):
     walker = Walker(alone, name).act(2.5, (speed, 0.0, 0.0))

@@ -152,7 +152,8 @@ class Torque(Textbook):
 
     def command(self, state, force, bias):
         """Return the torques, shape (n,)."""
-        carried = state.data.qfrc_bias[self.drives["dof"]]
+        data = state.data
+        carried = (data.qfrc_bias - data.qfrc_gravcomp)[self.drives["dof"]]
         return self._clipped(self.target()[0] + self.record["compensation"] * carried)
 
 

@@ -145,7 +145,7 @@ def test_vectors_draw_what_each_sees_alone(mode):
     few = {k: v for k, v in SEEN.items() if "seg" not in k and "depths" not in k}
     few["randomisation"] = Randomisation(texture=True)  # drawn by another thread
     envs = gymnasium.make_vec(
-        "wbc_suite/Lift-v0",
+        "wbc_suite/Lift-v1",
         num_envs=2,
         vectorization_mode="vector_entry_point",
         autoreset_mode=mode,

@@ -127,7 +127,7 @@ def test_a_robot_measured_from_its_pelvis_is_lifted_out_of_the_floor(caplog):
     own = load_robot("gr1_fixed_lower_body")
     robot = own.with_root("fixed", pos=(0.0, 0.0, 0.0))
     env = wbc_suite.make("Lift", robots=robot)
-    assert "GR1FixedLowerBody has no root height" in caplog.text
+    assert "GR1FixedLowerBody has its lowest point" in caplog.text
     lifted = env.robots[0].root.pos[2]
     assert 0.85 < lifted <= own.root.pos[2] + 0.01
     env.reset(seed=0)
@@ -266,7 +266,7 @@ def test_wrong_arguments_say_what_is_legal():
 
 
 def test_gymnasium_accepts_the_environment(recwarn):
-    env = gymnasium.make("wbc_suite/Lift-v0", robots="Panda")
+    env = gymnasium.make("wbc_suite/Lift-v1", robots="Panda")
     check_env(env.unwrapped, skip_render_check=True)
     # Actions are metres and radians here, which Gymnasium would rather see scaled.
     warnings = [str(w.message) for w in recwarn if "normalized space" not in str(w)]
@@ -276,14 +276,14 @@ def test_gymnasium_accepts_the_environment(recwarn):
 @pytest.mark.parametrize(
     "code",
     [
-        "import wbc_suite, gymnasium; s = gymnasium.spec('wbc_suite/Lift-v0')",
-        "import gymnasium, wbc_suite; s = gymnasium.spec('wbc_suite/Lift-v0')",
-        "import wbc_suite; from gymnasium import spec; s = spec('wbc_suite/Lift-v0')",
+        "import wbc_suite, gymnasium; s = gymnasium.spec('wbc_suite/Lift-v1')",
+        "import gymnasium, wbc_suite; s = gymnasium.spec('wbc_suite/Lift-v1')",
+        "import wbc_suite; from gymnasium import spec; s = spec('wbc_suite/Lift-v1')",
         "import wbc_suite, gymnasium.spaces as g; import gymnasium.envs.registration; "
-        "s = gymnasium.envs.registration.spec('wbc_suite/Lift-v0')",
+        "s = gymnasium.envs.registration.spec('wbc_suite/Lift-v1')",
         pytest.param(  # Gymnasium's own way to name the module that registers
             "import gymnasium; "
-            "s = gymnasium.make('wbc_suite:wbc_suite/Lift-v0', robots='Panda').spec",
+            "s = gymnasium.make('wbc_suite:wbc_suite/Lift-v1', robots='Panda').spec",
             marks=pytest.mark.slow,
         ),
     ],
@@ -293,7 +293,7 @@ def test_environments_are_registered_in_either_order_of_imports(code):
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     )
-    assert done.stdout.strip() == "wbc_suite/Lift-v0"
+    assert done.stdout.strip() == "wbc_suite/Lift-v1"
 
 
 def test_importing_the_package_imports_nothing_heavy():

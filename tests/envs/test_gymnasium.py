@@ -20,7 +20,7 @@ SEEN = {"use_camera_obs": True, "camera_heights": 40, "camera_widths": 40}
 
 @pytest.fixture(scope="module")
 def env():
-    env = gymnasium.make("wbc_suite/Lift-v0", robots="Panda", **SEEN)
+    env = gymnasium.make("wbc_suite/Lift-v1", robots="Panda", **SEEN)
     yield env
     env.close()
 
@@ -79,7 +79,7 @@ def test_actions_inside_of_the_space_are_never_clipped():
 @pytest.mark.parametrize("mode", ["sync", "vector_entry_point"])
 def test_vectors_are_made_both_ways_and_see_the_same(mode, env):
     arguments = {"robots": "Panda", "vectorization_mode": mode}
-    envs = gymnasium.make_vec("wbc_suite/Lift-v0", num_envs=2, **arguments)
+    envs = gymnasium.make_vec("wbc_suite/Lift-v1", num_envs=2, **arguments)
     observations, _ = envs.reset(seed=[3, 4])
     assert observations in envs.observation_space
     assert envs.single_action_space == env.action_space
@@ -95,7 +95,7 @@ def test_vectors_are_made_both_ways_and_see_the_same(mode, env):
 
 
 def test_specs_are_text(env):
-    spec = gymnasium.spec("wbc_suite/Lift-v0")
+    spec = gymnasium.spec("wbc_suite/Lift-v1")
     assert isinstance(spec.entry_point, str)
     assert isinstance(spec.vector_entry_point, str)
     assert json.loads(env.spec.to_json())["kwargs"]["robots"] == "Panda"

@@ -20,7 +20,7 @@ MODES = [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP]
 
 def make(num_envs=3, **arguments):
     return gymnasium.make_vec(
-        "wbc_suite/Lift-v0",
+        "wbc_suite/Lift-v1",
         num_envs=num_envs,
         vectorization_mode="vector_entry_point",
         **{**ARGUMENTS, **arguments},
@@ -55,11 +55,11 @@ def listed(info):
 def test_gymnasium_makes_ours_and_knows_how_it_resets(envs):
     assert isinstance(envs, VectorRobotEnv)
     assert envs.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
-    assert envs.spec.id == "wbc_suite/Lift-v0"
+    assert envs.spec.id == "wbc_suite/Lift-v1"
     observations, _ = envs.reset(seed=0)
     assert observations in envs.observation_space
     assert envs.action_space.sample().shape == (3, envs.single_action_space.shape[0])
-    assert isinstance(gymnasium.make_vec("wbc_suite/Lift-v0"), VectorRobotEnv)
+    assert isinstance(gymnasium.make_vec("wbc_suite/Lift-v1"), VectorRobotEnv)
 
 
 @pytest.mark.slow

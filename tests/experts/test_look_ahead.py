@@ -1,5 +1,7 @@
 """The look-ahead against the robot's own kinematics."""
 
+import itertools
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -41,6 +43,22 @@ def test_a_pose_out_of_reach_costs_more_than_any_other(cell):
     far = arm.look_ahead([shifted(arm.pose, (1.5, 0.0, 0.0))])
     assert far.error > 0.5
     assert far.cost > near.cost + 50.0
+
+
+def test_a_sweep_ends_at_the_pose_of_its_joints(cell):
+    (arm,) = cell.arms
+    goal = shifted(arm.pose, (0.1, 0.1, -0.1))
+    q, period = arm.look_ahead([goal]).q[-1], 0.05
+    poses = arm.sweep(q, period)
+    assert poses[-1].isApprox(goal, 2e-3)
+    way = np.abs(q - arm.home_joints)
+    speed = arm.state.robot.to_pinocchio().velocityLimit[:7]
+    assert len(poses) == np.ceil((way / speed).max() / 0.4 / period)
+    steps = [
+        np.linalg.norm(b.translation - a.translation)
+        for a, b in itertools.pairwise(poses)
+    ]
+    assert max(steps) < 2.0 * np.mean(steps)
 
 
 def test_a_chain_in_two_parts_is_the_chain(cell):

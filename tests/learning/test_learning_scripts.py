@@ -17,12 +17,16 @@ SHORT = ["horizon=20", "learning_starts=40", "save_every=80", "log_every=40"]
 SHORT += ["evaluate=1", "buffer=400", "layers=[16]"]
 
 
-def run(name, *changes):
+def python(*arguments):
     if not PYTHON.exists():
         pytest.skip("torch is not installed: make .venv-learning/.installed")
     environment = os.environ | {"PYTHONPATH": f"{ROOT}{os.pathsep}{SCRIPTS}"}
-    command = [PYTHON, SCRIPTS / f"{name}.py", *changes]
+    command = [PYTHON, *arguments]
     return subprocess.check_output(command, text=True, env=environment, timeout=400)
+
+
+def run(name, *changes):
+    return python(SCRIPTS / f"{name}.py", *changes)
 
 
 @pytest.fixture(scope="module")
@@ -38,19 +42,45 @@ def demonstrations(tmp_path_factory):
     return path
 
 
+TRUTH = """
+import numpy as np, torch
+from imitation import Demonstrations, observe
+from scipy.spatial.transform import Rotation
+
+turns = Rotation.random(50, rng=0)
+quats = turns.as_quat() * np.where(np.arange(50) % 2, 1.0, -1.0)[:, None]
+seen = observe({"a_quat": quats, "b_pos": np.zeros((50, 3))}, ["a_quat", "b_pos"])
+first_two = turns.as_matrix()[:, :, :2].transpose(0, 2, 1).reshape(50, 6)
+assert np.allclose(seen[:, :6], first_two) and seen.shape == (50, 9)
+
+data = Demonstrations.__new__(Demonstrations)
+data.observations = [torch.arange(4.0)[:, None], torch.arange(10.0, 12.0)[:, None]]
+data.actions = [torch.arange(4.0)[:, None], torch.arange(10.0, 12.0)[:, None]]
+seen, acted = (each[:, :, 0].tolist() for each in data.windows(2, 3))
+assert seen == [[0, 0], [0, 1], [1, 2], [2, 3], [10, 10], [10, 11]]
+assert acted == [[0, 1, 2], [1, 2, 3], [2, 3, 3], [3, 3, 3], [10, 11, 11], [11, 11, 11]]
+"""
+
+
+@pytest.mark.peer
+@pytest.mark.slow
+def test_orientations_are_columns_and_windows_stay_in_their_episode():
+    python("-c", TRUTH)
+
+
 def test_every_script_has_its_settings():
-    scripts = {path.stem for path in SCRIPTS.glob("*.py")} - {"training"}
+    scripts = {path.stem for path in SCRIPTS.glob("*.py")} - {"training", "imitation"}
     assert scripts == {path.stem for path in SCRIPTS.glob("*.toml")}
     assert scripts == {"sac", *CLONING}
 
 
 @pytest.mark.parametrize("name", CLONING)
 def test_cloning_asks_for_the_same_things(name):
-    """Their curves can be compared: same data, observations and evaluation."""
+    """Their curves can be compared: same data and evaluation."""
     first, mine = (
         tomllib.loads((SCRIPTS / f"{n}.toml").read_text()) for n in ("bc", name)
     )
-    same = ("demonstrations", "episodes", "observed", "benchmark", "horizon")
+    same = ("demonstrations", "episodes", "benchmark", "horizon", "evaluate")
     assert {key: first[key] for key in same} == {key: mine[key] for key in same}
 
 
@@ -68,6 +98,7 @@ def test_cloning_trains_goes_on_and_is_evaluated(name, demonstrations, tmp_path)
     rows = [json.loads(line) for line in (tmp_path / "log.jsonl").open()]
     losses = [row["loss"] for row in rows if "loss" in row]
     assert losses[-1] < losses[0]
+    assert [row["step"] for row in rows if "success" in row][-3:] == [20, 40, 60]
     assert (tmp_path / "curves.png").stat().st_size > 1000
     assert list((tmp_path / "tensorboard").iterdir())
 

@@ -18,7 +18,7 @@ def test_minari_has_an_observation_more_than_actions(small_recording, tmp_path):
     told = json.loads((out / "data/metadata.json").read_text())
     assert (told["total_episodes"], told["total_steps"]) == (4, 20)
     assert told["dataset_id"] == "random-v3"
-    assert json.loads(told["env_spec"])["id"] == "wbc_suite/Lift-v0"
+    assert json.loads(told["env_spec"])["id"] == "wbc_suite/Lift-v1"
     spaces = json.loads(told["observation_space"])["subspaces"]
     assert spaces["cube_pos"]["shape"] == [3]
     with (

@@ -149,7 +149,7 @@ def test_a_table_without_a_kind_is_explained(load):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "hint"),
-    [("Pnda", "'Panda'"), ("GR2", "'GR1'"), ("Spot_Arm", "arm/Spot_Arm")],
+    [("Pnda", "'Panda'"), ("GR1Arms", "'GR1ArmsOnly'"), ("Spot_Arm", "arm/Spot_Arm")],
 )
 def test_the_error_of_an_unknown_robot_names_the_nearest(name, hint):
     with pytest.raises(UnknownNameError, match=hint):

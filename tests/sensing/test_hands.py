@@ -53,6 +53,24 @@ def test_the_gripper_is_the_hand_and_its_fingers(scene):
     assert "panda_link6" not in links
 
 
+def test_slip_is_the_speed_of_a_body_in_the_frame_of_the_hand(scene):
+    model, data, _ = scene
+    hand, cube = grip(scene, 0.0195, aside=(0.03, 0.05))
+    rng = np.random.default_rng(0)
+    data.qvel[:] = rng.normal(0.0, 1.0, model.nv)
+    mujoco.mj_forward(model, data)
+    found, places = hand.slip(cube.body), []
+    for _ in range(2):
+        R = data.site_xmat[hand.site].reshape(3, 3)
+        places.append(R.T @ (data.xipos[cube.body] - hand.position))
+        mujoco.mj_integratePos(model, data.qpos, data.qvel, 1e-6)
+        mujoco.mj_kinematics(model, data)
+    data.qvel[:] = 0.0
+    speed = np.linalg.norm(places[1] - places[0]) / 1e-6
+    assert found == pytest.approx(speed, rel=1e-4)
+    assert found > 0.5
+
+
 def test_two_fingers_on_a_cube_are_a_grasp(scene):
     hand, cube = grip(scene, 0.0195)
     assert hand.grasps(cube.geoms)

@@ -14,7 +14,7 @@ from wbc_suite.wrappers import DemoStart, Flat, Indicators
 @pytest.fixture(scope="module")
 def env():
     env = gymnasium.make(
-        "wbc_suite/Lift-v0",
+        "wbc_suite/Lift-v1",
         robots="Panda",
         render_mode="rgb_array",
         render_size=(96, 96),

@@ -49,10 +49,11 @@ class LiftConfig(ObjectBenchmarkConfig):
 
 
 class Lift(ObjectBenchmark):
-    """A cube on a table is to be lifted 4 cm.
+    """A cube on a table is to be lifted 4 cm by a hand.
 
     Source of geometry and reward: Zhu et al. (2020), "robosuite: A Modular Simulation
     Framework and Benchmark for Robot Learning", arXiv:2009.12293, and its release 1.5.
+    Unlike there, a cube that is thrown or batted up is not lifted: a hand must hold it.
     """
 
     def __init__(self, path: Path) -> None:
@@ -91,9 +92,9 @@ class Lift(ObjectBenchmark):
         return self.states[CUBE].position
 
     def success(self) -> bool:
-        """Whether the cube's middle is more than `lift_height` above the table."""
+        """Whether a hand holds the cube, its middle `lift_height` above the table."""
         height = self.cube_position.item(2) - self.config.table.center[2]
-        return height > self.config.reward.lift_height
+        return height > self.config.reward.lift_height and self.held(CUBE)
 
     def progress(self) -> float:
         """Return the shaped reward.

@@ -42,6 +42,7 @@ TRIES = 50
 """Placements that are drawn if a robot touches the objects of the first."""
 PARKED = (8.0, 8.0)
 """Place of objects that are not used in an episode, m."""
+SLIP = 0.2  # m/s, between a hand and what it holds, at most
 BELOW_ONE = float(np.nextafter(1.0, 0.0))
 
 
@@ -272,6 +273,14 @@ class ObjectBenchmark(ABC):
         """Whether two links of one gripper touch an object."""
         geoms = self.states[name].geoms
         return any(hand.grasps(geoms) for hand in self.hands)
+
+    def held(self, name: str) -> bool:
+        """Whether a hand grasps an object, which moves with it."""
+        state = self.states[name]
+        return any(
+            hand.grasps(state.geoms) and hand.slip(state.body) < SLIP
+            for hand in self.hands
+        )
 
     def touching(self, first: str, second: str) -> bool:
         """Whether two objects touch."""

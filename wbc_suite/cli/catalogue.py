@@ -12,6 +12,7 @@ from wbc_suite.cli.options import (
     CatalogueOption,
     JsonOption,
     MeshRootOption,
+    RootOption,
     StrictOption,
 )
 
@@ -124,6 +125,7 @@ def check_file(
         str | None,
         typer.Option(metavar="ROBOT", help="Check a controller's names against it."),
     ] = None,
+    root: RootOption = None,
     mesh_root: MeshRootOption = None,
     strict: StrictOption = False,
     as_json: JsonOption = False,
@@ -159,18 +161,18 @@ def check_file(
             f"Skin of {len(skin.link)} links with {meshes} meshes of {skin.provider}."
         )
     else:
-        found = _robot(file, mesh_root, strict=strict)
+        found = _robot(file, root=root, mesh_root=mesh_root, strict=strict)
     if as_json:
         print(json.dumps({"file": str(file), "fine": True, "summary": found}))
     else:
         print(f"{file}: fine. {found}")
 
 
-def _robot(file: Path, mesh_root: Path | None, *, strict: bool) -> str:
+def _robot(file: Path, **options: Any) -> str:
     from wbc_suite.envs.hold_check import hold_faults
     from wbc_suite.robot import load_robot
 
-    robot = load_robot(file, mesh_root=mesh_root, strict=strict)
+    robot = load_robot(file, **options)
     for fault in hold_faults(robot) if file.suffix != ".toml" else ():
         print(f"Warning: {fault}", file=sys.stderr)
     simulated = robot.to_mjspec().compile()

@@ -1,25 +1,32 @@
-"""`wbc-suite demo`: a humanoid reaches with both hands, without a browser."""
+"""`wbc-suite demo`: a robot reaches with its hands, without a browser."""
 
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from wbc_suite.cli import options
+from wbc_suite.errors import WbcError
+
 if TYPE_CHECKING:
     import numpy as np
 
+    from wbc_suite.robot import RobotDescription
     from wbc_suite.typing import Matrix, Vector
     from wbc_suite.viewers.offscreen import Image
 
-HANDS = ("right_hand", "left_hand")
 RATE = 50  # Hz, of actions
 PERIOD = 4.0  # s, of one figure
 REST = 1.0  # s, standing still at the end
 FRAMES_PER_SECOND = 10
+ARM = 0.6  # m; length of an arm that moves through the whole figure
+ON_FEET = 0.15  # of the figure, by what moves a robot without hands: its trunk
 
 
 def demo(
+    robot: options.RobotArgument = "GR1",
     output: Annotated[
         Path, typer.Option("--output", "-o", help="Folder for the pictures.")
     ] = Path("artifacts/demo"),
@@ -27,28 +34,64 @@ def demo(
     controller: Annotated[
         str, typer.Option(help="WHOLE_BODY_IK or WHOLE_BODY_MINK_IK.")
     ] = "WHOLE_BODY_IK",
+    gripper: options.GripperOption = None,
+    base: options.BaseOption = None,
+    root: options.RootOption = None,
+    mesh_root: options.MeshRootOption = None,
+    catalogue: options.CatalogueOption = None,
 ) -> None:
-    """Move both hands of GR1 along curves; print tracking errors, write pictures."""
+    """Move a robot's hands along curves; print tracking errors, write pictures.
+
+    The robot is alone on the floor. One without hands moves its trunk, or its end.
+    """
     from PIL import Image
 
-    import wbc_suite
+    from wbc_suite.control import load_composite_controller_config
+    from wbc_suite.envs.hold_check import alone
     from wbc_suite.recording.plots import save_picture
     from wbc_suite.recording.video import write_video
+    from wbc_suite.robot import load_robot
 
+    chosen = options.chosen(gripper)
+    loaded = load_robot(
+        robot, gripper=chosen, base=base, root=root, mesh_root=mesh_root
+    )
+    config = load_composite_controller_config(controller, loaded)
+    sizes = dict(_sizes(loaded, config))
+    env = alone(loaded, controller_configs=config, control_freq=RATE)
     seconds = figures * PERIOD + REST
-    horizon = round(seconds * RATE) + 1
-    made = {"controller_configs": controller, "control_freq": RATE, "horizon": horizon}
-    env = wbc_suite.make("Lift", robots="GR1", **made)
-    errors, step_times, pictures = _reach(env.unwrapped, seconds)
-    _report(controller, errors, step_times)
+    errors, step_times, pictures = _reach(env, sizes, seconds)
+    _report(f"{loaded.name} by {controller}", sizes, errors, step_times)
     still, film = output / "reach.png", output / "reach.gif"
     save_picture(Image.fromarray(pictures[len(pictures) // 4]), still)
     write_video(pictures, film, rate=FRAMES_PER_SECOND)
     print(f"Wrote {still} and {film}.")
 
 
-def _reach(env: Any, seconds: float) -> "tuple[Matrix, Vector, list[Image]]":
-    """Move both hands along figures; return errors (n, 2) m, times (n,) s, pictures."""
+def _sizes(
+    robot: "RobotDescription", config: dict[str, Any]
+) -> "Iterator[tuple[str, float]]":
+    """Yield each frame that moves and the size of its figure, 1 for a long arm."""
+    import numpy as np
+
+    for frame in config["frame"]:
+        if frame.get("kind", "pose") != "pose":
+            continue
+        length, link = 0.0, robot.link(robot.link_of(frame["frame"]))
+        while link.parent is not None:
+            length += float(np.linalg.norm(link.pos))
+            link = robot.link(link.parent)
+        yield frame["name"], min(1.0, length / ARM) if length else ON_FEET
+
+
+def _reach(
+    env: Any, sizes: dict[str, float], seconds: float
+) -> "tuple[Matrix, Vector, list[Image]]":
+    """Move frames along figures; return errors (n, frames) m, times (n,) s, pictures.
+
+    Raises:
+        PhysicsError: If the robot falls.
+    """
     import numpy as np
 
     from wbc_suite.viewers.offscreen import Camera, Mark
@@ -60,42 +103,47 @@ def _reach(env: Any, seconds: float) -> "tuple[Matrix, Vector, list[Image]]":
     errors, step_times, pictures = [], [], []
     with Camera(model, data, width=480, height=480, subject="robot0_") as camera:
         for step in range(round(seconds * RATE)):
+            offset = _figure(min(step / RATE, seconds - REST))
             goals = {
-                hand: np.concatenate([start[hand][:3] + offset, start[hand][3:]])
-                for hand, offset in _figure(min(step / RATE, seconds - REST)).items()
+                name: start[name] + np.pad(size * _mirrored(offset, name), (0, 3))
+                for name, size in sizes.items()
             }
             action, begin = layout.pack(goals, base=env.hold_action), perf_counter()
             *_, info = env.step(action)
             step_times.append(perf_counter() - begin)
+            if info.get("failure"):
+                raise WbcError(f"{info['failure']} `wbc-suite check` names causes.")
             frames = info["ik"]["frames"]
-            errors.append([frames[hand]["position_error"] for hand in HANDS])
+            errors.append([frames[name]["position_error"] for name in sizes])
             if step % (RATE // FRAMES_PER_SECOND) == 0:
-                marks = [Mark(position=goals[hand][:3]) for hand in HANDS]
+                marks = [Mark(position=goal[:3]) for goal in goals.values()]
                 pictures.append(camera.take(data, marks))
     return np.array(errors), np.array(step_times), pictures
 
 
-def _figure(time: float) -> "dict[str, np.ndarray]":
-    """Return each hand's way from where it started, m: a Lissajous figure, mirrored."""
+def _figure(time: float) -> "np.ndarray":
+    """Return the way of a right hand from where it started, m: a Lissajous figure."""
     import numpy as np
 
     phase = 2.0 * np.pi * time / PERIOD
     forward, side = 0.06 * (1.0 - np.cos(phase)), 0.10 * np.sin(phase)
-    up = 0.10 * (1.0 - np.cos(2.0 * phase))
-    return {
-        "right_hand": np.array([forward, side, up]),
-        "left_hand": np.array([forward, -side, up]),
-    }
+    return np.array([forward, side, 0.10 * (1.0 - np.cos(2.0 * phase))])
 
 
-def _report(controller: str, errors: "Matrix", step_times: "Vector") -> None:
+def _mirrored(offset: "np.ndarray", name: str) -> "np.ndarray":
+    return offset * (1.0, -1.0, 1.0) if name.startswith("left") else offset
+
+
+def _report(
+    title: str, names: "Iterable[str]", errors: "Matrix", step_times: "Vector"
+) -> None:
     import numpy as np
 
-    print(f"GR1 reaches with both hands by {controller}, simulated by MuJoCo:")
-    for hand, column in zip(HANDS, 1e3 * errors.T, strict=True):
+    print(f"{title}, simulated by MuJoCo:")
+    for name, column in zip(names, 1e3 * errors.T, strict=True):
         moving = column[: -round(REST * RATE)]
         print(
-            f"  {hand:<11} behind its moving target by {np.median(moving):5.2f} mm "
+            f"  {name:<11} behind its moving target by {np.median(moving):5.2f} mm "
             f"(median), {moving.max():5.2f} mm (worst); at rest {column[-1]:.3f} mm"
         )
     median, slowest = np.percentile(1e3 * step_times, [50, 99])

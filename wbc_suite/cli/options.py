@@ -6,7 +6,7 @@ import tomllib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 import typer
 
@@ -37,6 +37,13 @@ BaseOption = Annotated[
 ]
 ExecutorOption = Annotated[
     str, typer.Option(metavar="NAME", help="process, serial, ray or slurm.")
+]
+RootOption = Annotated[
+    Literal["fixed", "planar", "free"] | None,
+    typer.Option(
+        help="Another root. By default that of the file, and free for a URDF with "
+        "four feet or more."
+    ),
 ]
 SkinOption = Annotated[
     str | None,

@@ -1,11 +1,18 @@
 """Simulate a robot for a second at `ready`, and name what moves and why."""
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import mujoco
 import numpy as np
 
-from wbc_suite.benchmark import ObjectBenchmark, ObjectBenchmarkConfig
+from wbc_suite.benchmark import (
+    Benchmark,
+    ObjectBenchmark,
+    ObjectBenchmarkConfig,
+    load_benchmark,
+)
+from wbc_suite.benchmark.stand import Stand
 from wbc_suite.envs.env import RobotEnv
 from wbc_suite.errors import WbcError
 from wbc_suite.robot import RobotDescription
@@ -50,6 +57,25 @@ class _Floor(ObjectBenchmark):
         return 0.0
 
 
+def _unpushed() -> Benchmark:
+    """Return Stand without pushes."""
+    stand = load_benchmark("Stand")
+    assert isinstance(stand, Stand)
+    stand.config = stand.config.model_copy(update={"until": 0.0})
+    return stand
+
+
+def alone(robot: RobotDescription, **options: Any) -> RobotEnv:
+    """Return an environment with one robot on a floor, on its feet if it is free.
+
+    Raises:
+        WbcError: If it cannot be controlled, or an option of `make` is wrong.
+    """
+    feet = any(frame.role == "foot" for frame in robot.frames)
+    benchmark = _unpushed if feet and robot.root.kind == "free" else _Floor
+    return RobotEnv(benchmark, robots=robot, **{"horizon": 100_000} | options)
+
+
 def hold_faults(robot: RobotDescription, *, seconds: float = SECONDS) -> list[str]:
     """Return one sentence for each fault of a robot that holds `ready` in simulation.
 
@@ -57,10 +83,8 @@ def hold_faults(robot: RobotDescription, *, seconds: float = SECONDS) -> list[st
     divergence, and joints that move away, each with its likely cause. The list is empty
     if the robot stays where it is.
     """
-    feet = any(frame.role == "foot" for frame in robot.frames)
-    benchmark = "Stand" if feet and robot.root.kind == "free" else _Floor
     try:
-        env = RobotEnv(benchmark, robots=robot, horizon=100_000)
+        env = alone(robot)
     except WbcError as error:
         return [f"It cannot be controlled: {error}"]
     env.reset(seed=0)

@@ -59,6 +59,7 @@ class Arm:
         self.finger_reach = cache(self._measure_fingers)
         self._closing = 0
         self.home = self._goal = self._target = self.pose
+        self._home = state.q.copy()
         self._speed, self._turn, self._exact = SPEED, TURN, True
         self._correction, self._turn_correction = np.zeros(3), np.zeros(3)
         self._moves, self._grips = False, False
@@ -80,6 +81,18 @@ class Arm:
         See `LookAhead.along`.
         """
         return self._look_ahead(grasp or self.grasp).along(poses, after)
+
+    def sweep(self, q: Vector, period: float) -> Sequence[pin.SE3]:
+        """Return poses on the way to joints as an outlook has them.
+
+        See `LookAhead.sweep`.
+        """
+        return [*self._look_ahead(self.grasp).sweep(q, period)]
+
+    @property
+    def home_joints(self) -> Vector:
+        """Joints at the start, as an outlook has them."""
+        return self._look_ahead(self.grasp).own(self._home)
 
     def configuration(self, q: Vector) -> Vector:
         """Return the robot's configuration with joints as an outlook has them."""

@@ -1,6 +1,7 @@
 """Kinematic look-ahead: how well a hand gets along a chain of poses."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,8 +13,10 @@ from wbc_suite.qp import FrameTask, PositionLimit, PostureTask, TaskStack, Veloc
 from wbc_suite.typing import Vector
 
 STEP = 0.1  # s, time of one iteration
-ITERATIONS = 24  # for each pose at most
+ITERATIONS = 60  # for each pose at most
+STUCK = 2e-3  # rad or m, of joints in an iteration
 CLOSE = 1e-3  # m and rad
+SWEEP = 0.4  # of the greatest velocity of joints, on a sweep
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -81,11 +84,29 @@ class LookAhead:
         speed = reduced.velocityLimit
         self._speed = np.where((speed > 0.0) & (speed < 1e3), speed, 3.0)
 
+    def own(self, q: Vector) -> Vector:
+        """Return the joints that move the hand, of the whole robot's."""
+        return q[self._index]
+
     def full(self, q: Vector) -> Vector:
         """Return the whole robot's configuration, the other joints as measured."""
         whole = self._state.q
         whole[self._index] = q
         return whole
+
+    def sweep(self, q: Vector, period: float) -> Iterator[pin.SE3]:
+        """Yield poses of the frame while joints move on a straight line to q.
+
+        One for each period, s; the slowest joint has 0.4 of its greatest velocity.
+        """
+        configuration, start = self._configuration, self.own(self._state.q)
+        configuration.update(start)
+        way = configuration.difference(q)
+        count = math.ceil(float((np.abs(way) / self._speed).max()) / SWEEP / period)
+        for k in range(max(count, 1)):
+            configuration.update(start)
+            configuration.update(configuration.integrate((k + 1) / max(count, 1) * way))
+            yield configuration.frame_pose(self._frame)
 
     def along(self, poses: Sequence[pin.SE3], after: Outlook | None = None) -> Outlook:
         """Follow a chain of poses of the frame in the world.
@@ -98,7 +119,7 @@ class LookAhead:
                 error=0.0,
                 margin=np.inf,
                 times=np.zeros(configuration.nv),
-                q=(self._state.q[self._index],),
+                q=(self.own(self._state.q),),
             )
             begun: tuple[Vector, ...] = ()
         else:
@@ -133,7 +154,7 @@ class LookAhead:
             configuration.update(configuration.integrate(step))
             travel += np.abs(step)
             left = self._error()
-            if left < CLOSE:
+            if left < CLOSE or np.abs(step).max() < STUCK:
                 break
         return self._error(), travel
 

@@ -11,6 +11,7 @@ from wbc_suite.experts.workcell import Steps, Workcell
 
 TURNS = {"SquareNut": 4, "RoundNut": 8}
 """Equivalent turns of a nut about its peg."""
+TRIES = 3  # to lower a nut that meets the peg's rim, before it is let go
 AWAY = 0.1  # m, to withdraw
 ABOVE, DOWN_TO = 0.03, 0.03  # m, over the peg's end; over the table
 
@@ -48,6 +49,8 @@ def _put_over_peg(cell: Workcell[NutAssembly], name: str) -> Steps[None]:
     if choice is None:
         return
     arm, (above, down) = choice.arm, choice.then
-    yield from carry(cell, arm, name, shifted(above, (0, 0, 0)), tolerance=0.003)
-    yield from carry(cell, arm, name, down, tolerance=0.006, speed=0.2)
+    for _ in range(TRIES):
+        yield from carry(cell, arm, name, above, tolerance=0.003)
+        if (yield from carry(cell, arm, name, down, tolerance=0.006, speed=0.2)):
+            break
     yield from release(arm, back=AWAY)

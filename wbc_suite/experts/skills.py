@@ -54,6 +54,18 @@ def move(
     return False
 
 
+def move_in_joints(cell: Workcell, arm: Arm, q: Vector, **options: Any) -> Steps[bool]:
+    """Move a hand as its joints move on a straight line to q, as an outlook has them.
+
+    On a straight line in space an arm may end in other joints than the look-ahead, and
+    meet their limits. `options` are those of `move`, for the end.
+    """
+    for pose in (poses := arm.sweep(q, cell.period)):
+        arm.aim(pose, speed=2 * SPEED, turn=2 * TURN)
+        yield
+    return (yield from move(arm, poses[-1], **options))
+
+
 def travel(arm: Arm, target: pin.SE3, *, height: float, **options: Any) -> Steps[bool]:
     """Move over what is below a height in the world, m, then down to a pose.
 
@@ -192,6 +204,8 @@ def take(
         arrived = yield from move(arm, choice.before, **near)
     else:
         arrived = yield from travel(arm, choice.before, height=over, **near)
+    if not arrived:
+        arrived = yield from move_in_joints(cell, arm, choice.outlook.q[0], **near)
     if not arrived and arm.error()[0] > 2 * PASSING:
         return False
     yield from move(arm, lambda: choice.hand_at(cell.pose(name)))

@@ -1,22 +1,41 @@
 """The expert of ToolHang."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import pinocchio as pin
 
 from wbc_suite.benchmark.tool_hang import FRAME, STAND, TOOL, ToolHang
 from wbc_suite.experts.arm import Arm
-from wbc_suite.experts.skills import UP, carry, move, pick, release, shifted, travel
+from wbc_suite.experts.skills import (
+    UP,
+    at_height,
+    carry,
+    move,
+    move_in_joints,
+    pick,
+    release,
+    shifted,
+)
 from wbc_suite.experts.workcell import Steps, Workcell
 from wbc_suite.typing import Vector
 
 YAWS = tuple(k * math.pi / 8 for k in range(16))
 OVER = 0.40  # m above the table, clear of a standing frame
+RAISED = 0.15  # m, of the wrench before it is turned
 ABOVE = 0.02  # m, of the rod's tip over the socket
-WAY = ((0.0, 0.05, 0.4), (0.0, 0.012, 0.4), (-0.006, 0.003, 0.9), (-0.014, -0.006, 1.3))
+WAY = (
+    (0.0, 0.15, 0.3),
+    (0.0, 0.05, 0.3),
+    (0.0, 0.012, 0.3),
+    (-0.002, 0.0055, 0.65),
+    (-0.005, 0.002, 0.9),
+    (-0.012, 0.0, 1.2),
+)
 """Way of a hole over the hook: from its bend outward and upward, m, and the angle of
-the hole's axis to the upward direction, rad."""
+the hole's axis to the upward direction, rad. Between any two points the wrench stays
+2.6 mm clear of the hook."""
 
 
 def tool_hang(cell: Workcell[ToolHang]) -> Steps[None]:
@@ -41,7 +60,7 @@ def _insert(cell: Workcell[ToolHang]) -> Steps[None]:
     length = cell.point(f"{FRAME}_corner") - cell.point(f"{FRAME}_tip")
     half = float(np.linalg.norm(length)) / 2
     stands = [pin.SE3(pin.exp3(yaw * UP), floor + half * UP) for yaw in YAWS]
-    costs = [_cost_of_hanging(cell, arm, pose) for pose in stands]
+    costs = _costs_of_hanging(cell, arm, stands)
     rise = socket[2] - floor[2] + ABOVE
     plans = [(shifted(pose, rise * UP), pose) for pose in stands]
     choice = yield from pick(cell, FRAME, then=plans, costs=costs, raised=0.25)
@@ -51,24 +70,24 @@ def _insert(cell: Workcell[ToolHang]) -> Steps[None]:
     yield from carry(cell, arm, FRAME, above, tolerance=0.003, turn_tolerance=0.03)
     yield from carry(cell, arm, FRAME, inside, tolerance=0.006, speed=0.12)
     yield from release(arm, back=0.12)
-    yield from travel(arm, arm.home, height=_over(cell), tolerance=0.05, most=40)
+    yield from move(arm, at_height(arm.pose, _over(cell)), tolerance=0.03, most=40)
+    yield from move_in_joints(cell, arm, arm.home_joints, tolerance=0.05, most=40)
 
 
 def _hang(cell: Workcell[ToolHang]) -> Steps[None]:
     """Bring a hole of the wrench over the hook, and let go."""
     frame = cell.pose(FRAME)
     plans = [_way(cell, frame, end) for end in (1.0, -1.0)]
-    choice = yield from pick(cell, TOOL, then=plans, raised=0.15, over=_over(cell))
+    choice = yield from pick(cell, TOOL, then=plans, raised=RAISED, over=_over(cell))
     if choice is None:
         return
     arm, end = choice.arm, 1.0 if choice.then == plans[0] else -1.0
-    first = _way(cell, cell.pose(FRAME), end)[0]
-    over = pin.SE3(first.rotation, first.translation + 0.1 * UP)
-    yield from carry(cell, arm, TOOL, over, tolerance=0.03, turn_tolerance=0.2)
+    over = choice.outlook.q[-len(WAY)]
+    yield from move_in_joints(cell, arm, over, tolerance=0.03, turn_tolerance=0.2)
     for k in range(len(WAY)):
         goal = _way(cell, cell.pose(FRAME), end)[k]
         yield from carry(
-            cell, arm, TOOL, goal, tolerance=0.004, speed=0.12, turn=0.8, most=60
+            cell, arm, TOOL, goal, tolerance=0.0025, speed=0.12, turn=0.3, most=60
         )
     yield from release(arm, back=0.15)
     yield from move(arm, shifted(arm.pose, 0.1 * UP), tolerance=0.05, most=30)
@@ -97,13 +116,21 @@ def _geometry(cell: Workcell[ToolHang]) -> tuple[Vector, float]:
     return bend.translation, float(np.linalg.norm(holes)) / 2
 
 
-def _cost_of_hanging(cell: Workcell[ToolHang], arm: Arm, frame: pin.SE3) -> float:
-    """Return the cost of hanging the wrench on a frame that stands at a pose."""
-    costs = [math.inf]
+def _costs_of_hanging(
+    cell: Workcell[ToolHang], arm: Arm, frames: Sequence[pin.SE3]
+) -> list[float]:
+    """Return the cost of picking the wrench up and hanging it on each pose of a frame.
+
+    The least of all grasps from above, and of both ends.
+    """
+    tool, costs = cell.pose(TOOL), np.full(len(frames), np.inf)
     for site in cell.grasps(TOOL):
-        if cell.pose(TOOL).rotation @ site.approach @ UP > -0.8:
+        at = tool * site.pose
+        if at.rotation[2, 2] > -0.8:
             continue
-        for end in (1.0, -1.0):
-            way = [pose * site.pose for pose in _way(cell, frame, end)]
-            costs.append(arm.look_ahead(way).cost)
-    return min(costs)
+        picked = arm.look_ahead([at, shifted(at, RAISED * UP)])
+        for k, frame in enumerate(frames):
+            for end in (1.0, -1.0):
+                way = [pose * site.pose for pose in _way(cell, frame, end)]
+                costs[k] = min(costs[k], arm.look_ahead(way, after=picked).cost)
+    return costs.tolist()

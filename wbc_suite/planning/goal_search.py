@@ -17,7 +17,8 @@ from wbc_suite.planning.trajectory import Motion, TimedState
 from wbc_suite.qp import FrameEquality, Limit, PostureTask, Task, TaskStack
 from wbc_suite.typing import Vector
 
-STEP = 0.1  # s; one iteration goes as far as joints can in this time
+STEP = 0.1  # s; one iteration goes as far as joints can in this time,
+STRIDE = 0.2  # rad or m; or in the time in which the fastest joint goes this far
 MAX_ITERATIONS = 40  # from one initial configuration
 STARTS = 16
 MORE_STARTS = 24  # once some configuration is known, for a nearer one
@@ -79,6 +80,7 @@ class GoalSearch:
     ) -> None:
         self._problem, self._clearance, self._planner = problem, clearance, planner
         self._configuration = problem.configuration
+        self._step = max(STEP, STRIDE / float(problem.speed.max(initial=1e-9)))
         self._near = problem.stack(problem.start)
         self._exact = problem.stack()
         self._apart = problem.stack(limits=problem.distance_limits)
@@ -216,7 +218,7 @@ class GoalSearch:
                 return
             if stack is self._near and (error < CLOSE or waited > 2):
                 stack = self._exact
-            q = self._configuration.integrate(stack.solve(STEP).dq)
+            q = self._configuration.integrate(stack.solve(self._step).dq)
             yield None
 
     def _random(self, q: Vector, rng: np.random.Generator) -> Vector:

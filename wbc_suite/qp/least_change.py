@@ -36,6 +36,9 @@ def least_change(
     for _ in range(_MAX_STEPS):
         row, sign = _most_violated(rows, low, high, x)
         if row < 0:
+            _project_out(1.0, x, work, count)
+            for i in range(x.shape[0]):
+                x[i] -= work[2 * x.shape[0] + 2, i]  # rounding of long steps
             return True
         bound = low[row] if sign > 0.0 else -high[row]
         count = _activate(rows[row], sign, bound, x, work, count)

@@ -7,6 +7,7 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.elements import rigid_bodies
@@ -15,7 +16,9 @@ from wbc_suite.robot.shape_geometry import hull_spheres, support_points
 from wbc_suite.robot.shapes import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
 from wbc_suite.typing import Matrix, Vector
 
-MAX_STRIPS = 4  # largest number of parallel capsules for a flat box
+MAX_STRIPS = 4  # largest number of capsules for a flat box, or a hull
+TIGHT = 1.4  # a capsule with less of the hull's volume is not cut
+SAVED = 0.8  # of a capsule's volume that its pieces may have together
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -119,7 +122,7 @@ def _capsules(shape: Shape) -> list[Segment]:
         case Box(size=size):
             return _around_box(np.asarray(size))
         case _:
-            return [_around_points(support_points(shape))]
+            return _around_hull(support_points(shape), MAX_STRIPS)
 
 
 def _around_cylinder(start: Vector, end: Vector, radius: float) -> Segment:
@@ -159,6 +162,35 @@ def _around_box(size: Vector) -> list[Segment]:
         centre[middle] = -size[middle] + (2 * k + 1) * width
         found.append(_around_cylinder(centre - half, centre + half, radius))
     return found
+
+
+def _around_hull(points: Matrix, pieces: int) -> list[Segment]:
+    """Return capsules around the hull of points, cut across while that saves much."""
+    whole = _around_points(points)
+    hull = ConvexHull(points, qhull_options="QJ")
+    if pieces < 2 or _volume(whole) < TIGHT * hull.volume:
+        return [whole]
+    axis = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][0]
+    along = points @ axis
+    middle = (along.min() + along.max()) / 2
+    edges = hull.simplices[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    crossing = edges[(along[edges] < middle).sum(axis=1) == 1]
+    near, far = along[crossing].T - middle
+    share = (near / (near - far))[:, None]
+    cut = points[crossing[:, 0]] * (1 - share) + points[crossing[:, 1]] * share
+    halves = points[along < middle], points[along >= middle]
+    found = [
+        capsule
+        for half in halves
+        for capsule in _around_hull(np.concatenate([half, cut]), pieces // 2)
+    ]
+    return found if sum(map(_volume, found)) < SAVED * _volume(whole) else [whole]
+
+
+def _volume(capsule: Segment) -> float:
+    start, end, radius = capsule
+    length = float(np.linalg.norm(end - start))
+    return float(np.pi * radius**2 * (length + 4.0 / 3.0 * radius))
 
 
 def _around_points(points: Matrix) -> Segment:

@@ -17,12 +17,13 @@ if TYPE_CHECKING:
 KINDS = {
     "gripper": "finger fingers thumb gripper index middle ring pinky jaw knuckle",
     "head": "head neck",
-    "torso": "torso waist trunk spine chest lift",
+    "torso": "torso waist trunk spine chest abdomen lift",
     "leg": "leg hip knee ankle thigh calf shin foot toe haa hfe kfe",
     "arm": "arm shoulder elbow wrist forearm upperarm",
-    "base": "wheel caster",
+    "base": "wheel caster castor rotacastor",
 }
 """Words of each kind of limb."""
+FINGERS = {"finger", "fingers", "thumb"}
 KIND_OF = {word: kind for kind, words in KINDS.items() for word in words.split()}
 
 SIDE_OF = {"left": "left", "l": "left", "right": "right", "r": "right"}
@@ -46,7 +47,17 @@ END_OF = {
 """Role of the frame at the end of a limb."""
 
 END_WORDS = {
-    "arm": {"eef", "ee", "effector", "tcp", "tool", "flange", "grasp", "grasping"},
+    "arm": {
+        "eef",
+        "ee",
+        "effector",
+        "tcp",
+        "tool",
+        "flange",
+        "grasp",
+        "grasping",
+        "tip",
+    },
     "gripper": {"tcp", "grasp", "grasping", "tool"},
     "leg": {"foot", "sole", "toe"},
 }
@@ -81,9 +92,12 @@ def infer_limbs(links: Sequence[Link]) -> tuple[Limb, ...]:
 
     A link without a known word in its names belongs to the limb of its parent. Branches
     of an arm form a gripper; a chain below a torso or the root is an arm. A single arm
-    is the right one; several arms without a side are numbered.
+    is the right one; several arms without a side are numbered. Two slides and a hinge
+    that move all others in a plane are a base. The fingers of a hand alone are arms.
     """
     traits = _traits(links)
+    if not any(own.kind == "arm" for own in traits.values()):
+        traits = _fingers_as_arms(traits, _moving_parents(links))
     arms = list(dict.fromkeys(x.top for x in traits.values() if x.kind == "arm"))
     unnamed = [top for top in arms if not traits[top].side]
     grippers = [x.side for x in traits.values() if x.kind == "gripper"]
@@ -109,7 +123,7 @@ def infer_limbs(links: Sequence[Link]) -> tuple[Limb, ...]:
 def _traits(links: Sequence[Link]) -> dict[str, _Traits]:
     """Return kind, side and top of each moving link, by name."""
     parents = _moving_parents(links)
-    owners = list(parents.values())
+    owners, driving = list(parents.values()), _planar_base(links, parents)
     traits: dict[str, _Traits] = {}
     for link in links:
         if link.joint is None:
@@ -118,10 +132,16 @@ def _traits(links: Sequence[Link]) -> dict[str, _Traits]:
         above = traits.get(parent or "", _Traits())
         words = [*_words(link.joint.name), *_words(link.name)]
         kind = next((KIND_OF[w] for w in words if w in KIND_OF), None)
+        if link.name in driving:
+            kind = "base"
+        elif FINGERS.intersection(_words(link.joint.name)):
+            kind = "gripper"  # "arm_right_finger"
         if kind is None and above.kind == "arm" and owners.count(parent) > 1:
             kind = "gripper"
         elif kind is None:
             kind = above.kind if above.kind in ("leg", "gripper", "head") else "arm"
+        if kind == "torso" and _side(words, pairs=False):
+            kind = "arm"  # "waist" of the left one of two arms
         same_limb = above.kind in ("arm", "leg", "gripper")
         side = above.side if same_limb else ""
         if not (kind == "gripper" and same_limb):  # "left finger" of a right hand
@@ -129,6 +149,32 @@ def _traits(links: Sequence[Link]) -> dict[str, _Traits]:
         top = above.top if above.kind == kind else link.name
         traits[link.name] = _Traits(kind, side, top)
     return traits
+
+
+def _fingers_as_arms(
+    traits: dict[str, _Traits], parents: dict[str, str | None]
+) -> dict[str, _Traits]:
+    """Return the traits with each chain of a gripper as an arm without a side."""
+    changed = dict(traits)
+    for name, own in traits.items():
+        if own.kind == "gripper":
+            above = changed.get(parents[name] or "", _Traits())
+            top = above.top if above.kind == "arm" else name
+            changed[name] = _Traits("arm", "", top)
+    return changed
+
+
+def _planar_base(
+    links: Sequence[Link], parents: dict[str, str | None]
+) -> tuple[str, ...]:
+    """Return the names of three links that move all others in a plane, if any."""
+    names = list(parents)[:3]
+    joints = [link.joint for link in links if link.name in names and link.joint]
+    chained = [parents[name] for name in names] == [None, *names[:2]]
+    level = [joint.type == "slide" and abs(joint.axis[2]) < 0.1 for joint in joints]
+    if not chained or level != [True, True, False]:
+        return ()
+    return tuple(names) if abs(joints[2].axis[2]) > 0.9 else ()
 
 
 def infer_frames(

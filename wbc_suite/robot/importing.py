@@ -2,7 +2,7 @@
 
 import logging
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -21,6 +21,7 @@ from wbc_suite.robot.inertia import implausible, nearest_physical, unphysical
 from wbc_suite.robot.shapes import Shape
 from wbc_suite.robot.standing_posture import standing_legs
 from wbc_suite.robot.validation import RESERVED
+from wbc_suite.robot.working_posture import working_arms
 from wbc_suite.tomlfile import parse_model
 
 LOG = logging.getLogger(__name__)
@@ -116,7 +117,14 @@ def describe_import(
     )
     if "ready" in keyframes:
         return robot
-    ready = robot.keyframes["ready"] | standing_legs(robot)
+    return _with_ready(_with_ready(robot, standing_legs), working_arms)
+
+
+def _with_ready(
+    robot: RobotDescription, find: Callable[[RobotDescription], dict[str, float]]
+) -> RobotDescription:
+    """Return the robot with some joints of its posture `ready` changed."""
+    ready = robot.keyframes["ready"] | find(robot)
     return robot.model_copy(update={"keyframes": robot.keyframes | {"ready": ready}})
 
 

@@ -1,16 +1,19 @@
 """`load_robot`: read a robot from the catalogue or from a TOML, URDF or MJCF file."""
 
+import logging
 from pathlib import Path
 from typing import Literal
 
 from wbc_suite.catalogue import Catalogue
-from wbc_suite.errors import ConfigError, UnknownNameError
+from wbc_suite.errors import ConfigError, DescriptionError, UnknownNameError
 from wbc_suite.robot.assembly import assemble, describe_component
 from wbc_suite.robot.component_choice import Choice
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.robot_file import Component, read_robot_file
 from wbc_suite.robot.skins import SkinFinder
 from wbc_suite.typing import RobotName
+
+LOG = logging.getLogger(__name__)
 
 FOLDERS = ("gripper", "base", "arm", "body")
 
@@ -36,7 +39,9 @@ def load_robot(
             the hand of each side. A name that ends in .toml is a file.
         base: Another base with its own root and height; "none" leaves it out. A robot
             with legs or wheels accepts only a base without body (`NullMobileBase`).
-        root: Another root: `fixed`, `planar` or `free`.
+        root: Another root: `fixed`, `planar` or `free`. A URDF that does not connect
+            its first link to a link `world` is free if it has four feet or more, else
+            fixed.
         skin: "meshes" draws the robot with meshes of installed packages, or of its
             URDF; a folder with those found there, see `robot.skins`. Physics does not
             change.
@@ -75,7 +80,13 @@ def load_robot(
         return robot
     from wbc_suite.robot.importing import with_soles
 
-    return with_soles(robot)
+    try:
+        return with_soles(robot)
+    except DescriptionError as error:
+        if root == "free" or path.suffix != ".urdf":
+            raise
+        LOG.warning("%s It is fixed.", error)
+        return robot.with_root("fixed")
 
 
 def _locate(name: str, catalogue: Catalogue) -> Path:

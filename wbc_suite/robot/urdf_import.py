@@ -34,6 +34,8 @@ LOG = logging.getLogger(__name__)
 
 UNLIMITED_RANGE = 1e4
 """A position limit at least as large, in rad or m, means that there is none."""
+FEET = 4
+"""A robot with so many feet is free if the file does not attach it to the world."""
 JOINT_TYPES = {"revolute": "hinge", "continuous": "hinge", "prismatic": "slide"}
 ROOT_KINDS = {urdf: kind for kind, urdf in ROOT_TYPES.items()}
 
@@ -79,6 +81,10 @@ def read_urdf(
             raise
         raise DescriptionError(f"{path}: {error}") from error
     shapes.report(path)
+    feet = sum(frame.role == "foot" for frame in robot.frames)
+    if feet >= FEET and not importer.rooted:
+        LOG.warning("%s: its root is free, since it has %d feet.", path, feet)
+        robot = robot.with_root("free")
     if skin:
         robot = robot.model_copy(update={"skins": importer.skins()})
     pairs = overlapping_links(robot)
@@ -94,7 +100,10 @@ def read_urdf(
 
 
 class _Importer:
-    """Converts the elements of one file to the fields of a description."""
+    """Converts the elements of one file to the fields of a description.
+
+    `rooted` says whether the file connects the robot to a link `world`.
+    """
 
     def __init__(
         self, branches: tuple[Branch, ...], shapes: UrdfShapes, *, strict: bool
@@ -104,6 +113,7 @@ class _Importer:
         self._links: dict[str, str] = {}
         self._joints: dict[str, str] = {}
         self._endless: list[str] = []
+        self.rooted = False
 
     def robot(self, name: str, path: Path) -> RobotDescription:
         root, branches = self._root()
@@ -160,7 +170,7 @@ class _Importer:
                     f"{first.where}: a planar root needs the axis z, not {axis}."
                 )
         _refuse_roots([b for b in moving if b is not first])
-        kind = ROOT_KINDS[first.kind]
+        kind, self.rooted = ROOT_KINDS[first.kind], True
         return {"kind": kind, **pose_fields(first.pose)}, tuple(rest)
 
     def _link(self, branch: Branch, *, first: bool) -> LinkFields:

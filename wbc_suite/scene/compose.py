@@ -20,6 +20,7 @@ SMALL = 24
 them a step of Lift takes 6 % less at 15 and 18, as long at 30 and 15 % more at 60."""
 
 GROUNDED = 0.03  # depth by which feet and mounts may reach into the floor, m
+LANDED = 0.005  # distance of free feet from the floor that is left as it is, m
 
 ROBOT_VIEW = "robotview"
 """Name of the camera behind each robot, after the robot's prefix."""
@@ -50,27 +51,56 @@ def place_robot(
 def _on_the_floor(robot: RobotDescription) -> RobotDescription:
     """Raise a robot without a root height so that it stands on the floor.
 
-    The URDF of many a humanoid has its origin in the pelvis.
+    The URDF of many a humanoid has its origin in the pelvis. A free robot on feet is
+    also put down, since the legs of one in the air kick.
     """
-    if any(robot.root.pos):
+    feet = any(frame.role == "foot" for frame in robot.frames)
+    stands = robot.root.kind == "free" and feet
+    if any(robot.root.pos) and not stands:
         return robot
-    model = robot.to_mjspec().compile()
-    data = mujoco.MjData(model)
-    if "ready" in robot.keyframes:
-        mujoco.mj_resetDataKeyframe(model, data, model.key("ready").id)
-    mujoco.mj_kinematics(model, data)
-    solid = np.flatnonzero(model.geom_contype | model.geom_conaffinity)
-    low, _ = _geom_bounds(model, data, solid, pin.SE3.Identity())
-    depth = -float(low[:, 2].min(initial=0.0))
-    if depth < GROUNDED:
+    height = _lowest_point(robot)
+    if (abs(height) < LANDED) if stands else (height > -GROUNDED):
         return robot
     log.warning(
-        "%s has no root height and reaches %.2f m below the floor; it is raised. "
-        "Set [root] pos in its file.",
-        robot.name,
-        depth,
+        "%s has its lowest point %.3f m over the floor, and is put on it. Set [root] "
+        "pos in its file.",
+        *(robot.name, height),
     )
-    return robot.with_root(robot.root.kind, pos=(0.0, 0.0, depth))
+    x, y, z = robot.root.pos
+    return robot.with_root(robot.root.kind, pos=(x, y, z - height))
+
+
+def _lowest_point(robot: RobotDescription) -> float:
+    """Return the height of the lowest point of a robot's solid shapes at `ready`, m."""
+    m = robot.to_mjspec().compile()
+    data = mujoco.MjData(m)
+    if "ready" in robot.keyframes:
+        mujoco.mj_resetDataKeyframe(m, data, m.key("ready").id)
+    mujoco.mj_kinematics(m, data)
+    solid = np.flatnonzero(m.geom_contype | m.geom_conaffinity)
+    return min((_bottom(m, data, int(geom)) for geom in solid), default=0.0)
+
+
+def _bottom(m: mujoco.MjModel, data: mujoco.MjData, geom: int) -> float:
+    """Return the height of the lowest point of a geom, m."""
+    up = data.geom_xmat[geom].reshape(3, 3)[2]  # the vertical in the geom's axes
+    size, shapes = m.geom_size[geom], mujoco.mjtGeom
+    match m.geom_type[geom]:
+        case shapes.mjGEOM_MESH:
+            mesh = m.geom_dataid[geom]
+            first, count = m.mesh_vertadr[mesh], m.mesh_vertnum[mesh]
+            depth = -np.min(m.mesh_vert[first : first + count] @ up)
+        case shapes.mjGEOM_SPHERE:
+            depth = size[0]
+        case shapes.mjGEOM_CAPSULE:
+            depth = size[0] + size[1] * abs(up[2])
+        case shapes.mjGEOM_CYLINDER:
+            depth = size[0] * np.hypot(up[0], up[1]) + size[1] * abs(up[2])
+        case shapes.mjGEOM_ELLIPSOID:
+            depth = np.linalg.norm(size * up)
+        case _:
+            depth = size @ abs(up)
+    return float(data.geom_xpos[geom, 2] - depth)
 
 
 def attach_robot(

@@ -3,6 +3,7 @@
 from collections.abc import Collection, Sequence
 
 import mujoco
+import numpy as np
 
 from wbc_suite.control import RobotState
 from wbc_suite.robot import RobotDescription
@@ -28,6 +29,7 @@ class Hand:
         self, state: RobotState, name: str, frame: str, links: Sequence[str]
     ) -> None:
         model, self._data = state.model, state.data
+        self._model, self._twists = model, np.zeros((2, 6))
         self.name, self.frame = name, frame
         self.site: int = model.site(state.prefix + frame).id
         self.position: Vector = state.data.site_xpos[self.site]
@@ -51,6 +53,19 @@ class Hand:
             if a in geoms or b in geoms
         }
         return len(touching - {None}) >= 2
+
+    def slip(self, body: int) -> float:
+        """Return the speed of a body's centre of mass relative to the hand, m/s.
+
+        With v and w the hand's velocities at its frame p, it is |v_b - v - w x (b - p)|
+        for a centre b.
+        """
+        model, data, kinds = self._model, self._data, mujoco.mjtObj
+        hand, other = self._twists
+        mujoco.mj_objectVelocity(model, data, kinds.mjOBJ_SITE, self.site, hand, 0)
+        mujoco.mj_objectVelocity(model, data, kinds.mjOBJ_BODY, body, other, 0)
+        turned = np.cross(hand[:3], data.xipos[body] - self.position)
+        return float(np.linalg.norm(other[3:] - hand[3:] - turned))
 
 
 def hands_of(state: RobotState) -> tuple[Hand, ...]:

@@ -3,7 +3,7 @@
 viser serves pages and messages on 127.0.0.1 without tokens or origins. The proxy
 listens where clients connect, admits them by `AccessRules`, fetches pages and relays
 WebSocket messages. A client that sends an invalid one is disconnected. The proxy adds
-the script of `HeldKeys` to the page.
+the script of `HeldKeys` to the page, and style and script of `pages/page.*`.
 """
 
 import asyncio
@@ -15,6 +15,7 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from http import HTTPStatus
+from importlib import resources
 from typing import TYPE_CHECKING, TypeAlias
 from urllib.parse import quote
 
@@ -36,12 +37,10 @@ PORTS = range(8080, 8100)  # tried in turn if no port is given
 MESSAGE_LIMIT = 50 * 1024 * 1024  # bytes from viser, its own limit
 HEARTBEAT = 30.0  # s between pings that find clients that are gone
 
-HELP_KEY = """<head><script>addEventListener("keydown", e => {
-  if (e.key !== "?" || e.target.closest?.("input, textarea")) return;
-  const buttons = [...document.querySelectorAll("button")];
-  buttons.find(b => b.textContent.trim() === "Keys and gestures")?.click();
-})</script>"""
-"""viser has no hotkey for a question mark."""
+PAGES = resources.files("wbc_suite.viewers") / "pages"
+OWN = {"/page.css": "text/css", "/page.js": "text/javascript"}
+"""Files of `PAGES` that every page loads, and their types."""
+HEAD = '<head><link rel="stylesheet" href="/page.css"><script src="/page.js"></script>'
 
 DATA = (WSMsgType.TEXT, WSMsgType.BINARY)
 WebSocket: TypeAlias = web.WebSocketResponse | aiohttp.ClientWebSocketResponse
@@ -117,12 +116,13 @@ class PageServer:
     def _rewrite(self, page: bytes) -> bytes:
         title = f"<title>{html.escape(self.title)}</title>"
         page = page.replace(b"<title>Viser</title>", title.encode(), 1)
-        page = page.replace(b"<head>", HELP_KEY.encode(), 1)
+        page = page.replace(b"<head>", HEAD.encode(), 1)
         return self.keys.add_script(page)
 
     def _start_proxy(self, ports: Sequence[int]) -> WebServer:
         routes = [
             *self.keys.routes,
+            *(web.get(path, _send_own) for path in OWN),
             *proxy(
                 self.server.get_port(), self._rewrite, admits=page_messages.is_valid
             ),
@@ -134,6 +134,14 @@ class PageServer:
                 if port == ports[-1]:
                     raise
         raise AssertionError("there is at least one port")
+
+
+async def _send_own(request: web.Request) -> web.Response:
+    return web.Response(
+        text=(PAGES / request.path.removeprefix("/")).read_text("utf-8"),
+        content_type=OWN[request.path],
+        headers={hdrs.CACHE_CONTROL: "no-store"},
+    )
 
 
 def _start_viser() -> "viser.ViserServer":

@@ -20,7 +20,8 @@ Colour: TypeAlias = tuple[int, int, int]
 Box: TypeAlias = tuple[Vector, Vector]
 """Corners with the smallest and the largest coordinates, m."""
 
-FIELD_OF_VIEW = np.deg2rad(42.0)  # vertical
+FIELD_OF_VIEW = np.deg2rad(42.0)  # vertical, or horizontal where that is less
+LEAST_ASPECT = 0.4  # width over height of a scene; at less, it is cut off
 VIEWS = {
     "Front": np.array([1.0, -0.62, 0.5]),
     "Left": np.array([0.1, 1.0, 0.25]),
@@ -63,20 +64,30 @@ def set_up_scene(site: "PageServer", *, label: str) -> None:
         fade_strength=2.0,
         shadow_opacity=0.22,
     )
-    server.scene.configure_environment_map(
+    _light(server.scene)
+
+
+def _light(scene: "viser.SceneApi", *, dark: bool = False) -> None:
+    scene.configure_environment_map(
         "studio",
         background=True,
         background_blurriness=1.0,
-        background_intensity=0.65,
+        background_intensity=0.06 if dark else 0.65,
         environment_intensity=0.3,
     )
 
 
-def set_theme(gui: "viser.GuiApi", dark: bool = False) -> None:
+def set_theme(gui: "viser.GuiApi", *, dark: bool = False) -> None:
     """Set the colours of the panel, for all clients or for one."""
     gui.configure_theme(
         show_logo=False, show_share_button=False, brand_color=BRAND, dark_mode=dark
     )
+
+
+def set_dark(client: "viser.ClientHandle", dark: bool) -> None:
+    """Set dark or light colours of panel and background for one client."""
+    set_theme(client.gui, dark=dark)
+    _light(client.scene, dark=dark)
 
 
 def set_camera(server: "viser.ViserServer", box: Box) -> None:
@@ -88,6 +99,19 @@ def set_camera(server: "viser.ViserServer", box: Box) -> None:
     server.initial_camera.position = tuple(position)
     server.initial_camera.look_at = tuple(look_at)
     server.initial_camera.fov = FIELD_OF_VIEW
+
+    @server.on_client_connect
+    def _(client: "viser.ClientHandle") -> None:
+        _widen(client.camera)
+        client.camera.on_update(_widen)
+
+
+def _widen(camera: "viser.CameraHandle") -> None:
+    """Set the field of view so that a box is seen whole in a tall window too."""
+    aspect = camera.image_width / max(camera.image_height, 1)
+    tangent = np.tan(FIELD_OF_VIEW / 2.0) / np.clip(aspect, LEAST_ASPECT, 1.0)
+    if abs(camera.fov - (fov := 2.0 * float(np.arctan(tangent)))) > 1e-3:
+        camera.fov = fov
 
 
 def add_views(client: "viser.ClientHandle", box: Callable[[], Box]) -> None:

@@ -93,6 +93,7 @@ class Snapshot:
         solved: Number of attempts, from reset to reset, in which the task was solved.
         solved_at: Simulated time when it was solved in this attempt, s; else nan.
         time: Simulated time, s.
+        positions: Generalised positions of the scene, shape (nq,).
         body_positions: Positions of all bodies in the world, m, shape (nbody, 3).
         body_quaternions: Their orientations (wxyz), shape (nbody, 4).
         limbs: Status by limb name.
@@ -115,6 +116,7 @@ class Snapshot:
     solved: int
     solved_at: float
     time: float
+    positions: Vector
     body_positions: Matrix
     body_quaternions: Matrix
     limbs: Mapping[str, LimbStatus]

@@ -22,9 +22,11 @@ from wbc_suite.viewers.session_state import (
     Snapshot,
 )
 
-GREEN, YELLOW, RED = "#3f8f5b", "#b08a2e", "#c8553d"
-FIRST_DRAG = "Drag an arrow or an arc of a handle: the limb follows."
+BLUE, GREEN, YELLOW, RED = "#3f7fbf", "#2f9e56", "#b08a2e", "#c8553d"
+FIRST_DRAG = "Drag an arrow of a handle: the limb follows."
+FIRST_GRIP = "The sliders below open and close grippers."
 FIRST_WALK = "Hold W A S D to move, Q E to turn."
+FIRST_KEY = "Key ? shows all keys."
 
 
 def plain(name: str) -> str:
@@ -82,7 +84,7 @@ def status_html(
     )
     cells = "".join(
         "<div style='flex:auto'><div style='font-size:1.05em;font-weight:600'>"
-        f"{value}</div><div style='opacity:.6;font-size:.78em'>{label}</div></div>"
+        f"{value}</div><div style='opacity:.75;font-size:.78em'>{label}</div></div>"
         for label, value in figures
     )
     reasons = "".join(
@@ -110,19 +112,25 @@ def status_html(
 
 def _task_html(snapshot: Snapshot, info: SessionInfo) -> str:
     """Return the task, the state of the attempt, and the first thing to do."""
-    state, dot = _state(snapshot)
+    state, colour = _state(snapshot, info)
     attempts = f"attempt {snapshot.epoch + 1}, {snapshot.solved} solved"
     hint = ""
     if snapshot.epoch == 0 and not any(x.moved for x in snapshot.limbs.values()):
-        hints = (FIRST_DRAG, bool(info.limbs)), (FIRST_WALK, bool(info.drive.any()))
-        text = " ".join(text for text, is_possible in hints if is_possible)
+        hints = {
+            FIRST_DRAG: bool(info.limbs),
+            FIRST_GRIP: bool(info.grippers),
+            FIRST_WALK: bool(info.drive.any()),
+            FIRST_KEY: True,
+        }
+        text = " ".join(text for text, is_possible in hints.items() if is_possible)
         hint = f"<div style='margin-bottom:.5em;font-size:.88em'>{text}</div>"
     return (
-        f"<div style='font-weight:600;font-size:1.1em'>{html.escape(info.task)}</div>"
-        "<div style='display:flex;justify-content:space-between;margin:.2em 0 .5em'>"
-        f"<span style='font-weight:600'><span style='color:{dot}'>&#9679;</span> "
-        f"{html.escape(state)}</span>"
-        f"<span style='opacity:.65;font-size:.88em'>{attempts}</span></div>{hint}"
+        "<h1 style='font-weight:600;font-size:1.1em;margin:0'>"
+        f"{html.escape(info.task)}</h1>"
+        "<div style='display:flex;justify-content:space-between;margin:.3em 0 .5em;"
+        f"padding:.2em .5em;border-left:.3em solid {colour};background:{colour}22'>"
+        f"<span style='font-weight:600'>{html.escape(state)}</span>"
+        f"<span style='opacity:.75;font-size:.88em'>{attempts}</span></div>{hint}"
     )
 
 
@@ -140,14 +148,14 @@ def limbs_html(
     rows = "".join(
         f"<tr><td><span style='color:{css(colours[name])}'>&#9632;</span> "
         f"{html.escape(limbs[name].title)}</td>"
-        f"<td style='opacity:.65'>{html.escape(_notes(snapshot, name, client))}</td>"
+        f"<td style='opacity:.75'>{html.escape(_notes(snapshot, name, client))}</td>"
         f"<td style='text-align:right'>{_error_cell(limbs[name], status)}</td></tr>"
         for name, status in snapshot.limbs.items()
     )
     return f"<table style='width:100%;padding:.2em .7em;font-size:.88em'>{rows}</table>"
 
 
-def _state(snapshot: Snapshot) -> tuple[str, str]:
+def _state(snapshot: Snapshot, info: SessionInfo) -> tuple[str, str]:
     """Return the state of the session and its colour."""
     if snapshot.message:
         return snapshot.message, RED
@@ -159,7 +167,8 @@ def _state(snapshot: Snapshot) -> tuple[str, str]:
         return ", ".join(snapshot.device).capitalize(), YELLOW
     if snapshot.success:
         return f"Solved in {snapshot.solved_at:.0f} s", GREEN
-    return f"Running, {snapshot.time:.0f} s", GREEN
+    state = "Not solved yet" if info.task else "Running"
+    return f"{state}, {snapshot.time:.0f} s", BLUE
 
 
 def _recording_html(snapshot: Snapshot) -> str:

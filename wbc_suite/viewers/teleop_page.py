@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from wbc_suite.devices.action_ports import LimbKind
 from wbc_suite.viewers.balance_overlay import BalanceOverlays
 from wbc_suite.viewers.camera_follower import CameraFollower
+from wbc_suite.viewers.camera_pictures import CameraPictures
 from wbc_suite.viewers.drag_handles import DragHandles
 from wbc_suite.viewers.model_scene import ModelScene, robot_box
 from wbc_suite.viewers.page_server import PageServer
@@ -50,6 +51,7 @@ class TeleopPage:
             model, snapshot.body_positions, (low + high) / 2.0
         )
         self.overlays = BalanceOverlays(session)
+        self.pictures = CameraPictures(model, snapshot)
         self.panel = TeleopPanel(
             self.server,
             session,
@@ -57,6 +59,7 @@ class TeleopPage:
             colours,
             cameras=self.cameras,
             overlays=self.overlays,
+            pictures=self.pictures,
             box=lambda: (low + self.cameras.moved, high + self.cameras.moved),
         )
         if self.panel.drive is not None:
@@ -72,6 +75,7 @@ class TeleopPage:
 
     def stop(self) -> None:
         """Stop the updates, and close the server."""
+        self.pictures.stop()
         self.site.stop()
 
     def update(self, count: int = 0) -> None:
@@ -87,20 +91,22 @@ class TeleopPage:
             self.markers.update(snapshot, notes)
         self.handles.update(snapshot)
         self.overlays.update(snapshot.balance)
+        self.pictures.update(snapshot)
         was_reset, self._epoch = snapshot.epoch != self._epoch, snapshot.epoch
         self.cameras.update(snapshot.body_positions, jump=was_reset)
-        self.panel.record_plots(snapshot)
+        self.panel.plots.record(snapshot)
         if count % PANEL_EVERY == 0:
             self.panel.update(snapshot)
         if count % PLOT_EVERY == 0:
-            self.panel.update_plots()
+            self.panel.plots.update()
 
     def _connect(self, client: "viser.ClientHandle") -> None:
         self.handles.add_client(client)
         self.panel.add_client(client)
 
     def _disconnect(self, client: "viser.ClientHandle") -> None:
-        for part in (self.handles, self.cameras, self.overlays, self.panel):
+        parts = self.handles, self.cameras, self.overlays, self.pictures, self.panel
+        for part in parts:
             part.remove_client(client.client_id)
 
 

@@ -2,38 +2,31 @@
 
 import functools
 import threading
-import time
-from collections import deque
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from wbc_suite.recording.episode_control import EpisodeCommand
 from wbc_suite.viewers.balance_overlay import BalanceOverlays, legend_html
 from wbc_suite.viewers.camera_follower import CameraFollower
+from wbc_suite.viewers.camera_pictures import CameraPictures
 from wbc_suite.viewers.drag_handles import DragHandles, HandleMode
 from wbc_suite.viewers.drive_panel import DrivePanel
 from wbc_suite.viewers.gripper_sliders import GripperSliders
 from wbc_suite.viewers.scene_setup import (
     Box,
     Colour,
-    add_plot,
     add_views,
-    css,
-    set_theme,
+    set_dark,
 )
 from wbc_suite.viewers.session_state import SessionInfo, Snapshot
 from wbc_suite.viewers.status_text import limbs_html, status_html
+from wbc_suite.viewers.tracking_plots import TrackingPlots
 
 if TYPE_CHECKING:
     import viser
 
     from wbc_suite.viewers.page_process import Session
 
-PLOT_SECONDS = 10.0
-PLOT_POINTS = 150
-PLOT_ROWS = 300  # more than PLOT_SECONDS at the rate of the page's updates
 RECORD_NOTE = (
     "This session was started without a file to record into. "
     "`wbc-suite teleop --record FILE` records."
@@ -46,7 +39,6 @@ CLUTCH_HINT = "Engaged: the limb follows its handle. Else only the handle moves.
 BALANCE_HINT = "Feet, capture point, next footstep and contact forces."
 SHADOW_HINT = "Two thirds of the rendering time without a graphics card."
 HELP = "Keys and gestures"
-STEP_COLOUR = "#4a6fa5"
 RECORD_KEYS = {
     "C": (EpisodeCommand.RECORD, "Record or keep the episode"),
     "Y": (EpisodeCommand.SUCCESS, "Keep the episode as a success"),
@@ -68,6 +60,7 @@ class TeleopPanel:
         colours: Colour of each limb.
         cameras: Moves cameras with the robot.
         overlays: Draws the balance of the robot.
+        pictures: Draws what cameras see.
         box: Returns two corners of the robot, for the cameras, m.
     """
 
@@ -80,15 +73,13 @@ class TeleopPanel:
         *,
         cameras: CameraFollower,
         overlays: BalanceOverlays,
+        pictures: CameraPictures,
         box: Callable[[], Box],
     ) -> None:
         self._server, self._session, self._handles = server, session, handles
         self._colours, self._cameras, self._overlays = colours, cameras, overlays
-        self._box = box
+        self._box, self._pictures = box, pictures
         self._info = info = session.info
-        # Rows of wall time, step time, and the position error of every limb.
-        self._history: deque[list[float]] = deque(maxlen=PLOT_ROWS)
-        self._last_tick = -1
         self._adding = threading.Lock()
         self._status = server.gui.add_html("")
         self._stand_up = server.gui.add_button(
@@ -111,11 +102,7 @@ class TeleopPanel:
                     for name in info.grippers
                 }
         with server.gui.add_folder("Tracking and timing"):
-            errors = {limb.title: css(colours[n]) for n, limb in info.limbs.items()}
-            if errors:
-                self._error_plot = add_plot(server, "Distance to target [mm]", errors)
-            times = {"step": STEP_COLOUR}
-            self._time_plot = add_plot(server, "Solve time [ms]", times, height=120)
+            self.plots = TrackingPlots(server.gui, info, colours)
 
     def add_client(self, client: "viser.ClientHandle") -> None:
         """Add the controls that each client has for itself."""
@@ -126,6 +113,7 @@ class TeleopPanel:
             if self._info.limbs:
                 self._add_handle_controls(client)
             add_views(client, self._box)
+            self._pictures.add_client(client)
             if self.drive is not None:
                 follow = functools.partial(self._cameras.follow, client)
                 _add_checkbox(client.gui, "Camera follows the robot", follow)
@@ -142,8 +130,8 @@ class TeleopPanel:
                     lambda on: client.scene.configure_default_lights(cast_shadow=on),
                     SHADOW_HINT,
                 )
-                dark = functools.partial(set_theme, client.gui)
-                _add_checkbox(client.gui, "Dark panel", dark, value=False)
+                dark = functools.partial(set_dark, client)
+                _add_checkbox(client.gui, "Dark colours", dark, value=False)
             keys = client.gui.add_button(HELP, color="gray", hint="Key: ?")
             keys.on_click(lambda _: _show_help(client, self._info))
 
@@ -209,28 +197,6 @@ class TeleopPanel:
         for name, sliders in self._grippers.items():
             sliders.update(snapshot.grippers[name])
         self._buttons.options = _buttons(snapshot)
-
-    def record_plots(self, snapshot: Snapshot) -> None:
-        """Append the errors and the step time of a tick to the plots."""
-        if snapshot.tick == self._last_tick:
-            return
-        self._last_tick = snapshot.tick
-        errors = [status.position_error for status in snapshot.limbs.values()]
-        self._history.append([time.monotonic(), snapshot.step_time, *errors])
-
-    def update_plots(self) -> None:
-        """Plot the errors and step times of the last seconds."""
-        if len(self._history) < 2:
-            return
-        rows = np.array(self._history, dtype=np.float64)
-        ago = rows[:, 0] - rows[-1, 0]
-        rows, ago = rows[ago > -PLOT_SECONDS], ago[ago > -PLOT_SECONDS]
-        step = max(1, len(rows) // PLOT_POINTS)
-        rows, ago = rows[::-step][::-1], ago[::-step][::-1]
-        errors = [np.ascontiguousarray(column) for column in 1e3 * rows[:, 2:].T]
-        if errors:
-            self._error_plot.data = (ago, *errors)
-        self._time_plot.data = (ago, 1e3 * rows[:, 1])
 
     def _add_buttons(self) -> None:
         gui = self._server.gui

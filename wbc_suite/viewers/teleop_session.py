@@ -328,6 +328,7 @@ class TeleopSession:
             solved=self._solved,
             solved_at=self._solved_at,
             time=float(data.time),
+            positions=data.qpos.copy(),
             body_positions=data.xpos.copy(),
             body_quaternions=data.xquat.copy(),
             limbs=limbs,

@@ -23,5 +23,5 @@ CONSOLE_LOGGING_LEVEL = "INFO"
 FILE_LOGGING_LEVEL = None
 
 with contextlib.suppress(ImportError):
-    _own = importlib.import_module("wbc_suite.compat.robosuite.macros_private")
-    globals().update({k: v for k, v in vars(_own).items() if k.isupper()})
+    _private = vars(importlib.import_module(f"{__package__}.macros_private"))
+    globals().update({name: _private[name] for name in _private if name.isupper()})

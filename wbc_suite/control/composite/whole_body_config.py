@@ -45,6 +45,10 @@ GoalsConfig: TypeAlias = Union["WholeBodyIKConfig", "WholeBodyIDConfig"]
 """Configs with controlled frames, and how an action moves their goals."""
 
 
+FEW_JOINTS = 0.02
+"""[cost]/rad of a hand that less than six joints move: its position comes first."""
+
+
 def _registered(kind: str) -> str:
     try:
         return find_frame_kind(kind).name
@@ -222,10 +226,12 @@ def default_whole_body_config(robot: RobotDescription) -> dict[str, Any]:
     A base that glides is moved where the hands leave it free. A robot without hands is
     moved by its trunk or its head.
     """
-    frames = [
-        {"name": _hand_name(side, len(robot.hands)), "frame": frame, "kind": "pose"}
-        for side, frame in robot.hands.items()
-    ]
+    frames: list[dict[str, Any]] = []
+    for side, frame in robot.hands.items():
+        name = _hand_name(side, len(robot.hands))
+        frames.append({"name": name, "frame": frame, "kind": "pose"})
+        if _joints_to(robot, frame) < 6:
+            frames[-1]["orientation_cost"] = FEW_JOINTS
     if robot.root.kind == "planar":
         frames.append(_gliding_base(robot))
     frames = frames or [{"name": name, "frame": name} for name in [_foremost(robot)]]
@@ -241,6 +247,15 @@ def default_whole_body_config(robot: RobotDescription) -> dict[str, Any]:
     if "ready" in robot.keyframes:
         config["posture"] = {"keyframe": "ready"}
     return config
+
+
+def _joints_to(robot: RobotDescription, frame: str) -> int:
+    """Return how many joints move a frame; six and more if its root moves."""
+    count, link = 0, robot.link(robot.link_of(frame))
+    while link.parent is not None:
+        count += link.joint is not None and link.joint.independent
+        link = robot.link(link.parent)
+    return count + 6 * (robot.root.kind != "fixed")
 
 
 def _hand_name(side: str, count: int) -> str:

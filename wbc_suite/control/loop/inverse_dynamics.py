@@ -131,7 +131,8 @@ def write_law_commands(
     """Write `M a + h - d - J^T f` within the limits of actuators, or setpoints.
 
     `physics.force` holds `M a - J^T f`. A torque law adds its torques to Coriolis,
-    centrifugal and gravity forces; passive forces stay.
+    centrifugal and gravity forces, less what `gravcomp` of the model cancels already;
+    other passive forces stay.
     """
     for j in range(law.first, law.last):
         drive = drives[j]
@@ -140,6 +141,7 @@ def write_law_commands(
         if law.kind == _SERVO:
             command = reference_at(law, drive)[0]
         elif law.kind == _TORQUE:
+            bias -= law.compensation * physics.qfrc_gravcomp[dof]
             command = reference_at(law, drive)[0] + bias
         else:
             bias -= law.compensation * physics.qfrc_passive[dof]

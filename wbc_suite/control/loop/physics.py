@@ -55,6 +55,7 @@ class Physics(NamedTuple):
     ctrl: Vector
     qfrc_bias: Vector
     qfrc_passive: Vector
+    qfrc_gravcomp: Vector
     M: Vector
     M_rownnz: Indices
     M_rowadr: Indices

@@ -1,6 +1,7 @@
 """Controllers: robosuite's default configs, its registries, and classes of users."""
 
 from wbc_suite.compat.robosuite.controllers.configs import (
+    ALL_COMPOSITE_CONTROLLERS,
     ALL_PART_CONTROLLERS,
     PART_CONTROLLER_INFO,
     is_part_controller_config,
@@ -9,7 +10,6 @@ from wbc_suite.compat.robosuite.controllers.configs import (
     refactor_composite_controller_config,
 )
 from wbc_suite.compat.robosuite.controllers.user_controllers import (
-    ALL_COMPOSITE_CONTROLLERS,
     REGISTERED_COMPOSITE_CONTROLLERS_DICT,
     CompositeController,
     HybridMobileBase,

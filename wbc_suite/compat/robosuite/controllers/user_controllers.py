@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wbc_suite.compat.robosuite.controllers.part_view import PartController
-from wbc_suite.control import RobotState, composite_names
+from wbc_suite.control import RobotState
 from wbc_suite.control.composite.basic import BasicController, default_basic_config
 from wbc_suite.control.composite.registry import register_composite
 from wbc_suite.typing import Vector
@@ -236,19 +236,3 @@ def view_of(controller: Any, state: RobotState, models: Any) -> CompositeControl
 
 
 _VIEWS = {"WHOLE_BODY_IK": WholeBodyIK, "HYBRID_MOBILE_BASE": HybridMobileBase}
-
-
-class _Names:
-    """Names of composite controllers, in the form of a dictionary's keys."""
-
-    def __iter__(self) -> Any:
-        return iter(composite_names())
-
-    def __contains__(self, name: object) -> bool:
-        return name in composite_names()
-
-    def __len__(self) -> int:
-        return len(composite_names())
-
-
-ALL_COMPOSITE_CONTROLLERS = _Names()

