@@ -27,7 +27,8 @@ PARTS = ("right", "left", "torso", "head", "base", "legs")
 KEYS = ("type", SPECIFIC, "body_parts", "body_part_ordering")
 
 IGNORED_OF_PARTS = {
-    *("lite_physics", "policy_freq", "damping_ratio_limits"),
+    *("lite_physics", "policy_freq", "damping_ratio_limits", "damping_limits"),
+    "uncouple_pos_ori",
     *("control_ori", "ik_pos_limit", "ik_ori_limit", "ik_integration_dt", "ki", "kv"),
     *("ik_pseudo_inverse_damping", "ik_step_limit", "converge_steps", "ref_name"),
     *("use_action_scaling", "use_torque_compensation", "actuator_range", "eef_name"),

@@ -19,6 +19,7 @@ from wbc_suite.errors import ConfigError
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.elements import Camera, Frame, Mount, Sensor, Synergy
 from wbc_suite.robot.toml_export import write_toml
+from wbc_suite.scene.compose import ROBOT_VIEW
 from wbc_suite.typing import Vector
 
 GRASP_SITES = ("grip_site", "ee", "ee_site")
@@ -142,6 +143,7 @@ def arm_file(model: Any, robot: RobotDescription) -> str:
         robot,
         frames=tuple(frames),
         sensors=tuple(sensors),
+        cameras=tuple(c for c in robot.cameras if c.name != ROBOT_VIEW),
         keyframes={"ready": ready},
         mounts=tuple(Mount(name=arm, link=body) for arm, body in ends.items()),
     )

@@ -31,6 +31,11 @@ class Measured:
         return self.sim.data._data.qvel[self._ref_joint_vel_indexes]
 
     @property
+    def torques(self) -> Vector:
+        """Torques that its actuators exert, N m."""
+        return self.sim.data._data.qfrc_actuator[self._ref_joint_vel_indexes].copy()
+
+    @property
     def js_energy(self) -> Vector:
         """Absolute torques of its actuators times a control period."""
         force = self.sim.data._data.qfrc_actuator[self._ref_joint_vel_indexes]

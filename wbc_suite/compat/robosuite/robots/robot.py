@@ -248,6 +248,8 @@ def _mounted(
     """Return the model of the gripper on an arm."""
     gripper = object.__new__(cls)
     GripperModel.__init__(gripper, None, idn, robot=robot, prefix=prefix, arm=arm)
+    if not cls.__module__.startswith("wbc_suite."):
+        gripper.own_file = cls().own_file
     return gripper
 
 

@@ -39,13 +39,13 @@ def create_composite_robot(
     """
     if robot not in REGISTERED_ROBOTS:
         raise UnknownNameError("robot", robot, REGISTERED_ROBOTS)
-    chosen = load_robot(robot)
+    chosen = REGISTERED_ROBOTS[robot]()
     names = [grippers] if isinstance(grippers, str) else list(grippers or ())
     gripper = None
     if names:
-        sides = list(chosen.hands)
+        sides = list(chosen.description.hands)
         given = names * len(sides) if len(names) == 1 else names
-        gripper = dict(zip(sides, given, strict=False))
+        gripper = chosen._choice(dict(zip(sides, given, strict=False)))
     description = load_robot(robot, gripper=gripper, base=base)
 
     def __init__(self: ManipulatorModel, idn: int = 0) -> None:

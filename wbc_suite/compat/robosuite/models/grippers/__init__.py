@@ -70,6 +70,8 @@ class GripperModel(DescribedModel):
         own = self.description
         every = [] if robot is not None else [link.name for link in own.links]
         self._links = gripper_links(own, arm, frame) if frame else every
+        if self.own_file is not None and not own.synergies:  # alone, as read
+            self._links = [link.name for link in own.links]
 
     @property
     def name(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride] - its class's
@@ -137,7 +139,9 @@ class GripperModel(DescribedModel):
     def _moves(self, link: Any) -> bool:
         """Whether a link is moved by the gripper, not by the arm."""
         robot = self.description
+        own = self.own_file is not None and not robot.synergies  # alone, as read
         arms = {j for g, js in robot.groups.items() if g.endswith("arm") for j in js}
+        arms = set() if own else arms
         return link.joint.name not in arms
 
     @property

@@ -12,8 +12,8 @@ import pinocchio as pin
 
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.compat.robosuite.models.described import DescribedModel
-from wbc_suite.compat.robosuite.models.own_files import arm_file, gripper_file
-from wbc_suite.compat.robosuite.models.robots.passive_joints import with_passive_joints
+from wbc_suite.compat.robosuite.models.own_files import arm_file, changed, gripper_file
+from wbc_suite.compat.robosuite.models.robots.passive import with_passive_joints
 from wbc_suite.compat.robosuite.utils.transform_utils import euler2mat
 from wbc_suite.errors import UnknownNameError
 from wbc_suite.robot import RobotDescription, load_robot
@@ -133,9 +133,7 @@ class RobotModel(DescribedModel):
     def joints(self) -> list[str]:
         """Names of its joints in the scene, without those of grippers."""
         prefix, robot = self.naming_prefix, self.description
-        fingers = {
-            j for g, js in robot.groups.items() if g.endswith("gripper") for j in js
-        }
+        fingers = set(self._fingers())
         own = [j.name for j in robot.joints if j.mimic is None]
         return [prefix + name for name in own if name not in fingers]
 
@@ -172,6 +170,37 @@ class RobotModel(DescribedModel):
     def contact_geoms(self) -> list[str]:
         """Names of its geoms that collide."""
         return self._geoms("collision")
+
+    _contact_geoms = contact_geoms
+
+    def set_joint_attribute(self, attrib: str, values: Any, force: bool = True) -> None:
+        """Write armature, damping or frictionloss of its joints, one value or each.
+
+        Without `force` values other than 0 stay. Other attributes have no effect.
+        """
+        if attrib not in ("armature", "damping", "frictionloss"):
+            return
+        fingers, links = set(self._fingers()), self.description.links
+        joined = [x for x in links if x.joint and x.joint.mimic is None]
+        moved = [x for x in joined if x.joint and x.joint.name not in fingers]
+        given = dict(
+            zip(
+                (x.name for x in moved),
+                np.broadcast_to(values, len(moved)),
+                strict=True,
+            )
+        )
+        changes = {link.name: link for link in links}
+        for link in moved:
+            if link.joint and (force or not getattr(link.joint, attrib)):
+                value = {attrib: float(given[link.name])}
+                update = {"joint": link.joint.model_copy(update=value)}
+                changes[link.name] = link.model_copy(update=update)
+        self.description = changed(self.description, links=tuple(changes.values()))
+
+    def _fingers(self) -> list[str]:
+        groups = self.description.groups.items()
+        return [j for g, js in groups if g.endswith("gripper") for j in js]
 
     @property
     def visual_geoms(self) -> list[str]:
@@ -265,6 +294,8 @@ class ManipulatorModel(RobotModel):
     def eef_name(self) -> dict[str, str]:
         """Name of the body at the end of each arm."""
         prefix, robot = self.naming_prefix, self.description
+        if self.own_file is not None:
+            return {arm: prefix + self._eef_name[arm] for arm in robot.hands}
         return {arm: prefix + robot.link_of(f) for arm, f in robot.hands.items()}
 
 

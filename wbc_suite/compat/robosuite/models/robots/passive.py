@@ -1,4 +1,4 @@
-"""Armature, damping, friction and efforts of arms, as robosuite's models have them."""
+"""What robosuite's models of arms have that ours do not: passive values, inertias."""
 
 from typing import Any
 

@@ -1,0 +1,117 @@
+"""Parts of a composite controller, as robosuite's scripts see them."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from wbc_suite.control import RobotState
+from wbc_suite.typing import Vector
+
+
+class PartController:
+    """One part of a composite controller, as robosuite's scripts see it.
+
+    Attributes:
+        name: Type of the controller.
+        control_dim: Number of its action values.
+    """
+
+    def __init__(self, name: str, part: Any, state: RobotState) -> None:
+        self.part_name, self._part, self._state = name, part, state
+        config = getattr(part, "config", None)
+        self.name = getattr(config, "type", "GRIP").removeprefix("UNCOUPLED_")
+        self.control_dim = sum(len(s.labels) for s in part.slices)
+        self.joint_index = {
+            "joints": state.joint_addresses(part.law.joints)[1].tolist(),
+            "qpos": state.joint_addresses(part.law.joints)[0].tolist(),
+            "qvel": state.joint_addresses(part.law.joints)[1].tolist(),
+        }
+
+    def __getattr__(self, name: str) -> Any:
+        config = getattr(self.__dict__["_part"], "config", None)
+        if name.startswith("__") or not hasattr(config, name):
+            raise AttributeError(f"{self.name} has no attribute '{name}'.")
+        return getattr(config, name)
+
+    @property
+    def control_limits(self) -> tuple[Vector, Vector]:
+        """Least and greatest values of its slices of the action."""
+        slices = self._part.slices
+        low = np.concatenate([np.zeros(0), *(s.low for s in slices)])
+        return low, np.concatenate([np.zeros(0), *(s.high for s in slices)])
+
+    @property
+    def joint_pos(self) -> Vector:
+        """Positions of its joints."""
+        return self._state.data.qpos[self.joint_index["qpos"]]
+
+    @property
+    def joint_vel(self) -> Vector:
+        """Velocities of its joints."""
+        return self._state.data.qvel[self.joint_index["qvel"]]
+
+    @property
+    def kp(self) -> Vector:
+        """Present stiffness."""
+        return np.array(self._part.law.record["kp"]).ravel()
+
+    @property
+    def kd(self) -> Vector:
+        """Present damping."""
+        return np.array(self._part.law.record["kd"]).ravel()
+
+    @property
+    def goal_pos(self) -> Vector | None:
+        """Goal of the hand, in the axes of the goal, m; None without a hand."""
+        goal = self._part.goal
+        return None if isinstance(goal, np.ndarray) else np.array(goal.translation)
+
+    @property
+    def goal_ori(self) -> Any:
+        """Goal orientation of the hand as a matrix; None without a hand."""
+        goal = self._part.goal
+        return None if isinstance(goal, np.ndarray) else np.array(goal.rotation)
+
+    @property
+    def goal_qpos(self) -> Vector | None:
+        """Goal of the joints; None of a hand."""
+        goal = self._part.goal
+        return goal if isinstance(goal, np.ndarray) else None
+
+    @property
+    def ref_pos(self) -> Vector:
+        """Position of the hand in the world, m."""
+        return self._site("site_xpos")
+
+    @property
+    def ref_ori_mat(self) -> Any:
+        """Orientation of the hand in the world, shape (3, 3)."""
+        return self._site("site_xmat").reshape(3, 3)
+
+    def _site(self, field: str) -> Any:
+        state = self._state
+        frame = state.robot.hands[self.part_name]
+        site = state.model.site(state.prefix + frame).id
+        return np.array(getattr(state.data, field)[site])
+
+    def set_goal(self, action: Any) -> None:
+        """Take values of its slices of the action."""
+        self._part.set_goal(np.asarray(action, np.float64), 0.05)
+
+    def reset_goal(self) -> None:
+        """Hold the part where it is."""
+        self._part.reset(self._state)
+
+    def update_initial_joints(self, initial_joints: Any) -> None:
+        """Hold the part where it is; `set_robot_joint_positions` has moved it."""
+        self.reset_goal()
+
+    def update(self, force: bool = False) -> None:
+        """Do nothing: values are read when they are asked for."""
+
+    @property
+    def interpolator(self) -> Any:
+        """Whether it interpolates: None where it does not."""
+        ramp = getattr(self._part.config, "interpolation", None)
+        return None if ramp is None else SimpleNamespace(order=1)
