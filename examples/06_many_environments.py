@@ -1,4 +1,9 @@
-"""Step eight environments of one process in parallel threads."""
+"""Step eight environments of one process in parallel threads.
+
+With `--view` the first of them is shown in a browser.
+"""
+
+import sys
 
 import gymnasium
 import numpy as np
@@ -12,14 +17,21 @@ envs = gymnasium.make_vec(
     robots="Panda",
     reward_shaping=True,
     horizon=20,
+    render_mode="human" if "--view" in sys.argv else None,
 )
 observations, infos = envs.reset(seed=1)  # seeds 1 to 8
 envs.action_space.seed(1)
+first = envs.unwrapped.envs[0]  # type: ignore[attr-defined]
+if first.render_mode:
+    first.render()
+    input("Open this address in a browser, then press Enter. ")
 
 total, episodes = np.zeros(envs.num_envs), 0
 for _ in range(42):  # a finished episode is reset in the next step
     actions = envs.action_space.sample()
     observations, rewards, terminated, truncated, infos = envs.step(actions)
+    if first.render_mode:
+        first.render()
     total += rewards
     episodes += int((terminated | truncated).sum())
 envs.close()
