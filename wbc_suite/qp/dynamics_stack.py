@@ -278,8 +278,7 @@ class DynamicsStack:
                 worst = max(worst, Fallback.LEVEL)
                 continue
             if result is None:
-                lb, ub = stated.lb.copy(), stated.ub.copy()
-                *result, fallback = retreat(solver, stated, lb=lb, ub=ub)
+                *result, fallback = retreat(solver, stated)
             y, worst = result[0], max(worst, fallback)
             if level < levels[-1]:
                 kept = _row_space(np.concatenate([kept, J]))

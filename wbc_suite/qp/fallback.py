@@ -1,11 +1,11 @@
 """How a tick is solved where its active set is not found, or has no solution.
 
 A solver runs first. Where the first level has no solution, a ladder is descended,
-mildest rung first: relax inequality rows with slack; leave the acceleration window, as
-little as may be; keep it, and relax equality rows too; damped least squares within the
-joints' bounds; stand still. The bounds of position and velocity are kept on every rung.
-Limits come before the window: a robot that must brake harder than it can brakes as it
-can, where dropping the window let it jump by 6 rad/s between two ticks.
+mildest rung first: relax inequality rows with slack; relax equality rows too; damped
+least squares within the joints' bounds; stand still. The bounds of joints are kept on
+every rung, with the acceleration window: rows that nearly depend on each other have
+solutions of any speed, and without the window a robot that was to keep them was
+measured to jump by 37 rad/s in each tick.
 """
 
 from collections.abc import Sequence
@@ -34,9 +34,15 @@ class Ladder:
     """
 
     def __init__(
-        self, q: Vector, levels: Sequence[Level], tick: TickArrays, solver: QpSolver
+        self,
+        q: Vector,
+        levels: Sequence[Level],
+        tick: TickArrays,
+        solver: QpSolver,
+        overshoot_damping: Vector,
     ) -> None:
         self._q, self._levels, self._tick, self.solver = q, levels, tick, solver
+        self._overshoot_damping = overshoot_damping
         self._problems: dict[tuple[int, int], tuple[Problem, QpSolver]] = {}
 
     def reset(self) -> None:
@@ -58,11 +64,11 @@ class Ladder:
             result = checked_solve(solver, problem)
         if result is None:
             problem.weight = RETURN_WEIGHT * stiffness(level.arrays.tasks)
-            lb, ub = self._bounds_without_acceleration(dt)
             if is_finite:
-                *result, fallback = retreat(solver, problem, lb=lb, ub=ub)
-                level.qp.lower[:], level.qp.upper[:] = problem.lower, problem.upper
+                damping = float(self._overshoot_damping[0])
+                *result, fallback = retreat(solver, problem, damping=damping)
             else:
+                lb, ub = self._bounds_without_acceleration(dt)
                 still = np.clip(np.zeros(problem.nv), lb, ub)
                 result, fallback = (still, np.zeros(len(problem.upper))), Fallback.HOLD
         level.qp.x[:], level.qp.multipliers[:] = result
@@ -126,47 +132,22 @@ def checked_solve(solver: QpSolver, problem: Problem) -> tuple[Vector, Vector] |
 
 
 def retreat(
-    solver: QpSolver, problem: Problem, *, lb: Vector, ub: Vector
+    solver: QpSolver, problem: Problem, *, damping: float = 0.0
 ) -> tuple[Vector, Vector, Fallback]:
     """Return step, multipliers and rung for a problem that has no solution.
 
-    Its bounds may be replaced by lb and ub, those of position and velocity alone.
+    `damping` is added to that of relaxed rows, m^2/rad^2; see `overshoot`.
     """
     if result := _solve_with_loose_limits(solver, problem):
         return *result, Fallback.LIMITS
-    if result := _solve_without_window(solver, problem, lb, ub):
-        return *result, Fallback.ACCELERATION
-    if result := _solve_with_slack(solver, problem):
+    if result := _solve_with_slack(solver, problem, damping):
         return *result, Fallback.SLACK
     nothing = np.zeros(len(problem.upper))
     x = box_least_squares(problem.H, problem.c, problem.lb, problem.ub, _SWEEPS)
     if np.isfinite(x).all():
         return x, nothing, Fallback.BOX
-    return np.clip(np.zeros(problem.nv), lb, ub), nothing, Fallback.HOLD
-
-
-def _solve_without_window(
-    solver: QpSolver, problem: Problem, lb: Vector, ub: Vector
-) -> tuple[Vector, Vector] | None:
-    """Solve within wider bounds, leaving the acceleration window as little as may be.
-
-    The cost is joined by `w || dq - m ||^2`, m the middle of the window, w the largest
-    weight of a joint: without it the velocity is free, and the next tick's window is
-    around a wild one. On failure the problem is as it was.
-    """
-    low, high = np.maximum(problem.lb, lb), np.minimum(problem.ub, ub)
-    held = np.isfinite(low) & np.isfinite(high)
-    middle, w = np.zeros(problem.nv), np.zeros(problem.nv)
-    middle[held] = 0.5 * (low[held] + high[held])
-    w[held] = problem.H.diagonal().max()
-    calm = problem.copy()
-    calm.H += np.diag(w)
-    calm.c -= w * middle
-    calm.lb[:], calm.ub[:] = lb, ub
-    result = checked_solve(solver.fresh(), calm)
-    if result is not None:
-        problem.lb[:], problem.ub[:] = lb, ub
-    return result
+    still = np.clip(np.zeros(problem.nv), problem.lb, problem.ub)
+    return still, nothing, Fallback.HOLD
 
 
 def _solve_with_loose_limits(
@@ -185,7 +166,7 @@ def _loosened(problem: Problem) -> Problem:
 
 
 def _solve_with_slack(
-    solver: QpSolver, problem: Problem
+    solver: QpSolver, problem: Problem, damping: float
 ) -> tuple[Vector, Vector] | None:
     """Solve with equality rows as heavy tasks and slack s >= 0 on `G dq <= h + s`.
 
@@ -195,7 +176,7 @@ def _solve_with_slack(
     """
     relaxed = _loosened(problem.copy(equalities=False))
     A, b, weight = problem.A, problem.b, relaxed.weight
-    mu = np.abs(A).max(axis=1, initial=0.0) @ np.abs(b)
+    mu = damping + np.abs(A).max(axis=1, initial=0.0) @ np.abs(b)
     broken = np.maximum(0.0, -problem.wanted)
     mu += np.abs(problem.G).max(axis=1, initial=0.0) @ broken
     relaxed.H += weight * (A.T @ A + mu * np.eye(problem.nv))

@@ -20,12 +20,11 @@ class Fallback(IntEnum):
     LEVEL = 1
     LIMITS = 2
     """By the least that accelerations allow."""
-    ACCELERATION = 3
-    SLACK = 4
+    SLACK = 3
     """The bounds of joints are kept."""
-    BOX = 5
+    BOX = 4
     """Damped least squares."""
-    HOLD = 6
+    HOLD = 5
     """Inputs or results are not finite."""
 
     def __str__(self) -> str:
@@ -36,7 +35,6 @@ _SENTENCES = (
     "solved as stated",
     "a lower level could not be solved and was left out",
     "limit rows were relaxed",
-    "acceleration limits were dropped",
     "equality and limit rows were relaxed",
     "rows were left out, bounds of joints are kept",
     "the robot holds still",

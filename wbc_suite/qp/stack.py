@@ -123,7 +123,8 @@ class TaskStack:
         self.is_compiled = all(x.is_compiled for x in (rows, *self.levels))
         self._tick = self._make_arrays(results)
         self.v_previous: Vector = self._tick.v
-        self._ladder = Ladder(configuration.q, self.levels, self._tick, qp)
+        past = self._overshoot.damping
+        self._ladder = Ladder(configuration.q, self.levels, self._tick, qp, past)
         self.arrays = as_argument(self._tick)
         frames = [t for t in tasks if isinstance(t, FrameTask)]
         self._escape: Escape | None = None
@@ -243,8 +244,7 @@ class TaskStack:
     def problem(self) -> Problem:
         """Return the QP of the first level at the last tick, a buffer.
 
-        After a retreat its bounds are those without acceleration limits. Rows outside
-        their limit are soft, see `Problem`.
+        Rows outside their limit are soft, see `Problem`.
         """
         problem, _ = self._ladder.problem(0)
         self.levels[0].state(problem)

@@ -25,7 +25,7 @@ class QpFallback:
 
     def solve(self, qp: QpArrays) -> Fallback:
         """Write the optimum, or the nearest to it, to `qp.x`; return what it took."""
-        problem, n = self._problem, len(qp.x)
+        problem = self._problem
         problem.H[:] = qp.W.T @ qp.W + np.diag(qp.diagonal[0] + qp.mu[0])
         problem.c[:] = -(qp.W.T @ qp.e) - qp.diagonal[1]
         problem.rows[:] = qp.rows
@@ -33,7 +33,6 @@ class QpFallback:
         result, fallback = checked_solve(self._solver, problem), Fallback.NONE
         if result is None:
             problem.weight = SOFT
-            lb, ub = qp.lower[:n].copy(), qp.upper[:n].copy()
-            *result, fallback = retreat(self._solver, problem, lb=lb, ub=ub)
+            *result, fallback = retreat(self._solver, problem)
         qp.x[:] = result[0]
         return fallback
