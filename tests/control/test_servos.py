@@ -7,7 +7,8 @@ from wbc_suite.envs.hold_check import alone
 from wbc_suite.robot import load_robot
 
 KP = 40.0  # N m/rad; the upper joint carries 10 N m, and would sag by 0.25 rad
-ARM = f"""<mujoco><compiler angle="radian"/><default><joint damping="10"/></default><worldbody>
+ARM = f"""<mujoco><compiler angle="radian"/>
+<default><joint damping="10"/></default><worldbody>
 <body name="base" pos="0 0 1"><geom size="0.02" mass="1"/>
 <body name="upper"><joint name="shoulder" axis="0 1 0" range="-3 3"/>
 <geom type="capsule" fromto="0 0 0 0.4 0 0" size="0.03" mass="2"/>
