@@ -1,8 +1,8 @@
 """Define a device: three numbers in a UDP packet move the hand of a robot.
 
 Any program can send such packets. A device has three methods and needs no base class.
-With this file on the PYTHONPATH,
-`wbc-suite teleop --robots Panda --device own_device:UdpStick` uses it.
+
+    PYTHONPATH=examples wbc-suite teleop --robots Panda --device 09_own_device:UdpStick
 """
 
 import contextlib
