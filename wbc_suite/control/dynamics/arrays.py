@@ -240,23 +240,17 @@ def make_dynamics(
 ) -> WholeBodyDynamics:
     """Return the arrays of a robot; see `WholeBodyDynamics`."""
     n, f, h, u = len(qpos), len(feet), len(hands), len(upright)
-    is_free = dofs[0] >= 0
-    points = [len(foot.corners) for foot in feet]
-    edges = EDGES * sum(points)
-    rows = sum(6 if foot.sole else 3 for foot in feet) + 3 * u + 6 * h
-    rows += 6 if is_free else 0
-    rows += 0 if tracked is None else 6
-    place = np.full(nv, -1, dtype=np.int64)
-    place[dofs[dofs >= 0]] = np.arange(0 if is_free else 6, 6 + n)
-    W, diagonal = np.zeros((rows, edges + n)), np.zeros((2, edges + n))
-    rest = np.zeros(rows), diagonal, np.zeros(1)
+    is_free = int(dofs[0] >= 0)
+    edges = EDGES * sum(points := [len(foot.corners) for foot in feet])
+    rows = sum(6 if foot.sole else 3 for foot in feet) + 3 * u
+    rows += 6 * (h + is_free + (tracked is not None))
     state = readable(np.zeros(1, STATE))
     state["is_free"] = is_free
     return WholeBodyDynamics(
         state=state,
         dofs=np.array(dofs, dtype=np.int64),
         qpos=np.array(qpos, dtype=np.int64),
-        place=place,
+        place=_places(dofs, nv),
         terms=_make_terms(n, edges),
         site=np.array([foot.site for foot in feet], dtype=np.int64),
         middle=np.array([foot.middle for foot in feet]).reshape(-1, 3),
@@ -285,8 +279,22 @@ def make_dynamics(
         measured=make_measured(f),
         plan=make_plan(f),
         tracked=tracked or still_motion(np.zeros(7), np.zeros(n)),
-        qp=make_qp_arrays(W, *rest, inequalities=2 * n),
+        qp=_make_qp(rows, edges, n),
     )
+
+
+def _places(dofs: Indices, nv: int) -> Indices:
+    """Return the column of each degree of freedom of the scene, (nv,)."""
+    place, known = np.full(nv, -1, dtype=np.int64), dofs >= 0
+    place[dofs[known]] = np.flatnonzero(known)
+    return place
+
+
+def _make_qp(rows: int, edges: int, n: int) -> QpArrays:
+    """Return the arrays of a QP with torque limits of n joints."""
+    W, diagonal = np.zeros((rows, edges + n)), np.zeros((2, edges + n))
+    rest = np.zeros(rows), diagonal, np.zeros(1)
+    return make_qp_arrays(W, *rest, inequalities=2 * n)
 
 
 def still_motion(start: Vector, joints: Vector) -> Tracked:
