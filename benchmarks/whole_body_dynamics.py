@@ -361,8 +361,8 @@ class Trial:
             "slip": 1e3 * float(slip) if steps == 0 else np.nan,
             "hand": errors,
             "change": float(np.median(self.changes)) if self.changes else np.nan,
-            "reported": self.arrays.state["fell"][0] >= 0.0,
-            "late": not survived and not self.told < 0.2,
+            "reported": bool(self.arrays.state["fell"][0] >= 0.0),
+            "late": bool(self.drop > 0.2 and not self.told < 0.2),
             "unnamed": sum(
                 not hand["reached"] and not list(hand["reasons"])
                 for hand in frames.values()
