@@ -87,7 +87,7 @@ class Tray:
             name: SimpleNamespace(position=np.array([x, 0.0, 0.01]))
             for name, x in (("a", 0.0), ("b", 1.0))
         }
-        self.held, self.hand = set(), 1.0
+        self.held, self.moving, self.hand = set(), set(), 1.0
 
     def place(self, *names):
         for name, state in self.states.items():
@@ -98,6 +98,9 @@ class Tray:
 
     def grasped(self, name):
         return name in self.held
+
+    def rests(self, name):
+        return name not in self.moving
 
 
 def sorting(tray, *, pick_one=False):
@@ -143,6 +146,8 @@ def test_objects_count_once_they_lie_and_are_left():
     tray.hand, tray.held = 1.0, {"b"}
     assert not rules.success()
     assert 0.5 <= rules.progress() < 1.0
+    tray.held, tray.moving = set(), {"b"}
+    assert not rules.success()
 
 
 def test_the_best_of_the_others_is_rewarded():
