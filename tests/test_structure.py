@@ -32,7 +32,8 @@ ADDED = (
     # experts
     *("experts/", "scene/objects/grasp_site", "cli/expert"),
     # imports of other robots
-    *("envs/hold_check", "robot/mjcf_import_constraints"),
+    *("envs/hold_check", "robot/mjcf_import_constraints", "robot/contact_pairs"),
+    "robot/working_posture",
     # robosuite, and models for accelerators
     *("compat/robosuite/", "envs/exporting"),
     # evaluation, LeRobot
@@ -44,6 +45,8 @@ ADDED = (
     *("devices/pipeline/fingertips", "viewers/headset_view"),
     # checks of messages and caches
     *("viewers/page_messages", "kernel_cache", "cli/interrupts"),
+    # stacks that cannot come to rest, the page's pictures
+    *("qp/motion", "qp/overshoot", "viewers/camera_pictures", "viewers/tracking_plots"),
 )
 """Rooms that came after the bounds were set."""
 
@@ -264,7 +267,7 @@ def test_inheritance_is_shallow():
 
 
 @pytest.mark.xfail(
-    reason="about 650 lines too many, with later changes of older rooms", strict=False
+    reason="about 1,600 lines too many, with later changes of older rooms", strict=False
 )
 def test_the_package_is_small():
     counted = [path for path in TREES if not place(path).startswith(ADDED)]

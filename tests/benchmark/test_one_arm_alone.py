@@ -15,7 +15,8 @@ HOLDING = [(True, True), (True, False), (False, True), (False, False)]
 
 def hold(monkeypatch, task, holding):
     for hand, holds in zip(task.hands, holding, strict=True):
-        monkeypatch.setattr(hand, "grasps", lambda geoms, holds=holds: holds)
+        for measure in ("grasps", "clamps"):
+            monkeypatch.setattr(hand, measure, lambda geoms, holds=holds: holds)
 
 
 @pytest.mark.parametrize(("robots", "way"), WAYS)

@@ -37,7 +37,7 @@ HEAVIEST, HEAVIEST_MOMENT = 120.0, 8.0
 """N and N m; greatest load."""
 
 AT_STOP = 0.01
-"""rad or m; so near to its limit a joint's stop may act, and loads are not observed."""
+"""rad or m; so near to its limit a joint's stop may act, and an estimated load fades."""
 
 DAMPING = 1e-3
 """m^2; damps the wrench in directions that the arm does not feel."""
@@ -150,7 +150,7 @@ def _observe_loads(physics: Physics, body: WholeBodyDynamics) -> None:
         write_frame_terms(physics, body, int(physics.site_bodyid[body.hand[k]]), p)
         change = _missing_wrench(body, k, residual)
         if _is_at_stop(physics, body, k):
-            change[:] = 0.0
+            change[:] = -load
         for r in range(6):
             part = min(max(change[r], -STRONGEST_CHANGE), STRONGEST_CHANGE)
             most = HEAVIEST if r < 3 else HEAVIEST_MOMENT
