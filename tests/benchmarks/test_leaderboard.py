@@ -61,8 +61,8 @@ def test_what_does_not_fit_is_left_out_with_its_reason(tmp_path):
     report = json.loads(path.read_text())
     fits, not_fits = report["rows"]
     assert fits["settling_s"] < 2.0
-    assert "fixed root" in not_fits["left_out"]
-    assert "fixed root" in page(report)
+    assert "no base that drives" in not_fits["left_out"]
+    assert "no base that drives" in page(report)
 
 
 def test_the_page_ranks_by_the_circle():
