@@ -6,7 +6,7 @@ import pytest
 from wbc_suite.envs.hold_check import alone
 from wbc_suite.robot import load_robot
 
-KP = 40.0  # N m/rad; the upper joint carries 10 N m, and would sag by 0.25 rad
+KP = 40.0  # N m/rad; the upper joint carries 7 N m, and would sag by 0.18 rad
 ARM = f"""<mujoco><compiler angle="radian"/>
 <default><joint damping="10"/></default><worldbody>
 <body name="base" pos="0 0 1"><geom size="0.02" mass="1"/>
@@ -32,5 +32,7 @@ def test_a_weak_servo_holds_a_posture_without_sag(tmp_path):
     for _ in range(20):
         env.step(env.hold_action)
     assert np.abs(data.qfrc_actuator).max() > 5.0
-    assert data.qpos == pytest.approx([0.1, 0.3], abs=1e-3)
+    # At rest the torque is the weight; the goal moves while the first torque builds up.
+    assert data.qfrc_actuator == pytest.approx(data.qfrc_bias, abs=1e-6)
+    assert data.qpos == pytest.approx([0.1, 0.3], abs=5e-3)
     env.close()
