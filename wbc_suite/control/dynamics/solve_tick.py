@@ -37,7 +37,7 @@ HEAVIEST, HEAVIEST_MOMENT = 120.0, 8.0
 """N and N m; greatest load."""
 
 AT_STOP = 0.01
-"""rad or m; so near to its limit a joint's stop may act, and an estimated load fades."""
+"""rad or m; so near to its limit a joint's stop may act, and estimated loads fade."""
 
 DAMPING = 1e-3
 """m^2; damps the wrench in directions that the arm does not feel."""
