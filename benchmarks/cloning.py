@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from harness.report import Report, machine, options
+from harness.report import Report, machine, options, write_between
 
 from wbc_suite.evaluation import success_interval
 from wbc_suite.evaluation.generation import Plan, generate
@@ -35,7 +35,6 @@ SCRIPTS = ROOT / "examples" / "learning"
 DATA = ROOT / "artifacts" / "benchmarks" / "cloning"
 FOUND, PAGE = ROOT / "docs" / "learning.json", ROOT / "docs" / "learning.md"
 PLOT = ROOT / "docs" / "images" / "cloning.png"
-BEGIN, END = "<!-- results -->", "<!-- end of results -->"
 KINDS = {"plain": (0.0, 0.0), "noise": (1.0, 0.0), "recoveries": (0.0, 1.0)}
 KINDS |= {"both": (1.0, 1.0), "strong": (4.0, 1.0)}
 """Shares of a benchmark's noise, and of its pushes."""
@@ -229,9 +228,7 @@ def draw(rows: list[dict[str, Any]]) -> None:
 
 def write_page(rows: list[dict[str, Any]]) -> None:
     """Write the table into the page of the documentation, and draw its plot."""
-    text = PAGE.read_text(encoding="utf-8")
-    before, after = text.split(BEGIN)[0], text.split(END)[1]
-    PAGE.write_text(f"{before}{BEGIN}\n\n{table(rows)}\n\n{END}{after}", "utf-8")
+    write_between(PAGE, table(rows))
     draw(rows)
 
 

@@ -17,7 +17,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from harness.report import Report, machine, options
+from harness.report import Report, machine, options, write_between
 
 import wbc_suite
 from wbc_suite.evaluation import success_interval
@@ -26,7 +26,6 @@ from wbc_suite.evaluation.rollouts import run_episode
 ROOT = Path(__file__).parent.parent
 FOUND = ROOT / "artifacts" / "benchmarks" / "experts_table.json"
 PAGE = ROOT / "docs" / "experts.md"
-BEGIN, END = "<!-- results -->", "<!-- end of results -->"
 LONG = ("TwoArmTransport", "ToolHang", "NutAssembly", "PickPlace")
 ALL = (
     *("Lift", "Stack"),
@@ -90,9 +89,7 @@ def table(rows: list[dict[str, Any]]) -> str:
 
 def write_page(rows: list[dict[str, Any]]) -> None:
     """Write the table into the page of the documentation."""
-    text = PAGE.read_text(encoding="utf-8")
-    before, after = text.split(BEGIN)[0], text.split(END)[1]
-    PAGE.write_text(f"{before}{BEGIN}\n\n{table(rows)}\n\n{END}{after}", "utf-8")
+    write_between(PAGE, table(rows))
 
 
 def add(row: dict[str, Any]) -> None:

@@ -29,14 +29,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from harness.report import Report, machine, options
+from harness.report import Report, machine, options, write_between
 
 ROOT = Path(__file__).parent.parent
 SCRIPTS = ROOT / "examples" / "learning"
 FOUND, PAGE = ROOT / "docs" / "learning.json", ROOT / "docs" / "learning.md"
 PLOT = ROOT / "docs" / "images" / "sac.png"
 PUBLISHED = ROOT / "benchmarks" / "peers" / "sac_published.json"
-BEGIN, END = "<!-- SAC -->", "<!-- end of SAC -->"
+MARKS = "<!-- SAC -->", "<!-- end of SAC -->"
 BENCHMARKS = (
     *("Lift", "Door", "Stack", "NutAssemblyRound", "PickPlaceCan", "Wipe"),
     *("TwoArmLift", "TwoArmPegInHole", "TwoArmHandover"),
@@ -192,9 +192,7 @@ def draw(rows: list[dict[str, Any]]) -> None:
 
 def write_page(rows: list[dict[str, Any]]) -> None:
     """Write the table into the page of the documentation, and draw its plot."""
-    text = PAGE.read_text(encoding="utf-8")
-    before, after = text.split(BEGIN)[0], text.split(END)[1]
-    PAGE.write_text(f"{before}{BEGIN}\n\n{table(rows)}\n\n{END}{after}", "utf-8")
+    write_between(PAGE, table(rows), MARKS)
     draw(rows)
 
 

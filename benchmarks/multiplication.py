@@ -23,7 +23,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from harness.report import Report, machine, options
+from harness.report import Report, machine, options, write_between
 
 import wbc_suite
 from wbc_suite.evaluation import success_interval
@@ -36,7 +36,6 @@ ROOT = Path(__file__).parent.parent
 FOLDER = ROOT / "artifacts" / "benchmarks"
 FOUND = FOLDER / "multiplication.json"
 PAGE = ROOT / "docs" / "multiplication.md"
-BEGIN, END = "<!-- results -->", "<!-- end of results -->"
 PUBLISHED = {
     "Stack": 94.3,
     "NutAssemblySquare": 73.7,
@@ -145,9 +144,7 @@ def table(rows: list[dict[str, Any]]) -> str:
 def write_page(rows: list[dict[str, Any]]) -> None:
     """Write the table into the page of the documentation."""
     rows = sorted(rows, key=lambda row: CASES.index(row["case"]))
-    text = PAGE.read_text(encoding="utf-8")
-    before, after = text.split(BEGIN)[0], text.split(END)[1]
-    PAGE.write_text(f"{before}{BEGIN}\n\n{table(rows)}\n\n{END}{after}", "utf-8")
+    write_between(PAGE, table(rows))
 
 
 def main() -> None:

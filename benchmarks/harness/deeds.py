@@ -6,6 +6,7 @@ the simulation.
 """
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from typing import Any
 
@@ -37,7 +38,7 @@ SLOW = 0.05  # m/s, of things at rest
 RISE, RISES = 0.06, 14  # m, and actions, by which hands raise what they hold
 
 
-class Judge:
+class Judge(ABC):
     """Watches an episode; `env` was reset."""
 
     def __init__(self, env: RobotEnv) -> None:
@@ -47,10 +48,11 @@ class Judge:
 
     def after_step(self) -> str | None:
         """Look at the state after an action; return a deed that was feigned, if any."""
+        return None
 
+    @abstractmethod
     def verdict(self) -> str | None:
         """Return why the task is not done, or None."""
-        raise NotImplementedError
 
     def wait(self, seconds: float, forces: dict[int, Any] | None = None) -> None:
         """Let physics go on without robots, with forces on bodies, N."""

@@ -13,7 +13,19 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-__all__ = ["Report", "cell", "heading", "look_up", "options", "rows_with"]
+__all__ = [
+    "RESULTS",
+    "Report",
+    "cell",
+    "heading",
+    "look_up",
+    "options",
+    "rows_with",
+    "write_between",
+]
+
+RESULTS = "<!-- results -->", "<!-- end of results -->"
+"""Marks around the table of a page."""
 
 PACKAGES = ("wbc-suite", "mujoco", "pin", "numba", "numpy", "daqp", "mink", "pin-pink")
 
@@ -154,3 +166,10 @@ def _own_versions() -> dict[str, str]:
         except PackageNotFoundError:
             continue
     return found
+
+
+def write_between(page: Path, table: str, marks: tuple[str, str] = RESULTS) -> None:
+    """Write a table between two marks of a page of the documentation."""
+    text, (begin, end) = page.read_text(encoding="utf-8"), marks
+    before, after = text.split(begin)[0], text.split(end)[1]
+    page.write_text(f"{before}{begin}\n\n{table}\n\n{end}{after}", "utf-8")
