@@ -4,8 +4,8 @@ Each try is a short episode of random moves: of a thing (thrown at a goal, broug
 it by a force that holds it and lets go, pushed) and of the robots (still, struck at
 things, at random, or as their expert moves up to some step). Forces move things, so
 physics holds. Half of the tries change one that came near: the shaped reward of an
-episode says how near. At a success a judge looks whether the deed was done, see
-`harness/deeds.py`.
+episode says how near. At a success a check looks whether the task was done, see
+`harness/task_checks.py`.
 
 Usage: python benchmarks/false_success.py [BENCHMARK ...] [--tries 10000] [--seed 0]
     [--quick] [--json FILE]
@@ -19,8 +19,8 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from harness.deeds import JUDGES, Judge
 from harness.report import Report, options
+from harness.task_checks import CHECKS, Check
 
 import wbc_suite
 from wbc_suite.benchmark import Door, TwoArmPegInHole, Wipe
@@ -93,24 +93,24 @@ class Search:
             self._experts = [_recorded(self.env, scene) for scene in range(SCENES)]
         return self._experts
 
-    def judge(self) -> Judge:
-        """Return a judge of the present episode."""
+    def check(self) -> Check:
+        """Return a check of the present episode."""
         kinds = type(self.benchmark).__mro__
-        return next(JUDGES[kind] for kind in kinds if kind in JUDGES)(self.env)
+        return next(CHECKS[kind] for kind in kinds if kind in CHECKS)(self.env)
 
     def attempt(self) -> Attack:
         """Make one try, and keep it if it came near."""
         attack = self._draw()
         self.tries += 1
-        nearest, judged = 0.0, None
+        nearest, found = 0.0, None
         with suppress(PhysicsError):  # physics that broke ends a try
-            for reward, judged in self.run(attack):
-                nearest = max(nearest, reward * (judged is None))
-        if judged == "":
+            for reward, found in self.run(attack):
+                nearest = max(nearest, reward * (found is None))
+        if found == "":
             self.done += 1
-        elif judged is not None:
+        elif found is not None:
             self.found.append(
-                asdict(attack) | {"numbers": attack.numbers.tolist(), "why": judged}
+                asdict(attack) | {"numbers": attack.numbers.tolist(), "why": found}
             )
         self._elite.append((nearest, self.tries, attack))
         self._elite = sorted(self._elite, key=lambda one: one[:2])[-ELITE:]
@@ -133,9 +133,9 @@ class Search:
         )
 
     def run(self, attack: Attack) -> Iterator[tuple[float, str | None]]:
-        """Yield reward and judgement after each action; the latter ends a try.
+        """Yield reward and checkment after each action; the latter ends a try.
 
-        The judgement is None without a success, "" for one that is deserved, or else
+        The checkment is None without a success, "" for one that is deserved, or else
         what is wrong with it.
         """
         env, draw, actions = self.env, Draw(attack.numbers), list[Vector]()
@@ -143,28 +143,28 @@ class Search:
             actions = self.recorded()[attack.scene]
             actions = actions[: draw.whole(len(actions))]
         env.begin(attack.scene)
-        judge = self.judge()
+        check = self.check()
         for action in actions:
-            yield self._advance(judge, action)
+            yield self._advance(check, action)
         cell = Workcell(env, self.benchmark, np.random.default_rng(0))
         act = self._robot(attack.robot, draw, cell)
         move = self._move(attack.move, draw, cell)
         for k in range(STEPS):
             self.data.xfrc_applied[:] = 0.0
             move(k)
-            reward, judged = self._advance(judge, act(k))
-            yield reward, judged
-            if judged is not None:
+            reward, found = self._advance(check, act(k))
+            yield reward, found
+            if found is not None:
                 return
 
-    def _advance(self, judge: Judge, action: Vector) -> tuple[float, str | None]:
+    def _advance(self, check: Check, action: Vector) -> tuple[float, str | None]:
         reward, _, _, info = self.env.advance(action)
         if "physics_error" in info:
             raise PhysicsError(info["physics_error"])
-        wrong = judge.after_step()
+        wrong = check.after_step()
         free = not self.data.xfrc_applied.any()  # a force may hold what cannot stay
         if wrong is None and info["success"] and free:
-            wrong = judge.verdict() or ""
+            wrong = check.fault() or ""
         return reward, wrong
 
     def _bodies(self) -> list[int]:

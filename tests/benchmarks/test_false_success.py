@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 from false_success import ALL, Search
-from harness.deeds import JUDGES
+from harness.task_checks import CHECKS
 
 from wbc_suite.benchmark import Lift
 from wbc_suite.benchmark.base import load_benchmark
 
 
-def test_every_benchmark_that_is_searched_has_a_judge():
+def test_every_benchmark_that_is_searched_has_a_check():
     for name in ALL:
         kinds = type(load_benchmark(name)).__mro__
-        assert any(kind in JUDGES for kind in kinds), name
+        assert any(kind in CHECKS for kind in kinds), name
 
 
 @pytest.mark.slow
@@ -42,15 +42,15 @@ def test_none_is_found_in_a_few_tries(name):
 @pytest.mark.slow
 def test_a_success_of_the_expert_is_no_false_one():
     search = Search("Stack", seed=0)
-    env, judge = search.env, None
+    env, check = search.env, None
     for scene, actions in enumerate(search.recorded()):
         env.begin(scene)
-        judge = search.judge()
+        check = search.check()
         for action in actions:
             *_, info = env.advance(action)
-            assert judge.after_step() is None
+            assert check.after_step() is None
         assert info["success"]
-        assert judge.verdict() is None
+        assert check.fault() is None
 
 
 @pytest.mark.slow

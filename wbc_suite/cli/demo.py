@@ -90,7 +90,7 @@ def _reach(
     """Move frames along figures; return errors (n, frames) m, times (n,) s, pictures.
 
     Raises:
-        PhysicsError: If the robot falls.
+        WbcError: If the robot falls.
     """
     import numpy as np
 

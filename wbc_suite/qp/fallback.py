@@ -31,6 +31,7 @@ class Ladder:
 
     The levels are as `solve_tick` has stated them at the positions q. The solver is for
     the first level; a fresh one of its kind is made for each size of problem below.
+    `overshoot_damping`, shape (1,), also damps relaxed rows; see `overshoot`.
     """
 
     def __init__(

@@ -10,9 +10,8 @@ from wbc_suite.qp.overshoot import turned
 from wbc_suite.qp.report import TickRecord
 from wbc_suite.typing import Vector
 
-AT_REST = (
-    0.005  # rad/s or m/s; slower joints stand, and change speed by less than twice
-)
+AT_REST = 0.005
+"""rad/s or m/s; slower joints stand, and change speed by less than twice that."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.errors import DescriptionError, did_you_mean, join_first
-from wbc_suite.robot.contact_pairs import overlapping_links, without_idle_pairs
+from wbc_suite.robot.contact_pairs import exclude_never_colliding, overlapping_links
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.elements import Contacts
 from wbc_suite.robot.importing import (
@@ -95,7 +95,7 @@ def read_urdf(
             *(path, join_first(shown, limit=12)),
         )
         robot = robot.model_copy(update={"contacts": Contacts(exclude=pairs)})
-    return without_idle_pairs(robot)
+    return exclude_never_colliding(robot)
 
 
 class _Importer:

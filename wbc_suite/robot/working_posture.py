@@ -17,8 +17,8 @@ TRIED = 40  # best postures that are checked for contacts
 PLACE = (0.55, 0.0, -0.15)
 """Where a hand is best, from the first joint of its arm, as part of its length."""
 ABOVE = 0.25  # its least height over the root, likewise
-FORWARD, MARGIN, TWIST = 0.5, 0.2, 1.0
-"""Costs of the distance from there, of joint limits, and of turns from `ready`."""
+FORWARD, MARGIN = 0.5, 0.2
+"""Costs of the distance from there, and of joint limits."""
 FLOOR = 0.05  # m; least height of a hand over the root
 PARALLEL = 0.9  # least cosine between two axes that are each other's mirror images
 ENDLESS = np.pi  # rad; range of a joint without one
@@ -40,9 +40,9 @@ def working_arms(robot: RobotDescription) -> dict[str, float]:
 
     Random postures of each arm are compared. With the Jacobian J of the hand, its
     linear part divided by the arm's length L, the hand's place p in front of the first
-    joint, joints u from -1 to 1 in their ranges, and q0 of `ready`, it has the greatest
+    joint, and joints u from -1 to 1 in their ranges, the best has the greatest
 
-        sigma_min(J) - 0.5 |p_hand - p| / L - 0.2 sum(u^8) - mean((q - q0)^2) / pi^2
+        sigma_min(J) - 0.5 |p_hand - p| / L - 0.2 sum(u^8)
 
     and no contacts beyond those of `ready`, in which other joints stay. A left arm is
     the mirror image of the right one where their joints allow it. An arm whose postures

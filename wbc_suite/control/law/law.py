@@ -14,8 +14,8 @@ DECELERATION = 10.0
 """rad/s^2 or m/s^2; joints stop at their limits with it unless the robot's description
 gives another. Arms of the catalogue can do so carrying themselves."""
 
-NOTICED = 0.1
-"""Part of a joint's inertia above which implicit damping counts."""
+LEAST_SHARE = 0.1
+"""Of a joint's inertia; less that implicit damping adds is left out."""
 
 FOREVER = np.inf
 """s; a reference that moves until it is replaced."""
@@ -60,12 +60,12 @@ class Law:
         drives["command_max"] = np.where(limited, limits[:, 1], np.inf)
         drives["gain"] = 1.0
         if kind != LawKind.SERVO:
-            self._see_through_servos(state.model)
+            self._read_servos(state.model)
         drives["position_min"], drives["position_max"] = -np.inf, np.inf
         drives["velocity_max"], drives["deceleration"] = np.inf, DECELERATION
         drives["windup_max"], drives["correction_max"] = np.inf, np.inf
 
-    def _see_through_servos(self, m: mujoco.MjModel) -> None:
+    def _read_servos(self, m: mujoco.MjModel) -> None:
         """Read how servos make forces, and the damping that a step treats implicitly.
 
         In a step h, a joint of damping D moves as if it had h D more inertia. That is
@@ -83,8 +83,10 @@ class Law:
         drives["command_min"] = np.where(servo, limits[:, 0], low)
         drives["command_max"] = np.where(servo, limits[:, 1], high)
         damping = m.dof_damping.reshape(m.nv, -1)[dof, 0] + drives["damping"]
-        lag = m.opt.timestep * damping
-        drives["lag"] = np.where(lag > NOTICED * m.dof_M0[dof], lag, 0.0)
+        added = m.opt.timestep * damping
+        drives["implicit_inertia"] = np.where(
+            added > LEAST_SHARE * m.dof_M0[dof], added, 0.0
+        )
 
     def reset(self, state: RobotState) -> None:
         """Reset the disturbance observer."""

@@ -146,7 +146,8 @@ def write_law_commands(
             command = reference_at(law, drive)[0] + bias
         else:
             bias -= law.compensation * physics.qfrc_passive[dof]
-            force = physics.force[dof] + drive.lag * physics.acceleration[dof]
+            force = physics.force[dof]
+            force += drive.implicit_inertia * physics.acceleration[dof]
             command = force + bias - drive.disturbance
         drive.command = min(max(command, drive.command_min), drive.command_max)
         drive.saturation = drive.command - command

@@ -64,7 +64,7 @@ DRIVE = np.dtype(
         ("gain", "f8"),
         ("stiffness", "f8"),  # N m/rad or N/m; 0 of a motor
         ("damping", "f8"),  # N m s/rad or N s/m
-        ("lag", "f8"),  # inertia that implicit damping adds in a step, kg m^2 or kg
+        ("implicit_inertia", "f8"),  # of damping in a step, kg m^2 or kg
         ("position", "f8"),  # reference after s seconds:
         ("velocity", "f8"),  #   position + velocity s + acceleration s^2 / 2
         ("acceleration", "f8"),  # + jerk s^3 / 6

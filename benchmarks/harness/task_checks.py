@@ -1,7 +1,7 @@
-"""Judges of deeds: was a benchmark's task done, by other means than its success says.
+"""Checks whether a task was done, by other means than the benchmark's own success.
 
-Judges look at geometry and at what physics does next. `after_step` watches an episode;
-`verdict` is asked at the first success, returns what is wrong or None, and may change
+They look at geometry and at what physics does next. `after_step` watches an episode;
+`fault` is asked at the first success, returns what is wrong or None, and may change
 the simulation.
 """
 
@@ -38,7 +38,7 @@ SLOW = 0.05  # m/s, of things at rest
 RISE, RISES = 0.06, 14  # m, and actions, by which hands raise what they hold
 
 
-class Judge(ABC):
+class Check(ABC):
     """Watches an episode; `env` was reset."""
 
     def __init__(self, env: RobotEnv) -> None:
@@ -47,11 +47,11 @@ class Judge(ABC):
         self.cell: Workcell[Any] = Workcell(env, env.benchmark, np.random.default_rng())
 
     def after_step(self) -> str | None:
-        """Look at the state after an action; return a deed that was feigned, if any."""
+        """Look at the state after an action; return what was feigned, or None."""
         return None
 
     @abstractmethod
-    def verdict(self) -> str | None:
+    def fault(self) -> str | None:
         """Return why the task is not done, or None."""
 
     def wait(self, seconds: float, forces: dict[int, Any] | None = None) -> None:
@@ -103,10 +103,10 @@ class Judge(ABC):
         return None
 
 
-class LiftJudge(Judge):
+class LiftCheck(Check):
     """A hand must carry the cube."""
 
-    def verdict(self) -> str | None:
+    def fault(self) -> str | None:
         """Raise the nearest hand."""
         table = self.benchmark.config.table.center[2]
         at = self.cell.object("cube").position
@@ -114,10 +114,10 @@ class LiftJudge(Judge):
         return self.carried("cube", [int(np.argmin(far))], table + 0.04)
 
 
-class StackJudge(Judge):
+class StackCheck(Check):
     """Without robots the small cube must lie on the large one."""
 
-    def verdict(self) -> str | None:
+    def fault(self) -> str | None:
         """Wait, then measure the distance of the middles."""
         self.wait(1.0)
         config = self.benchmark.config
@@ -130,10 +130,10 @@ class StackJudge(Judge):
         return self.moving(["cubeA", "cubeB"])
 
 
-class PickPlaceJudge(Judge):
+class PickPlaceCheck(Check):
     """Without robots things must lie on the floor of their quadrants."""
 
-    def verdict(self) -> str | None:
+    def fault(self) -> str | None:
         """Wait, then look where things lie."""
         self.wait(1.0)
         config, names = self.benchmark.config, self.benchmark.sorting.active
@@ -148,10 +148,10 @@ class PickPlaceJudge(Judge):
         return self.moving(names)
 
 
-class NutJudge(Judge):
+class NutCheck(Check):
     """Without robots nuts cannot be pulled away from their pegs."""
 
-    def verdict(self) -> str | None:
+    def fault(self) -> str | None:
         """Pull each nut to four sides."""
         self.wait(1.0)
         for name in self.benchmark.sorting.active:
@@ -165,10 +165,10 @@ class NutJudge(Judge):
         return None
 
 
-class ToolHangJudge(Judge):
+class ToolHangCheck(Check):
     """Without robots the frame stands, and the wrench hangs although it is pushed."""
 
-    def verdict(self) -> str | None:
+    def fault(self) -> str | None:
         """Wait, then push the wrench to both sides of the frame's arm."""
         self.wait(1.0)
         side = 0.3 * self.cell.object("frame").rotation[:, 1]
@@ -183,10 +183,10 @@ class ToolHangJudge(Judge):
         return None
 
 
-class TransportJudge(Judge):
+class TransportCheck(Check):
     """Without robots things must lie in their bins."""
 
-    def verdict(self) -> str | None:
+    def fault(self) -> str | None:
         """Wait, then look where things lie."""
         self.wait(1.0)
         length, width, _ = self.benchmark.config.bin.size
@@ -199,10 +199,10 @@ class TransportJudge(Judge):
         return self.moving(GOALS)
 
 
-class TwoArmLiftJudge(Judge):
+class TwoArmLiftCheck(Check):
     """Both hands must carry the pot."""
 
-    def verdict(self) -> str | None:
+    def fault(self) -> str | None:
         """Raise both hands."""
         half, table = self.benchmark.config.pot.half_size[2], self.benchmark.config
         found = self.carried(POT, (0, 1), table.table.center[2] + half + 0.1)
@@ -210,7 +210,7 @@ class TwoArmLiftJudge(Judge):
         return found if found or level else "the pot is tilted"
 
 
-class HandoverJudge(Judge):
+class HandoverCheck(Check):
     """Arm 1 alone must carry what arm 0 alone has carried before."""
 
     def __init__(self, env: RobotEnv) -> None:
@@ -232,7 +232,7 @@ class HandoverJudge(Judge):
         self.given += raised and first and not second and not self.taken
         self.taken += raised and first and second
 
-    def verdict(self) -> str | None:
+    def fault(self) -> str | None:
         """Raise the hand of arm 1."""
         if not self.given:
             return "arm 0 has not carried the hammer"
@@ -240,7 +240,7 @@ class HandoverJudge(Judge):
         return self.carried(HAMMER, [1], table + 0.05)
 
 
-class DoorJudge(Judge):
+class DoorCheck(Check):
     """The lever must have been turned before the door opened."""
 
     def __init__(self, env: RobotEnv) -> None:
@@ -253,12 +253,12 @@ class DoorJudge(Judge):
         hinge = self.data.joint("door_panel_joint").qpos.item()
         self.forced |= hinge > 0.05 and self.turned < 1.0
 
-    def verdict(self) -> str | None:
+    def fault(self) -> str | None:
         """Look at what was noted."""
         return "the latch was forced" if self.forced else None
 
 
-class WipeJudge(Judge):
+class WipeCheck(Check):
     """Each mark must be wiped by a shape of the hand that lies on it."""
 
     def __init__(self, env: RobotEnv) -> None:
@@ -296,12 +296,12 @@ class WipeJudge(Judge):
         others = [i for i in range(3) if i != k]
         return (np.abs(local[:, others]) <= half[others] + gap).all(axis=1)
 
-    def verdict(self) -> str | None:
+    def fault(self) -> str | None:
         """All marks were judged as they were wiped."""
         return None
 
 
-class PegJudge(Judge):
+class PegCheck(Check):
     """The peg's tip must have come through the hole, and not through the plate."""
 
     def __init__(self, env: RobotEnv) -> None:
@@ -323,7 +323,7 @@ class PegJudge(Judge):
             hole = self.benchmark.config.plate.hole
             self.through = bool(np.abs(at[:2]).max() < hole)
 
-    def verdict(self) -> str | None:
+    def fault(self) -> str | None:
         """Look at the way of the tip, and for overlaps."""
         if not self.through:
             return "the peg did not come through the hole"
@@ -331,16 +331,16 @@ class PegJudge(Judge):
         return "the peg is inside the plate" if overlap > 0.005 else None
 
 
-JUDGES: dict[type, type[Judge]] = {
-    Door: DoorJudge,
-    Lift: LiftJudge,
-    NutAssembly: NutJudge,
-    PickPlace: PickPlaceJudge,
-    Stack: StackJudge,
-    ToolHang: ToolHangJudge,
-    TwoArmHandover: HandoverJudge,
-    TwoArmLift: TwoArmLiftJudge,
-    TwoArmPegInHole: PegJudge,
-    TwoArmTransport: TransportJudge,
-    Wipe: WipeJudge,
+CHECKS: dict[type, type[Check]] = {
+    Door: DoorCheck,
+    Lift: LiftCheck,
+    NutAssembly: NutCheck,
+    PickPlace: PickPlaceCheck,
+    Stack: StackCheck,
+    ToolHang: ToolHangCheck,
+    TwoArmHandover: HandoverCheck,
+    TwoArmLift: TwoArmLiftCheck,
+    TwoArmPegInHole: PegCheck,
+    TwoArmTransport: TransportCheck,
+    Wipe: WipeCheck,
 }
