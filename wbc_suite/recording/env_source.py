@@ -16,6 +16,7 @@ from wbc_suite.errors import DatasetError, WbcError
 from wbc_suite.recording.dataset import Dataset
 from wbc_suite.recording.episode import Fact
 
+PACKAGE = "wbc_suite"
 GYM_TYPE = 2  # type of Gymnasium environments in robomimic's `env_args`
 PACKAGES = ("mujoco", "pin", "numpy", "gymnasium", "h5py", "daqp")
 MAX_TEXT = 1_000_000  # characters of env_args
@@ -37,7 +38,7 @@ class EnvSource:
 
     benchmark: str
     arguments: Mapping[str, Any]
-    package: str = "wbc_suite"
+    package: str = PACKAGE
     missing: tuple[str, ...] = ()
 
     @classmethod
