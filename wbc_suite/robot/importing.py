@@ -16,6 +16,7 @@ from wbc_suite.robot.group_inference import (
     infer_role,
 )
 from wbc_suite.robot.inertia import implausible, nearest_physical, unphysical
+from wbc_suite.robot.missing_data import estimate_masses, estimate_motors
 from wbc_suite.robot.shapes import Shape
 from wbc_suite.robot.standing_posture import standing_legs
 from wbc_suite.robot.validation import RESERVED
@@ -83,7 +84,7 @@ def describe_import(
     for fields in _without_chains(links):
         where = f"{source}: link '{fields['name']}'"
         checked.append(parse_model(Link, fields, source=where, error=DescriptionError))
-    checked = _with_masses(checked, source, strict=strict)
+    checked = _with_masses(_filled(checked, source, strict), source, strict=strict)
     checked = _physical(checked, source, strict=strict)
     checked = _accept_implausible(checked, source)
     given = [
@@ -96,13 +97,21 @@ def describe_import(
         for frame in frames
     ]
     limbs = infer_limbs(checked)
+    placed = infer_frames(checked, limbs, given, names)
+    deviations: tuple[str, ...] = ()
+    moving = [link.joint for link in checked if link.joint is not None]
+    if moving and not others.get("actuators") and not any(j.effort for j in moving):
+        checked = estimate_motors(checked, placed)
+        deviations = ("efforts and armatures are estimated: the file has no motors",)
+        LOG.warning("%s: %s.", source, deviations[0])
     keyframes = others.pop("keyframes", {})
     data: dict[str, Any] = {
         "name": NameTable().take(name, "robot"),
         "source": f"imported from {source.name}",
         "root": root,
         "links": checked,
-        "frames": infer_frames(checked, limbs, given, names),
+        "frames": placed,
+        "deviations": deviations,
         "groups": {limb.name: limb.joints for limb in limbs if limb.joints},
         "keyframes": {"ready": infer_ready(checked)} | keyframes,
     }
@@ -142,6 +151,18 @@ def _without_chains(links: Sequence[LinkFields]) -> Sequence[LinkFields]:
                 "offset": own["offset"] + own["ratio"] * leader["offset"],
             }
     return links
+
+
+def _filled(links: Sequence[Link], source: Path, strict: bool) -> Sequence[Link]:
+    """Estimate the masses of a file without any, unless the import is `strict`."""
+    filled = links if strict else estimate_masses(links)
+    if filled != links and sum(link.mass for link in filled) > 0.0:
+        LOG.warning(
+            "%s: no link has a mass; mended: ellipsoids of 1000 kg/m^3 as large as the "
+            "links' shapes, %.3g kg in all.",
+            *(source, sum(link.mass for link in filled)),
+        )
+    return filled
 
 
 def _with_masses(links: Sequence[Link], source: Path, *, strict: bool) -> list[Link]:
