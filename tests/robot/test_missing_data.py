@@ -36,7 +36,7 @@ def test_estimated_motors_hold_twice_the_weight_of_a_stretched_limb(tmp_path, ca
     assert "estimated" in robot.deviations[0]
 
 
-def test_a_file_with_one_motor_keeps_the_others_without(tmp_path):
+def test_a_file_with_half_of_the_motors_gets_no_others(tmp_path):
     shoulder, slide = read(tmp_path, ARM.format(effort=7)).joints
     assert (shoulder.effort, slide.effort, slide.armature) == (7.0, None, 0.0)
 
@@ -55,4 +55,19 @@ def test_a_ball_without_mass_gets_that_of_its_volume(tmp_path, caplog):
     assert robot.joints[0].effort == pytest.approx(
         RESERVE * GRAVITY * mass / 2, abs=0.01
     )
-    assert "no link has a mass; mended" in caplog.text
+    assert "most links have no mass; mended" in caplog.text
+
+
+def test_an_inertia_in_other_units_is_mended(tmp_path, caplog):
+    text = ARM.format(effort=1).replace(
+        'ixx="0.01" iyy="0.01" izz="0.01"', 'ixx="1e4" iyy="1e4" izz="1e4"'
+    )
+    shape = f"<collision>{BALL}</collision></link>"
+    text = text.replace(
+        'izz="1e4" ixy="0" ixz="0" iyz="0"/></inertial></link>',
+        f'izz="1e4" ixy="0" ixz="0" iyz="0"/></inertial>{shape}',
+    )
+    lower = read(tmp_path, text).link("lower")
+    assert lower.inertia == pytest.approx((0.4 * 0.1**2,) * 3 + (0.0,) * 3)
+    assert lower.com == (0.0, 0.0, 0.2)
+    assert "a radius of gyration of 122 m is impossible in 0.346 m" in caplog.text

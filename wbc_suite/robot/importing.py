@@ -16,9 +16,14 @@ from wbc_suite.robot.group_inference import (
     infer_role,
 )
 from wbc_suite.robot.inertia import implausible, nearest_physical, unphysical
-from wbc_suite.robot.missing_data import estimate_masses, estimate_motors
+from wbc_suite.robot.missing_data import (
+    ellipsoid,
+    estimate_masses,
+    estimate_motors,
+    oversized,
+)
 from wbc_suite.robot.shapes import Shape
-from wbc_suite.robot.standing_posture import standing_legs
+from wbc_suite.robot.standing_posture import feet_are_level, standing_legs
 from wbc_suite.robot.validation import RESERVED
 from wbc_suite.robot.working_posture import working_arms
 from wbc_suite.tomlfile import parse_model
@@ -98,18 +103,18 @@ def describe_import(
     ]
     limbs = infer_limbs(checked)
     placed = infer_frames(checked, limbs, given, names)
+    actuated = {fields["joint"] for fields in others.get("actuators", ())}
+    driven = estimate_motors(checked, placed, actuated)
     deviations: tuple[str, ...] = ()
-    moving = [link.joint for link in checked if link.joint is not None]
-    if moving and not others.get("actuators") and not any(j.effort for j in moving):
-        checked = estimate_motors(checked, placed)
-        deviations = ("efforts and armatures are estimated: the file has no motors",)
+    if driven != checked:
+        deviations = ("efforts and armatures are estimated: the file has few or none",)
         LOG.warning("%s: %s.", source, deviations[0])
     keyframes = others.pop("keyframes", {})
     data: dict[str, Any] = {
         "name": NameTable().take(name, "robot"),
         "source": f"imported from {source.name}",
         "root": root,
-        "links": checked,
+        "links": driven,
         "frames": placed,
         "deviations": deviations,
         "groups": {limb.name: limb.joints for limb in limbs if limb.joints},
@@ -119,7 +124,10 @@ def describe_import(
         RobotDescription, data | others, source=str(source), error=DescriptionError
     )
     if "ready" in keyframes:
-        return robot
+        if keyframes["ready"] != keyframes.get("home") or feet_are_level(robot):
+            return robot
+        LOG.warning("%s: the feet in keyframe 'home' are not level; not used.", source)
+        robot = _with_ready(robot, lambda robot: infer_ready(robot.links))
     return _with_ready(_with_ready(robot, standing_legs), working_arms)
 
 
@@ -154,12 +162,12 @@ def _without_chains(links: Sequence[LinkFields]) -> Sequence[LinkFields]:
 
 
 def _filled(links: Sequence[Link], source: Path, strict: bool) -> Sequence[Link]:
-    """Estimate the masses of a file without any, unless the import is `strict`."""
+    """Estimate masses where most are missing, unless the import is `strict`."""
     filled = links if strict else estimate_masses(links)
-    if filled != links and sum(link.mass for link in filled) > 0.0:
+    if filled != links:
         LOG.warning(
-            "%s: no link has a mass; mended: ellipsoids of 1000 kg/m^3 as large as the "
-            "links' shapes, %.3g kg in all.",
+            "%s: most links have no mass; mended: ellipsoids of 1000 kg/m^3 in their "
+            "bounding boxes, %.3g kg in all.",
             *(source, sum(link.mass for link in filled)),
         )
     return filled
@@ -211,6 +219,9 @@ def _physical(links: Sequence[Link], source: Path, *, strict: bool) -> list[Link
         if rigid[link.name] in moving and link.mass > 0.0
     }
     faults |= {link.name: fault for link in links if (fault := unphysical(link))}
+    huge = {x.name: fault for x in links if (fault := oversized(x))}
+    faults |= huge
+    links = [ellipsoid(x, x.mass) if x.name in huge else x for x in links]
     shown = "; ".join(f"link '{n}': {fault}" for n, fault in faults.items())
     if faults and strict:
         raise DescriptionError(

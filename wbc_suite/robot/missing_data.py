@@ -1,10 +1,10 @@
-"""Estimate masses and motors of robots whose files state none."""
+"""Estimate masses and motors of robots whose files state few or none."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 
 import numpy as np
 
-from wbc_suite.robot.elements import Frame, Link
+from wbc_suite.robot.elements import Frame, Link, rigid_bodies
 from wbc_suite.robot.shape_geometry import shape_bounds
 from wbc_suite.typing import Vector
 
@@ -12,6 +12,9 @@ DENSITY = 1000.0  # kg/m^3; what MuJoCo assumes
 GRAVITY = 9.81  # m/s^2
 RESERVE = 2.0
 """An estimated motor holds so many times the weight of what it moves."""
+OVERSIZED = 10.0
+"""Largest radius of gyration over the diagonal of the link's shapes; some meshes may be
+missing."""
 LEAST_EFFORT = 1.0  # N m or N
 ROTOR = 2e-4
 """Estimated armature over effort, s^2: it is 1e-4 to 2e-4 for hips, knees and ankles of
@@ -19,42 +22,71 @@ Unitree's G1 and Go1 in the models of MuJoCo Menagerie."""
 
 
 def estimate_masses(links: Sequence[Link]) -> list[Link]:
-    """Return links with estimated masses if none of those that have shapes has a mass.
+    """Return links with estimated masses if most of those that move have none.
 
     A link is a solid ellipsoid as large as the bounding box of its shapes.
     """
-    if any(link.mass > 0.0 for link in links):
+    rigid = rigid_bodies(links)
+    heavy = {rigid[link.name] for link in links if link.mass > 0.0}
+    moving = {link.name for link in links if link.joint is not None}
+    if 2 * len(moving & heavy) >= len(moving):
         return list(links)
-    return [_filled(x) if x.collision or x.visual else x for x in links]
+    empty = {x.name for x in links if rigid[x.name] not in heavy}
+    solid = {x.name for x in links if x.collision or x.visual}
+    return [ellipsoid(x) if x.name in empty & solid else x for x in links]
 
 
-def _filled(link: Link) -> Link:
+def ellipsoid(link: Link, mass: float | None = None) -> Link:
+    """Return the link as a solid ellipsoid in the bounding box of its shapes.
+
+    Without a mass in kg it has that of its volume. With one it keeps its centre.
+    """
     bounds = np.array([shape_bounds(shape) for shape in link.collision or link.visual])
     low: Vector = bounds[:, 0].min(axis=0)
     high: Vector = bounds[:, 1].max(axis=0)
-    mass = DENSITY * np.pi / 6.0 * float(np.prod(high - low))
+    com = tuple(((low + high) / 2.0).tolist()) if mass is None else link.com
+    mass = mass or DENSITY * np.pi / 6.0 * float(np.prod(high - low))
     squares = ((high - low) / 2.0) ** 2
     moments = mass / 5.0 * (squares.sum() - squares)
-    fields = {
-        "mass": mass,
-        "com": tuple(((low + high) / 2.0).tolist()),
-        "inertia": (*moments.tolist(), 0.0, 0.0, 0.0),
-    }
+    fields = {"mass": mass, "com": com, "inertia": (*moments.tolist(), 0.0, 0.0, 0.0)}
     return link.model_copy(update=fields)
 
 
-def estimate_motors(links: Sequence[Link], frames: Sequence[Frame]) -> list[Link]:
-    """Return links with estimated motors, and armatures where there are none.
+def oversized(link: Link) -> str | None:
+    """Return what is wrong with an inertia far beyond the link's shapes, or None.
 
-    The motor of a hinge holds twice the moment of the links behind it, as if these were
-    stretched out horizontally; below the trunk of a robot with feet it holds half of
-    the robot on its foot as well. That of a slide holds twice their weight.
+    Files with such tensors have them in other units.
     """
+    shapes = (*link.collision, *link.visual)
+    if not shapes or link.mass == 0.0:
+        return None
+    bounds = np.array([shape_bounds(shape) for shape in shapes])
+    size = float(np.linalg.norm(bounds[:, 1].max(axis=0) - bounds[:, 0].min(axis=0)))
+    radius = float(np.sqrt(sum(link.inertia[:3]) / 2.0 / link.mass))
+    if radius <= OVERSIZED * size:
+        return None
+    return f"a radius of gyration of {radius:.3g} m is impossible in {size:.3g} m"
+
+
+def estimate_motors(
+    links: Sequence[Link], frames: Sequence[Frame], driven: Collection[str]
+) -> list[Link]:
+    """Return links with motors, and armatures, for joints without, if most have none.
+
+    Joints that are `driven` have an actuator of another kind. The motor of a hinge
+    holds twice the moment of the links behind it, as if these were stretched out
+    horizontally; below the trunk of a robot with feet it holds half of the robot on its
+    foot as well. That of a slide holds twice their weight.
+    """
+    own = [x.joint for x in links if x.joint is not None and x.joint.independent]
+    bare = [x for x in own if x.effort is None and x.name not in driven]
+    if 2 * len(bare) <= len(own):
+        return list(links)
     efforts = dict(_efforts(links, frames))
     changed: list[Link] = []
     for link in links:
         joint = link.joint
-        if joint is not None and joint.independent:
+        if joint is not None and joint in bare:
             effort = efforts[joint.name]
             armature = joint.armature or ROTOR * effort
             update = {"effort": effort, "armature": armature}
