@@ -94,7 +94,7 @@ def hold_faults(robot: RobotDescription, *, seconds: float = SECONDS) -> list[st
     failure = ""
     while data.time < seconds and not failure and np.isfinite(data.qpos).all():
         *_, info = env.step(env.hold_action)
-        failure = info.get("failure") or ""
+        failure = info.get("failure") or info.get("physics_error") or ""
     faults = [failure[0].upper() + failure[1:]] if failure else []
     faults += _divergence(data)
     faults += _moved(robot, m, np.abs(data.qpos - start), weight)

@@ -139,7 +139,9 @@ def _traits(links: Sequence[Link]) -> dict[str, _Traits]:
         if kind is None and above.kind == "arm" and owners.count(parent) > 1:
             kind = "gripper"
         elif kind is None:
-            kind = above.kind if above.kind in ("leg", "gripper", "head") else "arm"
+            rolls = above.kind == "base" and parent not in driving  # rim of a wheel
+            inherits = rolls or above.kind in ("leg", "gripper", "head")
+            kind = above.kind if inherits else "arm"
         if kind == "torso" and _side(words, pairs=False):
             kind = "arm"  # "waist" of the left one of two arms
         same_limb = above.kind in ("arm", "leg", "gripper")

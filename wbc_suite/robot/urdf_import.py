@@ -8,9 +8,8 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.errors import DescriptionError, did_you_mean, join_first
-from wbc_suite.robot.contact_pairs import exclude_never_colliding, overlapping_links
+from wbc_suite.robot.contact_pairs import exclude_never_colliding, exclude_overlapping
 from wbc_suite.robot.description import RobotDescription
-from wbc_suite.robot.elements import Contacts
 from wbc_suite.robot.importing import (
     LinkFields,
     NameTable,
@@ -87,15 +86,7 @@ def read_urdf(
         robot = robot.with_root("free")
     if skin:
         robot = robot.model_copy(update={"skins": importer.skins()})
-    pairs = overlapping_links(robot)
-    if pairs:
-        shown = [f"'{first}' and '{second}'" for first, second in pairs]
-        LOG.warning(
-            "%s: these links overlap in the posture ready and will not collide: %s.",
-            *(path, join_first(shown, limit=12)),
-        )
-        robot = robot.model_copy(update={"contacts": Contacts(exclude=pairs)})
-    return exclude_never_colliding(robot)
+    return exclude_never_colliding(exclude_overlapping(robot, path))
 
 
 class _Importer:

@@ -113,9 +113,11 @@ def attach_robot(
     """Add a robot at its own root pose, on a frame or the world, with prefixed names.
 
     Fingers get torsional friction, so that an object does not turn about the line
-    between them.
+    between them. A camera with the name of `add_robot_view`'s is left out.
     """
     own = robot.to_mjspec()
+    for camera in [camera for camera in own.cameras if camera.name == ROBOT_VIEW]:
+        own.delete(camera)
     for key in list(own.keys):
         own.delete(key)
     for joint in (j for gripper in robot.synergies for j in robot.groups[gripper]):
