@@ -211,3 +211,15 @@ def test_missing_files_and_surfaces_without_a_table_are_refused(kitchen):
         wbc_suite.make("Lift", arena="none.xml")
     with pytest.raises(ConfigError, match="PickPlace has not one table"):
         wbc_suite.make("PickPlace", arena={"file": kitchen, "surface": "top"})
+
+
+def test_cameras_that_a_wall_hides_turn_until_they_see_the_table(lift):
+    model, data = lift.simulation.model, lift.simulation.data
+    lift.reset(seed=0)
+    wall = model.geom("arena_wall").id
+    for name in ("agentview", "frontview", "sideview"):
+        eye, cube = data.camera(name).xpos, lift.benchmark.cube_position
+        assert eye[0] < data.geom_xpos[wall, 0]  # which is across x
+        ahead = -data.camera(name).xmat.reshape(3, 3)[:, 2]
+        to_cube = (cube - eye) / np.linalg.norm(cube - eye)
+        assert math.degrees(math.acos(ahead @ to_cube)) < 22.5  # half of the view

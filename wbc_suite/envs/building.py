@@ -37,7 +37,7 @@ from wbc_suite.sensing.proprioception import (
     proprioception,
     sensors_of,
 )
-from wbc_suite.sensing.things import check_room, readings_of_things
+from wbc_suite.sensing.things import check_room, clear_views, readings_of_things
 
 WATCH_PAGE = "wbc_suite.viewers.watch_page"
 """Imported when needed: `viewers` is a layer above `envs`."""
@@ -142,6 +142,8 @@ def simulate(
     mujoco.mj_forward(model, data)
     if (arena := arena_of(benchmark)) is not None:
         check_room(arena, states)
+        table = getattr(getattr(benchmark, "config", None), "table", None)
+        clear_views(model, data, (0.0, 0.0, 0.8) if table is None else table.center)
     for state in states:
         aim_robot_view(state)
     pairs: list[tuple[RobotState, CompositeController]] = []
