@@ -59,6 +59,7 @@ class EnvArguments(TypedDict, total=False):
     """Keyword arguments of `make` as users write them; see `EnvConfig`."""
 
     robots: Robot | Sequence[Robot]
+    arena: str | Path | Mapping[str, Any] | None
     env_configuration: Configuration
     controller_configs: Controller | Sequence[Controller | None] | None
     placement_initializer: Sampler | None
@@ -97,6 +98,8 @@ class EnvConfig(FrozenModel):
     Attributes:
         robots: One robot, or several: names, files or descriptions; the benchmark's
             own choice by default.
+        arena: MJCF file of a scene around the benchmark, or the keys of a
+            `wbc_suite.scene.ArenaConfig`; an empty floor by default.
         env_configuration: Arrangement of robots: two `opposed` (by default) or
             `parallel`, one `single-robot`.
         controller_configs: Composite controller: a name, a file or a config; one for
@@ -142,6 +145,7 @@ class EnvConfig(FrozenModel):
     model_config = ConfigDict(arbitrary_types_allowed=True)
 
     robots: Any = "Panda"
+    arena: str | Path | dict[str, Any] | None = None
     env_configuration: Configuration = "default"
     controller_configs: Any = None
     placement_initializer: Any = None

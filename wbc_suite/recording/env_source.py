@@ -23,7 +23,7 @@ MAX_TEXT = 1_000_000  # characters of env_args
 _SHOWN = {"render_mode", "render_camera", "render_size", "render_preset", "skin"}
 """Arguments of rendering, which do not change an episode."""
 _PATH = re.compile(r"[/\\]|\.(toml|json|xml|urdf|py)\Z", re.IGNORECASE)
-_NAMES = ("robots", "controller_configs", "gripper_types", "base_types")
+_NAMES = ("robots", "arena", "controller_configs", "gripper_types", "base_types")
 _SIZES = ("camera_heights", "camera_widths")
 MAX_PIXELS = 2048  # of a camera's side, unless the dataset is trusted
 
