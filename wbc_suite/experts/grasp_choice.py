@@ -156,11 +156,11 @@ def _needed_lift(cell: Workcell, name: str, arm: Arm, grasp: str, at: pin.SE3) -
 
 
 def _first_clear(cell: Workcell, name: str, choices: Sequence[Choice]) -> Choice:
-    """Return the first choice whose approach touches nothing, or else the first."""
+    """Return the first choice whose poses touch nothing, or else the first."""
     for choice in choices:
         if choice.cost > choices[0].cost + COLLISION:
             break
-        before, at = map(choice.arm.configuration, choice.outlook.q[:2])
-        if all(cell.is_clear(choice.arm, q, but=name) for q in (at, before)):
+        poses = map(choice.arm.configuration, choice.outlook.q)
+        if all(cell.is_clear(choice.arm, q, but=name) for q in poses):
             return choice
     return choices[0]

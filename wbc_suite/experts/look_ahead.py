@@ -17,6 +17,7 @@ ITERATIONS = 60  # for each pose at most
 STUCK = 2e-3  # rad or m, of joints in an iteration
 CLOSE = 1e-3  # m and rad
 SWEEP = 0.4  # of the greatest velocity of joints, on a sweep
+SINGULAR = 0.05  # singular value of a hand's Jacobian, below which controllers lag
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -26,12 +27,14 @@ class Outlook:
     Attributes:
         error: Largest error at a pose, m, with 0.1 m for each rad.
         margin: Least distance of a joint from its limits at a pose, rad or m.
+        dexterity: Least singular value of the hand's Jacobian on the way.
         times: Time of each joint at its greatest velocity, s.
         q: Configurations at the poses.
     """
 
     error: float
     margin: float
+    dexterity: float
     times: Vector
     q: tuple[Vector, ...]
 
@@ -42,9 +45,11 @@ class Outlook:
 
     @property
     def cost(self) -> float:
-        """Duration, and penalties of poses that are out of reach or near limits."""
+        """Duration, and penalties of what is out of reach, near limits or singular."""
         near = max(0.0, 0.2 - self.margin)
-        return self.duration + 100.0 * max(0.0, self.error - CLOSE) + 10.0 * near
+        singular = 20.0 * max(0.0, SINGULAR - self.dexterity)
+        far = 100.0 * max(0.0, self.error - CLOSE)
+        return self.duration + far + 10.0 * near + singular
 
 
 class LookAhead:
@@ -118,6 +123,7 @@ class LookAhead:
             after = Outlook(
                 error=0.0,
                 margin=np.inf,
+                dexterity=np.inf,
                 times=np.zeros(configuration.nv),
                 q=(self.own(self._state.q),),
             )
@@ -126,12 +132,13 @@ class LookAhead:
             begun = after.q
         configuration.update(after.q[-1])
         error, margin, times = after.error, after.margin, after.times
+        dexterity = after.dexterity
         found = [*begun]
         for pose in poses:
             self._task.set_target(pose)
-            left, moved = self._descend()
+            left, moved, least = self._descend()
             times = times + moved / self._speed
-            error = max(error, left)
+            error, dexterity = max(error, left), min(dexterity, least)
             q = configuration.q.copy()
             found.append(q)
             limited = q[self._limited]
@@ -140,23 +147,29 @@ class LookAhead:
         return Outlook(
             error=error,
             margin=margin,
+            dexterity=dexterity,
             times=times,
             q=tuple(found),
         )
 
-    def _descend(self) -> tuple[float, Vector]:
-        """Move to the task's target; return the error, and how far joints went."""
+    def _descend(self) -> tuple[float, Vector, float]:
+        """Move to the task's target.
+
+        Returns the error, how far joints went, and the least singular value met.
+        """
         configuration = self._configuration
-        travel = np.zeros(configuration.nv)
+        travel, least = np.zeros(configuration.nv), np.inf
         self._stack.reset()
         for _ in range(ITERATIONS):
             step = self._stack.solve(STEP).dq
             configuration.update(configuration.integrate(step))
             travel += np.abs(step)
+            J = configuration.frame_jacobian(self._frame)
+            least = min(least, np.linalg.svd(J, compute_uv=False)[-1].item())
             left = self._error()
             if left < CLOSE or np.abs(step).max() < STUCK:
                 break
-        return self._error(), travel
+        return self._error(), travel, least
 
     def _error(self) -> float:
         error = self._task.error(self._configuration)
