@@ -95,6 +95,12 @@ def estimate_motors(
     return changed
 
 
+def _reach(link: Link) -> float:
+    """Return the distance of a link's outermost corner from its joint, m."""
+    bounds = [shape_bounds(shape) for shape in (*link.collision, *link.visual)]
+    return max((float(np.linalg.norm(x)) for pair in bounds for x in pair), default=0.0)
+
+
 def _efforts(
     links: Sequence[Link], frames: Sequence[Frame]
 ) -> Iterator[tuple[str, float]]:
@@ -102,7 +108,15 @@ def _efforts(
     by_name = {link.name: link for link in links}
     half = sum(link.mass for link in links) / 2.0
     loads = [(link.name, link.mass, float(np.linalg.norm(link.com))) for link in links]
-    loads += [(frame.link, half, 0.0) for frame in frames if frame.role == "foot"]
+    loads += [
+        (
+            frame.link,
+            half,
+            max(_reach(by_name[frame.link]), float(np.linalg.norm(frame.pos))),
+        )
+        for frame in frames
+        if frame.role == "foot"
+    ]
     moments: dict[str, float] = {}
     weights: dict[str, float] = {}
     for name, mass, offset in loads:
