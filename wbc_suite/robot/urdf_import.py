@@ -82,8 +82,11 @@ def read_urdf(
     shapes.report(path)
     feet = sum(frame.role == "foot" for frame in robot.frames)
     if feet >= FEET and not importer.rooted:
-        LOG.warning("%s: its root is free, since it has %d feet.", path, feet)
-        robot = robot.with_root("free")
+        try:
+            robot = robot.with_root("free")
+            LOG.warning("%s: its root is free, since it has %d feet.", path, feet)
+        except DescriptionError as error:
+            LOG.warning("%s: its root is fixed: %s", path, error)
     if skin:
         robot = robot.model_copy(update={"skins": importer.skins()})
     return exclude_never_colliding(exclude_overlapping(robot, path))
