@@ -28,6 +28,9 @@ INFLUENCE = 0.5
 TOUCHING = 1e-4
 """m; nearer pairs keep their last normal: points are known to 1e-6 m."""
 
+PLANAR = 3
+"""Last joint of a planar root."""
+
 
 @struct
 class SceneArrays(NamedTuple):
@@ -40,7 +43,7 @@ class SceneArrays(NamedTuple):
         geom: Geom of each pair that the robot moves.
         body: Body whose frame is that of the joint which moves it.
         centre: Centre of each geom's box in its frame, m, shape (ngeom, 3).
-        half: Half its sides; endless for planes.
+        half: Half its sides.
         bound: Least possible distance of the nearest pairs, m, shape (k,).
         normal: Last normal of each pair, shape (p, 3).
         segment: Nearest points of a pair, of obstacle and robot, m, shape (6,).
@@ -112,8 +115,6 @@ class SceneObstacles:
         self.limit.bind(configuration)
         bodies = _joint_bodies(state, configuration)
         segment, rows = np.zeros(6), self.limit.dim
-        half = model.geom_aabb[:, 3:].copy()
-        half[model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE] = np.inf, np.inf, 0.0
         self._arrays = SceneArrays(
             *addresses(model, data),
             xpos=data.xpos,
@@ -125,7 +126,7 @@ class SceneObstacles:
             geom=self._pairs[:, 1].copy(),
             body=bodies[self.limit.arrays.joint],
             centre=model.geom_aabb[:, :3].copy(),
-            half=half,
+            half=model.geom_aabb[:, 3:].copy(),
             bound=np.zeros(rows),
             normal=np.zeros((len(pairs), 3)),
             segment=segment,
@@ -222,21 +223,33 @@ def _pairs(
     config: WholeBodyIKConfig,
     configuration: Configuration,
 ) -> Iterator[tuple[int, int, str]]:
-    """Yield obstacle, geom and its link. Legs that stand are not kept off planes."""
-    model, frames = state.model, configuration.model.frames
+    """Yield obstacle, geom and its link.
+
+    Legs that stand and a base that glides are not kept off planes.
+    """
+    model = state.model
     bodies = model.geom_bodyid.tolist()
     links = {model.body(state.prefix + link.name).id: link.name for link in robot.links}
     own = {geom: links[body] for geom, body in enumerate(bodies) if body in links}
-    legs = {link for held in config.held for link in _chain(robot, held.frame)}
+    grounded = {link for held in config.held for link in _chain(robot, held.frame)}
+    if robot.root.kind == "planar":
+        grounded |= {
+            link for link in links.values() if _joint(configuration, link) <= PLANAR
+        }
     fixed = np.flatnonzero(model.body_weldid[bodies] == 0).tolist()
     kinds, affinity = model.geom_contype, model.geom_conaffinity
     obstacles = [geom for geom in fixed if geom not in own]
     for o, (g, link) in product(obstacles, own.items()):
         touch = kinds[o] & affinity[g] | kinds[g] & affinity[o]
-        moves = frames[configuration.frame_id(link)].parentJoint > 0
-        stands = link in legs and model.geom_type[o] == mujoco.mjtGeom.mjGEOM_PLANE
-        if touch and moves and not stands:
+        plane = model.geom_type[o] == mujoco.mjtGeom.mjGEOM_PLANE
+        moves = _joint(configuration, link) > 0
+        if touch and moves and not (plane and link in grounded):
             yield o, g, link
+
+
+def _joint(configuration: Configuration, link: str) -> int:
+    """Return the joint that moves a link, 0 for none."""
+    return int(configuration.model.frames[configuration.frame_id(link)].parentJoint)
 
 
 def _chain(robot: RobotDescription, frame: str) -> Iterator[str]:
