@@ -3,6 +3,7 @@
 import time
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from conftest import Viewer, note, wait_until
 
@@ -46,14 +47,12 @@ def test_a_mobile_manipulator_is_adopted(context, tmp_path):
     page, viewer, said = opened(exported("Tiago", tmp_path), context, tmp_path / "lab")
     began = time.monotonic()
     try:
-        name = next(n for n, f in page.frames.items() if f.role == "tcp")
+        name = page.robot.hands["left"]
         before = page.frames[name].pos
         handle = page.handles[name]
         body = page.page.data.body(page.frames[name].link)
 
         def arrow():
-            import pinocchio as pin
-
             R = body.xmat.reshape(3, 3)
             local = pin.Quaternion(*np.roll(handle.wxyz, -1)).matrix()
             at = body.xpos + R @ np.asarray(handle.position)
