@@ -17,7 +17,7 @@ from pydantic import (
 
 from wbc_suite.control import CompositeControllerName, PartControllerName
 from wbc_suite.envs.states import Randomiser
-from wbc_suite.errors import ConfigError
+from wbc_suite.errors import ConfigError, UnknownArgumentError, did_you_mean
 from wbc_suite.robot import RobotDescription
 from wbc_suite.scene.placement import Sampler
 from wbc_suite.sensing.cameras import CameraRequest
@@ -285,6 +285,12 @@ def parse_env_config(arguments: Mapping[str, Any]) -> EnvConfig:
     drawn = given.pop("has_offscreen_renderer", False)
     if shown or drawn:
         given.setdefault("render_mode", "human" if shown else "rgb_array")
+    known = sorted(EnvConfig.model_fields)
+    for name in (name for name in given if name not in known):
+        raise UnknownArgumentError(
+            f"make() got an unexpected keyword argument '{name}'."
+            f"{did_you_mean(name, known)} Known: {', '.join(known)}."
+        )
     return parse_model(EnvConfig, given, source="make()")
 
 

@@ -35,7 +35,8 @@ class Goals(gymnasium.Wrapper[GoalObservation, Any, Flattened, Flattened]):
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any]) -> None:
-        super().__init__(Flat(env))
+        flat: Any = Flat(env)  # the type of its observations is what changes here
+        super().__init__(flat)
         self._benchmark: Benchmark = env.unwrapped.benchmark  # pyright: ignore[reportAttributeAccessIssue] - ours
         kinds = [kind for kind in NEAR if isinstance(self._benchmark, kind)]
         if not kinds:
@@ -49,7 +50,7 @@ class Goals(gymnasium.Wrapper[GoalObservation, Any, Flattened, Flattened]):
         anywhere = gymnasium.spaces.Box(
             -np.inf, np.inf, self._desired.shape, dtype=np.float64
         )
-        spaces = {"observation": self.env.observation_space}
+        spaces: dict[str, Any] = {"observation": self.env.observation_space}
         spaces |= dict.fromkeys(("achieved_goal", "desired_goal"), anywhere)
         self.observation_space: Any = gymnasium.spaces.Dict(spaces)
 
