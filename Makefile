@@ -53,6 +53,11 @@ $(VENV)/.installed-peers: $(VENV)/.installed-dev
 	.venv-$*/bin/python -m pip install --disable-pip-version-check -r $<
 	@touch $@
 
+.venv-client-%/.installed: examples/clients/%.txt | $(VENV)/.python
+	@test -x .venv-client-$*/bin/python || $(PY) -m venv .venv-client-$*
+	.venv-client-$*/bin/python -m pip install --disable-pip-version-check -e . -r $<
+	@touch $@
+
 pictures: $(VENV)/.installed ## draw the pictures of the README and of walking anew
 	$(PY) docs/draw_pictures.py
 	$(PY) docs/draw_walking.py

@@ -24,7 +24,6 @@ import itertools
 import json
 import sys
 import tempfile
-import time
 from pathlib import Path
 from typing import Any
 
@@ -97,23 +96,30 @@ def measure(
         "evaluate": evaluate,
     }
     settings = Settings(settings)
-    begun = time.perf_counter()
     model, run = sac.train(settings)
     found = sac.evaluate(settings, lambda o: model.predict(o, deterministic=True)[0])
-    curve = run / "curve.jsonl"
-    lines = curve.read_text("utf-8").splitlines() if curve.exists() else []
+    path = run / "curve.jsonl"
+    lines = path.read_text("utf-8").splitlines() if path.exists() else []
+    curve = [json.loads(line) for line in lines]
     return {
         **dict(zip(KEY, case, strict=True)),
         "return": round(float(np.mean([total for total, _ in found])), 1),
         "success": float(np.mean([solved for _, solved in found])),
         "evaluated": len(found),
-        "hours": round((time.perf_counter() - begun) / 3600, 2),
-        "curve": [json.loads(line) for line in lines],
+        "hours": hours(curve),
+        "curve": curve,
         "settings": dict(settings) | {"folder": name},
         "date": datetime.datetime.now(tz=datetime.UTC).date().isoformat(),
         "machine": machine(),
         "command": "python " + " ".join(["benchmarks/learning.py", *sys.argv[1:]]),
     }
+
+
+def hours(curve: list[dict[str, Any]]) -> float:
+    """Return the time of training, also of one that was stopped and continued."""
+    seconds = [row["seconds"] for row in curve]
+    ends = [a for a, b in itertools.pairwise([*seconds, 0.0]) if b < a]
+    return round(sum(ends) / 3600, 2)
 
 
 def known_rows() -> list[dict[str, Any]]:

@@ -10,6 +10,7 @@ Usage: python benchmarks/unseen_robots.py [--quick] [--development] [--folder DI
 """
 
 import copy
+import datetime
 import logging
 import multiprocessing
 import re
@@ -26,8 +27,8 @@ from typing import Any
 import mujoco
 import numpy as np
 import pinocchio as pin
-from harness.report import Report, options
-from import_corpus import progress, unpack
+from harness.report import Report, machine, options
+from import_corpus import UNSEEN_SECTION, progress, unpack
 
 from wbc_suite.control import load_composite_controller_config
 from wbc_suite.envs.env import RobotEnv
@@ -122,7 +123,9 @@ GOALS = 10
 REACHED = 2e-3  # m
 PATIENCE = 30.0  # s of simulation for one goal
 CLEARANCE = 0.02  # m; between links, and between robot and floor, at a goal
-DRAWS = 3000  # random postures that are tried for the goals
+DRAWS = 30000  # random postures that are tried for the goals
+SECONDS = 30  # s for a robot to move its hands
+FOUR = 4  # feet of a quadruped
 LIMIT = 300  # s for one command
 ENDLESS = np.pi  # rad; range of a joint without one
 Row = dict[str, Any]
@@ -260,11 +263,57 @@ def measure(task: tuple[str, Path, Path]) -> Row:
     return row
 
 
+def write_table(rows: list[Row], path: Path) -> None:
+    """Replace, or add, the section of a page that has the robots' table."""
+    page = path.read_text(encoding="utf-8").partition(UNSEEN_SECTION)[0].rstrip()
+    moved = [row for row in rows if row.get("moves")]
+    spent = sum(row["processor_s"] < SECONDS for row in moved)
+    quick = sum(row["seconds"] < SECONDS for row in moved)
+    armed = [max(row["errors_mm"]) for row in rows if row.get("goals")]
+    reached = sum(error < 1e3 * REACHED for error in armed)
+    four = [row["stand_faults"] for row in rows if row.get("feet", 0) >= FOUR]
+    broken = sum(bool(row.get("traceback")) for row in rows)
+    now = datetime.datetime.now(tz=datetime.UTC)
+    lines = [
+        f"\n\n{UNSEEN_SECTION}",
+        "Written by `python benchmarks/unseen_robots.py --table FILE`, "
+        f"{now:%Y-%m-%d}, {machine()}.",
+        "",
+        f"- {len(rows)} robots: {len(moved)} move by `wbc-suite demo FILE`, {spent} of",
+        f"  them with less than {SECONDS} s of processor time, {quick} in less than",
+        f"  {SECONDS} s of a machine that was shared with other work;",
+        f"- {reached} of {len(armed)} with hands on a root that cannot fall reach all",
+        f"  random goals, {GOALS} where so many were found, within 2 mm;",
+        f"- {four.count([])} of {len(four)} with four feet stand for 10 s;",
+        f"- {broken} end in a traceback.",
+        "",
+        "| file | root | s | processor s | goals reached | standing 10 s |",
+        "| --- | --- | ---: | ---: | ---: | --- |",
+    ]
+    for row in rows:
+        errors = row.get("errors_mm")
+        reached = sum(e < 1e3 * REACHED for e in errors or ())
+        faults = row.get("stand_faults")
+        said = row.get("refused") or row.get("said") or ""
+        stands = "" if faults is None else faults[0] if faults else "yes"
+        cells = (
+            f"`{row['case']}`",
+            row.get("root", ""),
+            f"{row['seconds']:.0f}",
+            f"{row.get('processor_s', 0.0):.0f}",
+            "" if errors is None else f"{reached} of {len(errors)}",
+            stands or ("" if row.get("moves") else said),
+        )
+        lines.append("| " + " | ".join(map(str, cells)) + " |")
+    path.write_text(page + "\n".join(lines) + "\n", encoding="utf-8")
+
+
 def main() -> None:
     parser = options(__doc__, "two robots")
     parser.add_argument("--folder", type=Path, default=Path("artifacts/corpus"))
     parser.add_argument("--development", action="store_true", help="the other robots")
     parser.add_argument("--only", default="", help="files whose path holds this text")
+    parser.add_argument("--table", type=Path, help="page with the section to write")
     parser.add_argument("--processes", type=int, default=1)
     arguments = parser.parse_args()
     lines = (DEVELOPMENT if arguments.development else UNSEEN).split("\n")[1:-1]
@@ -283,6 +332,8 @@ def main() -> None:
             progress(done, len(tasks), began, row["case"])
             print("\n", row, flush=True)
     report.write(arguments.json)
+    if arguments.table:
+        write_table(report.rows, arguments.table)
 
 
 if __name__ == "__main__":

@@ -33,7 +33,10 @@ ADDED = (
     *("experts/", "scene/objects/grasp_site", "cli/expert"),
     # imports of other robots
     *("envs/hold_check", "robot/mjcf_import_constraints", "robot/contact_pairs"),
-    "robot/working_posture",
+    *("robot/working_posture", "robot/missing_data", "robot/gripper_inference"),
+    *("cli/adopt", "viewers/adopt_"),
+    # scenes of others, goals
+    *("scene/mjcf_arena", "scene/surfaces", "sensing/things", "wrappers/goals"),
     # robosuite, and models for accelerators
     *("compat/robosuite/", "envs/exporting"),
     # evaluation, LeRobot
@@ -46,6 +49,7 @@ ADDED = (
     # checks of messages and caches
     *("viewers/page_messages", "kernel_cache", "cli/interrupts"),
     # stacks that cannot come to rest, the page's pictures
+    *("qp/obstacle_limit", "control/composite/scene_obstacles"),
     *("qp/motion", "qp/overshoot", "viewers/camera_pictures", "viewers/tracking_plots"),
 )
 """Rooms that came after the bounds were set."""

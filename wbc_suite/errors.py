@@ -41,6 +41,14 @@ class ConfigError(WbcError, ValueError):
     """A file, a key or a value of a configuration is wrong."""
 
 
+class UnknownArgumentError(ConfigError, TypeError):
+    """A function has no argument of a name, in the words of Python's own TypeError.
+
+    Libraries that try arguments, as TorchRL does with `frameskip`, look for these, and
+    Gymnasium makes the error anew from its text.
+    """
+
+
 class DescriptionError(ConfigError):
     """A robot description is inconsistent or physically impossible."""
 

@@ -30,6 +30,12 @@ BENCHMARKS = (
 )
 """Benchmarks with an id."""
 
+GOALS = (
+    *("Lift", "Stack", "Reach", "PickPlace", "PickPlaceSingle"),
+    *("PickPlaceMilk", "PickPlaceBread", "PickPlaceCereal", "PickPlaceCan"),
+)
+"""Benchmarks with an id `wbc_suite/{name}-Goal-v0` too; see `wrappers.Goals`."""
+
 _CHANGED = (
     *("Door", "Lift", "NutAssembly", "PickPlace", "Stack", "ToolHang"),
     *("TwoArmHandover", "TwoArmPegInHole", "TwoArmTransport", "Wipe"),
@@ -59,6 +65,13 @@ def _register() -> None:
                 id=environment_id(name),
                 entry_point="wbc_suite.envs.env:RobotEnv",
                 vector_entry_point="wbc_suite.envs.vector:VectorRobotEnv",
+                kwargs={"benchmark": name},
+            )
+    for name in GOALS:
+        if f"wbc_suite/{name}-Goal-v0" not in registry:
+            register(
+                id=f"wbc_suite/{name}-Goal-v0",
+                entry_point="wbc_suite.wrappers.goals:make_goal_env",
                 kwargs={"benchmark": name},
             )
 

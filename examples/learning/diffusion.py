@@ -1,8 +1,8 @@
 """A small diffusion policy on states: it draws the next actions from noise.
 
-Used like bc.py, which has the commands. The network predicts the noise that was added
-to a chunk of actions; denoising in a few steps gives a chunk, of which the first
-actions are taken.
+Used like bc.py, which has the commands. The network predicts a chunk of actions from
+the same with noise; denoising in a few steps gives a chunk, of which the first actions
+are taken.
 
 Sources: Chi et al. (2023), "Diffusion Policy", RSS; Song et al. (2021), "Denoising
 Diffusion Implicit Models", ICLR (the sampler); Nichol and Dhariwal (2021), "Improved
@@ -32,7 +32,7 @@ SHARES = signal_shares()
 
 
 class Denoiser(nn.Module):
-    """Predicts the noise in a chunk of actions from the observations before it."""
+    """Predicts a chunk of actions from a noisy one and the observations before it."""
 
     def __init__(
         self, *, inputs: int, outputs: int, history: int, chunk: int, width: int
@@ -48,7 +48,7 @@ class Denoiser(nn.Module):
         self.last = nn.Linear(width, outputs * chunk)
 
     def forward(self, noisy: Tensor, level: Tensor, seen: Tensor) -> Tensor:
-        """Return the noise, of the shape of `noisy`; `level` has shape (batch,)."""
+        """Return actions of the shape of `noisy`; `level` has shape (batch,)."""
         phase = level[:, None] * self.get_buffer("rates")
         known = [noisy.flatten(1), seen.flatten(1), phase.sin(), phase.cos()]
         hidden = nn.functional.mish(self.first(torch.cat(known, dim=1)))
@@ -60,12 +60,12 @@ class Denoiser(nn.Module):
 def loss(
     model: nn.Module, seen: Tensor, acted: Tensor, rng: np.random.Generator
 ) -> Tensor:
-    """Return the mean squared error of the noise, at levels drawn at random."""
+    """Return the mean squared error of the actions, at levels drawn at random."""
     level = torch.as_tensor(rng.integers(LEVELS, size=len(seen)))
     noise = torch.as_tensor(rng.standard_normal(acted.shape, dtype=np.float32))
     share = SHARES[level][:, None, None]
     noisy = share.sqrt() * acted + (1.0 - share).sqrt() * noise
-    return nn.functional.mse_loss(model(noisy, level.float(), seen), noise)
+    return nn.functional.mse_loss(model(noisy, level.float(), seen), acted)
 
 
 def draw(model: nn.Module, seen: Tensor, rng: np.random.Generator) -> Tensor:
@@ -75,9 +75,8 @@ def draw(model: nn.Module, seen: Tensor, rng: np.random.Generator) -> Tensor:
     chunk, one = torch.as_tensor(start), torch.ones(1)
     levels = torch.linspace(LEVELS - 1, 0, DENOISING).round().long()
     for k, level in enumerate(levels):
-        noise = model(chunk, level.expand(len(seen)).float(), seen)
+        clean = model(chunk, level.expand(len(seen)).float(), seen).clamp(-1.0, 1.0)
         share = SHARES[level]
-        clean = ((chunk - (1.0 - share).sqrt() * noise) / share.sqrt()).clamp(-1.0, 1.0)
         after = SHARES[levels[k + 1]] if k + 1 < DENOISING else one
         noise = (chunk - share.sqrt() * clean) / (1.0 - share).sqrt()
         chunk = after.sqrt() * clean + (1.0 - after).sqrt() * noise

@@ -3,11 +3,15 @@
 import json
 from copy import deepcopy
 
+import h5py
 import numpy as np
 import pytest
 
+import wbc_suite
 from wbc_suite.compat import robosuite
 from wbc_suite.errors import ActionError, ConfigError, UnknownNameError
+from wbc_suite.recording.converting import convert
+from wbc_suite.wrappers import DataCollection
 
 OLD_CONTROLLER = {  # as in the datasets of robomimic 0.1
     "type": "OSC_POSE",
@@ -209,3 +213,28 @@ def test_all_grippers_are_listed_as_there():
     )
     assert env.action_dim == 6
     assert env.robots[0].gripper["right"].dof == 0
+
+
+@pytest.mark.slow
+def test_what_is_converted_for_robomimic_plays_in_its_environment(tmp_path):
+    made = wbc_suite.make("Lift", robots="Panda", terminate_on_success=True)
+    with DataCollection(made, tmp_path / "lift.hdf5") as recorded:
+        recorded.reset(seed=3)
+        for _ in range(10):
+            recorded.step(0.2 * recorded.action_space.sample())
+    out = convert(tmp_path / "lift.hdf5", tmp_path / "out.hdf5", "robomimic")
+    with h5py.File(out) as file:
+        meta, demo = json.loads(file["data"].attrs["env_args"]), file["data/demo_0"]
+        states, actions = demo["states"][:], demo["actions"][:]
+        seen, text = demo["obs/robot0_eef_pos"][:], str(demo.attrs["model_file"])
+    assert meta["type"] == 1  # robosuite, in robomimic's EnvType
+    theirs = {"has_renderer": False, "has_offscreen_renderer": False}
+    theirs |= {"ignore_done": True, "use_object_obs": True, "use_camera_obs": False}
+    driver = Driver(meta["env_name"], **meta["env_kwargs"], **theirs)
+    driver.reset()
+    first = driver.reset_to({"model": text, "states": states[0]})
+    np.testing.assert_allclose(first["robot0_eef_pos"], seen[0], atol=1e-12)
+    for position, action in zip(seen[1:], actions, strict=False):
+        found, _, _ = driver.step(action)
+        np.testing.assert_allclose(found["robot0_eef_pos"], position, atol=1e-4)
+    driver.env.close()

@@ -32,7 +32,20 @@ def test_robomimics_layout_holds_its_columns_and_nothing_else(lift_recording, tm
             demo["next_obs/cube_pos"][:-1], demo["obs/cube_pos"][1:]
         )
         assert set(demo["obs"]) == set(demo["next_obs"])
+        np.testing.assert_array_equal(demo["obs/object"], demo["obs/object-state"])
     assert not any(f.problem for f in editing.verify(out))
+
+
+def test_policies_learn_the_intended_actions(tmp_path):
+    episode = make_episode(0)
+    intended = episode.columns["actions"] + 1.0
+    labelled = {"intended": intended, "disturbed": np.zeros(episode.length)}
+    with Store(tmp_path / "labelled.hdf5", HEADER) as store:
+        store.add(replace(episode, columns=episode.columns | labelled))
+    out = convert(tmp_path / "labelled.hdf5", tmp_path / "out.hdf5", "robomimic")
+    with h5py.File(out) as file:
+        np.testing.assert_array_equal(file["data/demo_0/actions"], intended)
+        assert not {"intended", "disturbed"} & set(file["data/demo_0"])
 
 
 def test_arrays_are_loaded_without_pickle(small_recording, tmp_path):

@@ -385,3 +385,43 @@ def test_a_plane_on_a_body_is_no_shape_of_the_robot(tmp_path):
 def test_size_hints_of_older_files_are_ignored(tmp_path):
     text = body("<joint/>").replace("<mujoco>", '<mujoco><size nstack="5000000"/>')
     assert read_mjcf(write(tmp_path, text)).dof == 1
+
+
+LEGS = """<mujoco><compiler angle="radian"/><worldbody>
+<body name="base" pos="0 0 1"><freejoint/>
+<geom type="box" size="0.3 0.2 0.05"/>{legs}</body></worldbody>
+<keyframe><key name="home" qpos="0 0 1 1 0 0 0 {angles}"/></keyframe></mujoco>"""
+LEG = """<body name="{name}_thigh" pos="{x} {y} 0"><joint name="{name}_hip" axis="0 1 0"
+range="-2 2"/><geom type="capsule" fromto="0 0 -0.1 0 0 -0.2" size="0.02"/>
+<body name="{name}_calf" pos="0 0 -0.3"><joint name="{name}_knee" axis="0 1 0"
+range="-2.5 -0.1"/><geom type="capsule" fromto="0 0 -0.1 0 0 -0.3" size="0.02"/>
+<body name="{name}_foot" pos="0 0 -0.3"><geom type="sphere" size="0.02"/></body></body>
+</body>"""
+PLACES = {"FL": (0.3, 0.2), "FR": (0.3, -0.2), "RL": (-0.3, 0.2), "RR": (-0.3, -0.2)}
+
+
+@pytest.mark.parametrize("first", [0.4, 1.2])
+def test_a_home_posture_is_used_if_the_feet_are_level(tmp_path, first):
+    legs = "".join(LEG.format(name=n, x=x, y=y) for n, (x, y) in PLACES.items())
+    angles = f"{first} -0.8 " + "0.4 -0.8 " * 3
+    path = tmp_path / "dog.xml"
+    path.write_text(LEGS.format(legs=legs, angles=angles))
+    ready = wbc_suite.load_robot(path).keyframe("ready")
+    hips = [ready[f"{name}_hip"] for name in PLACES]
+    if first == 0.4:
+        assert hips == [0.4] * 4
+    else:
+        assert np.ptp(hips) < 1e-3
+        assert 0.4 < hips[0] < 0.7  # bent by `standing_legs`
+
+
+def test_a_free_robot_with_a_hand_and_no_feet_is_planar(tmp_path):
+    text = """<mujoco><worldbody><body name="base" pos="0 0 0.2"><freejoint/>
+    <geom type="box" size="0.2 0.2 0.1"/><body name="arm" pos="0 0 0.2">
+    <joint name="shoulder" axis="0 1 0" range="-1 1"/>
+    <geom type="capsule" fromto="0 0 0.1 0 0 0.5" size="0.03"/></body></body>
+    </worldbody></mujoco>"""
+    path = tmp_path / "cart.xml"
+    path.write_text(text)
+    assert wbc_suite.load_robot(path).root.kind == "planar"
+    assert wbc_suite.load_robot(path, root="free").root.kind == "free"

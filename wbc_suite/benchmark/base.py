@@ -1,8 +1,9 @@
 """The interface of benchmarks, their registry, and how their files are loaded."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeAlias, TypeVar
 
 import mujoco
 import numpy as np
@@ -12,11 +13,24 @@ from wbc_suite.catalogue import Catalogue
 from wbc_suite.control import RobotState
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.robot import RobotDescription
-from wbc_suite.scene import Push
+from wbc_suite.scene import ArenaConfig, Push, TableConfig
 from wbc_suite.sensing.reading import Reading
 from wbc_suite.tomlfile import located, parse_model, read_toml
 
 C = TypeVar("C", bound=BaseModel)
+Arena: TypeAlias = str | Path | Mapping[str, Any]
+"""An MJCF scene, or the keys of an `ArenaConfig`."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class InArena:
+    """A benchmark's file, and an arena in place of that in the file."""
+
+    path: Path
+    arena: Arena
+
+
+Source: TypeAlias = Path | InArena
 
 
 class Benchmark(Protocol):
@@ -28,6 +42,7 @@ class Benchmark(Protocol):
         robots: Default robots.
         gripper: Default gripper of the robots; None for their own.
         pushes: Forces on bodies in this episode, drawn at a reset.
+        arena: The scene around it; None for an empty floor.
     """
 
     name: str
@@ -36,6 +51,7 @@ class Benchmark(Protocol):
     robots: Sequence[str]
     gripper: str | None
     pushes: Sequence[Push]
+    arena: ArenaConfig | None
 
     def arrange(
         self, robots: Sequence[RobotDescription], configuration: str
@@ -101,11 +117,14 @@ class Benchmark(Protocol):
         ...
 
 
-_BUILDERS: dict[str, Callable[[Path], Benchmark]] = {}
+_BUILDERS: dict[str, Callable[[Any], Benchmark]] = {}
 
 
-def register_benchmark(name: str, build: Callable[[Path], Benchmark]) -> None:
-    """Register a benchmark; `build` gets the path of `tasks/{name}.toml`."""
+def register_benchmark(name: str, build: Callable[[Any], Benchmark]) -> None:
+    """Register a benchmark; `build` gets the path of `tasks/{name}.toml`.
+
+    In an arena it gets an `InArena`; `load_config` takes both.
+    """
     _BUILDERS[name] = build
 
 
@@ -115,11 +134,15 @@ def benchmark_names() -> tuple[str, ...]:
 
 
 def load_benchmark(
-    name: str | Path | Callable[[], Benchmark], catalogue: Catalogue | None = None
+    name: str | Path | Callable[[], Benchmark],
+    catalogue: Catalogue | None = None,
+    *,
+    arena: Arena | None = None,
 ) -> Benchmark:
     """Make a benchmark by its name, without regard to case, or from its file.
 
-    A class of your own, or a function that returns a benchmark, is called.
+    A class of your own, or a function that returns a benchmark, is called. It brings
+    its own table into an arena.
 
     Raises:
         UnknownNameError: If there is no such benchmark.
@@ -128,7 +151,10 @@ def load_benchmark(
     if not isinstance(name, str | Path):
         if not callable(name):
             raise UnknownNameError("benchmark", name, _BUILDERS)
-        return name()
+        own = name()
+        if arena is not None:
+            own.arena = parse_arena(arena)
+        return own
     if str(name).endswith(".toml"):
         path = Path(name)
         try:
@@ -136,10 +162,25 @@ def load_benchmark(
         except UnknownNameError as error:
             where = f"{path}: {located('name', str(path))}"
             raise ConfigError(f"{where}: {error}") from error
-        return _BUILDERS[known](path)
-    known = _find(str(name))
-    path = (catalogue or Catalogue()).find("tasks", known, kind="benchmark file")
-    return _BUILDERS[known](path)
+    else:
+        known = _find(str(name))
+        path = (catalogue or Catalogue()).find("tasks", known, kind="benchmark file")
+    build = _BUILDERS[known]
+    return build(path if arena is None else InArena(path=path, arena=arena))
+
+
+def parse_arena(arena: Arena, *, source: Path | None = None) -> ArenaConfig:
+    """Check an arena; its file is relative to that of the source, if there is one.
+
+    Raises:
+        ConfigError: Names the key, its value and what is allowed.
+    """
+    keys = dict(arena) if isinstance(arena, Mapping) else {"file": arena}
+    config = parse_model(
+        ArenaConfig, keys, source=str(source or "make()"), within="arena"
+    )
+    folder = Path() if source is None else source.parent
+    return config.model_copy(update={"file": folder / config.file})
 
 
 def _find(name: str) -> str:
@@ -149,12 +190,41 @@ def _find(name: str) -> str:
     raise UnknownNameError("benchmark", name, _BUILDERS)
 
 
-def load_config(model: type[C], path: Path) -> C:
+def load_config(model: type[C], source: Source) -> C:
     """Read a benchmark's file; one that `extends` another has only the differences.
+
+    In an arena with a surface, that is the table.
 
     Raises:
         ConfigError: If it is wrong, or extends a file outside its folder.
     """
+    path = source.path if isinstance(source, InArena) else source
+    data = _read(path)
+    arena = data.pop("arena", None)
+    config = parse_model(model, data, source=str(path))
+    if isinstance(source, InArena):
+        return _in_arena(config, parse_arena(source.arena))
+    if arena is None:
+        return config
+    return _in_arena(config, parse_arena(arena, source=path))
+
+
+def _in_arena(config: C, arena: ArenaConfig) -> C:
+    """Return a config in an arena, whose surface replaces the only table."""
+    table = getattr(config, "table", None)
+    if isinstance(table, TableConfig) and getattr(config, "one_table", True):
+        arena, table = arena.with_surface(table)
+        return config.model_copy(update={"arena": arena, "table": table})
+    if arena.surface is not None:
+        raise ConfigError(
+            f"arena: surface = {arena.surface!r}: {getattr(config, 'name', '')} has "
+            "not one table that a surface could replace. Leave `surface` out, and give "
+            "`at` and `yaw`."
+        )
+    return config.model_copy(update={"arena": arena})
+
+
+def _read(path: Path) -> dict[str, Any]:
     data = read_toml(path)
     base = data.pop("extends", None)
     if base is not None:
@@ -168,4 +238,4 @@ def load_config(model: type[C], path: Path) -> C:
             data = read_toml(path.with_name(f"{name}.toml")) | data
         except ConfigError as error:
             raise ConfigError(f"{path}: key 'extends' = {name!r}: {error}") from error
-    return parse_model(model, data, source=str(path))
+    return data

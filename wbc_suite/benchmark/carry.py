@@ -2,13 +2,13 @@
 
 import math
 from collections.abc import Sequence
-from pathlib import Path
+from typing import ClassVar
 
 import mujoco
 import numpy as np
 from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
 
-from wbc_suite.benchmark.base import load_config
+from wbc_suite.benchmark.base import Source, load_config
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
 from wbc_suite.benchmark.standing import Standing, StandingConfig, arrange_on_feet
 from wbc_suite.benchmark.two_arm_lift import HANDLES, POT, WALL, PotConfig
@@ -79,6 +79,7 @@ class CarryConfig(ObjectBenchmarkConfig):
         reward: Numbers of the reward.
     """
 
+    one_table: ClassVar[bool] = False
     table: TableConfig
     other: Vector3
     pot: PotConfig
@@ -99,7 +100,7 @@ class Carry(ObjectBenchmark):
 
     robots: Sequence[str] = ("GR1FreeBody",)
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Source) -> None:
         self.config = load_config(CarryConfig, path)
         super().__init__(self.config)
         self.standing = Standing(self.config.standing)

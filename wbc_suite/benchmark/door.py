@@ -2,12 +2,11 @@
 
 import math
 from collections.abc import Sequence
-from pathlib import Path
 
 import mujoco
 from pydantic import NonNegativeFloat, PositiveFloat
 
-from wbc_suite.benchmark.base import load_config
+from wbc_suite.benchmark.base import Source, load_config
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
 from wbc_suite.control import RobotState
 from wbc_suite.robot.shapes import Vector3
@@ -57,7 +56,7 @@ class Door(ObjectBenchmark):
 
     needs_gripper = False  # a lever can be pushed down, and the door pulled, without
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Source) -> None:
         self.config = load_config(DoorConfig, path)
         super().__init__(self.config)
         self.sampler = UniformSampler(

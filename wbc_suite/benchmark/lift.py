@@ -2,13 +2,12 @@
 
 import math
 from collections.abc import Sequence
-from pathlib import Path
 
 import mujoco
 import numpy as np
 from pydantic import NonNegativeFloat, PositiveFloat
 
-from wbc_suite.benchmark.base import load_config
+from wbc_suite.benchmark.base import Source, load_config
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
 from wbc_suite.robot.elements import Channel
 from wbc_suite.robot.shapes import SizeInterval
@@ -56,7 +55,7 @@ class Lift(ObjectBenchmark):
     Unlike there, a cube that is thrown or batted up is not lifted: a hand must hold it.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Source) -> None:
         self.config = load_config(LiftConfig, path)
         super().__init__(self.config)
         table, cube = self.config.table, self.config.cube

@@ -2,13 +2,12 @@
 
 import math
 from collections.abc import Sequence
-from pathlib import Path
 
 import mujoco
 import numpy as np
 from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
-from wbc_suite.benchmark.base import load_config
+from wbc_suite.benchmark.base import Source, load_config
 from wbc_suite.benchmark.lift import CUBE, CubeConfig
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
 from wbc_suite.benchmark.standing import (
@@ -65,7 +64,7 @@ class LocoLift(ObjectBenchmark):
 
     robots: Sequence[str] = ("SpotWithArm",)
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Source) -> None:
         self.config = load_config(LocoLiftConfig, path)
         super().__init__(self.config)
         self.standing = Standing(self.config.standing)

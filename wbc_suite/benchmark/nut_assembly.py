@@ -2,14 +2,13 @@
 
 import math
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Annotated, Literal
 
 import mujoco
 import numpy as np
 from pydantic import Field, PositiveFloat
 
-from wbc_suite.benchmark.base import load_config
+from wbc_suite.benchmark.base import Source, load_config
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
 from wbc_suite.benchmark.sorting import Sorting
 from wbc_suite.benchmark.staged_reward import StagedReward
@@ -71,7 +70,7 @@ class NutAssembly(ObjectBenchmark):
     edge beside the peg is not placed, nor one that a hand still holds.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Source) -> None:
         self.config = config = load_config(NutAssemblyConfig, path)
         super().__init__(config)
         self.sorting = Sorting(

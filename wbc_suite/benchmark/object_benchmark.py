@@ -4,7 +4,7 @@ import logging
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import mujoco
 import numpy as np
@@ -18,9 +18,10 @@ from wbc_suite.benchmark.arrangement import (
 )
 from wbc_suite.benchmark.falls import fall_of
 from wbc_suite.control import RobotState
-from wbc_suite.errors import PlacementError
+from wbc_suite.errors import ConfigError, PlacementError
 from wbc_suite.robot import RobotDescription
-from wbc_suite.scene import Push
+from wbc_suite.scene import ArenaConfig, Push
+from wbc_suite.scene.mjcf_arena import PREFIX
 from wbc_suite.scene.objects import ObjectState, SceneObject
 from wbc_suite.scene.placement import Placed, Sampler
 from wbc_suite.sensing.hands import Hand, hands_of, pairs_in_contact
@@ -40,6 +41,7 @@ log = logging.getLogger(__name__)
 
 TRIES = 50
 """Placements that are drawn if a robot touches the objects of the first."""
+PRESSED = 1e-3  # depth from which an object is in the arena, and not on it, m
 PARKED = (8.0, 8.0)
 """Place of objects that are not used in an episode, m."""
 SLIP = 0.2  # m/s, between a hand and what it holds, at most
@@ -54,15 +56,19 @@ class ObjectBenchmarkConfig(BaseModel):
         title: The task in a few words.
         horizon: Actions in an episode.
         places: Position of each robot, m.
+        one_table: Whether `table`, if there is one, is the only table.
+        arena: The scene around it; None for an empty floor.
     """
 
     model_config = FrozenModel.model_config
+    one_table: ClassVar[bool] = True
 
     format: Literal[1]
     name: str
     title: str
     horizon: PositiveInt
     places: Places
+    arena: ArenaConfig | None = None
 
 
 class ObjectBenchmark(ABC):
@@ -73,7 +79,9 @@ class ObjectBenchmark(ABC):
 
     Attributes:
         sampler: Draws the start poses; may be replaced by a sampler of your own.
-        states: The objects in the simulation, by name, after `bind`.
+        arena: The scene around it; None for an empty floor.
+        states: The objects and the arena's things in the simulation, by name, after
+            `bind`.
         grasps: Where and how hands can hold each object, and the objects attached to
             it, by name, after `bind`.
         hands: The hands of all robots, after `bind`.
@@ -86,7 +94,7 @@ class ObjectBenchmark(ABC):
 
     def __init__(self, config: ObjectBenchmarkConfig) -> None:
         self.name, self.title, self.horizon = config.name, config.title, config.horizon
-        self._placement = config
+        self._placement, self.arena = config, config.arena
         self.sampler: Sampler | None = None
 
     @abstractmethod
@@ -145,7 +153,27 @@ class ObjectBenchmark(ABC):
         self.hands = [hand for state in robots for hand in hands_of(state)]
         things = self.objects()
         self.states = {t.name: ObjectState(model, data, t.name) for t in things}
+        self._own = tuple(self.states)
+        self._bind_arena()
         self.grasps = {t.name: t.grasps for thing in things for t in thing.family()}
+
+    def _bind_arena(self) -> None:
+        """Look up the arena's things and geoms."""
+        self._arena_geoms = frozenset[int]()
+        arena = self.arena
+        if arena is None:
+            return
+        names = (self.model.geom(geom).name for geom in range(self.model.ngeom))
+        self._arena_geoms = frozenset(
+            geom for geom, name in enumerate(names) if name.startswith(PREFIX)
+        )
+        for name in arena.thing_names(self.model):
+            if name in self.states:
+                raise ConfigError(
+                    f"{self.name} and {arena.file} both have '{name}'. Rename the body "
+                    "in the scene."
+                )
+            self.states[name] = ObjectState(self.model, self.data, PREFIX + name)
 
     def reset(self, rng: np.random.Generator) -> None:
         """Place the objects; sizes and poses are written into model and data."""
@@ -163,19 +191,25 @@ class ObjectBenchmark(ABC):
             placements = sampler.sample(rng, self.states, {})
             for name, placed in placements.items():
                 self.states[name].move(placed.position, placed.quat)
-            if not self._robot_touches(placements):
+            if not self._is_blocked(placements):
                 return
+        what = "a robot" if self.arena is None else "a robot or the arena"
         raise PlacementError(
-            f"{self.name}: a robot touched {', '.join(placements)} in all {TRIES} "
+            f"{self.name}: {what} touched {', '.join(placements)} in all {TRIES} "
             "placements. Move the robot away, or enlarge the region."
         )
 
-    def _robot_touches(self, names: Iterable[str]) -> bool:
-        """Whether a robot touches one of the free objects among `names`."""
+    def _is_blocked(self, names: Iterable[str]) -> bool:
+        """Whether a free object among `names` touches a robot, or is in the arena."""
         free = [self.states[n].geoms for n in names if self.states[n].is_free]
         placed = frozenset[int]().union(*free)
         mujoco.mj_fwdPosition(self.model, self.data)
-        return self.in_contact(placed, self._robot_geoms)
+        deep = self.data.contact.geom[self.data.contact.dist < -PRESSED].tolist()
+        return self.in_contact(placed, self._robot_geoms) or any(
+            (a in placed and b in self._arena_geoms)
+            or (b in placed and a in self._arena_geoms)
+            for a, b in deep
+        )
 
     def park(self, names: Iterable[str]) -> None:
         """Place objects that are not used in this episode far away on the floor."""
@@ -196,7 +230,7 @@ class ObjectBenchmark(ABC):
         Keys are those of existing datasets: `{object}_pos`, `{object}_quat`,
         `gripper_to_{object}`; with several hands they start with the hand's name.
         """
-        return self.poses_of(self.states)
+        return self.poses_of(self._own)
 
     def robot_observables(self) -> dict[str, dict[str, Reading]]:
         """Return no readings besides those of the robots themselves."""

@@ -1,14 +1,13 @@
 """PickPlace: sort groceries from one bin into the quadrants of another."""
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Annotated, Literal
 
 import mujoco
 import numpy as np
 from pydantic import Field, PositiveFloat
 
-from wbc_suite.benchmark.base import load_config
+from wbc_suite.benchmark.base import Source, load_config
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
 from wbc_suite.benchmark.sorting import Sorting
 from wbc_suite.benchmark.staged_reward import StagedReward
@@ -61,7 +60,7 @@ class PickPlace(ObjectBenchmark):
     object that a hand still holds is not placed, nor one that flies or rolls.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Source) -> None:
         self.config = config = load_config(PickPlaceConfig, path)
         super().__init__(config)
         length, width, _ = config.target.size

@@ -2,14 +2,13 @@
 
 import math
 from collections.abc import Sequence
-from pathlib import Path
 
 import mujoco
 import numpy as np
 from pydantic import Field, PositiveFloat, field_validator
 
 from wbc_suite.benchmark.arrangement import with_default
-from wbc_suite.benchmark.base import load_config
+from wbc_suite.benchmark.base import Source, load_config
 from wbc_suite.benchmark.object_benchmark import (
     ObjectBenchmark,
     ObjectBenchmarkConfig,
@@ -90,7 +89,7 @@ class Reach(ObjectBenchmark):
     robots: Sequence[str] = ("GR1FreeBody",)
     needs_gripper = False
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Source) -> None:
         self.config = load_config(ReachConfig, path)
         super().__init__(self.config)
         self.standing = Standing(self.config.standing)

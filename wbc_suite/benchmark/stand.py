@@ -2,13 +2,12 @@
 
 import math
 from collections.abc import Sequence
-from pathlib import Path
 
 import mujoco
 import numpy as np
 from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
 
-from wbc_suite.benchmark.base import load_config
+from wbc_suite.benchmark.base import Source, load_config
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
 from wbc_suite.benchmark.standing import (
     Standing,
@@ -67,7 +66,7 @@ class Stand(ObjectBenchmark):
     robots: Sequence[str] = ("GR1FreeBody",)
     needs_gripper = False
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Source) -> None:
         self.config = load_config(StandConfig, path)
         super().__init__(self.config)
         self.standing = Standing(self.config.standing)

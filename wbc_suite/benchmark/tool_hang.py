@@ -2,13 +2,12 @@
 
 import math
 from collections.abc import Sequence
-from pathlib import Path
 
 import mujoco
 import numpy as np
 from pydantic import PositiveFloat
 
-from wbc_suite.benchmark.base import load_config
+from wbc_suite.benchmark.base import Source, load_config
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
 from wbc_suite.benchmark.staged_reward import StagedReward
 from wbc_suite.robot.shapes import Vector3
@@ -60,7 +59,7 @@ class ToolHang(ObjectBenchmark):
     Source of the task: robosuite 1.5, see `Lift`; no shaped reward there.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Source) -> None:
         self.config = load_config(ToolHangConfig, path)
         super().__init__(self.config)
         config, origin = self.config, self.config.table.center

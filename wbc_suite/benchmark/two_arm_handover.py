@@ -2,14 +2,13 @@
 
 import math
 from collections.abc import Sequence
-from pathlib import Path
 
 import mujoco
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from wbc_suite.benchmark.arrangement import Opposed
-from wbc_suite.benchmark.base import load_config
+from wbc_suite.benchmark.base import Source, load_config
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
 from wbc_suite.control import RobotState
 from wbc_suite.robot.shapes import Size, SizeInterval
@@ -66,7 +65,7 @@ class TwoArmHandover(ObjectBenchmark):
 
     robots: Sequence[str] = ("Panda", "Panda")
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Source) -> None:
         self.config = load_config(TwoArmHandoverConfig, path)
         super().__init__(self.config)
         self._head = 0.0

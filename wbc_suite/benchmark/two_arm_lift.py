@@ -2,13 +2,12 @@
 
 import math
 from collections.abc import Sequence
-from pathlib import Path
 
 import mujoco
 from pydantic import Field, NonNegativeFloat, PositiveFloat, field_validator
 
 from wbc_suite.benchmark.arrangement import Opposed
-from wbc_suite.benchmark.base import load_config
+from wbc_suite.benchmark.base import Source, load_config
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
 from wbc_suite.control import RobotState
 from wbc_suite.robot.shapes import Size
@@ -78,7 +77,7 @@ class TwoArmLift(ObjectBenchmark):
 
     robots: Sequence[str] = ("Panda", "Panda")
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Source) -> None:
         self.config = load_config(TwoArmLiftConfig, path)
         super().__init__(self.config)
         self.sampler = UniformSampler(

@@ -3,14 +3,13 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import mujoco
 import numpy as np
 from pydantic import Field, PositiveFloat, model_validator
 
 from wbc_suite.benchmark.arrangement import Opposed
-from wbc_suite.benchmark.base import load_config
+from wbc_suite.benchmark.base import Source, load_config
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
 from wbc_suite.errors import ConfigError
 from wbc_suite.robot import RobotDescription
@@ -94,7 +93,7 @@ class TwoArmPegInHole(ObjectBenchmark):
     gripper: str | None = "none"
     needs_gripper = False
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Source) -> None:
         self.config = load_config(TwoArmPegInHoleConfig, path)
         super().__init__(self.config)
 

@@ -3,13 +3,13 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
+from typing import ClassVar
 
 import mujoco
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from wbc_suite.benchmark.arrangement import Opposed
-from wbc_suite.benchmark.base import load_config
+from wbc_suite.benchmark.base import Source, load_config
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
 from wbc_suite.control import RobotState
 from wbc_suite.robot.elements import Rgba
@@ -84,6 +84,7 @@ class RewardConfig(FrozenModel):
 class TwoArmTransportConfig(ObjectBenchmarkConfig):
     """`tasks/two_arm_transport.toml`."""
 
+    one_table: ClassVar[bool] = False
     opposed: Opposed
     apart: PositiveFloat
     table: TableConfig
@@ -106,7 +107,7 @@ class TwoArmTransport(ObjectBenchmark):
 
     robots: Sequence[str] = ("Panda", "Panda")
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Source) -> None:
         self.config = load_config(TwoArmTransportConfig, path)
         super().__init__(self.config)
         config, places = self.config, self._bin_places()

@@ -2,13 +2,12 @@
 
 import math
 from collections.abc import Sequence
-from pathlib import Path
 
 import mujoco
 import numpy as np
 from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
-from wbc_suite.benchmark.base import load_config
+from wbc_suite.benchmark.base import Source, load_config
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
 from wbc_suite.benchmark.standing import (
     Standing,
@@ -86,7 +85,7 @@ class WalkTo(ObjectBenchmark):
     robots: Sequence[str] = ("Spot",)
     needs_gripper = False
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Source) -> None:
         self.config = load_config(WalkToConfig, path)
         super().__init__(self.config)
         self.standing = Standing(self.config.standing)

@@ -2,16 +2,16 @@
 
 import math
 from collections.abc import Sequence
-from pathlib import Path
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
-from wbc_suite.benchmark.base import load_config
+from wbc_suite.benchmark.base import Source, load_config
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
 from wbc_suite.control import RobotState
+from wbc_suite.errors import ConfigError
 from wbc_suite.robot.elements import Channel
 from wbc_suite.scene import TableConfig, add_table, add_table_cameras
 from wbc_suite.scene.objects import SceneObject
@@ -93,7 +93,7 @@ class Wipe(ObjectBenchmark):
     needs_gripper = False
     gripper: str | None = "WipingGripper"
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Source) -> None:
         self.config = load_config(WipeConfig, path)
         super().__init__(self.config)
         self.marks: Matrix = np.zeros((self.config.stroke.marks, 3))
@@ -129,7 +129,10 @@ class Wipe(ObjectBenchmark):
     ) -> None:
         """Look up the marks, their user data, and the table."""
         super().bind(model, data, robots)
-        self._table: int = model.geom("table").id
+        surface = self.config.table.geom or "table"
+        if surface not in (model.geom(i).name for i in range(model.ngeom)):
+            raise ConfigError(f"{self.name}: name a geom as `surface`, not a site.")
+        self._table: int = model.geom(surface).id
         self._first_prefix = robots[0].prefix
         first = model.geom(f"{MARK}0").id
         self._geoms = slice(first, first + len(self.marks))
@@ -195,7 +198,7 @@ class Wipe(ObjectBenchmark):
                 mujoco.mj_contactForce(self.model, self.data, i, self._wrench)
                 force += abs(self._wrench.item(0))
                 points.append(self.data.contact.pos[i, :2])
-            else:
+            elif not self._robot_geoms.isdisjoint((a, b)):
                 collided = True
         return points, force, collided
 

@@ -11,6 +11,7 @@ import typer
 
 from wbc_suite import __version__
 from wbc_suite.cli import (
+    adopt,
     bench,
     catalogue,
     datasets,
@@ -37,6 +38,7 @@ app = typer.Typer(
 app.command("teleop")(teleop.teleop)
 app.command("view")(robots.view)
 app.command("demo")(demo.demo)
+app.command("adopt")(adopt.adopt)
 app.command("record")(record.record)
 app.command("multiply")(multiply.multiply)
 app.command("replay")(replay.replay)
@@ -67,7 +69,17 @@ def _show_version(asked: bool) -> None:
         raise typer.Exit
 
 
-LOADS = ("teleop", "view", "demo", "record", "multiply", "replay", "render", "expert")
+LOADS = (
+    "teleop",
+    "view",
+    "demo",
+    "adopt",
+    "record",
+    "multiply",
+    "replay",
+    "render",
+    "expert",
+)
 LOADS += ("evaluate", "serve-policy", "bench")
 """Commands that import for a second before they have something to say."""
 

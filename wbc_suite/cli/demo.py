@@ -22,6 +22,7 @@ PERIOD = 4.0  # s, of one figure
 REST = 1.0  # s, standing still at the end
 FRAMES_PER_SECOND = 10
 ARM = 0.6  # m; length of an arm that moves through the whole figure
+LATE = 0.02  # m; error at rest from which on causes are looked for
 ON_FEET = 0.15  # of the figure, by what moves a robot without hands: its trunk
 
 
@@ -47,7 +48,7 @@ def demo(
     from PIL import Image
 
     from wbc_suite.control import load_composite_controller_config
-    from wbc_suite.envs.hold_check import alone
+    from wbc_suite.envs.hold_check import alone, hold_faults
     from wbc_suite.recording.plots import save_picture
     from wbc_suite.recording.video import write_video
     from wbc_suite.robot import load_robot
@@ -62,6 +63,8 @@ def demo(
     seconds = figures * PERIOD + REST
     errors, step_times, pictures = _reach(env, sizes, seconds)
     _report(f"{loaded.name} by {controller}", sizes, errors, step_times)
+    for fault in hold_faults(loaded) if errors[-1].max() > LATE else ():
+        print(f"  at `ready`: {fault}")
     still, film = output / "reach.png", output / "reach.gif"
     save_picture(Image.fromarray(pictures[len(pictures) // 4]), still)
     write_video(pictures, film, rate=FRAMES_PER_SECOND)
@@ -111,8 +114,8 @@ def _reach(
             action, begin = layout.pack(goals, base=env.hold_action), perf_counter()
             *_, info = env.step(action)
             step_times.append(perf_counter() - begin)
-            if info.get("failure"):
-                raise WbcError(f"{info['failure']} `wbc-suite check` names causes.")
+            if fault := info.get("failure") or info.get("physics_error"):
+                raise WbcError(f"{fault} `wbc-suite check` names causes.")
             frames = info["ik"]["frames"]
             errors.append([frames[name]["position_error"] for name in sizes])
             if step % (RATE // FRAMES_PER_SECOND) == 0:

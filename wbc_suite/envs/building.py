@@ -21,6 +21,7 @@ from wbc_suite.envs.simulation import Simulation
 from wbc_suite.errors import ConfigError
 from wbc_suite.robot import RobotDescription, load_robot
 from wbc_suite.scene import (
+    ArenaConfig,
     add_robot_view,
     aim_robot_view,
     attach_robot,
@@ -36,6 +37,7 @@ from wbc_suite.sensing.proprioception import (
     proprioception,
     sensors_of,
 )
+from wbc_suite.sensing.things import check_room, clear_views, readings_of_things
 
 WATCH_PAGE = "wbc_suite.viewers.watch_page"
 """Imported when needed: `viewers` is a layer above `envs`."""
@@ -72,11 +74,17 @@ def _load(robot: Any, benchmark: Benchmark, config: EnvConfig) -> RobotDescripti
     return load_robot(robot, gripper=gripper, base=base, skin=config.skin)
 
 
+def arena_of(benchmark: Benchmark) -> ArenaConfig | None:
+    """Return the scene around a benchmark; classes of users need not name one."""
+    return getattr(benchmark, "arena", None)
+
+
 def compose(
     benchmark: Benchmark, robots: tuple[RobotDescription, ...], config: EnvConfig
 ) -> mujoco.MjSpec:
     """Return the scene: the benchmark's arena and objects, and the robots."""
-    spec = empty_arena()
+    arena = arena_of(benchmark)
+    spec = empty_arena() if arena is None else arena.build()
     benchmark.build(spec)
     for i, robot in enumerate(robots):
         attach_robot(spec, robot, robot_prefix(i))
@@ -132,6 +140,10 @@ def simulate(
     for posture in postures:
         posture.write()
     mujoco.mj_forward(model, data)
+    if (arena := arena_of(benchmark)) is not None:
+        check_room(arena, states)
+        table = getattr(getattr(benchmark, "config", None), "table", None)
+        clear_views(model, data, (0.0, 0.0, 0.8) if table is None else table.center)
     for state in states:
         aim_robot_view(state)
     pairs: list[tuple[RobotState, CompositeController]] = []
@@ -159,6 +171,8 @@ def make_observables(
             groups[f"{state.prefix}sensor-state"] = sensors_of(state)
     if config.use_object_obs:
         groups["object-state"] = benchmark.observables()
+        if (arena := arena_of(benchmark)) is not None:
+            groups["object-state"] |= readings_of_things(arena, simulation.model)
     observables = Observables(simulation.model, simulation.data, groups)
     for key, changes in (config.observables or {}).items():
         observables.modify(key, **changes)

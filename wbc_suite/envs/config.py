@@ -17,7 +17,7 @@ from pydantic import (
 
 from wbc_suite.control import CompositeControllerName, PartControllerName
 from wbc_suite.envs.states import Randomiser
-from wbc_suite.errors import ConfigError
+from wbc_suite.errors import ConfigError, UnknownArgumentError, did_you_mean
 from wbc_suite.robot import RobotDescription
 from wbc_suite.scene.placement import Sampler
 from wbc_suite.sensing.cameras import CameraRequest
@@ -59,6 +59,7 @@ class EnvArguments(TypedDict, total=False):
     """Keyword arguments of `make` as users write them; see `EnvConfig`."""
 
     robots: Robot | Sequence[Robot]
+    arena: str | Path | Mapping[str, Any] | None
     env_configuration: Configuration
     controller_configs: Controller | Sequence[Controller | None] | None
     placement_initializer: Sampler | None
@@ -97,6 +98,8 @@ class EnvConfig(FrozenModel):
     Attributes:
         robots: One robot, or several: names, files or descriptions; the benchmark's
             own choice by default.
+        arena: MJCF file of a scene around the benchmark, or the keys of a
+            `wbc_suite.scene.ArenaConfig`; an empty floor by default.
         env_configuration: Arrangement of robots: two `opposed` (by default) or
             `parallel`, one `single-robot`.
         controller_configs: Composite controller: a name, a file or a config; one for
@@ -142,6 +145,7 @@ class EnvConfig(FrozenModel):
     model_config = ConfigDict(arbitrary_types_allowed=True)
 
     robots: Any = "Panda"
+    arena: str | Path | dict[str, Any] | None = None
     env_configuration: Configuration = "default"
     controller_configs: Any = None
     placement_initializer: Any = None
@@ -281,6 +285,12 @@ def parse_env_config(arguments: Mapping[str, Any]) -> EnvConfig:
     drawn = given.pop("has_offscreen_renderer", False)
     if shown or drawn:
         given.setdefault("render_mode", "human" if shown else "rgb_array")
+    known = sorted(EnvConfig.model_fields)
+    for name in (name for name in given if name not in known):
+        raise UnknownArgumentError(
+            f"make() got an unexpected keyword argument '{name}'."
+            f"{did_you_mean(name, known)} Known: {', '.join(known)}."
+        )
     return parse_model(EnvConfig, given, source="make()")
 
 

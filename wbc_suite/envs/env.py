@@ -71,7 +71,7 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         **arguments: Unpack[EnvArguments],
     ) -> None:
         self._given, self.lock = (benchmark, dict(arguments)), RLock()
-        self.benchmark = load_benchmark(benchmark)
+        self.benchmark = load_benchmark(benchmark, arena=arguments.get("arena"))
         robots = list(self.benchmark.robots)
         self.config = parse_env_config({"robots": robots, **arguments})
         use_sampler(self.benchmark, self.config)
@@ -266,7 +266,7 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
     @property
     def scene_xml(self) -> str:
         """The scene as MJCF text, with plain colours in place of computed textures."""
-        benchmark = load_benchmark(self._given[0])
+        benchmark = load_benchmark(self._given[0], arena=self.config.arena)
         return write_scene(compose(benchmark, self.robots, self.config))
 
     def __getstate__(self) -> dict[str, Any]:

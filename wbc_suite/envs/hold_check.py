@@ -77,15 +77,17 @@ def alone(robot: RobotDescription, **options: Any) -> RobotEnv:
     return RobotEnv(benchmark, robots=robot, **options)
 
 
-def hold_faults(robot: RobotDescription, *, seconds: float = SECONDS) -> list[str]:
+def hold_faults(
+    robot: RobotDescription, *, seconds: float = SECONDS, controller: str | None = None
+) -> list[str]:
     """Return one sentence for each fault of a robot that holds `ready` in simulation.
 
-    The robot is alone on the floor, with its default controller. Faults are a fall,
-    divergence, and joints that move away, each with its likely cause. The list is empty
-    if the robot stays where it is.
+    The robot is alone on the floor, with its default controller or that of a file.
+    Faults are a fall, divergence, and joints that move away, each with its likely
+    cause. The list is empty if the robot stays where it is.
     """
     try:
-        env = alone(robot)
+        env = alone(robot, controller_configs=controller)
     except WbcError as error:
         return [f"It cannot be controlled: {error}"]
     env.reset(seed=0)
@@ -94,7 +96,7 @@ def hold_faults(robot: RobotDescription, *, seconds: float = SECONDS) -> list[st
     failure = ""
     while data.time < seconds and not failure and np.isfinite(data.qpos).all():
         *_, info = env.step(env.hold_action)
-        failure = info.get("failure") or ""
+        failure = info.get("failure") or info.get("physics_error") or ""
     faults = [failure[0].upper() + failure[1:]] if failure else []
     faults += _divergence(data)
     faults += _moved(robot, m, np.abs(data.qpos - start), weight)

@@ -17,6 +17,7 @@ from wbc_suite.qp.kernel import Kernel
 from wbc_suite.qp.limit import BoxLimit, Limit, LimitKind, RowLimit
 from wbc_suite.qp.look_at_task import LookAtTask
 from wbc_suite.qp.motion import Approach, Escaping, Motion, Overshoot, Relaxed
+from wbc_suite.qp.obstacle_limit import ObstacleLimit
 from wbc_suite.qp.posture_task import DampingTask, PostureTask
 from wbc_suite.qp.problem import Problem
 from wbc_suite.qp.report import (
@@ -61,6 +62,7 @@ __all__ = [
     "LookAtTask",
     "MomentumTask",
     "Motion",
+    "ObstacleLimit",
     "OutOfReach",
     "Overshoot",
     "PositionLimit",

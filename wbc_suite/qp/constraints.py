@@ -15,6 +15,7 @@ from wbc_suite.qp.equality import Equality, FrameEquality, HeldFrames, LinearEqu
 from wbc_suite.qp.floor_limit import FloorLimit
 from wbc_suite.qp.kernel import Kernel, kernel_of
 from wbc_suite.qp.limit import Limit, LimitKind, RowLimit
+from wbc_suite.qp.obstacle_limit import ObstacleLimit
 from wbc_suite.qp.self_collision_limit import SelfCollisionLimit
 from wbc_suite.qp.strict_level import MAX_LEVELS
 from wbc_suite.qp.task import RowTask, Task
@@ -24,7 +25,7 @@ from wbc_suite.typing import Indices, Vector
 class Constraints:
     """Inequality rows, then equality rows, in the order in which a problem has them.
 
-    The first self-collision limit, the first floor limit and the equalities of this
+    The first limits of self-collision, floor and obstacles and the equalities of this
     package are written by kernels; others by their own `rows` before each tick. All are
     bound here. Limits without rows are left out.
 
@@ -39,6 +40,8 @@ class Constraints:
         collision_rows: Its first inequality row and the end.
         floor: The floor limit that a kernel writes.
         floor_rows: Its first inequality row and the end.
+        obstacles: The obstacle limit that a kernel writes.
+        obstacle_rows: Its first inequality row and the end.
         is_compiled: Whether kernels write all rows.
     """
 
@@ -67,6 +70,8 @@ class Constraints:
         self.collision, self.floor = SelfCollisionLimit((), ()), FloorLimit({})
         self.collision_rows: Indices = np.zeros(2, dtype=np.int64)
         self.floor_rows: Indices = np.zeros(2, dtype=np.int64)
+        self.obstacles = ObstacleLimit((), ())
+        self.obstacle_rows: Indices = np.zeros(2, dtype=np.int64)
         for limit, rows in self._limits:
             kernel, end = kernel_of(limit), (rows.start, rows.stop)
             is_first = not self.collision_rows.any()
@@ -74,10 +79,17 @@ class Constraints:
                 self.collision, self.collision_rows[:] = limit, end
             elif isinstance(limit, FloorLimit) and kernel and not self.floor_rows.any():
                 self.floor, self.floor_rows[:] = limit, end
+            elif (
+                isinstance(limit, ObstacleLimit)
+                and kernel
+                and not self.obstacle_rows.any()
+            ):
+                self.obstacles, self.obstacle_rows[:] = limit, end
             else:
                 self._python_limits.append((limit, rows))
         self.collision.bind(configuration)
         self.floor.bind(configuration)
+        self.obstacles.bind(configuration)
 
     def _bind_equalities(self, configuration: Configuration) -> None:
         self.rate: Vector = np.full(self.equalities, np.nan)

@@ -13,6 +13,7 @@ class Kernel(IntEnum):
     POSTURE = 4
     SELF_COLLISION = 5
     FLOOR = 6
+    OBSTACLE = 7
 
 
 def kernel_of(part: object) -> Kernel:

@@ -28,6 +28,7 @@ class LimitKind(IntEnum):
     FLOOR = 8
     OTHER = 9
     """A limit of a user's own that names no kind."""
+    OBSTACLE = 10
 
     def __str__(self) -> str:
         """Return the name as reports print it: "self-collision"."""

@@ -166,6 +166,8 @@ class TaskStack:
             collision_rows=rows.collision_rows,
             spheres=rows.floor.argument,
             floor_rows=rows.floor_rows,
+            obstacles=rows.obstacles.argument,
+            obstacle_rows=rows.obstacle_rows,
             prepared=np.full(2, int(self.is_compiled), dtype=np.int64),
             damping=float(self.damping),
             curvature=float(self.curvature_damping),

@@ -17,6 +17,7 @@ from wbc_suite.qp.active_set import QpArrays, solve_warm
 from wbc_suite.qp.equality import HeldFrames, hold_frames
 from wbc_suite.qp.floor_limit import SphereArrays, floor_rows
 from wbc_suite.qp.limit import JointBounds, merge_bounds
+from wbc_suite.qp.obstacle_limit import ObstacleArrays, obstacle_rows
 from wbc_suite.qp.overshoot import OvershootArrays, damp_overshoot
 from wbc_suite.qp.problem import UNBOUNDED, worst_violation
 from wbc_suite.qp.self_collision_rows import CapsuleArrays, self_collision_rows
@@ -69,6 +70,8 @@ class TickArrays(NamedTuple):
     collision_rows: Indices  # (2,), its first inequality row and the end
     spheres: SphereArrays  # of the floor limit
     floor_rows: Indices  # (2,), its first inequality row and the end
+    obstacles: ObstacleArrays  # of the obstacle limit
+    obstacle_rows: Indices  # (2,), its first inequality row and the end
     prepared: Indices  # (2,)
     damping: float  # Tikhonov term, [cost]^2/rad^2
     curvature: float  # see `write_tasks`
@@ -163,6 +166,10 @@ def _write_rows(tick: TickArrays, qp: QpArrays, dt: float) -> None:
     first, last = tick.floor_rows[0], tick.floor_rows[1]
     if last > first:
         floor_rows(robot, tick.spheres, dt, qp.rows[first:last], h[first:last])
+    first, last = tick.obstacle_rows[0], tick.obstacle_rows[1]
+    if last > first:
+        G, near = qp.rows[first:last], h[first:last]
+        obstacle_rows(robot, tick.obstacles, dt, G, near)
     for row in range(p):
         wanted = h[row]
         h[row] = max(wanted, 0.0, -2.0 * (wanted + tick.relax_speed[row] * dt))

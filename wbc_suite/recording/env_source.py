@@ -16,13 +16,14 @@ from wbc_suite.errors import DatasetError, WbcError
 from wbc_suite.recording.dataset import Dataset
 from wbc_suite.recording.episode import Fact
 
+PACKAGE = "wbc_suite"
 GYM_TYPE = 2  # type of Gymnasium environments in robomimic's `env_args`
 PACKAGES = ("mujoco", "pin", "numpy", "gymnasium", "h5py", "daqp")
 MAX_TEXT = 1_000_000  # characters of env_args
 _SHOWN = {"render_mode", "render_camera", "render_size", "render_preset", "skin"}
 """Arguments of rendering, which do not change an episode."""
 _PATH = re.compile(r"[/\\]|\.(toml|json|xml|urdf|py)\Z", re.IGNORECASE)
-_NAMES = ("robots", "controller_configs", "gripper_types", "base_types")
+_NAMES = ("robots", "arena", "controller_configs", "gripper_types", "base_types")
 _SIZES = ("camera_heights", "camera_widths")
 MAX_PIXELS = 2048  # of a camera's side, unless the dataset is trusted
 
@@ -37,7 +38,7 @@ class EnvSource:
 
     benchmark: str
     arguments: Mapping[str, Any]
-    package: str = "wbc_suite"
+    package: str = PACKAGE
     missing: tuple[str, ...] = ()
 
     @classmethod

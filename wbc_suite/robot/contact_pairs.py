@@ -1,13 +1,18 @@
 """Find pairs of links that need not collide, by sampling postures."""
 
+import logging
 from collections.abc import Iterator
 from itertools import combinations
+from pathlib import Path
 
 import mujoco
 import numpy as np
 
+from wbc_suite.errors import join_first
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.elements import Contacts
+
+LOG = logging.getLogger(__name__)
 
 OVERLAP = 1e-3  # smallest penetration in m that counts as an overlap
 NEAR = 0.01  # m; links that never come nearer never touch
@@ -55,6 +60,20 @@ def _near_pairs(robot: RobotDescription) -> Iterator[Pair]:
     for first, second in found:
         a, b = sorted((names[first], names[second]))
         yield a, b
+
+
+def exclude_overlapping(robot: RobotDescription, source: Path) -> RobotDescription:
+    """Return the robot with the pairs of `overlapping_links` excluded from contact."""
+    pairs = overlapping_links(robot)
+    if not pairs:
+        return robot
+    shown = [f"'{first}' and '{second}'" for first, second in pairs]
+    LOG.warning(
+        "%s: these links overlap in the posture ready and will not collide: %s.",
+        *(source, join_first(shown, limit=12)),
+    )
+    exclude = (*robot.contacts.exclude, *pairs)
+    return robot.model_copy(update={"contacts": Contacts(exclude=exclude)})
 
 
 def overlapping_links(robot: RobotDescription) -> tuple[Pair, ...]:

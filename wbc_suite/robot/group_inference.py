@@ -9,7 +9,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from wbc_suite.robot.elements import Frame, Link, rigid_bodies
+from wbc_suite.robot.poses import rotation_matrix
+from wbc_suite.robot.shape_geometry import hull_spheres
 
 if TYPE_CHECKING:
     from wbc_suite.robot.importing import NameTable
@@ -62,6 +66,10 @@ END_WORDS = {
     "leg": {"foot", "sole", "toe"},
 }
 """Words in the names of frames and links at the end of a limb."""
+
+
+POINT_FOOT = 3
+"""A leg with at most so many joints and no named end stands on its outermost point."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -139,7 +147,9 @@ def _traits(links: Sequence[Link]) -> dict[str, _Traits]:
         if kind is None and above.kind == "arm" and owners.count(parent) > 1:
             kind = "gripper"
         elif kind is None:
-            kind = above.kind if above.kind in ("leg", "gripper", "head") else "arm"
+            rolls = above.kind == "base" and parent not in driving  # rim of a wheel
+            inherits = rolls or above.kind in ("leg", "gripper", "head")
+            kind = above.kind if inherits else "arm"
         if kind == "torso" and _side(words, pairs=False):
             kind = "arm"  # "waist" of the left one of two arms
         same_limb = above.kind in ("arm", "leg", "gripper")
@@ -186,7 +196,8 @@ def infer_frames(
     """Return the given frames, and `eef`, `foot`, `head`, `torso` at the limbs' ends.
 
     A new frame is placed at a given frame or link with a word of `END_WORDS`, or else
-    at the tip. A gripper gets a `tcp` only in the first case.
+    at the tip, where a leg of a quadruped ends. A gripper gets a `tcp` only in the
+    first case.
     """
     frames = {frame.name: frame for frame in given}
     for limb in limbs:
@@ -197,7 +208,7 @@ def infer_frames(
                 side = _side(_words(tip.name), pairs=True)
                 name = "_".join(filter(None, (side, role)))
             placed = _placed(links, limb, tip, given)
-            if name in frames:
+            if any(frame.name == name for frame in given):
                 frames[name] = frames[name].model_copy(update={"role": role})
             elif placed is not None:
                 name = names.take(name, "frame")
@@ -291,4 +302,17 @@ def _placed(
         palms = [link for link in fixed if link.name in carriers]
         if palms:
             return {"link": palms[-1].name}
+    above, leg = _moving_parents(links), {link.name for link in limb.links}
+    chain = {n: parent if parent in leg else None for n, parent in above.items()}
+    if limb.kind == "leg" and _depth(tip.name, chain) <= POINT_FOOT:
+        return {"link": tip.name, "pos": _farthest(tip)}
     return {"link": tip.name}
+
+
+def _farthest(link: Link) -> tuple[float, ...]:
+    """Return the centre of the sphere or the corner farthest from the link's joint."""
+    points = np.zeros((1, 3))
+    for shape in link.collision or link.visual:
+        own = hull_spheres(shape)[:, :3] @ rotation_matrix(shape).T + shape.pos
+        points = np.concatenate([points, own])
+    return tuple(points[np.argmax(np.linalg.norm(points, axis=1))].tolist())

@@ -16,8 +16,14 @@ from wbc_suite.robot.group_inference import (
     infer_role,
 )
 from wbc_suite.robot.inertia import implausible, nearest_physical, unphysical
+from wbc_suite.robot.missing_data import (
+    ellipsoid,
+    estimate_masses,
+    estimate_motors,
+    oversized,
+)
 from wbc_suite.robot.shapes import Shape
-from wbc_suite.robot.standing_posture import standing_legs
+from wbc_suite.robot.standing_posture import feet_are_level, standing_legs
 from wbc_suite.robot.validation import RESERVED
 from wbc_suite.robot.working_posture import working_arms
 from wbc_suite.tomlfile import parse_model
@@ -83,7 +89,7 @@ def describe_import(
     for fields in _without_chains(links):
         where = f"{source}: link '{fields['name']}'"
         checked.append(parse_model(Link, fields, source=where, error=DescriptionError))
-    checked = _with_masses(checked, source, strict=strict)
+    checked = _with_masses(_filled(checked, source, strict), source, strict=strict)
     checked = _physical(checked, source, strict=strict)
     checked = _accept_implausible(checked, source)
     given = [
@@ -96,13 +102,21 @@ def describe_import(
         for frame in frames
     ]
     limbs = infer_limbs(checked)
+    placed = infer_frames(checked, limbs, given, names)
+    actuated = {fields["joint"] for fields in others.get("actuators", ())}
+    driven = estimate_motors(checked, placed, actuated)
+    deviations: tuple[str, ...] = ()
+    if driven != checked:
+        deviations = ("efforts and armatures are estimated: the file has few or none",)
+        LOG.warning("%s: %s.", source, deviations[0])
     keyframes = others.pop("keyframes", {})
     data: dict[str, Any] = {
         "name": NameTable().take(name, "robot"),
         "source": f"imported from {source.name}",
         "root": root,
-        "links": checked,
-        "frames": infer_frames(checked, limbs, given, names),
+        "links": driven,
+        "frames": placed,
+        "deviations": deviations,
         "groups": {limb.name: limb.joints for limb in limbs if limb.joints},
         "keyframes": {"ready": infer_ready(checked)} | keyframes,
     }
@@ -110,7 +124,10 @@ def describe_import(
         RobotDescription, data | others, source=str(source), error=DescriptionError
     )
     if "ready" in keyframes:
-        return robot
+        if keyframes["ready"] != keyframes.get("home") or feet_are_level(robot):
+            return robot
+        LOG.warning("%s: the feet in keyframe 'home' are not level; not used.", source)
+        robot = _with_ready(robot, lambda robot: infer_ready(robot.links))
     return _with_ready(_with_ready(robot, standing_legs), working_arms)
 
 
@@ -142,6 +159,18 @@ def _without_chains(links: Sequence[LinkFields]) -> Sequence[LinkFields]:
                 "offset": own["offset"] + own["ratio"] * leader["offset"],
             }
     return links
+
+
+def _filled(links: Sequence[Link], source: Path, strict: bool) -> Sequence[Link]:
+    """Estimate masses where most are missing, unless the import is `strict`."""
+    filled = links if strict else estimate_masses(links)
+    if filled != links:
+        LOG.warning(
+            "%s: most links have no mass; mended: ellipsoids of 1000 kg/m^3 in their "
+            "bounding boxes, %.3g kg in all.",
+            *(source, sum(link.mass for link in filled)),
+        )
+    return filled
 
 
 def _with_masses(links: Sequence[Link], source: Path, *, strict: bool) -> list[Link]:
@@ -190,6 +219,9 @@ def _physical(links: Sequence[Link], source: Path, *, strict: bool) -> list[Link
         if rigid[link.name] in moving and link.mass > 0.0
     }
     faults |= {link.name: fault for link in links if (fault := unphysical(link))}
+    huge = {x.name: fault for x in links if (fault := oversized(x))}
+    faults |= huge
+    links = [ellipsoid(x, x.mass) if x.name in huge else x for x in links]
     shown = "; ".join(f"link '{n}': {fault}" for n, fault in faults.items())
     if faults and strict:
         raise DescriptionError(

@@ -41,7 +41,7 @@ def load_robot(
             with legs or wheels accepts only a base without body (`NullMobileBase`).
         root: Another root: `fixed`, `planar` or `free`. A URDF that does not connect
             its first link to a link `world` is free if it has four feet or more, else
-            fixed.
+            fixed. A free robot that has hands, but no feet, is planar.
         skin: "meshes" draws the robot with meshes of installed packages, or of its
             URDF; a folder with those found there, see `robot.skins`. Physics does not
             change.
@@ -78,12 +78,24 @@ def load_robot(
         robot = robot.with_root(root)
     if path.suffix == ".toml" or robot.root.kind != "free":
         return robot
+    return _standing(robot, path, asked=root == "free")
+
+
+def _standing(robot: RobotDescription, path: Path, *, asked: bool) -> RobotDescription:
+    """Return a free robot with soles, or with another root if it cannot stand.
+
+    One whose free root is `asked` for keeps it.
+    """
     from wbc_suite.robot.importing import with_soles
 
+    feet = any(frame.role == "foot" for frame in robot.frames)
+    if robot.hands and not feet and not asked:
+        LOG.warning("%s: its root is planar: it is free, but has no feet.", path)
+        return robot.with_root("planar")
     try:
         return with_soles(robot)
     except DescriptionError as error:
-        if root == "free" or path.suffix != ".urdf":
+        if asked or path.suffix != ".urdf":
             raise
         LOG.warning("%s It is fixed.", error)
         return robot.with_root("fixed")

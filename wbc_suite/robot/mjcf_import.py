@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.errors import DescriptionError, join_first
-from wbc_suite.robot.contact_pairs import exclude_never_colliding
+from wbc_suite.robot.contact_pairs import exclude_never_colliding, exclude_overlapping
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.importing import LinkFields, NameTable, describe_import
 from wbc_suite.robot.inertia import inertia_fields
@@ -70,7 +70,8 @@ def read_mjcf(
     m, _ = compile_mjcf(path, root=mesh_root)
     if not _world_children(m):
         raise DescriptionError(f"{path}: the model has no body.")
-    return exclude_never_colliding(_Importer(m, path, strict=strict).robot())
+    robot = _Importer(m, path, strict=strict).robot()
+    return exclude_never_colliding(exclude_overlapping(robot, path))
 
 
 def _robot_roots(m: mujoco.MjModel) -> list[int]:

@@ -8,6 +8,7 @@ from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.elements import Frame
 from wbc_suite.typing import Vector
 
+LEVEL = 0.02  # largest difference of the heights of feet that stand, m
 TOLERANCE = 0.02  # largest residual in m of a posture that is accepted
 
 MIN_COSINE = 0.9  # smallest cosine between the axis of a pitch joint and y
@@ -35,6 +36,18 @@ def standing_legs(robot: RobotDescription) -> dict[str, float]:
         if frame.role == "foot":
             found |= _bent_leg(robot, model, data, q, frame)
     return found
+
+
+def feet_are_level(robot: RobotDescription) -> bool:
+    """Whether all feet have nearly the same height in the posture `ready`."""
+    model = robot.to_pinocchio()
+    data, q = model.createData(), pin.neutral(model)
+    for name, value in robot.keyframe("ready").items():
+        q[model.joints[model.getJointId(name)].idx_q] = value
+    pin.framesForwardKinematics(model, data, q)
+    feet = [frame.name for frame in robot.frames if frame.role == "foot"]
+    heights = [data.oMf[model.getFrameId(name)].translation[2] for name in feet]
+    return not feet or float(np.ptp(heights)) < LEVEL
 
 
 def _bent_leg(

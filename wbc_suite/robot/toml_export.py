@@ -26,11 +26,27 @@ def write_toml(robot: RobotDescription) -> str:
         **data,
     )
     fields = component.model_dump(by_alias=True, exclude_defaults=True)
-    tables = [f"format = {fields.pop('format')}"]
-    fields = {"component": fields.pop("component"), **fields}
-    for name, value in fields.items():
+    head = {key: fields.pop(key) for key in ("format", "component")}
+    return toml_text(head | fields)
+
+
+def toml_text(fields: "Table") -> str:
+    """Write plain data as TOML: values, then one table for each dict or list of these.
+
+    Entries that are None are left out.
+    """
+    given = {key: value for key, value in fields.items() if value is not None}
+    tabular = {key: x for key, x in given.items() if x and _is_table(x)}
+    plain = [f"{key} = {_inline(x)}" for key, x in given.items() if key not in tabular]
+    tables = ["\n".join(plain)]
+    for name, value in tabular.items():
         tables += _tables(name, value)
     return "\n\n".join(tables) + "\n"
+
+
+def _is_table(value: Any) -> bool:
+    rows = cast(list[Any], value if isinstance(value, list) else [value])
+    return all(isinstance(row, dict) for row in rows)
 
 
 Table: TypeAlias = dict[str, Any]  # a model as plain data

@@ -8,9 +8,8 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.errors import DescriptionError, did_you_mean, join_first
-from wbc_suite.robot.contact_pairs import exclude_never_colliding, overlapping_links
+from wbc_suite.robot.contact_pairs import exclude_never_colliding, exclude_overlapping
 from wbc_suite.robot.description import RobotDescription
-from wbc_suite.robot.elements import Contacts
 from wbc_suite.robot.importing import (
     LinkFields,
     NameTable,
@@ -83,19 +82,14 @@ def read_urdf(
     shapes.report(path)
     feet = sum(frame.role == "foot" for frame in robot.frames)
     if feet >= FEET and not importer.rooted:
-        LOG.warning("%s: its root is free, since it has %d feet.", path, feet)
-        robot = robot.with_root("free")
+        try:
+            robot = robot.with_root("free")
+            LOG.warning("%s: its root is free, since it has %d feet.", path, feet)
+        except DescriptionError as error:
+            LOG.warning("%s: its root is fixed: %s", path, error)
     if skin:
         robot = robot.model_copy(update={"skins": importer.skins()})
-    pairs = overlapping_links(robot)
-    if pairs:
-        shown = [f"'{first}' and '{second}'" for first, second in pairs]
-        LOG.warning(
-            "%s: these links overlap in the posture ready and will not collide: %s.",
-            *(path, join_first(shown, limit=12)),
-        )
-        robot = robot.model_copy(update={"contacts": Contacts(exclude=pairs)})
-    return exclude_never_colliding(robot)
+    return exclude_never_colliding(exclude_overlapping(robot, path))
 
 
 class _Importer:

@@ -17,9 +17,11 @@ from wbc_suite.scene.compose import (
     place_robot,
     robot_prefix,
 )
+from wbc_suite.scene.mjcf_arena import ArenaConfig
 from wbc_suite.scene.pushes import Push, PushConfig, draw_pushes
 
 __all__ = [
+    "ArenaConfig",
     "Push",
     "PushConfig",
     "TableConfig",

@@ -18,17 +18,25 @@ LEG_AT = 0.5
 """Distance of a table's legs from its middle, as a share of half its side; further out
 they would stand on the feet of robots' pedestals, which reach 24 cm under it."""
 
+FLOOR = "floor"
+"""Name of the plane that robots stand on, in every scene."""
+
 LEAST_LEG = 0.01  # shortest legs of a table, m
 
 Friction: TypeAlias = Annotated[float, Field(ge=0.0, le=1e3)]
 
 
 class TableConfig(FrozenModel):
-    """A table: length, width and thickness of its top, middle of its upper face, m."""
+    """A table: length, width and thickness of its top, middle of its upper face, m.
+
+    Attributes:
+        geom: Geom of the arena that is the top; nothing is added then.
+    """
 
     size: tuple[Size, Size, Size] = (0.8, 0.8, 0.05)
     center: Vector3 = (0.0, 0.0, 0.8)
     friction: tuple[Friction, Friction, Friction] = FRICTION
+    geom: str | None = None
 
     @model_validator(mode="after")
     def _stands_on_the_floor(self) -> "TableConfig":
@@ -41,7 +49,16 @@ class TableConfig(FrozenModel):
 
 
 def empty_arena(*, timestep: float = 0.002) -> mujoco.MjSpec:
-    """Return an arena with floor, sky and soft light, and the physics options set.
+    """Return an arena with floor, sky and soft light, and the physics options set."""
+    spec = bare_arena(timestep=timestep)
+    add_sky(spec)
+    add_floor(spec)
+    add_lights(spec)
+    return spec
+
+
+def bare_arena(*, timestep: float = 0.002) -> mujoco.MjSpec:
+    """Return an arena of no elements but tables' materials, with the options set.
 
     Implicit integration keeps stiff servos and damping stable; dense Jacobians avoid a
     fault of the sparse Newton path in MuJoCo 4.0.0.
@@ -57,20 +74,27 @@ def empty_arena(*, timestep: float = 0.002) -> mujoco.MjSpec:
     option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     option.impratio = 10.0
     spec.memory = 64 * 2**20
-    _add_textures(spec)
-    spec.worldbody.add_geom(
-        name="floor",
-        type=mujoco.mjtGeom.mjGEOM_PLANE,
-        size=(0, 0, 0.05),
-        material="floor",
-        friction=FRICTION,
-    )
-    _add_lights(spec)
+    spec.visual.headlight.ambient = (0.34, 0.34, 0.35)
+    spec.visual.headlight.diffuse = (0.28, 0.28, 0.28)
+    spec.visual.headlight.specular = (0.05, 0.05, 0.05)
+    spec.visual.map.znear = 0.005
+    spec.visual.map.shadowclip = 6.0  # extents; at its edge the floor is full of dots
+    spec.visual.rgba.haze = (0.80, 0.83, 0.86, 1.0)  # white is a bar at the horizon
+    wood = spec.add_material(name="wood", specular=0.2, shininess=0.3)
+    planks = wood_pixels(WOOD_SIZE)
+    add_texture(spec, wood, mujoco.mjtTexture.mjTEXTURE_2D, planks)
+    wood.texrepeat = (1, 1)
+    spec.add_material(name="table_leg", rgba=(0.32, 0.33, 0.35, 1), specular=0.4)
     return spec
 
 
 def add_table(spec: mujoco.MjSpec, table: TableConfig, name: str = "table") -> None:
-    """Add a table on four legs; body and top are called `name`."""
+    """Add a table on four legs; body and top are called `name`.
+
+    A surface is there already, and nothing is added.
+    """
+    if table.geom is not None:
+        return
     length, width, thickness = table.size
     height = table.center[2] - thickness
     body = spec.worldbody.add_body(name=name, pos=table.center)
@@ -99,7 +123,7 @@ def add_tables(
     """Add equal tables at the middles of their tops' upper faces, m, by name."""
     for name, center in centers.items():
         given = table.model_dump() | {"center": center}
-        add_table(spec, TableConfig(**given), name)
+        add_table(spec, TableConfig.model_validate(given), name)
 
 
 def add_table_cameras(
@@ -118,7 +142,8 @@ def add_table_cameras(
     add_camera(spec, "birdview", (x - 0.2, y, z + 2.2), (x - 0.2, y, z))
 
 
-def _add_textures(spec: mujoco.MjSpec) -> None:
+def add_sky(spec: mujoco.MjSpec) -> None:
+    """Add a bright sky."""
     spec.add_texture(
         name="sky",
         type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
@@ -128,6 +153,20 @@ def _add_textures(spec: mujoco.MjSpec) -> None:
         width=64,  # a gradient needs no more, and every environment holds it
         height=384,
     )
+
+
+def add_floor(spec: mujoco.MjSpec, *, drawn: bool = True) -> None:
+    """Add the plane that robots stand on."""
+    geom = spec.worldbody.add_geom(
+        name=FLOOR,
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        size=(0, 0, 0.05),
+        friction=FRICTION,
+    )
+    if not drawn:
+        geom.rgba[3] = 0.0
+        return
+    geom.material = "floor"
     spec.add_texture(
         name="floor",
         type=mujoco.mjtTexture.mjTEXTURE_2D,
@@ -143,20 +182,10 @@ def _add_textures(spec: mujoco.MjSpec) -> None:
     floor.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "floor"
     floor.texrepeat = (1, 1)
     floor.texuniform = True
-    wood = spec.add_material(name="wood", specular=0.2, shininess=0.3)
-    planks = wood_pixels(WOOD_SIZE)
-    add_texture(spec, wood, mujoco.mjtTexture.mjTEXTURE_2D, planks)
-    wood.texrepeat = (1, 1)
-    spec.add_material(name="table_leg", rgba=(0.32, 0.33, 0.35, 1), specular=0.4)
 
 
-def _add_lights(spec: mujoco.MjSpec) -> None:
-    spec.visual.headlight.ambient = (0.34, 0.34, 0.35)
-    spec.visual.headlight.diffuse = (0.28, 0.28, 0.28)
-    spec.visual.headlight.specular = (0.05, 0.05, 0.05)
-    spec.visual.map.znear = 0.005
-    spec.visual.map.shadowclip = 6.0  # extents; at its edge the floor is full of dots
-    spec.visual.rgba.haze = (0.80, 0.83, 0.86, 1.0)  # white is a bar at the horizon
+def add_lights(spec: mujoco.MjSpec) -> None:
+    """Add two soft lights, one of which casts shadows."""
     for name, pos, diffuse, shadow in (
         ("key_light", (-1.5, -2.0, 4.0), 0.5, True),
         ("fill_light", (2.0, 2.0, 3.0), 0.2, False),

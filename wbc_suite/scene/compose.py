@@ -113,9 +113,11 @@ def attach_robot(
     """Add a robot at its own root pose, on a frame or the world, with prefixed names.
 
     Fingers get torsional friction, so that an object does not turn about the line
-    between them.
+    between them. A camera with the name of `add_robot_view`'s is left out.
     """
     own = robot.to_mjspec()
+    for camera in [camera for camera in own.cameras if camera.name == ROBOT_VIEW]:
+        own.delete(camera)
     for key in list(own.keys):
         own.delete(key)
     for joint in (j for gripper in robot.synergies for j in robot.groups[gripper]):
@@ -138,33 +140,12 @@ def compile_scene(spec: mujoco.MjSpec) -> mujoco.MjModel:
     - MuJoCo's broadphase uses bounding spheres of all geoms, visual ones included.
       Those get radius 0: GR1 has 115 pairs of bodies to test instead of 191.
     - In small scenes all constraints are solved at once, without islands.
-    - If no force but joint damping depends on velocities, the Euler integrator, which
-      takes joint damping implicitly as well, replaces the implicit one.
     """
     model = spec.compile()
     model.geom_rbound[(model.geom_contype | model.geom_conaffinity) == 0] = 0.0
     if model.nv <= SMALL:
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ISLAND
-    implicit = model.opt.integrator == mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    if implicit and not _has_velocity_forces(model):
-        model.opt.integrator = mujoco.mjtIntegrator.mjINT_EULER
     return model
-
-
-def _has_velocity_forces(model: mujoco.MjModel) -> bool:
-    """Whether forces other than linear joint damping depend on velocities."""
-    gains, biases = model.actuator_gaintype, model.actuator_biastype
-    fixed = gains == mujoco.mjtGain.mjGAIN_FIXED
-    affine = biases == mujoco.mjtBias.mjBIAS_AFFINE
-    slow = affine & (model.actuator_biasprm[:, 2] == 0.0)
-    slow |= biases == mujoco.mjtBias.mjBIAS_NONE
-    damped = (model.tendon_damping, model.actuator_damping, model.dof_dampingpoly)
-    return (
-        not np.all(fixed & slow)
-        or any(array.any() for array in damped)
-        or max(model.opt.density, model.opt.viscosity) > 0.0
-        or model.nflex + model.nplugin > 0
-    )
 
 
 def add_camera(

@@ -253,13 +253,16 @@ def subject_corners(
 ) -> Matrix:
     """Return the corners of all geoms' boxes in the world, shape (n, 3); no planes.
 
-    Only bodies whose names start with the subject count.
+    Only bodies whose names start with the subject count. One without geoms is a point.
     """
     signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8).T
     names = [model.body(body).name for body in model.geom_bodyid]
     seen = np.array([name.startswith(subject) for name in names])
     seen &= model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE
     seen &= model.geom_group < 3  # others are hidden by default in MuJoCo's viewers
+    if not seen.any():
+        own = [model.body(b).name.startswith(subject) for b in range(model.nbody)]
+        return data.xpos[own]
     centre, half = model.geom_aabb[seen, :3], model.geom_aabb[seen, 3:]
     local = centre[:, None] + signs * half[:, None]
     rotation = data.geom_xmat[seen].reshape(-1, 3, 3)

@@ -36,6 +36,7 @@ class RobotPage:
         self.model = robot.to_mjspec().compile()
         self.data = mujoco.MjData(self.model)
         self._lock = threading.Lock()
+        self._followers: dict[int, viser.FrameHandle] = {}
         self._sliders: dict[str, viser.GuiSliderHandle[float]] = {}
         set_up_scene(site, label=f"wbc_suite · {robot.name}")
         self.scene = ModelScene(site.server, self.model)
@@ -78,6 +79,19 @@ class RobotPage:
             mujoco.mj_comPos(self.model, self.data)
             self.scene.update(self.data.xpos, self.data.xquat)
             self._overlays.update()
+            for body, node in self._followers.items():
+                node.position, node.wxyz = self.data.xpos[body], self.data.xquat[body]
+
+    def follow(self, link: str) -> str:
+        """Return the name of a scene node that stays at a link.
+
+        It is short, as those of handles have to be.
+        """
+        body = self.model.body(link).id
+        node = self.site.server.scene.add_frame(f"/link{body}", show_axes=False)
+        node.position, node.wxyz = self.data.xpos[body], self.data.xquat[body]
+        self._followers[body] = node
+        return node.name
 
     def position(self, joint: str) -> float:
         """Return the position of a joint, rad or m."""

@@ -37,9 +37,7 @@ def describe_reason(reason: Reason) -> str:
             return f"{plain(str(joint))} is at its {side} limit"
         case ActiveLimit(kind=LimitKind.VELOCITY, subject=joint):
             return f"{plain(str(joint))} is at its velocity limit"
-        case ActiveLimit(
-            kind=LimitKind.SELF_COLLISION, subject=LinkPair(first, second)
-        ):
+        case ActiveLimit(subject=LinkPair(first, second)):
             return f"{plain(first)} would touch {plain(second)}"
         case ActiveLimit(kind=LimitKind.FLOOR, subject=link):
             return f"{plain(str(link))} would touch the floor"

@@ -2,6 +2,7 @@
 
 from wbc_suite.wrappers.disturbance import Disturbance
 from wbc_suite.wrappers.flat import Flat
+from wbc_suite.wrappers.goals import Goals
 from wbc_suite.wrappers.indicators import Indicators
 from wbc_suite.wrappers.recordings import DataCollection, DemoStart, Playback
 
@@ -10,6 +11,7 @@ __all__ = [
     "DemoStart",
     "Disturbance",
     "Flat",
+    "Goals",
     "Indicators",
     "Playback",
 ]

@@ -40,6 +40,7 @@ class GoalArrays(NamedTuple):
         is_in_base: Whether goals are relative to the base.
         follows_base: Whether the base moves as commanded.
         root: Index of a free root in qpos, -1 without one.
+        correction: Pose of measured in commanded axes, shape (12,).
     """
 
     goal: Matrix
@@ -51,6 +52,7 @@ class GoalArrays(NamedTuple):
     is_in_base: bool
     follows_base: bool
     root: int
+    correction: Vector
 
 
 @compiled
@@ -63,7 +65,7 @@ def place_goals(
     the measured root is from the commanded one, so that hands arrive although legs
     yield. `qpos` are the measured positions of the simulation.
     """
-    correction, pose = np.empty(12), np.empty(12)
+    correction, pose = goals.correction, np.empty(12)
     if goals.follows_base:
         compute_joint_poses(robot)
         write_frame_pose(robot.pose[goals.base_joint], goals.base_offset, goals.base)
@@ -171,6 +173,7 @@ class FrameGoals:
             is_in_base=in_base,
             follows_base=kind == "free" or (kind == "planar" and in_base),
             root=root,
+            correction=np.eye(3, 4).ravel(),
         )
         self.argument = as_argument(self._arrays)
 
@@ -178,6 +181,11 @@ class FrameGoals:
     def rows(self) -> Matrix:
         """Goals in the reference frame as rows [R p], shape (n, 12); a view."""
         return self._arrays.goal
+
+    @property
+    def correction(self) -> Vector:
+        """Pose of measured in commanded axes, [R p], shape (12,); a view."""
+        return self._arrays.correction
 
     @property
     def base(self) -> pin.SE3:

@@ -15,7 +15,7 @@ from wbc_suite.control.composite.whole_body_config import (
 )
 from wbc_suite.control.reasons import NoSolution, Reason
 from wbc_suite.kinematics import Configuration, Conversion
-from wbc_suite.qp import ActiveLimit, LimitKind
+from wbc_suite.qp import ActiveLimit, LimitKind, ObstacleLimit
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Matrix, Vector
 
@@ -53,7 +53,7 @@ class HeldPoint(mink.Task):
 class MinkBackend:
     """`IkBackend` over mink's weighted tasks and limits, solved by daqp.
 
-    Levels become weights, and there is no acceleration limit.
+    Levels become weights; there is no limit of accelerations and none of obstacles.
     """
 
     def __init__(
@@ -61,6 +61,7 @@ class MinkBackend:
         robot: RobotDescription,
         config: WholeBodyIKConfig,
         commanded: Configuration,
+        obstacles: ObstacleLimit | None = None,
     ) -> None:
         self._config, self._commanded = config, commanded
         self._model = robot.to_mjspec().compile()

@@ -21,6 +21,7 @@ from wbc_suite.qp import (
     Conflict,
     Equality,
     FrameEquality,
+    ObstacleLimit,
     PostureTask,
     Solution,
     SupportLimit,
@@ -45,6 +46,7 @@ class StackBackend:
         robot: RobotDescription,
         config: WholeBodyIKConfig,
         commanded: Configuration,
+        obstacles: ObstacleLimit,
     ) -> None:
         self._config, self._commanded = config, commanded
         self._posture = PostureTask(
@@ -61,6 +63,8 @@ class StackBackend:
             sideways = FrameEquality(base, directions=("y",), hold_pose=False)
             equalities.append(sideways)
         limits = make_limits(robot, config)
+        if obstacles.pairs:
+            limits.append(obstacles)
         self._support = [x for x in limits if isinstance(x, SupportLimit)]
         make_stack = partial(
             TaskStack, commanded, limits=limits, equalities=equalities, escape=False

@@ -1,6 +1,7 @@
 """One tick of whole-body inverse kinematics, compiled.
 
-    goals -> targets nearby -> QP -> motors suffice? -> spline -> references of the laws
+    goals -> obstacles -> targets nearby -> QP -> motors suffice? -> spline
+    -> references of the laws
 
 The control loop calls `run_tick` between two physics steps. It returns where Python has
 to act: the planner; tasks and limits without a kernel; a QP whose active set is not
@@ -27,6 +28,7 @@ from wbc_suite.control.composite.progress import (
     record_state,
     watch_progress,
 )
+from wbc_suite.control.composite.scene_obstacles import SceneArrays, measure_obstacles
 from wbc_suite.control.composite.torque_limiter import TorqueArrays, motors_suffice
 from wbc_suite.control.law.reference import set_reference
 from wbc_suite.control.loop.records import CompiledRecords, Records
@@ -82,6 +84,7 @@ class WholeBodyArrays(NamedTuple):
     state: Records
     goals: GoalArrays
     frames: FrameArrays
+    scene: SceneArrays
     posture: PostureArrays
     progress: ProgressArrays
     qp: TickArrays
@@ -111,6 +114,7 @@ def run_tick(
     """
     state, qp, robot = tick.state[0], tick.qp, tick.qp.robot
     place_goals(tick.goals, robot, tick.frames, qpos)
+    measure_obstacles(tick.scene)
     state.event = watch_progress(tick.progress, robot, tick.frames, tick.v)
     if state.event != Event.NONE:
         state.stage = Stage.PLAN.value

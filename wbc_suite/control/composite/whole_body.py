@@ -20,6 +20,7 @@ from wbc_suite.control.composite.reduced_robot import (
     lock_groups,
     moved_joints,
 )
+from wbc_suite.control.composite.scene_obstacles import SceneObstacles
 from wbc_suite.control.composite.stack_backend import StackBackend
 from wbc_suite.control.composite.tick import TICK, Stage, WholeBodyArrays
 from wbc_suite.control.composite.waypoint_planner import Waypoint, WaypointPlanner
@@ -39,6 +40,7 @@ from wbc_suite.control.state import RobotState
 from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Configuration, Conversion
 from wbc_suite.planning import LinkDistanceChecker, SceneCollisionChecker
+from wbc_suite.qp import ObstacleLimit
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Vector
 
@@ -48,7 +50,7 @@ MIN_POINT_CONTACTS = 3
 """Fewer points of contact cannot balance a robot; soles can."""
 
 BackendFactory = Callable[
-    [RobotDescription, WholeBodyIKConfig, Configuration], IkBackend
+    [RobotDescription, WholeBodyIKConfig, Configuration, ObstacleLimit], IkBackend
 ]
 
 
@@ -75,7 +77,6 @@ class WholeBodyIK:
         self.config = read_whole_body(config, state.robot, str(config.get("type")))
         self.robot = lock_groups(state.robot, self.config.locked)
         self._configuration = Configuration(self.robot.to_pinocchio())
-        self._backend = backend(self.robot, self.config, self._configuration)
         model = self._configuration.model
         self._conversion = Conversion(state.model, model, prefix=state.prefix)
         timestep = float(state.model.opt.timestep)
@@ -96,6 +97,12 @@ class WholeBodyIK:
             root = int(state.model.joint(f"{state.prefix}root").qposadr[0])
         self._goals = FrameGoals(
             self.config, self.layout, self.robot, self._configuration, root
+        )
+        self._scene = SceneObstacles(
+            state, self.robot, self.config, self._configuration, self._goals.correction
+        )
+        self._backend = backend(
+            self.robot, self.config, self._configuration, self._scene.limit
         )
         self._make_laws(state, float(limits.max()))
         self._state = readable(np.zeros(1, TICK))
@@ -220,6 +227,7 @@ class WholeBodyIK:
         """Run a tick; return for how many physics steps it is enough."""
         robot, qpos = self._configuration.robot, state.data.qpos
         place_goals(self._goals.argument, robot, self.frames.argument, qpos)
+        self._scene.measure()
         self._follow_waypoint(self._planner.next(self._answer.v))
         return self._steps_per_solve
 
@@ -234,6 +242,7 @@ class WholeBodyIK:
             state=self._state,
             goals=self._goals.argument,
             frames=self.frames.argument,
+            scene=self._scene.argument,
             posture=self.frames.posture_argument,
             progress=self._planner.argument,
             qp=backend.stack.arrays,

@@ -142,6 +142,10 @@ class LimitsConfig(FrozenModel):
         collision_distance: Distance kept between links, m.
         floor: Height in the world of what a robot on its feet stands on, m; all but its
             legs keep the same distance from it.
+        obstacles: Whether the robot keeps out of the scene's fixed things.
+        obstacle_distance: Distance kept from them, m.
+        press_depth: How far inside of them links of hands may be commanded, m: what
+            stops them there is what they press on.
         weight_shares: Part of a joint's effort that holding still may take, by joint.
         balance_margin: Distance kept from the edges of the soles, m.
     """
@@ -157,6 +161,9 @@ class LimitsConfig(FrozenModel):
     collision_pairs: int = Field(default=20, ge=1, le=200)
     collision_distance: PositiveFloat = 0.005
     floor: float = 0.0
+    obstacles: bool = True
+    obstacle_distance: NonNegativeFloat = 0.002
+    press_depth: NonNegativeFloat = 0.002
     weight_shares: dict[Name, PositiveFloat] = {}
     balance_margin: NonNegativeFloat = 0.03
 

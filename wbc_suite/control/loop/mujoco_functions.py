@@ -11,6 +11,8 @@ import llvmlite.binding
 import mujoco
 from numba import types
 
+from wbc_suite.typing import Vector
+
 _MODEL_AND_DATA = types.void(types.intp, types.intp)
 
 _LIBRARY = next(Path(mujoco.__file__).parent.glob("libmujoco*"))
@@ -20,8 +22,20 @@ mj_step1 = types.ExternalFunction("mj_step1", _MODEL_AND_DATA)
 mj_step2 = types.ExternalFunction("mj_step2", _MODEL_AND_DATA)
 mj_kinematics = types.ExternalFunction("mj_kinematics", _MODEL_AND_DATA)
 mj_comPos = types.ExternalFunction("mj_comPos", _MODEL_AND_DATA)
+mj_geomDistance = types.ExternalFunction(
+    "mj_geomDistance",
+    types.double(
+        types.intp, types.intp, types.intc, types.intc, types.double, types.intp
+    ),
+)
+"""Its last argument is the `address_of` an array of shape (6,)."""
 
 
 def addresses(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[int, int]:
     """Return the addresses of a model and its data, valid as long as both live."""
     return model._address, data._address
+
+
+def address_of(array: Vector) -> int:
+    """Return the address of an array's numbers, valid as long as it lives."""
+    return int(array.__array_interface__["data"][0])

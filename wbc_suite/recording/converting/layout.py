@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from wbc_suite.recording.dataset import Dataset
+from wbc_suite.recording.episode import Column, Episode
 
 MAX_EPISODES = 50  # episodes of a piece, which are lost with a killed worker
 
@@ -39,6 +40,11 @@ class Layout:
     write: Callable[[Dataset, Piece, Path, Progress], Mapping[str, Any] | None]
     finish: Finish = lambda *_: None
     in_pieces: bool = False
+
+
+def policy_actions(episode: Episode) -> Column:
+    """Return the actions that a policy shall imitate: intended, not disturbed ones."""
+    return episode.columns.get("intended", episode.columns["actions"])
 
 
 def whole_dataset(dataset: Dataset) -> Piece:

@@ -24,7 +24,12 @@ from numpy.typing import NDArray
 
 from wbc_suite.errors import DatasetError
 from wbc_suite.recording.atomic_files import new_folder, replace_file, write_bytes
-from wbc_suite.recording.converting.layout import Layout, Piece, Progress
+from wbc_suite.recording.converting.layout import (
+    Layout,
+    Piece,
+    Progress,
+    policy_actions,
+)
 from wbc_suite.recording.dataset import Dataset
 from wbc_suite.recording.episode import Episode
 from wbc_suite.recording.extras import import_extra
@@ -149,7 +154,7 @@ def _vectors(episode: Episode) -> dict[str, NDArray[np.float32]]:
     found = {"observation.state": np.concatenate(states, axis=1)}
     if "object-state" in flat:
         found["observation.environment_state"] = flat["object-state"]
-    found["action"] = episode.columns["actions"]
+    found["action"] = policy_actions(episode)
     return {name: column.astype(np.float32) for name, column in found.items()}
 
 

@@ -1,18 +1,29 @@
-"""robomimic's HDF5 layout with its own columns only."""
+"""robomimic's HDF5 layout with its own columns only, for its training and roll-outs."""
 
-from collections.abc import Iterator
+import json
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from wbc_suite.recording.atomic_files import check_folder
-from wbc_suite.recording.converting.layout import Layout, Piece, Progress
+from wbc_suite.recording.converting.layout import (
+    Layout,
+    Piece,
+    Progress,
+    policy_actions,
+)
 from wbc_suite.recording.dataset import Dataset
-from wbc_suite.recording.episode import Episode
+from wbc_suite.recording.env_source import PACKAGE, EnvSource
+from wbc_suite.recording.episode import Episode, Fact
 from wbc_suite.recording.hdf5_writer import write_dataset
 
-_OTHER_COLUMNS = ("clipped", "step_time", "stamp")
+ROBOSUITE_TYPE = 1
+"""Type of robosuite's environments in robomimic's `env_args`."""
+
+_OTHER_COLUMNS = ("clipped", "step_time", "stamp", "intended", "disturbed")
+_OTHER_ARGUMENTS = ("terminate_on_success",)
 _FACTS = ("model_file", "success", "seed", "uid")
 
 
@@ -29,12 +40,35 @@ def _write(dataset: Dataset, piece: Piece, out: Path, on_progress: Progress) -> 
         key: [names[name] for name in masked if name in names]
         for key, masked in dataset.masks.items()
     }
-    write_dataset(out, episodes(), dataset.header, masks=masks)
+    write_dataset(out, episodes(), _header(dataset.header), masks=masks)
+
+
+def _header(header: Mapping[str, Fact]) -> dict[str, Fact]:
+    """Return attributes with which robomimic makes the environment of robosuite's name.
+
+    `wbc_suite.compat.robosuite` has robosuite's default controllers; ours are named.
+    """
+    if "env_args" not in header:
+        return dict(header)
+    source = EnvSource.parse(str(header["env_args"]))
+    if source.package != PACKAGE:
+        return dict(header)
+    given = source.arguments.items()
+    arguments = {key: value for key, value in given if key not in _OTHER_ARGUMENTS}
+    if "controller_config" in header:
+        controllers = json.loads(str(header["controller_config"]))
+        arguments["controller_configs"] = controllers
+    fields = json.loads(replace(source, arguments=arguments).text)
+    text = json.dumps(fields | {"type": ROBOSUITE_TYPE}, sort_keys=True)
+    return {**header, "env_args": text}
 
 
 def _own_columns(episode: Episode, name: str) -> Episode:
     columns = {n: c for n, c in episode.columns.items() if n not in _OTHER_COLUMNS}
-    for key in episode.observed:
+    columns["actions"] = policy_actions(episode)
+    if "obs/object-state" in columns:
+        columns["obs/object"] = columns["obs/object-state"]
+    for key in [n.removeprefix("obs/") for n in columns if n.startswith("obs/")]:
         before = columns[f"obs/{key}"]
         columns.setdefault(f"next_obs/{key}", np.concatenate([before[1:], before[-1:]]))
     facts = {n: f for n, f in episode.facts.items() if n in _FACTS}

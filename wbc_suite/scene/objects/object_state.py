@@ -36,6 +36,7 @@ class ObjectState:
         geoms: Its solid geoms, and those of its children.
         position: Position of its origin in the world, m. A view.
         rotation: Rotation R_wb of its frame, shape (3, 3). A view.
+        joints: Positions of its hinges and slides, rad or m; empty for others. A view.
     """
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, name: str) -> None:
@@ -48,12 +49,15 @@ class ObjectState:
         )
         self.position: Vector = data.xpos[self.body]
         self.rotation: Matrix = data.xmat[self.body].reshape(3, 3)
-        joint = model.body_jntadr[self.body]
+        joint, count = model.body_jntadr[self.body], model.body_jntnum[self.body]
         free = mujoco.mjtJoint.mjJNT_FREE
         self._q = self._v = -1
         if joint >= 0 and model.jnt_type[joint] == free:
             self._q = int(model.jnt_qposadr[joint])
             self._v = int(model.jnt_dofadr[joint])
+        first = int(model.jnt_qposadr[joint]) if count else 0
+        count = 0 if self.is_free else count
+        self.joints: Vector = data.qpos[first : first + count]
 
     @property
     def is_free(self) -> bool:

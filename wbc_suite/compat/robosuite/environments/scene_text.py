@@ -64,7 +64,7 @@ def load_scene(text: str, model: mujoco.MjModel) -> Scene:
 
 def scene_as_it_is(env: RobotEnv) -> str:
     """Return the scene as MJCF text with the present sizes and places."""
-    benchmark = load_benchmark(env.made_of[0])
+    benchmark = load_benchmark(env.made_of[0], arena=env.config.arena)
     spec = compose(benchmark, env.robots, env.config)
     model = env.simulation.model
     for geom in (g for g in spec.geoms if g.name):

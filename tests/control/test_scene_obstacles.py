@@ -1,0 +1,142 @@
+"""Robots under whole-body inverse kinematics keep out of what does not move."""
+
+import mujoco
+import numpy as np
+import pytest
+
+import wbc_suite
+from wbc_suite.control.composite.scene_obstacles import INFLUENCE, SceneObstacles
+from wbc_suite.control.reasons import ActiveLimit, LimitKind
+from wbc_suite.kinematics import Configuration
+
+DT = 0.01
+
+
+class Scene:
+    """A robot in Lift, with obstacles measured for a configuration of its own."""
+
+    def __init__(self, name):
+        self.env = wbc_suite.make(
+            "Lift", robots=name, controller_configs="WHOLE_BODY_IK"
+        )
+        self.env.reset(seed=0)
+        self.state, controller = self.env.simulation.pairs[0]
+        self.model, self.data = self.state.model, self.state.data
+        self.robot = controller.robot
+        self.configuration = Configuration(self.robot.to_pinocchio())
+        self.obstacles = SceneObstacles(
+            self.state,
+            self.robot,
+            controller.config,
+            self.configuration,
+            np.eye(3, 4).ravel(),
+        )
+
+    def write(self, q):
+        """Move the simulated robot to a configuration of the reduced one."""
+        for name, joint in zip(
+            self.configuration.model.names[1:],
+            self.configuration.model.joints[1:],
+            strict=True,
+        ):
+            joint_id = self.model.joint(self.state.prefix + name).id
+            self.data.qpos[self.model.jnt_qposadr[joint_id]] = q[joint.idx_q]
+        mujoco.mj_kinematics(self.model, self.data)
+        self.configuration.update(q)
+
+    def rows(self):
+        limit = self.obstacles.limit
+        G, h = np.zeros((limit.dim, self.configuration.nv)), np.zeros(limit.dim)
+        limit.rows(self.configuration, DT, G, h)
+        return G, h
+
+    def truth(self):
+        """Return MuJoCo's distances of the robot's moving geoms from fixed ones, m."""
+        m, found = self.model, {}
+        links = {
+            m.body(self.state.prefix + x.name).id: x.name for x in self.robot.links
+        }
+        for o in np.flatnonzero(m.body_weldid[m.geom_bodyid] == 0).tolist():
+            for g in np.flatnonzero(m.geom_contype).tolist():
+                body = int(m.geom_bodyid[g])
+                if body in links and self.moves(links[body], o):
+                    other = m.body(int(m.geom_bodyid[o])).name
+                    key = links[body], "floor" if other == "world" else other
+                    d = mujoco.mj_geomDistance(m, self.data, o, g, 9.0, None)
+                    found[key] = min(found.get(key, np.inf), d)
+        return found
+
+    def moves(self, link, geom):
+        """Whether something but a gliding base moves a link nearer to a fixed geom."""
+        if int(self.model.geom_bodyid[geom]) and self.model.body(
+            int(self.model.geom_bodyid[geom])
+        ).name.startswith(self.state.prefix):
+            return False
+        support = set(self.configuration.support(link).tolist())
+        if self.model.geom(geom).name == "floor":
+            support -= {*self.configuration.root_linear}
+            support -= {*self.configuration.root_angular}
+        return bool(support)
+
+    def lowest(self):
+        return min(self.truth().values())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["Panda", "Tiago"])
+def test_distances_are_those_of_the_simulator(name):
+    scene, rng = Scene(name), np.random.default_rng(0)
+    model, limit = scene.configuration.model, scene.obstacles.limit
+    low = np.maximum(model.lowerPositionLimit, -1.0)
+    high = np.minimum(model.upperPositionLimit, 1.0)
+    for _ in range(5):
+        scene.write(rng.uniform(low, high))
+        scene.obstacles.measure()
+        scene.rows()
+        truth = scene.truth()
+        rows = np.flatnonzero(limit.arrays.found >= 0)
+        found = {}
+        for row in rows.tolist():
+            pair = limit.subject(row)
+            key, d = (pair.first, pair.second), float(limit.arrays.distance[row])
+            found[key] = min(found.get(key, np.inf), d)
+        for key, d in found.items():
+            assert d >= truth[key] - 1e-5
+        least = min(truth.values())
+        if least < INFLUENCE:
+            assert min(found.values()) == pytest.approx(least, abs=1e-5)
+
+
+@pytest.mark.slow
+def test_rows_are_the_derivative_of_the_distance():
+    scene, rng = Scene("Panda"), np.random.default_rng(0)
+    arrays = scene.obstacles.limit.arrays
+    scene.write(np.array([0.0, 1.0, 0.0, -1.0, 0.0, 2.0, 0.0]))
+    scene.obstacles.measure()
+    G, _ = scene.rows()
+    used, before = arrays.found >= 0, arrays.distance.copy()
+    step = 1e-6 * rng.normal(size=scene.configuration.nv)
+    scene.configuration.update(scene.configuration.integrate(step))
+    scene.rows()
+    assert used.sum() > 5
+    change = arrays.distance[used] - before[used]
+    np.testing.assert_allclose(change, -G[used] @ step, atol=1e-10)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["Panda", "Tiago"])
+def test_a_hand_sent_through_the_table_stays_out_and_says_so(name):
+    scene = Scene(name)
+    env = scene.env
+    action, least = env.hold_action, np.inf
+    top = scene.data.geom("table").xpos[2] + scene.model.geom("table").size[2]
+    action[:2], action[2] = scene.data.geom("table").xpos[:2], top - 0.3
+    for _ in range(80):
+        *_, info = env.step(action)
+        least = min(least, scene.lowest())
+    assert least > -1e-3
+    report = info["ik"]["frames"]["right_hand"]
+    reasons = [x for x in report["reasons"] if isinstance(x, ActiveLimit)]
+    named = [x for x in reasons if x.kind is LimitKind.OBSTACLE]
+    assert any("- table" in str(x) for x in named), report
+    assert report["position_error"] > 0.1

@@ -1,0 +1,73 @@
+"""Estimated masses and motors of files that state none."""
+
+import numpy as np
+import pytest
+
+from wbc_suite.robot import load_robot
+from wbc_suite.robot.missing_data import DENSITY, GRAVITY, RESERVE, ROTOR
+
+BALL = '<geometry><sphere radius="0.1"/></geometry>'
+ARM = """<robot name="arm"><link name="base"/>
+<link name="upper"><inertial><mass value="2"/><origin xyz="0.3 0 0"/>
+ <inertia ixx="0.01" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<link name="lower"><inertial><mass value="1"/><origin xyz="0 0 0.2"/>
+ <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/>
+ <limit lower="-1" upper="1" effort="{effort}" velocity="1"/><axis xyz="0 1 0"/></joint>
+<joint name="slide" type="prismatic"><parent link="upper"/><child link="lower"/>
+ <origin xyz="0.5 0 0"/><limit lower="0" upper="1" effort="0" velocity="1"/>
+ <axis xyz="0 0 1"/></joint></robot>"""
+
+
+def read(tmp_path, text):
+    path = tmp_path / "robot.urdf"
+    path.write_text(text)
+    return load_robot(path)
+
+
+def test_estimated_motors_hold_twice_the_weight_of_a_stretched_limb(tmp_path, caplog):
+    robot = read(tmp_path, ARM.format(effort=0))
+    moment = 2.0 * 0.3 + 1.0 * (0.5 + 0.2)
+    shoulder, slide = robot.joints
+    assert shoulder.effort == pytest.approx(RESERVE * GRAVITY * moment, abs=0.01)
+    assert slide.effort == pytest.approx(RESERVE * GRAVITY * 1.0, abs=0.01)
+    assert shoulder.armature == pytest.approx(ROTOR * (shoulder.effort or 0.0))
+    assert "estimated" in caplog.text
+    assert "estimated" in robot.deviations[0]
+
+
+def test_a_file_with_half_of_the_motors_gets_no_others(tmp_path):
+    shoulder, slide = read(tmp_path, ARM.format(effort=7)).joints
+    assert (shoulder.effort, slide.effort, slide.armature) == (7.0, None, 0.0)
+
+
+def test_a_ball_without_mass_gets_that_of_its_volume(tmp_path, caplog):
+    text = f"""<robot name="ball"><link name="base"/><link name="ball">
+    <collision><origin xyz="0 0 0.5"/>{BALL}</collision></link>
+    <joint name="hinge" type="continuous"><parent link="base"/><child link="ball"/>
+    </joint></robot>"""
+    robot = read(tmp_path, text)
+    ball = robot.link("ball")
+    mass = DENSITY * 4.0 / 3.0 * np.pi * 0.1**3
+    assert ball.mass == pytest.approx(mass)
+    assert ball.com == pytest.approx((0.0, 0.0, 0.5))
+    assert ball.inertia == pytest.approx((0.4 * mass * 0.1**2,) * 3 + (0.0,) * 3)
+    assert robot.joints[0].effort == pytest.approx(
+        RESERVE * GRAVITY * mass / 2, abs=0.01
+    )
+    assert "most links have no mass; mended" in caplog.text
+
+
+def test_an_inertia_in_other_units_is_mended(tmp_path, caplog):
+    text = ARM.format(effort=1).replace(
+        'ixx="0.01" iyy="0.01" izz="0.01"', 'ixx="1e4" iyy="1e4" izz="1e4"'
+    )
+    shape = f"<collision>{BALL}</collision></link>"
+    text = text.replace(
+        'izz="1e4" ixy="0" ixz="0" iyz="0"/></inertial></link>',
+        f'izz="1e4" ixy="0" ixz="0" iyz="0"/></inertial>{shape}',
+    )
+    lower = read(tmp_path, text).link("lower")
+    assert lower.inertia == pytest.approx((0.4 * 0.1**2,) * 3 + (0.0,) * 3)
+    assert lower.com == (0.0, 0.0, 0.2)
+    assert "a radius of gyration of 122 m is impossible in 0.346 m" in caplog.text

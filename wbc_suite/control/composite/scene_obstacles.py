@@ -1,0 +1,282 @@
+"""What of a scene a robot may run into, measured by the simulator."""
+
+from collections.abc import Iterator
+from itertools import product
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from wbc_suite.compiling import as_argument, compiled, struct
+from wbc_suite.control.composite.whole_body_config import WholeBodyIKConfig
+from wbc_suite.control.loop.mujoco_functions import (
+    address_of,
+    addresses,
+    mj_geomDistance,
+)
+from wbc_suite.control.state import RobotState
+from wbc_suite.kinematics import Configuration
+from wbc_suite.qp import LinkPair, ObstacleLimit
+from wbc_suite.qp.obstacle_limit import ObstacleArrays
+from wbc_suite.qp.self_collision_rows import insert_nearest
+from wbc_suite.robot import RobotDescription
+from wbc_suite.typing import Indices, Matrix, Vector
+
+INFLUENCE = 0.5
+"""m; pairs further apart are left out: at 4 m/s^2 a hand stops from 2 m/s in it."""
+
+TOUCHING = 1e-4
+"""m; nearer pairs keep their last normal: points are known to 1e-6 m."""
+
+PLANAR = 3
+"""Last joint of a planar root."""
+
+
+@struct
+class SceneArrays(NamedTuple):
+    """p pairs of geoms, of which the k nearest are measured; views of the simulation.
+
+    Attributes:
+        model: Address of the model.
+        data: Address of its data.
+        obstacle: Geom of each pair that does not move, shape (p,).
+        geom: Geom of each pair that the robot moves.
+        body: Body whose frame is that of the joint which moves it.
+        centre: Centre of each geom's box in its frame, m, shape (ngeom, 3).
+        half: Half its sides.
+        bound: Least possible distance of the nearest pairs, m, shape (k,).
+        normal: Last normal of each pair, shape (p, 3).
+        segment: Nearest points of a pair, of obstacle and robot, m, shape (6,).
+        segment_address: Address of that.
+        correction: Pose of measured in commanded axes, [R p], shape (12,).
+    """
+
+    model: int
+    data: int
+    xpos: Matrix
+    xmat: Matrix
+    geom_xpos: Matrix
+    geom_xmat: Matrix
+    geom_rbound: Vector
+    obstacle: Indices
+    geom: Indices
+    body: Indices
+    centre: Matrix
+    half: Matrix
+    bound: Vector
+    normal: Matrix
+    segment: Vector
+    segment_address: int
+    correction: Vector
+    limit: ObstacleArrays
+
+
+class SceneObstacles:
+    """Writes the nearest points of a robot and its scene into an obstacle limit.
+
+    Obstacles are all geoms without a joint that can touch the robot. Nearest points are
+    those of the simulated robot, with its fingers where they are, of exact shapes; they
+    are then moved with the commanded robot.
+
+    Args:
+        state: The robot in its scene.
+        robot: The reduced robot.
+        config: Its controller's config.
+        configuration: The commanded configuration.
+        correction: See `SceneArrays`; a view.
+
+    Attributes:
+        limit: The limit; without pairs where there is nothing to touch.
+        argument: The argument of kernels that stands for the scene.
+    """
+
+    def __init__(
+        self,
+        state: RobotState,
+        robot: RobotDescription,
+        config: WholeBodyIKConfig,
+        configuration: Configuration,
+        correction: Vector,
+    ) -> None:
+        self._model, self._data = model, data = state.model, state.data
+        pairs: list[tuple[int, int, str]] = []
+        if config.limits.obstacles:
+            pairs += _pairs(state, robot, config, configuration)
+        self._pairs = np.array([x[:2] for x in pairs], dtype=np.int64).reshape(-1, 2)
+        limits, hands = config.limits, _hand_links(robot)
+        self.limit = ObstacleLimit(
+            [LinkPair(link, _name(model, o)) for o, _, link in pairs],
+            [
+                -limits.press_depth if link in hands else limits.obstacle_distance
+                for *_, link in pairs
+            ],
+            nearest=limits.collision_pairs,
+        )
+        self.limit.bind(configuration)
+        bodies = _joint_bodies(state, configuration)
+        segment, rows = np.zeros(6), self.limit.dim
+        self._arrays = SceneArrays(
+            *addresses(model, data),
+            xpos=data.xpos,
+            xmat=data.xmat,
+            geom_xpos=data.geom_xpos,
+            geom_xmat=data.geom_xmat,
+            geom_rbound=model.geom_rbound,
+            obstacle=self._pairs[:, 0].copy(),
+            geom=self._pairs[:, 1].copy(),
+            body=bodies[self.limit.arrays.joint],
+            centre=model.geom_aabb[:, :3].copy(),
+            half=model.geom_aabb[:, 3:].copy(),
+            bound=np.zeros(rows),
+            normal=np.zeros((len(pairs), 3)),
+            segment=segment,
+            segment_address=address_of(segment),
+            correction=correction,
+            limit=self.limit.argument,
+        )
+        self.argument = as_argument(self._arrays)
+
+    def measure(self) -> None:
+        """Do what `measure_obstacles` does, in Python."""
+        list_nearest(self.argument)
+        for row, pair in enumerate(self.limit.arrays.found.tolist()):
+            if pair >= 0:
+                first, second = self._pairs[pair]
+                distance = mujoco.mj_geomDistance(
+                    self._model,
+                    self._data,
+                    first,
+                    second,
+                    INFLUENCE,
+                    self._arrays.segment,
+                )
+                write_plane(self.argument, row, distance)
+
+
+@compiled
+def measure_obstacles(scene: SceneArrays) -> None:
+    """Write the planes between the robot and the obstacles that are nearest to it."""
+    list_nearest(scene)
+    for row in range(scene.bound.shape[0]):
+        pair = scene.limit.found[row]
+        if pair >= 0:
+            distance = mj_geomDistance(
+                scene.model,
+                scene.data,
+                scene.obstacle[pair],
+                scene.geom[pair],
+                INFLUENCE,
+                scene.segment_address,
+            )
+            write_plane(scene, row, distance)
+
+
+@compiled
+def list_nearest(scene: SceneArrays) -> None:
+    """List the pairs whose ball and box are nearest, and within the influence."""
+    found, bound, count = scene.limit.found, scene.bound, 0
+    found[:], bound[:] = -1, np.inf
+    for pair in range(scene.geom.shape[0]):
+        o, g = scene.obstacle[pair], scene.geom[pair]
+        R, square = scene.geom_xmat[o], 0.0
+        most = min(INFLUENCE, bound[-1]) + scene.geom_rbound[g]
+        for i in range(3):
+            x = -scene.centre[o, i]
+            for j in range(3):
+                x += R[3 * j + i] * (scene.geom_xpos[g, j] - scene.geom_xpos[o, j])
+            outside = max(abs(x) - scene.half[o, i], 0.0)
+            square += outside * outside
+        if square < most * most:
+            d = np.sqrt(square) - scene.geom_rbound[g]
+            insert_nearest(found, bound, count, pair, d)
+            count += 1
+
+
+@compiled
+def write_plane(scene: SceneArrays, row: int, distance: float) -> None:
+    """Write a row's point and plane, of a measured distance and segment, m."""
+    limit, s, X = scene.limit, scene.segment, scene.correction
+    pair = limit.found[row]
+    normal, body = scene.normal[pair], scene.body[pair]
+    if abs(distance) > TOUCHING:
+        for i in range(3):
+            normal[i] = (s[3 + i] - s[i]) / distance
+    size = normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2
+    if distance >= INFLUENCE or size < 0.5:  # too far, or touching from the start
+        limit.found[row] = -1
+        return
+    limit.plane[row, 3] = 0.0
+    for i in range(3):
+        limit.point[row, i], limit.plane[row, i] = 0.0, 0.0
+        at = X[4 * i + 3]
+        for j in range(3):
+            from_body = s[3 + j] - scene.xpos[body, j]
+            limit.point[row, i] += scene.xmat[body, 3 * j + i] * from_body
+            limit.plane[row, i] += X[4 * i + j] * normal[j]
+            at += X[4 * i + j] * s[j]
+        limit.plane[row, 3] += limit.plane[row, i] * at
+
+
+def _pairs(
+    state: RobotState,
+    robot: RobotDescription,
+    config: WholeBodyIKConfig,
+    configuration: Configuration,
+) -> Iterator[tuple[int, int, str]]:
+    """Yield obstacle, geom and its link.
+
+    Legs that stand and a base that glides are not kept off planes.
+    """
+    model = state.model
+    bodies = model.geom_bodyid.tolist()
+    links = {model.body(state.prefix + link.name).id: link.name for link in robot.links}
+    own = {geom: links[body] for geom, body in enumerate(bodies) if body in links}
+    grounded = {link for held in config.held for link in _chain(robot, held.frame)}
+    if robot.root.kind == "planar":
+        grounded |= {
+            link for link in links.values() if _joint(configuration, link) <= PLANAR
+        }
+    fixed = np.flatnonzero(model.body_weldid[bodies] == 0).tolist()
+    kinds, affinity = model.geom_contype, model.geom_conaffinity
+    obstacles = [geom for geom in fixed if geom not in own]
+    for o, (g, link) in product(obstacles, own.items()):
+        touch = kinds[o] & affinity[g] | kinds[g] & affinity[o]
+        plane = model.geom_type[o] == mujoco.mjtGeom.mjGEOM_PLANE
+        moves = _joint(configuration, link) > 0
+        if touch and moves and not (plane and link in grounded):
+            yield o, g, link
+
+
+def _joint(configuration: Configuration, link: str) -> int:
+    """Return the joint that moves a link, 0 for none."""
+    return int(configuration.model.frames[configuration.frame_id(link)].parentJoint)
+
+
+def _chain(robot: RobotDescription, frame: str) -> Iterator[str]:
+    """Yield the links from a frame's to the one below the root."""
+    link = robot.link(robot.link_of(frame))
+    while link.parent is not None:
+        yield link.name
+        link = robot.link(link.parent)
+
+
+def _hand_links(robot: RobotDescription) -> set[str]:
+    """Return the links that carry frames of hands, and those that these carry."""
+    found = {robot.link_of(frame) for frame in robot.hands.values()}
+    for link in robot.links:  # parents come first
+        if link.parent in found:
+            found.add(link.name)
+    return found
+
+
+def _joint_bodies(state: RobotState, configuration: Configuration) -> Indices:
+    """Return the body with each joint of the reduced robot; the world's is 0."""
+    model, names = state.model, configuration.model.names
+    joints = [model.joint(state.prefix + name).id for name in names[1:]]
+    return np.array([0, *model.jnt_bodyid[joints]], dtype=np.int64)
+
+
+def _name(model: mujoco.MjModel, geom: int) -> str:
+    """Return the name of a geom's body, or its own where that is the world."""
+    body = int(model.geom_bodyid[geom])
+    return model.body(body).name if body else model.geom(geom).name
