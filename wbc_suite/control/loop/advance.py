@@ -74,7 +74,7 @@ def _advance(
     if not check_before(state):
         return -1
     done = 0
-    while done < steps and _run_ticks(model, data, physics, laws, drives, ticks):
+    while done < steps and _run_ticks(physics, laws, drives, ticks):
         mj_step1(model, data)
         if sources is not None:
             read_all_sensors(sources)
@@ -99,20 +99,14 @@ advance_custom_laws = compiled_nogil(_advance, kept=False)
 
 @compiled
 def _run_ticks(
-    model: Any,
-    data: Any,
-    physics: Physics,
-    laws: CompiledRecords,
-    drives: CompiledRecords,
-    ticks: Ticks,
+    physics: Physics, laws: CompiledRecords, drives: CompiledRecords, ticks: Ticks
 ) -> bool:
-    """Run the ticks that are due, on present poses; return whether all are done."""
+    """Run the ticks that are due; return whether all of them are done."""
     if ticks is not None:
         for tick in ticks:
-            if tick.state[0].countdown <= 0:
-                mj_kinematics(model, data)
-                if not run_tick(tick, physics.qpos, laws, drives):
-                    return False
+            is_due = tick.state[0].countdown <= 0
+            if is_due and not run_tick(tick, physics.qpos, laws, drives):
+                return False
     return True
 
 
