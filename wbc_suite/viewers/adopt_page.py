@@ -228,7 +228,7 @@ class AdoptPage:
             path = self._folder / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text, encoding="utf-8")
-        faults = hold_faults(robot, controller=str(self._folder / [*files][-1]))
+        faults = hold_faults(robot, controller=str(self._folder / [*files][1]))
         return "\n".join(
             [
                 *(f"Wrote {self._folder / name}." for name in files),

@@ -13,6 +13,7 @@ from wbc_suite.control.loop.mujoco_functions import (
     address_of,
     addresses,
     mj_geomDistance,
+    mj_kinematics,
 )
 from wbc_suite.control.state import RobotState
 from wbc_suite.kinematics import Configuration
@@ -138,6 +139,7 @@ class SceneObstacles:
 
     def measure(self) -> None:
         """Do what `measure_obstacles` does, in Python."""
+        mujoco.mj_kinematics(self._model, self._data)
         list_nearest(self.argument)
         for row, pair in enumerate(self.limit.arrays.found.tolist()):
             if pair >= 0:
@@ -156,6 +158,7 @@ class SceneObstacles:
 @compiled
 def measure_obstacles(scene: SceneArrays) -> None:
     """Write the planes between the robot and the obstacles that are nearest to it."""
+    mj_kinematics(scene.model, scene.data)  # a step leaves poses behind the joints
     list_nearest(scene)
     for row in range(scene.bound.shape[0]):
         pair = scene.limit.found[row]
