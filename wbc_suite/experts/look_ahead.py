@@ -9,15 +9,16 @@ import pinocchio as pin
 
 from wbc_suite.control import RobotState
 from wbc_suite.kinematics import Configuration
+from wbc_suite.linear_algebra import inverse_trace, lq_factor
 from wbc_suite.qp import FrameTask, PositionLimit, PostureTask, TaskStack, VelocityLimit
-from wbc_suite.typing import Vector
+from wbc_suite.typing import Matrix, Vector
 
 STEP = 0.1  # s, time of one iteration
 ITERATIONS = 60  # for each pose at most
 STUCK = 2e-3  # rad or m, of joints in an iteration
 CLOSE = 1e-3  # m and rad
 SWEEP = 0.4  # of the greatest velocity of joints, on a sweep
-SINGULAR = 0.05  # singular value of a hand's Jacobian, below which controllers lag
+SINGULAR = 0.05  # dexterity below which controllers lag
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -27,7 +28,7 @@ class Outlook:
     Attributes:
         error: Largest error at a pose, m, with 0.1 m for each rad.
         margin: Least distance of a joint from its limits at a pose, rad or m.
-        dexterity: Least singular value of the hand's Jacobian on the way.
+        dexterity: Least `_dexterity` on the way.
         times: Time of each joint at its greatest velocity, s.
         q: Configurations at the poses.
     """
@@ -155,7 +156,7 @@ class LookAhead:
     def _descend(self) -> tuple[float, Vector, float]:
         """Move to the task's target.
 
-        Returns the error, how far joints went, and the least singular value met.
+        Returns the error, how far joints went, and the least dexterity met.
         """
         configuration = self._configuration
         travel, least = np.zeros(configuration.nv), np.inf
@@ -164,8 +165,7 @@ class LookAhead:
             step = self._stack.solve(STEP).dq
             configuration.update(configuration.integrate(step))
             travel += np.abs(step)
-            J = configuration.frame_jacobian(self._frame)
-            least = min(least, np.linalg.svd(J, compute_uv=False)[-1].item())
+            least = min(least, _dexterity(configuration.frame_jacobian(self._frame)))
             left = self._error()
             if left < CLOSE or np.abs(step).max() < STUCK:
                 break
@@ -174,3 +174,10 @@ class LookAhead:
     def _error(self) -> float:
         error = self._task.error(self._configuration)
         return float(np.linalg.norm(error[:3]) + 0.1 * np.linalg.norm(error[3:]))
+
+
+def _dexterity(J: Matrix) -> float:
+    """Return a lower bound of the least singular value of a Jacobian, shape (6, n)."""
+    Q, L = np.ascontiguousarray(J), np.zeros((6, 6))
+    lq_factor(Q, Q.shape[1], L)
+    return float(inverse_trace(L, np.zeros(6))) ** 0.5
