@@ -1,3 +1,5 @@
+# pyright: reportIndexIssue=false
+# h5py's types cannot say what is in a file.
 """What robomimic's environment of robosuite asks for, in its order, and scripts too."""
 
 import json

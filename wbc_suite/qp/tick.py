@@ -168,8 +168,7 @@ def _write_rows(tick: TickArrays, qp: QpArrays, dt: float) -> None:
         floor_rows(robot, tick.spheres, dt, qp.rows[first:last], h[first:last])
     first, last = tick.obstacle_rows[0], tick.obstacle_rows[1]
     if last > first:
-        G, near = qp.rows[first:last], h[first:last]
-        obstacle_rows(robot, tick.obstacles, dt, G, near)
+        obstacle_rows(robot, tick.obstacles, dt, qp.rows[first:last], h[first:last])
     for row in range(p):
         wanted = h[row]
         h[row] = max(wanted, 0.0, -2.0 * (wanted + tick.relax_speed[row] * dt))

@@ -10,7 +10,7 @@ from wbc_suite.compat.robosuite.models.base import MujocoXML
 from wbc_suite.control import RobotState
 from wbc_suite.errors import ConfigError
 from wbc_suite.robot import RobotDescription
-from wbc_suite.scene import Push
+from wbc_suite.scene import ArenaConfig, Push
 from wbc_suite.sensing.reading import Reading
 
 __all__ = ["ManipulationTask", "MujocoWorldBase", "Task", "TaskBenchmark"]
@@ -72,6 +72,7 @@ class TaskBenchmark:
 
     gripper: str | None = None
     pushes: Sequence[Push] = ()
+    arena: ArenaConfig | None = None
     robots: Sequence[str] = ("Panda",)
 
     def __init__(self, env: Any) -> None:
