@@ -17,6 +17,7 @@ STOPPED = 2e-4  # rad or m per control period, of fingers
 OPENING = 8  # control periods until a gripper is open
 OUT_OF_REACH = 0.008  # m, error of outlooks; from the start more may be in reach
 PASSING = 0.03  # m, tolerance of poses on the way
+ALIGNED = 0.002, 0.02  # m and rad, over an object that may barely fit between fingers
 
 
 def shifted(pose: pin.SE3, offset: Iterable[float]) -> pin.SE3:
@@ -208,6 +209,9 @@ def take(
         arrived = yield from move_in_joints(cell, arm, choice.outlook.q[0], **near)
     if not arrived and arm.error()[0] > 2 * PASSING:
         return False
+    if over is not None:
+        close, even = ALIGNED
+        yield from move(arm, choice.before, tolerance=close, turn_tolerance=even)
     yield from move(arm, lambda: choice.hand_at(cell.pose(name)))
     if not (yield from grip(cell, arm, name)):
         return False
