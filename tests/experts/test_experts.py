@@ -91,3 +91,15 @@ def test_an_expert_of_your_own_is_found_by_its_benchmark(monkeypatch):
     monkeypatch.setattr("wbc_suite.experts.registry._EXPERTS", {})
     register_expert(MyLift, wave)
     assert expert_names() == ("MyLift",)
+
+
+def test_what_no_hand_reaches_is_told(caplog):
+    env = wbc_suite.make("Lift", robots="GR1ArmsOnly")
+    seen, _ = env.reset(seed=0)
+    policy = make_policy("expert", env, 0)
+    for _ in range(60):
+        seen, *_ = env.step(policy(seen))
+        if "No hand reaches 'cube'" in caplog.text:
+            break
+    env.close()
+    assert "No hand reaches 'cube'" in caplog.text

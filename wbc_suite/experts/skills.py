@@ -1,5 +1,6 @@
 """Skills of one arm: move, grasp, carry, release."""
 
+import logging
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
@@ -11,11 +12,14 @@ from wbc_suite.experts.grasp_choice import Approach, Choice, choose_grasp
 from wbc_suite.experts.workcell import Steps, Workcell, wait_until
 from wbc_suite.typing import Vector
 
+log = logging.getLogger(__name__)
+
 UP = np.array([0.0, 0.0, 1.0])
 STALLED = 8  # control periods without progress end a motion
 STOPPED = 2e-4  # rad or m per control period, of fingers
 OPENING = 8  # control periods until a gripper is open
 OUT_OF_REACH = 0.008  # m, error of outlooks; from the start more may be in reach
+FAR = 0.05  # m, error that is told
 PASSING = 0.03  # m, tolerance of poses on the way
 ALIGNED = 0.002, 0.02  # m and rad, over an object that may barely fit between fingers
 
@@ -175,6 +179,9 @@ def pick(
             choice = choose()
         if choice is None:
             return None
+        if choice.outlook.error > FAR:
+            short = 1e3 * choice.outlook.error
+            log.warning("No hand reaches '%s' on its way: %.0f mm short.", name, short)
         if (yield from take(cell, name, choice, raised=way.raised, over=over)):
             return choice
         choice.arm.open()
