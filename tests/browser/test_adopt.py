@@ -59,7 +59,11 @@ def test_a_mobile_manipulator_is_adopted(context, tmp_path):
             return viewer.arrow(pin.SE3(R @ local, at), handle.scale)
 
         viewer.drag_until(lambda: page.frames[name].pos != before, arrow, 30)
+        guessed = next(iter(page.synergies.values()))
         viewer.page.get_by_role("button", name="swap").first.click()
+        wait_until(
+            lambda: next(iter(page.synergies.values())) != guessed, "it is swapped"
+        )
         swapped = next(iter(page.synergies.values()))
         choose(viewer, "Root", "planar")
         text = write(viewer, said)
