@@ -271,7 +271,7 @@ def test_inheritance_is_shallow():
 
 
 @pytest.mark.xfail(
-    reason="about 1,600 lines too many, with later changes of older rooms", strict=False
+    reason="about 2,000 lines too many, with later changes of older rooms", strict=False
 )
 def test_the_package_is_small():
     counted = [path for path in TREES if not place(path).startswith(ADDED)]
@@ -282,7 +282,7 @@ def test_the_package_is_small():
     )
 
 
-@pytest.mark.xfail(reason="0.67 of everything", strict=False)
+@pytest.mark.xfail(reason="0.66 of everything", strict=False)
 def test_the_tests_are_many_for_everything():
     assert lines_of(sorted(TESTS.rglob("*.py"))) >= MIN_TESTS * lines_of(list(TREES))
 
