@@ -88,7 +88,7 @@ def measure(
     own = BENCHMARKS[benchmark]
     settings = training.read_settings(SCRIPTS / f"{method}.toml")
     steps = own["steps"] * settings.steps // BENCHMARKS["Lift"]["steps"]
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         settings |= {
             "folder": folder,
             "demonstrations": str(demonstrations(benchmark, data, max(SIZES))),
