@@ -88,7 +88,7 @@ def measure(
     own = BENCHMARKS[benchmark]
     settings = training.read_settings(SCRIPTS / f"{method}.toml")
     steps = own["steps"] * settings.steps // BENCHMARKS["Lift"]["steps"]
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+    with tempfile.TemporaryDirectory() as folder:
         settings |= {
             "folder": folder,
             "demonstrations": str(demonstrations(benchmark, data, max(SIZES))),
@@ -105,6 +105,7 @@ def measure(
         run = imitation.train(training.Settings(settings), chosen)
         trained = time.process_time()
         found = imitation.evaluate(run, chosen)
+        run.writer.close()  # else it goes on writing into the folder
     return {
         **dict(zip(KEY, (benchmark, data, method, episodes, seed), strict=True)),
         **found,

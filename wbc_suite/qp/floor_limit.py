@@ -12,8 +12,7 @@ from wbc_suite.kinematics import Configuration
 from wbc_suite.kinematics.forward import RobotArrays, compute_joint_poses
 from wbc_suite.qp.kernel import Kernel
 from wbc_suite.qp.limit import LimitKind, RowLimit, joint_movers
-from wbc_suite.qp.problem import UNBOUNDED
-from wbc_suite.qp.self_collision_rows import SEPARATION, insert_nearest
+from wbc_suite.qp.self_collision_rows import greatest_approach, insert_nearest
 from wbc_suite.typing import Indices, Matrix, Vector
 
 
@@ -135,9 +134,7 @@ def floor_rows(
     G[:] = 0.0
     for row in range(h.shape[0]):
         left, k = spheres.distance[row] - spheres.margin, spheres.found[row]
-        braked = np.sqrt(2.0 * spheres.braking * max(left, 0.0))
-        speed = min(spheres.rate * left, braked)
-        h[row] = min(max(speed, -SEPARATION) * dt, UNBOUNDED)
+        h[row] = greatest_approach(left, spheres.rate, spheres.braking, dt)
         if k < 0:
             continue
         T, s = robot.pose[spheres.joint[k]], spheres.sphere[k]

@@ -14,7 +14,7 @@ from wbc_suite.qp.kernel import Kernel
 from wbc_suite.qp.limit import LimitKind, RowLimit, joint_movers
 from wbc_suite.qp.problem import UNBOUNDED
 from wbc_suite.qp.self_collision_limit import LinkPair
-from wbc_suite.qp.self_collision_rows import SEPARATION
+from wbc_suite.qp.self_collision_rows import greatest_approach, speed_along
 from wbc_suite.typing import Indices, Matrix, Vector
 
 
@@ -130,12 +130,7 @@ def obstacle_rows(
         d = n[0] * x + n[1] * y + n[2] * z - c
         obstacles.distance[row] = d
         left = d - obstacles.margin[pair]
-        braked = np.sqrt(2.0 * obstacles.braking * max(left, 0.0))
-        speed = min(obstacles.rate * left, braked)
-        h[row] = min(max(speed, -SEPARATION) * dt, UNBOUNDED)
+        h[row] = greatest_approach(left, obstacles.rate, obstacles.braking, dt)
         for col in range(G.shape[1]):
-            J = robot.jacobian[col]
-            speed = n[0] * (J[0] + J[4] * z - J[5] * y)
-            speed += n[1] * (J[1] + J[5] * x - J[3] * z)
-            speed += n[2] * (J[2] + J[3] * y - J[4] * x)
+            speed = speed_along(robot.jacobian[col], n, x, y, z)
             G[row, col] = -obstacles.moves[joint, col] * speed

@@ -172,11 +172,30 @@ def _write_row(
     for col in range(out.shape[0]):
         side = moves_a[col] - moves_b[col]
         if side != 0.0:
-            J, z = robot.jacobian[col], x if side > 0.0 else y
-            speed = n[0] * (J[0] + J[4] * z[2] - J[5] * z[1])
-            speed += n[1] * (J[1] + J[5] * z[0] - J[3] * z[2])
-            speed += n[2] * (J[2] + J[3] * z[1] - J[4] * z[0])
+            z = x if side > 0.0 else y
+            speed = speed_along(robot.jacobian[col], n, z[0], z[1], z[2])
             out[col] = -side * speed
+
+
+@compiled
+def speed_along(J: Vector, n: Vector, x: float, y: float, z: float) -> float:
+    """Return the speed of a point along n per unit of a column of the Jacobian."""
+    speed = n[0] * (J[0] + J[4] * z - J[5] * y)
+    speed += n[1] * (J[1] + J[5] * x - J[3] * z)
+    speed += n[2] * (J[2] + J[3] * y - J[4] * x)
+    return speed
+
+
+@compiled
+def greatest_approach(left: float, rate: float, braking: float, dt: float) -> float:
+    """Return how far a point may come nearer in dt seconds with so much left, m.
+
+    The speed falls to zero at `rate` or by `braking`, whichever is slower; what is too
+    near has to move away.
+    """
+    braked = np.sqrt(2.0 * braking * max(left, 0.0))
+    speed = min(rate * left, braked)
+    return min(max(speed, -SEPARATION) * dt, UNBOUNDED)
 
 
 @compiled

@@ -10,9 +10,8 @@ import numpy as np
 from wbc_suite.compiling import as_argument, compiled, struct
 from wbc_suite.control.composite.whole_body_config import WholeBodyIKConfig
 from wbc_suite.control.loop.mujoco_functions import (
-    address_of,
     addresses,
-    mj_geomDistance,
+    geom_distance,
     mj_kinematics,
 )
 from wbc_suite.control.state import RobotState
@@ -48,7 +47,6 @@ class SceneArrays(NamedTuple):
         bound: Least possible distance of the nearest pairs, m, shape (k,).
         normal: Last normal of each pair, shape (p, 3).
         segment: Nearest points of a pair, of obstacle and robot, m, shape (6,).
-        segment_address: Address of that.
         correction: Pose of measured in commanded axes, [R p], shape (12,).
     """
 
@@ -67,7 +65,6 @@ class SceneArrays(NamedTuple):
     bound: Vector
     normal: Matrix
     segment: Vector
-    segment_address: int
     correction: Vector
     limit: ObstacleArrays
 
@@ -131,7 +128,6 @@ class SceneObstacles:
             bound=np.zeros(rows),
             normal=np.zeros((len(pairs), 3)),
             segment=segment,
-            segment_address=address_of(segment),
             correction=correction,
             limit=self.limit.argument,
         )
@@ -163,13 +159,13 @@ def measure_obstacles(scene: SceneArrays) -> None:
     for row in range(scene.bound.shape[0]):
         pair = scene.limit.found[row]
         if pair >= 0:
-            distance = mj_geomDistance(
+            distance = geom_distance(
                 scene.model,
                 scene.data,
-                scene.obstacle[pair],
-                scene.geom[pair],
+                int(scene.obstacle[pair]),
+                int(scene.geom[pair]),
                 INFLUENCE,
-                scene.segment_address,
+                scene.segment,
             )
             write_plane(scene, row, distance)
 

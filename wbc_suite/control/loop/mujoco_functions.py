@@ -11,6 +11,7 @@ import llvmlite.binding
 import mujoco
 from numba import types
 
+from wbc_suite.compiling import compiled
 from wbc_suite.typing import Vector
 
 _MODEL_AND_DATA = types.void(types.intp, types.intp)
@@ -28,7 +29,6 @@ mj_geomDistance = types.ExternalFunction(
         types.intp, types.intp, types.intc, types.intc, types.double, types.intp
     ),
 )
-"""Its last argument is the `address_of` an array of shape (6,)."""
 
 
 def addresses(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[int, int]:
@@ -36,6 +36,12 @@ def addresses(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[int, int]:
     return model._address, data._address
 
 
-def address_of(array: Vector) -> int:
-    """Return the address of an array's numbers, valid as long as it lives."""
-    return int(array.__array_interface__["data"][0])
+@compiled
+def geom_distance(
+    model: int, data: int, first: int, second: int, farthest: float, segment: Vector
+) -> float:
+    """Return the distance of two geoms, m, at most `farthest`; below zero inside.
+
+    The segment, shape (6,), gets the nearest points of both, in the world, m.
+    """
+    return mj_geomDistance(model, data, first, second, farthest, segment.ctypes.data)
