@@ -2,6 +2,7 @@
 
 import importlib
 import time
+from collections.abc import Sequence
 from typing import Any
 
 import gymnasium
@@ -29,6 +30,7 @@ from wbc_suite.scene import (
     empty_arena,
     robot_prefix,
 )
+from wbc_suite.scene.mjcf_arena import PREFIX, clear_views
 from wbc_suite.sensing.cameras import Cameras
 from wbc_suite.sensing.observables import Observables
 from wbc_suite.sensing.projection import camera_id
@@ -37,8 +39,9 @@ from wbc_suite.sensing.proprioception import (
     proprioception,
     sensors_of,
 )
-from wbc_suite.sensing.things import check_room, clear_views, readings_of_things
+from wbc_suite.sensing.things import readings_of_things
 
+DEEPEST = 1e-3  # of robots in an arena at their start, m
 WATCH_PAGE = "wbc_suite.viewers.watch_page"
 """Imported when needed: `viewers` is a layer above `envs`."""
 
@@ -77,6 +80,27 @@ def _load(robot: Any, benchmark: Benchmark, config: EnvConfig) -> RobotDescripti
 def arena_of(benchmark: Benchmark) -> ArenaConfig | None:
     """Return the scene around a benchmark; classes of users need not name one."""
     return getattr(benchmark, "arena", None)
+
+
+def check_room(arena: ArenaConfig, robots: Sequence[RobotState]) -> None:
+    """Check that no robot is in the arena now.
+
+    Raises:
+        ConfigError: Names what it is in.
+    """
+    if not robots:
+        return
+    m, data = robots[0].model, robots[0].data
+    prefixes = tuple(robot.prefix for robot in robots)
+    for pair in data.contact.geom[data.contact.dist < -DEEPEST].tolist():
+        for own, other in (pair, pair[::-1]):
+            body, found = m.body(m.geom_bodyid[own]).name, m.geom(other).name
+            if body.startswith(prefixes) and found.startswith(PREFIX):
+                raise ConfigError(
+                    f"{arena.file}: at its start '{body}' is in "
+                    f"'{found.removeprefix(PREFIX)}'. Give another `surface`, or `at` "
+                    "and `yaw`."
+                )
 
 
 def compose(

@@ -9,10 +9,12 @@ from typing import Any
 
 import mujoco
 import numpy as np
+import pinocchio as pin
 
 from wbc_suite.errors import ConfigError, UnknownNameError, join_first
 from wbc_suite.robot.mjcf_compile import compile_mjcf
-from wbc_suite.robot.shapes import Real
+from wbc_suite.robot.poses import pose_at, pose_fields
+from wbc_suite.robot.shapes import Real, Vector3
 from wbc_suite.scene.arena import (
     FLOOR,
     TableConfig,
@@ -33,6 +35,7 @@ from wbc_suite.scene.surfaces import (
     surface_of_geom,
 )
 from wbc_suite.tomlfile import FrozenModel
+from wbc_suite.typing import Vector
 
 log = logging.getLogger(__name__)
 
@@ -44,6 +47,7 @@ NEAR = 0.25
 """Distance of the benchmark's origin from the front edge of a surface, at most, m:
 pedestals, whose feet reach under tables, then stand before a cupboard."""
 FLAT = 0.01  # height of a top that is a floor, m
+IN_VIEW = 0.15  # height over a surface of the point that cameras must see, m
 
 
 class ArenaConfig(FrozenModel):
@@ -270,3 +274,35 @@ def _driven_bodies(m: mujoco.MjModel) -> Iterator[int]:
             yield int(m.site_bodyid[target])
         else:
             yield int(m.jnt_bodyid[target])
+
+
+def clear_views(m: mujoco.MjModel, data: mujoco.MjData, center: Vector3) -> None:
+    """Turn the benchmark's cameras about the vertical through a point till they see it.
+
+    They look from in front of a table, where the walls of a room may be.
+    """
+    middle = np.array(center) + np.array([0.0, 0.0, IN_VIEW])
+    for camera in np.flatnonzero(m.cam_bodyid == 0):
+        if m.camera(camera).name.startswith(PREFIX):
+            continue
+        place = pose_at(m.cam_pos[camera], m.cam_quat[camera])
+        for step in sorted(range(-5, 7), key=abs):
+            R = pin.utils.rotate("z", step * math.pi / 6)
+            eye = middle + R @ (place.translation - middle)
+            if not _is_hidden(m, data, eye, middle):
+                pose = pose_fields(pin.SE3(R @ place.rotation, eye))
+                m.cam_pos[camera], m.cam_quat[camera] = pose["pos"], pose["quat"]
+                break
+
+
+def _is_hidden(
+    m: mujoco.MjModel, data: mujoco.MjData, eye: Vector, middle: Vector
+) -> bool:
+    """Whether the arena hides a point from an eye, or the eye from the point."""
+    hit = np.zeros(1, dtype=np.int32)
+    for start, end in ((eye, middle), (middle, eye)):
+        share = mujoco.mj_ray(m, data, start, end - start, None, True, -1, hit)
+        found = m.geom(hit[0]).name if hit[0] >= 0 else ""
+        if 0.0 <= share < 1.0 and found.startswith(PREFIX):
+            return True
+    return False
