@@ -219,11 +219,13 @@ def test_all_grippers_are_listed_as_there():
 
 @pytest.mark.slow
 def test_what_is_converted_for_robomimic_plays_in_its_environment(tmp_path):
+    """While no motor saturates: those of robosuite's Panda have other limits."""
     made = wbc_suite.make("Lift", robots="Panda", terminate_on_success=True)
+    rng = np.random.default_rng(0)
     with DataCollection(made, tmp_path / "lift.hdf5") as recorded:
         recorded.reset(seed=3)
         for _ in range(10):
-            recorded.step(0.2 * recorded.action_space.sample())
+            recorded.step(rng.uniform(-0.05, 0.05, 7))
     out = convert(tmp_path / "lift.hdf5", tmp_path / "out.hdf5", "robomimic")
     with h5py.File(out) as file:
         meta, demo = json.loads(file["data"].attrs["env_args"]), file["data/demo_0"]
@@ -238,5 +240,5 @@ def test_what_is_converted_for_robomimic_plays_in_its_environment(tmp_path):
     np.testing.assert_allclose(first["robot0_eef_pos"], seen[0], atol=1e-12)
     for position, action in zip(seen[1:], actions, strict=False):
         found, _, _ = driver.step(action)
-        np.testing.assert_allclose(found["robot0_eef_pos"], position, atol=1e-4)
+        np.testing.assert_allclose(found["robot0_eef_pos"], position, atol=1e-6)
     driver.env.close()
