@@ -2,11 +2,11 @@
 
 `make bench` runs all scripts in `benchmarks/`; with `ARGS=--quick` each takes under a
 minute, and `--only env_step` runs one. Everything that they measure is written to
-artifacts/benchmarks: NAME.json and NAME.md with all tables, and plots.
+artifacts/benchmarks: NAME.json and NAME.md with all tables, and plots. Ratios that the
+page shows are kept in docs/benchmarks.json: a run of one script leaves the others'.
 """
 
 import argparse
-import datetime
 import json
 import subprocess
 import sys
@@ -20,6 +20,7 @@ from harness.report import cell, heading, look_up, rows_with  # noqa: E402
 
 FOUND = ROOT / "artifacts" / "benchmarks"
 PAGE = ROOT / "docs" / "benchmarks.md"
+RATIOS = ROOT / "docs" / "benchmarks.json"
 ORDER = (
     "env_step",
     "control_law",
@@ -111,29 +112,36 @@ def table(head: list[str], rows: list[list[str]]) -> str:
     return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
 
 
-def about(found: dict[Path, dict[str, Any]]) -> str:
-    """Return machine, dates and versions."""
-    notes = [report["about"] for report in found.values()]
-    machines = ", ".join(sorted({note["machine"] for note in notes}))
-    dates = sorted({note["date"] for note in notes})
+def merged(found: dict[Path, dict[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Return value, date, machine and versions of each goal's ratio; write RATIOS."""
+    kept = json.loads(RATIOS.read_text("utf-8")) if RATIOS.exists() else {}
+    for report in found.values():
+        for name, value in report["ratios"].items():
+            if name in {goal[0] for goal in GOALS + AT_LEAST}:
+                kept[name] = {"found": value, **report["about"]}
+    RATIOS.write_text(json.dumps(kept, indent=1, sort_keys=True) + "\n", "utf-8")
+    return kept
+
+
+def about(ratios: dict[str, dict[str, Any]]) -> str:
+    """Return machines and versions."""
+    machines = ", ".join(sorted({note["machine"] for note in ratios.values()}))
     versions: dict[str, str] = {}
-    for note in notes:
+    for note in sorted(ratios.values(), key=lambda note: note["date"]):
         versions |= note["versions"]
-    today = datetime.datetime.now(datetime.UTC).date().isoformat()
-    when = " to ".join(dict.fromkeys([dates[0], dates[-1]])) if dates else today
     packages = ", ".join(f"{name} {version}" for name, version in versions.items())
-    return f"Machine: {machines}. Date: {when}. Versions: {packages}.\n"
+    return f"Machine: {machines}. Versions: {packages}.\n"
 
 
-def goals(found: dict[Path, dict[str, Any]]) -> str:
+def goals(ratios: dict[str, dict[str, Any]]) -> str:
     """Return the goals beside what was found; not measured is empty."""
-    ratios = {n: r for report in found.values() for n, r in report["ratios"].items()}
-    rows = [
-        [f"`{name}`", text, f"{words} {limit:.3g}", cell(ratios.get(name))]
-        for words, wanted in (("at most", GOALS), ("at least", AT_LEAST))
-        for name, limit, text in wanted
-    ]
-    return table(["ratio", "what", "goal", "found"], rows)
+    rows = []
+    for words, wanted in (("at most", GOALS), ("at least", AT_LEAST)):
+        for name, limit, text in wanted:
+            note = ratios.get(name, {})
+            found = [cell(note.get("found")), note.get("date", "")]
+            rows.append([f"`{name}`", text, f"{words} {limit:.3g}", *found])
+    return table(["ratio", "what", "goal", "found", "date"], rows)
 
 
 def contents() -> str:
@@ -214,7 +222,8 @@ def main() -> None:
             draw_env_step(report, FOUND / "env_step.png")
         text = section(script, report)
         (FOUND / f"{script.stem}.md").write_text(text, encoding="utf-8")
-    parts = [HEAD, about(found), goals(found), contents()]
+    ratios = merged(found)
+    parts = [HEAD, about(ratios), goals(ratios), contents()]
     PAGE.write_text("\n".join(parts), encoding="utf-8")
 
 

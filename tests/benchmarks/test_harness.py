@@ -72,20 +72,29 @@ def test_the_artefact_shows_tables_and_ratios(report, tmp_path):
     assert "| `Lift/theirs` | 0.1 |" in text
 
 
-def test_the_page_shows_each_goal_once_with_its_figure():
-    found = {Path("a.py"): {"ratios": {"GR1/mink": 0.123, "GR1/placo": 0.9, "x": 1.0}}}
-    lines = write_benchmarks.goals(found).splitlines()[2:]
+def test_the_page_shows_each_goal_once_with_its_figure(tmp_path, monkeypatch):
+    monkeypatch.setattr(write_benchmarks, "RATIOS", tmp_path / "ratios.json")
+    about = {"date": "2026-01-02", "machine": "m", "versions": {"mujoco": "4.0"}}
+    first = {"ratios": {"GR1/mink": 0.123, "GR1/placo": 0.9, "x": 1.0}, "about": about}
+    write_benchmarks.merged({Path("a.py"): first})
+    later = {"ratios": {"GR1/placo": 0.8}, "about": about | {"date": "2026-03-04"}}
+    ratios = write_benchmarks.merged({Path("a.py"): later})
+    lines = write_benchmarks.goals(ratios).splitlines()[2:]
     assert len(lines) == len(write_benchmarks.GOALS) + len(write_benchmarks.AT_LEAST)
     (mink,) = (line for line in lines if "`GR1/mink`" in line)
-    assert mink.endswith("| at most 0.2 | 0.123 |")
+    assert mink.endswith("| at most 0.2 | 0.123 | 2026-01-02 |")  # kept
+    (placo,) = (line for line in lines if "`GR1/placo`" in line)
+    assert placo.endswith("| 0.8 | 2026-03-04 |")
     (reset,) = (line for line in lines if "`Lift/Panda/reset/1ms`" in line)
-    assert reset.endswith("| at most 1 |  |")  # not measured
+    assert reset.endswith("| at most 1 |  |  |")  # not measured
+    assert "x" not in ratios
 
 
-def test_the_page_in_docs_names_all_goals_and_scripts():
+def test_the_page_in_docs_has_a_figure_for_every_goal_and_lists_all_scripts():
     text = write_benchmarks.PAGE.read_text(encoding="utf-8")
     for name, *_ in (*write_benchmarks.GOALS, *write_benchmarks.AT_LEAST):
-        assert f"| `{name}` |" in text
+        (line,) = (x for x in text.splitlines() if x.startswith(f"| `{name}` |"))
+        assert float(line.split("|")[4]) > 0.0
     assert write_benchmarks.contents() in text
     assert len(text.splitlines()) < 60
 
