@@ -84,6 +84,8 @@ class Adversary:
     def _values(self, part: ActionSlice, poses: dict[str, pin.SE3]) -> np.ndarray:
         if part.kind is SliceKind.GRIPPER:
             return np.sign(self.grip[part.start : part.stop])
+        if part.kind in (SliceKind.VELOCITY, SliceKind.POSITION):  # walk, height
+            return self.grip[part.start : part.stop]
         pose = poses[part.name]
         turn = pin.log3(pose.rotation)
         if part.kind is SliceKind.BASE:
