@@ -5,7 +5,11 @@ import numpy as np
 import pytest
 
 import wbc_suite
-from wbc_suite.control.composite.scene_obstacles import INFLUENCE, SceneObstacles
+from wbc_suite.control.composite.scene_obstacles import (
+    INFLUENCE,
+    ROWS_OF_BODY,
+    SceneObstacles,
+)
 from wbc_suite.control.reasons import ActiveLimit, LimitKind
 from wbc_suite.kinematics import Configuration
 
@@ -105,6 +109,31 @@ def test_distances_are_those_of_the_simulator(name):
         least = min(truth.values())
         if least < INFLUENCE:
             assert min(found.values()) == pytest.approx(least, abs=1e-5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["Panda", "Tiago", "GR1"])
+def test_the_nearest_geoms_of_each_body_and_obstacle_have_rows(name):
+    scene, rng = Scene(name), np.random.default_rng(1)
+    model, arrays = scene.configuration.model, scene.obstacles._arrays
+    low = np.maximum(model.lowerPositionLimit, -1.0)
+    high = np.minimum(model.upperPositionLimit, 1.0)
+    for _ in range(5):
+        scene.write(rng.uniform(low, high))
+        scene.obstacles.measure()
+        listed = {int(k) for k in scene.obstacles.limit.arrays.found if k >= 0}
+        groups = {}
+        for k, pair in enumerate(zip(arrays.obstacle, arrays.geom, strict=True)):
+            d = mujoco.mj_geomDistance(
+                scene.model, scene.data, *map(int, pair), 9, None
+            )
+            key = int(arrays.obstacle[k]), int(arrays.body[k])
+            groups.setdefault(key, []).append((d, k))
+        nearest = sorted(min(found) for found in groups.values())
+        for d, k in [x for x in nearest if x[0] < 0.2][:4]:
+            assert k in listed, (d, scene.obstacles.limit.pairs[k])
+        for found in groups.values():
+            assert len(listed & {k for _, k in found}) <= ROWS_OF_BODY
 
 
 @pytest.mark.slow

@@ -25,6 +25,9 @@ from wbc_suite.typing import Indices, Matrix, Vector
 INFLUENCE = 0.5
 """m; pairs further apart are left out: at 4 m/s^2 a hand stops from 2 m/s in it."""
 
+ROWS_OF_BODY = 4
+"""Rows of one body and obstacle at most, so that fingers leave some for elbows."""
+
 TOUCHING = 1e-4
 """m; nearer pairs keep their last normal: points are known to 1e-6 m."""
 
@@ -44,7 +47,7 @@ class SceneArrays(NamedTuple):
         body: Body whose frame is that of the joint which moves it.
         centre: Centre of each geom's box in its frame, m, shape (ngeom, 3).
         half: Half its sides.
-        bound: Least possible distance of the nearest pairs, m, shape (k,).
+        bound: Lower bound of the distance of the nearest pairs, m, shape (k,).
         normal: Last normal of each pair, shape (p, 3).
         segment: Nearest points of a pair, of obstacle and robot, m, shape (6,).
         correction: Pose of measured in commanded axes, [R p], shape (12,).
@@ -172,23 +175,59 @@ def measure_obstacles(scene: SceneArrays) -> None:
 
 @compiled
 def list_nearest(scene: SceneArrays) -> None:
-    """List the pairs whose ball and box are nearest, and within the influence."""
+    """List the pairs whose boxes are nearest, and within the influence."""
     found, bound, count = scene.limit.found, scene.bound, 0
     found[:], bound[:] = -1, np.inf
     for pair in range(scene.geom.shape[0]):
-        o, g = scene.obstacle[pair], scene.geom[pair]
-        R, square = scene.geom_xmat[o], 0.0
-        most = min(INFLUENCE, bound[-1]) + scene.geom_rbound[g]
-        for i in range(3):
-            x = -scene.centre[o, i]
-            for j in range(3):
-                x += R[3 * j + i] * (scene.geom_xpos[g, j] - scene.geom_xpos[o, j])
-            outside = max(abs(x) - scene.half[o, i], 0.0)
-            square += outside * outside
-        if square < most * most:
-            d = np.sqrt(square) - scene.geom_rbound[g]
-            insert_nearest(found, bound, count, pair, d)
-            count += 1
+        most = min(INFLUENCE, bound[-1])
+        d = _least_distance(scene, pair, most)
+        if d < most:
+            kept, last = _rows_of_body(scene, pair, count)
+            if kept < ROWS_OF_BODY:
+                insert_nearest(found, bound, count, pair, d)
+                count = min(count + 1, found.shape[0])
+            elif d < bound[last]:
+                insert_nearest(found[: last + 1], bound[: last + 1], last, pair, d)
+
+
+@compiled
+def _least_distance(scene: SceneArrays, pair: int, most: float) -> float:
+    """Return a lower bound of the distance of a pair, m; `most` or more where greater.
+
+    No point of the obstacle's box lies in front of the plane at its point that is
+    nearest to the geom's centre; the geom reaches towards it no farther than its box.
+    """
+    o, g = scene.obstacle[pair], scene.geom[pair]
+    R, R_geom, square = scene.geom_xmat[o], scene.geom_xmat[g], 0.0
+    n = np.zeros(3)
+    for i in range(3):
+        x = -scene.centre[o, i]
+        for j in range(3):
+            x += R[3 * j + i] * (scene.geom_xpos[g, j] - scene.geom_xpos[o, j])
+        outside = np.sign(x) * max(abs(x) - scene.half[o, i], 0.0)
+        square += outside * outside
+        for j in range(3):
+            n[j] += R[3 * j + i] * outside
+    d = np.sqrt(square)
+    if d == 0.0 or d - scene.geom_rbound[g] >= most:
+        return d - scene.geom_rbound[g]
+    least = d
+    for j in range(3):
+        along = (R_geom[j] * n[0] + R_geom[3 + j] * n[1] + R_geom[6 + j] * n[2]) / d
+        least += along * scene.centre[g, j] - abs(along) * scene.half[g, j]
+    return least
+
+
+@compiled
+def _rows_of_body(scene: SceneArrays, pair: int, count: int) -> tuple[int, int]:
+    """Return how many rows a pair's body and obstacle have, and the last of them."""
+    kept, last = 0, 0
+    for row in range(count):
+        other = scene.limit.found[row]
+        same_body = scene.body[other] == scene.body[pair]
+        if same_body and scene.obstacle[other] == scene.obstacle[pair]:
+            kept, last = kept + 1, row
+    return kept, last
 
 
 @compiled
