@@ -26,6 +26,8 @@ MAKERS = {
 GROCERIES = tuple(MAKERS)
 QUADRANTS = {"Milk": (-1, -1), "Bread": (1, -1), "Cereal": (-1, 1), "Can": (1, 1)}
 """Quadrant of each object in the second bin, by the signs of x and y."""
+ON_FLOOR = 0.01
+"""Greatest height of the lowest point of a placed object above the floor, m."""
 REST = {"Milk": 0.065, "Bread": 0.022, "Cereal": 0.060, "Can": 0.0425}
 """Height of the origin of each object at rest, m."""
 
@@ -57,7 +59,8 @@ class PickPlace(ObjectBenchmark):
     """Each object is to lie in its own quadrant of the second bin, the hand withdrawn.
 
     Source of geometry and reward: robosuite 1.5, see `Lift`. Unlike there, an
-    object that a hand still holds is not placed, nor one that flies or rolls.
+    object that a hand still holds is not placed, nor one that flies, rolls or
+    hangs over a wall.
     """
 
     def __init__(self, path: Source) -> None:
@@ -69,6 +72,7 @@ class PickPlace(ObjectBenchmark):
             {name: self.goal(name) for name in config.objects},
             within=lambda dx, dy: abs(dx) < length / 4 and abs(dy) < width / 4,
             grip=lambda name: self.states[name].position,
+            lies=self._is_on_floor,
             floor=config.target.center[2],
             **config.model_dump(include={"height", "lift_height", "pick_one"}),
             stages=config.stages,
@@ -107,6 +111,13 @@ class PickPlace(ObjectBenchmark):
         length, width, _ = self.config.target.size
         side, end = QUADRANTS[name]
         return x + side * length / 4, y + end * width / 4
+
+    def _is_on_floor(self, name: str) -> bool:
+        """Whether an object reaches down to the floor of its bin, not over a wall."""
+        state = self.states[name]
+        w, x, y, z = self.data.xquat[state.body].tolist()
+        low = state.position.item(2) - state.extent((w, x, y, z)).bottom
+        return low < self.config.target.center[2] + ON_FLOOR
 
     def success(self) -> bool:
         """Whether each object lies in its quadrant; see `Sorting`."""

@@ -107,8 +107,8 @@ class ToolHang(ObjectBenchmark):
     def is_hanging(self) -> bool:
         """Whether the wrench hangs on the arm of the frame.
 
-        It touches the frame and not the stand, no hand holds it, it is above the table,
-        and the arm passes through one of its holes.
+        It lies still, touches the frame and not the stand, no hand holds it, it is
+        above the table, and the arm passes through one of its holes.
         """
         holes = [self.site(f"{TOOL}_hole{k}") for k in (1, 2)]
         lowest = min(hole.item(2) for hole in holes)
@@ -118,6 +118,7 @@ class ToolHang(ObjectBenchmark):
             and self.touching(TOOL, FRAME)
             and not self.touching(TOOL, STAND)
             and not self.grasped(TOOL)
+            and self.states[TOOL].is_still
         )
 
     def _passes(self, hole: np.ndarray) -> bool:

@@ -15,7 +15,7 @@ from wbc_suite.typing import Matrix, Vector
 DIRECTIONS = 64
 """Horizontal directions along which an object is measured; 0.1 % below the circle."""
 
-STILL, STILL_TURN = 0.05, 0.5
+STILL, STILL_TURN = 0.02, 0.2
 """m/s and rad/s, of things that lie still."""
 
 
@@ -66,7 +66,7 @@ class ObjectState:
 
     @property
     def is_still(self) -> bool:
-        """Whether it moves less than 0.05 m/s and 0.5 rad/s; fixed ones do not move."""
+        """Whether it moves less than 0.02 m/s and 0.2 rad/s; fixed ones do not move."""
         v = self.data.qvel[self._v : self._v + 6] if self.is_free else np.zeros(6)
         return math.hypot(*v[:3]) < STILL and math.hypot(*v[3:]) < STILL_TURN
 
