@@ -1,10 +1,11 @@
 # Everything a newcomer or a build machine types. `make` alone lists it.
 .DEFAULT_GOAL := help
-.PHONY: help teleop demo test test-versions check format docs bench bench-peers pictures gallery wheel clean
+.PHONY: help teleop demo test test-versions check format docs bench bench-peers clients pictures gallery wheel clean
 
 VENV := .venv
 PY := $(VENV)/bin/python
 PYTEST := $(PY) -m pytest
+CLIENTS := $(notdir $(basename $(wildcard examples/clients/*.py)))
 FAST := -m "not slow and not browser and not peer"
 export PYTHON
 
@@ -42,7 +43,7 @@ bench: $(VENV)/.installed-dev ## run every benchmark: docs/benchmarks.md, artifa
 	$(PY) docs/write_benchmarks.py $(ARGS)
 
 # Peers get environments of their own where they ask for other versions than ours.
-bench-peers: $(VENV)/.installed-peers .venv-placo/.installed .venv-robosuite/.installed .venv-robosuite-demos/.installed .venv-cluster/.installed .venv-datasets/.installed ## install what benchmarks and tests compare or work with
+bench-peers: $(VENV)/.installed-peers .venv-placo/.installed .venv-robosuite/.installed .venv-robosuite-demos/.installed .venv-cluster/.installed .venv-datasets/.installed .venv-clients/.installed .venv-accelerators/.installed ## install what benchmarks and tests compare or work with
 
 $(VENV)/.installed-peers: $(VENV)/.installed-dev
 	$(PY) -m pip install --disable-pip-version-check --group peers
@@ -57,6 +58,11 @@ $(VENV)/.installed-peers: $(VENV)/.installed-dev
 	@test -x .venv-client-$*/bin/python || $(PY) -m venv .venv-client-$*
 	.venv-client-$*/bin/python -m pip install --disable-pip-version-check -e . -r $<
 	@touch $@
+
+clients: $(CLIENTS:%=client-%) ## run the examples of examples/clients, each in an environment of its own
+
+$(CLIENTS:%=client-%): client-%: .venv-client-%/.installed
+	.venv-client-$*/bin/python examples/clients/$*.py
 
 pictures: $(VENV)/.installed ## draw the pictures of the README and of walking anew
 	$(PY) docs/draw_pictures.py

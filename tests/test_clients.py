@@ -11,14 +11,17 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 CLIENTS = sorted((ROOT / "examples" / "clients").glob("*.py"))
+SHARED = (ROOT / "benchmarks" / "peers" / "clients.txt").read_text()
 PATIENCE = 900.0  # s; torch takes minutes to be imported for the first time
 
 
 def python_for(script: Path) -> str | None:
-    """Return the client's own Python, or this one if it has the packages."""
+    """Return the client's own Python, the shared one, or this one if it has all."""
     own = ROOT / f".venv-client-{script.stem}/bin/python"
-    if own.exists():
-        return str(own)
+    shared = ROOT / ".venv-clients/bin/python"
+    for python, has in ((own, True), (shared, script.stem in SHARED)):
+        if has and python.exists():
+            return str(python)
     modules = {
         name.partition(".")[0]
         for node in ast.walk(ast.parse(script.read_text()))

@@ -52,6 +52,10 @@ KWARGS = {  # of a dataset, and what the trainer puts over it
 }
 
 
+# what robomimic's configs of low dimension observe, for Lift with Panda
+LEARNED = ["object", *(f"robot0_{k}" for k in ("eef_pos", "eef_quat", "gripper_qpos"))]
+
+
 class Driver:
     """Calls an environment as robomimic's `EnvRobosuite` does; written here."""
 
@@ -231,13 +235,17 @@ def test_what_is_converted_for_robomimic_plays_in_its_environment(tmp_path):
         meta, demo = json.loads(file["data"].attrs["env_args"]), file["data/demo_0"]
         states, actions = demo["states"][:], demo["actions"][:]
         seen, text = demo["obs/robot0_eef_pos"][:], str(demo.attrs["model_file"])
+        learned = {k: demo[f"obs/{k}"][0] for k in LEARNED}
+        moved = demo["next_obs/robot0_gripper_qpos"][:-1]
+        np.testing.assert_array_equal(moved, demo["obs/robot0_gripper_qpos"][1:])
     assert meta["type"] == 1  # robosuite, in robomimic's EnvType
     theirs = {"has_renderer": False, "has_offscreen_renderer": False}
     theirs |= {"ignore_done": True, "use_object_obs": True, "use_camera_obs": False}
     driver = Driver(meta["env_name"], **meta["env_kwargs"], **theirs)
     driver.reset()
     first = driver.reset_to({"model": text, "states": states[0]})
-    np.testing.assert_allclose(first["robot0_eef_pos"], seen[0], atol=1e-12)
+    for key, value in learned.items():
+        np.testing.assert_allclose(first[key], value, atol=1e-12)
     for position, action in zip(seen[1:], actions, strict=False):
         found, _, _ = driver.step(action)
         np.testing.assert_allclose(found["robot0_eef_pos"], position, atol=1e-6)

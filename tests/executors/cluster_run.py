@@ -1,6 +1,7 @@
 """Run by the cluster's own environment: six items, one of them a killer of workers.
 
-Arguments: name of the executor, folder. Prints the outcomes as JSON.
+Arguments: name of the executor, folder, and the JSON file for the outcomes: Ray writes
+its log where a script prints.
 """
 
 import json
@@ -43,4 +44,5 @@ if __name__ == "__main__":
     outcomes = run_items(
         cluster_run.killed, items, folder=folder, executor=executor(sys.argv[1])
     )
-    print(json.dumps({o.name: [o.result.get("twice"), o.error] for o in outcomes}))
+    found = {o.name: [o.result.get("twice"), o.error] for o in outcomes}
+    Path(sys.argv[3]).write_text(json.dumps(found))

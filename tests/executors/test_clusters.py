@@ -19,11 +19,11 @@ def test_work_survives_the_death_of_a_worker(name, tmp_path):
     if not PYTHON.exists():
         pytest.skip("Ray and submitit are not installed: make bench-peers")
     paths = os.pathsep.join([str(ROOT), str(HERE)])
-    command = [PYTHON, HERE / "cluster_run.py", name, tmp_path]
-    output = subprocess.check_output(
-        command, text=True, env={**os.environ, "PYTHONPATH": paths}, timeout=300
-    )
-    outcomes = json.loads(output.splitlines()[-1])
+    found = tmp_path / "outcomes.json"
+    command = [PYTHON, HERE / "cluster_run.py", name, tmp_path / "work", found]
+    environment = {**os.environ, "PYTHONPATH": paths}
+    subprocess.run(command, check=True, env=environment, timeout=300)
+    outcomes = json.loads(found.read_text())
     lost = outcomes.pop("c")
     assert outcomes == {n: [2 * "abcdef".index(n), None] for n in "abdef"}
     assert lost[0] is None

@@ -10,7 +10,8 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 SCRIPTS = ROOT / "examples" / "learning"
-PYTHON = ROOT / ".venv-learning/bin/python"
+ENVIRONMENTS = (ROOT / f".venv-{n}/bin/python" for n in ("learning", "clients"))
+PYTHON = next((python for python in ENVIRONMENTS if python.exists()), None)
 CLONING = ("bc", "bc_history", "diffusion")
 SMALL = ["save_every=20", "evaluate=1", "horizon=20", "width=32"]
 SHORT = ["horizon=20", "learning_starts=40", "save_every=80", "log_every=40"]
@@ -18,7 +19,7 @@ SHORT += ["evaluate=1", "buffer=400", "layers=[16]"]
 
 
 def python(*arguments):
-    if not PYTHON.exists():
+    if PYTHON is None:
         pytest.skip("torch is not installed: make .venv-learning/.installed")
     environment = os.environ | {"PYTHONPATH": f"{ROOT}{os.pathsep}{SCRIPTS}"}
     command = [PYTHON, *arguments]

@@ -63,7 +63,7 @@ def _hands(state: RobotState) -> dict[str, Reading]:
 
 
 def _grippers(state: RobotState) -> dict[str, Reading]:
-    grippers = _gripper_groups(state.robot)
+    grippers = gripper_groups(state.robot)
     readings: dict[str, Reading] = {}
     for name, joints in grippers.items():
         key = name if len(grippers) > 1 else "gripper"
@@ -73,7 +73,8 @@ def _grippers(state: RobotState) -> dict[str, Reading]:
     return readings
 
 
-def _gripper_groups(robot: RobotDescription) -> dict[str, tuple[str, ...]]:
+def gripper_groups(robot: RobotDescription) -> dict[str, tuple[str, ...]]:
+    """Return the driven joints of each gripper, by its group's name."""
     return {
         name: tuple(joints)
         for name, joints in robot.groups.items()
@@ -83,7 +84,7 @@ def _gripper_groups(robot: RobotDescription) -> dict[str, tuple[str, ...]]:
 
 def _body_joints(robot: RobotDescription) -> tuple[str, ...]:
     """Return the independent joints but those of grippers, in the robot's order."""
-    fingers = {joint for joints in _gripper_groups(robot).values() for joint in joints}
+    fingers = {joint for joints in gripper_groups(robot).values() for joint in joints}
     own = (joint.name for joint in robot.joints if joint.mimic is None)
     return tuple(name for name in own if name not in fingers)
 

@@ -1,4 +1,7 @@
-"""robomimic's HDF5 layout with its own columns only, for its training and roll-outs."""
+"""robomimic's HDF5 layout with its own columns only, for its training and roll-outs.
+
+Observations are those of `wbc_suite.compat.robosuite`, in which robomimic rolls out.
+"""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -18,6 +21,7 @@ from wbc_suite.recording.dataset import Dataset
 from wbc_suite.recording.env_source import PACKAGE, EnvSource
 from wbc_suite.recording.episode import Episode, Fact
 from wbc_suite.recording.hdf5_writer import write_dataset
+from wbc_suite.sensing.proprioception import gripper_groups
 
 ROBOSUITE_TYPE = 1
 """Type of robosuite's environments in robomimic's `env_args`."""
@@ -31,9 +35,12 @@ def _write(dataset: Dataset, piece: Piece, out: Path, on_progress: Progress) -> 
     """Write `demo_0`, ...; the last `next_obs` repeats `obs` if it was not recorded."""
     names = {name: f"demo_{k}" for k, name in enumerate(piece.names)}
 
+    fingers = _fingers(dataset)
+
     def episodes() -> Iterator[Episode]:
         for episode in map(dataset.episode, piece.names):
-            yield _own_columns(episode, names[episode.name])
+            columns = {**episode.columns, **_finger_columns(episode, fingers)}
+            yield _own_columns(replace(episode, columns=columns), names[episode.name])
             on_progress(1)
 
     masks = {
@@ -61,6 +68,49 @@ def _header(header: Mapping[str, Fact]) -> dict[str, Fact]:
     fields = json.loads(replace(source, arguments=arguments).text)
     text = json.dumps(fields | {"type": ROBOSUITE_TYPE}, sort_keys=True)
     return {**header, "env_args": text}
+
+
+def _fingers(dataset: Dataset) -> dict[str, list[int]]:
+    """Return where `states` hold the joints of grippers, by keys of `obs`.
+
+    robosuite observes all joints of a gripper, we those that are driven. Nothing is
+    found where the environment cannot be made from the file.
+    """
+    first = dataset.episode(dataset.names[0])
+    if "env_args" not in dataset.header or "states" not in first.columns:
+        return {}
+    source = EnvSource.parse(str(dataset.header["env_args"]))
+    seen = [key for key in first.observed if key.endswith("gripper_qpos")]
+    if source.package != PACKAGE or not seen:
+        return {}
+    env, found = source.build(), {}
+    for state in env.simulation.robots:
+        groups = gripper_groups(state.robot)
+        for name, driven in groups.items():
+            joints = tuple(
+                joint.name
+                for joint in state.robot.joints
+                if (joint.mimic.joint if joint.mimic else joint.name) in driven
+            )
+            q, v = state.joint_addresses(joints)
+            key = state.prefix + (name if len(groups) > 1 else "gripper")
+            found[f"{key}_qpos"] = (1 + q).tolist()  # behind the time
+            found[f"{key}_qvel"] = (1 + state.model.nq + v).tolist()
+    env.close()
+    return {key: places for key, places in found.items() if key in first.observed}
+
+
+def _finger_columns(
+    episode: Episode, fingers: Mapping[str, list[int]]
+) -> dict[str, np.ndarray]:
+    columns, states = {}, episode.columns.get("states")
+    if states is not None and fingers:
+        last = states[-1] if episode.final_state is None else episode.final_state
+        after = np.concatenate([states[1:], last[None]])
+        for key, places in fingers.items():
+            columns[f"obs/{key}"] = states[:, places]
+            columns[f"next_obs/{key}"] = after[:, places]
+    return columns
 
 
 def _own_columns(episode: Episode, name: str) -> Episode:
