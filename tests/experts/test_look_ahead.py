@@ -11,6 +11,8 @@ from wbc_suite.evaluation import make_policy
 from wbc_suite.experts.workcell import Workcell
 from wbc_suite.kinematics import Configuration
 
+ARM = "sh0", "sh1", "el0", "el1", "wr0", "wr1"
+
 
 @pytest.fixture(scope="module")
 def cell():
@@ -98,3 +100,19 @@ def test_a_cube_that_slips_away_is_grasped_again():
             break
     assert moved
     assert info["success"]
+
+
+@pytest.mark.slow
+def test_the_trunk_of_a_robot_on_its_feet_stays_where_it_is():
+    env = wbc_suite.make(
+        "Lift", robots="SpotWithArm", controller_configs="WHOLE_BODY_IK"
+    )
+    env.reset(seed=0)
+    (arm,) = Workcell(env, env.benchmark, np.random.default_rng(0)).arms
+    model = arm.state.robot.to_pinocchio()
+    own = [model.joints[model.getJointId(f"arm_{j}")].idx_q for j in ARM]
+    others = np.setdiff1d(np.arange(model.nq), own)
+    before, away = arm.state.q, shifted(arm.pose, (2.0, 0.0, 0.0))
+    q = arm.configuration(arm.look_ahead([away]).q[-1])
+    np.testing.assert_array_equal(q[others], before[others])
+    assert np.abs(q[own] - before[own]).max() > 0.1
