@@ -8,8 +8,12 @@ import pytest
 
 import wbc_suite
 from wbc_suite.evaluation import make_policy
+from wbc_suite.experts.look_ahead import LookAhead
 from wbc_suite.experts.workcell import Workcell
 from wbc_suite.kinematics import Configuration
+
+MOVING = "waist", *(f"{s}_{j}" for s in ("left", "right") for j in ("sh", "el", "wr"))
+ARM = "sh0", "sh1", "el0", "el1", "wr0", "wr1"
 
 
 @pytest.fixture(scope="module")
@@ -98,3 +102,45 @@ def test_a_cube_that_slips_away_is_grasped_again():
             break
     assert moved
     assert info["success"]
+
+
+@pytest.mark.slow
+def test_both_hands_of_a_shared_waist_meet_their_poses():
+    env = wbc_suite.make("TwoArmLift", robots="GR1", controller_configs="WHOLE_BODY_IK")
+    env.reset(seed=0)
+    arms = Workcell(env, env.benchmark, np.random.default_rng(0)).arms
+    assert arms[0].shares_joints(arms[1])
+    robot = Configuration(arms[0].state.robot.to_pinocchio())
+    joints = [n for n in arms[0].state.robot.joint_names if n.startswith(MOVING)]
+    frames = [arm.hand.frame for arm in arms]
+    robot.update(arms[0].state.q)
+    # Turning the waist brings one hand forward and takes the other back.
+    poses = [robot.frame_pose(frame) for frame in frames]
+    apart = [shifted(p, (x, 0.0, 0.0)) for p, x in zip(poses, (0.3, 0.0), strict=True)]
+    look_ahead = LookAhead(arms[0].state, joints, *frames)
+    outlook = look_ahead.along([apart])
+    assert outlook.error < 1e-3
+    robot.update(look_ahead.full(outlook.q[-1]))
+    for frame, pose in zip(frames, apart, strict=True):
+        found = robot.frame_pose(frame)
+        assert np.linalg.norm(found.translation - pose.translation) < 1e-3
+    both = [shifted(p, (x, 0.0, 0.0)) for p, x in zip(poses, (0.4, -0.4), strict=True)]
+    assert look_ahead.along([both]).error > max(
+        arm.look_ahead([pose]).error for arm, pose in zip(arms, both, strict=True)
+    )
+
+
+@pytest.mark.slow
+def test_the_trunk_of_a_robot_on_its_feet_stays_where_it_is():
+    env = wbc_suite.make(
+        "Lift", robots="SpotWithArm", controller_configs="WHOLE_BODY_IK"
+    )
+    env.reset(seed=0)
+    (arm,) = Workcell(env, env.benchmark, np.random.default_rng(0)).arms
+    model = arm.state.robot.to_pinocchio()
+    own = [model.joints[model.getJointId(f"arm_{j}")].idx_q for j in ARM]
+    others = np.setdiff1d(np.arange(model.nq), own)
+    before, away = arm.state.q, shifted(arm.pose, (2.0, 0.0, 0.0))
+    q = arm.configuration(arm.look_ahead([away]).q[-1])
+    np.testing.assert_array_equal(q[others], before[others])
+    assert np.abs(q[own] - before[own]).max() > 0.1

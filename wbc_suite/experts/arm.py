@@ -80,7 +80,22 @@ class Arm:
 
         See `LookAhead.along`.
         """
-        return self._look_ahead(grasp or self.grasp).along(poses, after)
+        chain = [(pose,) for pose in poses]
+        return self._look_ahead(grasp or self.grasp).along(chain, after)
+
+    def shares_joints(self, other: "Arm") -> bool:
+        """Whether a joint moves the hands of both arms."""
+        return self.state is other.state and not {*self._joints}.isdisjoint(
+            other._joints
+        )
+
+    def look_ahead_beside(
+        self, other: "Arm", grasps: tuple[str, str], poses: Sequence[Sequence[pin.SE3]]
+    ) -> Outlook:
+        """Look along a chain of poses of this hand and of another of the robot."""
+        joints = tuple(dict.fromkeys((*self._joints, *other._joints)))
+        frames = self._frame(grasps[0]), other._frame(grasps[1])
+        return LookAhead(self.state, joints, *frames).along(poses)
 
     def sweep(self, q: Vector, period: float) -> Sequence[pin.SE3]:
         """Return poses on the way to joints as an outlook has them.

@@ -1,5 +1,6 @@
-"""Choice of a grasp: among all sites and arms, by a look-ahead over what follows."""
+"""Choice of grasps: among all sites and arms, by a look-ahead over what follows."""
 
+import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -20,6 +21,7 @@ ANGLE = 0.4  # cost of an approach that deviates from the wanted one, 1/rad
 CLEAR = 0.001  # m, between fingers and what an object lies on
 MOST_LIFT = 0.03  # m, by which hands stay back for that
 STEEP = 0.7  # cosine, of approaches from above
+PAIRED = 8  # grasps of each arm that are looked at with those of the other
 GOOD = 1.0  # of outlooks; tilted grasps are looked at if none is so good
 
 
@@ -87,19 +89,71 @@ def choose_grasp(
         then: Alternatives of where it will be carried, each a chain of its poses.
         costs: Cost of each alternative beside its outlook, s.
     """
+    found = _ranked(cell, name, arms, approach, then, costs)
+    return _first_clear(cell, name, found) if found else None
+
+
+def choose_pair(
+    cell: Workcell,
+    name: str,
+    *,
+    arms: Sequence[Arm],
+    approaches: Sequence[Approach],
+    then: Sequence[pin.SE3],
+) -> tuple[Choice, Choice] | None:
+    """Return the best grasps of an object by two arms at once; None if one has none.
+
+    For arms that share joints, such as those of a waist, a look-ahead with both hands
+    decides among the `PAIRED` best of each.
+    """
+    shared = arms[0].shares_joints(arms[1])
+    one, other = (
+        _ranked(cell, name, [arm], approach, [then], enough=0.0 if shared else GOOD)
+        for arm, approach in zip(arms, approaches, strict=True)
+    )
+    if not one or not other:
+        return None
+    if not shared:
+        return _first_clear(cell, name, one), _first_clear(cell, name, other)
+    at = cell.pose(name)
+
+    def cost(pair: tuple[Choice, Choice]) -> float:
+        chains = [(c.before, *(c.hand_at(T) for T in (at, *then))) for c in pair]
+        return (
+            arms[0]
+            .look_ahead_beside(
+                arms[1],
+                (pair[0].site.grasp, pair[1].site.grasp),
+                [*zip(*chains, strict=True)],
+            )
+            .cost
+        )
+
+    return min(itertools.product(one[:PAIRED], other[:PAIRED]), key=cost)
+
+
+def _ranked(
+    cell: Workcell,
+    name: str,
+    arms: Sequence[Arm],
+    approach: Approach,
+    then: Sequence[Sequence[pin.SE3]],
+    costs: Sequence[float] | None = None,
+    *,
+    enough: float = GOOD,
+) -> list[Choice]:
+    """Return grasps by cost, tilted ones too if none costs less than enough."""
     ways = [*zip(map(tuple, then), costs or [0.0] * len(then), strict=True)]
     found: list[Choice] = []
     for tilt in TILTS:
-        if found and min(choice.cost for choice in found) < GOOD:
+        if found and min(choice.cost for choice in found) < enough:
             break
         for arm in arms:
             for site in cell.grasps(name):
                 if abs(tilt) <= site.tilt and site.name == approach.place:
                     grasp = tilted(site, tilt)
                     found += _choices(cell, name, arm, site, grasp, ways, approach)
-    if not found:
-        return None
-    return _first_clear(cell, name, sorted(found, key=lambda choice: choice.cost))
+    return sorted(found, key=lambda choice: choice.cost)
 
 
 def tilted(site: GraspSite, tilt: float) -> pin.SE3:

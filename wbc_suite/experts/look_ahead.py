@@ -1,7 +1,7 @@
-"""Kinematic look-ahead: how well a hand gets along a chain of poses."""
+"""Kinematic look-ahead: how well hands get along a chain of poses."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +23,7 @@ SINGULAR = 0.05  # dexterity below which controllers lag
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Outlook:
-    """What a hand would meet along a chain of poses.
+    """What hands would meet along a chain of poses.
 
     Attributes:
         error: Largest error at a pose, m, with 0.1 m for each rad.
@@ -58,12 +58,12 @@ class LookAhead:
 
     Args:
         state: The robot.
-        joints: The joints that move the hand; others stay where they are.
-        frame: The hand's frame.
+        joints: The joints that move the hands; others stay where they are.
+        frames: The frame of each hand.
     """
 
-    def __init__(self, state: RobotState, joints: Sequence[str], frame: str) -> None:
-        self._state, self._frame = state, frame
+    def __init__(self, state: RobotState, joints: Sequence[str], *frames: str) -> None:
+        self._state, self._frames = state, frames
         model = state.robot.to_pinocchio()
         moving = {*joints}
         locked = [i for i, n in enumerate(model.names) if i and n not in moving]
@@ -76,11 +76,11 @@ class LookAhead:
             ]
         )
         self._configuration = Configuration(reduced, self._start[self._index])
-        self._task = FrameTask(frame)
+        self._tasks = [FrameTask(frame) for frame in frames]
         self._posture = PostureTask(3e-3)
         self._stack = TaskStack(
             self._configuration,
-            [self._task, self._posture],
+            [*self._tasks, self._posture],
             limits=[PositionLimit(), VelocityLimit()],
             escape=False,
         )
@@ -101,7 +101,7 @@ class LookAhead:
         return whole
 
     def sweep(self, q: Vector, period: float) -> Iterator[pin.SE3]:
-        """Yield poses of the frame while joints move on a straight line to q.
+        """Yield poses of the first frame while joints move on a straight line to q.
 
         One for each period, s; the slowest joint has 0.4 of its greatest velocity.
         """
@@ -112,12 +112,14 @@ class LookAhead:
         for k in range(max(count, 1)):
             configuration.update(start)
             configuration.update(configuration.integrate((k + 1) / max(count, 1) * way))
-            yield configuration.frame_pose(self._frame)
+            yield configuration.frame_pose(self._frames[0])
 
-    def along(self, poses: Sequence[pin.SE3], after: Outlook | None = None) -> Outlook:
-        """Follow a chain of poses of the frame in the world.
+    def along(
+        self, poses: Iterable[Sequence[pin.SE3]], after: Outlook | None = None
+    ) -> Outlook:
+        """Follow a chain of poses in the world, each one pose for each frame.
 
-        It begins where the hand is, or goes on `after` another outlook.
+        It begins where the hands are, or goes on `after` another outlook.
         """
         configuration = self._configuration
         if after is None:
@@ -135,8 +137,9 @@ class LookAhead:
         error, margin, times = after.error, after.margin, after.times
         dexterity = after.dexterity
         found = [*begun]
-        for pose in poses:
-            self._task.set_target(pose)
+        for targets in poses:
+            for task, target in zip(self._tasks, targets, strict=True):
+                task.set_target(target)
             left, moved, least = self._descend()
             times = times + moved / self._speed
             error, dexterity = max(error, left), min(dexterity, least)
@@ -154,7 +157,7 @@ class LookAhead:
         )
 
     def _descend(self) -> tuple[float, Vector, float]:
-        """Move to the task's target.
+        """Move to the targets of the tasks.
 
         Returns the error, how far joints went, and the least dexterity met.
         """
@@ -165,15 +168,17 @@ class LookAhead:
             step = self._stack.solve(STEP).dq
             configuration.update(configuration.integrate(step))
             travel += np.abs(step)
-            least = min(least, _dexterity(configuration.frame_jacobian(self._frame)))
+            for frame in self._frames:
+                least = min(least, _dexterity(configuration.frame_jacobian(frame)))
             left = self._error()
             if left < CLOSE or np.abs(step).max() < STUCK:
                 break
         return self._error(), travel, least
 
     def _error(self) -> float:
-        error = self._task.error(self._configuration)
-        return float(np.linalg.norm(error[:3]) + 0.1 * np.linalg.norm(error[3:]))
+        errors = [task.error(self._configuration) for task in self._tasks]
+        norm = np.linalg.norm
+        return max(float(norm(e[:3]) + 0.1 * norm(e[3:])) for e in errors)
 
 
 def _dexterity(J: Matrix) -> float:

@@ -206,6 +206,29 @@ def take(
     See `pick` for `raised` and `over`.
     """
     arm = choice.arm
+    if not (yield from come_before(cell, choice, over=over)):
+        return False
+    yield from close_in(cell, name, choice)
+    if not (yield from grip(cell, arm, name)):
+        return False
+    if raised > 0.0:
+        yield from move(arm, shifted(arm.pose, raised * UP), tolerance=0.02)
+    return cell.holds(arm, name)
+
+
+def close_in(cell: Workcell, name: str, choice: Choice) -> Steps[bool]:
+    """Bring the open hand to a grasp of an object that may move."""
+    return (yield from move(choice.arm, lambda: choice.hand_at(cell.pose(name))))
+
+
+def come_before(
+    cell: Workcell, choice: Choice, *, over: float | None = None
+) -> Steps[bool]:
+    """Bring the open hand before a grasp; return whether it got near.
+
+    See `pick` for `over`.
+    """
+    arm = choice.arm
     arm.open(choice.site.grasp)
     near: dict[str, Any] = {"tolerance": 0.02, "turn_tolerance": 0.15}
     if over is None:
@@ -219,12 +242,7 @@ def take(
     if over is not None:
         close, even = ALIGNED
         yield from move(arm, choice.before, tolerance=close, turn_tolerance=even)
-    yield from move(arm, lambda: choice.hand_at(cell.pose(name)))
-    if not (yield from grip(cell, arm, name)):
-        return False
-    if raised > 0.0:
-        yield from move(arm, shifted(arm.pose, raised * UP), tolerance=0.02)
-    return cell.holds(arm, name)
+    return True
 
 
 def put_down(

@@ -4,21 +4,28 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.benchmark.two_arm_lift import HANDLES, POT, TwoArmLift
-from wbc_suite.experts.grasp_choice import Approach, Choice, choose_grasp
-from wbc_suite.experts.skills import UP, move, shifted, take
+from wbc_suite.experts.grasp_choice import Approach, choose_pair
+from wbc_suite.experts.skills import UP, close_in, come_before, grip, move, shifted
 from wbc_suite.experts.two_arms import carry_together
 from wbc_suite.experts.workcell import Steps, Workcell, together
 
 RISE = 0.15  # m
+AWAY = 0.11  # m, from where fingers are clear of the pot's rim
 
 
 def two_arm_lift(cell: Workcell[TwoArmLift]) -> Steps[None]:
     """Grasp a handle with each arm, and raise the pot level."""
     goal = shifted(cell.pose(POT), RISE * UP)
+    arms = cell.arms[:2]
+    places = [handle.removeprefix(f"{POT}_") for handle in HANDLES]
+    ways = [Approach(raised=0.0, away=AWAY, place=place) for place in places]
     for _ in range(3):
-        choices = [_choose(cell, k, goal) for k in range(2)]
-        held = yield from together(*(take(cell, POT, choice) for choice in choices))
-        arms = [choice.arm for choice in choices]
+        choices = choose_pair(cell, POT, arms=arms, approaches=ways, then=[goal])
+        if choices is None:
+            return
+        yield from together(*(come_before(cell, choice) for choice in choices))
+        yield from together(*(close_in(cell, POT, choice) for choice in choices))
+        held = yield from together(*(grip(cell, arm, POT) for arm in arms))
         if all(held):
             now = cell.pose(POT)
             level = pin.SE3(_upright(now.rotation), goal.translation)
@@ -30,17 +37,6 @@ def two_arm_lift(cell: Workcell[TwoArmLift]) -> Steps[None]:
         yield from together(
             *(move(a, shifted(a.pose, 0.08 * UP), most=15) for a in arms)
         )
-
-
-def _choose(cell: Workcell[TwoArmLift], k: int, goal: pin.SE3) -> Choice:
-    """Choose how arm k grasps its handle."""
-    handle = HANDLES[k].removeprefix(f"{POT}_")
-    approach = Approach(raised=0.0, place=handle)
-    choice = choose_grasp(
-        cell, POT, arms=[cell.arms[k]], approach=approach, then=[(goal,)]
-    )
-    assert choice is not None, "a bar has grasps from all around"
-    return choice
 
 
 def _upright(R: np.ndarray) -> np.ndarray:

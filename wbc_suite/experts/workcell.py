@@ -164,10 +164,17 @@ class Workcell(Generic[B]):
 
 
 def _joints(state: RobotState, controller: object, hand: Hand) -> tuple[str, ...]:
-    """Return the joints that a controller moves a hand by."""
+    """Return the joints that a controller moves a hand by.
+
+    The trunk of a robot on its feet stays where the controller holds it.
+    """
     parts = getattr(controller, "parts", None)
     if parts is None:
-        return (*state.robot.root_joint_names, *state.robot.joint_names)
+        model = state.robot.to_pinocchio()
+        chain = model.supports[model.frames[model.getFrameId(hand.frame)].parentJoint]
+        held = state.robot.root_joint_names if state.robot.root.kind == "free" else ()
+        names = [model.names[joint] for joint in chain.tolist()[1:]]
+        return tuple(name for name in names if name not in held)
     part = parts.get(hand.name) or next(iter(parts.values()))
     return part.law.joints
 
