@@ -64,7 +64,7 @@ def test_a_json_file_makes_an_environment_and_says_what_it_leaves_out(tmp_path, 
     with caplog.at_level(logging.WARNING):
         env = wbc_suite.make("Lift", robots="Panda", controller_configs=str(file))
     [said] = [r.getMessage() for r in caplog.records if "ignored" in r.msg]
-    for word in ("mine.json", "damping_ratio_limits", "torso"):
+    for word in ("mine.json", "use_action_scaling", "torso"):
         assert word in said
     assert "kp," not in said
     layout = env.unwrapped.action_layout

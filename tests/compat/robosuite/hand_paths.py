@@ -9,14 +9,23 @@ import sys
 import numpy as np
 
 ARM = [0.4, -0.3, 0.2, 0.1, -0.2, 0.3]
+JOINTS = [0.3, -0.2, 0.1, 0.2, -0.3, 0.2, 0.1]
+KP, RATIO = [200.0, 120.0, 160.0, 90.0, 250.0, 150.0, 100.0], [0.8, 1.2, 1.0] * 3
+STIFF = {"impedance_mode": "variable_kp"}
+BOTH = {"impedance_mode": "variable", "damping_ratio_limits": [0, 1.1]}
 CASES = {
     "OSC_POSE": (ARM, {}),
     "OSC_POSE one axis": ([0.0, 0.5, 0.0, 0.0, 0.0, 0.0], {}),
     "OSC_POSE world": (ARM, {"input_ref_frame": "world"}),
     "OSC_POSE coupled": (ARM, {"uncouple_pos_ori": False}),
     "OSC_POSE kp 300": (ARM, {"kp": 300, "damping_ratio": 0.7}),
+    "OSC_POSE variable_kp": ([*KP[:6], *ARM], STIFF),
+    "OSC_POSE variable": ([*RATIO[:6], *KP[:6], *ARM], BOTH),
     "OSC_POSITION": (ARM[:3], {}),
-    "JOINT_POSITION": ([0.3, -0.2, 0.1, 0.2, -0.3, 0.2, 0.1], {}),
+    "OSC_POSITION variable": ([*RATIO[:6], *KP[:6], *ARM[:3]], BOTH),
+    "JOINT_POSITION": (JOINTS, {}),
+    "JOINT_POSITION variable_kp": ([*KP, *JOINTS], STIFF),
+    "JOINT_POSITION variable": ([*RATIO[:7], *KP, *JOINTS], BOTH),
     "JOINT_POSITION kp 120": ([0.3] * 7, {"kp": 120, "output_max": 0.1}),
     "JOINT_POSITION ramp": ([0.3] * 7, {"interpolation": "linear"}),
     "JOINT_TORQUE": (

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from wbc_suite.compat.robosuite.controllers.uncoupled_osc import UNCOUPLED
+from wbc_suite.compat.robosuite.controllers.variable_impedance import VARIABLE_JOINTS
 from wbc_suite.control.part.registry import is_part_controller, part_models
 from wbc_suite.control.robot_parts import hands_of, parts_of
 from wbc_suite.errors import ConfigError, UnknownNameError, did_you_mean
@@ -168,7 +169,9 @@ class _Conversion:
         if kind == "OSC_POSE" and given.get("control_ori") is False:
             kind = "OSC_POSITION"
         kind = self._check_name("part controller", kind, models, f"{where}type")
-        kind = UNCOUPLED.get(kind, kind)
+        kind, asked = UNCOUPLED.get(kind, kind), kind
+        if kind == JOINTS and given.get("impedance_mode", "fixed") != "fixed":
+            kind = VARIABLE_JOINTS
         fields = set(models[kind].model_fields) - OTHER_UNITS.get(kind, set())
         own = fields | {"type"}
         self._check_keys(given, own, IGNORED_OF_PARTS, where)
@@ -180,7 +183,7 @@ class _Conversion:
                 ours["input_type"] = "delta" if value else "absolute"
             elif value is None or key in ("type", "control_ori"):
                 continue
-            elif key not in fields or (key, kind) == ("interpolation", JOINTS):
+            elif key not in fields or (key, asked) == ("interpolation", JOINTS):
                 self.ignored.append(where + key)
             elif value != "null":
                 ours[key] = value

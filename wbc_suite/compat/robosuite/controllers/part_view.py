@@ -20,7 +20,8 @@ class PartController:
     def __init__(self, name: str, part: Any, state: RobotState) -> None:
         self.part_name, self._part, self._state = name, part, state
         config = getattr(part, "config", None)
-        self.name = getattr(config, "type", "GRIP").removeprefix("UNCOUPLED_")
+        kind = getattr(config, "type", "GRIP").removeprefix("UNCOUPLED_")
+        self.name = kind.removeprefix("VARIABLE_")
         self.control_dim = sum(len(s.labels) for s in part.slices)
         self.joint_index = {
             "joints": state.joint_addresses(part.law.joints)[1].tolist(),
