@@ -1,9 +1,10 @@
 """Robots that were not used in development: hands move, reach goals; quadrupeds stand.
 
 Each robot is given to `wbc-suite demo FILE`, as a user would. Then the hands of one
-with a fixed base get random goals, the poses of random postures without contact, and
-have to come within 2 mm; one with feet stands free for ten seconds. Packages of the
-registry are downloaded and unpacked; nothing of them is run.
+with a fixed base get random goals, the poses of random postures without contact that
+the controller's limits allow, and have to come within 2 mm; one with feet stands free
+for ten seconds. Packages of the registry are downloaded and unpacked; nothing of them
+is run.
 
 Usage: python benchmarks/unseen_robots.py [--quick] [--development] [--folder DIR]
        [--only TEXT] [--json FILE] [--table FILE]
@@ -20,7 +21,7 @@ import sys
 import tempfile
 import time
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -31,9 +32,14 @@ from harness.report import Report, machine, options
 from import_corpus import UNSEEN_SECTION, progress, unpack
 
 from wbc_suite.control import load_composite_controller_config
+from wbc_suite.control.composite.qp_tasks import distance_limits
+from wbc_suite.control.composite.reduced_robot import lock_groups
+from wbc_suite.control.composite.whole_body_config import read_whole_body
 from wbc_suite.envs.env import RobotEnv
 from wbc_suite.envs.hold_check import alone, hold_faults
 from wbc_suite.errors import WbcError
+from wbc_suite.kinematics import Conversion
+from wbc_suite.planning.collision_checker import LinkDistanceChecker
 from wbc_suite.robot import RobotDescription, load_robot
 from wbc_suite.typing import Vector
 
@@ -167,16 +173,19 @@ def reach(robot: RobotDescription) -> Row:
     env = alone(robot, controller_configs=config, control_freq=20)
     env.reset(seed=0)
     frames = {f["name"]: f["frame"] for f in config["frame"] if f["kind"] == "pose"}
-    goals = list(random_goals(env, robot, frames))
+    goals = list(random_goals(env, robot, frames, allowed(env, robot, config)))
     errors = [approach(env, goal) for goal in goals]
     env.close()
     return {"goals": len(goals), "errors_mm": [round(1e3 * e, 3) for e in errors]}
 
 
 def random_goals(
-    env: RobotEnv, robot: RobotDescription, frames: dict[str, str]
+    env: RobotEnv,
+    robot: RobotDescription,
+    frames: dict[str, str],
+    is_allowed: Callable[[Vector], bool],
 ) -> Iterator[dict[str, Vector]]:
-    """Yield poses of all hands in postures that touch nothing, by name of the slice."""
+    """Yield poses of all hands in allowed postures without contact, by slice."""
     m = copy.copy(env.simulation.model)
     data, rng, found = mujoco.MjData(m), np.random.default_rng(0), 0
     data.qpos[:] = env.simulation.data.qpos
@@ -190,11 +199,38 @@ def random_goals(
         found_near = distances(m, data).items()
         if any(pair not in near or d < min(0.0, near[pair]) for pair, d in found_near):
             continue
+        if not is_allowed(data.qpos):
+            continue
         found += 1
         sites = {name: data.site(f"robot0_{f}") for name, f in frames.items()}
         yield {name: pose_of(site) for name, site in sites.items()}
         if found == GOALS:
             break
+
+
+def allowed(
+    env: RobotEnv, robot: RobotDescription, config: dict[str, Any]
+) -> Callable[[Vector], bool]:
+    """Return whether links keep the controller's distances and motors hold a posture.
+
+    Weight may take as much of a motor's effort as the controller's limit says.
+    """
+    read = read_whole_body(config, robot, robot.name)
+    reduced = lock_groups(robot, read.locked)
+    model = reduced.to_pinocchio()
+    data = model.createData()
+    conversion = Conversion(env.simulation.model, model, prefix="robot0_")
+    links = LinkDistanceChecker(model, distance_limits(reduced, read))
+    shares = read.limits.weight_shares
+    index = [model.joints[model.getJointId(name)].idx_v for name in shares]
+    most = [share * (robot.joint(n).effort or 0.0) for n, share in shares.items()]
+
+    def is_allowed(qpos: Vector) -> bool:
+        q = conversion.q_to_pinocchio(qpos)
+        weight = np.abs(pin.computeGeneralizedGravity(model, data, q)[index])
+        return links.clearance(q) > 0.0 and bool((weight < most).all())
+
+    return is_allowed
 
 
 def in_chain(robot: RobotDescription, joint: Any, frames: dict[str, str]) -> bool:

@@ -163,7 +163,9 @@ def test_engines_read_the_meshes_of_an_exported_robot(bag, tmp_path: Path):
     path = tmp_path / "bag.urdf"
     path.write_text(robot.to_urdf(mesh_dir=tmp_path / "meshes"), encoding="utf-8")
     model = mujoco.MjModel.from_xml_path(str(path))
-    assert (model.geom_type == mujoco.mjtGeom.mjGEOM_MESH).sum() == 4
+    meshes = model.geom_type == mujoco.mjtGeom.mjGEOM_MESH
+    assert (meshes & (model.geom_contype > 0)).sum() == 4
+    assert (meshes & (model.geom_contype == 0)).sum() == 4  # visual ones are kept too
     tree = pin.buildModelFromUrdf(str(path))
     kind = pin.GeometryType.VISUAL
     shapes = pin.buildGeomFromUrdf(tree, str(path), kind, [str(tmp_path)])

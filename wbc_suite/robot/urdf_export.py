@@ -47,11 +47,11 @@ def write_urdf(robot: RobotDescription, *, mesh_dir: Path | None = None) -> str:
       text refers to relative to the folder's parent.
     """
     root = Element("robot", name=robot.name)
-    # For MuJoCo, which would infer a mass for links without one.
+    # For MuJoCo, which would infer masses that are absent and drop visual shapes.
     extension = SubElement(root, "mujoco")
     compiler = SubElement(extension, "compiler", inertiafromgeom="false")
     if mesh_dir is not None:
-        compiler.set("strippath", "false")
+        compiler.attrib |= {"strippath": "false", "discardvisual": "false"}
     for name, rgba in robot.materials.items():
         material = SubElement(root, "material", name=name)
         SubElement(material, "color", rgba=_numbers(rgba))

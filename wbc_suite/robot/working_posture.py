@@ -44,9 +44,9 @@ def working_arms(robot: RobotDescription) -> dict[str, float]:
 
         sigma_min(J) - 0.5 |p_hand - p| / L - 0.2 sum(u^8)
 
-    and no contacts beyond those of `ready`, in which other joints stay. A left arm is
-    the mirror image of the right one where their joints allow it. An arm whose postures
-    all touch something has no entry.
+    no contacts beyond those of `ready`, in which other joints stay, and its motors can
+    hold it. A left arm is the mirror image of the right one where their joints allow
+    it. An arm without such a posture has no entry.
     """
     search = _Search(robot)
     found: dict[str, float] = {}
@@ -81,6 +81,7 @@ class _Search:
             joint.name: self._compiled.joint(joint.name).qposadr[0]
             for joint in robot.joints
         }
+        self._efforts = {joint.name: joint.effort for joint in robot.joints}
         self._touching = self._contacts(self.q)
 
     def arm(self, frame: str) -> _Arm | None:
@@ -118,9 +119,13 @@ class _Search:
             yield values
 
     def is_clear(self, arm: _Arm, values: Vector) -> bool:
-        """Whether the hand is off the floor, and only what touched at first does."""
+        """Whether motors hold it off the floor, and only what touched before does."""
         q = self.q.copy()
         q[arm.q] = values
+        weights = pin.computeGeneralizedGravity(self._model, self._data, q)[arm.v]
+        efforts = [self._efforts[name] or np.inf for name in arm.joints]
+        if (np.abs(weights) > efforts).any():
+            return False
         height = self._height(arm, q)
         low = height < FLOOR and self._height(arm, self.q) > FLOOR
         return not low and not self._contacts(q) - self._touching

@@ -1,7 +1,9 @@
 """QP tasks, equality rows and limits out of a whole-body config."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from itertools import product
 
+import mujoco
 import numpy as np
 
 from wbc_suite.control.composite.reduced_robot import joint_indices, planar_joints
@@ -15,7 +17,7 @@ from wbc_suite.control.part.feasible_acceleration import (
 )
 from wbc_suite.control.part.stance_controller import soles_of
 from wbc_suite.errors import UnknownNameError
-from wbc_suite.kinematics import Configuration
+from wbc_suite.kinematics import Configuration, Conversion
 from wbc_suite.kinematics.configuration import random_configuration
 from wbc_suite.qp import (
     AccelerationLimit,
@@ -45,7 +47,10 @@ MAX_NEIGHBOUR_JOINTS = 1
 
 SAMPLES = 100
 MAX_OVERLAP_SHARE = 0.4
-"""Pairs that overlap in a greater share of random configurations are left out."""
+MAX_FALSE_SHARE = 0.2
+"""Pairs whose capsules overlap in a greater share of random configurations are left
+out, and those whose capsules overlap in a greater share where their shapes do not."""
+FREE = 0.005  # m; distance of shapes that are clearly apart
 
 
 def held_equality(held: HeldFrame) -> FrameEquality:
@@ -73,14 +78,20 @@ def make_limits(robot: RobotDescription, config: WholeBodyIKConfig) -> list[Limi
             base_angular=base_angular,
         ),
     ]
-    made += distance_limits(robot, config)
-    if limits.weight_shares:
-        made.append(WeightLimit(_greatest_weights(robot, limits.weight_shares)))
+    made += [*distance_limits(robot, config), *weight_limits(robot, config)]
     soles = soles_of(config.held)
     if soles:
         margin = limits.balance_margin
         made.append(SupportLimit(soles, margin=margin, pressure_margin=0.5 * margin))
     return made
+
+
+def weight_limits(
+    robot: RobotDescription, config: WholeBodyIKConfig
+) -> list[WeightLimit]:
+    """Return the limit of what some motors hold, if the config has one."""
+    shares = config.limits.weight_shares
+    return [WeightLimit(_greatest_weights(robot, shares))] if shares else []
 
 
 def _greatest_weights(
@@ -226,14 +237,44 @@ def _rarely_overlapping(
     )
     limit.bind(configuration)
     G, h = np.zeros((nearest, configuration.nv)), np.zeros(nearest)
-    touches = dict.fromkeys(pairs, 0)
+    touching: dict[tuple[str, str], list[Vector]] = {pair: [] for pair in pairs}
     rng = np.random.default_rng(0)
     for _ in range(SAMPLES):
         q = random_configuration(configuration.model, configuration.q, rng)
         configuration.update(q)
         limit.rows(configuration, 1.0, G, h)
         rows = np.flatnonzero(limit.distances < 0.0).tolist()
-        touching = {limit.subject(row) for row in rows}
-        for a, b in {tuple(sorted((x.first, x.second))) for x in touching}:
-            touches[a, b] += 1
-    return [pair for pair in pairs if touches[pair] <= MAX_OVERLAP_SHARE * SAMPLES]
+        found = {limit.subject(row) for row in rows}
+        for a, b in {tuple(sorted((x.first, x.second))) for x in found}:
+            touching[a, b].append(q)
+    frequent = [p for p in pairs if len(touching[p]) > MAX_FALSE_SHARE * SAMPLES]
+    out = {p for p in frequent if len(touching[p]) > MAX_OVERLAP_SHARE * SAMPLES}
+    if len(out) < len(frequent):
+        distance = _shape_distance(robot, configuration)
+        for pair in frequent:
+            false = sum(distance(pair, q) > FREE for q in touching[pair])
+            out |= {pair} if false > MAX_FALSE_SHARE * SAMPLES else set()
+    return [pair for pair in pairs if pair not in out]
+
+
+def _shape_distance(
+    robot: RobotDescription, configuration: Configuration
+) -> Callable[[tuple[str, str], Vector], float]:
+    """Return what measures the distance of two links' exact shapes, m, up to 1 cm."""
+    m = robot.to_mjspec().compile()
+    data, conversion = mujoco.MjData(m), Conversion(m, configuration.model)
+    solid = (m.geom_contype | m.geom_conaffinity) > 0
+
+    def distance(pair: tuple[str, str], q: Vector) -> float:
+        conversion.q_to_mujoco(q, data.qpos)
+        mujoco.mj_kinematics(m, data)
+        first, second = (
+            np.flatnonzero(solid & (m.geom_bodyid == m.body(link).id)).tolist()
+            for link in pair
+        )
+        return min(
+            mujoco.mj_geomDistance(m, data, a, b, 2.0 * FREE, None)
+            for a, b in product(first, second)
+        )
+
+    return distance

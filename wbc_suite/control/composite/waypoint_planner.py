@@ -26,6 +26,7 @@ from wbc_suite.control.composite.qp_tasks import (
     held_equality,
     joint_speeds,
     travel_costs,
+    weight_limits,
 )
 from wbc_suite.control.composite.whole_body_config import WholeBodyIKConfig
 from wbc_suite.control.part.stance_controller import soles_of
@@ -243,6 +244,7 @@ def _goal_problem(
             margin=2.0 * config.limits.position_margin, joints=config.limits.positions
         ),
         VelocityLimit(base_linear=linear, base_angular=angular),
+        *weight_limits(robot, config),
     ]
     soles = soles_of(config.held)
     if soles:

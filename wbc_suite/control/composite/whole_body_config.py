@@ -14,6 +14,7 @@ from pydantic import (
 from wbc_suite.control.composite.frame_kinds import FrameKind, find_frame_kind
 from wbc_suite.control.composite.reduced_robot import gripper_groups
 from wbc_suite.control.law.joint_laws import JointLawConfig
+from wbc_suite.control.part.feasible_acceleration import weight_shares
 from wbc_suite.control.part.part_settings import InputFrame, InputType, check_axes
 from wbc_suite.control.part.stance_controller import HeldFrame
 from wbc_suite.errors import ConfigError, UnknownNameError
@@ -45,8 +46,8 @@ GoalsConfig: TypeAlias = Union["WholeBodyIKConfig", "WholeBodyIDConfig"]
 """Configs with controlled frames, and how an action moves their goals."""
 
 
-FEW_JOINTS = 0.02
-"""[cost]/rad of a hand that less than six joints move: its position comes first."""
+FEW_JOINTS = 0.02  # [cost]/rad of a hand that less than six joints move
+CLOSE_FIT = 0.0025  # m; small arms have links 5 mm apart wherever they are
 
 
 def _registered(kind: str) -> str:
@@ -222,7 +223,7 @@ class WholeBodyIKConfig(FrozenModel):
 def check_goals(config: GoalsConfig) -> None:
     """Raise ValueError where frames share a name, or axes do not fit the input."""
     names = [frame.name for frame in config.frames]
-    if len(set(names)) != len(names):
+    if len({*names}) != len(names):
         raise ValueError(f"controlled frames share a name: {names}")
     check_axes(config.input_type, config.input_ref_frame)
 
@@ -231,7 +232,7 @@ def default_whole_body_config(robot: RobotDescription) -> dict[str, Any]:
     """Return a config for a robot without a file: hands as poses, feet held.
 
     A base that glides is moved where the hands leave it free. A robot without hands is
-    moved by its trunk or its head.
+    moved by its trunk or its head. Motors keep to postures that they can hold.
     """
     frames: list[dict[str, Any]] = []
     for side, frame in robot.hands.items():
@@ -242,15 +243,18 @@ def default_whole_body_config(robot: RobotDescription) -> dict[str, Any]:
     if robot.root.kind == "planar":
         frames.append(_gliding_base(robot))
     frames = frames or [{"name": name, "frame": name} for name in [_foremost(robot)]]
-    feet = [f.name for f in robot.frames if f.role == "foot"]
-    held = feet if robot.root.kind == "free" else []
-    config: dict[str, Any] = {"format": 1, "frame": frames}
+    is_free = robot.root.kind == "free"
+    held = [f.name for f in robot.frames if is_free and f.role == "foot"]
     contact = "surface" if len(held) < 3 else "point"  # a biped balances on its soles
-    config["held"] = [{"frame": name, "contact": contact} for name in held]
+    feet = [{"frame": name, "contact": contact} for name in held]
+    config: dict[str, Any] = {"format": 1, "frame": frames, "held": feet}
     if held:  # no faster than pressure under the feet can follow
         config["limits"] = {"acceleration": 12.0, "base_acceleration": (1.0, 2.0)}
         for frame in frames:
             frame |= {"linear_braking": 1.0, "angular_braking": 2.0}
+    else:
+        weights = weight_shares(robot, without=gripper_groups(robot))
+        config["limits"] = {"collision_distance": CLOSE_FIT, "weight_shares": weights}
     if "ready" in robot.keyframes:
         config["posture"] = {"keyframe": "ready"}
     return config
@@ -299,9 +303,8 @@ def _foremost(robot: RobotDescription) -> str:
     if not moving:
         raise ConfigError(f"{robot.name}: it has no joint, so nothing can be moved.")
     frames = {f.role: f.name for f in robot.frames if f.link in moving}
-    roles = ("torso", "base", "head")
     last = robot.links[0].name if robot.root.kind == "free" else moving[-1]
-    return next((frames[r] for r in roles if r in frames), last)
+    return next((frames[r] for r in ("torso", "base", "head") if r in frames), last)
 
 
 def read_whole_body(

@@ -1,13 +1,20 @@
 """Feasible accelerations of joints, from the effort of their motors."""
 
+import logging
+from collections.abc import Collection
+
 import numpy as np
 import pinocchio as pin
 
+from wbc_suite.errors import join_first
 from wbc_suite.kinematics.configuration import random_configuration
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Vector
 
+LOG = logging.getLogger(__name__)
+
 LOAD_SAMPLES = 50
+WEIGHT_SHARE = 0.9  # of the effort of a motor that cannot hold every posture
 LEAST_ACCELERATION = 2.0
 """rad/s^2 or m/s^2; where holding the load takes nearly the whole effort."""
 
@@ -33,6 +40,29 @@ def feasible_accelerations(
             limit = min(limit, max(feasible, LEAST_ACCELERATION))
         found[joint.name] = limit
     return found
+
+
+def weight_shares(
+    robot: RobotDescription, *, without: Collection[str] = ()
+) -> dict[str, float]:
+    """Return the share of its effort that holding still may take, by joint.
+
+    Joints are listed whose gravity torque is greater than their motor's effort in some
+    of 50 random configurations, but those of some groups.
+    """
+    left_out = {j for group in without for j in robot.groups.get(group, ())}
+    model = robot.to_pinocchio()
+    _, weight = greatest_loads(model)
+    weak = [
+        joint.name
+        for joint in robot.joints
+        if joint.effort and joint.independent and joint.name not in left_out
+        if weight[model.joints[model.getJointId(joint.name)].idx_v] > joint.effort
+    ]
+    if weak:
+        names = join_first([f"'{name}'" for name in weak])
+        LOG.warning("%s: too weak to hold every posture: %s.", robot.name, names)
+    return dict.fromkeys(weak, WEIGHT_SHARE)
 
 
 def greatest_loads(model: pin.Model) -> tuple[Vector, Vector]:

@@ -1,0 +1,64 @@
+"""Limits of robots without a controller file: links kept apart, weak motors."""
+
+import numpy as np
+import pytest
+
+from wbc_suite.control import load_composite_controller_config
+from wbc_suite.control.composite.qp_tasks import distance_limits
+from wbc_suite.control.composite.whole_body_config import read_whole_body
+from wbc_suite.envs.hold_check import alone
+from wbc_suite.robot import load_robot
+
+CUBE = """<mujoco><worldbody><body name="base"><geom type="box" size=".1 .1 .1"/>
+  <body name="arm"><joint name="turn" axis="1 0 0" range="-.1 .1" limited="true"/>
+  <inertial pos="0 0 0" mass="1" diaginertia=".01 .01 .01"/>
+  <body name="ball"><joint name="slide" type="slide" axis="1 0 0" range="{low} .3"
+  limited="true"/><geom size=".02" mass="1"/></body></body></body></worldbody>
+  <keyframe><key name="ready" qpos="0 .28"/></keyframe></mujoco>"""
+PENDULUM = """<robot name="p"><link name="base"/><link name="rod"><inertial>
+  <origin xyz="0 0 -1"/><mass value="2"/>
+  <inertia ixx=".01" ixy="0" ixz="0" iyy=".01" iyz="0" izz=".01"/></inertial></link>
+  <joint name="hinge" type="revolute"><parent link="base"/><child link="rod"/>
+  <origin xyz="0 0 1.5"/><axis xyz="0 1 0"/>
+  <limit lower="-1.7" upper="0.5" effort="{effort}" velocity="2"/></joint></robot>"""
+WEIGHT = 2.0 * 9.81  # N m, of the rod that lies level
+
+
+def config_of(robot):
+    config = load_composite_controller_config("WHOLE_BODY_IK", robot)
+    return read_whole_body(config, robot, robot.name)
+
+
+@pytest.mark.parametrize(("low", "kept"), [(0.125, 0), (0.08, 1)])
+def test_capsules_that_overlap_without_their_shapes_are_left_out(tmp_path, low, kept):
+    # The cube's capsule has a radius of 0.141 m, 0.041 m more than its side. On its way
+    # from 0.125 m on the ball is never nearer than 5 mm to the cube, and in its capsule
+    # for a fifth of the way; from 0.08 m on it is as often in both.
+    path = tmp_path / "cube.xml"
+    path.write_text(CUBE.format(low=low))
+    robot = load_robot(path)
+    limits = distance_limits(robot, config_of(robot))
+    assert sum(limit.pair_count for limit in limits) == kept
+
+
+def test_weak_motors_are_asked_for_postures_that_they_can_hold(tmp_path):
+    path = tmp_path / "pendulum.urdf"
+    path.write_text(PENDULUM.format(effort=0.5 * WEIGHT))
+    robot = load_robot(path)
+    config = load_composite_controller_config("WHOLE_BODY_IK", robot)
+    assert config["limits"]["weight_shares"] == {"hinge": 0.9}
+    env = alone(robot, controller_configs=config)
+    env.reset(seed=0)
+    name = config["frame"][0]["name"]
+    goal = np.array([0.0, 0.0, 1.5, 0.0, -np.pi / 2, 0.0])  # level
+    action = env.action_layout.pack({name: goal}, base=env.hold_action)
+    for _ in range(60):
+        env.step(action)
+    q = float(env.simulation.data.joint("robot0_hinge").qpos[0])
+    assert np.sin(-q) == pytest.approx(0.45, rel=0.02)  # of the torque when level
+
+
+def test_strong_motors_have_no_limit_of_weight(tmp_path):
+    path = tmp_path / "pendulum.urdf"
+    path.write_text(PENDULUM.format(effort=1.1 * WEIGHT))
+    assert config_of(load_robot(path)).limits.weight_shares == {}
