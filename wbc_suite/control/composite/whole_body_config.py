@@ -164,7 +164,7 @@ class LimitsConfig(FrozenModel):
     floor: float = 0.0
     obstacles: bool = True
     obstacle_distance: NonNegativeFloat = 0.002
-    press_depth: NonNegativeFloat = 0.0
+    press_depth: NonNegativeFloat = 0.001
     weight_shares: dict[Name, PositiveFloat] = {}
     balance_margin: NonNegativeFloat = 0.03
 
