@@ -199,21 +199,22 @@ def _least_distance(scene: SceneArrays, pair: int, most: float) -> float:
     """
     o, g = scene.obstacle[pair], scene.geom[pair]
     R, R_geom, square = scene.geom_xmat[o], scene.geom_xmat[g], 0.0
-    n = np.zeros(3)
+    x_n = y_n = z_n = 0.0  # the way from the box to the centre, in the world
     for i in range(3):
         x = -scene.centre[o, i]
         for j in range(3):
             x += R[3 * j + i] * (scene.geom_xpos[g, j] - scene.geom_xpos[o, j])
         outside = np.sign(x) * max(abs(x) - scene.half[o, i], 0.0)
         square += outside * outside
-        for j in range(3):
-            n[j] += R[3 * j + i] * outside
+        x_n += R[i] * outside
+        y_n += R[3 + i] * outside
+        z_n += R[6 + i] * outside
     d = np.sqrt(square)
     if d == 0.0 or d - scene.geom_rbound[g] >= most:
         return d - scene.geom_rbound[g]
     least = d
     for j in range(3):
-        along = (R_geom[j] * n[0] + R_geom[3 + j] * n[1] + R_geom[6 + j] * n[2]) / d
+        along = (R_geom[j] * x_n + R_geom[3 + j] * y_n + R_geom[6 + j] * z_n) / d
         least += along * scene.centre[g, j] - abs(along) * scene.half[g, j]
     return least
 
