@@ -15,7 +15,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from wbc_suite.compat.robosuite.controllers.variable_impedance import GainsFirst
+from wbc_suite.compat.robosuite.controllers.variable_impedance import (
+    GainsFirstController,
+)
 from wbc_suite.compiling import compiled
 from wbc_suite.control.law.custom import register_law
 from wbc_suite.control.law.osc import OscLaw, write_hand_task
@@ -25,10 +27,7 @@ from wbc_suite.control.loop.rigid_body import point_velocity_and_drift
 from wbc_suite.control.part.impedance import Gains
 from wbc_suite.control.part.osc_controller import OscConfig, OscController
 from wbc_suite.control.part.registry import register_part_controller
-from wbc_suite.control.robot_parts import RobotPart
-from wbc_suite.control.state import RobotState
 from wbc_suite.linear_algebra import cholesky, dot, solve_lower, solve_upper
-from wbc_suite.typing import Vector
 
 UNCOUPLED = {"OSC_POSE": "UNCOUPLED_OSC_POSE", "OSC_POSITION": "UNCOUPLED_OSC_POSITION"}
 """Types of this law for those of robosuite's configs."""
@@ -122,24 +121,8 @@ class UncoupledOscConfig(OscConfig):
         return 6 if self.type == "UNCOUPLED_OSC_POSE" else 3
 
 
-class UncoupledOscController(OscController):
+class UncoupledOscController(GainsFirstController, OscController):
     """`OscController` with the uncoupled law and robosuite's order of the action."""
-
-    def __init__(
-        self, part: RobotPart, config: UncoupledOscConfig, state: RobotState
-    ) -> None:
-        super().__init__(part, config, state)
-        self._order = GainsFirst(self.slices, config.damping_ratio_limits)
-        self.slices = self._order.slices
-
-    def set_goal(self, values: Vector, period: float) -> None:
-        """Take gains, then a step or a goal."""
-        super().set_goal(self._order.ours(values), period)
-
-    @property
-    def hold_action(self) -> Vector:
-        """The action that keeps the goal and the gains."""
-        return self._order.theirs(super().hold_action)
 
     def _make_law(self, joints: tuple[str, ...], site: str) -> OscLaw:
         law = super()._make_law(joints, site)

@@ -6,7 +6,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -71,6 +71,27 @@ class GainsFirst:
         return np.concatenate([ratio, kp, motion])
 
 
+class GainsFirstController:
+    """Mixed into a part controller: robosuite's order of the action."""
+
+    def __init__(self, part: RobotPart, config: Any, state: RobotState) -> None:
+        super().__init__(part, config, state)  # pyright: ignore[reportCallIssue] - of the next class
+        own: Any = self
+        self._order = GainsFirst(own.slices, config.damping_ratio_limits)
+        self.slices = self._order.slices
+
+    def set_goal(self, values: Vector, period: float) -> None:
+        """Take gains, then a step or a goal."""
+        following: Any = super()
+        following.set_goal(self._order.ours(values), period)
+
+    @property
+    def hold_action(self) -> Vector:
+        """The action that keeps the goal and the gains."""
+        following: Any = super()
+        return self._order.theirs(following.hold_action)
+
+
 class VariableJointConfig(JointPositionConfig):
     """Config of joint positions with robosuite's order of the action."""
 
@@ -78,24 +99,8 @@ class VariableJointConfig(JointPositionConfig):
     damping_ratio_limits: tuple[Gains, Gains] = (0.0, 100.0)
 
 
-class VariableJointController(JointPositionController):
+class VariableJointController(GainsFirstController, JointPositionController):
     """`JointPositionController` with robosuite's order of the action."""
-
-    def __init__(
-        self, part: RobotPart, config: VariableJointConfig, state: RobotState
-    ) -> None:
-        super().__init__(part, config, state)
-        self._order = GainsFirst(self.slices, config.damping_ratio_limits)
-        self.slices = self._order.slices
-
-    def set_goal(self, values: Vector, period: float) -> None:
-        """Take gains, then steps or positions."""
-        super().set_goal(self._order.ours(values), period)
-
-    @property
-    def hold_action(self) -> Vector:
-        """The action that keeps the goal and the gains."""
-        return self._order.theirs(super().hold_action)
 
 
 register_part_controller(VARIABLE_JOINTS, VariableJointController, VariableJointConfig)
