@@ -70,13 +70,6 @@ class Check(ABC):
         model.geom_contype[:], model.geom_conaffinity[:] = kept
         data.xfrc_applied[:] = 0.0
 
-    def settle(self, names: Iterable[str]) -> None:
-        """Wait a second, and up to three more until things lie still."""
-        self.wait(1.0)
-        for _ in range(6):
-            if self.moving(names):
-                self.wait(0.5)
-
     def moving(self, names: Iterable[str]) -> str | None:
         """Return what does not lie still."""
         for name in names:
@@ -142,8 +135,8 @@ class PickPlaceCheck(Check):
 
     def fault(self) -> str | None:
         """Wait, then look where things lie."""
+        self.wait(1.0)
         config, names = self.benchmark.config, self.benchmark.sorting.active
-        self.settle(names)
         length, width, _ = config.target.size
         for name in names:
             at, goal = self.cell.object(name).position, self.benchmark.goal(name)
