@@ -23,7 +23,9 @@ from wbc_suite.qp import (
     RelativeFrameTask,
     TargetNotFinite,
     TaskStack,
+    fallback,
 )
+from wbc_suite.qp.solver import QpsolversSolver
 
 DT = 5e-3
 CHATTER = 0.01  # rad/s, p99 of the change of velocity between ticks, last second
@@ -286,22 +288,45 @@ def test_a_measured_position_that_is_not_finite_holds_still(arm):
     assert solution.fallback is Fallback.HOLD
 
 
-def test_a_solver_that_answers_nonsense_is_not_believed(arm):
+class Liar:
+    """A solver that answers nonsense."""
+
+    def solve(self, problem):
+        return np.full(problem.nv, np.nan), np.zeros(len(problem.upper))
+
+    def fresh(self):
+        return self
+
+
+@pytest.mark.parametrize("all_lie", [False, True])
+def test_a_solver_that_answers_nonsense_is_not_believed(arm, monkeypatch, all_lie):
+    """Daqp takes its place; if that lies too, coordinate descent does."""
     stack = arm_stack(arm, warm=False)
-
-    class Liar:
-        def solve(self, problem):
-            return np.full(problem.nv, np.nan), np.zeros(len(problem.upper))
-
-        def fresh(self):
-            return self
-
     shift(stack.tasks[0], [0.0, 0.1, 0.0])
     stack._ladder.solver = Liar()
+    if all_lie:
+        monkeypatch.setattr(fallback, "DaqpSolver", Liar)
     before = np.linalg.norm(stack.tasks[0].error(arm))
     solution, _ = run(stack, 2.0)
-    assert solution.fallback is Fallback.BOX
+    assert solution.fallback is (Fallback.BOX if all_lie else Fallback.NONE)
     assert np.linalg.norm(stack.tasks[0].error(arm)) < 0.1 * before
+
+
+@pytest.mark.slow
+def test_a_slow_solver_is_asked_once_a_tick(arm, monkeypatch):
+    """Daqp solves fallbacks and what `escape` simulates."""
+    row, calls = np.eye(7)[:1], []
+    equalities = [LinearEquality(row), LinearEquality(row, rate=np.array([0.5]))]
+    stack = arm_stack(arm, equalities=equalities, solver="proxqp")
+    shift(stack.tasks[0], [2.0, 0.0, 0.0])
+    solve = QpsolversSolver.solve
+    monkeypatch.setattr(
+        QpsolversSolver, "solve", lambda *x: calls.append(1) or solve(*x)
+    )
+    solution, chatter = run(stack, 4.0)
+    assert solution.fallback is Fallback.SLACK
+    assert len(calls) == round(4.0 / DT)
+    assert chatter <= CHATTER
 
 
 def test_stack_works_on_a_model_without_limits():

@@ -278,7 +278,7 @@ class DynamicsStack:
                 worst = max(worst, Fallback.LEVEL)
                 continue
             if result is None:
-                *result, fallback = retreat(solver, stated)
+                *result, fallback = retreat(stated)
             y, worst = result[0], max(worst, fallback)
             if level < levels[-1]:
                 kept = _row_space(np.concatenate([kept, J]))

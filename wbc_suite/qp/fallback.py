@@ -1,11 +1,11 @@
 """How a tick is solved where its active set is not found, or has no solution.
 
-A solver runs first. Where the first level has no solution, a ladder is descended,
-mildest rung first: relax inequality rows with slack; relax equality rows too; damped
-least squares within the joints' bounds; stand still. The bounds of joints are kept on
-every rung, with the acceleration window: rows that nearly depend on each other have
-solutions of any speed, and without the window a robot that was to keep them was
-measured to jump by 37 rad/s in each tick.
+A solver runs first, and daqp where it gives up. Where the first level has no solution,
+a ladder is descended, mildest rung first: relax inequality rows with slack; relax
+equality rows too; damped least squares within the joints' bounds; stand still. The
+bounds of joints are kept on every rung, with the acceleration window: rows that nearly
+depend on each other have solutions of any speed, and without the window a robot that
+was to keep them was measured to jump by 37 rad/s in each tick.
 """
 
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ from wbc_suite.qp.level import Level
 from wbc_suite.qp.limit import merge_bounds
 from wbc_suite.qp.problem import UNBOUNDED, Problem, clip_step
 from wbc_suite.qp.solution import Fallback
-from wbc_suite.qp.solver import QpSolver
+from wbc_suite.qp.solver import DaqpSolver, QpSolver
 from wbc_suite.qp.tick import RETURN_WEIGHT, TOLERANCE, TickArrays, stiffness
 from wbc_suite.typing import Matrix, Vector
 
@@ -45,6 +45,7 @@ class Ladder:
         self._q, self._levels, self._tick, self.solver = q, levels, tick, solver
         self._overshoot_damping = overshoot_damping
         self._problems: dict[tuple[int, int], tuple[Problem, QpSolver]] = {}
+        box_least_squares(np.eye(1), *np.zeros((3, 1)), 1)  # compiled before a tick
 
     def reset(self) -> None:
         """Discard all warm starts."""
@@ -63,11 +64,12 @@ class Ladder:
         if is_finite:
             level.state(problem)
             result = checked_solve(solver, problem)
+            result = result or checked_solve(DaqpSolver(), problem)
         if result is None:
             problem.weight = RETURN_WEIGHT * stiffness(level.arrays.tasks)
             if is_finite:
                 damping = float(self._overshoot_damping[0])
-                *result, fallback = retreat(solver, problem, damping=damping)
+                *result, fallback = retreat(problem, damping=damping)
             else:
                 lb, ub = self._bounds_without_acceleration(dt)
                 still = np.clip(np.zeros(problem.nv), lb, ub)
@@ -92,7 +94,7 @@ class Ladder:
             bounds = slice(problem.nv + len(problem.G))
             problem.lower[bounds] -= _ROOM
             problem.upper[bounds] += _ROOM
-            result = checked_solve(solver, problem)
+            result = checked_solve(DaqpSolver(), problem)
         # Clipped again: over a short tick, that margin is a speed. Long rows are
         # more sensitive than their orthonormal basis.
         if result is None or not clip_step(
@@ -133,15 +135,16 @@ def checked_solve(solver: QpSolver, problem: Problem) -> tuple[Vector, Vector] |
 
 
 def retreat(
-    solver: QpSolver, problem: Problem, *, damping: float = 0.0
+    problem: Problem, *, damping: float = 0.0
 ) -> tuple[Vector, Vector, Fallback]:
     """Return step, multipliers and rung for a problem that has no solution.
 
+    Daqp solves the rungs, whichever solver failed: others take milliseconds for each.
     `damping` is added to that of relaxed rows, m^2/rad^2; see `overshoot`.
     """
-    if result := _solve_with_loose_limits(solver, problem):
+    if result := _solve_with_loose_limits(problem):
         return *result, Fallback.LIMITS
-    if result := _solve_with_slack(solver, problem, damping):
+    if result := _solve_with_slack(problem, damping):
         return *result, Fallback.SLACK
     nothing = np.zeros(len(problem.upper))
     x = box_least_squares(problem.H, problem.c, problem.lb, problem.ub, _SWEEPS)
@@ -151,11 +154,9 @@ def retreat(
     return still, nothing, Fallback.HOLD
 
 
-def _solve_with_loose_limits(
-    solver: QpSolver, problem: Problem
-) -> tuple[Vector, Vector] | None:
+def _solve_with_loose_limits(problem: Problem) -> tuple[Vector, Vector] | None:
     """Solve with slack s >= 0 on `G dq <= h + s`, within the acceleration window."""
-    return checked_solve(solver.fresh(), _loosened(problem.copy()))
+    return checked_solve(DaqpSolver(), _loosened(problem.copy()))
 
 
 def _loosened(problem: Problem) -> Problem:
@@ -166,9 +167,7 @@ def _loosened(problem: Problem) -> Problem:
     return problem
 
 
-def _solve_with_slack(
-    solver: QpSolver, problem: Problem, damping: float
-) -> tuple[Vector, Vector] | None:
+def _solve_with_slack(problem: Problem, damping: float) -> tuple[Vector, Vector] | None:
     """Solve with equality rows as heavy tasks and slack s >= 0 on `G dq <= h + s`.
 
     Rows that cannot be kept have a residual, so what damps unreachable tasks is needed
@@ -182,7 +181,7 @@ def _solve_with_slack(
     mu += np.abs(problem.G).max(axis=1, initial=0.0) @ broken
     relaxed.H += weight * (A.T @ A + mu * np.eye(problem.nv))
     relaxed.c -= weight * (A.T @ b)
-    result = checked_solve(solver.fresh(), relaxed)
+    result = checked_solve(DaqpSolver(), relaxed)
     if result is None:
         return None
     x, multipliers = result

@@ -289,17 +289,15 @@ class TaskStack:
         )
 
     def copy(self) -> "TaskStack":
-        """Return a copy without escape on a copy of the robot, where it is now."""
+        """Return a copy on a copy of the robot, with daqp and without escape."""
         return TaskStack(
             Configuration(self.configuration.model, self.configuration.q),
             self.tasks,
             limits=self._limits,
             equalities=self.equalities,
-            solver=self.solver,
             damping=self.damping,
             curvature_damping=self.curvature_damping,
             escape=False,
-            warm=self._warm,
         )
 
     def pressed(self) -> Indices:

@@ -33,6 +33,6 @@ class QpFallback:
         result, fallback = checked_solve(self._solver, problem), Fallback.NONE
         if result is None:
             problem.weight = SOFT
-            *result, fallback = retreat(self._solver, problem)
+            *result, fallback = retreat(problem)
         qp.x[:] = result[0]
         return fallback
