@@ -13,15 +13,20 @@ from wbc_suite.robot.mjcf_export_geoms import VisualGeoms, add_collision_geoms
 from wbc_suite.robot.poses import se3_of
 
 STOP_SOLREF = (0.004, 1.0)
-"""Time constant in s and damping ratio of joint limits, the stiffest that is stable
-with a step of 2 ms. With MuJoCo's default of 20 ms a joint overshoots its limit by
-3.7 mrad at 0.5 rad/s, and a head of 4 kg by 20 mrad; limits of real joints are hard."""
+"""Time constant in s and damping ratio of limits of slides, the stiffest that is stable
+with a step of 2 ms; limits of real joints are hard."""
 STOP_SOLIMP = (0.95, 0.99, 0.001)
-"""Smallest and largest impedance of joint limits, and the width between, m or rad."""
+"""Smallest and largest impedance of these limits, and the width between, m."""
+BUMPER_SOLREF = (-1000.0, -500.0)
+"""Stiffness in 1/s^2 and damping in 1/s, negative, of limits of hinges: the damping
+stops a joint within a step of 2 ms. Resistance grows from none to all of it over a
+distance before the limit, as at a rubber stop. MuJoCo tests limits at the start of a
+step only, and a hand that hits a table turns its fingers at 10 rad/s within
+one: without that distance they were 20 mrad past their limits."""
+BUMPER_TIME, BUMPER_WIDTH = 4e-3, 0.03
+"""That distance: the way at full speed in this time, s, at most this, rad."""
 STOP_MARGIN = 3e-3
-"""Distance in rad at which the limit of a limb joint becomes active, since MuJoCo tests
-limits only at the start of a step (2 ms), and contacts accelerate joints to 2.6 rad/s.
-Controllers keep limbs this far inside; fingers rest at their limits and have none."""
+"""Distance in rad that whole-body controllers keep limbs from their limits."""
 SITE_GROUP = 4  # site group of frames, hidden by default
 
 STIFF = (0.005, 1.0)
@@ -50,8 +55,6 @@ def build_mjspec(robot: RobotDescription, *, merged: bool = True) -> mujoco.MjSp
     spec.compiler.savecompiled = False
     bodies = {"world": spec.worldbody}
     inertias = _inertias(robot)
-    limbs = robot.groups.keys() - robot.synergies.keys()
-    limb_joints = {joint for name in limbs for joint in robot.groups[name]}
     visual = VisualGeoms(spec, robot, merged=merged)
     for link in robot.links:
         placed = robot.root if link.parent is None else link
@@ -63,9 +66,9 @@ def build_mjspec(robot: RobotDescription, *, merged: bool = True) -> mujoco.MjSp
         if link.parent is None and robot.root.kind == "free":
             body.add_joint(name="root", type=mujoco.mjtJoint.mjJNT_FREE)
         for joint in robot.root.joints if link.parent is None else ():
-            _add_joint(body, joint, limb=False)
+            _add_joint(body, joint)
         if link.joint is not None:
-            _add_joint(body, link.joint, limb=link.joint.name in limb_joints)
+            _add_joint(body, link.joint)
         _set_inertia(body, inertias[link.name])
         visual.add(body, link)
         add_collision_geoms(spec, body, robot, link)
@@ -96,8 +99,8 @@ def write_mjcf(robot: RobotDescription) -> str:
     return spec.to_xml()
 
 
-def _add_joint(body: mujoco.MjsBody, joint: Joint, *, limb: bool) -> None:
-    """Add a joint; hinges of limbs have a margin before their limits."""
+def _add_joint(body: mujoco.MjsBody, joint: Joint) -> None:
+    """Add a joint; hinges are resisted from a distance before their limits."""
     kinds = mujoco.mjtJoint
     added = body.add_joint(
         name=joint.name,
@@ -111,11 +114,14 @@ def _add_joint(body: mujoco.MjsBody, joint: Joint, *, limb: bool) -> None:
     added.limited = mujoco.mjtLimited.mjLIMITED_FALSE
     if joint.range is not None:
         added.limited = mujoco.mjtLimited.mjLIMITED_TRUE
-        added.solref_limit = STOP_SOLREF
-        added.solimp_limit[:3] = STOP_SOLIMP
+        added.solref_limit, added.solimp_limit[:3] = STOP_SOLREF, STOP_SOLIMP
         added.range = joint.range
-        if joint.type == "hinge" and limb:
-            added.margin = STOP_MARGIN
+        if joint.type == "hinge":
+            low, high = joint.range
+            way = BUMPER_TIME * (joint.velocity or np.inf)
+            added.margin = min(way, BUMPER_WIDTH, 0.25 * (high - low))
+            added.solref_limit = BUMPER_SOLREF
+            added.solimp_limit = (1e-4, 0.999, added.margin, 0.5, 1.0)
 
 
 def _inertias(robot: RobotDescription) -> dict[str, pin.Inertia]:
