@@ -14,13 +14,18 @@ import pytest
 from wbc_suite.recording import Dataset
 
 TIMES = int(os.environ.get("WBC_SUITE_SIGNALS", "1"))
-"""Signals for each command and kind of signal."""
+"""Signals for each command and kind of signal; 17 make 204, in a quarter of an hour."""
+RECORD = ("record", "Lift", "--episodes", "500", "--horizon", "20")
 COMMANDS = {
-    "list": ("list",),
-    "record": ("record", "Lift", "--episodes", "500", "--horizon", "20"),
-    "evaluate": ("evaluate", "Lift", "--episodes", "500"),
-    "teleop": ("teleop", "--robots", "Panda", "--port", "0"),
+    "list": (("list",), 0.5),
+    "start": (RECORD, 1.0),
+    "compile": (RECORD, 8.0),  # without a cache of compiled kernels
+    "step": (("bench", "Lift", "--actions", "100000"), 8.0),
+    "record": (RECORD, 8.0),
+    "evaluate": (("evaluate", "Lift", "--episodes", "500"), 8.0),
+    "teleop": (("teleop", "--robots", "Panda", "--port", "0"), 8.0),
 }
+"""Arguments, and the longest time until a signal, s."""
 SOON = 10.0  # s; 0.7 of grace, and a machine with eight times its load
 
 
@@ -34,10 +39,11 @@ def wait_for_handlers(process):
         time.sleep(0.01)
 
 
-def interrupted(arguments, number, wait):
+def interrupted(arguments, number, wait, cache=None):
     """Return exit code, time from the signal to the end, and what was printed."""
     process = subprocess.Popen(
         [sys.executable, "-m", "wbc_suite.cli", *arguments],
+        env=os.environ | ({"XDG_CACHE_HOME": str(cache)} if cache else {}),
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
@@ -58,14 +64,16 @@ def interrupted(arguments, number, wait):
 def test_a_signal_ends_a_command(command, number, tmp_path):
     out, rng = tmp_path / "a.hdf5", np.random.default_rng(number)
     extra = {"record": ("--out", str(out)), "evaluate": ("-o", str(tmp_path / "r"))}
-    for _ in range(TIMES):
-        arguments = (*COMMANDS[command], *extra.get(command, ()))
-        wait = rng.uniform(0.0, 12.0) if command != "list" else rng.uniform(0.0, 0.5)
-        result = interrupted(arguments, number, wait)
+    (name, *arguments), longest = COMMANDS[command]
+    for k in range(TIMES):
+        cache = tmp_path / f"cache {k}" if command == "compile" else None
+        line, wait = (name, *arguments, *extra.get(name, ())), rng.uniform(0.0, longest)
+        result = interrupted(line, number, wait, cache)
         if result is None:
             assert command == "list", "it ended by itself"
             continue
         code, spent, printed = result
+        print(f"{command} {number}: {spent:.2f} s after {wait:.2f} s")
         assert code == 128 + number, printed
         assert spent < SOON
         assert "Traceback" not in printed

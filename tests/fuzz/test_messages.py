@@ -1,13 +1,17 @@
-"""Random and hostile messages to the page and the stream, with a viewer watching.
+"""Random and hostile messages to page, stream and headset, with a viewer watching.
 
-The loop must neither stop nor stall, and the viewer must keep its connection.
+The loop must neither stop nor stall, the viewer must keep its connection, and memory
+must not grow.
 """
 
 import contextlib
 import json
 import math
+import os
 import random
+import re
 import time
+from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -19,11 +23,12 @@ from websockets.typing import Subprotocol
 
 from tests.viewers.fake_env import FakeEnv
 from wbc_suite.cli.teleop import stages_of
+from wbc_suite.devices.headset import Headset
 from wbc_suite.devices.stream import Stream
 from wbc_suite.viewers.page_process import PageProcess
 from wbc_suite.viewers.teleop_session import TeleopSession
 
-MESSAGES = 10_000
+MESSAGES = int(os.environ.get("WBC_SUITE_MESSAGES", "10000"))
 VALUES = (0, 1, -1, 0.5, 1e6, 1e300, math.nan, math.inf, -math.inf, "a", None, [], {})
 TYPES = (
     "ViewerCameraMessage",
@@ -64,6 +69,7 @@ def frame(rng, index):
         return rng.choice(("", "[", "null", "[" * 2000, '{"a":1}', "\x00"))
     limb = {"pose": {"position": vector(rng, 3), "orientation": vector(rng, 4)}}
     limb |= {"twist": vector(rng, 6), "grip": rng.choice(VALUES)}
+    limb["fingers"] = [vector(rng, 3) for _ in range(rng.choice((0, 1, 25, 26)))]
     limb = {name: limb[name] for name in limb if rng.random() < 0.5}
     content = {"format": "wbc-pose-frame/1", "time": 0.01 * index}
     content |= {"limbs": {rng.choice(("right", "left", "hand", "head")): limb}}
@@ -87,38 +93,66 @@ class Attacker:
             self._socket.send(message)
 
 
+class TimedEnv(FakeEnv):
+    """Notes when it is stepped."""
+
+    def __init__(self):
+        super().__init__()
+        self.times = []
+
+    def step(self, action):
+        self.times.append(time.monotonic())
+        return super().step(action)
+
+
+def megabytes(pid):
+    """Return what a process has in memory."""
+    status = Path(f"/proc/{pid}/status").read_text()
+    return int(re.search(r"VmRSS:\s*(\d+)", status)[1]) / 1024
+
+
 @pytest.mark.slow
-def test_ten_thousand_messages_stop_neither_the_loop_nor_a_viewer():
-    stream = Stream(port=0)
+@pytest.mark.parametrize("kind", ["stream", "headset"])
+def test_ten_thousand_messages_stop_neither_the_loop_nor_a_viewer(kind):
+    device = {"stream": Stream, "headset": Headset}[kind](port=0)
+    env = TimedEnv()
     session = TeleopSession(
-        FakeEnv(),
+        env,
         period=0.02,
-        device=stream,
-        pipeline=stages_of("stream", scale=1.0, mirror=False),
+        device=device,
+        pipeline=stages_of(kind, scale=1.0, mirror=False),
     )
     page = PageProcess(session, "127.0.0.1", 0, label="test")
     page.wait()
-    stream.start()
+    device.start()
     session.start()
     options = {"subprotocols": [Subprotocol(f"viser-v{viser.__version__}")]}
     address = page.url.rstrip("/").replace("http", "ws")
     viewer = connect(address, max_size=None, **options)
     page_attacker = Attacker(address, **options)
-    stream_attacker = Attacker(stream.url.rstrip("/").replace("http", "ws") + "/frames")
-    rng, began = random.Random(0), time.monotonic()
+    attacker = Attacker(device.url.rstrip("/").replace("http", "ws") + "/frames")
+    rng, began, before = random.Random(0), time.monotonic(), megabytes(os.getpid())
     for index in range(MESSAGES // 2):
         page_attacker.send(page_message(rng))
-        stream_attacker.send(frame(rng, index))
+        attacker.send(frame(rng, index))
     spent, ticks = time.monotonic() - began, session.snapshot.tick
     try:
         assert session.running
         assert page_attacker.connections > 20  # most messages ended a connection
         assert ticks * session.period > 0.2 * spent  # the rest is a busy machine
-        assert np.isfinite(session.env.actions).all()
+        assert np.isfinite(env.actions).all()
         viewer.ping().wait(10.0)
         assert viewer.protocol.state.name == "OPEN"
         page.check()
+        grown = megabytes(os.getpid()) - before
+        print(
+            f"{ticks} ticks in {spent:.2f} s, at most "
+            f"{1e3 * np.diff(env.times).max():.0f} ms apart; the page has "
+            f"{megabytes(page.pid):.0f} MB, the loop {grown:.0f} MB more"
+        )
+        assert megabytes(page.pid) < 1000
+        assert grown < 100
     finally:
         session.stop()
         page.stop()
-        stream.stop()
+        device.stop()
