@@ -69,7 +69,7 @@ class Randomisation(FrozenModel):
     @classmethod
     def _least_first(cls, latency: tuple[float, float]) -> tuple[float, float]:
         if latency[0] > latency[1]:
-            raise ValueError("the least latency comes first")
+            raise ValueError("the smallest latency must come first")
         return latency
 
     @classmethod

@@ -64,12 +64,12 @@ def test_nearer_and_higher_are_never_worse(aside, missing, over):
 def test_stages_that_do_not_rise_are_refused(names):
     first, second = names
     swapped = NUMBERS | {first: NUMBERS[second], second: NUMBERS[first] - 0.01}
-    with pytest.raises(ValidationError, match="stages rise"):
+    with pytest.raises(ValidationError, match="stages must rise"):
         StagedReward(**swapped)
 
 
 def test_a_hover_of_one_would_be_a_success():
-    with pytest.raises(ValidationError, match="stages rise"):
+    with pytest.raises(ValidationError, match="stages must rise"):
         StagedReward(**NUMBERS | {"hover": 1.0})
 
 

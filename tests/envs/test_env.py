@@ -261,7 +261,7 @@ def test_wrong_arguments_say_what_is_legal():
         wbc_suite.make("Lift", controller_configs="WHOLE_BODY_KI")
     with pytest.raises(ConfigError, match="must divide 500"):
         wbc_suite.make("Lift", control_freq=30)
-    with pytest.raises(ConfigError, match="a place for 1"):
+    with pytest.raises(ConfigError, match="takes one robot"):
         wbc_suite.make("Lift", robots=["Panda", "Panda"])
 
 

@@ -137,5 +137,5 @@ def test_an_object_takes_its_path_as_text_or_refuses_it(tmp_path):
     path = tmp_path / "a.xml"
     path.write_text("<mujoco/>")
     assert MjcfObject(name="a", path=str(path)).path == path
-    with pytest.raises(DescriptionError, match="is a path, not 3"):
+    with pytest.raises(DescriptionError, match="must be a path, not 3"):
         MjcfObject(name="a", path=3)  # type: ignore[arg-type]

@@ -199,7 +199,7 @@ def test_a_latency_of_several_periods_is_a_queue_of_actions():
 
 
 def test_wrong_amounts_are_refused():
-    with pytest.raises(ValidationError, match="least latency comes first"):
+    with pytest.raises(ValidationError, match="smallest latency must come first"):
         Randomisation(latency=(0.2, 0.1))
     with pytest.raises(ValidationError, match="less than 1"):
         Randomisation(mass=1.5)

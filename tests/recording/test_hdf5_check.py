@@ -165,5 +165,5 @@ def test_a_sparse_file_is_refused(tmp_path):
     path = tmp_path / "bomb.hdf5"
     with path.open("wb") as file:
         file.truncate(2 << 30)
-    with pytest.raises(DatasetError, match="claims 2147483648 bytes"):
+    with pytest.raises(DatasetError, match="declares 2147483648 bytes"):
         open_safely(path, checked=True)

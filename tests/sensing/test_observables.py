@@ -170,7 +170,7 @@ def test_wrong_changes_are_named_and_change_nothing():
         slide.seen.modify("x", delay=-1)
     with pytest.raises(ConfigError, match="sampling_rate"):
         slide.seen.modify("x", sampling_rate=0)
-    with pytest.raises(ConfigError, match="noise is a function"):
+    with pytest.raises(ConfigError, match="noise must be a function"):
         slide.seen.modify("x", noise=0.1)
     with pytest.raises(ConfigError, match="already"):
         slide.seen.add("x", lambda m, d: reading.joint_positions([0]), group="all")

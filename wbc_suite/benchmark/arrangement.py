@@ -58,7 +58,7 @@ def arrange_one(
         ConfigError: If there are several robots, or the configuration is for several.
     """
     if len(robots) != 1:
-        raise ConfigError(f"{name} has a place for 1 robot(s), not {len(robots)}.")
+        raise ConfigError(f"{name} takes one robot, not {len(robots)}.")
     if configuration not in ("default", "single-robot"):
         raise ConfigError(
             f"{name}: one robot cannot stand '{configuration}'; leave "

@@ -63,7 +63,7 @@ class RewardConfig(FrozenModel):
     @model_validator(mode="after")
     def _stays_below_one(self) -> "RewardConfig":
         if self.reach + self.hold + self.carry + self.place >= 1.0:
-            raise ValueError("reach + hold + carry + place is below 1")
+            raise ValueError("reach + hold + carry + place must be below 1")
         return self
 
 

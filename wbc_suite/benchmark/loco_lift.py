@@ -41,7 +41,7 @@ class RewardConfig(FrozenModel):
     @model_validator(mode="after")
     def _stays_below_one(self) -> "RewardConfig":
         if self.approach + self.reach + self.grasp + self.lift >= 1.0:
-            raise ValueError("approach + reach + grasp + lift is below 1")
+            raise ValueError("approach + reach + grasp + lift must be below 1")
         return self
 
 

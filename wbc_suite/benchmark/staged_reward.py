@@ -30,7 +30,7 @@ class StagedReward(FrozenModel):
     @model_validator(mode="after")
     def _rises_to_one(self) -> "StagedReward":
         if not self.reach <= self.grasp <= self.lift <= self.hover < 1.0:
-            raise ValueError("stages rise: reach <= grasp <= lift <= hover < 1")
+            raise ValueError("stages must rise: reach <= grasp <= lift <= hover < 1")
         return self
 
     def has_left(self, distance: float) -> bool:

@@ -34,7 +34,7 @@ class RewardConfig(FrozenModel):
     @model_validator(mode="after")
     def _stays_below_one(self) -> "RewardConfig":
         if self.upright + self.rest >= 1.0:
-            raise ValueError("upright + rest is below 1")
+            raise ValueError("upright + rest must be below 1")
         return self
 
 

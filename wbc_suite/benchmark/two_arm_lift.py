@@ -38,7 +38,7 @@ class PotConfig(FrozenModel):
         cls, sizes: tuple[float, float, float]
     ) -> tuple[float, float, float]:
         if min(sizes) <= 2 * WALL:
-            raise ValueError(f"half sizes are more than {2 * WALL} m")
+            raise ValueError(f"half sizes must be more than {2 * WALL} m")
         return sizes
 
 

@@ -53,7 +53,7 @@ class PlateConfig(FrozenModel):
     @model_validator(mode="after")
     def _has_a_rim(self) -> "PlateConfig":
         if self.hole > 0.9 * self.half_size:
-            raise ValueError("the hole is at most nine tenths of the plate")
+            raise ValueError("the hole must be at most nine tenths of the plate")
         return self
 
 

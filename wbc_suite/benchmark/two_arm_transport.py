@@ -45,7 +45,7 @@ class BinConfig(FrozenModel):
     @model_validator(mode="after")
     def _has_room(self) -> "BinConfig":
         if min(self.size) <= 3 * self.wall:
-            raise ValueError("a bin is more than three walls wide and high")
+            raise ValueError("a bin must be more than three walls wide and high")
         return self
 
 

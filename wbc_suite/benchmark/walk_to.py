@@ -63,7 +63,7 @@ class RewardConfig(FrozenModel):
     @model_validator(mode="after")
     def _stays_below_one(self) -> "RewardConfig":
         if self.place + self.heading + self.rest >= 1.0:
-            raise ValueError("place + heading + rest is below 1")
+            raise ValueError("place + heading + rest must be below 1")
         return self
 
 

@@ -180,15 +180,15 @@ class ActionLayout:
             array = np.asarray(action)
         except ValueError as error:  # rows of different lengths
             raise ActionError(
-                f"An action is a flat vector, not {action!r:.60}."
+                f"An action must be a flat vector, not {action!r:.60}."
             ) from error
         if array.dtype.kind not in "fiu":
             raise ActionError(
-                f"An action holds real numbers, not {array.dtype} ({action!r:.60})."
+                f"An action must hold real numbers, not {array.dtype} ({action!r:.60})."
             )
         if array.shape != (self.size,):
             raise ActionError(
-                f"An action has shape ({self.size},), not {array.shape}. "
+                f"An action must have shape ({self.size},), not {array.shape}. "
                 "print(env.unwrapped.action_layout) explains the values."
             )
         vector = array.astype(np.float64)

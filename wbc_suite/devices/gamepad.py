@@ -153,7 +153,7 @@ class Gamepad:
 
     help = (
         "Gamepad: left stick and triggers move the hand, right stick turns it, "
-        "south button closes, north: next hand, the cross drives. Press the left "
+        "south button closes, north: next hand, the D-pad drives. Press the left "
         "stick: both sticks drive.\n"
     )
 

@@ -32,7 +32,7 @@ class Pose(FrozenModel):
     @classmethod
     def _is_rotation(cls, quat: tuple[float, ...]) -> tuple[float, ...]:
         if abs(float(np.linalg.norm(quat)) - 1.0) > 1e-2:
-            raise ValueError("a quaternion w x y z has length 1")
+            raise ValueError("a quaternion w x y z must have length 1")
         return quat
 
     def se3(self) -> pin.SE3:

@@ -109,7 +109,7 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
                 nothing has changed.
         """
         if options:
-            raise ConfigError(f"reset: there are no options, got {options!r:.60}.")
+            raise ConfigError(f"reset takes no options, but got {options!r:.60}.")
         info = self.begin(seed)
         if self.render_mode == "human":
             self.render()

@@ -171,11 +171,11 @@ def decode(value: Any) -> np.ndarray:
     try:
         dtype = np.dtype(str(value["dtype"]))
         if dtype.kind not in KINDS:
-            raise ValueError(f"{dtype} is no number")
+            raise ValueError(f"{dtype} is not a numeric type")
         flat = np.frombuffer(base64.b64decode(value["data"], validate=True), dtype)
         return flat.reshape([int(n) for n in value["shape"]]).copy()
     except (TypeError, KeyError) as error:
-        raise ValueError(f"no array: {str(value)[:60]}") from error
+        raise ValueError(f"not an array: {str(value)[:60]}") from error
 
 
 def _send(file: _Writer, message: Message) -> None:

@@ -51,7 +51,8 @@ def plan_rollouts(
     """
     if len(seeds) == 0 or chunk < 1:
         raise ConfigError(
-            f"{len(seeds)} seeds in chunks of {chunk}: at least one of each."
+            f"At least one seed and a chunk of at least 1 are needed, "
+            f"not {len(seeds)} and {chunk}."
         )
     items = []
     for case in cases:

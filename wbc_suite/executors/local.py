@@ -38,7 +38,7 @@ class Processes:
     def __init__(self, workers: int | None = None, *, attempts: int = 3) -> None:
         if (workers is not None and workers < 1) or attempts < 1:
             raise ConfigError(
-                f"{workers} workers and {attempts} attempts: at least one of each."
+                f"workers ({workers}) and attempts ({attempts}) must be at least 1."
             )
         self.workers = workers or os.cpu_count() or 1
         self.attempts = attempts

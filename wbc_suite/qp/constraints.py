@@ -183,9 +183,11 @@ def _check_list(
     what: str, given: object, name: str, kind: type | UnionType
 ) -> Sequence[object]:
     if not isinstance(given, Sequence) or isinstance(given, str):
-        raise ConfigError(f"TaskStack: {what} are a list, not {given!r:.60}.")
+        raise ConfigError(f"TaskStack: {what} must be a list, not {given!r:.60}.")
     items = cast("Sequence[object]", given)
     for x in items:
         if not isinstance(x, kind):
-            raise ConfigError(f"TaskStack: {what} hold {name} objects, not {x!r:.60}.")
+            raise ConfigError(
+                f"TaskStack: {what} must be {name} objects, not {x!r:.60}."
+            )
     return items

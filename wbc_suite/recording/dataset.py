@@ -139,7 +139,7 @@ class Dataset:
             claimed = facts.pop("num_samples", len(columns["actions"]))
             if claimed != len(columns["actions"]):
                 raise DatasetError(
-                    f"'{name}' claims {claimed} samples, and has "
+                    f"'{name}' declares {claimed} samples, but has "
                     f"{len(columns['actions'])} actions."
                 )
             if written is not None and written != fingerprint(columns, final):
@@ -158,7 +158,7 @@ class Dataset:
         with hdf5_reader.reading(path):
             data = hdf5_reader.child(file, "data", h5py.Group)
             if data is None:
-                raise DatasetError("there is no group 'data'; that is no dataset.")
+                raise DatasetError("it has no group 'data', so it holds no episodes.")
             earlier = set(self._uids)
             for name in filter(_DEMO.match, hdf5_reader.child_names(data)):
                 group = hdf5_reader.child(data, name, h5py.Group)

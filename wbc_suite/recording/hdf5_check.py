@@ -43,7 +43,7 @@ def open_safely(path: Path, *, checked: bool = False) -> h5py.File:
     size = path.stat()
     held = getattr(size, "st_blocks", size.st_size) * 512
     if size.st_size > SPARSE_FROM and held * SPARSE < size.st_size:
-        raise DatasetError(f"'{path}' claims {size.st_size} bytes, and holds {held}.")
+        raise DatasetError(f"'{path}' declares {size.st_size} bytes, but holds {held}.")
     if not h5py.is_hdf5(path):
         raise DatasetError(
             f"'{path}' is not an HDF5 file, or its start is damaged. If it was "

@@ -48,7 +48,7 @@ def reading(path: Path) -> Iterator[None]:
             raise
         raise DatasetError(f"'{path}': {error}") from error
     except MemoryError as error:
-        raise DatasetError(f"'{path}' claims more than memory holds.") from error
+        raise DatasetError(f"'{path}' declares more data than memory holds.") from error
     except ERRORS as error:
         reason = " ".join(str(error).split())[:160]
         raise DatasetError(
@@ -61,14 +61,16 @@ def child_names(group: h5py.Group) -> list[str]:
     """Return the names in a group; raise DatasetError if there are too many."""
     count = group.id.get_num_objs()
     if count > MAX_CHILDREN:
-        raise DatasetError(f"'{group.name}' has {count} entries; that is no dataset.")
+        raise DatasetError(
+            f"'{group.name}' has {count} entries; at most {MAX_CHILDREN} are read."
+        )
     return list(group)
 
 
 def child(group: h5py.Group, name: str, kind: type[Node]) -> Node | None:
     """Return a member of a group, or None; raise DatasetError for links."""
     if len(name) > MAX_NAME or not _PLAIN.match(name) or name in (".", ".."):
-        raise DatasetError(f"'{name:.40}' is no name for a part of a dataset.")
+        raise DatasetError(f"'{name:.40}' is not a valid name in a dataset.")
     link = group.get(name, getlink=True)
     if link is None:
         return None
@@ -100,7 +102,7 @@ def attribute(
         return None
     held = node.attrs.get_id(name)
     if held.shape not in ((), (1,)) or held.get_storage_size() > MAX_TEXT:
-        raise DatasetError(f"'{node.name}': '{name}' is no single text or number.")
+        raise DatasetError(f"'{node.name}': '{name}' is not a single string or number.")
     if held.dtype.kind not in "fiubSO" or (
         held.dtype.kind == "O" and h5py.check_string_dtype(held.dtype) is None
     ):
@@ -154,7 +156,7 @@ def read_names(dataset: h5py.Dataset) -> list[str]:
     _check_storage(dataset)
     text = h5py.check_string_dtype(dataset.dtype)
     if text is None or dataset.ndim != 1 or len(dataset) > MAX_CHILDREN:
-        raise DatasetError(f"'{dataset.name}' is no list of names.")
+        raise DatasetError(f"'{dataset.name}' is not a list of names.")
     if text.length is not None and text.length > MAX_NAME:
         raise DatasetError(f"'{dataset.name}' has names of {text.length} characters.")
     names = []

@@ -33,7 +33,7 @@ class PushConfig(FrozenModel):
     @classmethod
     def _least_first(cls, ends: tuple[float, float]) -> tuple[float, float]:
         if ends[0] > ends[1]:
-            raise ValueError("the least value comes first")
+            raise ValueError("the smallest value must come first")
         return ends
 
 

@@ -53,7 +53,8 @@ class Change:
             value = getattr(self, name)
             if value is not None and not callable(value):
                 raise ConfigError(
-                    f"An observation's {name} is a function or None, not {value!r:.60}."
+                    f"An observation's {name} must be a function or None, "
+                    f"not {value!r:.60}."
                 )
 
 

@@ -29,7 +29,7 @@ IN_BODY, IN_WORLD = "Body", "World"
 HOLD_HINT = (
     "Body: targets of hands move with the robot. World: they stay where they are."
 )
-SPEED_HINT = "Per cent of the greatest speed, for keys, buttons and sticks."
+SPEED_HINT = "Percentage of top speed, for keys, buttons and sticks."
 
 
 class DrivePanel:

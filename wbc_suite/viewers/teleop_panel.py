@@ -35,7 +35,7 @@ BUTTON_HINT = (
     "Keys: P pause, 0 reset, C record or keep, Y keep as a success, X discard, "
     "U delete the last episode"
 )
-CLUTCH_HINT = "Engaged: the limb follows its handle. Else only the handle moves."
+CLUTCH_HINT = "Engaged: the limb follows its handle. Otherwise only the handle moves."
 BALANCE_HINT = "Feet, capture point, next footstep and contact forces."
 SHADOW_HINT = "Two thirds of the rendering time without a graphics card."
 HELP = "Keys and gestures"

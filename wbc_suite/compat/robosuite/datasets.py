@@ -27,5 +27,5 @@ def make_from_dataset(path: str | Path) -> Any:
         data = hdf5_reader.child(file, "data", h5py.Group)
         env_args = None if data is None else hdf5_reader.attribute(data, "env_args")
     if env_args is None:
-        raise DatasetError(f"{path}: no env_args in it.")
+        raise DatasetError(f"{path}: the file has no env_args.")
     return make_from_env_args(str(env_args))

@@ -41,7 +41,9 @@ def _write(dataset: Dataset, piece: Piece, out: Path, on_progress: Progress) -> 
         with h5py.File(temporary, "w", track_order=True) as file:
             for number, episode in enumerate(map(dataset.episode, piece.names)):
                 if set(episode.columns) != set(first.columns):
-                    raise DatasetError(f"'{episode.name}' has other columns.")
+                    raise DatasetError(
+                        f"'{episode.name}' has other columns than the first episode."
+                    )
                 _write_episode(file.create_group(f"episode_{number}"), number, episode)
                 steps += episode.length
                 on_progress(1)

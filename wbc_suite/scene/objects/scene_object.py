@@ -260,7 +260,7 @@ class MjcfObject:
 
     def __post_init__(self) -> None:
         if not isinstance(self.path, str | Path):
-            raise DescriptionError(f"'path' is a path, not {self.path!r:.60}.")
+            raise DescriptionError(f"'path' must be a path, not {self.path!r:.60}.")
         object.__setattr__(self, "path", Path(self.path))
 
     def add_to(self, spec: mujoco.MjSpec) -> None:

@@ -190,7 +190,7 @@ def _read(path: str | Path) -> dict[str, Any]:
     try:
         return json.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        raise ConfigError(f"{path}: no controller in it: {error}") from error
+        raise ConfigError(f"{path}: not a controller file: {error}") from error
 
 
 def _composite(kind: str, robot: RobotDescription | None, arm: str) -> dict[str, Any]:

@@ -247,7 +247,7 @@ def parse_file(fname: str | Path) -> tuple[Element, Path]:
     try:
         root = ET.fromstring(path.read_text(encoding="utf-8"))
     except (OSError, ET.ParseError) as error:
-        raise ConfigError(f"{fname}: no MJCF in it: {error}") from error
+        raise ConfigError(f"{fname}: not readable as MJCF: {error}") from error
     compiler = root.find("compiler")
     dirs = {} if compiler is None else compiler.attrib
     for element in root.iter():

@@ -46,7 +46,7 @@ class GymWrapper(gymnasium.Env[Any, Any]):
     ) -> tuple[Any, dict[str, Any]]:
         """Start an episode."""
         if options:
-            raise ConfigError(f"reset: there are no options, got {options!r:.60}.")
+            raise ConfigError(f"reset takes no options, but got {options!r:.60}.")
         if seed is not None:
             self.env.unwrapped.seed_of_next = seed
         return self._chosen(self.env.reset()), {}
