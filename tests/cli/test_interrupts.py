@@ -109,6 +109,25 @@ def test_a_command_that_does_not_listen_is_ended(tmp_path):
     assert time.monotonic() - sent < SOON
 
 
+def test_an_exception_that_a_library_makes_of_the_end_is_not_shown():
+    """As pydantic does when it builds a class, and numba after a callback."""
+    code = (
+        "import os, signal;"
+        "from wbc_suite.cli.interrupts import signals_end_the_process as block\n"
+        "with block():\n"
+        "    try:\n"
+        "        os.kill(os.getpid(), signal.SIGTERM)\n"
+        "    except SystemExit as end:\n"
+        "        raise ValueError('half a class') from end\n"
+    )
+    command = [sys.executable, "-c", code]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert ended.returncode == 143
+    assert ended.stderr == (
+        "\nwbc-suite: stopped. Nothing was changed; the same command starts again.\n"
+    )
+
+
 def test_handlers_are_as_before_after_a_command(monkeypatch, capsys):
     from wbc_suite.cli import main
 

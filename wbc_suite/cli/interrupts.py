@@ -12,7 +12,8 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from functools import partial
 from types import FrameType
 from typing import NoReturn
 
@@ -40,21 +41,25 @@ def signals_end_the_process() -> Iterator[None]:
     reader, writer = os.pipe()
     os.set_blocking(writer, False)
     earlier = signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
-    handlers = [signal.signal(number, _stop) for number in SIGNALS]
+    received = list[int]()
+    stop = partial(_stop, received)
+    handlers = [signal.signal(number, stop) for number in SIGNALS]
     threading.Thread(
         target=_end_in_time, args=(reader,), name="interrupts", daemon=True
     ).start()
     try:
         yield
     finally:
-        if signal.getsignal(signal.SIGINT) is _stop:  # no signal came
-            for number, handler in zip(SIGNALS, handlers, strict=True):
-                signal.signal(number, handler)
-            signal.set_wakeup_fd(earlier)
-            os.close(writer)
+        if received:  # whatever the exception has become on its way
+            _leave(received[0])
+        for number, handler in zip(SIGNALS, handlers, strict=True):
+            signal.signal(number, handler)
+        signal.set_wakeup_fd(earlier)
+        os.close(writer)
 
 
-def _stop(number: int, _: FrameType | None) -> NoReturn:
+def _stop(received: list[int], number: int, _: FrameType | None) -> NoReturn:
+    received.append(number)
     for each in SIGNALS:  # another one does not disturb the cleaning up
         signal.signal(each, signal.SIG_IGN)
     sys.unraisablehook = lambda _: None  # if it comes in a callback, which drops it
@@ -80,6 +85,17 @@ def _end_in_time(reader: int) -> None:
     threading.Event().wait(GRACE / 2)
     _say_what_is_kept()
     threading.Event().wait(GRACE / 2)
+    _leave(number)
+
+
+def _leave(number: int) -> NoReturn:
+    """End the process, without what Python does at its end.
+
+    A signal that comes in a callback of LLVM leaves half a library behind, and that end
+    crashed; and libraries make exceptions of their own of `SystemExit`.
+    """
     for child in multiprocessing.active_children():
         child.kill()
+    with suppress(OSError, ValueError):
+        sys.stdout.flush()
     os._exit(128 + number)
