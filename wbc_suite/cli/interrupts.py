@@ -11,6 +11,7 @@ import os
 import signal
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
@@ -18,6 +19,7 @@ from types import FrameType
 from typing import NoReturn
 
 GRACE = 0.7  # s, for cleaning up
+CHECKS = 0.3  # s, for children that check libraries: glfw's prints if its pipe breaks
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 KEPT = {
     "record": "Finished episodes are kept; the same command goes on.",
@@ -51,7 +53,7 @@ def signals_end_the_process() -> Iterator[None]:
         yield
     finally:
         if received:  # whatever the exception has become on its way
-            _leave(received[0])
+            _leave(received[0], CHECKS)
         for number, handler in zip(SIGNALS, handlers, strict=True):
             signal.signal(number, handler)
         signal.set_wakeup_fd(earlier)
@@ -88,7 +90,7 @@ def _end_in_time(reader: int) -> None:
     _leave(number)
 
 
-def _leave(number: int) -> NoReturn:
+def _leave(number: int, patience: float = 0.0) -> NoReturn:
     """End the process, without what Python does at its end.
 
     A signal that comes in a callback of LLVM leaves half a library behind, and that end
@@ -98,4 +100,9 @@ def _leave(number: int) -> NoReturn:
         child.kill()
     with suppress(OSError, ValueError):
         sys.stdout.flush()
+    until = time.monotonic() + patience
+    with suppress(ChildProcessError):  # there are none
+        while time.monotonic() < until:
+            if os.waitpid(-1, os.WNOHANG)[0] == 0:
+                time.sleep(0.01)
     os._exit(128 + number)
