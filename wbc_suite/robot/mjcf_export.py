@@ -23,10 +23,11 @@ stops a joint within a step of 2 ms. Resistance grows from none to all of it ove
 distance before the limit, as at a rubber stop. MuJoCo tests limits at the start of a
 step only, and a hand that hits a table turns its fingers at 10 rad/s within
 one: without that distance they were 20 mrad past their limits."""
-BUMPER_TIME, BUMPER_LEAST, BUMPER_WIDTH = 4e-3, 0.01, 0.03
-"""That distance: the way at full speed in this time, s, from this to this, rad."""
-STOP_MARGIN = 3e-3
-"""Distance in rad that whole-body controllers keep limbs from their limits."""
+BUMPER_TIME, BUMPER_WIDTH = 4e-3, 0.03
+"""That distance: the way at full speed in this time, s, at most this, rad."""
+STOP_MARGIN = 0.01
+"""Least of it, rad, and what whole-body controllers keep: where a stop holds a joint
+back from its command, the hand may be in a table that the command avoids."""
 SITE_GROUP = 4  # site group of frames, hidden by default
 
 STIFF = (0.005, 1.0)
@@ -118,7 +119,7 @@ def _add_joint(body: mujoco.MjsBody, joint: Joint) -> None:
         added.range = joint.range
         if joint.type == "hinge":
             low, high = joint.range
-            way = max(BUMPER_TIME * (joint.velocity or np.inf), BUMPER_LEAST)
+            way = max(BUMPER_TIME * (joint.velocity or np.inf), STOP_MARGIN)
             added.margin = min(way, BUMPER_WIDTH, 0.25 * (high - low))
             added.solref_limit = BUMPER_SOLREF
             added.solimp_limit = (1e-4, 0.999, added.margin, 0.5, 1.0)
