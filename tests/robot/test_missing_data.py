@@ -41,6 +41,20 @@ def test_a_file_with_half_of_the_motors_gets_no_others(tmp_path):
     assert (shoulder.effort, slide.effort, slide.armature) == (7.0, None, 0.0)
 
 
+def test_motors_of_a_urdf_get_armatures_and_those_of_mjcf_keep_theirs(tmp_path):
+    robot = read(tmp_path, ARM.format(effort=7))
+    assert robot.joint("shoulder").armature == pytest.approx(7.0 * ROTOR)
+    assert robot.deviations == (
+        "armatures are estimated from efforts: the file has none",
+    )
+    path = tmp_path / "arm.xml"
+    path.write_text("""<mujoco><worldbody><body name="upper"><joint name="shoulder"/>
+    <geom size="0.1"/></body></worldbody>
+    <actuator><motor joint="shoulder" ctrlrange="-7 7"/></actuator></mujoco>""")
+    robot = load_robot(path)
+    assert (robot.joint("shoulder").armature, robot.deviations) == (0.0, ())
+
+
 def test_a_ball_without_mass_gets_that_of_its_volume(tmp_path, caplog):
     text = f"""<robot name="ball"><link name="base"/><link name="ball">
     <collision><origin xyz="0 0 0.5"/>{BALL}</collision></link>

@@ -3,6 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 
 from wbc_suite.errors import DescriptionError
 from wbc_suite.robot import load_robot
@@ -216,6 +217,19 @@ def test_a_fitted_hull_touches_the_cloud_along_the_axes_and_stays_inside():
     assert {tuple(p) for p in kept[:, :3]} <= {tuple(p) for p in points}
     np.testing.assert_array_equal(kept[:, :3].min(axis=0), points.min(axis=0))
     np.testing.assert_array_equal(kept[:, :3].max(axis=0), points.max(axis=0))
+
+
+def test_a_fitted_hull_keeps_the_corners_of_a_flat_sole():
+    rng = np.random.default_rng(2)
+    sole = np.array([[x, y, 0.0] for x in (-0.1, 0.15) for y in (-0.05, 0.06)])
+    upper = rng.normal(size=(2000, 3))
+    upper *= 0.08 / np.linalg.norm(upper, axis=1, keepdims=True)
+    upper[:, 2] += 0.08
+    kept = np.array(fit_hull(np.concatenate([upper, sole]))["spheres"])
+    assert {tuple(p) for p in sole} <= {tuple(p) for p in kept[:, :3]}
+    planes = ConvexHull(kept[:, :3]).equations
+    outside = upper @ planes[:, :3].T + planes[:, 3]
+    assert outside.max() < 0.004  # of a radius of 80 mm; without any point it is 80
 
 
 @pytest.mark.parametrize("count", [1, 3, 50])

@@ -42,6 +42,24 @@ def test_a_sole_is_the_rectangle_of_the_lowest_shapes(foot):
     assert ball_radius(robot, frame) == 0.0
 
 
+def test_a_sole_frame_on_a_fixed_link_takes_the_shapes_of_the_body(tmp_path):
+    shapes = "".join(CORNER.format(x=x, y=y) for x, y in [(-0.05, 0.03), (0.12, -0.03)])
+    text = FOOT.format(shapes=shapes).replace('"left_foot"', '"left_ankle"')
+    fixed = """<link name="left_foot"><inertial><mass value="0.01"/><inertia ixx="1e-4"
+iyy="1e-4" izz="1e-4" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="fixed" type="fixed">
+<parent link="left_ankle"/><child link="left_foot"/><origin xyz="0.01 0 -0.035"/>
+</joint>
+</robot>"""
+    file = tmp_path / "fixed.urdf"
+    file.write_text(text.replace("</robot>", fixed))
+    robot = load_robot(file)
+    frame = next(frame for frame in robot.frames if frame.link == "left_foot")
+    sole = guess_sole(robot, frame.name)
+    assert sole.edges == pytest.approx((-0.06, 0.11, -0.03, 0.03))
+    assert sole.height == pytest.approx(0.0, abs=1e-9)
+
+
 def test_a_single_ball_about_the_frame_has_a_radius_and_no_sole(foot):
     ball = CORNER.format(x=0.0, y=0.0).replace("-0.03", "0.0")
     robot = foot(ball.replace("0.005", "0.02"))

@@ -600,7 +600,7 @@ def test_massless_links_between_masses_hardly_change_the_mass_matrix(tmp_path):
     path = write(tmp_path, text)
     ours, theirs = read_urdf(path).to_pinocchio(), pin.buildModelFromUrdf(str(path))
     q = np.array([0.3, -0.4])
-    found = pin.crba(ours, ours.createData(), q)
+    found = pin.crba(ours, ours.createData(), q) - np.diag(ours.armature)  # estimated
     wanted = pin.crba(theirs, theirs.createData(), q)
     np.testing.assert_allclose(np.triu(found), np.triu(wanted), atol=1e-9)
 
@@ -619,6 +619,7 @@ def test_a_tensor_without_mass_is_kept(tmp_path):
     theirs = pin.buildModelFromUrdf(str(path))
     wanted = pin.crba(theirs, theirs.createData(), np.zeros(1))
     ours = robot.to_pinocchio()
+    wanted += np.diag(ours.armature)  # estimated
     assert pin.crba(ours, ours.createData(), np.zeros(1)) == pytest.approx(wanted)
     model = robot.to_mjspec().compile()
     assert model.dof_M0 == pytest.approx(wanted[0])

@@ -288,11 +288,11 @@ def _placed(
         palm = rigid[str(limb.links[0].parent)]
         tip = next(link for link in links if link.name == palm)
     end_words = END_WORDS.get(limb.kind, set[str]())
-    for frame in given:
+    for frame in sorted(given, key=_is_no_sole):
         if rigid[frame.link] == tip.name and end_words.intersection(_words(frame.name)):
             return {"link": frame.link, "pos": frame.pos, "quat": frame.quat}
     fixed = [link for link in links if rigid[link.name] == tip.name]
-    for link in fixed:
+    for link in sorted(fixed, key=_is_no_sole):
         if end_words.intersection(_words(link.name)):
             return {"link": link.name}
     if limb.kind == "gripper":
@@ -307,6 +307,11 @@ def _placed(
     if limb.kind == "leg" and _depth(tip.name, chain) <= POINT_FOOT:
         return {"link": tip.name, "pos": _farthest(tip)}
     return {"link": tip.name}
+
+
+def _is_no_sole(item: Frame | Link) -> bool:
+    """Return the key that sorts soles before ankles and feet."""
+    return "sole" not in _words(item.name)
 
 
 def _farthest(link: Link) -> tuple[float, ...]:

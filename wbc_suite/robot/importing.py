@@ -18,6 +18,7 @@ from wbc_suite.robot.group_inference import (
 from wbc_suite.robot.inertia import implausible, nearest_physical, unphysical
 from wbc_suite.robot.missing_data import (
     ellipsoid,
+    estimate_armatures,
     estimate_masses,
     estimate_motors,
     oversized,
@@ -105,18 +106,21 @@ def describe_import(
     placed = infer_frames(checked, limbs, given, names)
     actuated = {fields["joint"] for fields in others.get("actuators", ())}
     driven = estimate_motors(checked, placed, actuated)
-    deviations: tuple[str, ...] = ()
+    deviations: list[str] = []
     if driven != checked:
-        deviations = ("efforts and armatures are estimated: the file has few or none",)
+        deviations = ["efforts and armatures are estimated: the file has few or none"]
         LOG.warning("%s: %s.", source, deviations[0])
+    complete = estimate_armatures(driven)
+    if complete != driven:
+        deviations.append("armatures are estimated from efforts: the file has none")
     keyframes = others.pop("keyframes", {})
     data: dict[str, Any] = {
         "name": NameTable().take(name, "robot"),
         "source": f"imported from {source.name}",
         "root": root,
-        "links": driven,
+        "links": complete,
         "frames": placed,
-        "deviations": deviations,
+        "deviations": tuple(deviations),
         "groups": {limb.name: limb.joints for limb in limbs if limb.joints},
         "keyframes": {"ready": infer_ready(checked)} | keyframes,
     }

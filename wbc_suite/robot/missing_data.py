@@ -62,7 +62,8 @@ def oversized(link: Link) -> str | None:
         return None
     bounds = np.array([shape_bounds(shape) for shape in shapes])
     size = float(np.linalg.norm(bounds[:, 1].max(axis=0) - bounds[:, 0].min(axis=0)))
-    radius = float(np.sqrt(sum(link.inertia[:3]) / 2.0 / link.mass))
+    moments = max(0.0, sum(link.inertia[:3]))
+    radius = float(np.sqrt(moments / 2.0 / link.mass))
     if radius <= OVERSIZED * size:
         return None
     return f"a radius of gyration of {radius:.3g} m is impossible in {size:.3g} m"
@@ -92,6 +93,21 @@ def estimate_motors(
             update = {"effort": effort, "armature": armature}
             joint = joint.model_copy(update=update)
         changed.append(link.model_copy(update={"joint": joint}))
+    return changed
+
+
+def estimate_armatures(links: Sequence[Link]) -> list[Link]:
+    """Return links with armatures for motors whose file does not state them.
+
+    URDF cannot state an armature.
+    """
+    changed = list(links)
+    for k, link in enumerate(links):
+        joint = link.joint
+        if joint and joint.effort and "armature" not in joint.model_fields_set:
+            armature = float(f"{ROTOR * joint.effort:.3g}")
+            joint = joint.model_copy(update={"armature": armature})
+            changed[k] = link.model_copy(update={"joint": joint})
     return changed
 
 

@@ -258,9 +258,8 @@ def _loft_faces(rings: int, n: int) -> Indices:
 def fit_hull(points: Matrix) -> dict[str, Any]:
     """Return the fields of a hull that approximates the convex hull of points (n, 3).
 
-    A flat cloud gives a thin box. Of more than `HULL_POINTS` corners the extreme ones
-    along evenly spread directions are kept, where the hull touches the exact one from
-    inside.
+    A flat cloud gives a thin box. Of more than `HULL_POINTS` corners those are kept
+    that lie farthest outside the hull of the ones before them.
     """
     low, high = points.min(axis=0), points.max(axis=0)
     centred = points - points.mean(axis=0)
@@ -271,18 +270,20 @@ def fit_hull(points: Matrix) -> dict[str, Any]:
         return {"shape": "box", "size": half.tolist(), "pos": centre}
     corners = points[ConvexHull(points).vertices]
     if len(corners) > HULL_POINTS:
-        scaled = corners / np.maximum(high - low, 1e-9)
-        extreme = np.argmax(scaled @ _directions().T, axis=0)
-        corners = corners[np.unique(extreme)]
+        corners = _farthest_first(corners)
     return {"shape": "hull", "spheres": [[*p, 0.0] for p in corners.tolist()]}
 
 
-def _directions() -> Matrix:
-    """Return axes and a Fibonacci spiral of unit vectors, shape (HULL_POINTS, 3)."""
-    count = HULL_POINTS - 6
-    k = np.arange(count) + 0.5
-    z = 1 - 2 * k / count
-    turn = np.pi * (1 + 5**0.5) * k
-    ring = np.sqrt(1 - z * z)
-    spiral = np.column_stack([ring * np.cos(turn), ring * np.sin(turn), z])
-    return np.concatenate([np.eye(3), -np.eye(3), spiral])
+def _farthest_first(corners: Matrix) -> Matrix:
+    """Return the `HULL_POINTS` corners that leave the least outside their hull."""
+    scaled = corners / np.ptp(corners, axis=0)
+    directions = np.concatenate([np.eye(3), -np.eye(3), _icosphere(0)])
+    chosen = np.unique(np.argmax(scaled @ directions.T, axis=0)).tolist()
+    hull = ConvexHull(corners[chosen], incremental=True)
+    while len(chosen) < HULL_POINTS:
+        planes = hull.equations
+        outside = (corners @ planes[:, :3].T + planes[:, 3]).max(axis=1)
+        farthest = int(np.argmax(outside))
+        chosen.append(farthest)
+        hull.add_points(corners[[farthest]])
+    return corners[chosen]

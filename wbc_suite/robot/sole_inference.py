@@ -1,15 +1,17 @@
-"""What a foot touches the ground with, by the collision shapes of its link."""
+"""What a foot touches the ground with, by the collision shapes of its rigid body."""
 
 from typing import NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 from wbc_suite.robot.collision_capsules import collision_spheres
 from wbc_suite.robot.description import RobotDescription
-from wbc_suite.robot.poses import rotation_matrix
+from wbc_suite.robot.elements import rigid_bodies
+from wbc_suite.robot.poses import se3_of
 from wbc_suite.typing import Matrix
 
-FLAT = 0.005
+FLAT = 0.002
 """m; what lies at most so much higher than the lowest point belongs to the sole."""
 
 AT_FRAME = 0.01
@@ -51,8 +53,20 @@ def ball_radius(robot: RobotDescription, frame: str) -> float:
 
 
 def _spheres(robot: RobotDescription, name: str) -> Matrix:
-    """Return the spheres of a foot in the axes of its frame, shape (n, 4)."""
+    """Return the spheres of a foot's rigid body in the axes of its frame, (n, 4)."""
     frame = robot.frame(name)
-    spheres = collision_spheres(robot).get(frame.link, np.zeros((0, 4)))
-    centres = (spheres[:, :3] - frame.pos) @ rotation_matrix(frame)
-    return np.column_stack([centres, spheres[:, 3]])
+    bodies, poses = rigid_bodies(robot.links), dict[str, pin.SE3]()
+    rows = [np.zeros((0, 4))]
+    spheres = collision_spheres(robot)
+    for link in robot.links:
+        is_first = bodies[link.name] == link.name
+        poses[link.name] = (
+            pin.SE3.Identity() if is_first else poses[link.parent] * se3_of(link)
+        )
+    to_frame = (poses[frame.link] * se3_of(frame)).inverse()
+    for link, found in spheres.items():
+        if bodies[link] == bodies[frame.link]:
+            pose = to_frame * poses[link]
+            centres = found[:, :3] @ pose.rotation.T + pose.translation
+            rows.append(np.column_stack([centres, found[:, 3]]))
+    return np.concatenate(rows)
