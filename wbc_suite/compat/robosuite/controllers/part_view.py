@@ -53,6 +53,11 @@ class PartController:
         return self._state.data.qvel[self.joint_index["qvel"]]
 
     @property
+    def torques(self) -> Vector:
+        """Torques that the actuators of its joints exert now, N m or N."""
+        return self._state.data.qfrc_actuator[self.joint_index["qvel"]].copy()
+
+    @property
     def kp(self) -> Vector:
         """Present stiffness."""
         return np.array(self._part.law.record["kp"]).ravel()

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from wbc_suite.benchmark import load_benchmark
-from wbc_suite.compat.robosuite.environments.aliases import aliases_of
+from wbc_suite.compat.robosuite.environments.aliases import SceneNames
 from wbc_suite.compat.robosuite.environments.arguments import (
     controller_of,
     one_each,
@@ -120,7 +120,11 @@ class RobotEnv(MujocoEnv):
             self.robots, core.simulation.pairs, strict=True
         ):
             robot.bind(sim, state, controller)
-        sim.model._aliases = aliases_of(core.simulation.model, self.robots)
+        names = SceneNames(core.simulation.model, self.robots)
+        sim.model.understand(names.ours, names.theirs)
+        for robot in self.robots:
+            for model in (robot.robot_model, *robot.gripper.values()):
+                model.theirs = names.theirs
         return sim
 
     def _setup_observables(self) -> dict[str, Observable]:
@@ -141,6 +145,20 @@ class RobotEnv(MujocoEnv):
         if self._picture_keys:
             found += camera_observables(self._picture_keys, self._picture, rate)
         return OrderedDict((o.name, o) for o in found)
+
+    def _pre_action(self, action: Any, policy_step: bool = False) -> None:
+        """Let the next `sim.step` follow the controllers, in loops of one's own.
+
+        With `policy_step` they take the action. In `step` it does nothing.
+        """
+        if self._stepping:
+            return
+        given, start = self._of_enabled_parts(action), 0
+        for robot in self.robots if policy_step else ():
+            stop = start + robot.action_dim
+            robot.composite_controller.set_goal(given[start:stop])
+            start = stop
+        self.sim.next_step = lambda: self.env.simulation.tick(1)
 
     def _of_enabled_parts(self, action: Any) -> Any:
         """Return the action with zeros for parts that are switched off; they hold."""

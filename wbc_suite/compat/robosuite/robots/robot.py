@@ -68,7 +68,7 @@ class Robot(Measured):
     def _start_at(self, qpos: Any) -> None:
         """Write the joints' positions at the start into the description."""
         model, prefix = self.robot_model, len(self.robot_model.naming_prefix)
-        names = [name[prefix:] for name in model.joints]
+        names = [name[prefix:] for name in model.own_joints]
         robot = model.description
         ready = {**robot.keyframes["ready"], **dict(zip(names, qpos, strict=True))}
         keyframes = {**robot.keyframes, "ready": ready}
@@ -102,19 +102,19 @@ class Robot(Measured):
         ids = [state.model.joint(state.prefix + n).id for n in self._joints(False)]
         self._ref_joint_indexes: Indices = np.array(ids)
         self._ref_gripper_joint_pos_indexes = {
-            arm: [sim.model.get_joint_qpos_addr(j) for j in g.joints]
+            arm: [sim.model.get_joint_qpos_addr(j) for j in g.own_joints]
             for arm, g in self.gripper.items()
         }
         self._ref_gripper_joint_vel_indexes = {
-            arm: [sim.model.get_joint_qvel_addr(j) for j in g.joints]
+            arm: [sim.model.get_joint_qvel_addr(j) for j in g.own_joints]
             for arm, g in self.gripper.items()
         }
 
     def _joints(self, grippers: bool) -> tuple[str, ...]:
         robot, prefix = self.robot_model, len(self.robot_model.naming_prefix)
-        names = [*robot.joints]
+        names = [*robot.own_joints]
         if grippers:
-            names += [j for g in self.gripper.values() for j in g.joints]
+            names += [j for g in self.gripper.values() for j in g.own_joints]
         return tuple(name[prefix:] for name in names)
 
     def __getattr__(self, name: str) -> Any:
@@ -205,7 +205,7 @@ class Robot(Measured):
     @property
     def torque_limits(self) -> tuple[Vector, Vector]:
         """Least and greatest torques of its joints' actuators, N m or N."""
-        model, names = self._state.model, self.robot_model.joints
+        model, names = self._state.model, self.robot_model.own_joints
         known = {model.actuator(i).name: i for i in range(model.nu)}
         ids = [known[name] for name in names if name in known]
         low, high = model.actuator_ctrlrange[ids].T
