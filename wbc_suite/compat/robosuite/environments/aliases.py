@@ -75,6 +75,7 @@ class SceneNames:
             aliases["joint"][f"{name}_joint{k}"] = joint.name
         for k, geom in enumerate(geoms):
             aliases["geom"][f"{name}_g{k}"] = geom.name
+            aliases["geom"][f"{name}_g{k}_vis"] = geom.name
             if free:
                 self._show("geom", f"{name}_g{k}", geom.name)
         if free:
@@ -109,7 +110,10 @@ class SceneNames:
                 self._show("body", f"{prefix}link{k}", prefix + link)
         for arm, frame in own.hands.items():
             self._show("body", f"{prefix}{arm}_hand", prefix + own.link_of(frame))
-            aliases["camera"][f"{prefix}eye_in_hand"] = f"{prefix}{arm}_eye_in_hand"
+            camera = f"{prefix}{arm}_eye_in_hand"
+            aliases["camera"][f"{prefix}eye_in_hand"] = camera
+            if not several:
+                self._show("camera", f"{prefix}eye_in_hand", camera)
         for frame in own.frames:
             aliases["site"][f"{prefix}{frame.name}"] = prefix + frame.name
 

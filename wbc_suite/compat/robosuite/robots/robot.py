@@ -81,6 +81,8 @@ class Robot(Measured):
             has_one = f"{arm}_gripper" in robot.synergies
             given = self.gripper_type
             given = given.get(arm) if isinstance(given, Mapping) else given
+            if given == "default":
+                given = self.robot_model.default_gripper.get(arm)
             cls = GRIPPER_MAPPING.get(given, GripperModel) if has_one else NullGripper
             self.gripper[arm] = _mounted(cls, robot, prefix, arm, f"{self.idn}_{arm}")
 
@@ -153,6 +155,17 @@ class Robot(Measured):
     def joint_indexes(self) -> list[int]:
         """Indices of its joints in the scene, without grippers."""
         return self._ref_joint_indexes.tolist()
+
+    @property
+    def part_controller_config(self) -> dict[str, Any]:
+        """Configs of the parts that it has, by name, those of grippers included."""
+        config, found = self.composite_controller_config, {}
+        given = config.get("body_parts", {}) if isinstance(config, Mapping) else {}
+        for part in self.part_controllers:
+            arm = part.removesuffix("_gripper")
+            own = given.get(arm, {})
+            found[part] = own if part == arm else own.get("gripper", {})
+        return found
 
     @property
     def part_controllers(self) -> dict[str, Any]:

@@ -85,8 +85,7 @@ class MjModel:
             return int(name)
         found = self.find(kind, name)
         if found is None:
-            known = [known for known in self.names(kind) if known]
-            raise UnknownNameError(kind, name, known)
+            raise UnknownNameError(kind, name, self._ids[kind])
         return found
 
     def get_xml(self) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.catalogue import Catalogue
-from wbc_suite.compat.robosuite.models.described import DescribedModel
+from wbc_suite.compat.robosuite.models.described import DescribedModel, choices_of
 from wbc_suite.compat.robosuite.models.own_files import arm_file, changed, gripper_file
 from wbc_suite.compat.robosuite.models.robots.passive import with_passive_joints
 from wbc_suite.compat.robosuite.utils.transform_utils import euler2mat
@@ -201,17 +201,12 @@ class RobotModel(DescribedModel):
         fingers, links = set(self._fingers()), self.description.links
         joined = [x for x in links if x.joint and x.joint.mimic is None]
         moved = [x for x in joined if x.joint and x.joint.name not in fingers]
-        given = dict(
-            zip(
-                (x.name for x in moved),
-                np.broadcast_to(values, len(moved)),
-                strict=True,
-            )
-        )
+        each = np.broadcast_to(values, len(moved))
+        given = {x.name: float(v) for x, v in zip(moved, each, strict=True)}
         changes = {link.name: link for link in links}
         for link in moved:
             if link.joint and (force or not getattr(link.joint, attrib)):
-                value = {attrib: float(given[link.name])}
+                value = {attrib: given[link.name]}
                 update = {"joint": link.joint.model_copy(update=value)}
                 changes[link.name] = link.model_copy(update=update)
         self.description = changed(self.description, links=tuple(changes.values()))
@@ -267,17 +262,19 @@ class RobotModel(DescribedModel):
     @property
     def default_base(self) -> str:
         """Name of its base."""
-        return "RethinkMount"
+        return choices_of(self.robot).get("base", "RethinkMount")
 
     @property
     def default_gripper(self) -> dict[str, str]:
         """Name of the gripper of each arm."""
-        return {arm: "default" for arm in self.description.hands}
+        own, hands = choices_of(self.robot), self.description.hands
+        return {arm: own.get(f"{arm}_gripper", "default") for arm in hands}
 
     @property
     def default_controller_config(self) -> dict[str, str]:
         """Name of the default config of each arm."""
-        return {arm: f"default_{self.name.lower()}" for arm in self.description.hands}
+        name = type(self).__name__.lower()
+        return {arm: f"default_{name}" for arm in self.description.hands}
 
 
 def _is_overridden(model: RobotModel, name: str) -> bool:
