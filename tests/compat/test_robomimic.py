@@ -172,8 +172,9 @@ def test_robots_answer_scripts(driver):
 def test_model_and_state_answer_by_name(driver):
     sim = driver.env.sim
     raw = driver.env.env.simulation.data
-    site = "robot0_right_tcp"
+    site = "gripper0_right_grip_site"
     assert site in sim.model.site_names
+    assert sim.model.site_name2id("robot0_right_tcp") == sim.model.site_name2id(site)
     index = sim.model.site_name2id(site)
     assert sim.model.site_id2name(index) == site
     np.testing.assert_array_equal(sim.data.get_site_xpos(site), raw.site_xpos[index])

@@ -148,7 +148,8 @@ def test_a_gripper_of_a_file_closes_on_an_arm(suite, files, robot):
     opened = seen["robot0_gripper_qpos"]
     hand = env.robots[0].gripper["right"]
     assert type(hand) is files[0]
-    assert hand.important_geoms["left_fingerpad"] == ["robot0_left_collision0"]
+    assert hand.important_geoms["left_fingerpad"] == ["gripper0_right_left_pad"]
+    assert hand.joints == ["gripper0_right_left_slide", "gripper0_right_right_slide"]
     action = np.zeros(env.action_dim)
     action[-1] = 1.0
     for _ in range(20):

@@ -161,7 +161,7 @@ def test_an_environment_of_a_user_runs(push):
     assert reward == pytest.approx(1.0 - np.tanh(10.0 * distance))
     assert not done
     assert push.check_contact(push.cube, "table")
-    assert push.get_contacts(push.cube) == {"table"}
+    assert push.get_contacts(push.cube) == {"table_collision"}
     push.sim.data.set_joint_qpos(push.cube.joints[0], [0.2, 0, 0.83, 1, 0, 0, 0])
     push.sim.forward()
     assert push._check_success()

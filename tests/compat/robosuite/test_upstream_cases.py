@@ -46,7 +46,8 @@ def test_single_arm_environments(suite, name):
 @pytest.mark.parametrize("name", DOUBLE)
 @pytest.mark.parametrize("robots", [["Panda", "Sawyer"], "Baxter"])
 def test_two_arm_environments(suite, name, robots):
-    env = suite.make(name, robots=robots, seed=0, **QUIET)
+    how = "bimanual" if robots == "Baxter" else "opposed"
+    env = suite.make(name, robots=robots, env_configuration=how, seed=0, **QUIET)
     drive(env)
     assert env._eef0_xpos.shape == env._eef1_xquat[:3].shape == (3,)
     env.close()

@@ -33,7 +33,10 @@ class PartController:
         config = getattr(self.__dict__["_part"], "config", None)
         if name.startswith("__") or not hasattr(config, name):
             raise AttributeError(f"{self.name} has no attribute '{name}'.")
-        return getattr(config, name)
+        value = getattr(config, name)
+        if name in ("input_max", "input_min", "output_max", "output_min"):
+            return np.broadcast_to(value, self.kp.shape).copy()
+        return value
 
     @property
     def control_limits(self) -> tuple[Vector, Vector]:
@@ -51,6 +54,11 @@ class PartController:
     def joint_vel(self) -> Vector:
         """Velocities of its joints."""
         return self._state.data.qvel[self.joint_index["qvel"]]
+
+    @property
+    def torques(self) -> Vector:
+        """Torques that the actuators of its joints exert now, N m or N."""
+        return self._state.data.qfrc_actuator[self.joint_index["qvel"]].copy()
 
     @property
     def kp(self) -> Vector:

@@ -25,6 +25,9 @@ SCENE = (
 )
 """Arguments of single tasks, whose numbers are in `tasks/*.toml` here."""
 
+_CONFIGURATIONS = {"bimanual": "single-robot"}
+"""Arrangements of robots that robosuite 1.5 renamed."""
+
 _RENAMED = {"damping": "damping_ratio", "damping_limits": "damping_ratio_limits"}
 """Keys of controllers that robosuite 1.5 renamed."""
 
@@ -41,7 +44,8 @@ def ours(given: Mapping[str, Any]) -> dict[str, Any]:
         camera = camera[0]
     kwargs["render_camera"] = "frontview" if camera in (None, "free") else camera
     configuration = str(kwargs.get("env_configuration") or "default")
-    kwargs["env_configuration"] = configuration.removeprefix("single-arm-")
+    configuration = configuration.removeprefix("single-arm-")
+    kwargs["env_configuration"] = _CONFIGURATIONS.get(configuration, configuration)
     for key in ("env_name", "type"):
         kwargs.pop(key, None)
     return kwargs

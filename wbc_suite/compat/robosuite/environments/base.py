@@ -105,6 +105,7 @@ class MujocoEnv(Observing):
         load_renderer_config(self.renderer)  # raises for unknown ones
         self.viewer = Viewer()
         self.timestep, self.done, self.deterministic_reset = 0, False, False
+        self._stepping = False
         self._ep_meta: dict[str, Any] = {}
         self._xml_processor: Callable[[str], str] | None = None
         self.model: Any = None
@@ -188,7 +189,11 @@ class MujocoEnv(Observing):
         if self.done:
             raise ValueError("executing action in terminated episode")
         self.timestep += 1
-        self._pre_action(action, True)
+        self._stepping = True
+        try:
+            self._pre_action(action, True)
+        finally:
+            self._stepping = False
         self._last_info = self.env.advance(self._of_enabled_parts(action))[3]
         reward, done, info = self._post_action(action)
         if "physics_error" in self._last_info:
@@ -219,8 +224,12 @@ class MujocoEnv(Observing):
 
     @property
     def cur_time(self) -> float:
-        """Time since the begin of the episode, s."""
+        """Time since the begin of the episode, s; writing it has no effect."""
         return self.timestep * self.control_timestep
+
+    @cur_time.setter
+    def cur_time(self, value: float) -> None:
+        """Do nothing: loops of scripts add to it beside `timestep`."""
 
     @property
     def action_spec(self) -> tuple[Vector, Vector]:

@@ -6,6 +6,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from wbc_suite.compat.robosuite import macros
+from wbc_suite.compat.robosuite.utils.mjcf_utils import IMAGE_CONVENTION_MAPPING
 from wbc_suite.compat.robosuite.utils.observables import Observable, sensor
 from wbc_suite.compat.robosuite.utils.transform_utils import mat2quat
 from wbc_suite.sensing.cameras import CameraRequest
@@ -47,7 +49,8 @@ class PolledObservables:
         core = self._env.env
         if not self._pictures:
             self._pictures = core.cameras.observation()
-        picture = self._pictures[key][::-1]
+        step = IMAGE_CONVENTION_MAPPING[macros.IMAGE_CONVENTION]
+        picture = self._pictures[key][::-step]
         if key.endswith("_depth"):
             picture = self._env.sim.opengl_depth(picture).astype(np.float32)
         return np.ascontiguousarray(picture)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from wbc_suite.benchmark import load_benchmark
-from wbc_suite.compat.robosuite.environments.aliases import aliases_of
+from wbc_suite.compat.robosuite.environments.aliases import SceneNames
 from wbc_suite.compat.robosuite.environments.arguments import (
     controller_of,
     one_each,
@@ -27,6 +27,10 @@ from wbc_suite.compat.robosuite.utils.binding_utils import (
     MjSim,
 )
 from wbc_suite.compat.robosuite.utils.observables import Observable, sensor
+from wbc_suite.compat.robosuite.utils.placement_samplers import (
+    ObjectPositionSampler,
+    SamplerOfTask,
+)
 from wbc_suite.compat.robosuite.utils.sim_utils import (
     check_contact,
     names_of,
@@ -48,6 +52,10 @@ class RobotEnv(MujocoEnv):
         given = [robots] if isinstance(robots, str) else list(robots)
         self.robot_names, self.num_robots = given, len(given)
         self.use_camera_obs = arguments.get("use_camera_obs", True)
+        for name, default in (("use_object_obs", True), ("reward_shaping", False)):
+            if not hasattr(self, name):  # classes of users set their own before
+                setattr(self, name, arguments.get(name, default))
+        self.env_configuration = arguments.get("env_configuration", "default")
         super().__init__(**arguments)
 
     def _load_model(self) -> None:
@@ -110,6 +118,9 @@ class RobotEnv(MujocoEnv):
                     robot.robot_model.load(own, None)
             models = [robot.robot_model for robot in self.robots]
             arguments["robots"] = [model.description for model in models]
+        given = arguments.get("placement_initializer")
+        if isinstance(given, ObjectPositionSampler):
+            arguments["placement_initializer"] = SamplerOfTask(given)
         return arguments
 
     def _make_sim(self, core: Core) -> MjSim:
@@ -120,7 +131,11 @@ class RobotEnv(MujocoEnv):
             self.robots, core.simulation.pairs, strict=True
         ):
             robot.bind(sim, state, controller)
-        sim.model._aliases = aliases_of(core.simulation.model, self.robots)
+        names = SceneNames(core.simulation.model, self.robots)
+        sim.model.understand(names.ours, names.theirs)
+        for robot in self.robots:
+            for model in (robot.robot_model, *robot.gripper.values()):
+                model.theirs = names.theirs
         return sim
 
     def _setup_observables(self) -> dict[str, Observable]:
@@ -137,10 +152,30 @@ class RobotEnv(MujocoEnv):
                 found += own
             readings = core.benchmark.observables()
             found += object_observables(readings, core.simulation.data, rate)
-        self._picture_keys = picture_keys(core.config.cameras)
+        cameras = core.config.cameras
+        self.camera_names = [camera.name for camera in cameras]
+        self.camera_heights = [camera.height for camera in cameras]
+        self.camera_widths = [camera.width for camera in cameras]
+        self.camera_depths = [camera.depth for camera in cameras]
+        self.num_cameras = len(cameras)
+        self._picture_keys = picture_keys(cameras)
         if self._picture_keys:
             found += camera_observables(self._picture_keys, self._picture, rate)
         return OrderedDict((o.name, o) for o in found)
+
+    def _pre_action(self, action: Any, policy_step: bool = False) -> None:
+        """Let the next `sim.step` follow the controllers, in loops of one's own.
+
+        With `policy_step` they take the action. In `step` it does nothing.
+        """
+        if self._stepping:
+            return
+        given, start = self._of_enabled_parts(action), 0
+        for robot in self.robots if policy_step else ():
+            stop = start + robot.action_dim
+            robot.composite_controller.set_goal(given[start:stop])
+            start = stop
+        self.sim.next_step = lambda: self.env.simulation.tick(1)
 
     def _of_enabled_parts(self, action: Any) -> Any:
         """Return the action with zeros for parts that are switched off; they hold."""

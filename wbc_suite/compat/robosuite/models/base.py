@@ -1,8 +1,9 @@
 """MJCF as trees of elements, and what all models of robosuite can tell."""
 
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import mujoco
@@ -100,6 +101,13 @@ class MujocoModel:
     bottom_offset: Any = np.zeros(3)
     top_offset: Any = np.zeros(3)
     horizontal_radius: Any = 0.0
+    theirs: Mapping[str, Mapping[str, str]] = MappingProxyType({})
+    """robosuite's names of elements in a scene by kind and ours; none before that."""
+
+    def shown(self, kind: str, names: Iterable[str]) -> list[str]:
+        """Return the names of elements as the scene shows them."""
+        known = self.theirs.get(kind, {})
+        return [known.get(name, name) for name in names]
 
     def correct_naming(self, names: Any) -> Any:
         """Return names with the model's prefix: one, a list, or values of a table."""

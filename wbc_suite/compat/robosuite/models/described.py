@@ -1,8 +1,11 @@
 """Robots and grippers of ours as trees of MJCF elements, for scenes made by hand."""
 
+import tomllib
 import xml.etree.ElementTree as ET
+from functools import cache
 from typing import Any
 
+from wbc_suite.catalogue import Catalogue
 from wbc_suite.compat.robosuite.models.base import SECTIONS, MujocoModel, MujocoXML
 from wbc_suite.compat.robosuite.utils.mjcf_utils import add_prefix
 from wbc_suite.robot import RobotDescription
@@ -28,3 +31,19 @@ class DescribedModel(MujocoXML, MujocoModel):  # pyright: ignore[reportIncompati
         MujocoXML.__init__(self, self.own_file or self.description.to_mjcf())
         self.tree = ET.ElementTree(self.root)
         add_prefix(self.root, self.naming_prefix)
+
+
+@cache
+def choices_of(robot: str) -> dict[str, str]:
+    """Return the parts of a robot of the catalogue that may be chosen, by name."""
+    catalogue, found = Catalogue(), {}
+    if not catalogue.holds("robots", robot):
+        return found
+    path = catalogue.find("robots", robot, kind="robot")
+    for part in tomllib.loads(path.read_text("utf-8")).get("part", ()):
+        folder, _, stem = str(part.get("component", "")).partition("/")
+        names = catalogue.names(f"robots/{folder}")
+        if "choice" in part and stem in names:
+            index = names.index(stem)
+            found[part["name"]] = catalogue.called(f"robots/{folder}")[index]
+    return found

@@ -68,7 +68,7 @@ class Robot(Measured):
     def _start_at(self, qpos: Any) -> None:
         """Write the joints' positions at the start into the description."""
         model, prefix = self.robot_model, len(self.robot_model.naming_prefix)
-        names = [name[prefix:] for name in model.joints]
+        names = [name[prefix:] for name in model.own_joints]
         robot = model.description
         ready = {**robot.keyframes["ready"], **dict(zip(names, qpos, strict=True))}
         keyframes = {**robot.keyframes, "ready": ready}
@@ -81,6 +81,8 @@ class Robot(Measured):
             has_one = f"{arm}_gripper" in robot.synergies
             given = self.gripper_type
             given = given.get(arm) if isinstance(given, Mapping) else given
+            if given == "default":
+                given = self.robot_model.default_gripper.get(arm)
             cls = GRIPPER_MAPPING.get(given, GripperModel) if has_one else NullGripper
             self.gripper[arm] = _mounted(cls, robot, prefix, arm, f"{self.idn}_{arm}")
 
@@ -102,19 +104,19 @@ class Robot(Measured):
         ids = [state.model.joint(state.prefix + n).id for n in self._joints(False)]
         self._ref_joint_indexes: Indices = np.array(ids)
         self._ref_gripper_joint_pos_indexes = {
-            arm: [sim.model.get_joint_qpos_addr(j) for j in g.joints]
+            arm: [sim.model.get_joint_qpos_addr(j) for j in g.own_joints]
             for arm, g in self.gripper.items()
         }
         self._ref_gripper_joint_vel_indexes = {
-            arm: [sim.model.get_joint_qvel_addr(j) for j in g.joints]
+            arm: [sim.model.get_joint_qvel_addr(j) for j in g.own_joints]
             for arm, g in self.gripper.items()
         }
 
     def _joints(self, grippers: bool) -> tuple[str, ...]:
         robot, prefix = self.robot_model, len(self.robot_model.naming_prefix)
-        names = [*robot.joints]
+        names = [*robot.own_joints]
         if grippers:
-            names += [j for g in self.gripper.values() for j in g.joints]
+            names += [j for g in self.gripper.values() for j in g.own_joints]
         return tuple(name[prefix:] for name in names)
 
     def __getattr__(self, name: str) -> Any:
@@ -153,6 +155,17 @@ class Robot(Measured):
     def joint_indexes(self) -> list[int]:
         """Indices of its joints in the scene, without grippers."""
         return self._ref_joint_indexes.tolist()
+
+    @property
+    def part_controller_config(self) -> dict[str, Any]:
+        """Configs of the parts that it has, by name, those of grippers included."""
+        config, found = self.composite_controller_config, {}
+        given = config.get("body_parts", {}) if isinstance(config, Mapping) else {}
+        for part in self.part_controllers:
+            arm = part.removesuffix("_gripper")
+            own = given.get(arm, {})
+            found[part] = own if part == arm else own.get("gripper", {})
+        return found
 
     @property
     def part_controllers(self) -> dict[str, Any]:
@@ -205,7 +218,7 @@ class Robot(Measured):
     @property
     def torque_limits(self) -> tuple[Vector, Vector]:
         """Least and greatest torques of its joints' actuators, N m or N."""
-        model, names = self._state.model, self.robot_model.joints
+        model, names = self._state.model, self.robot_model.own_joints
         known = {model.actuator(i).name: i for i in range(model.nu)}
         ids = [known[name] for name in names if name in known]
         low, high = model.actuator_ctrlrange[ids].T

@@ -28,7 +28,7 @@ class MjModel:
     """MuJoCo's model (`_model`), and names and indices of its elements.
 
     `site_name2id(name)`, `site_id2name(index)`, `site_names` and the like exist for all
-    kinds. Names are ours; robosuite's are understood as well.
+    kinds. Elements that robosuite has too have its names; ours are understood as well.
     """
 
     def __init__(
@@ -38,6 +38,7 @@ class MjModel:
         write_xml: Callable[[], str] | None = None,
     ) -> None:
         self._model, self._aliases = model, aliases or {}
+        self.theirs: Aliases = {}
         self._write_xml = write_xml
         self._all: dict[str, tuple[str, ...]] = {}
         self._ids: dict[str, dict[str, int]] = {}
@@ -59,19 +60,33 @@ class MjModel:
         if kind not in self._all:
             count = getattr(self._model, f"n{_COUNTS.get(kind, kind)}")
             get = getattr(self._model, kind)
-            self._all[kind] = tuple(get(i).name for i in range(count))
-            self._ids[kind] = {n: i for i, n in enumerate(self._all[kind]) if n}
+            own = tuple(get(i).name for i in range(count))
+            theirs = self.theirs.get(kind, {})
+            self._all[kind] = tuple(theirs.get(name, name) for name in own)
+            ids = {name: i for i, name in enumerate(own) if name}
+            others = self._aliases.get(kind, {}).items()
+            more = {name: ids[n] for name, n in others if n in ids}
+            self._ids[kind] = more | ids
         return self._all[kind]
+
+    def understand(self, aliases: Aliases, theirs: Aliases) -> None:
+        """Take over other names of elements, and those that are shown."""
+        self._aliases, self.theirs = aliases, theirs
+        self._all, self._ids = {}, {}
+
+    def find(self, kind: str, name: str) -> int | None:
+        """Return the index of an element; None if there is none with that name."""
+        self.names(kind)
+        return self._ids[kind].get(name)
 
     def index(self, kind: str, name: str | int) -> int:
         """Return the index of an element; raises UnknownNameError."""
         if isinstance(name, int | np.integer):
             return int(name)
-        names, ids = self.names(kind), self._ids[kind]
-        name = self._aliases.get(kind, {}).get(name, name) if name not in ids else name
-        if name not in ids:
-            raise UnknownNameError(kind, name, [known for known in names if known])
-        return ids[name]
+        found = self.find(kind, name)
+        if found is None:
+            raise UnknownNameError(kind, name, self._ids[kind])
+        return found
 
     def get_xml(self) -> str:
         """Return the scene as MJCF text, as it is now."""
@@ -223,6 +238,7 @@ class MjSim:
         self.model = MjModel(model, aliases, write_xml)
         self.data = MjData(self.model, mujoco.MjData(model) if data is None else data)
         self._cameras, self._start = cameras, start
+        self.next_step: Callable[[], None] | None = None
 
     @classmethod
     def from_xml_string(cls, xml: str) -> "MjSim":
@@ -243,7 +259,10 @@ class MjSim:
         mujoco.mj_forward(self.model._model, self.data._data)
 
     def step(self, with_udd: bool = True) -> None:
-        """Advance physics by one step with the present controls."""
+        """Advance physics by one step: by `next_step`, or with the present controls."""
+        if self.next_step is not None:
+            advance, self.next_step = self.next_step, None
+            return advance()
         mujoco.mj_step(self.model._model, self.data._data)
 
     def step1(self) -> None:

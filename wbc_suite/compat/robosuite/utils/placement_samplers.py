@@ -6,10 +6,45 @@ from typing import Any
 
 import numpy as np
 
+from wbc_suite.compat.robosuite.models.objects.scene import TaskObject
 from wbc_suite.compat.robosuite.utils.transform_utils import quat_multiply
 from wbc_suite.errors import ConfigError, PlacementError
+from wbc_suite.scene.placement import Objects, Placed, Placements, Taken
 
 TRIES = 5000
+
+
+class SamplerOfTask:
+    """A sampler of robosuite's for the objects of one of our tasks."""
+
+    def __init__(self, sampler: "ObjectPositionSampler") -> None:
+        self.sampler = sampler
+
+    def sample(
+        self, rng: np.random.Generator, objects: Objects, taken: Taken
+    ) -> Placements:
+        """Return a pose of each object; see `wbc_suite.scene.placement`.
+
+        Of a composite, the sampler `{object}Sampler` places the object, as robosuite's.
+        """
+        sampler = self.sampler
+        sampler.reset()
+        own = [TaskObject(state) for state in objects.values()]
+        parts = getattr(sampler, "samplers", None)
+        if parts is None:
+            sampler.add_objects(own)
+        for name, part in (parts or {}).items():
+            part.add_objects([item for item in own if name == f"{item.name}Sampler"])
+        for part in (sampler, *(parts or {}).values()):
+            part.rng = rng
+        return {
+            name: Placed(
+                position=(float(x), float(y), float(z)),
+                quat=(float(w), float(i), float(j), float(k)),
+                extent=objects[name].extent(),
+            )
+            for name, ((x, y, z), (w, i, j, k), _) in sampler.sample().items()
+        }
 
 
 class ObjectPositionSampler:

@@ -6,11 +6,10 @@ from typing import Any
 from wbc_suite.compat.robosuite.utils.binding_utils import MjSim
 
 
-def contact_names(sim: MjSim) -> list[tuple[str | None, str | None]]:
-    """Return the names of the two geoms of each contact."""
-    names, data = sim.model.names("geom"), sim.data._data
-    pairs = data.contact.geom.tolist() if data.ncon else []
-    return [(names[a] or None, names[b] or None) for a, b in pairs]
+def contact_pairs(sim: MjSim) -> list[list[int]]:
+    """Return the two geoms of each contact."""
+    data = sim.data._data
+    return data.contact.geom.tolist() if data.ncon else []
 
 
 def names_of(geoms: Any) -> set[str]:
@@ -21,9 +20,9 @@ def names_of(geoms: Any) -> set[str]:
 
 def check_contact(sim: MjSim, geoms_1: Any, geoms_2: Any = None) -> bool:
     """Whether a geom of the first set touches one of the second, or any other."""
-    first = _resolved(sim, names_of(geoms_1))
-    second = None if geoms_2 is None else _resolved(sim, names_of(geoms_2))
-    for a, b in contact_names(sim):
+    first = _indices(sim, names_of(geoms_1))
+    second = None if geoms_2 is None else _indices(sim, names_of(geoms_2))
+    for a, b in contact_pairs(sim):
         for one, other in ((a, b), (b, a)):
             if one in first and (second is None or other in second):
                 return True
@@ -32,18 +31,14 @@ def check_contact(sim: MjSim, geoms_1: Any, geoms_2: Any = None) -> bool:
 
 def get_contacts(sim: MjSim, model: Any) -> set[str]:
     """Return the names of the geoms that touch a model, its own left out."""
-    own = _resolved(sim, names_of(model))
-    found: set[str] = set()
-    for a, b in contact_names(sim):
-        if a in own and b not in own and b is not None:
-            found.add(b)
-        elif b in own and a not in own and a is not None:
-            found.add(a)
-    return found
+    own, names = _indices(sim, names_of(model)), sim.model.names("geom")
+    touching = {
+        b if a in own else a for a, b in contact_pairs(sim) if (a in own) != (b in own)
+    }
+    return {names[geom] for geom in touching if names[geom]}
 
 
-def _resolved(sim: MjSim, names: Iterable[str]) -> set[str]:
-    """Return names in the scene for those that may be robosuite's."""
-    known, ids = sim.model.names("geom"), sim.model
-    aliases = ids._aliases.get("geom", {})
-    return {name if name in known else aliases.get(name, name) for name in names}
+def _indices(sim: MjSim, names: Iterable[str]) -> set[int]:
+    """Return the indices of geoms; names that the scene does not have are left out."""
+    found = (sim.model.find("geom", name) for name in names)
+    return {index for index in found if index is not None}

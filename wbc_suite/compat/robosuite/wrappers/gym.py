@@ -31,6 +31,9 @@ class GymWrapper(gymnasium.Env[Any, Any]):
             keys = [key for kind in kinds for key in example if key.endswith(kind)]
         self.keys = list(keys)
         first = self._chosen(example)
+        self.modality_dims = {key: np.shape(example[key]) for key in self.keys}
+        self.obs_dim = sum(np.size(example[key]) for key in self.keys)
+        self.reward_range = (0, env.reward_scale)
         if flatten_obs:
             self.observation_space = _box(first)
         else:
@@ -39,7 +42,12 @@ class GymWrapper(gymnasium.Env[Any, Any]):
             )
         low, high = (limit.astype(np.float32) for limit in env.action_spec)
         self.action_space = gymnasium.spaces.Box(low, high, dtype=np.float32)
-        self.name = f"{'_'.join(r.name for r in env.robots)}_{env.name}"
+        self.name = f"{''.join(robot.name for robot in env.robots)}_{env.name}"
+
+    def __getattr__(self, name: str) -> Any:
+        if name == "env" or name.startswith("__"):
+            raise AttributeError(name)
+        return getattr(self.env, name)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

@@ -21,8 +21,9 @@ def _setup_references(self: Any) -> None:
     for item in self.objects:
         if not hasattr(self, item.name):
             setattr(self, item.name, item)
-    if "cube" in states:
-        self.cube_body_id = states["cube"].body
+        setattr(self, f"{item.name}_body_id", states[item.name].body)
+    self.obj_body_id = {name: state.body for name, state in states.items()}
+    self.obj_geom_id = {name: sorted(state.geoms) for name, state in states.items()}
     table = getattr(getattr(self.env.benchmark, "config", None), "table", None)
     if table is not None:
         self.table_full_size, self.table_offset = table.size, table.center

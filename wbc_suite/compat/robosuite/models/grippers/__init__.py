@@ -6,6 +6,11 @@ import numpy as np
 
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.compat.robosuite.models.described import DescribedModel
+from wbc_suite.compat.robosuite.models.grippers.fingers import (
+    finger_sides,
+    moved_links,
+    pads,
+)
 from wbc_suite.compat.robosuite.models.own_files import changed, collision_names
 from wbc_suite.compat.robosuite.utils.mjcf_utils import array_to_string
 from wbc_suite.robot import RobotDescription, load_robot
@@ -68,10 +73,8 @@ class GripperModel(DescribedModel):
             frame = robot.hands[arm]
         self._frame, self._arm = frame, arm
         own = self.description
-        every = [] if robot is not None else [link.name for link in own.links]
-        self._links = gripper_links(own, arm, frame) if frame else every
-        if self.own_file is not None and not own.synergies:  # alone, as read
-            self._links = [link.name for link in own.links]
+        every = [link.name for link in own.links]
+        self._links = every if robot is None else gripper_links(own, arm, frame)
 
     @property
     def name(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride] - its class's
@@ -127,27 +130,31 @@ class GripperModel(DescribedModel):
                 actuator.attrib |= {"ctrlrange": text, "ctrllimited": "true"}
 
     @property
+    def own_joints(self) -> list[str]:
+        """Names of its joints in our model."""
+        links = map(self.description.link, self._moved())
+        return [self.prefix + link.joint.name for link in links if link.joint]
+
+    @property
     def joints(self) -> list[str]:
         """Names of its joints in the scene."""
-        robot, links = self.description, set(self._links)
-        return [
-            self.prefix + link.joint.name
-            for link in robot.links
-            if link.joint is not None and link.name in links and self._moves(link)
-        ]
+        return self.shown("joint", self.own_joints)
 
-    def _moves(self, link: Any) -> bool:
-        """Whether a link is moved by the gripper, not by the arm."""
-        robot = self.description
-        own = self.own_file is not None and not robot.synergies  # alone, as read
-        arms = {j for g, js in robot.groups.items() if g.endswith("arm") for j in js}
-        arms = set() if own else arms
-        return link.joint.name not in arms
+    def _moved(self) -> list[str]:
+        groups = self.description.groups.items()
+        alone = self.prefix == self.naming_prefix
+        arms = {j for g, js in groups if g.endswith("arm") and not alone for j in js}
+        return moved_links(self.description, self._links, arms)
+
+    @property
+    def own_actuators(self) -> list[str]:
+        """Names of its actuators in our model, which are called like joints."""
+        return [self.prefix + name for name in self._driven()]
 
     @property
     def actuators(self) -> list[str]:
-        """Names of its actuators, which are called like joints."""
-        return [self.prefix + name for name in self._driven()]
+        """Names of its actuators in the scene."""
+        return self.shown("actuator", self.own_actuators)
 
     @property
     def sites(self) -> list[str]:
@@ -157,6 +164,11 @@ class GripperModel(DescribedModel):
     @property
     def contact_geoms(self) -> list[str]:
         """Names of its geoms that collide."""
+        return self.shown("geom", self.own_contact_geoms)
+
+    @property
+    def own_contact_geoms(self) -> list[str]:
+        """Names of its geoms that collide in our model."""
         return [name for link in self._links for name in self._geoms(link)]
 
     def _geoms(self, name: str) -> list[str]:
@@ -170,26 +182,28 @@ class GripperModel(DescribedModel):
 
     @property
     def important_geoms(self) -> dict[str, list[str]]:
-        """Geoms of the fingers by side; by default the first half is left."""
+        """Geoms of the fingers, and of what touches objects, by side."""
+        found = self.own_important_geoms.items()
+        return {role: self.shown("geom", names) for role, names in found}
+
+    @property
+    def own_important_geoms(self) -> dict[str, list[str]]:
+        """Names of `important_geoms` in our model."""
         if self._important_geoms:
             own = self.geom_names
             return {
                 role: [own[name] for name in names if name in own]
                 for role, names in self._important_geoms.items()
             }
-        fingers = [
-            link.name
-            for link in self.description.links
-            if link.name in self._links and link.joint and self._moves(link)
-        ]
-        if not fingers:
-            return {k: [] for k in ("left_finger", "right_finger")}
-        lefts = [f for f in fingers if "left" in f] or fingers[: len(fingers) // 2]
-        rights = [f for f in fingers if f not in lefts]
-        sides = {"left_finger": lefts, "right_finger": rights}
+        fingers = self._moved()
+        solid = [name for name in self._links if self._geoms(name)]
+        sides = finger_sides(fingers, solid if fingers else (), self._arm)
         found = {k: [g for f in v for g in self._geoms(f)] for k, v in sides.items()}
-        pads = {f"{k}pad": geoms[-1:] for k, geoms in found.items()}
-        return found | pads
+        touching = {
+            f"{side}pad": [g for f in pads(links) for g in self._geoms(f)[-1:]]
+            for side, links in sides.items()
+        }
+        return found | touching
 
     @property
     def geom_names(self) -> dict[str, str]:
@@ -224,7 +238,7 @@ class GripperModel(DescribedModel):
         ready = self.description.keyframes.get("ready") and self.description.keyframe(
             "ready"
         )
-        names = [name.removeprefix(self.prefix) for name in self.joints]
+        names = [name.removeprefix(self.prefix) for name in self.own_joints]
         return np.array([ready[n] if ready else 0.0 for n in names])
 
 

@@ -2,6 +2,8 @@
 
 from typing import Any
 
+import numpy as np
+
 from wbc_suite.compat.robosuite.models.base import MujocoModel
 from wbc_suite.scene.objects import ObjectState
 
@@ -33,6 +35,16 @@ class TaskObject(MujocoModel):
     def horizontal_radius(self) -> Any:  # pyright: ignore[reportIncompatibleVariableOverride] - measured
         """Radius of its upright bounding cylinder, m."""
         return self._state.extent().radius
+
+    @property
+    def bottom_offset(self) -> Any:  # pyright: ignore[reportIncompatibleVariableOverride] - measured
+        """Its lowest point when it stands upright, from its origin, m."""
+        return np.array([0.0, 0.0, -self._state.extent().bottom])
+
+    @property
+    def top_offset(self) -> Any:  # pyright: ignore[reportIncompatibleVariableOverride] - measured
+        """Its highest point when it stands upright, from its origin, m."""
+        return np.array([0.0, 0.0, self._state.extent().top])
 
     @property
     def sites(self) -> list[str]:

@@ -11,13 +11,14 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.catalogue import Catalogue
-from wbc_suite.compat.robosuite.models.described import DescribedModel
+from wbc_suite.compat.robosuite.models.described import DescribedModel, choices_of
 from wbc_suite.compat.robosuite.models.own_files import arm_file, changed, gripper_file
 from wbc_suite.compat.robosuite.models.robots.passive import with_passive_joints
 from wbc_suite.compat.robosuite.utils.transform_utils import euler2mat
 from wbc_suite.errors import UnknownNameError
 from wbc_suite.robot import RobotDescription, load_robot
 from wbc_suite.robot.poses import pose_fields
+from wbc_suite.sensing.hands import gripper_links
 from wbc_suite.typing import Vector
 
 log = logging.getLogger(__name__)
@@ -35,8 +36,6 @@ REGISTERED_ROBOTS: dict[str, type["RobotModel"]] = {}
 """Classes of robot models by name."""
 
 _NO_MODELS = ("RobotModel", "ManipulatorModel", "LeggedManipulatorModel")
-
-_LEGGED, _WHEELED = ("GR1", "Spot"), ("Tiago", "PandaOmron")
 
 BASE_X = {"default": -0.16, "GR1": -0.15, "Spot": -0.5}
 """Place of a robot before a table of no length, m, by the begin of its name."""
@@ -127,11 +126,16 @@ class RobotModel(DescribedModel):
     @property
     def dof(self) -> int:
         """Number of its driven joints, without grippers."""
-        return len(self.joints)
+        return len(self.own_joints)
 
     @property
     def joints(self) -> list[str]:
         """Names of its joints in the scene, without those of grippers."""
+        return self.shown("joint", self.own_joints)
+
+    @property
+    def own_joints(self) -> list[str]:
+        """Names of its joints in our model, without those of grippers."""
         prefix, robot = self.naming_prefix, self.description
         fingers = set(self._fingers())
         own = [j.name for j in robot.joints if j.mimic is None]
@@ -141,20 +145,34 @@ class RobotModel(DescribedModel):
 
     @property
     def arm_joints(self) -> list[str]:
-        """Names of the joints of its arms."""
+        """Names of the joints of its arms in the scene."""
+        return self.shown("joint", self.own_arm_joints)
+
+    @property
+    def own_arm_joints(self) -> list[str]:
+        """Names of the joints of its arms in our model."""
         groups = self.description.groups
         names = [j for g, js in groups.items() if g.endswith("arm") for j in js]
         return [self.naming_prefix + name for name in names]
 
     @property
     def actuators(self) -> list[str]:
-        """Names of the actuators of its joints, which are called like them."""
-        return self.joints
+        """Names of the actuators of its joints."""
+        return self.shown("actuator", self.own_joints)
+
+    @property
+    def own_links(self) -> list[Any]:
+        """Links of our model without those of grippers."""
+        robot, known = self.description, self.description.synergies
+        hands = [h for h in robot.hands.items() if f"{h[0]}_gripper" in known]
+        held = {name for hand in hands for name in gripper_links(robot, *hand)}
+        return [link for link in robot.links if link.name not in held]
 
     @property
     def bodies(self) -> list[str]:
         """Names of its bodies."""
-        return [self.naming_prefix + link.name for link in self.description.links]
+        links = self.own_links
+        return self.shown("body", [self.naming_prefix + link.name for link in links])
 
     @property
     def root_body(self) -> str:
@@ -183,17 +201,12 @@ class RobotModel(DescribedModel):
         fingers, links = set(self._fingers()), self.description.links
         joined = [x for x in links if x.joint and x.joint.mimic is None]
         moved = [x for x in joined if x.joint and x.joint.name not in fingers]
-        given = dict(
-            zip(
-                (x.name for x in moved),
-                np.broadcast_to(values, len(moved)),
-                strict=True,
-            )
-        )
+        each = np.broadcast_to(values, len(moved))
+        given = {x.name: float(v) for x, v in zip(moved, each, strict=True)}
         changes = {link.name: link for link in links}
         for link in moved:
             if link.joint and (force or not getattr(link.joint, attrib)):
-                value = {attrib: float(given[link.name])}
+                value = {attrib: given[link.name]}
                 update = {"joint": link.joint.model_copy(update=value)}
                 changes[link.name] = link.model_copy(update=update)
         self.description = changed(self.description, links=tuple(changes.values()))
@@ -208,18 +221,16 @@ class RobotModel(DescribedModel):
         return self._geoms("visual")
 
     def _geoms(self, kind: str) -> list[str]:
-        return [
-            f"{self.naming_prefix}{link.name}_{kind}{k}"
-            for link in self.description.links
-            for k in range(len(getattr(link, kind)))
-        ]
+        own = ((link.name, len(getattr(link, kind))) for link in self.own_links)
+        names = (f"{name}_{kind}{k}" for name, count in own for k in range(count))
+        return self.shown("geom", (self.naming_prefix + name for name in names))
 
     @property
     def init_qpos(self) -> Vector:
         """Positions of its joints at the start, without grippers."""
         ready = self.description.keyframe("ready")
         prefix = len(self.naming_prefix)
-        return np.array([ready[name[prefix:]] for name in self.joints])
+        return np.array([ready[name[prefix:]] for name in self.own_joints])
 
     @property
     def base_xpos_offset(self) -> dict[str, Any]:
@@ -251,17 +262,19 @@ class RobotModel(DescribedModel):
     @property
     def default_base(self) -> str:
         """Name of its base."""
-        return "RethinkMount"
+        return choices_of(self.robot).get("base", "RethinkMount")
 
     @property
     def default_gripper(self) -> dict[str, str]:
         """Name of the gripper of each arm."""
-        return {arm: "default" for arm in self.description.hands}
+        own, hands = choices_of(self.robot), self.description.hands
+        return {arm: own.get(f"{arm}_gripper", "default") for arm in hands}
 
     @property
     def default_controller_config(self) -> dict[str, str]:
         """Name of the default config of each arm."""
-        return {arm: f"default_{self.name.lower()}" for arm in self.description.hands}
+        name = type(self).__name__.lower()
+        return {arm: f"default_{name}" for arm in self.description.hands}
 
 
 def _is_overridden(model: RobotModel, name: str) -> bool:
@@ -292,11 +305,15 @@ class ManipulatorModel(RobotModel):
 
     @property
     def eef_name(self) -> dict[str, str]:
-        """Name of the body at the end of each arm."""
-        prefix, robot = self.naming_prefix, self.description
-        if self.own_file is not None:
-            return {arm: prefix + self._eef_name[arm] for arm in robot.hands}
-        return {arm: prefix + robot.link_of(f) for arm, f in robot.hands.items()}
+        """Name of the body at the end of each arm in the scene."""
+        own = self.own_eef_name
+        return dict(zip(own, self.shown("body", own.values()), strict=True))
+
+    @property
+    def own_eef_name(self) -> dict[str, str]:
+        """Name of the body at the end of each arm in our model."""
+        ends, prefix = self._eef_name, self.naming_prefix
+        return {arm: prefix + ends[arm] for arm in self.description.hands}
 
 
 def register_robot(target_class: type[RobotModel]) -> type[RobotModel]:
