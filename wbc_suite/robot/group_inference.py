@@ -1,19 +1,16 @@
 """Infer groups, end-effector frames and a ready posture of an imported robot.
 
-The words of link and joint names, and the structure of the tree, give them. Users edit
-the result after `to_toml()`.
+Words of names and the structure of the tree give them. Users edit the result.
 """
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-
 from wbc_suite.robot.elements import Frame, Link, rigid_bodies
-from wbc_suite.robot.poses import rotation_matrix
-from wbc_suite.robot.shape_geometry import hull_spheres
+from wbc_suite.robot.shape_geometry import farthest_point
 
 if TYPE_CHECKING:
     from wbc_suite.robot.importing import NameTable
@@ -39,7 +36,8 @@ PAIRS = {
 }
 """Words for the legs of quadrupeds."""
 PAIR_OF = {word: pair for pair, words in PAIRS.items() for word in words.split()}
-ENDS = {"front": "front", "fore": "front", "rear": "rear", "hind": "rear"}
+ENDS = {"front": "front", "fore": "front"}
+ENDS |= dict.fromkeys(("rear", "hind", "back"), "rear")
 
 END_OF = {
     "arm": "eef",
@@ -50,26 +48,17 @@ END_OF = {
 }
 """Role of the frame at the end of a limb."""
 
-END_WORDS = {
-    "arm": {
-        "eef",
-        "ee",
-        "effector",
-        "tcp",
-        "tool",
-        "flange",
-        "grasp",
-        "grasping",
-        "tip",
-    },
-    "gripper": {"tcp", "grasp", "grasping", "tool"},
-    "leg": {"foot", "sole", "toe"},
+ENDINGS = {
+    "arm": "eef ee effector tcp tool flange grasp grasping tip",
+    "gripper": "tcp grasp grasping tool",
+    "leg": "foot sole toe",
 }
+END_WORDS = {kind: set(words.split()) for kind, words in ENDINGS.items()}
 """Words in the names of frames and links at the end of a limb."""
 
 
-POINT_FOOT = 3
-"""A leg with at most so many joints and no named end stands on its outermost point."""
+MIN_ARM = 3  # joints; a shorter chain beside a left and a right arm is a head
+POINT_FOOT = 3  # joints of a leg that stands on its outermost point, if it has no name
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -102,8 +91,9 @@ def infer_limbs(links: Sequence[Link]) -> tuple[Limb, ...]:
     of an arm form a gripper; a chain below a torso or the root is an arm. A single arm
     is the right one; several arms without a side are numbered. Two slides and a hinge
     that move all others in a plane are a base. The fingers of a hand alone are arms.
+    One or two joints without a side beside two arms that have one are a head.
     """
-    traits = _traits(links)
+    traits = _without_masts(_traits(links))
     if not any(own.kind == "arm" for own in traits.values()):
         traits = _fingers_as_arms(traits, _moving_parents(links))
     arms = list(dict.fromkeys(x.top for x in traits.values() if x.kind == "arm"))
@@ -132,6 +122,7 @@ def _traits(links: Sequence[Link]) -> dict[str, _Traits]:
     """Return kind, side and top of each moving link, by name."""
     parents = _moving_parents(links)
     owners, driving = list(parents.values()), _planar_base(links, parents)
+    named = _named_kinds(links, parents)
     traits: dict[str, _Traits] = {}
     for link in links:
         if link.joint is None:
@@ -139,7 +130,7 @@ def _traits(links: Sequence[Link]) -> dict[str, _Traits]:
         parent = parents[link.name]
         above = traits.get(parent or "", _Traits())
         words = [*_words(link.joint.name), *_words(link.name)]
-        kind = next((KIND_OF[w] for w in words if w in KIND_OF), None)
+        kind = named[link.name]
         if link.name in driving:
             kind = "base"
         elif FINGERS.intersection(_words(link.joint.name)):
@@ -161,6 +152,32 @@ def _traits(links: Sequence[Link]) -> dict[str, _Traits]:
     return traits
 
 
+def _named_kinds(
+    links: Sequence[Link], parents: dict[str, str | None]
+) -> dict[str, str | None]:
+    """Return the kind that words give each moving link, None without one.
+
+    What carries only legs is a leg, and what carries a left and a right arm a torso.
+    """
+    kinds: dict[str, str | None] = {}
+    arms: dict[str, set[str]] = {}  # sides of the arms from a link on
+    for link in reversed(links):
+        if link.joint is None:
+            continue
+        words = [*_words(link.joint.name), *_words(link.name)]
+        kind = next((KIND_OF[w] for w in words if w in KIND_OF), None)
+        below = [name for name, own in parents.items() if own == link.name]
+        arms[link.name] = set[str]().union(*(arms[name] for name in below))
+        if kind is None and {kinds[name] for name in below} == {"leg"}:
+            kind = "leg"
+        elif kind is None and len(arms[link.name]) > 1:
+            kind = "torso"
+        elif kind == "arm" and (side := _side(words, pairs=False)):
+            arms[link.name].add(side)
+        kinds[link.name] = kind
+    return kinds
+
+
 def _fingers_as_arms(
     traits: dict[str, _Traits], parents: dict[str, str | None]
 ) -> dict[str, _Traits]:
@@ -172,6 +189,18 @@ def _fingers_as_arms(
             top = above.top if above.kind == "arm" else name
             changed[name] = _Traits("arm", "", top)
     return changed
+
+
+def _without_masts(traits: dict[str, _Traits]) -> dict[str, _Traits]:
+    """Return the traits with what is too short for an arm, beside two, as a head."""
+    arms = [own for own in traits.values() if own.kind == "arm"]
+    length = Counter(own.top for own in arms)
+    if not {"left", "right"} <= {own.side for own in arms}:
+        return traits
+    masts = {top for top, joints in length.items() if joints < MIN_ARM}
+    masts -= {own.top for own in arms if own.side}
+    heads = {n: x._replace(kind="head") for n, x in traits.items() if x.top in masts}
+    return traits | heads
 
 
 def _planar_base(
@@ -238,8 +267,8 @@ def infer_ready(links: Sequence[Link]) -> dict[str, float]:
 
 
 def _words(name: str) -> list[str]:
-    """Split a name: `LHipYaw` gives l, hip, yaw; `arm_left_1` gives arm, left."""
-    parts = re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)
+    """Split a name: `LHipYaw` gives l, hip, yaw; `leftarm_1` gives left, arm."""
+    parts = re.findall(r"left|right|[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)
     return [part.lower() for part in parts]
 
 
@@ -266,13 +295,25 @@ def _moving_parents(links: Sequence[Link]) -> dict[str, str | None]:
 
 
 def _tips(links: Sequence[Link], limb: Limb) -> list[Link]:
-    """Return the last moving links of legs, and the deepest one of other limbs."""
+    """Return the last moving link of each leg (its toe), or the deepest of a limb."""
     above = _moving_parents(links)
     followed = {above[link.name] for link in limb.links}
     tips = [link for link in limb.links if link.name not in followed]
-    if limb.kind == "leg":
-        return tips
-    return [max(tips, key=lambda tip: _depth(tip.name, above))]
+    tops: dict[str, str] = {}
+    for link in limb.links:
+        tops[link.name] = tops.get(above[link.name] or "", link.name)
+
+    def rank(tip: Link) -> tuple[bool, int]:
+        foot = END_WORDS["leg"].intersection(_words(tip.name))
+        return limb.kind == "leg" and bool(foot), _depth(tip.name, above)
+
+    found: dict[str, Link] = {}
+    for tip in tips:
+        side = _side(_words(tip.name), pairs=True)
+        key = f"{side} {tops[tip.name]}" if limb.kind == "leg" else ""
+        if key not in found or rank(tip) > rank(found[key]):
+            found[key] = tip
+    return list(found.values())
 
 
 def _depth(name: str | None, above: dict[str, str | None]) -> int:
@@ -305,14 +346,5 @@ def _placed(
     above, leg = _moving_parents(links), {link.name for link in limb.links}
     chain = {n: parent if parent in leg else None for n, parent in above.items()}
     if limb.kind == "leg" and _depth(tip.name, chain) <= POINT_FOOT:
-        return {"link": tip.name, "pos": _farthest(tip)}
+        return {"link": tip.name, "pos": farthest_point(tip.collision or tip.visual)}
     return {"link": tip.name}
-
-
-def _farthest(link: Link) -> tuple[float, ...]:
-    """Return the centre of the sphere or the corner farthest from the link's joint."""
-    points = np.zeros((1, 3))
-    for shape in link.collision or link.visual:
-        own = hull_spheres(shape)[:, :3] @ rotation_matrix(shape).T + shape.pos
-        points = np.concatenate([points, own])
-    return tuple(points[np.argmax(np.linalg.norm(points, axis=1))].tolist())

@@ -128,7 +128,10 @@ def describe_import(
             return robot
         LOG.warning("%s: the feet in keyframe 'home' are not level; not used.", source)
         robot = _with_ready(robot, lambda robot: infer_ready(robot.links))
-    return _with_ready(_with_ready(robot, standing_legs), working_arms)
+    try:
+        return _with_ready(_with_ready(robot, standing_legs), working_arms)
+    except ValueError as error:  # of MuJoCo's compiler
+        raise DescriptionError(f"{source}: MuJoCo refuses it: {error}") from error
 
 
 def _with_ready(

@@ -22,6 +22,8 @@ STOP_MARGIN = 3e-3
 """Distance in rad at which the limit of a limb joint becomes active, since MuJoCo tests
 limits only at the start of a step (2 ms), and contacts accelerate joints to 2.6 rad/s.
 Controllers keep limbs this far inside; fingers rest at their limits and have none."""
+ROUNDING = 1e-12
+"""Relative reserve of the triangle inequality, which MuJoCo checks without any."""
 SITE_GROUP = 4  # site group of frames, hidden by default
 
 STIFF = (0.005, 1.0)
@@ -147,7 +149,10 @@ def _set_inertia(body: mujoco.MjsBody, inertia: pin.Inertia) -> None:
     body.mass = inertia.mass
     body.ipos = inertia.lever
     if inertia.inertia.any():
-        body.fullinertia = inertia_fields(inertia.inertia)
+        moments = np.linalg.eigvalsh(inertia.inertia)
+        excess = moments[2] * (1.0 + ROUNDING) - moments[0] - moments[1]
+        tensor = inertia.inertia + max(0.0, excess) * np.eye(3)
+        body.fullinertia = inertia_fields(tensor)
     else:  # a point mass, which MuJoCo refuses as a full tensor
         body.inertia = np.zeros(3)
 
