@@ -659,6 +659,30 @@ def test_what_lifts_both_arms_is_a_torso_and_no_arm(tmp_path):
     assert set(robot.hands) == {"left", "right"}
 
 
+def test_two_arms_without_sides_have_a_gripper_and_a_hand_each(tmp_path):
+    rows = [
+        f"{'base' if k == 0 else f'p{n}_{k}'} j{n}_{k} p{n}_{k + 1}"
+        for n in (1, 2)
+        for k in range(3)
+    ]
+    rows += [f"p{n}_3 f{n}_{k}_finger finger{n}_{k}" for n in (1, 2) for k in (1, 2)]
+    chain = [row.split() for row in rows]
+    links = "".join(f'<link name="{child}">{BODY}</link>' for *_, child in chain)
+    joints = "".join(joint(own, parent, child) for parent, own, child in chain)
+    robot = read_urdf(write(tmp_path, one_arm(links, joints)))
+    assert set(robot.groups) == {"arm_1", "arm_2", "gripper_1", "gripper_2"}
+    assert set(robot.hands) == {"eef_1", "eef_2"}
+
+
+def test_a_side_that_is_spelt_counts_more_than_a_letter(tmp_path):
+    rows = ["base r2_left_shoulder r2_l1", "base r2_right_shoulder r2_r1"]
+    chain = [row.split() for row in rows]
+    links = "".join(f'<link name="{child}">{BODY}</link>' for *_, child in chain)
+    joints = "".join(joint(own, parent, child) for parent, own, child in chain)
+    robot = read_urdf(write(tmp_path, one_arm(links, joints)))
+    assert set(robot.groups) == {"left_arm", "right_arm"}
+
+
 @pytest.mark.parametrize("name", LEGGED)
 def test_each_leg_has_one_foot(tmp_path, name):
     chain, feet = LEGGED[name]

@@ -3,41 +3,17 @@
 Words of names and the structure of the tree give them. Users edit the result.
 """
 
-import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from wbc_suite.robot.elements import Frame, Link, rigid_bodies
+from wbc_suite.robot.name_words import END_WORDS, FINGERS, kind_of, side_of, words_of
 from wbc_suite.robot.shape_geometry import farthest_point
 
 if TYPE_CHECKING:
     from wbc_suite.robot.importing import NameTable
-
-KINDS = {
-    "gripper": "finger fingers thumb gripper index middle ring pinky jaw knuckle",
-    "head": "head neck",
-    "torso": "torso waist trunk spine chest abdomen lift",
-    "leg": "leg hip knee ankle thigh calf shin foot toe haa hfe kfe",
-    "arm": "arm shoulder elbow wrist forearm upperarm",
-    "base": "wheel caster castor rotacastor",
-}
-"""Words of each kind of limb."""
-FINGERS = {"finger", "fingers", "thumb"}
-KIND_OF = {word: kind for kind, words in KINDS.items() for word in words.split()}
-
-SIDE_OF = {"left": "left", "l": "left", "right": "right", "r": "right"}
-PAIRS = {
-    "front_left": "fl lf",
-    "front_right": "fr rf",
-    "rear_left": "hl lh rl bl",
-    "rear_right": "hr rh rr br",
-}
-"""Words for the legs of quadrupeds."""
-PAIR_OF = {word: pair for pair, words in PAIRS.items() for word in words.split()}
-ENDS = {"front": "front", "fore": "front"}
-ENDS |= dict.fromkeys(("rear", "hind", "back"), "rear")
 
 END_OF = {
     "arm": "eef",
@@ -47,15 +23,6 @@ END_OF = {
     "torso": "torso",
 }
 """Role of the frame at the end of a limb."""
-
-ENDINGS = {
-    "arm": "eef ee effector tcp tool flange grasp grasping tip",
-    "gripper": "tcp grasp grasping tool",
-    "leg": "foot sole toe",
-}
-END_WORDS = {kind: set(words.split()) for kind, words in ENDINGS.items()}
-"""Words in the names of frames and links at the end of a limb."""
-
 
 MIN_ARM = 3  # joints; a shorter chain beside a left and a right arm is a head
 POINT_FOOT = 3  # joints of a leg that stands on its outermost point, if it has no name
@@ -100,17 +67,26 @@ def infer_limbs(links: Sequence[Link]) -> tuple[Limb, ...]:
     unnamed = [top for top in arms if not traits[top].side]
     grippers = [x.side for x in traits.values() if x.kind == "gripper"]
     single = len(arms) == len(unnamed) == 1 and not any(grippers)
+    numbers = {top: unnamed.index(top) + 1 for top in unnamed if len(unnamed) > 1}
+    above = _moving_parents(links)
     members: dict[tuple[str, str], list[Link]] = {}
+
+    def arm_of(name: str | None) -> str:
+        """Return the top of the arm that a link belongs to or is carried by."""
+        while name is not None and traits[name].kind != "arm":
+            name = above[name]
+        return "" if name is None else traits[name].top
+
     for link in links:
         if link.joint is None:
             continue
-        kind, side, top = traits[link.name]
+        kind, side, _ = traits[link.name]
         side = "right" if single else side
         name = "legs" if kind == "leg" else kind
         if kind in ("arm", "gripper") and side:
             name = f"{side}_{kind}"
-        elif kind == "arm" and len(unnamed) > 1:
-            name = f"arm_{unnamed.index(top) + 1}"
+        elif kind in ("arm", "gripper") and (number := numbers.get(arm_of(link.name))):
+            name = f"{kind}_{number}"
         members.setdefault((name, kind), []).append(link)
     return tuple(
         Limb(name=name, kind=kind, links=tuple(own))
@@ -129,11 +105,11 @@ def _traits(links: Sequence[Link]) -> dict[str, _Traits]:
             continue
         parent = parents[link.name]
         above = traits.get(parent or "", _Traits())
-        words = [*_words(link.joint.name), *_words(link.name)]
+        words = [*words_of(link.joint.name), *words_of(link.name)]
         kind = named[link.name]
         if link.name in driving:
             kind = "base"
-        elif FINGERS.intersection(_words(link.joint.name)):
+        elif FINGERS.intersection(words_of(link.joint.name)):
             kind = "gripper"  # "arm_right_finger"
         if kind is None and above.kind == "arm" and owners.count(parent) > 1:
             kind = "gripper"
@@ -141,12 +117,12 @@ def _traits(links: Sequence[Link]) -> dict[str, _Traits]:
             rolls = above.kind == "base" and parent not in driving  # rim of a wheel
             inherits = rolls or above.kind in ("leg", "gripper", "head")
             kind = above.kind if inherits else "arm"
-        if kind == "torso" and _side(words, pairs=False):
+        if kind == "torso" and side_of(words, pairs=False):
             kind = "arm"  # "waist" of the left one of two arms
         same_limb = above.kind in ("arm", "leg", "gripper")
         side = above.side if same_limb else ""
         if not (kind == "gripper" and same_limb):  # "left finger" of a right hand
-            side = _side(words, pairs=kind == "leg") or side
+            side = side_of(words, pairs=kind == "leg") or side
         top = above.top if above.kind == kind else link.name
         traits[link.name] = _Traits(kind, side, top)
     return traits
@@ -164,15 +140,15 @@ def _named_kinds(
     for link in reversed(links):
         if link.joint is None:
             continue
-        words = [*_words(link.joint.name), *_words(link.name)]
-        kind = next((KIND_OF[w] for w in words if w in KIND_OF), None)
+        words = [*words_of(link.joint.name), *words_of(link.name)]
+        kind = kind_of(words)
         below = [name for name, own in parents.items() if own == link.name]
         arms[link.name] = set[str]().union(*(arms[name] for name in below))
         if kind is None and {kinds[name] for name in below} == {"leg"}:
             kind = "leg"
         elif kind is None and len(arms[link.name]) > 1:
             kind = "torso"
-        elif kind == "arm" and (side := _side(words, pairs=False)):
+        elif kind == "arm" and (side := side_of(words, pairs=False)):
             arms[link.name].add(side)
         kinds[link.name] = kind
     return kinds
@@ -234,7 +210,7 @@ def infer_frames(
         for tip in _tips(links, limb) if role else ():
             name = limb.name.replace(limb.kind, str(role))
             if limb.kind == "leg":
-                side = _side(_words(tip.name), pairs=True)
+                side = side_of(words_of(tip.name), pairs=True)
                 name = "_".join(filter(None, (side, role)))
             placed = _placed(links, limb, tip, given)
             if any(frame.name == name for frame in given):
@@ -248,7 +224,7 @@ def infer_frames(
 
 def infer_role(name: str) -> str:
     """Return the role of a frame in the file if its name is unambiguous."""
-    words = _words(name)
+    words = words_of(name)
     if name in ("head", "torso", "base"):
         return name
     if words and words[-1] in ("tip", "foot"):
@@ -264,22 +240,6 @@ def infer_ready(links: Sequence[Link]) -> dict[str, float]:
             low, high = joint.range or (0.0, 0.0)
             ready[joint.name] = min(max(0.0, low), high)
     return ready
-
-
-def _words(name: str) -> list[str]:
-    """Split a name: `LHipYaw` gives l, hip, yaw; `leftarm_1` gives left, arm."""
-    parts = re.findall(r"left|right|[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)
-    return [part.lower() for part in parts]
-
-
-def _side(words: Sequence[str], *, pairs: bool) -> str:
-    """Return `left`, with `pairs` also `front_left`, or "" if no word gives a side."""
-    side = next((SIDE_OF[w] for w in words if w in SIDE_OF), "")
-    if not pairs:
-        return side
-    pair = next((PAIR_OF[w] for w in words if w in PAIR_OF), "")
-    end = next((ENDS[w] for w in words if w in ENDS), "")
-    return pair or (f"{end}_{side}" if end and side else side)
 
 
 def _moving_parents(links: Sequence[Link]) -> dict[str, str | None]:
@@ -304,12 +264,12 @@ def _tips(links: Sequence[Link], limb: Limb) -> list[Link]:
         tops[link.name] = tops.get(above[link.name] or "", link.name)
 
     def rank(tip: Link) -> tuple[bool, int]:
-        foot = END_WORDS["leg"].intersection(_words(tip.name))
+        foot = END_WORDS["leg"].intersection(words_of(tip.name))
         return limb.kind == "leg" and bool(foot), _depth(tip.name, above)
 
     found: dict[str, Link] = {}
     for tip in tips:
-        side = _side(_words(tip.name), pairs=True)
+        side = side_of(words_of(tip.name), pairs=True)
         key = f"{side} {tops[tip.name]}" if limb.kind == "leg" else ""
         if key not in found or rank(tip) > rank(found[key]):
             found[key] = tip
@@ -330,11 +290,13 @@ def _placed(
         tip = next(link for link in links if link.name == palm)
     end_words = END_WORDS.get(limb.kind, set[str]())
     for frame in given:
-        if rigid[frame.link] == tip.name and end_words.intersection(_words(frame.name)):
+        if rigid[frame.link] == tip.name and end_words.intersection(
+            words_of(frame.name)
+        ):
             return {"link": frame.link, "pos": frame.pos, "quat": frame.quat}
     fixed = [link for link in links if rigid[link.name] == tip.name]
     for link in fixed:
-        if end_words.intersection(_words(link.name)):
+        if end_words.intersection(words_of(link.name)):
             return {"link": link.name}
     if limb.kind == "gripper":
         return None
