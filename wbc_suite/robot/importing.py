@@ -104,7 +104,8 @@ def describe_import(
     limbs = infer_limbs(checked)
     placed = infer_frames(checked, limbs, given, names)
     actuated = {fields["joint"] for fields in others.get("actuators", ())}
-    driven = estimate_motors(checked, placed, actuated)
+    moving = [limb.joints for limb in limbs if limb.kind in ("arm", "leg")]
+    driven = estimate_motors(checked, placed, actuated, moving)
     deviations: tuple[str, ...] = ()
     if driven != checked:
         deviations = ("efforts and armatures are estimated: the file has few or none",)
