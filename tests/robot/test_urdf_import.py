@@ -422,6 +422,7 @@ def test_a_link_out_of_the_folder_is_not_followed(tmp_path):
         ),
         ("pack/robots/r.urdf", "pack/part.stl", "model://pack/part.stl"),
         ("robots/arm/r.urdf", "robots/hand/meshes/part.stl", "../hand/meshes/part.stl"),
+        ("arm/urdf/r.urdf", "arm/meshes/m1/seen/part.stl", "package://seen/part.stl"),
     ],
 )
 def test_meshes_are_found_in_the_package_around_the_file(
@@ -435,6 +436,14 @@ def test_meshes_are_found_in_the_package_around_the_file(
     assert isinstance(robot.links[0].visual[0], Hull)
     (skin,) = robot.skins[robot.links[0].name]
     assert Path(skin.file) == tmp_path / mesh
+
+
+def test_of_two_meshes_with_one_name_elsewhere_none_is_taken(tmp_path, caplog):
+    for folder in ("a", "b"):
+        write_stl(tmp_path / "meshes" / folder / "part.stl", *tetrahedron())
+    robot = read_urdf(write(tmp_path, mesh_robot("package://gone/part.stl")))
+    assert robot.links[0].visual == ()
+    assert "meshes are not in" in caplog.text
 
 
 def test_chains_of_followers_follow_the_first(tmp_path):
@@ -588,7 +597,101 @@ def test_unphysical_inertias_are_mended(tmp_path):
     np.testing.assert_allclose([xx, yy, zz], [0.15, 0.15, 0.3], atol=3e-6)
 
 
+def test_moments_that_miss_the_triangle_inequality_by_rounding_compile(tmp_path):
+    plate = BODY.replace('ixx="0.1"', 'ixx="9e-6"').replace('iyy="0.1"', 'iyy="1e-6"')
+    plate = plate.replace('izz="0.1"', 'izz="1.0000001e-5"')
+    plate = plate.replace('ixy="0"', 'ixy="-1e-6"')
+    own = joint("a", "base", "l0", kind="revolute", inner=LIMIT)
+    robot = read_urdf(write(tmp_path, one_arm(f'<link name="l0">{plate}</link>', own)))
+    assert robot.link("l0").inertia == (9e-6, 1e-6, 1.0000001e-5, -1e-6, 0.0, 0.0)
+    moments = robot.to_mjspec().compile().body("l0").inertia
+    np.testing.assert_allclose(sorted(moments), [8.77e-7, 9.123e-6, 1e-5], rtol=1e-3)
+
+
 LIMIT = '<limit lower="-1" upper="1" effort="1" velocity="1"/>'
+
+
+def test_negative_effort_and_velocity_mean_none(tmp_path):
+    limit = LIMIT.replace('effort="1" velocity="1"', 'effort="-1" velocity="-1"')
+    links = f'<link name="l0">{BODY}</link><link name="l1">{BODY}</link>'
+    first = joint("a", "base", "l0", kind="revolute", inner=limit)
+    second = joint("b", "l0", "l1", kind="revolute", inner=LIMIT)
+    robot = read_urdf(write(tmp_path, one_arm(links, first + second)))
+    assert (robot.joint("a").effort, robot.joint("a").velocity) == (None, None)
+
+
+LEGGED = {
+    "a leg begins with a joint whose name says nothing": (
+        ("base hr ll", "ll thigh ll_thigh", "ll_thigh kfe ll_foot"),
+        ["foot"],
+    ),
+    "of toe and heel the toe is the foot": (
+        (
+            "base hip lefthip",
+            "lefthip knee leftshin",
+            "leftshin heel leftheelspring",
+            "leftshin toe_left lefttoe",
+        ),
+        ["left_foot"],
+    ),
+    "the legs at the back are the rear ones": (
+        ("base hip_bl back_left_hip", "back_left_hip toe_bl back_left_toe"),
+        ["rear_left_foot"],
+    ),
+}
+
+
+def test_what_lifts_both_arms_is_a_torso_and_no_arm(tmp_path):
+    rows = [
+        "base elv z",
+        "z l_shoulder l1",
+        "z r_shoulder r1",
+        "l1 l_b l2",
+        "r1 r_b r2",
+        "base pan mast",
+        "mast tilt camera",
+    ]
+    chain = [row.split() for row in rows]
+    links = "".join(f'<link name="{child}">{BODY}</link>' for *_, child in chain)
+    joints = "".join(joint(own, parent, child) for parent, own, child in chain)
+    robot = read_urdf(write(tmp_path, one_arm(links, joints)))
+    assert set(robot.groups) == {"torso", "left_arm", "right_arm", "head"}
+    assert set(robot.hands) == {"left", "right"}
+
+
+def test_two_arms_without_sides_have_a_gripper_and_a_hand_each(tmp_path):
+    rows = [
+        f"{'base' if k == 0 else f'p{n}_{k}'} j{n}_{k} p{n}_{k + 1}"
+        for n in (1, 2)
+        for k in range(3)
+    ]
+    rows += [f"p{n}_3 f{n}_{k}_finger finger{n}_{k}" for n in (1, 2) for k in (1, 2)]
+    chain = [row.split() for row in rows]
+    links = "".join(f'<link name="{child}">{BODY}</link>' for *_, child in chain)
+    joints = "".join(joint(own, parent, child) for parent, own, child in chain)
+    robot = read_urdf(write(tmp_path, one_arm(links, joints)))
+    assert set(robot.groups) == {"arm_1", "arm_2", "gripper_1", "gripper_2"}
+    assert set(robot.hands) == {"eef_1", "eef_2"}
+
+
+def test_a_side_that_is_spelt_counts_more_than_a_letter(tmp_path):
+    rows = ["base r2_left_shoulder r2_l1", "base r2_right_shoulder r2_r1"]
+    chain = [row.split() for row in rows]
+    links = "".join(f'<link name="{child}">{BODY}</link>' for *_, child in chain)
+    joints = "".join(joint(own, parent, child) for parent, own, child in chain)
+    robot = read_urdf(write(tmp_path, one_arm(links, joints)))
+    assert set(robot.groups) == {"left_arm", "right_arm"}
+
+
+@pytest.mark.parametrize("name", LEGGED)
+def test_each_leg_has_one_foot(tmp_path, name):
+    chain, feet = LEGGED[name]
+    rows = [row.split() for row in chain]
+    links = "".join(f'<link name="{child}">{BODY}</link>' for *_, child in rows)
+    joints = "".join(joint(own, parent, child) for parent, own, child in rows)
+    robot = read_urdf(write(tmp_path, one_arm(links, joints)))
+    assert [frame.name for frame in robot.frames if frame.role == "foot"] == feet
+    assert set(robot.groups) == {"legs"}
 
 
 def test_massless_links_between_masses_hardly_change_the_mass_matrix(tmp_path):

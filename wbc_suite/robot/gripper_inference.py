@@ -63,8 +63,9 @@ def _infer(
         f"{1e3 * gaps[1]:.0f} mm when closed"
     )
     synergy = Synergy(gripper=group, name="grasp", open=opened, closed=closed)
-    side = group.removesuffix("gripper")
-    named = [f for f in robot.frames if f.role == "tcp" and f.name.startswith(side)]
+    side, name = group.removesuffix("gripper"), group.replace("gripper", "tcp")
+    given = [frame.name for frame in robot.frames if frame.role == "tcp"]
+    named = name in given or any(own.startswith(side) for own in given)
     tcp = None if named else _tcp(robot, model, group, tips, closed)
     return Gripper(synergy, tcp, reason)
 
@@ -149,7 +150,7 @@ def _tcp(
         return None
     y /= np.linalg.norm(y)
     pose = pin.SE3(np.column_stack([np.cross(y, z), y, z]), middle)
-    name = group.removesuffix("gripper") + "tcp"
+    name = group.replace("gripper", "tcp")
     return Frame.model_validate(
         {"name": name, "link": palm, "role": "tcp", **pose_fields(pose)}
     )

@@ -1,45 +1,19 @@
 """Infer groups, end-effector frames and a ready posture of an imported robot.
 
-The words of link and joint names, and the structure of the tree, give them. Users edit
-the result after `to_toml()`.
+Words of names and the structure of the tree give them. Users edit the result.
 """
 
-import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-
 from wbc_suite.robot.elements import Frame, Link, rigid_bodies
-from wbc_suite.robot.poses import rotation_matrix
-from wbc_suite.robot.shape_geometry import hull_spheres
+from wbc_suite.robot.name_words import END_WORDS, FINGERS, kind_of, side_of, words_of
+from wbc_suite.robot.shape_geometry import farthest_point
 
 if TYPE_CHECKING:
     from wbc_suite.robot.importing import NameTable
-
-KINDS = {
-    "gripper": "finger fingers thumb gripper index middle ring pinky jaw knuckle",
-    "head": "head neck",
-    "torso": "torso waist trunk spine chest abdomen lift",
-    "leg": "leg hip knee ankle thigh calf shin foot toe haa hfe kfe",
-    "arm": "arm shoulder elbow wrist forearm upperarm",
-    "base": "wheel caster castor rotacastor",
-}
-"""Words of each kind of limb."""
-FINGERS = {"finger", "fingers", "thumb"}
-KIND_OF = {word: kind for kind, words in KINDS.items() for word in words.split()}
-
-SIDE_OF = {"left": "left", "l": "left", "right": "right", "r": "right"}
-PAIRS = {
-    "front_left": "fl lf",
-    "front_right": "fr rf",
-    "rear_left": "hl lh rl bl",
-    "rear_right": "hr rh rr br",
-}
-"""Words for the legs of quadrupeds."""
-PAIR_OF = {word: pair for pair, words in PAIRS.items() for word in words.split()}
-ENDS = {"front": "front", "fore": "front", "rear": "rear", "hind": "rear"}
 
 END_OF = {
     "arm": "eef",
@@ -50,26 +24,8 @@ END_OF = {
 }
 """Role of the frame at the end of a limb."""
 
-END_WORDS = {
-    "arm": {
-        "eef",
-        "ee",
-        "effector",
-        "tcp",
-        "tool",
-        "flange",
-        "grasp",
-        "grasping",
-        "tip",
-    },
-    "gripper": {"tcp", "grasp", "grasping", "tool"},
-    "leg": {"foot", "sole", "toe"},
-}
-"""Words in the names of frames and links at the end of a limb."""
-
-
-POINT_FOOT = 3
-"""A leg with at most so many joints and no named end stands on its outermost point."""
+MIN_ARM = 3  # joints; a shorter chain beside a left and a right arm is a head
+POINT_FOOT = 3  # joints of a leg that stands on its outermost point, if it has no name
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -102,25 +58,35 @@ def infer_limbs(links: Sequence[Link]) -> tuple[Limb, ...]:
     of an arm form a gripper; a chain below a torso or the root is an arm. A single arm
     is the right one; several arms without a side are numbered. Two slides and a hinge
     that move all others in a plane are a base. The fingers of a hand alone are arms.
+    One or two joints without a side beside two arms that have one are a head.
     """
-    traits = _traits(links)
+    traits = _without_masts(_traits(links))
     if not any(own.kind == "arm" for own in traits.values()):
         traits = _fingers_as_arms(traits, _moving_parents(links))
     arms = list(dict.fromkeys(x.top for x in traits.values() if x.kind == "arm"))
     unnamed = [top for top in arms if not traits[top].side]
     grippers = [x.side for x in traits.values() if x.kind == "gripper"]
     single = len(arms) == len(unnamed) == 1 and not any(grippers)
+    numbers = {top: unnamed.index(top) + 1 for top in unnamed if len(unnamed) > 1}
+    above = _moving_parents(links)
     members: dict[tuple[str, str], list[Link]] = {}
+
+    def arm_of(name: str | None) -> str:
+        """Return the top of the arm that a link belongs to or is carried by."""
+        while name is not None and traits[name].kind != "arm":
+            name = above[name]
+        return "" if name is None else traits[name].top
+
     for link in links:
         if link.joint is None:
             continue
-        kind, side, top = traits[link.name]
+        kind, side, _ = traits[link.name]
         side = "right" if single else side
         name = "legs" if kind == "leg" else kind
         if kind in ("arm", "gripper") and side:
             name = f"{side}_{kind}"
-        elif kind == "arm" and len(unnamed) > 1:
-            name = f"arm_{unnamed.index(top) + 1}"
+        elif kind in ("arm", "gripper") and (number := numbers.get(arm_of(link.name))):
+            name = f"{kind}_{number}"
         members.setdefault((name, kind), []).append(link)
     return tuple(
         Limb(name=name, kind=kind, links=tuple(own))
@@ -132,17 +98,18 @@ def _traits(links: Sequence[Link]) -> dict[str, _Traits]:
     """Return kind, side and top of each moving link, by name."""
     parents = _moving_parents(links)
     owners, driving = list(parents.values()), _planar_base(links, parents)
+    named = _named_kinds(links, parents)
     traits: dict[str, _Traits] = {}
     for link in links:
         if link.joint is None:
             continue
         parent = parents[link.name]
         above = traits.get(parent or "", _Traits())
-        words = [*_words(link.joint.name), *_words(link.name)]
-        kind = next((KIND_OF[w] for w in words if w in KIND_OF), None)
+        words = [*words_of(link.joint.name), *words_of(link.name)]
+        kind = named[link.name]
         if link.name in driving:
             kind = "base"
-        elif FINGERS.intersection(_words(link.joint.name)):
+        elif FINGERS.intersection(words_of(link.joint.name)):
             kind = "gripper"  # "arm_right_finger"
         if kind is None and above.kind == "arm" and owners.count(parent) > 1:
             kind = "gripper"
@@ -150,15 +117,41 @@ def _traits(links: Sequence[Link]) -> dict[str, _Traits]:
             rolls = above.kind == "base" and parent not in driving  # rim of a wheel
             inherits = rolls or above.kind in ("leg", "gripper", "head")
             kind = above.kind if inherits else "arm"
-        if kind == "torso" and _side(words, pairs=False):
+        if kind == "torso" and side_of(words, pairs=False):
             kind = "arm"  # "waist" of the left one of two arms
         same_limb = above.kind in ("arm", "leg", "gripper")
         side = above.side if same_limb else ""
         if not (kind == "gripper" and same_limb):  # "left finger" of a right hand
-            side = _side(words, pairs=kind == "leg") or side
+            side = side_of(words, pairs=kind == "leg") or side
         top = above.top if above.kind == kind else link.name
         traits[link.name] = _Traits(kind, side, top)
     return traits
+
+
+def _named_kinds(
+    links: Sequence[Link], parents: dict[str, str | None]
+) -> dict[str, str | None]:
+    """Return the kind that words give each moving link, None without one.
+
+    What carries only legs is a leg, and what carries a left and a right arm a torso.
+    """
+    kinds: dict[str, str | None] = {}
+    arms: dict[str, set[str]] = {}  # sides of the arms from a link on
+    for link in reversed(links):
+        if link.joint is None:
+            continue
+        words = [*words_of(link.joint.name), *words_of(link.name)]
+        kind = kind_of(words)
+        below = [name for name, own in parents.items() if own == link.name]
+        arms[link.name] = set[str]().union(*(arms[name] for name in below))
+        if kind is None and {kinds[name] for name in below} == {"leg"}:
+            kind = "leg"
+        elif kind is None and len(arms[link.name]) > 1:
+            kind = "torso"
+        elif kind == "arm" and (side := side_of(words, pairs=False)):
+            arms[link.name].add(side)
+        kinds[link.name] = kind
+    return kinds
 
 
 def _fingers_as_arms(
@@ -172,6 +165,18 @@ def _fingers_as_arms(
             top = above.top if above.kind == "arm" else name
             changed[name] = _Traits("arm", "", top)
     return changed
+
+
+def _without_masts(traits: dict[str, _Traits]) -> dict[str, _Traits]:
+    """Return the traits with what is too short for an arm, beside two, as a head."""
+    arms = [own for own in traits.values() if own.kind == "arm"]
+    length = Counter(own.top for own in arms)
+    if not {"left", "right"} <= {own.side for own in arms}:
+        return traits
+    masts = {top for top, joints in length.items() if joints < MIN_ARM}
+    masts -= {own.top for own in arms if own.side}
+    heads = {n: x._replace(kind="head") for n, x in traits.items() if x.top in masts}
+    return traits | heads
 
 
 def _planar_base(
@@ -205,7 +210,7 @@ def infer_frames(
         for tip in _tips(links, limb) if role else ():
             name = limb.name.replace(limb.kind, str(role))
             if limb.kind == "leg":
-                side = _side(_words(tip.name), pairs=True)
+                side = side_of(words_of(tip.name), pairs=True)
                 name = "_".join(filter(None, (side, role)))
             placed = _placed(links, limb, tip, given)
             if any(frame.name == name for frame in given):
@@ -219,7 +224,7 @@ def infer_frames(
 
 def infer_role(name: str) -> str:
     """Return the role of a frame in the file if its name is unambiguous."""
-    words = _words(name)
+    words = words_of(name)
     if name in ("head", "torso", "base"):
         return name
     if words and words[-1] in ("tip", "foot"):
@@ -237,22 +242,6 @@ def infer_ready(links: Sequence[Link]) -> dict[str, float]:
     return ready
 
 
-def _words(name: str) -> list[str]:
-    """Split a name: `LHipYaw` gives l, hip, yaw; `arm_left_1` gives arm, left."""
-    parts = re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)
-    return [part.lower() for part in parts]
-
-
-def _side(words: Sequence[str], *, pairs: bool) -> str:
-    """Return `left`, with `pairs` also `front_left`, or "" if no word gives a side."""
-    side = next((SIDE_OF[w] for w in words if w in SIDE_OF), "")
-    if not pairs:
-        return side
-    pair = next((PAIR_OF[w] for w in words if w in PAIR_OF), "")
-    end = next((ENDS[w] for w in words if w in ENDS), "")
-    return pair or (f"{end}_{side}" if end and side else side)
-
-
 def _moving_parents(links: Sequence[Link]) -> dict[str, str | None]:
     """Map each moving link to its closest moving ancestor."""
     rigid = rigid_bodies(links)
@@ -266,13 +255,25 @@ def _moving_parents(links: Sequence[Link]) -> dict[str, str | None]:
 
 
 def _tips(links: Sequence[Link], limb: Limb) -> list[Link]:
-    """Return the last moving links of legs, and the deepest one of other limbs."""
+    """Return the last moving link of each leg (its toe), or the deepest of a limb."""
     above = _moving_parents(links)
     followed = {above[link.name] for link in limb.links}
     tips = [link for link in limb.links if link.name not in followed]
-    if limb.kind == "leg":
-        return tips
-    return [max(tips, key=lambda tip: _depth(tip.name, above))]
+    tops: dict[str, str] = {}
+    for link in limb.links:
+        tops[link.name] = tops.get(above[link.name] or "", link.name)
+
+    def rank(tip: Link) -> tuple[bool, int]:
+        foot = END_WORDS["leg"].intersection(words_of(tip.name))
+        return limb.kind == "leg" and bool(foot), _depth(tip.name, above)
+
+    found: dict[str, Link] = {}
+    for tip in tips:
+        side = side_of(words_of(tip.name), pairs=True)
+        key = f"{side} {tops[tip.name]}" if limb.kind == "leg" else ""
+        if key not in found or rank(tip) > rank(found[key]):
+            found[key] = tip
+    return list(found.values())
 
 
 def _depth(name: str | None, above: dict[str, str | None]) -> int:
@@ -289,11 +290,13 @@ def _placed(
         tip = next(link for link in links if link.name == palm)
     end_words = END_WORDS.get(limb.kind, set[str]())
     for frame in sorted(given, key=_is_no_sole):
-        if rigid[frame.link] == tip.name and end_words.intersection(_words(frame.name)):
+        if rigid[frame.link] == tip.name and end_words.intersection(
+            words_of(frame.name)
+        ):
             return {"link": frame.link, "pos": frame.pos, "quat": frame.quat}
     fixed = [link for link in links if rigid[link.name] == tip.name]
     for link in sorted(fixed, key=_is_no_sole):
-        if end_words.intersection(_words(link.name)):
+        if end_words.intersection(words_of(link.name)):
             return {"link": link.name}
     if limb.kind == "gripper":
         return None
@@ -305,19 +308,10 @@ def _placed(
     above, leg = _moving_parents(links), {link.name for link in limb.links}
     chain = {n: parent if parent in leg else None for n, parent in above.items()}
     if limb.kind == "leg" and _depth(tip.name, chain) <= POINT_FOOT:
-        return {"link": tip.name, "pos": _farthest(tip)}
+        return {"link": tip.name, "pos": farthest_point(tip.collision or tip.visual)}
     return {"link": tip.name}
 
 
 def _is_no_sole(item: Frame | Link) -> bool:
     """Return the key that sorts soles before ankles and feet."""
-    return "sole" not in _words(item.name)
-
-
-def _farthest(link: Link) -> tuple[float, ...]:
-    """Return the centre of the sphere or the corner farthest from the link's joint."""
-    points = np.zeros((1, 3))
-    for shape in link.collision or link.visual:
-        own = hull_spheres(shape)[:, :3] @ rotation_matrix(shape).T + shape.pos
-        points = np.concatenate([points, own])
-    return tuple(points[np.argmax(np.linalg.norm(points, axis=1))].tolist())
+    return "sole" not in words_of(item.name)

@@ -105,7 +105,8 @@ def describe_import(
     limbs = infer_limbs(checked)
     placed = infer_frames(checked, limbs, given, names)
     actuated = {fields["joint"] for fields in others.get("actuators", ())}
-    driven = estimate_motors(checked, placed, actuated)
+    moving = [limb.joints for limb in limbs if limb.kind in ("arm", "leg")]
+    driven = estimate_motors(checked, placed, actuated, moving)
     deviations: list[str] = []
     if driven != checked:
         deviations = ["efforts and armatures are estimated: the file has few or none"]
@@ -132,7 +133,10 @@ def describe_import(
             return robot
         LOG.warning("%s: the feet in keyframe 'home' are not level; not used.", source)
         robot = _with_ready(robot, lambda robot: infer_ready(robot.links))
-    return _with_ready(_with_ready(robot, standing_legs), working_arms)
+    try:
+        return _with_ready(_with_ready(robot, standing_legs), working_arms)
+    except ValueError as error:  # of MuJoCo's compiler
+        raise DescriptionError(f"{source}: MuJoCo refuses it: {error}") from error
 
 
 def _with_ready(

@@ -70,10 +70,14 @@ def oversized(link: Link) -> str | None:
 
 
 def estimate_motors(
-    links: Sequence[Link], frames: Sequence[Frame], driven: Collection[str]
+    links: Sequence[Link],
+    frames: Sequence[Frame],
+    driven: Collection[str],
+    limbs: Sequence[Collection[str]] = (),
 ) -> list[Link]:
     """Return links with motors, and armatures, for joints without, if most have none.
 
+    Most are those of the robot, or of one of the limbs, which are joints by name.
     Joints that are `driven` have an actuator of another kind. The motor of a hinge
     holds twice the moment of the links behind it, as if these were stretched out
     horizontally; below the trunk of a robot with feet it holds half of the robot on its
@@ -81,7 +85,11 @@ def estimate_motors(
     """
     own = [x.joint for x in links if x.joint is not None and x.joint.independent]
     bare = [x for x in own if x.effort is None and x.name not in driven]
+    names = {joint.name for joint in bare}
+    empty = [limb for limb in limbs if 2 * len(names.intersection(limb)) > len(limb)]
     if 2 * len(bare) <= len(own):
+        bare = [joint for joint in bare if any(joint.name in limb for limb in empty)]
+    if not bare:
         return list(links)
     efforts = dict(_efforts(links, frames))
     changed: list[Link] = []

@@ -13,21 +13,23 @@ from wbc_suite.robot.mjcf_export_geoms import VisualGeoms, add_collision_geoms
 from wbc_suite.robot.poses import se3_of
 
 STOP_SOLREF = (0.004, 1.0)
-"""Time constant in s and damping ratio of limits of slides, the stiffest that is stable
-with a step of 2 ms; limits of real joints are hard."""
+"""Time constant in s and damping ratio of limits of slides and fingers, the stiffest that
+is stable with a step of 2 ms; limits of real joints are hard."""
 STOP_SOLIMP = (0.95, 0.99, 0.001)
-"""Smallest and largest impedance of these limits, and the width between, m."""
+"""Smallest and largest impedance of these limits, and the width between, m or rad."""
 BUMPER_SOLREF = (-1000.0, -500.0)
-"""Stiffness in 1/s^2 and damping in 1/s, negative, of limits of hinges: the damping
-stops a joint within a step of 2 ms. Resistance grows from none to all of it over a
-distance before the limit, as at a rubber stop. MuJoCo tests limits at the start of a
-step only, and a hand that hits a table turns its fingers at 10 rad/s within
-one: without that distance they were 20 mrad past their limits."""
+"""Stiffness in 1/s^2 and damping in 1/s, negative, of limits of a limb's hinges: the
+damping stops a joint within a step of 2 ms. Resistance grows from none to all of it over
+a distance before the limit, as at a rubber stop. MuJoCo tests limits at the start of a
+step only, and a blow turns a wrist at 10 rad/s within one: without that distance it was
+20 mrad past its limit."""
 BUMPER_TIME, BUMPER_WIDTH = 4e-3, 0.03
 """That distance: the way at full speed in this time, s, at most this, rad."""
 STOP_MARGIN = 0.01
 """Least of it, rad, and what whole-body controllers keep: where a stop holds a joint
 back from its command, the hand may be in a table that the command avoids."""
+ROUNDING = 1e-12
+"""Relative reserve of the triangle inequality, which MuJoCo checks without any."""
 SITE_GROUP = 4  # site group of frames, hidden by default
 
 STIFF = (0.005, 1.0)
@@ -56,6 +58,8 @@ def build_mjspec(robot: RobotDescription, *, merged: bool = True) -> mujoco.MjSp
     spec.compiler.savecompiled = False
     bodies = {"world": spec.worldbody}
     inertias = _inertias(robot)
+    limbs = robot.groups.keys() - robot.synergies.keys()
+    limb_joints = {joint for name in limbs for joint in robot.groups[name]}
     visual = VisualGeoms(spec, robot, merged=merged)
     for link in robot.links:
         placed = robot.root if link.parent is None else link
@@ -67,9 +71,9 @@ def build_mjspec(robot: RobotDescription, *, merged: bool = True) -> mujoco.MjSp
         if link.parent is None and robot.root.kind == "free":
             body.add_joint(name="root", type=mujoco.mjtJoint.mjJNT_FREE)
         for joint in robot.root.joints if link.parent is None else ():
-            _add_joint(body, joint)
+            _add_joint(body, joint, limb=False)
         if link.joint is not None:
-            _add_joint(body, link.joint)
+            _add_joint(body, link.joint, limb=link.joint.name in limb_joints)
         _set_inertia(body, inertias[link.name])
         visual.add(body, link)
         add_collision_geoms(spec, body, robot, link)
@@ -100,8 +104,11 @@ def write_mjcf(robot: RobotDescription) -> str:
     return spec.to_xml()
 
 
-def _add_joint(body: mujoco.MjsBody, joint: Joint) -> None:
-    """Add a joint; hinges are resisted from a distance before their limits."""
+def _add_joint(body: mujoco.MjsBody, joint: Joint, *, limb: bool) -> None:
+    """Add a joint; hinges of limbs are resisted from a distance before their limits.
+
+    Fingers open and close up to theirs.
+    """
     kinds = mujoco.mjtJoint
     added = body.add_joint(
         name=joint.name,
@@ -117,7 +124,7 @@ def _add_joint(body: mujoco.MjsBody, joint: Joint) -> None:
         added.limited = mujoco.mjtLimited.mjLIMITED_TRUE
         added.solref_limit, added.solimp_limit[:3] = STOP_SOLREF, STOP_SOLIMP
         added.range = joint.range
-        if joint.type == "hinge":
+        if joint.type == "hinge" and limb:
             low, high = joint.range
             way = max(BUMPER_TIME * (joint.velocity or np.inf), STOP_MARGIN)
             added.margin = min(way, BUMPER_WIDTH, 0.25 * (high - low))
@@ -154,7 +161,10 @@ def _set_inertia(body: mujoco.MjsBody, inertia: pin.Inertia) -> None:
     body.mass = inertia.mass
     body.ipos = inertia.lever
     if inertia.inertia.any():
-        body.fullinertia = inertia_fields(inertia.inertia)
+        moments = np.linalg.eigvalsh(inertia.inertia)
+        excess = moments[2] * (1.0 + ROUNDING) - moments[0] - moments[1]
+        tensor = inertia.inertia + max(0.0, excess) * np.eye(3)
+        body.fullinertia = inertia_fields(tensor)
     else:  # a point mass, which MuJoCo refuses as a full tensor
         body.inertia = np.zeros(3)
 

@@ -4,6 +4,7 @@ Everything here is computed at export: no mesh file is read or shipped.
 """
 
 import math
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -115,6 +116,15 @@ def shape_bounds(shape: Shape) -> tuple[Vector, Vector]:
     for corner in bounds:
         corner.flags.writeable = False
     return bounds
+
+
+def farthest_point(shapes: Sequence[Shape]) -> tuple[float, ...]:
+    """Return the centre of the sphere or corner that is farthest from the origin."""
+    points = np.zeros((1, 3))
+    for shape in shapes:
+        own = hull_spheres(shape)[:, :3] @ rotation_matrix(shape).T + shape.pos
+        points = np.concatenate([points, own])
+    return tuple(points[np.argmax(np.linalg.norm(points, axis=1))].tolist())
 
 
 def _own_bounds(shape: Shape) -> tuple[Vector, Vector]:

@@ -264,7 +264,7 @@ def _axis(joint: Element, where: str) -> list[float]:
 
 
 def _limits(joint: Element, kind: str, where: str) -> dict[str, Any]:
-    """Read `<limit>`; zero effort or velocity, and huge limits, mean no limit.
+    """Read `<limit>`; an effort or velocity <= 0, and huge limits, mean no limit.
 
     A range that is missing, empty at zero or reversed means an endless joint.
     """
@@ -274,7 +274,7 @@ def _limits(joint: Element, kind: str, where: str) -> dict[str, Any]:
     fields: dict[str, Any] = {}
     for key in ("effort", "velocity"):
         value = number(limit, key, where=where, default=0.0)
-        if 0.0 != value < UNLIMITED:
+        if 0.0 < value < UNLIMITED:
             fields[key] = value
     low = number(limit, "lower", where=where, default=0.0)
     high = number(limit, "upper", where=where, default=0.0)

@@ -2,6 +2,8 @@
 
 import logging
 from collections.abc import Iterator
+from functools import cached_property
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +12,7 @@ import pinocchio as pin
 
 from wbc_suite.errors import DescriptionError, join_first
 from wbc_suite.robot.importing import NameTable
-from wbc_suite.robot.mesh_files import can_read, read_points
+from wbc_suite.robot.mesh_files import COLLADA, GLTF, READABLE, can_read, read_points
 from wbc_suite.robot.poses import pose_fields
 from wbc_suite.robot.shape_geometry import fit_hull
 from wbc_suite.robot.shapes import SkinMesh
@@ -21,6 +23,8 @@ from wbc_suite.typing import Vector
 LOG = logging.getLogger(__name__)
 
 MIN_SIZE = 2e-6  # smallest size of a shape in m; smaller ones are left out
+ENDING, MAX_FILES = 3, 20_000
+"""Parts of a path by which a mesh is found elsewhere, among so many files."""
 
 
 class MeshFolder:
@@ -54,7 +58,27 @@ class MeshFolder:
             path = candidate.resolve()
             if path.is_relative_to(self._root) and path.is_file():
                 return path
+        return self._elsewhere(rest or filename)
+
+    def _elsewhere(self, filename: str) -> Path | None:
+        """Return the only file in the folder whose last parts are those of a name."""
+        parts = Path(filename).parts
+        for count in range(min(len(parts), ENDING), 0, -1):
+            same = self._files.get(parts[-count:], [])
+            if same:
+                return same[0] if len(same) == 1 else None
         return None
+
+    @cached_property
+    def _files(self) -> dict[tuple[str, ...], list[Path]]:
+        """The meshes of the folder, by their last parts."""
+        found: dict[tuple[str, ...], list[Path]] = {}
+        for path in islice(self._root.rglob("*"), MAX_FILES):
+            mesh = path.suffix.lower() in (*READABLE, COLLADA, GLTF)
+            if mesh and path.resolve().is_relative_to(self._root):
+                for count in range(1, ENDING + 1):
+                    found.setdefault(path.parts[-count:], []).append(path)
+        return found
 
     def report(self) -> None:
         """Log one line with the number of meshes, and a warning about absent ones."""
