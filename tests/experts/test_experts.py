@@ -61,6 +61,13 @@ def test_a_long_finger_does_not_sweep_the_other_cube_away():
         assert len(rewards) < 150
 
 
+@pytest.mark.slow
+def test_a_long_jaw_stays_clear_of_the_door_behind_the_lever():
+    config = {"robots": "SpotWithArm", "controller_configs": "WHOLE_BODY_IK"}
+    env = wbc_suite.make("Door", horizon=150, **config)
+    assert solve(env, 1)[1]
+
+
 def test_a_tipped_cube_stays_on_its_face():
     rng = np.random.default_rng(0)
     for _ in range(100):

@@ -19,6 +19,7 @@ TILTS = (0.0, 0.25, -0.25, 0.5, -0.5)  # rad, about the closing axis
 OVERLAP = 200.0  # cost of what hands meet on the way, 1/m
 ANGLE = 0.4  # cost of an approach that deviates from the wanted one, 1/rad
 CLEAR = 0.001  # m, between fingers and what an object lies on
+ROOM = 0.006  # m, between fingers and what is behind an object: hands miss by 4 mm
 MOST_LIFT = 0.03  # m, by which hands stay back for that
 STEEP = 0.7  # cosine, of approaches from above
 PAIRED = 8  # grasps of each arm that are looked at with those of the other
@@ -180,13 +181,20 @@ def _choices(
     if along < math.cos(approach.upright):
         return
     back = _needed_lift(cell, name, arm, site.grasp, at)
-    grasp = grasp * pin.SE3(np.eye(3), back * DOWN)
-    at = cell.pose(name) * grasp
-    before = pin.SE3(at.rotation, at.translation - approach.away * at.rotation[:, 2])
-    up = pin.SE3(at.rotation, at.translation - approach.raised * DOWN)
-    first = arm.look_ahead([before, at, up], site.grasp)
-    angle = math.acos(min(1.0, along))
-    met = _overlap_while_closing(cell, name, arm, first, arm.closing(site.grasp))
+    for _ in range(2):
+        held = grasp * pin.SE3(np.eye(3), back * DOWN)
+        at = cell.pose(name) * held
+        z = at.rotation[:, 2]
+        before = pin.SE3(at.rotation, at.translation - approach.away * z)
+        up = pin.SE3(at.rotation, at.translation - approach.raised * DOWN)
+        first = arm.look_ahead([before, at, up], site.grasp)
+        q, closing = arm.configuration(first.q[1]), arm.closing(site.grasp)
+        ahead = max(cell.overlap(arm, q, but=name, fingers=f, along=z) for f in closing)
+        if not 0.0 < ahead < MOST_LIFT - back - ROOM:
+            break
+        back += ahead + ROOM
+    grasp, angle = held, math.acos(min(1.0, along))
+    met = _overlap_while_closing(cell, name, arm, first, closing)
     for way, extra in ways:
         poses = [pose * grasp for pose in way]
         if approach.leave > 0.0:

@@ -110,12 +110,24 @@ class Workcell(Generic[B]):
         return self.benchmark.touching(name, other)
 
     def overlap(
-        self, arm: Arm, q: Vector, *, but: str, fingers: Mapping[str, float] = NONE
+        self,
+        arm: Arm,
+        q: Vector,
+        *,
+        but: str,
+        fingers: Mapping[str, float] = NONE,
+        along: Vector | None = None,
     ) -> float:
         """Return how deep a robot at a configuration is in anything but an object, m.
 
-        `fingers` are joints of its gripper that are elsewhere than now. Contacts that
-        there are already do not count.
+        Contacts that there are already do not count.
+
+        Args:
+            arm: An arm of the robot.
+            q: The configuration.
+            but: The object.
+            fingers: Joints of the gripper that are elsewhere than now.
+            along: Unit vector in the world, if only depth along it counts.
         """
         data, state = self._copy, arm.state
         data.qpos[:] = self.data.qpos
@@ -125,13 +137,14 @@ class Workcell(Generic[B]):
         mujoco.mj_kinematics(self.model, data)
         mujoco.mj_collision(self.model, data)
         present = {(a, b) for a, b in pairs_in_contact(self.data)}
+        depths = -data.contact.dist
+        if along is not None:
+            depths = depths * np.abs(data.contact.frame[:, :3] @ along)
         object_geoms, deepest = self.object(but).geoms, 0.0
-        for (a, b), distance in zip(
-            pairs_in_contact(data), data.contact.dist.tolist(), strict=True
-        ):
+        for (a, b), depth in zip(pairs_in_contact(data), depths.tolist(), strict=True):
             own = self._is_of(state, a) == self._is_of(state, b)
             if not own and (a, b) not in present and not {a, b} & {*object_geoms}:
-                deepest = max(deepest, -distance)
+                deepest = max(deepest, depth)
         return deepest
 
     def _is_of(self, state: RobotState, geom: int) -> bool:
