@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -188,13 +188,15 @@ def _choices(
         before = pin.SE3(at.rotation, at.translation - approach.away * z)
         up = pin.SE3(at.rotation, at.translation - approach.raised * DOWN)
         first = arm.look_ahead([before, at, up], site.grasp)
+        met = _overlap_while_closing(cell, name, arm, site.grasp, first)
+        if met == 0.0:
+            break
         q, closing = arm.configuration(first.q[1]), arm.closing(site.grasp)
         ahead = max(cell.overlap(arm, q, but=name, fingers=f, along=z) for f in closing)
         if not 0.0 < ahead < MOST_LIFT - back - ROOM:
             break
         back += ahead + ROOM
     grasp, angle = held, math.acos(min(1.0, along))
-    met = _overlap_while_closing(cell, name, arm, first, closing)
     for way, extra in ways:
         poses = [pose * grasp for pose in way]
         if approach.leave > 0.0:
@@ -224,16 +226,13 @@ def _needed_lift(cell: Workcell, name: str, arm: Arm, grasp: str, at: pin.SE3) -
 
 
 def _overlap_while_closing(
-    cell: Workcell,
-    name: str,
-    arm: Arm,
-    outlook: Outlook,
-    closing: Sequence[Mapping[str, float]],
+    cell: Workcell, name: str, arm: Arm, grasp: str, outlook: Outlook
 ) -> float:
     """Return how deep a hand that comes, closes and rises gets in other things, m.
 
     Fingers sweep over what lies beside the object while they close.
     """
     before, at, up = map(arm.configuration, outlook.q)
+    closing = arm.closing(grasp)
     moments = [(before, closing[0]), *((at, f) for f in closing), (up, closing[-1])]
     return max(cell.overlap(arm, q, but=name, fingers=f) for q, f in moments)
