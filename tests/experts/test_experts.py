@@ -1,12 +1,14 @@
 """Each expert solves its benchmark."""
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import wbc_suite
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.evaluation import make_policy
 from wbc_suite.experts import expert, expert_names, register_expert
+from wbc_suite.experts.stack import aligned
 
 SINGLE = (
     *("Lift", "Stack", "Door", "Wipe"),
@@ -47,6 +49,35 @@ def test_other_robots_take_the_same_expert(robot):
     for name in ("Lift", "Stack"):
         env = wbc_suite.make(name, robots=robot, horizon=500)
         assert solve(env, 1)[1], name
+
+
+@pytest.mark.slow
+def test_a_long_finger_does_not_sweep_the_other_cube_away():
+    config = {"robots": "SpotWithArm", "controller_configs": "WHOLE_BODY_IK"}
+    env = wbc_suite.make("Stack", horizon=500, **config)
+    for seed in (7, 28):
+        rewards, success = solve(env, seed)
+        assert success
+        assert len(rewards) < 150
+
+
+@pytest.mark.slow
+def test_a_long_jaw_stays_clear_of_the_door_behind_the_lever():
+    config = {"robots": "SpotWithArm", "controller_configs": "WHOLE_BODY_IK"}
+    env = wbc_suite.make("Door", horizon=150, **config)
+    assert solve(env, 1)[1]
+
+
+def test_a_tipped_cube_stays_on_its_face():
+    rng = np.random.default_rng(0)
+    for _ in range(100):
+        there = pin.SE3.Random()
+        tilt = pin.exp3(rng.uniform(-0.3, 0.3, 3))
+        tipped = pin.exp3(np.pi / 2 * np.eye(3)[rng.integers(3)])
+        cube = pin.SE3(there.rotation @ tilt @ tipped, rng.normal(size=3))
+        found = aligned(cube, there)
+        np.testing.assert_allclose(found.rotation, there.rotation @ tipped, atol=1e-9)
+        np.testing.assert_array_equal(found.translation, there.translation)
 
 
 @pytest.mark.slow

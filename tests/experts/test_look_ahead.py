@@ -8,7 +8,9 @@ import pytest
 
 import wbc_suite
 from wbc_suite.evaluation import make_policy
+from wbc_suite.experts.grasp_choice import Approach, choose_grasp
 from wbc_suite.experts.look_ahead import LookAhead
+from wbc_suite.experts.skills import close_in, come_before
 from wbc_suite.experts.workcell import Workcell
 from wbc_suite.kinematics import Configuration
 
@@ -82,9 +84,49 @@ def test_a_configuration_in_the_table_is_not_clear(cell):
     (arm,) = cell.arms
     into = shifted(arm.pose, (0.0, 0.0, -0.3))
     q = arm.configuration(arm.look_ahead([into]).q[-1])
-    assert not cell.is_clear(arm, q, but="cube")
+    assert cell.overlap(arm, q, but="cube") > 0.01
     here = arm.configuration(arm.look_ahead([arm.pose]).q[-1])
-    assert cell.is_clear(arm, here, but="cube")
+    assert cell.overlap(arm, here, but="cube") == 0.0
+
+
+@pytest.mark.slow
+def test_open_fingers_meet_what_lies_beside_an_object_and_closed_ones_do_not():
+    env = wbc_suite.make("Stack", robots="Panda")
+    env.reset(seed=0)
+    cell = Workcell(env, env.benchmark, np.random.default_rng(0))
+    (arm,) = cell.arms
+    a, b = (env.benchmark.states[name] for name in ("cubeA", "cubeB"))
+    a.move((0.0, 0.0, 0.82))
+    at = pin.SE3(np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0.0, 0.83]))
+    q = arm.configuration(arm.look_ahead([at]).q[-1])
+    fingers = arm.closing("pinch")
+    for y, is_met in ((0.07, True), (0.15, False)):
+        b.move((0.0, y, 0.825))
+        depths = [cell.overlap(arm, q, but="cubeA", fingers=f) for f in fingers]
+        assert (depths[0] > 0.003) == is_met
+        assert depths[-1] == 0.0
+
+
+@pytest.mark.slow
+def test_a_hand_beside_its_way_stays_back():
+    env = wbc_suite.make("Lift", robots="Panda")
+    env.reset(seed=0)
+    cell = Workcell(env, env.benchmark, np.random.default_rng(0))
+    choice = choose_grasp(cell, "cube", arms=cell.arms, approach=Approach())
+
+    def run(skill):
+        for _ in skill:
+            env.step(cell.action())
+            yield choice.hand_at(cell.pose("cube")).actInv(choice.arm.pose).translation
+
+    assert all(len(place) == 3 for place in run(come_before(cell, choice)))
+    x, y, z = cell.object("cube").position
+    cell.object("cube").move((x, y + 0.04, z))
+    places = np.array([*run(close_in(cell, "cube", choice))])
+    beside, back = np.linalg.norm(places[:, :2], axis=1), -places[:, 2]
+    assert beside[0] > 0.02
+    assert back[beside > 0.015].min() > 0.04
+    assert np.linalg.norm(places[-1]) < 0.006
 
 
 @pytest.mark.slow

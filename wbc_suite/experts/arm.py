@@ -1,7 +1,7 @@
 """One arm that an expert moves: the pose of its hand, its goal and its gripper."""
 
 from collections.abc import Sequence
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pinocchio as pin
@@ -9,7 +9,7 @@ import pinocchio as pin
 from wbc_suite.control import ActionLayout, RobotState
 from wbc_suite.control.action import ActionSlice
 from wbc_suite.devices.action_ports import LimbPort
-from wbc_suite.experts.finger_reach import finger_reach
+from wbc_suite.experts.finger_reach import closing_postures, finger_reach
 from wbc_suite.experts.look_ahead import LookAhead, Outlook
 from wbc_suite.sensing.hands import Hand
 from wbc_suite.typing import Vector
@@ -32,6 +32,7 @@ class Arm:
         grasp: The present kind of grasp.
         home: Pose of the hand at the start.
         finger_reach: Returns how far fingers reach beyond the frame of a grasp, m.
+        closing: Returns the joints of the gripper from open to closed for a grasp.
     """
 
     def __init__(
@@ -57,6 +58,7 @@ class Arm:
         self._look_ahead = cache(self._make_look_ahead)
         self._offset = cache(self._measure_offset)
         self.finger_reach = cache(self._measure_fingers)
+        self.closing = cache(partial(closing_postures, state, self._synergies))
         self._closing = 0
         self.home = self._goal = self._target = self.pose
         self._home = state.q.copy()

@@ -1,4 +1,4 @@
-"""How far the fingers of a closing gripper reach beyond the frame of a grasp."""
+"""Where the fingers of a closing gripper are, and how far they reach forward."""
 
 from collections.abc import Sequence
 
@@ -25,9 +25,9 @@ def finger_reach(
     if not own or not synergies:
         return 0.0
     farthest = 0.0
-    for share in np.linspace(0.0, 1.0, SAMPLES):
+    for posture in closing_postures(state, synergies, grasp):
         data.qpos[:] = state.data.qpos
-        for joint, value in _posture(state, synergies, grasp, float(share)).items():
+        for joint, value in posture.items():
             data.joint(state.prefix + joint).qpos = value
         mujoco.mj_kinematics(model, data)
         site = data.site(state.prefix + frame)
@@ -38,6 +38,14 @@ def finger_reach(
         half = np.sum(np.abs(rows) * model.geom_aabb[own, 3:], axis=1)
         farthest = max(farthest, float((middle + half).max()))
     return farthest
+
+
+def closing_postures(
+    state: RobotState, synergies: Sequence[Synergy], grasp: str
+) -> list[dict[str, float]]:
+    """Return the joints of a gripper from open to closed, for a kind of grasp."""
+    shares = np.linspace(0.0, 1.0, SAMPLES).tolist()
+    return [_posture(state, synergies, grasp, share) for share in shares]
 
 
 def _posture(

@@ -16,9 +16,10 @@ from wbc_suite.typing import Vector
 
 DOWN = np.array([0.0, 0.0, -1.0])
 TILTS = (0.0, 0.25, -0.25, 0.5, -0.5)  # rad, about the closing axis
-COLLISION = 5.0  # cost
+OVERLAP = 200.0  # cost of what hands meet on the way, 1/m
 ANGLE = 0.4  # cost of an approach that deviates from the wanted one, 1/rad
 CLEAR = 0.001  # m, between fingers and what an object lies on
+ROOM = 0.006  # m, between fingers and what is behind an object: hands miss by 4 mm
 MOST_LIFT = 0.03  # m, by which hands stay back for that
 STEEP = 0.7  # cosine, of approaches from above
 PAIRED = 8  # grasps of each arm that are looked at with those of the other
@@ -52,6 +53,7 @@ class Choice:
 
     Attributes:
         before: Pose of the hand before it approaches.
+        away: Distance from there to the grasp, m.
         grasp: Pose T_oh of the hand in the object's frame.
         then: Chain of poses of the object that follows.
         cost: Of the outlook, with penalties.
@@ -60,6 +62,7 @@ class Choice:
     arm: Arm
     site: GraspSite
     before: pin.SE3
+    away: float
     grasp: pin.SE3
     then: tuple[pin.SE3, ...]
     outlook: Outlook
@@ -90,7 +93,7 @@ def choose_grasp(
         costs: Cost of each alternative beside its outlook, s.
     """
     found = _ranked(cell, name, arms, approach, then, costs)
-    return _first_clear(cell, name, found) if found else None
+    return found[0] if found else None
 
 
 def choose_pair(
@@ -114,7 +117,7 @@ def choose_pair(
     if not one or not other:
         return None
     if not shared:
-        return _first_clear(cell, name, one), _first_clear(cell, name, other)
+        return one[0], other[0]
     at = cell.pose(name)
 
     def cost(pair: tuple[Choice, Choice]) -> float:
@@ -178,25 +181,38 @@ def _choices(
     if along < math.cos(approach.upright):
         return
     back = _needed_lift(cell, name, arm, site.grasp, at)
-    grasp = grasp * pin.SE3(np.eye(3), back * DOWN)
-    at = cell.pose(name) * grasp
-    before = pin.SE3(at.rotation, at.translation - approach.away * at.rotation[:, 2])
-    up = pin.SE3(at.rotation, at.translation - approach.raised * DOWN)
-    first = arm.look_ahead([before, at, up], site.grasp)
-    angle = math.acos(min(1.0, along))
+    for _ in range(2):
+        held = grasp * pin.SE3(np.eye(3), back * DOWN)
+        at = cell.pose(name) * held
+        z = at.rotation[:, 2]
+        before = pin.SE3(at.rotation, at.translation - approach.away * z)
+        up = pin.SE3(at.rotation, at.translation - approach.raised * DOWN)
+        first = arm.look_ahead([before, at, up], site.grasp)
+        met = _overlap_while_closing(cell, name, arm, site.grasp, first)
+        if met == 0.0:
+            break
+        q, closing = arm.configuration(first.q[1]), arm.closing(site.grasp)
+        ahead = max(cell.overlap(arm, q, but=name, fingers=f, along=z) for f in closing)
+        if not 0.0 < ahead < MOST_LIFT - back - ROOM:
+            break
+        back += ahead + ROOM
+    grasp, angle = held, math.acos(min(1.0, along))
     for way, extra in ways:
         poses = [pose * grasp for pose in way]
         if approach.leave > 0.0:
             poses.append(poses[-1] * pin.SE3(np.eye(3), approach.leave * DOWN))
         outlook = arm.look_ahead(poses, site.grasp, after=first)
+        carried = map(arm.configuration, outlook.q[len(first.q) :])
+        depth = max(met, *(cell.overlap(arm, q, but=name) for q in carried), 0.0)
         yield Choice(
             arm=arm,
             site=site,
             before=before,
+            away=approach.away,
             grasp=grasp,
             then=way,
             outlook=outlook,
-            cost=outlook.cost + ANGLE * angle + extra,
+            cost=outlook.cost + ANGLE * angle + extra + OVERLAP * depth,
         )
 
 
@@ -209,12 +225,14 @@ def _needed_lift(cell: Workcell, name: str, arm: Arm, grasp: str, at: pin.SE3) -
     return min(max(arm.finger_reach(grasp) + CLEAR - room, 0.0), MOST_LIFT)
 
 
-def _first_clear(cell: Workcell, name: str, choices: Sequence[Choice]) -> Choice:
-    """Return the first choice whose poses touch nothing, or else the first."""
-    for choice in choices:
-        if choice.cost > choices[0].cost + COLLISION:
-            break
-        poses = map(choice.arm.configuration, choice.outlook.q)
-        if all(cell.is_clear(choice.arm, q, but=name) for q in poses):
-            return choice
-    return choices[0]
+def _overlap_while_closing(
+    cell: Workcell, name: str, arm: Arm, grasp: str, outlook: Outlook
+) -> float:
+    """Return how deep a hand that comes, closes and rises gets in other things, m.
+
+    Fingers sweep over what lies beside the object while they close.
+    """
+    before, at, up = map(arm.configuration, outlook.q)
+    closing = arm.closing(grasp)
+    moments = [(before, closing[0]), *((at, f) for f in closing), (up, closing[-1])]
+    return max(cell.overlap(arm, q, but=name, fingers=f) for q, f in moments)

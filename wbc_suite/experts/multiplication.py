@@ -36,6 +36,7 @@ CLOSING = 10  # control periods that another gripper may need more
 ENDING = 10  # control periods after the last goal
 SAMPLES = (0.4, 0.7, 0.85, 1.0)  # of the path of a segment, where it is looked at
 COLLISION = 5.0  # s, cost of a grasp that is not clear
+TOUCH = 1e-3  # m; what overlaps less is clear
 SPREAD = 0.3  # s, beside the best outlook, of which sources are drawn
 
 
@@ -227,7 +228,7 @@ def _cost(cell: Workcell[Any], source: Source) -> float:
         total += outlook.cost
         for k, name in near:
             q = arm.configuration(outlook.q[k])
-            total += COLLISION * (not cell.is_clear(arm, q, but=name))
+            total += COLLISION * (cell.overlap(arm, q, but=name) > TOUCH)
     return total
 
 

@@ -21,6 +21,7 @@ OPENING = 8  # control periods until a gripper is open
 OUT_OF_REACH = 0.008  # m, error of outlooks; from the start more may be in reach
 FAR = 0.05  # m, error that is told
 PASSING = 0.03  # m, tolerance of poses on the way
+BESIDE, STAYS_BACK = 0.002, 8.0  # m; distance kept for each m beside the way
 ALIGNED = 0.002, 0.02  # m and rad, over an object that may barely fit between fingers
 
 
@@ -217,8 +218,23 @@ def take(
 
 
 def close_in(cell: Workcell, name: str, choice: Choice) -> Steps[bool]:
-    """Bring the open hand to a grasp of an object that may move."""
-    return (yield from move(choice.arm, lambda: choice.hand_at(cell.pose(name))))
+    """Bring the open hand to a grasp of an object that may move.
+
+    It stays back while it is beside its way, so that no finger comes down on an object
+    that barely fits between them.
+    """
+    arm = choice.arm
+
+    def goal() -> pin.SE3:
+        return choice.hand_at(cell.pose(name))
+
+    def behind() -> pin.SE3:
+        beside = np.linalg.norm(goal().actInv(arm.pose).translation[:2])
+        back = min(STAYS_BACK * max(0.0, float(beside) - BESIDE), choice.away)
+        return goal() * pin.SE3(np.eye(3), -back * UP)
+
+    yield from move(arm, behind)
+    return (yield from move(arm, goal))
 
 
 def come_before(

@@ -17,7 +17,7 @@ def stack(cell: Workcell[Stack]) -> Steps[None]:
     config = cell.benchmark.config
     height = config.cube_a.half_size + config.cube_b.half_size
     for _ in range(3):
-        on_top = shifted(cell.pose(B), (height + 0.002) * UP)
+        on_top = shifted(aligned(cell.pose(A), cell.pose(B)), (height + 0.002) * UP)
         ways = [turned(on_top, R) for R in QUARTERS]
         plans = [(shifted(way, 0.06 * UP), way) for way in ways]
         choice = yield from pick(cell, A, then=plans, raised=0.07)
@@ -29,6 +29,19 @@ def stack(cell: Workcell[Stack]) -> Steps[None]:
         yield from release(choice.arm)
         if cell.benchmark.success():
             return
+
+
+def aligned(pose: pin.SE3, to: pin.SE3) -> pin.SE3:
+    """Return another pose, with one of the 24 rotations that keep a cube's axes.
+
+    It is the nearest to a pose's, so that a cube which has tipped over stays so.
+    """
+    cosines, R = to.rotation.T @ pose.rotation, np.zeros((3, 3))
+    for _ in range(3):
+        row, column = np.unravel_index(np.abs(cosines).argmax(), (3, 3))
+        R[row, column] = np.sign(cosines[row, column])
+        cosines[row], cosines[:, column] = 0.0, 0.0
+    return pin.SE3(to.rotation @ R, to.translation)
 
 
 def turned(pose: pin.SE3, R: np.ndarray) -> pin.SE3:

@@ -1,6 +1,7 @@
 """What an expert sees and moves: arms, objects, and the action of both."""
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
+from types import MappingProxyType
 from typing import Generic, TypeAlias, TypeVar
 
 import mujoco
@@ -18,6 +19,7 @@ from wbc_suite.scene.objects.grasp_site import GraspSite
 from wbc_suite.sensing.hands import Hand, pairs_in_contact
 from wbc_suite.typing import Vector
 
+NONE: Mapping[str, float] = MappingProxyType({})
 T = TypeVar("T")
 B = TypeVar("B", bound=ObjectBenchmark)
 Steps: TypeAlias = Generator[None, None, T]
@@ -107,28 +109,43 @@ class Workcell(Generic[B]):
         """Whether two objects touch."""
         return self.benchmark.touching(name, other)
 
-    def is_clear(self, arm: Arm, q: Vector, *, but: str) -> bool:
-        """Whether a robot at a configuration touches nothing but an object.
+    def overlap(
+        self,
+        arm: Arm,
+        q: Vector,
+        *,
+        but: str,
+        fingers: Mapping[str, float] = NONE,
+        along: Vector | None = None,
+    ) -> float:
+        """Return how deep a robot at a configuration is in anything but an object, m.
 
-        Contacts that there are already do not count, nor those up to 1 mm deep.
+        Contacts that there are already do not count.
+
+        Args:
+            arm: An arm of the robot.
+            q: The configuration.
+            but: The object.
+            fingers: Joints of the gripper that are elsewhere than now.
+            along: Unit vector in the world, if only depth along it counts.
         """
         data, state = self._copy, arm.state
         data.qpos[:] = self.data.qpos
         state.conversion.q_to_mujoco(q, data.qpos)
+        for joint, value in fingers.items():
+            data.joint(state.prefix + joint).qpos = value
         mujoco.mj_kinematics(self.model, data)
         mujoco.mj_collision(self.model, data)
         present = {(a, b) for a, b in pairs_in_contact(self.data)}
-        object_geoms = self.object(but).geoms
-        for (a, b), depth in zip(
-            pairs_in_contact(data), data.contact.dist.tolist(), strict=True
-        ):
-            if depth > -1e-3 or (a, b) in present:
-                continue
-            if self._is_of(state, a) == self._is_of(state, b):
-                continue
-            if a not in object_geoms and b not in object_geoms:
-                return False
-        return True
+        depths = -data.contact.dist
+        if along is not None:
+            depths = depths * np.abs(data.contact.frame[:, :3] @ along)
+        object_geoms, deepest = self.object(but).geoms, 0.0
+        for (a, b), depth in zip(pairs_in_contact(data), depths.tolist(), strict=True):
+            own = self._is_of(state, a) == self._is_of(state, b)
+            if not own and (a, b) not in present and not {a, b} & {*object_geoms}:
+                deepest = max(deepest, depth)
+        return deepest
 
     def _is_of(self, state: RobotState, geom: int) -> bool:
         body = self.model.geom_bodyid[geom]
