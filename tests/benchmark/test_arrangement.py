@@ -60,7 +60,7 @@ def test_one_robot_stands_at_its_own_place_or_the_default(robots):
 
 @pytest.mark.parametrize(
     ("count", "configuration", "message"),
-    [(2, "default", "a place for 1"), (1, "opposed", "cannot stand 'opposed'")],
+    [(2, "default", "takes one robot"), (1, "opposed", "cannot stand 'opposed'")],
 )
 def test_one_place_is_for_one_robot(robots, count, configuration, message):
     with pytest.raises(ConfigError, match=message):

@@ -43,7 +43,7 @@ def test_items_cover_every_seed_once_and_keep_their_names():
 
 @pytest.mark.parametrize(("seeds", "chunk"), [(range(0), 1), (range(3), 0)])
 def test_nothing_to_do_is_refused(seeds, chunk):
-    with pytest.raises(ConfigError, match="at least one"):
+    with pytest.raises(ConfigError, match="At least one seed"):
         plan_rollouts([CASE], seeds=seeds, chunk=chunk)
 
 

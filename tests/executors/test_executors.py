@@ -137,7 +137,7 @@ def test_executors_have_names():
     assert make_executor("process", workers=3).workers == 3
     with pytest.raises(UnknownNameError, match="process"):
         make_executor("proces")
-    with pytest.raises(ConfigError, match="at least one"):
+    with pytest.raises(ConfigError, match="must be at least 1"):
         make_executor("process", workers=0)
 
 

@@ -150,9 +150,9 @@ def test_stops_are_hard():
         assert data.joint(joint).qvel[0] < 0.0  # it was thrown back
 
 
-@pytest.mark.parametrize("name", ["left_wrist_pitch_joint", "L_index_proximal_joint"])
-def test_a_blow_throws_no_light_joint_past_its_limit(name):
+def test_a_blow_throws_no_wrist_past_its_limit():
     """Within a step, as when a hand hits a table: stops are tested at its start."""
+    name = "left_wrist_pitch_joint"
     spec = wbc_suite.load_robot("GR1").to_mjspec()
     spec.option.gravity = (0.0, 0.0, 0.0)
     spec.option.timestep = 0.002

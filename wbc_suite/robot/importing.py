@@ -38,6 +38,8 @@ MAX_NAME = 70
 CARRIER_MASS, END_MASS = 1e-10, 1e-3
 """Mass in kg of a moving link for which the file has none, if it carries others."""
 GYRATION = 0.03  # radius of gyration of such a link, m
+FEW_MOTORS = "efforts and armatures are estimated: the file has few or none"
+NO_ARMATURES = "armatures are estimated from efforts: the file has none"
 MAX_MESSAGE = 800  # largest number of characters of a list in a message
 
 
@@ -107,13 +109,10 @@ def describe_import(
     actuated = {fields["joint"] for fields in others.get("actuators", ())}
     moving = [limb.joints for limb in limbs if limb.kind in ("arm", "leg")]
     driven = estimate_motors(checked, placed, actuated, moving)
-    deviations: list[str] = []
-    if driven != checked:
-        deviations = ["efforts and armatures are estimated: the file has few or none"]
-        LOG.warning("%s: %s.", source, deviations[0])
     complete = estimate_armatures(driven)
-    if complete != driven:
-        deviations.append("armatures are estimated from efforts: the file has none")
+    if driven != checked:
+        LOG.warning("%s: %s.", source, FEW_MOTORS)
+    deviations = {FEW_MOTORS: driven != checked, NO_ARMATURES: complete != driven}
     keyframes = others.pop("keyframes", {})
     data: dict[str, Any] = {
         "name": NameTable().take(name, "robot"),
@@ -121,7 +120,7 @@ def describe_import(
         "root": root,
         "links": complete,
         "frames": placed,
-        "deviations": tuple(deviations),
+        "deviations": tuple(text for text, holds in deviations.items() if holds),
         "groups": {limb.name: limb.joints for limb in limbs if limb.joints},
         "keyframes": {"ready": infer_ready(checked)} | keyframes,
     }

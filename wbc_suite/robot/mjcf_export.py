@@ -13,16 +13,16 @@ from wbc_suite.robot.mjcf_export_geoms import VisualGeoms, add_collision_geoms
 from wbc_suite.robot.poses import se3_of
 
 STOP_SOLREF = (0.004, 1.0)
-"""Time constant in s and damping ratio of limits of slides and fingers, the stiffest that
-is stable with a step of 2 ms; limits of real joints are hard."""
+"""Time constant in s and damping ratio of limits of slides and fingers, the stiffest
+that is stable with a step of 2 ms; limits of real joints are hard."""
 STOP_SOLIMP = (0.95, 0.99, 0.001)
 """Smallest and largest impedance of these limits, and the width between, m or rad."""
 BUMPER_SOLREF = (-1000.0, -500.0)
 """Stiffness in 1/s^2 and damping in 1/s, negative, of limits of a limb's hinges: the
-damping stops a joint within a step of 2 ms. Resistance grows from none to all of it over
-a distance before the limit, as at a rubber stop. MuJoCo tests limits at the start of a
-step only, and a blow turns a wrist at 10 rad/s within one: without that distance it was
-20 mrad past its limit."""
+damping stops a joint within a step of 2 ms. Resistance grows from none to all of it
+over a distance before the limit, as at a rubber stop. MuJoCo tests limits at the start
+of a step only, and a blow turns a wrist at 10 rad/s within one: without that distance
+it was 20 mrad past its limit."""
 BUMPER_TIME, BUMPER_WIDTH = 4e-3, 0.03
 """That distance: the way at full speed in this time, s, at most this, rad."""
 STOP_MARGIN = 0.01
