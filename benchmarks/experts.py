@@ -2,8 +2,8 @@
 
 Episodes are those of seeds that no tuning saw, from 7000 on. An episode counts as a
 success if the benchmark is solved within 500 steps, or 1000 for those with several
-objects. Results are added to artifacts/benchmarks/experts_table.json; `--table` writes
-that into docs/experts.md, and measures nothing.
+objects. Results are added to docs/experts.json; `--table` writes that into
+docs/experts.md, and measures nothing.
 
 Usage: python benchmarks/experts.py [BENCHMARK ...] [--robots R[,R]] [--controller C]
     [--seeds 100] [--base 7000] [--quick] [--json FILE]
@@ -24,7 +24,7 @@ from wbc_suite.evaluation import success_interval
 from wbc_suite.evaluation.rollouts import run_episode
 
 ROOT = Path(__file__).parent.parent
-FOUND = ROOT / "artifacts" / "benchmarks" / "experts_table.json"
+FOUND = ROOT / "docs" / "experts.json"
 PAGE = ROOT / "docs" / "experts.md"
 LONG = ("TwoArmTransport", "ToolHang", "NutAssembly", "PickPlace")
 ALL = (
@@ -97,7 +97,6 @@ def add(row: dict[str, Any]) -> None:
     known = json.loads(FOUND.read_text("utf-8")) if FOUND.exists() else []
     key = ("benchmark", "robots", "controller")
     others = [r for r in known if any(r[k] != row[k] for k in key)]
-    FOUND.parent.mkdir(parents=True, exist_ok=True)
     FOUND.write_text(json.dumps([*others, row], indent=1), "utf-8")
 
 
