@@ -7,7 +7,7 @@ import pytest
 
 import wbc_suite
 from wbc_suite.catalogue import Catalogue
-from wbc_suite.robot.mjcf_export import BUMPER_WIDTH
+from wbc_suite.robot.mjcf_export import STOP_MARGIN
 
 ROBOTS = Catalogue().names("robots")
 ROOTS = ("fixed", "planar", "free")
@@ -146,27 +146,5 @@ def test_stops_are_hard():
         for _ in range(100):
             mujoco.mj_step(model, data)
             passed = max(passed, data.joint(joint).qpos[0] - high)
-        assert -BUMPER_WIDTH < passed < 1e-3
+        assert -STOP_MARGIN < passed < 1e-3
         assert data.joint(joint).qvel[0] < 0.0  # it was thrown back
-
-
-def test_a_blow_throws_no_wrist_past_its_limit():
-    """Within a step, as when a hand hits a table: stops are tested at its start."""
-    name = "left_wrist_pitch_joint"
-    spec = wbc_suite.load_robot("GR1").to_mjspec()
-    spec.option.gravity = (0.0, 0.0, 0.0)
-    spec.option.timestep = 0.002
-    model = spec.compile()
-    joint = model.joint(name)
-    for before in np.linspace(1e-4, joint.margin.item(), 10):
-        data = mujoco.MjData(model)
-        data.joint(name).qpos[0] = joint.range[1] - before
-        mujoco.mj_forward(model, data)
-        inertia = 1.0 / model.dof_invweight0[joint.dofadr[0]]
-        data.joint(name).qfrc_applied[0] = 10.0 * inertia / 0.002  # to 10 rad/s
-        passed = -before
-        for _ in range(20):
-            mujoco.mj_step(model, data)
-            passed = max(passed, data.joint(name).qpos[0] - joint.range[1])
-            data.joint(name).qfrc_applied[0] = 0.0
-        assert passed < 2e-3
