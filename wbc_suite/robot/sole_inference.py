@@ -11,7 +11,7 @@ from wbc_suite.robot.elements import rigid_bodies
 from wbc_suite.robot.poses import se3_of
 from wbc_suite.typing import Matrix
 
-FLAT = 0.002
+FLAT = 0.004
 """m; what lies at most so much higher than the lowest point belongs to the sole."""
 
 AT_FRAME = 0.01
