@@ -11,10 +11,15 @@ Usage:
     python benchmarks/whole_body_dynamics.py --only hand/far --trials 200
 """
 
+import json
+import subprocess
+import sys
+import tempfile
 import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -24,6 +29,7 @@ from harness.stand import Stand
 
 import wbc_suite
 from wbc_suite.control import load_composite_controller_config
+from wbc_suite.robot import load_robot
 
 GR1, SPOT, ARM = "GR1FreeBody", "Spot", "SpotWithArm"
 TILTED, DROPPED = 0.6, 0.25  # cosine; m
@@ -433,6 +439,47 @@ def tick_cost(report: Report, robot: str, walk: float, seconds: float) -> None:
     report.add(f"{robot}/tick", name, ticks)
 
 
+def tsid_tick(report: Report, ticks: int) -> None:
+    """Measure a tick of TSID with GR1 standing, fingers locked, where it is installed.
+
+    TSID computes the dynamics as well, which ours takes from the physics step.
+    """
+    here = Path(__file__).parent
+    python = here.parent / ".venv-tsid" / "bin" / "python"
+    if not python.exists():
+        print("TSID is left out: make .venv-tsid/.installed", file=sys.stderr)
+        return
+    robot = load_robot(GR1, root="fixed")
+    config = load_composite_controller_config("WHOLE_BODY_ID", GR1)
+    groups = robot.groups.keys() - robot.synergies.keys()
+    limbs = [robot.joint(name) for group in groups for name in robot.groups[group]]
+    names = {joint.name for joint in limbs}
+    ready = robot.keyframe("ready")
+    bare = {"visual": (), "collision": ()}
+    links = tuple(link.model_copy(update=bare) for link in robot.links)
+    job = {
+        "dt": 0.002,
+        "ticks": ticks,
+        "friction": 0.6,
+        "weight": 9.81 * robot.mass,
+        "feet": [{"height": 0.0} | foot for foot in config["foot"]],
+        "hands": [hand["frame"] for hand in config["frame"]],
+        "trunk": "torso",
+        "torques": {joint.name: joint.effort for joint in limbs},
+        "joints": {name: value for name, value in ready.items() if name in names},
+        "locked": [name for name in robot.joint_names if name not in names],
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        text = robot.model_copy(update={"links": links}).to_urdf()
+        (Path(folder) / "robot.urdf").write_text(text, encoding="utf-8")
+        (Path(folder) / "job.json").write_text(json.dumps(job), encoding="utf-8")
+        side = [python, here / "peers" / "tsid_side.py", folder]
+        found = subprocess.run(side, capture_output=True, text=True, check=True)
+    theirs = report.add(f"{GR1}/tick", "standing, TSID", json.loads(found.stdout)["us"])
+    ours = next(row for row in report.rows if row["side"] == "standing")
+    report.compare(f"{GR1}/tick/tsid", ours, theirs)
+
+
 def real_time_factor(report: Report, robot: str, walk: float) -> None:
     """Measure simulated time over the time of one core, in actions at 50 Hz."""
     stand = Stand(robot, "WHOLE_BODY_ID")
@@ -508,6 +555,7 @@ def show_ticks(report: Report, quick: bool) -> None:
         for walk in (0.0, 0.2):
             tick_cost(report, robot, walk, 2.0)
         real_time_factor(report, robot, 0.3)
+    tsid_tick(report, 200 if quick else 1500)
     report.show("A tick of the QP", ("case", "side", "median_us", "p99_us", "n"))
     report.show("Simulated time over time", ("case", "side", "factor"))
     for robot in (GR1, SPOT, ARM):
