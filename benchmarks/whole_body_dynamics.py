@@ -439,24 +439,44 @@ def tick_cost(report: Report, robot: str, walk: float, seconds: float) -> None:
     report.add(f"{robot}/tick", name, ticks)
 
 
-def tsid_tick(report: Report, ticks: int) -> None:
-    """Measure a tick of TSID with GR1 standing, fingers locked, where it is installed.
+PEERS = {"TSID": ("tsid", "tsid_side.py"), "placo": ("placo", "placo_dynamics_side.py")}
+"""Environment and script of each; see `peers/`."""
 
-    TSID computes the dynamics as well, which ours takes from the physics step.
+
+def peers_ticks(report: Report, ticks: int) -> None:
+    """Measure a tick of peers that are installed: GR1 stands, its fingers fixed.
+
+    They compute the dynamics as well, which ours takes from the physics step.
     """
     here = Path(__file__).parent
-    python = here.parent / ".venv-tsid" / "bin" / "python"
-    if not python.exists():
-        print("TSID is left out: make .venv-tsid/.installed", file=sys.stderr)
-        return
+    ours = next(row for row in report.rows if row["side"] == "standing")
+    with tempfile.TemporaryDirectory() as folder:
+        write_job(Path(folder), ticks)
+        for name, (environment, script) in PEERS.items():
+            python = here.parent / f".venv-{environment}" / "bin" / "python"
+            if not python.exists():
+                left_out = f"{name} is left out: make .venv-{environment}/.installed"
+                print(left_out, file=sys.stderr)
+                continue
+            side = [python, here / "peers" / script, folder]
+            found = subprocess.run(side, capture_output=True, text=True, check=True)
+            times = json.loads(found.stdout.splitlines()[-1])["us"]
+            theirs = report.add(f"{GR1}/tick", f"standing, {name}", times)
+            report.compare(f"{GR1}/tick/{environment}", ours, theirs)
+
+
+def write_job(folder: Path, ticks: int) -> None:
+    """Write the robot, and the tasks of WHOLE_BODY_ID, for a peer."""
     robot = load_robot(GR1, root="fixed")
     config = load_composite_controller_config("WHOLE_BODY_ID", GR1)
     groups = robot.groups.keys() - robot.synergies.keys()
     limbs = [robot.joint(name) for group in groups for name in robot.groups[group]]
-    names = {joint.name for joint in limbs}
-    ready = robot.keyframe("ready")
-    bare = {"visual": (), "collision": ()}
-    links = tuple(link.model_copy(update=bare) for link in robot.links)
+    ready, links = robot.keyframe("ready"), []
+    for link in robot.links:
+        changes: dict[str, Any] = {"visual": (), "collision": ()}
+        if link.joint not in limbs:
+            changes["joint"] = None
+        links.append(link.model_copy(update=changes))
     job = {
         "dt": 0.002,
         "ticks": ticks,
@@ -466,18 +486,11 @@ def tsid_tick(report: Report, ticks: int) -> None:
         "hands": [hand["frame"] for hand in config["frame"]],
         "trunk": "torso",
         "torques": {joint.name: joint.effort for joint in limbs},
-        "joints": {name: value for name, value in ready.items() if name in names},
-        "locked": [name for name in robot.joint_names if name not in names],
+        "joints": {joint.name: ready[joint.name] for joint in limbs},
     }
-    with tempfile.TemporaryDirectory() as folder:
-        text = robot.model_copy(update={"links": links}).to_urdf()
-        (Path(folder) / "robot.urdf").write_text(text, encoding="utf-8")
-        (Path(folder) / "job.json").write_text(json.dumps(job), encoding="utf-8")
-        side = [python, here / "peers" / "tsid_side.py", folder]
-        found = subprocess.run(side, capture_output=True, text=True, check=True)
-    theirs = report.add(f"{GR1}/tick", "standing, TSID", json.loads(found.stdout)["us"])
-    ours = next(row for row in report.rows if row["side"] == "standing")
-    report.compare(f"{GR1}/tick/tsid", ours, theirs)
+    text = robot.model_copy(update={"links": tuple(links)}).to_urdf()
+    (folder / "robot.urdf").write_text(text, encoding="utf-8")
+    (folder / "job.json").write_text(json.dumps(job), encoding="utf-8")
 
 
 def real_time_factor(report: Report, robot: str, walk: float) -> None:
@@ -555,7 +568,7 @@ def show_ticks(report: Report, quick: bool) -> None:
         for walk in (0.0, 0.2):
             tick_cost(report, robot, walk, 2.0)
         real_time_factor(report, robot, 0.3)
-    tsid_tick(report, 200 if quick else 1500)
+    peers_ticks(report, 200 if quick else 1500)
     report.show("A tick of the QP", ("case", "side", "median_us", "p99_us", "n"))
     report.show("Simulated time over time", ("case", "side", "factor"))
     for robot in (GR1, SPOT, ARM):

@@ -25,11 +25,8 @@ class Standing:
     """A formulation of TSID, and its state."""
 
     def __init__(self, folder: Path, job: dict) -> None:
-        whole = pin.buildModelFromUrdf(
-            str(folder / "robot.urdf"), pin.JointModelFreeFlyer()
-        )
-        fingers = [whole.getJointId(name) for name in job["locked"]]
-        model = pin.buildReducedModel(whole, fingers, pin.neutral(whole))
+        file = str(folder / "robot.urdf")
+        model = pin.buildModelFromUrdf(file, pin.JointModelFreeFlyer())
         floating = tsid.RootJointType.FLOATING_BASE_SYSTEM
         self.robot = tsid.RobotWrapper(model, floating, False)
         self.model = model
