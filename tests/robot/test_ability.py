@@ -2,8 +2,8 @@
 
 import mujoco
 import numpy as np
-import pinocchio as pin
 import pytest
+from hand_checks import assert_links_agree, at_ready, landmarks
 
 import wbc_suite
 
@@ -35,9 +35,7 @@ def test_outer_joints_follow_and_reach_their_limits_together(hand):
 
 
 def test_fingers_close_and_open_within_half_a_second(hand):
-    model = hand.to_mjspec().compile()
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, model.key("ready").id)
+    model, data = at_ready(hand)
     side = hand.links[0].name[0]
     for posture, low, high in (("closed", 1.55, 1.83), ("open", -0.05, 0.12)):
         for synergy in hand.synergies["gripper"]:
@@ -53,31 +51,12 @@ def test_fingers_close_and_open_within_half_a_second(hand):
 
 
 def test_both_engines_agree_on_every_link(hand):
-    model, other = hand.to_mjspec().compile(), hand.to_pinocchio()
-    data, other_data = mujoco.MjData(model), other.createData()
-    mujoco.mj_resetDataKeyframe(model, data, model.key("ready").id)
-    mujoco.mj_forward(model, data)
-    q = np.zeros(other.nq)
-    for joint in hand.joints:
-        index = other.joints[other.getJointId(joint.name)].idx_q
-        q[index] = data.joint(joint.name).qpos[0]
-    pin.framesForwardKinematics(other, other_data, q)
-    for link in hand.links:
-        pose = other_data.oMf[other.getFrameId(link.name, pin.FrameType.BODY)]
-        np.testing.assert_allclose(
-            data.body(link.name).xpos, pose.translation, atol=1e-9
-        )
+    assert_links_agree(hand, at_ready(hand)[1])
 
 
 def test_left_hand_is_the_mirror_image():
-    tips = {}
-    for side in ("right", "left"):
-        hand = wbc_suite.load_robot(f"gripper/ability_{side}_hand")
-        model = hand.to_mjspec().compile()
-        data = mujoco.MjData(model)
-        mujoco.mj_resetDataKeyframe(model, data, model.key("ready").id)
-        mujoco.mj_forward(model, data)
-        names = [f"{finger}_tip" for finger in (*FINGERS, "thumb")]
-        names += ["tcp", "pinch", "wrap"]
-        tips[side] = np.array([data.site(name).xpos for name in names])
-    np.testing.assert_allclose(tips["left"], tips["right"] * [1, -1, 1], atol=1e-7)
+    right, left = (
+        landmarks(at_ready(wbc_suite.load_robot(f"gripper/ability_{side}_hand"))[1])
+        for side in ("right", "left")
+    )
+    np.testing.assert_allclose(left, right * [1, -1, 1], atol=1e-7)

@@ -2,12 +2,10 @@
 
 import mujoco
 import numpy as np
-import pinocchio as pin
 import pytest
+from hand_checks import assert_links_agree, at_ready, landmarks
 
 import wbc_suite
-
-FINGERS = ("index", "middle", "ring", "pinky")
 
 
 @pytest.fixture(scope="module", params=["right", "left"])
@@ -17,8 +15,7 @@ def hand(request):
 
 def moved(hand, values):
     """Return MuJoCo's state with drives at values and followers behind them."""
-    model = hand.to_mjspec().compile()
-    data = mujoco.MjData(model)
+    model, data = at_ready(hand)
     for joint in hand.joints:
         if joint.mimic is None:
             value = values.get(joint.name, 0.0)
@@ -26,7 +23,7 @@ def moved(hand, values):
             value = joint.mimic.ratio * values.get(joint.mimic.joint, 0.0)
         data.joint(joint.name).qpos = value
     mujoco.mj_forward(model, data)
-    return model, data
+    return data
 
 
 def test_hand_weighs_what_the_data_sheet_says(hand):
@@ -44,9 +41,7 @@ def test_nine_drives_move_twenty_joints_within_their_ranges(hand):
 
 
 def test_fingers_close_and_open_within_a_second(hand):
-    model = hand.to_mjspec().compile()
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, model.key("ready").id)
+    model, data = at_ready(hand)
     side = hand.links[0].name.split("_")[0]
     for posture, low, high in (("closed", 0.8, 1.4), ("open", -0.05, 0.12)):
         for synergy in hand.synergies["gripper"]:
@@ -61,39 +56,21 @@ def test_fingers_close_and_open_within_a_second(hand):
 
 def test_both_engines_agree_on_every_link(hand):
     values = {j.name: 0.4 * j.range[1] for j in hand.joints if j.mimic is None}
-    _, data = moved(hand, values)
-    other = hand.to_pinocchio()
-    other_data = other.createData()
-    q = np.zeros(other.nq)
-    for joint in hand.joints:
-        index = other.joints[other.getJointId(joint.name)].idx_q
-        q[index] = data.joint(joint.name).qpos[0]
-    pin.framesForwardKinematics(other, other_data, q)
-    for link in hand.links:
-        pose = other_data.oMf[other.getFrameId(link.name, pin.FrameType.BODY)]
-        np.testing.assert_allclose(
-            data.body(link.name).xpos, pose.translation, atol=1e-9
-        )
+    assert_links_agree(hand, moved(hand, values))
 
 
 def test_left_hand_is_the_mirror_image():
-    tips = {}
+    places = {}
     for side in ("right", "left"):
         hand = wbc_suite.load_robot(f"gripper/schunk_svh_{side}_hand")
         values = {j.name: 0.3 * j.range[1] for j in hand.joints if j.mimic is None}
-        _, data = moved(hand, values)
-        names = [f"{finger}_tip" for finger in (*FINGERS, "thumb")]
-        names += ["tcp", "pinch", "wrap"]
-        tips[side] = np.array([data.site(name).xpos for name in names])
-    np.testing.assert_allclose(tips["left"], tips["right"] * [1, -1, 1], atol=1e-7)
+        places[side] = landmarks(moved(hand, values))
+    np.testing.assert_allclose(places["left"], places["right"] * [1, -1, 1], atol=1e-7)
 
 
 def test_gr1_carries_both_hands():
     robot = wbc_suite.load_robot("GR1ArmsOnly", gripper="SchunkSvhHand")
-    model = robot.to_mjspec().compile()
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, model.key("ready").id)
-    mujoco.mj_forward(model, data)
+    model, data = at_ready(robot)
     assert data.ncon == 0
     for side in ("right", "left"):
         assert model.joint(f"{side}_hand_Thumb_Opposition").id >= 0

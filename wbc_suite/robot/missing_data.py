@@ -109,14 +109,21 @@ def estimate_armatures(links: Sequence[Link]) -> list[Link]:
 
     URDF cannot state an armature.
     """
-    changed = list(links)
-    for k, link in enumerate(links):
-        joint = link.joint
-        if joint and joint.effort and "armature" not in joint.model_fields_set:
-            armature = float(f"{ROTOR * joint.effort:.3g}")
-            joint = joint.model_copy(update={"armature": armature})
-            changed[k] = link.model_copy(update={"joint": joint})
-    return changed
+    return [
+        with_rotor(link)
+        if link.joint and "armature" not in link.joint.model_fields_set
+        else link
+        for link in links
+    ]
+
+
+def with_rotor(link: Link) -> Link:
+    """Return a link whose motor has an estimated armature, if it has none."""
+    joint = link.joint
+    if joint is None or joint.armature or not joint.effort:
+        return link
+    update = {"armature": float(f"{ROTOR * joint.effort:.3g}")}
+    return link.model_copy(update={"joint": joint.model_copy(update=update)})
 
 
 def _reach(link: Link) -> float:

@@ -10,7 +10,7 @@ from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.elements import Actuator, Joint, rigid_bodies
 from wbc_suite.robot.inertia import inertia_fields, inertia_of
 from wbc_suite.robot.mjcf_export_geoms import VisualGeoms, add_collision_geoms
-from wbc_suite.robot.poses import se3_of
+from wbc_suite.robot.poses import poses_in_rigid_bodies
 
 STOP_SOLREF = (0.004, 1.0)
 """Time constant in s and damping ratio of joint limits, the stiffest that is stable
@@ -127,13 +127,11 @@ def _inertias(robot: RobotDescription) -> dict[str, pin.Inertia]:
     """
     inertias = {link.name: inertia_of(link) for link in robot.links}
     rigid = rigid_bodies(robot.links)
-    placement: dict[str, pin.SE3] = {}
+    placement = poses_in_rigid_bodies(robot.links)
     for link in robot.links:
         owner = rigid[link.name]
         if owner == link.name:
-            placement[link.name] = pin.SE3.Identity()
             continue
-        placement[link.name] = placement[str(link.parent)] * se3_of(link)
         moves = owner != robot.links[0].name or robot.root.kind != "fixed"
         light = robot.link(owner).mass == 0.0 or link.mass == 0.0
         if moves and light and any((link.mass, *link.inertia)):

@@ -1,11 +1,13 @@
 """Poses of description items as `pinocchio.SE3`, and back."""
 
+from collections.abc import Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
 import pinocchio as pin
 from scipy.spatial.transform import Rotation
 
+from wbc_suite.robot.elements import Link, rigid_bodies
 from wbc_suite.robot.shapes import Posed, ShapeFields
 from wbc_suite.typing import Matrix, Vector
 
@@ -46,6 +48,18 @@ def compose(*items: HasPose) -> dict[str, Any]:
     for item in moved:
         pose = pose * se3_of(item)
     return pose_fields(pose)
+
+
+def poses_in_rigid_bodies(links: Sequence[Link]) -> dict[str, Any]:
+    """Return the pose of each link in the moving (or first) link it is fixed to."""
+    owners = rigid_bodies(links)
+    poses: dict[str, Any] = {}
+    for link in links:
+        if owners[link.name] == link.name:
+            poses[link.name] = pin.SE3.Identity()
+        else:
+            poses[link.name] = poses[str(link.parent)] * se3_of(link)
+    return poses
 
 
 def joint_motion(axis: Vector, value: float, *, slide: bool) -> Any:

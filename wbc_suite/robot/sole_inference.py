@@ -3,12 +3,11 @@
 from typing import NamedTuple
 
 import numpy as np
-import pinocchio as pin
 
 from wbc_suite.robot.collision_capsules import collision_spheres
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.elements import rigid_bodies
-from wbc_suite.robot.poses import se3_of
+from wbc_suite.robot.poses import poses_in_rigid_bodies, se3_of
 from wbc_suite.typing import Matrix
 
 FLAT = 0.004
@@ -55,16 +54,10 @@ def ball_radius(robot: RobotDescription, frame: str) -> float:
 def _spheres(robot: RobotDescription, name: str) -> Matrix:
     """Return the spheres of a foot's rigid body in the axes of its frame, (n, 4)."""
     frame = robot.frame(name)
-    bodies, poses = rigid_bodies(robot.links), dict[str, pin.SE3]()
+    bodies, poses = rigid_bodies(robot.links), poses_in_rigid_bodies(robot.links)
     rows = [np.zeros((0, 4))]
-    spheres = collision_spheres(robot)
-    for link in robot.links:
-        is_first = bodies[link.name] == link.name
-        poses[link.name] = (
-            pin.SE3.Identity() if is_first else poses[link.parent] * se3_of(link)
-        )
     to_frame = (poses[frame.link] * se3_of(frame)).inverse()
-    for link, found in spheres.items():
+    for link, found in collision_spheres(robot).items():
         if bodies[link] == bodies[frame.link]:
             pose = to_frame * poses[link]
             centres = found[:, :3] @ pose.rotation.T + pose.translation

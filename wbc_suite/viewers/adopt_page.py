@@ -13,10 +13,10 @@ from wbc_suite.control.composite.whole_body_dynamics_config import (
 from wbc_suite.envs.hold_check import hold_faults
 from wbc_suite.errors import WbcError
 from wbc_suite.robot import RobotDescription
-from wbc_suite.robot.elements import Frame, Link, Root
+from wbc_suite.robot.elements import Frame, Root
 from wbc_suite.robot.gripper_inference import Gripper, infer_grippers
 from wbc_suite.robot.importing import with_soles
-from wbc_suite.robot.missing_data import ROTOR
+from wbc_suite.robot.missing_data import with_rotor
 from wbc_suite.robot.sole_inference import guess_sole
 from wbc_suite.robot.toml_export import toml_text
 from wbc_suite.tomlfile import parse_model
@@ -196,7 +196,7 @@ class AdoptPage:
             ready |= synergy.open
         links = self.robot.links
         if self._rotors.value:
-            links = tuple(map(_with_rotor, links))
+            links = tuple(map(with_rotor, links))
         robot = _changed(
             self.robot,
             name=self._name.value,
@@ -274,14 +274,6 @@ def _changed(robot: RobotDescription, **changes: Any) -> RobotDescription:
     """Return the robot with some fields changed, and checked."""
     data = {key: getattr(robot, key) for key in type(robot).model_fields}
     return parse_model(RobotDescription, data | changes, source=robot.name)
-
-
-def _with_rotor(link: Link) -> Link:
-    joint = link.joint
-    if joint is None or joint.armature or not joint.effort:
-        return link
-    update = {"armature": round(ROTOR * joint.effort, 6)}
-    return link.model_copy(update={"joint": joint.model_copy(update=update)})
 
 
 def _reason(robot: RobotDescription, frame: Frame, grippers: dict[str, Gripper]) -> str:
