@@ -180,22 +180,25 @@ def _choices(
     along = float(at.rotation[:, 2] @ approach.direction)
     if along < math.cos(approach.upright):
         return
-    back = _needed_lift(cell, name, arm, site.grasp, at)
-    for _ in range(2):
+
+    def reach(back: float) -> tuple[pin.SE3, pin.SE3, Outlook]:
         held = grasp * pin.SE3(np.eye(3), back * DOWN)
         at = cell.pose(name) * held
-        z = at.rotation[:, 2]
-        before = pin.SE3(at.rotation, at.translation - approach.away * z)
+        away = approach.away * at.rotation[:, 2]
+        before = pin.SE3(at.rotation, at.translation - away)
         up = pin.SE3(at.rotation, at.translation - approach.raised * DOWN)
-        first = arm.look_ahead([before, at, up], site.grasp)
-        met = _overlap_while_closing(cell, name, arm, site.grasp, first)
-        if met == 0.0:
-            break
+        return held, before, arm.look_ahead([before, at, up], site.grasp)
+
+    back = _needed_lift(cell, name, arm, site.grasp, at)
+    held, before, first = reach(back)
+    met = _overlap_while_closing(cell, name, arm, site.grasp, first)
+    if met > 0.0:  # something is behind the object: the hand stays back from it
         q, closing = arm.configuration(first.q[1]), arm.closing(site.grasp)
+        z = (cell.pose(name) * held).rotation[:, 2]
         ahead = max(cell.overlap(arm, q, but=name, fingers=f, along=z) for f in closing)
-        if not 0.0 < ahead < MOST_LIFT - back - ROOM:
-            break
-        back += ahead + ROOM
+        if 0.0 < ahead < MOST_LIFT - back - ROOM:
+            held, before, first = reach(back + ahead + ROOM)
+            met = _overlap_while_closing(cell, name, arm, site.grasp, first)
     grasp, angle = held, math.acos(min(1.0, along))
     for way, extra in ways:
         poses = [pose * grasp for pose in way]

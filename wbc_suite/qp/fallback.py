@@ -45,7 +45,8 @@ class Ladder:
         self._q, self._levels, self._tick, self.solver = q, levels, tick, solver
         self._overshoot_damping = overshoot_damping
         self._problems: dict[tuple[int, int], tuple[Problem, QpSolver]] = {}
-        box_least_squares(np.eye(1), *np.zeros((3, 1)), 1)  # compiled before a tick
+        zero = np.zeros(1)
+        box_least_squares(np.eye(1), zero, zero, zero, 1)  # compiled before a tick
 
     def reset(self) -> None:
         """Discard all warm starts."""

@@ -25,8 +25,13 @@ PAIRS = {
 }
 """Words for the legs of quadrupeds."""
 PAIR_OF = {word: pair for pair, words in PAIRS.items() for word in words.split()}
-ENDS = {"front": "front", "fore": "front"}
-ENDS |= dict.fromkeys(("rear", "hind", "back"), "rear")
+ENDS = {
+    "front": "front",
+    "fore": "front",
+    "rear": "rear",
+    "hind": "rear",
+    "back": "rear",
+}
 
 ENDINGS = {
     "arm": "eef ee effector tcp tool flange grasp grasping tip",

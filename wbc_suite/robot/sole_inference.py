@@ -55,7 +55,7 @@ def _spheres(robot: RobotDescription, name: str) -> Matrix:
     """Return the spheres of a foot's rigid body in the axes of its frame, (n, 4)."""
     frame = robot.frame(name)
     bodies, poses = rigid_bodies(robot.links), poses_in_rigid_bodies(robot.links)
-    rows = [np.zeros((0, 4))]
+    rows: list[Matrix] = [np.zeros((0, 4))]
     to_frame = (poses[frame.link] * se3_of(frame)).inverse()
     for link, found in collision_spheres(robot).items():
         if bodies[link] == bodies[frame.link]:
