@@ -107,6 +107,13 @@ def test_a_humans_soles_are_level_and_its_knees_point_forward(tmp_path):
         assert shin.translation[0] > thigh.translation[0] + 0.05
 
 
+def test_rounded_angles_stay_within_limits(tmp_path):
+    angle = read(tmp_path, human()).keyframe("ready")["right_ankle"]
+    tight = human().replace('lower="-3.0"', f'lower="{angle + 3e-5}"')
+    ready = read(tmp_path, tight).keyframe("ready")
+    assert ready["right_ankle"] == pytest.approx(angle + 3e-5, abs=1e-9)
+
+
 def test_legs_that_cannot_stand_so_stay_near_zero(tmp_path):
     stiff = dog().replace('lower="-3.0" upper="3.0"', 'lower="-0.1" upper="0.1"')
     ready = read(tmp_path, stiff).keyframe("ready")

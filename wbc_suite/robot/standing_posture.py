@@ -89,7 +89,7 @@ def _bent_leg(
     if not np.linalg.norm(best.fun) < TOLERANCE:
         return {}
     names = [model.names[joint] for joint in hinges]
-    return dict(zip(names, best.x.clip(low, high).round(4).tolist(), strict=True))
+    return dict(zip(names, best.x.round(4).clip(low, high).tolist(), strict=True))
 
 
 def _along_y(
