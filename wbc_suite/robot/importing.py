@@ -23,7 +23,6 @@ from wbc_suite.robot.missing_data import (
     estimate_motors,
     oversized,
 )
-from wbc_suite.robot.shapes import Shape
 from wbc_suite.robot.standing_posture import feet_are_level, standing_legs
 from wbc_suite.robot.validation import RESERVED
 from wbc_suite.robot.working_posture import working_arms
@@ -281,13 +280,10 @@ def with_soles(robot: RobotDescription) -> RobotDescription:
         )
     shown = join_first([f"'{link.name}'" for link in bare])
     LOG.warning("%s: collides with its visual shapes: %s.", robot.name, shown)
-    update = {
-        link.name: link.model_copy(update={"collision": _solid(link.visual)})
-        for link in bare
-    }
+    grey = {"color": "grey"}
+    update = {}
+    for link in bare:
+        solid = tuple(shape.model_copy(update=grey) for shape in link.visual)
+        update[link.name] = link.model_copy(update={"collision": solid})
     links = tuple(update.get(link.name, link) for link in robot.links)
     return robot.model_copy(update={"links": links})
-
-
-def _solid(shapes: Sequence[Shape]) -> tuple[Shape, ...]:
-    return tuple(shape.model_copy(update={"color": "grey"}) for shape in shapes)

@@ -172,7 +172,7 @@ class TeleopPanel:
             self._handles.set_mode(number, chosen)
             mode.options = _marked(chosen)
 
-        mode.on_click(lambda _: set_mode(_unmarked(mode.value)))
+        mode.on_click(lambda _: set_mode(HandleMode(mode.value.strip("• "))))
         recall.on_click(lambda _: self._handles.recall(number))
         client.gui.add_command("Move or turn", hotkey="T").on_trigger(
             lambda _: set_mode(self._handles.mode(number).next())
@@ -292,7 +292,3 @@ def _buttons(snapshot: Snapshot) -> tuple[str, ...]:
 def _marked(chosen: HandleMode) -> tuple[str, ...]:
     """Return the labels of the modes with the chosen one marked."""
     return tuple(f"• {mode} •" if mode is chosen else mode.value for mode in HandleMode)
-
-
-def _unmarked(label: str) -> HandleMode:
-    return HandleMode(label.strip("• "))

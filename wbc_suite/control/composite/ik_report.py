@@ -90,7 +90,7 @@ class IkReport:
                 "orientation_error": angle,
                 "reasons": []
                 if is_reached
-                else LazyReasons(partial(_pick, reasons, k)),
+                else LazyReasons(lambda k=k: list(dict.fromkeys(reasons()[k]))),
             }
             for k, (frame, is_reached, (position, angle)) in enumerate(
                 zip(self._config.frames, reached, errors, strict=True)
@@ -185,11 +185,6 @@ class IkReport:
             and other.level <= self._config.frames[k].level
             and support & self._support[i]
         ]
-
-
-def _pick(reasons: Callable[[], Reasons], k: int) -> list[Reason]:
-    """Return the k-th reasons, each once."""
-    return list(dict.fromkeys(reasons()[k]))
 
 
 def contacts_of(

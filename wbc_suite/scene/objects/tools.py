@@ -125,18 +125,21 @@ def _with_handle(
         quat=(1.0, 0.0, 0.0, 0.0),
     )
     sites = {"center": (0.0, 0.0, 0.0), "handle": at}
-    across = [
-        GraspSite(
-            pos=(at[0], 0.0, -0.4 * side * half_height),  # fingers clear of a table
-            approach=(0.0, 0.0, side),
-            closing=(0.0, 1.0, 0.0),
-            tilt=0.6,
-        )
-        for side in (1.0, -1.0)
-    ]
-    grasps = tuple(turn for one in across for turn in (one, one.turned()))
+    grasps = _flat_grasps(at[0], lift=0.4 * half_height, tilt=0.6)
     whole = SceneObject(name=name, parts=(*ring, grip), sites=sites, grasps=grasps)
     return whole.with_mass(0.04)
+
+
+def _flat_grasps(x: float, *, lift: float, tilt: float) -> tuple[GraspSite, ...]:
+    """Return grasps across a lying bar along x, by `lift` clear of a table, m."""
+    closing = (0.0, 1.0, 0.0)
+    sides = [
+        GraspSite(
+            pos=(x, 0.0, -lift * z), approach=(0.0, 0.0, z), closing=closing, tilt=tilt
+        )
+        for z in (1.0, -1.0)
+    ]
+    return tuple(turn for one in sides for turn in (one, one.turned()))
 
 
 def wrench(
@@ -170,16 +173,7 @@ def wrench(
         "hole2": (-end, 0.0, 0.0),
         "grip": (0.0, 0.0, 0.0),
     }
-    across = [
-        GraspSite(
-            pos=(0.0, 0.0, -0.004 * side),  # fingers clear of a table
-            approach=(0.0, 0.0, side),
-            closing=(0.0, 1.0, 0.0),
-            tilt=0.4,
-        )
-        for side in (1.0, -1.0)
-    ]
-    grasps = tuple(turn for one in across for turn in (one, one.turned()))
+    grasps = _flat_grasps(0.0, lift=0.004, tilt=0.4)
     parts = (*rings, *shaft)
     whole = SceneObject(name=name, parts=parts, sites=sites, grasps=grasps)
     return whole.with_mass(mass)
