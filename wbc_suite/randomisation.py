@@ -197,11 +197,6 @@ def _light_position(model: Any, size: float, rng: np.random.Generator) -> None:
     model.light_dir[:] /= np.linalg.norm(model.light_dir, axis=1, keepdims=True)
 
 
-def _light_brightness(model: Any, share: float, rng: np.random.Generator) -> None:
-    factors = rng.uniform(1.0 - share, 1.0 + share, (model.nlight, 1))
-    model.light_diffuse[:] *= factors
-
-
 def _camera_position(model: Any, size: float, rng: np.random.Generator) -> None:
     model.cam_pos[:] += rng.uniform(-size, size, model.cam_pos.shape)
 
@@ -241,12 +236,6 @@ def _armature(model: Any, share: float, rng: np.random.Generator) -> None:
     model.dof_M0[:] += added
 
 
-def _gains(model: Any, share: float, rng: np.random.Generator) -> None:
-    factors = rng.uniform(1.0 - share, 1.0 + share, (model.nu, 1))
-    model.actuator_gainprm[:] *= factors
-    model.actuator_biasprm[:] *= factors
-
-
 def _scale_simple_inertia(
     model: Any, factors: Array, *, rotation_only: bool = False
 ) -> None:
@@ -266,13 +255,17 @@ def _scale_simple_inertia(
 Draw: TypeAlias = Callable[[Any, Any, np.random.Generator], None]
 
 
-def _scales(*arrays: str) -> tuple[tuple[str, ...], Draw]:
-    """Return a draw that multiplies every value of arrays by a factor of its own."""
+def _scales(*arrays: str, rows: bool = False) -> tuple[tuple[str, ...], Draw]:
+    """Return a draw that multiplies each value, or row of all arrays, by a factor."""
 
     def draw(model: Any, share: float, rng: np.random.Generator) -> None:
+        factors: Any = None
         for name in arrays:
             values = getattr(model, name)
-            values[:] *= rng.uniform(1.0 - share, 1.0 + share, values.shape)
+            if not rows or factors is None:
+                shape = (len(values), 1) if rows else values.shape
+                factors = rng.uniform(1.0 - share, 1.0 + share, shape)
+            values[:] *= factors
 
     return arrays, draw
 
@@ -281,7 +274,7 @@ _DRAWS: dict[str, tuple[tuple[str, ...], Draw]] = {
     "color": (("geom_rgba", "mat_rgba"), _color),
     "texture": (("tex_data",), _texture),
     "light_position": (("light_pos", "light_dir"), _light_position),
-    "light_brightness": (("light_diffuse",), _light_brightness),
+    "light_brightness": _scales("light_diffuse", rows=True),
     "camera_position": (("cam_pos",), _camera_position),
     "camera_rotation": (("cam_quat",), _camera_rotation),
     "camera_fovy": (("cam_fovy",), _camera_fovy),
@@ -290,6 +283,6 @@ _DRAWS: dict[str, tuple[tuple[str, ...], Draw]] = {
     "friction": _scales("geom_friction"),
     "damping": _scales("dof_damping", "dof_frictionloss"),
     "armature": (("dof_armature", "dof_M0"), _armature),
-    "gains": (("actuator_gainprm", "actuator_biasprm"), _gains),
+    "gains": _scales("actuator_gainprm", "actuator_biasprm", rows=True),
 }
 """Arrays that each property writes, and the function that draws it."""

@@ -97,3 +97,20 @@ def test_a_stopped_search_does_not_run(model):
     found.stop()
     assert not found.is_running
     assert found.advance(10, TimedState(0.0, READY, np.zeros(9))) is None
+
+
+@pytest.mark.slow
+def test_a_target_just_out_of_reach_is_approached(model):
+    goal = READY.copy()
+    goal[3] = -0.467  # shoulder, elbow and wrist are in line
+    target, data = pose_at(model, goal), model.createData()
+    pin.forwardKinematics(model, data, goal)
+    away = data.oMi[6].translation - data.oMi[2].translation
+    target.translation[:] += 0.01 * away / np.linalg.norm(away)
+    found = search(model, lambda q: 1.0, target)
+    found.start([READY], READY)
+    motion, _ = finish(found, TimedState(0.0, READY, np.zeros(9)))
+    assert motion is not None
+    missed = np.abs(pin.log6(pose_at(model, motion.goal).actInv(target)).vector).max()
+    assert 1e-3 < missed < 0.02
+    assert (motion.goal > model.lowerPositionLimit).all()

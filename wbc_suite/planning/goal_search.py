@@ -20,14 +20,15 @@ from wbc_suite.typing import Vector
 STEP = 0.1  # s; one iteration goes as far as joints can in this time,
 STRIDE = 0.2  # rad or m; or in the time in which the fastest joint goes this far
 MAX_ITERATIONS = 40  # from one initial configuration
-STARTS = 16
+STARTS = 150
 MORE_STARTS = 24  # once some configuration is known, for a nearer one
 QUICK = 0.7  # s; a configuration this near is taken at once, others are compared
 ITERATION_COST = 4e-4  # s; a later one may be farther by this for each iteration
 PATIENCE = 5  # iterations without progress end a start
 NEAR_TIME = 0.5  # s; every second random start lies within this time of the first
 MIN_GAIN = 0.05  # s; a motion must be so much shorter to replace the best
-CLOSE = 0.02  # m and rad; from here on only the targets count
+CLOSE = 0.02  # m and rad; from here on only the targets count, and errors of so much
+# are better than to stay where the robot is
 MET = 1e-7  # m and rad
 
 
@@ -73,6 +74,8 @@ class GoalSearch:
     """Searches for a configuration that meets a problem, and the motion to it.
 
     Starts from the configurations given, then from random ones, the same in each call.
+    If none of them leads to a configuration that meets the problem, the nearest that
+    was found is taken, if it is nearer than `CLOSE`.
     """
 
     def __init__(
@@ -88,6 +91,7 @@ class GoalSearch:
         self._best: Motion | None = None
         self._stopping: Motion | None = None
         self._blocked: Vector | None = None
+        self._nearest, self._least = problem.configuration.q.copy(), CLOSE
 
     @property
     def is_running(self) -> bool:
@@ -140,6 +144,7 @@ class GoalSearch:
         """Yield None after each iteration, and better and better motions."""
         rng = np.random.default_rng(0)
         self._best = self._stopping = self._blocked = None
+        self._least = CLOSE
         iterations, trial = 0, 0
         while trial < (MORE_STARTS if self._best or self._stopping else STARTS):
             q = starts[trial] if trial < len(starts) else self._random(starts[0], rng)
@@ -153,6 +158,8 @@ class GoalSearch:
                 if self._remaining < QUICK + ITERATION_COST * iterations:
                     yield from self._improve()
                     return
+        if self._least < CLOSE and not (self._best or self._stopping):
+            yield from self._compare(self._nearest)
         yield from self._improve()
 
     def _replace(self, goal: Vector) -> Iterator[Motion | None]:
@@ -212,6 +219,8 @@ class GoalSearch:
                 if accepted or stack is self._apart:
                     return
                 stack, best, waited = self._apart, np.inf, -PATIENCE
+            if error < self._least and self._clearance(q) > 0.0:
+                self._nearest, self._least = q, error
             waited = 0 if error < 0.95 * best else waited + 1
             best = min(best, error)
             if waited > PATIENCE and stack is not self._near:

@@ -143,7 +143,7 @@ def retreat(
     Daqp solves the rungs, whichever solver failed: others take milliseconds for each.
     `damping` is added to that of relaxed rows, m^2/rad^2; see `overshoot`.
     """
-    if result := _solve_with_loose_limits(problem):
+    if result := checked_solve(DaqpSolver(), _loosened(problem.copy())):
         return *result, Fallback.LIMITS
     if result := _solve_with_slack(problem, damping):
         return *result, Fallback.SLACK
@@ -155,13 +155,8 @@ def retreat(
     return still, nothing, Fallback.HOLD
 
 
-def _solve_with_loose_limits(problem: Problem) -> tuple[Vector, Vector] | None:
-    """Solve with slack s >= 0 on `G dq <= h + s`, within the acceleration window."""
-    return checked_solve(DaqpSolver(), _loosened(problem.copy()))
-
-
 def _loosened(problem: Problem) -> Problem:
-    """Make all inequality rows of a problem soft; return it."""
+    """Return a problem with slack s >= 0 on its rows, `G dq <= h + s`."""
     np.minimum(problem.wanted, problem.h, out=problem.wanted)
     problem.h[:] = UNBOUNDED
     problem.weight *= _SLACK_WEIGHT

@@ -128,7 +128,9 @@ def sensors_of(state: RobotState) -> dict[str, Reading]:
         readings[sensor.name] = reading.sensor_values(places)
     for frame in _feet(robot):
         found, *force = _places(model, f"{state.prefix}{frame}_contact")
-        readings[f"{frame}_contact"] = _is_positive(state.data, found)
+        readings[f"{frame}_contact"] = reading.computed(
+            1, lambda at=found: state.data.sensordata[at] > 0.0
+        )
         # MuJoCo gives the force of the foot on the ground.
         readings[f"{frame}_contact_force"] = reading.sensor_values(force, negated=True)
     for side in robot.hands:
@@ -149,10 +151,6 @@ def _touching(robot: RobotDescription, side: str) -> list[str]:
     """Return the links of a gripper with collision shapes, in the robot's order."""
     links = gripper_links(robot, side, robot.hands[side])
     return [k.name for k in robot.links if k.name in links and k.collision]
-
-
-def _is_positive(data: mujoco.MjData, place: int) -> Reading:
-    return reading.computed(1, lambda: data.sensordata[place] > 0.0)
 
 
 def _norms(data: mujoco.MjData, places: list[range]) -> Reading:
