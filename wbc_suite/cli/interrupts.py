@@ -11,15 +11,14 @@ import os
 import signal
 import sys
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
+from pathlib import Path
 from types import FrameType
 from typing import NoReturn
 
 GRACE = 0.7  # s, for cleaning up
-CHECKS = 0.3  # s, for children that check libraries: glfw's prints if its pipe breaks
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 KEPT = {
     "record": "Finished episodes are kept; the same command goes on.",
@@ -40,6 +39,8 @@ def signals_end_the_process() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
+    # Semaphores that a killed process leaves are removed; no user needs to hear of it.
+    os.environ.setdefault("PYTHONWARNINGS", "ignore:resource_tracker")
     reader, writer = os.pipe()
     os.set_blocking(writer, False)
     earlier = signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
@@ -53,7 +54,7 @@ def signals_end_the_process() -> Iterator[None]:
         yield
     finally:
         if received:  # whatever the exception has become on its way
-            _leave(received[0], CHECKS)
+            _leave(received[0])
         for number, handler in zip(SIGNALS, handlers, strict=True):
             signal.signal(number, handler)
         signal.set_wakeup_fd(earlier)
@@ -90,19 +91,28 @@ def _end_in_time(reader: int) -> None:
     _leave(number)
 
 
-def _leave(number: int, patience: float = 0.0) -> NoReturn:
+def _leave(number: int) -> NoReturn:
     """End the process, without what Python does at its end.
 
     A signal that comes in a callback of LLVM leaves half a library behind, and that end
     crashed; and libraries make exceptions of their own of `SystemExit`.
     """
+    for child in reversed(_descendants(os.getpid())):
+        with suppress(OSError):
+            if b"resource_tracker" not in Path(f"/proc/{child}/cmdline").read_bytes():
+                os.kill(child, signal.SIGKILL)
     for child in multiprocessing.active_children():
         child.kill()
     with suppress(OSError, ValueError):
         sys.stdout.flush()
-    until = time.monotonic() + patience
-    with suppress(ChildProcessError):  # there are none
-        while time.monotonic() < until:
-            if os.waitpid(-1, os.WNOHANG)[0] == 0:
-                time.sleep(0.01)
     os._exit(128 + number)
+
+
+def _descendants(process: int) -> list[int]:
+    """Return the processes below one, on Linux: glfw's print if they lose theirs."""
+    found = list[int]()
+    for children in Path(f"/proc/{process}/task").glob("*/children"):
+        with suppress(OSError):
+            for child in map(int, children.read_text().split()):
+                found += [child, *_descendants(child)]
+    return found
