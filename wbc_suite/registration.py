@@ -38,7 +38,7 @@ GOALS = (
 
 _CHANGED = (
     *("Door", "Lift", "NutAssembly", "PickPlace", "Stack", "ToolHang"),
-    *("TwoArmHandover", "TwoArmPegInHole", "TwoArmTransport", "Wipe"),
+    *("TwoArmHandover", "TwoArmLift", "TwoArmPegInHole", "TwoArmTransport", "Wipe"),
 )
 """Beginnings of the names whose reward, success or scene has changed: version 1."""
 

@@ -1,3 +1,4 @@
+import mujoco
 import numpy as np
 import pytest
 from conftest import penetration, put
@@ -69,6 +70,16 @@ def test_only_the_tilt_is_wrong_in_the_tilted_miss(both_hold):
     assert lift.height > 0.1
     assert all(hand.grasps(lift.states["pot"].geoms) for hand in lift.hands)
     assert raise_pot(both_hold, height=0.11, roll=np.radians(29.0)).success()
+
+
+def test_a_pot_that_slips_through_the_hands_is_not_held(both_hold):
+    lift = raise_pot(both_hold)
+    model, data = both_hold.simulation.model, both_hold.simulation.data
+    address = model.body_dofadr[model.body("pot").id]
+    for speed, success in ((0.15, True), (0.25, False), (0.0, True)):
+        data.qvel[address + 2] = speed
+        mujoco.mj_forward(model, data)
+        assert lift.success() == success
 
 
 def test_the_reward_rises_from_reach_to_grasp_to_lift(both_hold):

@@ -68,6 +68,14 @@ def test_a_long_jaw_stays_clear_of_the_door_behind_the_lever():
     assert solve(env, 1)[1]
 
 
+@pytest.mark.slow
+def test_a_base_drives_to_where_both_hands_reach():
+    config = {"robots": "Tiago", "controller_configs": "WHOLE_BODY_IK"}
+    env = wbc_suite.make("TwoArmLift", horizon=120, **config)
+    for seed in (1, 2, 3):
+        assert solve(env, seed)[1], f"seed {seed}"
+
+
 def test_a_tipped_cube_stays_on_its_face():
     rng = np.random.default_rng(0)
     for _ in range(100):

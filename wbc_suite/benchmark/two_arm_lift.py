@@ -72,7 +72,7 @@ class TwoArmLift(ObjectBenchmark):
     Arm 0 grasps `handle0`, which starts towards -y, and arm 1 `handle1`.
 
     Source of geometry and reward: robosuite 1.5, see `Lift`. Unlike there, both
-    hands must hold the pot.
+    hands must clamp the pot, which moves with them.
     """
 
     robots: Sequence[str] = ("Panda", "Panda")
@@ -129,12 +129,12 @@ class TwoArmLift(ObjectBenchmark):
         return upward > math.cos(self.config.reward.tilt)
 
     def success(self) -> bool:
-        """Whether the pot is level, above `lift_height`, and held by both hands."""
+        """Whether the pot is level, above `lift_height`, and clamped by both hands."""
         geoms = self.states[POT].geoms
         return (
             self.height > self.config.reward.lift_height
             and self.level
-            and all(hand.grasps(geoms) for hand in self.hands)
+            and all(self.holds(hand, POT, geoms) for hand in self.hands)
         )
 
     def progress(self) -> float:

@@ -99,6 +99,12 @@ class Arm:
         frames = self._frame(grasps[0]), other._frame(grasps[1])
         return LookAhead(self.state, joints, *frames).along(poses)
 
+    def keep_base(self) -> None:
+        """Look ahead without the joints of a base, which stays where it was driven."""
+        root = self.state.robot.root_joint_names
+        self._joints = tuple(joint for joint in self._joints if joint not in root)
+        self._look_ahead.cache_clear()
+
     def sweep(self, q: Vector, period: float) -> Sequence[pin.SE3]:
         """Return poses on the way to joints as an outlook has them.
 

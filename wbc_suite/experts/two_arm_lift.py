@@ -6,7 +6,7 @@ import pinocchio as pin
 from wbc_suite.benchmark.two_arm_lift import HANDLES, POT, TwoArmLift
 from wbc_suite.experts.grasp_choice import Approach, choose_pair
 from wbc_suite.experts.skills import UP, close_in, come_before, grip, move, shifted
-from wbc_suite.experts.two_arms import carry_together
+from wbc_suite.experts.two_arms import carry_together, drive_before
 from wbc_suite.experts.workcell import Steps, Workcell, together
 
 RISE = 0.15  # m
@@ -19,6 +19,7 @@ def two_arm_lift(cell: Workcell[TwoArmLift]) -> Steps[None]:
     arms = cell.arms[:2]
     places = [handle.removeprefix(f"{POT}_") for handle in HANDLES]
     ways = [Approach(raised=0.0, away=AWAY, place=place) for place in places]
+    yield from drive_before(cell, POT, arms, HANDLES)
     for _ in range(3):
         choices = choose_pair(cell, POT, arms=arms, approaches=ways, then=[goal])
         if choices is None:

@@ -6,7 +6,12 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.experts.arm import Arm
+from wbc_suite.experts.skills import UP, shifted
 from wbc_suite.experts.workcell import Steps, Workcell
+from wbc_suite.typing import Vector
+
+RAISED = 0.08  # m, of hands while a base drives
+MOST = 100  # control periods
 
 
 def carry_together(
@@ -38,5 +43,39 @@ def carry_together(
         yield
         left = goal.translation - cell.pose(name).translation
         if np.linalg.norm(left) < tolerance:
+            return True
+    return False
+
+
+def drive_before(
+    cell: Workcell, name: str, arms: Sequence[Arm], sites: Sequence[str]
+) -> Steps[bool]:
+    """Drive a base to where two hands reach an object; return whether it arrived.
+
+    Does nothing for robots without. Hands keep their poses in the base, but raised.
+
+    Args:
+        cell: The workcell.
+        name: The object.
+        arms: The right and the left arm.
+        sites: Where each will grasp the object.
+    """
+    base = cell.base(arms[0].state)
+    if base is None:
+        return True
+    right, left = map(cell.point, sites)
+
+    def free(q: Vector) -> bool:
+        return cell.overlap(arms[0], q, but=name) == 0.0
+
+    base.go_before(cell.pose(name).translation, left - right, free)
+    held = [base.pose.actInv(shifted(arm.pose, RAISED * UP)) for arm in arms]
+    for arm in arms:
+        arm.keep_base()
+    for _ in range(MOST):
+        for arm, grip in zip(arms, held, strict=True):
+            arm.aim(base.pose * grip)
+        yield
+        if base.arrived:
             return True
     return False

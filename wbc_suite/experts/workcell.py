@@ -14,6 +14,7 @@ from wbc_suite.devices.action_ports import LimbKind, LimbPort, limb_ports
 from wbc_suite.envs import RobotEnv
 from wbc_suite.errors import ConfigError
 from wbc_suite.experts.arm import Arm
+from wbc_suite.experts.mobile_base import MobileBase
 from wbc_suite.scene.objects import ObjectState
 from wbc_suite.scene.objects.grasp_site import GraspSite
 from wbc_suite.sensing.hands import Hand, pairs_in_contact
@@ -44,7 +45,9 @@ class Workcell(Generic[B]):
         self._copy = mujoco.MjData(self.model)
         self._objects = dict(benchmark.states)
         self.period = 1.0 / env.config.control_freq
-        self.arms = tuple(self._arms())
+        ports = [*limb_ports(env).values()]
+        self.arms = tuple(self._arms([p for p in ports if p.kind is LimbKind.POSE]))
+        self._bases = self._find_bases([p for p in ports if p.kind is LimbKind.PLANAR])
         if not self.arms:
             names = ", ".join(s.name for s in env.action_layout.slices)
             raise ConfigError(
@@ -57,7 +60,13 @@ class Workcell(Generic[B]):
         action = self._env.hold_action
         for arm in self.arms:
             arm.write(action, self.period)
+        for base in self._bases.values():
+            base.write(action)
         return action
+
+    def base(self, state: RobotState) -> MobileBase | None:
+        """Return the base of a robot, if it drives by goals."""
+        return self._bases.get(state.prefix)
 
     def object(self, name: str) -> ObjectState:
         """Return the state of an object, or of a body attached to one."""
@@ -151,8 +160,19 @@ class Workcell(Generic[B]):
         body = self.model.geom_bodyid[geom]
         return self.model.body(body).name.startswith(state.prefix)
 
-    def _arms(self) -> "list[Arm]":
-        ports = [p for p in limb_ports(self._env).values() if p.kind is LimbKind.POSE]
+    def _find_bases(self, ports: Sequence[LimbPort]) -> dict[str, MobileBase]:
+        """Return the bases that drive, by the prefixes of their robots."""
+        layout, bases = self._env.action_layout, {}
+        for port in ports:
+            body = self.model.body(port.body).name
+            own = [a for a in self.arms if body.startswith(a.state.prefix)]
+            if own and (state := own[0].state).robot.root.kind == "planar":
+                middle = np.mean([arm.home.translation for arm in own], axis=0)
+                part = layout[port.name]
+                bases[state.prefix] = MobileBase(port, state, part, middle)
+        return bases
+
+    def _arms(self, ports: Sequence[LimbPort]) -> list[Arm]:
         hands = iter(self.benchmark.hands)
         arms = []
         for state, controller in self._env.simulation.pairs:
