@@ -97,3 +97,14 @@ def test_a_stopped_search_does_not_run(model):
     found.stop()
     assert not found.is_running
     assert found.advance(10, TimedState(0.0, READY, np.zeros(9))) is None
+
+
+def test_endless_joints_are_drawn_too():
+    endless = load_robot("Panda").to_pinocchio()
+    endless.lowerPositionLimit = np.full(9, -np.inf)
+    endless.upperPositionLimit = np.full(9, np.inf)
+    found = search(endless, lambda q: q[0] - 1.0, pose_at(endless, READY))
+    found.start([READY], READY)
+    motion, _ = finish(found, TimedState(0.0, READY, np.zeros(9)))
+    assert motion is not None
+    assert motion.goal[0] > 1.0
