@@ -120,6 +120,31 @@ trossen-arm-sim trossen_arm_sim/assets/wxai_follower.xml
 upkie-description upkie_description/urdf/upkie.urdf
 vs050-mujoco vs050_mujoco/models/vs050.xml
 vs050-mujoco vs050_mujoco/models/vs050_2f85.xml
+gkjohnson/nasa-urdf-robots r2_description/robots/r2b.urdf
+carlosferrazza/humanoid-bench humanoid_bench/assets/robots/h1hand_pos.xml
+Rhoban/sigmaban_urdf robot.urdf
+robot-descriptions/jaxon_description urdf/jaxon_jvrc.urdf
+ianathompson/eDO_description robots/edo_sim.urdf
+Derek-TH-Wang/mini_cheetah_urdf urdf/mini_cheetah.urdf
+bxirobotics/robot_models elf2_dof25/urdf/elf2_dof25.urdf
+hshi74/toddlerbot toddlerbot/descriptions/*/toddlerbot_gripper_scene.xml
+RainbowRobotics/rby1-sdk models/rby1m/urdf/model.urdf
+Dobot-Arm/TCP-IP-ROS-6AXis dobot_description/urdf/cr5_robot.urdf
+elephantrobotics/mycobot_ros mycobot_description/urdf/mybuddy/mybuddy.urdf
+SIGRobotics-UIUC/LeKiwi URDF/LeKiwi.urdf
+FAIR-INNOVATION/frcobot_ros2 fairino_description/urdf/fairino5_v6.urdf
+limxdynamics/robot-description pointfoot/SF_TRON1A/urdf/robot.urdf
+engineai-robotics/engineai_legged_gym resources/robots/zq_humanoid/urdf/zq_sa01.urdf
+code-iai/iai_robots iai_dlr_rollin_justin/urdf/rollin_justin.urdf
+erwincoumans/pybullet_robots data/atlas/atlas_v4_with_multisense.urdf
+jimmyyhwu/tidybot2 models/stanford_tidybot/tidybot.xml
+tork-a/rtmros_nextage nextage_description/urdf/NextageOpen.urdf
+voltdog/mors_quadruped common/urdf/mors.urdf
+apirrone/Open_Duck_Mini mini_bdx/robots/bdx/robot.xml
+mikeferguson/ubr_reloaded ubr1_description/robots/ubr1_robot.urdf
+doosan-robotics/doosan-robot2 dsr_description2/urdf/m1013.white.urdf
+rex-gym rex_gym-0.2.7/rex_gym/util/pybullet_data/assets/urdf/rex_arm.urdf
+mani_skill mani_skill/assets/robots/xarm7/xarm7_ability_right_hand.urdf
 """
 """Package or repository, and file, of robots that what is measured here was improved
 with."""

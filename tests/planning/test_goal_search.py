@@ -114,3 +114,14 @@ def test_a_target_just_out_of_reach_is_approached(model):
     missed = np.abs(pin.log6(pose_at(model, motion.goal).actInv(target)).vector).max()
     assert 1e-3 < missed < 0.02
     assert (motion.goal > model.lowerPositionLimit).all()
+
+
+def test_endless_joints_are_drawn_too():
+    endless = load_robot("Panda").to_pinocchio()
+    endless.lowerPositionLimit = np.full(9, -np.inf)
+    endless.upperPositionLimit = np.full(9, np.inf)
+    found = search(endless, lambda q: q[0] - 1.0, pose_at(endless, READY))
+    found.start([READY], READY)
+    motion, _ = finish(found, TimedState(0.0, READY, np.zeros(9)))
+    assert motion is not None
+    assert motion.goal[0] > 1.0

@@ -89,17 +89,25 @@ def test_a_motion_around_is_found_without_a_trail():
     plan = planner(wall)
     motion = plan.stop(at(-1.0, v=-1.0))
     stopping = motion.remaining
-    drain(plan.around(motion, at(1.0).q))
+    drain(plan.around(motion, [at(1.0).q]))
     assert motion.remaining > stopping
     assert least_clearance(motion, wall) > -0.05
     np.testing.assert_allclose(motion.goal, at(1.0).q, atol=1e-6)
+
+
+def test_a_motion_around_leads_to_the_first_goal_that_has_one():
+    shut, free = at(1.0, 0.5).q, at(1.0).q
+    plan = planner(lambda q: min(wall(q), np.abs(q - shut).max() - 0.3))
+    motion = plan.stop(at(-1.0, v=-1.0))
+    drain(plan.around(motion, [shut, free]))
+    np.testing.assert_allclose(motion.goal, free, atol=1e-6)
 
 
 def test_a_delayed_robot_rejoins_its_motion_directly():
     plan = planner(lambda q: 1.0)
     motion = plan.stop(at(0.0, v=-2.0))
     goal = at(1.0).q
-    drain(plan.around(motion, goal))
+    drain(plan.around(motion, [goal]))
     motion.clock = 0.2
     held = at(0.0)  # it never went out and so need not come back
     before = motion.remaining

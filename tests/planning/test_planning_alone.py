@@ -32,6 +32,31 @@ def turned(model, angle):
     return q
 
 
+def test_links_in_contact_may_come_apart_but_not_closer():
+    """Two blocks on slides, with faces 2 mm inside of one another."""
+    block = '<geom type="box" size="0.05 0.05 0.05" contype="1" conaffinity="1"/>'
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco><worldbody><body>
+        <body name="a">{block}</body>
+        <body name="b" pos="0.098 0 0"><joint name="j" type="slide" axis="1 0 0"/>
+        {block}</body></body></worldbody></mujoco>"""
+    )
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    assert data.ncon
+
+    class Slide:
+        def q_to_mujoco(self, q, qpos):
+            qpos[:] = q
+
+    checker = SceneCollisionChecker(model, data, Slide())
+    at = [checker.clearance(np.array([x])) for x in (-0.002, 0.0, 0.001, 0.01)]
+    assert at[0] < 0.0 < at[1] < at[2] < at[3] == np.inf
+    data.qpos[0] = 0.01  # apart, contacts less deep than before are collisions
+    mujoco.mj_forward(model, data)
+    assert checker.clearance(np.array([0.0015])) < 0.0
+
+
 def test_the_motion_goes_around_an_obstacle(scene):
     model, checker = scene
     start, goal = turned(model, -0.9), turned(model, 0.9)

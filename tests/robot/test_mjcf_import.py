@@ -305,6 +305,18 @@ def test_files_outside_the_folder_are_read_only_when_named(tmp_path, text):
         read_mjcf(path, mesh_root=tmp_path)
 
 
+def test_a_collection_of_robots_is_read_across_its_folders(tmp_path):
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
+    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    write_stl(tmp_path / "descriptions" / "parts" / "a.stl", vertices, faces)
+    (tmp_path / "descriptions" / "one").mkdir()
+    mesh = '<asset><mesh name="a" file="../parts/a.stl"/></asset>'
+    geom = '<joint name="j"/><geom type="mesh" mesh="a"/>'
+    text = body(geom).replace("<worldbody>", f"{mesh}<worldbody>")
+    robot = read_mjcf(write(tmp_path / "descriptions" / "one", text))
+    assert robot.links[-1].visual or robot.links[-1].collision
+
+
 SPRUNG = """<mujoco><compiler angle="radian"/><worldbody><body name="base">
   <geom size="0.1" mass="1"/>
   <body name="upper" pos="0 0 0.1" gravcomp="0.5"><geom size="0.1" mass="1"/>

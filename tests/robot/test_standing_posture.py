@@ -114,6 +114,22 @@ def test_rounded_angles_stay_within_limits(tmp_path):
     assert ready["right_ankle"] == pytest.approx(angle + 3e-5, abs=1e-9)
 
 
+def test_frames_of_soles_are_level_and_turned_ones_stay(tmp_path):
+    turned = joint("s", "left_foot", "left_sole", "0 0 -0.06", kind="fixed")
+    turned = turned.replace('xyz="0 0 -0.06"', 'xyz="0 0 -0.06" rpy="1.5 0 0.4"')
+    text = human().replace("</robot>", f'<link name="left_sole"/>{turned}</robot>')
+    robot = read(tmp_path, text)
+    feet = [frame.name for frame in robot.frames if frame.role == "foot"]
+    assert len(feet) == 2
+    for foot, sole in zip(feet, places(robot, feet), strict=True):
+        np.testing.assert_allclose(sole.rotation, np.eye(3), atol=1e-3, err_msg=foot)
+    (given,) = places(robot, ["left_sole"])
+    expected = pin.rpy.rpyToMatrix(1.5, 0.0, 0.4)
+    np.testing.assert_allclose(given.rotation, expected, atol=1e-3)
+    (left,) = places(robot, [name for name in feet if "left" in name])
+    np.testing.assert_allclose(left.translation, given.translation, atol=1e-9)
+
+
 def test_legs_that_cannot_stand_so_stay_near_zero(tmp_path):
     stiff = dog().replace('lower="-3.0" upper="3.0"', 'lower="-0.1" upper="0.1"')
     ready = read(tmp_path, stiff).keyframe("ready")

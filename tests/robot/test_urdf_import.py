@@ -238,6 +238,13 @@ LIMBS = {
 }
 
 
+def test_templates_beside_links_stay_unread_and_are_named(tmp_path, caplog):
+    text = one_arm(TWO, joint("a", "base", "l0") + joint("b", "l0", "l1"))
+    path = write(tmp_path, text.replace("<link", '<xacro:property name="w"/><link', 1))
+    assert read_urdf(path).joint_names == ("a", "b")
+    assert "not expanded, and not read: xacro:property." in caplog.text
+
+
 @pytest.mark.parametrize(("joints", "groups"), LIMBS.items())
 def test_limbs_are_inferred_from_words(tmp_path, joints, groups):
     names = joints.split()
@@ -514,6 +521,10 @@ FAULTS = {
     ),
     "no URDF": ("<mujoco/>", "begins with <robot>, not <mujoco>.* name it .xml"),
     "xacro": ('<robot name="r"><xacro:include/></robot>', "expand it first"),
+    "xacro's value": (
+        one_arm('<xacro:property/><link name="l0"><a b="${c}"/></link>'),
+        "expand it first",
+    ),
     "entities": (
         '<!DOCTYPE r [<!ENTITY a SYSTEM "file:///etc/passwd">]><robot>&a;</robot>',
         "document type declaration",
@@ -641,22 +652,73 @@ LEGGED = {
 }
 
 
-def test_what_lifts_both_arms_is_a_torso_and_no_arm(tmp_path):
-    rows = [
-        "base elv z",
-        "z l_shoulder l1",
-        "z r_shoulder r1",
-        "l1 l_b l2",
-        "r1 r_b r2",
-        "base pan mast",
-        "mast tilt camera",
-    ]
-    chain = [row.split() for row in rows]
-    links = "".join(f'<link name="{child}">{BODY}</link>' for *_, child in chain)
-    joints = "".join(joint(own, parent, child) for parent, own, child in chain)
+def chain(first: str, joints: str) -> list[str]:
+    """Return the rows of joints one below the other; a link is named as its joint."""
+    names = joints.split()
+    parents = [first, *(f"{name}_link" for name in names)]
+    return [f"{a} {n} {n}_link" for a, n in zip(parents, names, strict=False)]
+
+
+SIX = "j1 j2 j3 j4 j5 j6"
+BRANCHED = {
+    "what lifts both arms": (
+        [
+            "base elv z",
+            *("z l_shoulder l1", "z r_shoulder r1", "l1 l_b l2", "r1 r_b r2"),
+            *("base pan mast", "mast tilt camera"),
+        ],
+        "torso left_arm right_arm head",
+        "left right",
+    ),
+    "a side that is spelt": (
+        ["base r2_left_shoulder r2_l1", "base r2_right_shoulder r2_r1"],
+        "left_arm right_arm",
+        "left right",
+    ),
+    "letters before words": (
+        [
+            *chain("base", "LARM_0 LARM_1"),
+            *chain("base", "RARM_0 RARM_1"),
+            *("LARM_1_link LARM_2 LARM_FINGER0", "LARM_1_link LARM_3 LARM_FINGER1"),
+            *chain("base", "LLEG_0 LLEG_1"),
+        ],
+        "left_arm right_arm left_gripper legs",
+        "left right",
+    ),
+    "long chains with sides": (
+        [
+            "base turn z",
+            *chain("z", " ".join(f"{name}_L" for name in SIX.split())),
+            *chain("z", " ".join(f"{name}_R" for name in SIX.split())),
+        ],
+        "torso left_arm right_arm",
+        "left right",
+    ),
+    "a slide beside a long arm": (
+        [*chain("base", SIX), "base bellows bellows_link"],
+        "right_arm head",
+        "right",
+    ),
+    "shoulders of legs": (
+        [
+            *chain("base", "front_left_shoulder front_left_leg"),
+            *chain("base", "front_right_shoulder front_right_leg"),
+        ],
+        "legs",
+        "",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BRANCHED)
+def test_limbs_are_inferred_from_the_tree(tmp_path, name):
+    rows, groups, hands = BRANCHED[name]
+    found = [row.split() for row in rows]
+    links = "".join(f'<link name="{child}">{BODY}</link>' for *_, child in found)
+    joints = "".join(joint(own, parent, child) for parent, own, child in found)
     robot = read_urdf(write(tmp_path, one_arm(links, joints)))
-    assert set(robot.groups) == {"torso", "left_arm", "right_arm", "head"}
-    assert set(robot.hands) == {"left", "right"}
+    assert set(robot.groups) == set(groups.split())
+    assert set(robot.hands) == set(hands.split())
 
 
 def test_two_arms_without_sides_have_a_gripper_and_a_hand_each(tmp_path):
@@ -672,15 +734,6 @@ def test_two_arms_without_sides_have_a_gripper_and_a_hand_each(tmp_path):
     robot = read_urdf(write(tmp_path, one_arm(links, joints)))
     assert set(robot.groups) == {"arm_1", "arm_2", "gripper_1", "gripper_2"}
     assert set(robot.hands) == {"eef_1", "eef_2"}
-
-
-def test_a_side_that_is_spelt_counts_more_than_a_letter(tmp_path):
-    rows = ["base r2_left_shoulder r2_l1", "base r2_right_shoulder r2_r1"]
-    chain = [row.split() for row in rows]
-    links = "".join(f'<link name="{child}">{BODY}</link>' for *_, child in chain)
-    joints = "".join(joint(own, parent, child) for parent, own, child in chain)
-    robot = read_urdf(write(tmp_path, one_arm(links, joints)))
-    assert set(robot.groups) == {"left_arm", "right_arm"}
 
 
 @pytest.mark.parametrize("name", LEGGED)

@@ -4,7 +4,7 @@ A planner asks `clearance(q)`: positive where nothing touches, by how much where
 known, and at most zero in collision.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import TypeAlias
 
 import mujoco
@@ -18,14 +18,17 @@ from wbc_suite.typing import Matrix, Vector
 Clearance: TypeAlias = Callable[[Vector], float]
 """Maps a configuration, shape (nq,), to a clearance, m."""
 
-DEPTH = 1e-3  # m; shallower contacts are no collision
+DEPTH, OWN_DEPTH = 1e-3, 1e-4
+"""m; shallower contacts are no collision; the second between two links of a robot,
+which hold each other back."""
 
 
 class SceneCollisionChecker:
     """Checks a robot against all geoms of a MuJoCo scene, and against itself.
 
     Works on a copy of the scene's state. Contacts that the scene has already are
-    ignored, such as those of feet on the floor. The conversion is that of the
+    ignored, such as those of feet on the floor or of a held object; those between two
+    links of a robot only as deep as they are. The conversion is that of the
     configurations that will be checked.
     """
 
@@ -34,11 +37,12 @@ class SceneCollisionChecker:
     ) -> None:
         self._model, self._scene, self._conversion = model, data, conversion
         self._data = mujoco.MjData(model)
+        self._root = model.body_rootid[model.geom_bodyid].tolist()
 
     def clearance(self, q: Vector) -> float:
         """Return the distance of the deepest new contact from a collision, m.
 
-        It is infinite without a contact. Contacts up to 1 mm deep are no collision.
+        It is infinite without a contact.
         """
         scene, data = self._scene, self._data
         data.qpos[:] = scene.qpos
@@ -48,11 +52,23 @@ class SceneCollisionChecker:
         mujoco.mj_collision(self._model, data)
         if not data.ncon:
             return np.inf
-        touching = scene.contact.geom[scene.contact.dist < 0.0]
-        present = {(int(a), int(b)) for a, b in touching}
-        found = zip(data.contact.geom.tolist(), data.contact.dist, strict=True)
-        new = [float(dist) for (a, b), dist in found if (a, b) not in present]
-        return min(new, default=np.inf) + DEPTH
+        present: dict[tuple[int, int], float] = {}
+        for pair, depth in _contacts(scene):
+            if depth < 0.0:
+                present[pair] = min(depth, present.get(pair, 0.0))
+        least = np.inf
+        for pair, depth in _contacts(data):
+            if self._root[pair[0]] == self._root[pair[1]]:
+                least = min(least, depth - present.get(pair, 0.0) + OWN_DEPTH)
+            elif pair not in present:
+                least = min(least, depth + DEPTH)
+        return least
+
+
+def _contacts(data: mujoco.MjData) -> Iterator[tuple[tuple[int, int], float]]:
+    """Yield the two geoms and the distance of each contact, m."""
+    pairs = map(tuple, data.contact.geom.tolist())
+    yield from zip(pairs, data.contact.dist.tolist(), strict=True)
 
 
 class LinkDistanceChecker:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wbc_suite.kinematics import Configuration
+from wbc_suite.kinematics.configuration import UNLIMITED
 from wbc_suite.planning.collision_checker import Clearance
 from wbc_suite.planning.motion_planner import MotionPlanner
 from wbc_suite.planning.trajectory import Motion, TimedState
@@ -20,8 +21,9 @@ from wbc_suite.typing import Vector
 STEP = 0.1  # s; one iteration goes as far as joints can in this time,
 STRIDE = 0.2  # rad or m; or in the time in which the fastest joint goes this far
 MAX_ITERATIONS = 40  # from one initial configuration
-STARTS = 150
-MORE_STARTS = 24  # once some configuration is known, for a nearer one
+STARTS = 150  # two arms need dozens: of 10 goals of Nextage's 16 starts met 3
+DETOURS = 6  # configurations to which a path around obstacles is searched
+MORE_STARTS = 24  # of them, once some configuration is known, for a nearer one
 QUICK = 0.7  # s; a configuration this near is taken at once, others are compared
 ITERATION_COST = 4e-4  # s; a later one may be farther by this for each iteration
 PATIENCE = 5  # iterations without progress end a start
@@ -90,7 +92,7 @@ class GoalSearch:
         self._run: Iterator[Motion | None] | None = None
         self._best: Motion | None = None
         self._stopping: Motion | None = None
-        self._blocked: Vector | None = None
+        self._blocked: list[Vector] = []
         self._nearest, self._least = problem.configuration.q.copy(), CLOSE
 
     @property
@@ -143,7 +145,8 @@ class GoalSearch:
     def _search(self, starts: list[Vector]) -> Iterator[Motion | None]:
         """Yield None after each iteration, and better and better motions."""
         rng = np.random.default_rng(0)
-        self._best = self._stopping = self._blocked = None
+        self._best = self._stopping = None
+        self._blocked.clear()
         self._least = CLOSE
         iterations, trial = 0, 0
         while trial < (MORE_STARTS if self._best or self._stopping else STARTS):
@@ -184,8 +187,7 @@ class GoalSearch:
             return
         motion = planner.direct(now, found)
         if motion is None:
-            if self._best is None:
-                self._blocked = found
+            self._blocked.append(found)
             motion = yield from planner.retrace(now, found, self._trail)
         if motion is not None and motion.remaining < self._remaining - MIN_GAIN:
             self._best = motion
@@ -196,9 +198,9 @@ class GoalSearch:
 
     def _improve(self) -> Iterator[Motion | None]:
         """Plan around obstacles if nothing else is known; shorten the motion."""
-        if self._best is None and self._blocked is not None:
+        if self._best is None and self._blocked:
             assert self._stopping is not None
-            yield from self._planner.around(self._stopping, self._blocked)
+            yield from self._planner.around(self._stopping, self._blocked[:DETOURS])
             self._best = self._stopping
         if self._best is not None:
             yield from self._planner.shorten(self._best)
@@ -231,7 +233,10 @@ class GoalSearch:
             yield None
 
     def _random(self, q: Vector, rng: np.random.Generator) -> Vector:
-        """Return random joints, within their limits or near q; the root stays."""
+        """Return random joints, within their limits or near q; the root stays.
+
+        Endless joints are drawn up to half a turn from q.
+        """
         model, drawn = self._configuration.model, q.copy()
         low, high = model.lowerPositionLimit, model.upperPositionLimit
         draw = rng.uniform(size=model.nq)
@@ -239,9 +244,12 @@ class GoalSearch:
         root = {*self._configuration.root_linear, *self._configuration.root_angular}
         for joint in list(model.joints)[1:]:
             k = joint.idx_q
-            if joint.nq > 1 or joint.idx_v in root or not low[k] < high[k] < 1e6:
+            if joint.nq > 1 or joint.idx_v in root or not low[k] < high[k]:
                 continue
-            far = NEAR_TIME * self._problem.speed[joint.idx_v] if near else np.inf
+            turn = np.pi if high[k] > UNLIMITED else np.inf
+            far = min(
+                turn, NEAR_TIME * self._problem.speed[joint.idx_v] if near else turn
+            )
             least, most = max(low[k], q[k] - far), min(high[k], q[k] + far)
             drawn[k] = least + draw[k] * (most - least)
         return drawn

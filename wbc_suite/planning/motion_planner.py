@@ -76,14 +76,20 @@ class MotionPlanner:
         """Return the motion that stops each joint as soon as it can."""
         return self._motion(now, self._generator.stop((np.zeros_like(now.v), now.v)))
 
-    def around(self, motion: Motion, goal: Vector) -> Iterator[None]:
-        """Extend a motion that stops by a path of RRT-Connect, or else straight."""
-        path = [motion.goal, goal]
-        if self._is_euclidean:
-            for found in self._rrt.search(*path, max_checks=self._max_checks):
+    def around(self, motion: Motion, goals: Sequence[Vector]) -> Iterator[None]:
+        """Extend a motion that stops by a path of RRT-Connect, or else straight.
+
+        It leads to the first of the goals to which there is one.
+        """
+        path: list[Vector] = []
+        for goal in goals if self._is_euclidean else ():
+            ends = motion.goal, goal
+            for found in self._rrt.search(*ends, max_checks=self._max_checks):
                 path = found or path
                 yield None
-        motion.trajectory.extend(self._lines(motion, path))
+            if path:
+                break
+        motion.trajectory.extend(self._lines(motion, path or [motion.goal, goals[0]]))
 
     def plan(self, now: TimedState, goal: Vector) -> Motion | None:
         """Return a shortened motion around obstacles; None if no path was found."""

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.kinematics.configuration import random_configuration
+from wbc_suite.kinematics.configuration import UNLIMITED, random_configuration
 from wbc_suite.planning.collision_checker import Clearance
 from wbc_suite.planning.shortcutting import shorten_path
 from wbc_suite.typing import Vector
@@ -68,9 +68,11 @@ class RRTConnect:
         trees, self.checks = (_Tree(start), _Tree(end)), 0
         aside = LOCAL_TIME * self._speed
         low, high = np.minimum(start, end) - aside, np.maximum(start, end) + aside
+        endless = (self._model.upperPositionLimit > UNLIMITED) & (start != end)
         while self.checks < max_checks:
             for ours, theirs in (trees, trees[::-1]):
                 sample = random_configuration(self._model, start, rng)
+                sample[endless] = rng.uniform(low[endless], high[endless])
                 if rng.uniform() < LOCAL_SHARE:
                     sample = np.clip(sample, low, high)
                 self._grow(ours, sample, STRIDE)

@@ -9,7 +9,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from wbc_suite.robot.elements import Frame, Link, rigid_bodies
-from wbc_suite.robot.name_words import END_WORDS, FINGERS, kind_of, side_of, words_of
+from wbc_suite.robot.name_words import (
+    END_WORDS,
+    FINGERS,
+    KIND_OF,
+    kind_of,
+    side_of,
+    words_of,
+)
 from wbc_suite.robot.shape_geometry import farthest_point
 
 if TYPE_CHECKING:
@@ -24,7 +31,8 @@ END_OF = {
 }
 """Role of the frame at the end of a limb."""
 
-MIN_ARM = 3  # joints; a shorter chain beside a left and a right arm is a head
+MIN_ARM = 3  # joints; a shorter chain beside a left and a right arm, or beside one of
+LONG_ARM = 5  # so many, is a head
 POINT_FOOT = 3  # joints of a leg that stands on its outermost point, if it has no name
 
 
@@ -109,8 +117,8 @@ def _traits(links: Sequence[Link]) -> dict[str, _Traits]:
         kind = named[link.name]
         if link.name in driving:
             kind = "base"
-        elif FINGERS.intersection(words_of(link.joint.name)):
-            kind = "gripper"  # "arm_right_finger"
+        elif _is_finger(words_of(link.joint.name), words_of(link.name)):
+            kind = "gripper"
         if kind is None and above.kind == "arm" and owners.count(parent) > 1:
             kind = "gripper"
         elif kind is None:
@@ -128,15 +136,25 @@ def _traits(links: Sequence[Link]) -> dict[str, _Traits]:
     return traits
 
 
+def _is_finger(joint: Sequence[str], link: Sequence[str]) -> bool:
+    """Whether one is: joint `arm_hand_index`, or link `finger_2` of joint `arm_9`."""
+    part = next((w for w in joint if w in KIND_OF), "arm")
+    if part != "arm":
+        return bool(FINGERS.intersection(joint))
+    return "gripper" in map(KIND_OF.get, joint) or bool(FINGERS.intersection(link))
+
+
 def _named_kinds(
     links: Sequence[Link], parents: dict[str, str | None]
 ) -> dict[str, str | None]:
     """Return the kind that words give each moving link, None without one.
 
-    What carries only legs is a leg, and what carries a left and a right arm a torso.
+    What carries only legs is a leg, and what carries a left and a right arm a torso: a
+    long chain with a side is an arm even if no word says so.
     """
     kinds: dict[str, str | None] = {}
     arms: dict[str, set[str]] = {}  # sides of the arms from a link on
+    length: dict[str, int] = {}  # joints from a link on
     for link in reversed(links):
         if link.joint is None:
             continue
@@ -144,11 +162,13 @@ def _named_kinds(
         kind = kind_of(words)
         below = [name for name, own in parents.items() if own == link.name]
         arms[link.name] = set[str]().union(*(arms[name] for name in below))
-        if kind is None and {kinds[name] for name in below} == {"leg"}:
+        length[link.name] = 1 + max((length[name] for name in below), default=0)
+        is_long = kind is None and length[link.name] >= LONG_ARM
+        if kind in (None, "arm") and {kinds[name] for name in below} == {"leg"}:
             kind = "leg"
         elif kind is None and len(arms[link.name]) > 1:
             kind = "torso"
-        elif kind == "arm" and (side := side_of(words, pairs=False)):
+        elif (kind == "arm" or is_long) and (side := side_of(words, pairs=False)):
             arms[link.name].add(side)
         kinds[link.name] = kind
     return kinds
@@ -168,10 +188,11 @@ def _fingers_as_arms(
 
 
 def _without_masts(traits: dict[str, _Traits]) -> dict[str, _Traits]:
-    """Return the traits with what is too short for an arm, beside two, as a head."""
+    """Return the traits with what is too short for an arm beside others as a head."""
     arms = [own for own in traits.values() if own.kind == "arm"]
     length = Counter(own.top for own in arms)
-    if not {"left", "right"} <= {own.side for own in arms}:
+    several = {"left", "right"} <= {own.side for own in arms}
+    if not several and max(length.values(), default=0) < LONG_ARM:
         return traits
     masts = {top for top, joints in length.items() if joints < MIN_ARM}
     masts -= {own.top for own in arms if own.side}

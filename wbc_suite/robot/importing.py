@@ -23,7 +23,11 @@ from wbc_suite.robot.missing_data import (
     estimate_motors,
     oversized,
 )
-from wbc_suite.robot.standing_posture import feet_are_level, standing_legs
+from wbc_suite.robot.standing_posture import (
+    feet_are_level,
+    level_soles,
+    standing_legs,
+)
 from wbc_suite.robot.validation import RESERVED
 from wbc_suite.robot.working_posture import working_arms
 from wbc_suite.tomlfile import parse_model
@@ -126,13 +130,15 @@ def describe_import(
     robot = parse_model(
         RobotDescription, data | others, source=str(source), error=DescriptionError
     )
+    own = {frame.name for frame in given}
     if "ready" in keyframes:
         if keyframes["ready"] != keyframes.get("home") or feet_are_level(robot):
-            return robot
+            return level_soles(robot, own, names.take)
         LOG.warning("%s: the feet in keyframe 'home' are not level; not used.", source)
         robot = _with_ready(robot, lambda robot: infer_ready(robot.links))
     try:
-        return _with_ready(_with_ready(robot, standing_legs), working_arms)
+        robot = _with_ready(robot, standing_legs)
+        return _with_ready(level_soles(robot, own, names.take), working_arms)
     except ValueError as error:  # of MuJoCo's compiler
         raise DescriptionError(f"{source}: MuJoCo refuses it: {error}") from error
 

@@ -3,8 +3,10 @@
 import re
 from collections.abc import Sequence
 
+FINGERS = {"finger", "fingers", "thumb"}
 KINDS = {
-    "gripper": "finger fingers thumb gripper index middle ring pinky jaw knuckle",
+    "gripper": "finger fingers thumb gripper index middle ring little pinky jaw "
+    "knuckle",
     "head": "head neck",
     "torso": "torso waist trunk spine chest abdomen lift",
     "leg": "leg hip knee ankle thigh calf shin foot toe haa hfe kfe",
@@ -12,7 +14,6 @@ KINDS = {
     "base": "wheel caster castor rotacastor",
 }
 """Words of each kind of limb."""
-FINGERS = {"finger", "fingers", "thumb"}
 KIND_OF = {word: kind for kind, words in KINDS.items() for word in words.split()}
 
 SIDES = ("left", "right")
@@ -43,9 +44,13 @@ END_WORDS = {kind: set(words.split()) for kind, words in ENDINGS.items()}
 
 
 def words_of(name: str) -> list[str]:
-    """Split a name: `LHipYaw` gives l, hip, yaw; `leftarm_1` gives left, arm."""
+    """Split a name: `LHipYaw` is l, hip, yaw; `leftarm_1` left, arm; `LARM` l, arm."""
     parts = re.findall(r"left|right|[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)
-    return [part.lower() for part in parts]
+    words: list[str] = []
+    for word in (part.lower() for part in parts):
+        sided = word[0] in SIDE_OF and word not in KIND_OF and word[1:] in KIND_OF
+        words += [word[0], word[1:]] if sided else [word]
+    return words
 
 
 def side_of(words: Sequence[str], *, pairs: bool) -> str:

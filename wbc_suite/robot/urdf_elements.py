@@ -1,5 +1,7 @@
 """Read the XML elements of a URDF file: the tree of links, numbers and poses."""
 
+import logging
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +13,9 @@ from wbc_suite.errors import ConfigError, DescriptionError, did_you_mean, join_f
 from wbc_suite.robot.xml_files import Element, read_xml
 from wbc_suite.typing import Vector
 
+LOG = logging.getLogger(__name__)
+
+XACRO = "xacro:"
 MAX_LINKS = 500  # largest number of links, as in robot files
 
 
@@ -75,16 +80,27 @@ def read_tree(path: Path) -> tuple[Element, tuple[Branch, ...]]:
 
 
 def _check_root(robot: Element, path: Path) -> None:
-    if any(element.tag.startswith("xacro:") for element in robot.iter()):
+    templates = {x.tag for x in robot.iter() if x.tag.startswith(XACRO)}
+    parts = [*robot.findall("link"), *robot.findall("joint")]
+    inside = (x for part in parts for x in part.iter())
+    if templates and (not parts or any(map(_is_template, inside))):
         raise ConfigError(
             f"{path}: this is a xacro file, a template of a URDF; expand it first "
             "('xacro FILE > robot.urdf')."
         )
+    if templates:
+        shown = join_first(sorted(templates))
+        LOG.warning("%s: not expanded, and not read: %s.", path, shown)
     if robot.tag != "robot":
         hint = " It looks like MJCF: name it .xml." if robot.tag == "mujoco" else ""
         raise ConfigError(
             f"{path}: a URDF begins with <robot>, not <{robot.tag}>.{hint}"
         )
+
+
+def _is_template(element: Element) -> bool:
+    values = element.attrib.values()
+    return element.tag.startswith(XACRO) or any(re.search(r"\$[{(]", x) for x in values)
 
 
 def _by_name(robot: Element, tag: str, path: Path) -> dict[str, Element]:

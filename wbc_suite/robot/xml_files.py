@@ -15,6 +15,7 @@ MAX_BYTES = 8_000_000
 MAX_DEPTH = 400  # largest nesting depth; MJCF nests one body per link of a chain
 
 ROBOT_FOLDERS = ("urdf", "urdfs", "robots", "mjcf", "xml")
+COLLECTIONS = (*ROBOT_FOLDERS, "descriptions", "models")
 MESH_FOLDERS = ("meshes", "mesh", "assets")
 MAX_ABOVE = 6  # folders above a file that are looked at
 PACKAGE = re.compile(r"^(?:package|model):///?([^/]+)/.*$", re.DOTALL)
@@ -66,15 +67,15 @@ def model_root(file: Path, references: Iterable[str]) -> Path:
     """Return the folder whose files a robot file may refer to.
 
     This is the ROS package around the file, or else the outermost of a close folder
-    with meshes, the folder above `urdf` and the like, and a folder `robots` further up;
-    or the folder of that name around them if a reference is `package://NAME/...`.
+    with meshes, the folder above `urdf` and the like, and one of `COLLECTIONS` further
+    up; or the folder of that name around them if a reference is `package://NAME/...`.
     """
     folder, *above = file.resolve().parents
     close = (folder, *above[:3])
     package = next((p for p in close if (p / "package.xml").is_file()), None)
     holder = (p for p in close if any((p / m).is_dir() for m in MESH_FOLDERS))
     inside_one = folder.name.lower() in ROBOT_FOLDERS
-    outer = (p for p in close[1:] if p.name.lower() in ROBOT_FOLDERS)
+    outer = (p for p in close[1:] if p.name.lower() in COLLECTIONS)
     found = (folder.parent if inside_one else folder, next(holder, folder), *outer)
     root = package or min(found, key=lambda p: len(p.parts))
     packages = {PACKAGE.sub(r"\1", name) for name in references if PACKAGE.match(name)}
