@@ -55,7 +55,9 @@ def test_motors_of_a_urdf_get_armatures_and_those_of_mjcf_keep_theirs(tmp_path):
     assert (robot.joint("shoulder").armature, robot.deviations) == (0.0, ())
 
 
-def test_an_arm_with_few_motors_gets_them_beside_a_driven_hand(tmp_path):
+def chain(folder, rows):
+    """Read joints of (name, parent, child, effort)."""
+
     def row(name, parent, child, effort):
         return (
             f'<joint name="{name}" type="revolute"><parent link="{parent}"/>'
@@ -67,14 +69,24 @@ def test_an_arm_with_few_motors_gets_them_beside_a_driven_hand(tmp_path):
         '<inertial><mass value="1"/><inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1"'
         ' iyz="0" izz="0.1"/></inertial>'
     )
-    rows = [("arm_1", "base", "a1", 0), ("arm_2", "a1", "a2", 0)]
-    rows += [(f"finger_{k}", "a2", f"f{k}", 1) for k in range(3)]
     links = "".join(f'<link name="{child}">{body}</link>' for _, _, child, _ in rows)
     joints = "".join(row(*own) for own in rows)
-    path = tmp_path / "robot.urdf"
-    text = f'<robot name="r"><link name="base"/>{links}{joints}</robot>'
-    path.write_text(text, encoding="utf-8")
-    robot = load_robot(path)
+    return read(folder, f'<robot name="r"><link name="base"/>{links}{joints}</robot>')
+
+
+@pytest.mark.parametrize(("count", "driven"), [(2, False), (6, True)])
+def test_the_first_joint_of_a_long_arm_has_a_motor(tmp_path, count, driven):
+    names = ["base", *(f"a{k}" for k in range(count))]
+    rows = [(f"arm_{k}", names[k], names[k + 1], 50 * (k > 0)) for k in range(count)]
+    robot = chain(tmp_path, rows)
+    assert bool(robot.joint("arm_0").effort) is driven
+    assert robot.joint("arm_1").effort == 50.0
+
+
+def test_an_arm_with_few_motors_gets_them_beside_a_driven_hand(tmp_path):
+    rows = [("arm_1", "base", "a1", 0), ("arm_2", "a1", "a2", 0)]
+    rows += [(f"finger_{k}", "a2", f"f{k}", 1) for k in range(3)]
+    robot = chain(tmp_path, rows)
     assert all((robot.joint(f"arm_{k}").effort or 0.0) >= 1.0 for k in (1, 2))
     assert [robot.joint(f"finger_{k}").effort for k in range(3)] == [1.0, 1.0, 1.0]
 

@@ -130,15 +130,14 @@ def describe_import(
     robot = parse_model(
         RobotDescription, data | others, source=str(source), error=DescriptionError
     )
-    own = {frame.name for frame in given}
     if "ready" in keyframes:
         if keyframes["ready"] != keyframes.get("home") or feet_are_level(robot):
-            return level_soles(robot, own, names.take)
+            return level_soles(robot, given, names.take)
         LOG.warning("%s: the feet in keyframe 'home' are not level; not used.", source)
         robot = _with_ready(robot, lambda robot: infer_ready(robot.links))
     try:
         robot = _with_ready(robot, standing_legs)
-        return _with_ready(level_soles(robot, own, names.take), working_arms)
+        return _with_ready(level_soles(robot, given, names.take), working_arms)
     except ValueError as error:  # of MuJoCo's compiler
         raise DescriptionError(f"{source}: MuJoCo refuses it: {error}") from error
 

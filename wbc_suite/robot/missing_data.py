@@ -16,6 +16,7 @@ OVERSIZED = 10.0
 """Largest radius of gyration over the diagonal of the link's shapes; some meshes may be
 missing."""
 LEAST_EFFORT = 1.0  # N m or N
+LONG = 4  # joints; a limb of more is no pendulum, and its first joint has a motor
 ROTOR = 2e-4
 """Estimated armature over effort, s^2: it is 1e-4 to 2e-4 for hips, knees and ankles of
 Unitree's G1 and Go1 in the models of MuJoCo Menagerie."""
@@ -73,11 +74,12 @@ def estimate_motors(
     links: Sequence[Link],
     frames: Sequence[Frame],
     driven: Collection[str],
-    limbs: Sequence[Collection[str]] = (),
+    limbs: Sequence[Sequence[str]] = (),
 ) -> list[Link]:
     """Return links with motors, and armatures, for joints without, if most have none.
 
-    Most are those of the robot, or of one of the limbs, which are joints by name.
+    Most are those of the robot, or of one of the limbs, which are joints by name. The
+    first joint of a long limb gets a motor, too.
     Joints that are `driven` have an actuator of another kind. The motor of a hinge
     holds twice the moment of the links behind it, as if these were stretched out
     horizontally; below the trunk of a robot with feet it holds half of the robot on its
@@ -88,7 +90,9 @@ def estimate_motors(
     names = {joint.name for joint in bare}
     empty = [limb for limb in limbs if 2 * len(names.intersection(limb)) > len(limb)]
     if 2 * len(bare) <= len(own):
-        bare = [joint for joint in bare if any(joint.name in limb for limb in empty)]
+        lacking = {name for limb in empty for name in limb}
+        lacking |= {limb[0] for limb in limbs if len(limb) > LONG}
+        bare = [joint for joint in bare if joint.name in lacking]
     if not bare:
         return list(links)
     efforts = dict(_efforts(links, frames))

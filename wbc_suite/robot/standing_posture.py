@@ -1,6 +1,6 @@
 """Compute a standing posture of legs, knees bent, and level frames of their soles."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import pinocchio as pin
@@ -50,7 +50,7 @@ def feet_are_level(robot: RobotDescription) -> bool:
 
 
 def level_soles(
-    robot: RobotDescription, given: Collection[str], take: Callable[[str, str], str]
+    robot: RobotDescription, given: Sequence[Frame], take: Callable[[str, str], str]
 ) -> RobotDescription:
     """Return a biped whose frames of feet have z up and x ahead in `ready`.
 
@@ -70,7 +70,7 @@ def level_soles(
             continue
         fields = pose_fields(se3_of(frame) * pin.SE3(rotation.T, np.zeros(3)))
         name = frame.name
-        if name in given:
+        if any(frame.name == own.name for own in given):
             frames[name] = frame.model_copy(update={"role": "other"})
             name = take(f"{name}_sole", "frame")
         frames[name] = frame.model_copy(update={"name": name, **fields})
