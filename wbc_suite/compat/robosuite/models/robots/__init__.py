@@ -108,9 +108,10 @@ class RobotModel(DescribedModel):
         if cls is not None and not cls.__module__.startswith("wbc_suite."):
             return gripper_file(cls())
         other = "Left" if arm == "right" else "Right"
-        if gripper.endswith(f"{other}Hand"):
+        mirrored = gripper.replace(other, arm.capitalize())
+        if mirrored != gripper and mirrored in GRIPPER_MAPPING:
             log.warning("'%s' is of the other side; its mirror image is used.", gripper)
-            return gripper.replace(other, arm.capitalize())
+            return mirrored
         return gripper
 
     @property
