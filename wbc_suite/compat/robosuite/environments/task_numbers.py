@@ -70,7 +70,9 @@ _KEYS = {
 _CONVERTED = ("nut_type", "object_type", "single_object_mode", "tables_boundary")
 ARGUMENTS = frozenset(
     {*_KEYS, *_CONVERTED, "task_config", "prehensile", "z_offset"}
-) - frozenset(DEFAULT_WIPE_CONFIG).difference({"table_full_size", "table_friction"})
+) - frozenset(DEFAULT_WIPE_CONFIG).difference(
+    {"table_full_size", "table_friction", "table_offset"}
+)
 """Arguments of robosuite's tasks beside those of all environments."""
 
 _READ_ELSEWHERE = ("table_height", "table_height_std")
