@@ -183,6 +183,8 @@ def test_controllers_of_parts_are_of_robosuites_classes(suite):
     assert isinstance(found["right"], parts.OperationalSpaceController)
     assert isinstance(found["right_gripper"], grips.SimpleGripController)
     assert suite.Stack.__name__ == "Stack"
+    two_arms = importlib.import_module("robosuite.utils.robot_utils").check_bimanual
+    assert [two_arms(name) for name in ("Panda", "Baxter")] == [False, True]
 
 
 def test_elements_are_found_by_parts_of_their_names_and_recoloured():

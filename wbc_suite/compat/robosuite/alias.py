@@ -111,7 +111,7 @@ REEXPORTS = {
     "renderers.mjviewer.mjviewer_renderer": "renderers",
     "utils.opencv_renderer": "renderers",
     "utils.numba": "utils.control_utils",
-    "utils.robot_utils": "models.robots",
+    "utils.robot_utils": "utils.robot_composition_utils",
     "models.grippers.gripper_tester": "models.grippers.tester",
     "utils.usd": "utils.usd_export",
     "utils.usd.exporter": "utils.usd_export",

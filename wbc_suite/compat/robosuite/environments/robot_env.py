@@ -27,9 +27,7 @@ from wbc_suite.compat.robosuite.environments.task_numbers import (
 )
 from wbc_suite.compat.robosuite.models.tasks import TaskBenchmark
 from wbc_suite.compat.robosuite.robots import ROBOT_CLASS_MAPPING
-from wbc_suite.compat.robosuite.utils.binding_utils import (
-    MjSim,
-)
+from wbc_suite.compat.robosuite.utils.binding_utils import MjSim
 from wbc_suite.compat.robosuite.utils.observables import Observable, sensor
 from wbc_suite.compat.robosuite.utils.placement_samplers import (
     ObjectPositionSampler,

@@ -27,7 +27,6 @@ __all__ = [
     "REGISTERED_ROBOTS",
     "ManipulatorModel",
     "RobotModel",
-    "check_bimanual",
     "create_robot",
     "is_robosuite_robot",
     "register_robot",
@@ -329,11 +328,6 @@ def create_robot(robot_name: str, *args: Any, **kwargs: Any) -> RobotModel:
     if robot_name not in REGISTERED_ROBOTS:
         raise UnknownNameError("robot", robot_name, REGISTERED_ROBOTS)
     return REGISTERED_ROBOTS[robot_name](*args, **kwargs)
-
-
-def check_bimanual(robot_name: str) -> bool:
-    """Whether a robot has two arms."""
-    return REGISTERED_ROBOTS[robot_name]().arm_type == "bimanual"
 
 
 def is_robosuite_robot(robot: str) -> bool:
