@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from wbc_suite.compat.robosuite.models.objects import (
+    BallObject,
     BoxObject,
     CompositeBodyObject,
     CompositeObject,
@@ -17,7 +18,7 @@ from wbc_suite.compat.robosuite.models.objects.ready_made import READY_MADE
 from wbc_suite.compat.robosuite.models.tasks import MujocoWorldBase
 from wbc_suite.compat.robosuite.utils import control_utils, mjcf_utils
 from wbc_suite.compat.robosuite.utils import transform_utils as T
-from wbc_suite.errors import ConfigError
+from wbc_suite.errors import ConfigError, UnknownNameError
 
 
 def compiled(item):
@@ -194,3 +195,34 @@ def test_elements_are_found_by_parts_of_their_names_and_recoloured():
     assert mjcf_utils.find_elements_by_substring(body, "geom", "none") is None
     mjcf_utils.recolor_collision_geoms(body, (0.0, 1.0, 0.0, 1.0))
     assert body.find("geom").get("rgba").split()[1].startswith("1")
+
+
+@pytest.mark.slow
+def test_the_world_of_robosuites_guide_has_its_gripper_base_and_ball(suite):
+    models = importlib.import_module("robosuite.models.robots")
+    grippers = importlib.import_module("robosuite.models.grippers")
+    bases = importlib.import_module("robosuite.models.bases")
+    arenas = importlib.import_module("robosuite.models.arenas")
+    world, robot = MujocoWorldBase(), models.Panda()
+    assert robot.root is not None  # written before, and again after the change
+    robot.add_gripper(grippers.gripper_factory("RethinkGripper"))
+    robot.add_base(bases.NullMount())
+    robot.set_base_xpos([0, 0, 0])
+    world.merge(robot)
+    arena = arenas.TableArena()
+    arena.set_origin([0.8, 0, 0])
+    world.merge(arena)
+    ball = BallObject(name="sphere", size=[0.04], rgba=[0, 0.5, 0.5, 1]).get_obj()
+    ball.set("pos", "1.0 0 1.0")
+    world.worldbody.append(ball)
+    model = world.get_model(mode="mujoco")
+    names = [model.body(k).name for k in range(model.nbody)]
+    assert any("finger" in name and "panda" not in name for name in names)
+    assert not any("pedestal" in name or "panda_hand" in name for name in names)
+    data = mujoco.MjData(model)
+    while data.time < 1.0:
+        mujoco.mj_step(model, data)
+    top = model.geom("table").size[2] + data.geom("table").xpos[2]
+    assert data.body("sphere_main").xpos[2] == pytest.approx(top + 0.04, abs=2e-3)
+    with pytest.raises(UnknownNameError, match="third"):
+        robot.add_gripper(grippers.PandaGripper(), "third")

@@ -13,6 +13,7 @@ import pinocchio as pin
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.compat.robosuite.models.described import DescribedModel, choices_of
 from wbc_suite.compat.robosuite.models.own_files import arm_file, changed, gripper_file
+from wbc_suite.compat.robosuite.models.robots.mounting import Mounting
 from wbc_suite.compat.robosuite.models.robots.passive import with_passive_joints
 from wbc_suite.compat.robosuite.utils.transform_utils import euler2mat
 from wbc_suite.errors import UnknownNameError
@@ -283,7 +284,7 @@ def _is_overridden(model: RobotModel, name: str) -> bool:
     return getattr(type(model), name) is not getattr(RobotModel, name)
 
 
-class ManipulatorModel(RobotModel):
+class ManipulatorModel(Mounting, RobotModel):
     """A robot with arms; for a user's, `init_qpos` of the MJCF's first key counts."""
 
     @property
