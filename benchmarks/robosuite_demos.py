@@ -72,7 +72,9 @@ RUNS = {
     "setup_macros": Run(),
     "tune_camera": Run(),
     "tune_joints": Run(),
-    "view_robot_initialization": Run(steps=10**6),
+    "view_robot_initialization": Run(
+        ("--robots", "Panda", "Baxter", "GR1", "PandaOmron", "SpotWithArm"), steps=1000
+    ),
 }
 
 

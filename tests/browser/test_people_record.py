@@ -226,7 +226,7 @@ def assert_replays(path):
 
 def assert_peers_load(readers, path, tmp_path):
     """robomimic's and LeRobot's dataset classes hold the same, where they are there."""
-    if not readers.installed:
+    if not readers.every.exists():
         return
     with Dataset(path) as dataset:
         (episode,) = dataset

@@ -11,10 +11,8 @@ pytestmark = [pytest.mark.peer, pytest.mark.slow]
 
 
 @pytest.fixture(scope="module")
-def with_pictures(lift_recording, peer_readers, tmp_path_factory):
+def with_pictures(lift_recording, tmp_path_factory):
     """The shared recording, with pictures of one camera."""
-    if not peer_readers.installed:
-        pytest.skip("Readers of datasets are not installed: make bench-peers")
     out = tmp_path_factory.mktemp("pictures") / "lift.hdf5"
     seen = {"camera_names": ("agentview",), "camera_heights": 64, "camera_widths": 64}
     extract(lift_recording, out, use_camera_obs=True, **seen)

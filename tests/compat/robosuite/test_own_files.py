@@ -208,6 +208,11 @@ def test_a_gripper_without_servos_is_refused(suite, files, tmp_path):
             *(-0.02, 0.10),
             {"box_size": [0.035] * 3, "box_density": 500},
         ),
+        (
+            "JacoThreeFingerGripper",
+            *(0.01, 0.10),
+            {"box_size": [0.025] * 3, "step_time": 1000},
+        ),
     ],
 )
 def test_grippers_lift_a_box_as_robosuite_tests_them(name, low, high, more):

@@ -35,6 +35,7 @@ from wbc_suite.compat.robosuite.utils.robot_composition_utils import (
     create_composite_robot,
 )
 from wbc_suite.errors import ConfigError, UnknownNameError
+from wbc_suite.robot import load_robot
 
 TABLE = np.array((0.0, 0.0, 0.8))
 
@@ -356,6 +357,15 @@ def test_a_robot_is_composed_of_parts(suite):
     assert env.robots[0].robot_model.name == "MyArm0"
     with pytest.raises(UnknownNameError, match="Did you mean 'Sawyer'"):
         create_composite_robot("Other", "Sawyerr")
+
+
+@pytest.mark.parametrize("name", ["G1ThreeFingerLeftGripper", "InspireLeftHand"])
+def test_a_hand_of_the_other_side_is_replaced_by_its_mirror_image(name, caplog):
+    create_composite_robot("OneHanded", "Panda", base="NullMount", grippers=name)
+    own = ROBOT_CLASS_MAPPING["OneHanded"]("OneHanded").robot_model.description
+    mirrored = load_robot("Panda", gripper=name.replace("Left", "Right"))
+    assert own.synergies == mirrored.synergies
+    assert f"'{name}' is of the other side" in caplog.text
 
 
 @pytest.mark.slow

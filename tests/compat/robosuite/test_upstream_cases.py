@@ -205,6 +205,13 @@ def test_wrappers(suite, tmp_path):
     assert np.abs(env.sim.model.body_mass - masses).max() > 0.0
     varied.restore_default_domain()
     np.testing.assert_allclose(env.sim.model.body_mass[5:], masses[5:], rtol=1e-9)
+    marks = ["goal", {"type": "sphere"}]
+    marked = wrappers.VisualizationWrapper(env, indicator_configs=marks)
+    assert marked.get_indicator_names() == ["goal", "indicator1"]
+    marked.set_indicator_pos("goal", [0.0, 0.1, 1.0])
+    np.testing.assert_array_equal(marked.indicator_places["goal"], [0.0, 0.1, 1.0])
+    with pytest.raises(LookupError, match="'end'"):
+        marked.set_indicator_pos("end", [0, 0, 0])
     shown = wrappers.VisualizationWrapper(env)
     assert shown.get_visualization_settings() == {"env", "robots", "grippers"}
     assert shown.unwrapped is env

@@ -59,7 +59,14 @@ _PLACES = {
     "load_composite_controller_config": "controllers",
     "load_part_controller_config": "controllers",
     "GymWrapper": "wrappers",
-    "Lift": "environments.manipulation",
+    "ROBOSUITE_DEFAULT_LOGGER": "utils.log_utils",
+    **dict.fromkeys(
+        (
+            *("Lift", "Stack", "NutAssembly", "PickPlace", "Door", "Wipe", "ToolHang"),
+            *("TwoArmLift", "TwoArmPegInHole", "TwoArmHandover", "TwoArmTransport"),
+        ),
+        "environments.manipulation",
+    ),
 }
 """Names of robosuite's top level, and the modules that define them."""
 

@@ -74,7 +74,10 @@ REEXPORTS = {
         for o in (
             *("objects", "generated_objects", "xml_objects", "primitive"),
             *("primitive.box", "primitive.ball", "primitive.capsule"),
-            *("primitive.cylinder", "composite", "object_groups"),
+            *("primitive.cylinder", "composite", "object_groups", "group"),
+            *("composite_body", "composite.bin", "composite.hammer", "composite.lid"),
+            *("composite.hollow_cylinder", "composite.pot_with_handles"),
+            *("composite.hook_frame", "composite.stand_with_mount"),
         )
     },
     "models.tasks.manipulation_task": "models.tasks",
@@ -85,11 +88,15 @@ REEXPORTS = {
     "controllers.composite.composite_controller_factory": "controllers",
     "controllers.parts": "controllers",
     "controllers.parts.controller_factory": "controllers",
-    "controllers.parts.arm": "controllers",
-    "controllers.parts.arm.osc": "controllers",
-    "controllers.parts.generic": "controllers",
-    "controllers.parts.gripper": "controllers",
-    "controllers.parts.mobile_base": "controllers",
+    **{
+        f"controllers.parts.{p}": "controllers"
+        for p in (
+            *("controller", "arm", "arm.osc", "arm.ik", "generic", "gripper"),
+            *("generic.joint_pos", "generic.joint_vel", "generic.joint_tor"),
+            *("gripper.gripper_controller", "gripper.simple_grip", "mobile_base"),
+            *("mobile_base.mobile_base_controller", "mobile_base.joint_vel"),
+        )
+    },
     "wrappers.wrapper": "wrappers",
     "wrappers.gym_wrapper": "wrappers",
     "wrappers.data_collection_wrapper": "wrappers",
@@ -100,6 +107,11 @@ REEXPORTS = {
     "devices.spacemouse": "devices",
     "renderers.base": "renderers",
     "renderers.viewer": "renderers",
+    "renderers.mjviewer": "renderers",
+    "renderers.mjviewer.mjviewer_renderer": "renderers",
+    "utils.opencv_renderer": "renderers",
+    "utils.numba": "utils.control_utils",
+    "utils.robot_utils": "utils.robot_composition_utils",
     "models.grippers.gripper_tester": "models.grippers.tester",
     "utils.usd": "utils.usd_export",
     "utils.usd.exporter": "utils.usd_export",

@@ -9,6 +9,18 @@ from wbc_suite.compat.robosuite.controllers.configs import (
     load_part_controller_config,
     refactor_composite_controller_config,
 )
+from wbc_suite.compat.robosuite.controllers.part_view import (
+    InverseKinematicsController,
+    JointPositionController,
+    JointTorqueController,
+    JointVelocityController,
+    MobileBaseJointVelocityController,
+    OperationalSpaceController,
+    SimpleGripController,
+)
+from wbc_suite.compat.robosuite.controllers.part_view import (
+    PartController as Controller,
+)
 from wbc_suite.compat.robosuite.controllers.user_controllers import (
     REGISTERED_COMPOSITE_CONTROLLERS_DICT,
     CompositeController,
@@ -24,7 +36,15 @@ __all__ = [
     "PART_CONTROLLER_INFO",
     "REGISTERED_COMPOSITE_CONTROLLERS_DICT",
     "CompositeController",
+    "Controller",
     "HybridMobileBase",
+    "InverseKinematicsController",
+    "JointPositionController",
+    "JointTorqueController",
+    "JointVelocityController",
+    "MobileBaseJointVelocityController",
+    "OperationalSpaceController",
+    "SimpleGripController",
     "WholeBody",
     "WholeBodyIK",
     "is_part_controller_config",

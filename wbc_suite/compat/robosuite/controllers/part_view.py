@@ -124,3 +124,52 @@ class PartController:
         """Whether it interpolates: None where it does not."""
         ramp = getattr(self._part.config, "interpolation", None)
         return None if ramp is None else SimpleNamespace(order=1)
+
+
+class OperationalSpaceController(PartController):
+    """OSC_POSE or OSC_POSITION of an arm."""
+
+
+class InverseKinematicsController(PartController):
+    """IK_POSE of an arm."""
+
+
+class JointPositionController(PartController):
+    """JOINT_POSITION of a part."""
+
+
+class JointVelocityController(PartController):
+    """JOINT_VELOCITY of a part."""
+
+
+class JointTorqueController(PartController):
+    """JOINT_TORQUE of a part."""
+
+
+class SimpleGripController(PartController):
+    """GRIP of a gripper."""
+
+
+class MobileBaseJointVelocityController(PartController):
+    """JOINT_VELOCITY of a base."""
+
+
+_CLASSES = {
+    "OSC_POSE": OperationalSpaceController,
+    "OSC_POSITION": OperationalSpaceController,
+    "IK_POSE": InverseKinematicsController,
+    "JOINT_POSITION": JointPositionController,
+    "JOINT_VELOCITY": JointVelocityController,
+    "JOINT_TORQUE": JointTorqueController,
+    "GRIP": SimpleGripController,
+}
+"""robosuite's classes by type of controller."""
+
+
+def part_controller(name: str, part: Any, state: RobotState) -> PartController:
+    """Return the view of a part, of robosuite's class for its type."""
+    view = PartController(name, part, state)
+    kind = _CLASSES.get(view.name, PartController)
+    if name == "base" and kind is JointVelocityController:
+        kind = MobileBaseJointVelocityController
+    return kind(name, part, state)

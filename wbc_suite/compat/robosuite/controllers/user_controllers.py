@@ -6,7 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wbc_suite.compat.robosuite.controllers.part_view import PartController
+from wbc_suite.compat.robosuite.controllers.part_view import (
+    PartController,
+    part_controller,
+)
 from wbc_suite.control import RobotState
 from wbc_suite.control.composite.basic import BasicController, default_basic_config
 from wbc_suite.control.composite.registry import register_composite
@@ -57,7 +60,7 @@ class CompositeController:
         self.layout = inner.layout
         parts = getattr(inner, "parts", {})
         self.part_controllers = {
-            n: PartController(n, p, state) for n, p in parts.items()
+            n: part_controller(n, p, state) for n, p in parts.items()
         }
 
     def _validate_composite_controller_specific_config(self) -> None:

@@ -17,14 +17,6 @@ IGNORED = (
 )
 """Arguments without a meaning here."""
 
-SCENE = (
-    *("table_full_size", "table_friction", "table_offset", "single_object_mode"),
-    *("nut_type", "object_type", "bin1_pos", "bin2_pos", "z_offset", "z_rotation"),
-    *("use_latch", "task_config", "peg_radius", "peg_length", "prehensile"),
-    *("tables_boundary", "bin_size"),
-)
-"""Arguments of single tasks, whose numbers are in `tasks/*.toml` here."""
-
 _CONFIGURATIONS = {"bimanual": "single-robot"}
 """Arrangements of robots that robosuite 1.5 renamed."""
 

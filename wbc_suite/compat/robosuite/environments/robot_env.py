@@ -21,11 +21,13 @@ from wbc_suite.compat.robosuite.environments.observations import (
     picture_keys,
     robot_observables,
 )
+from wbc_suite.compat.robosuite.environments.task_numbers import (
+    ARGUMENTS,
+    changed_task,
+)
 from wbc_suite.compat.robosuite.models.tasks import TaskBenchmark
 from wbc_suite.compat.robosuite.robots import ROBOT_CLASS_MAPPING
-from wbc_suite.compat.robosuite.utils.binding_utils import (
-    MjSim,
-)
+from wbc_suite.compat.robosuite.utils.binding_utils import MjSim
 from wbc_suite.compat.robosuite.utils.observables import Observable, sensor
 from wbc_suite.compat.robosuite.utils.placement_samplers import (
     ObjectPositionSampler,
@@ -101,7 +103,10 @@ class RobotEnv(MujocoEnv):
         for key in ("gripper_types", "base_types"):
             arguments.pop(key, None)
         if self.benchmark is not None:
-            return Core(self.benchmark, **self._for_our_task(arguments))
+            task = changed_task(self.benchmark, arguments)
+            for key in ARGUMENTS & arguments.keys():
+                del arguments[key]
+            return Core(task, **self._for_our_task(arguments))
         arguments.pop("reward_shaping", None)
         arguments.pop("use_object_obs", None)
         return Core(lambda: TaskBenchmark(self), **arguments)

@@ -151,6 +151,14 @@ class MujocoModel:
         return {}
 
 
+class MujocoXMLModel(MujocoXML, MujocoModel):  # pyright: ignore[reportIncompatibleVariableOverride] - the file names it
+    """A model of an MJCF file that has a name and a number in its scene."""
+
+    def __init__(self, fname: str | Path, idn: Any = 0) -> None:
+        super().__init__(fname)
+        self.idn = idn
+
+
 def element_names(elements: Iterable[Element]) -> list[str]:
     """Return the names of elements that have one."""
     return [e.get("name", "") for e in elements if e.get("name")]

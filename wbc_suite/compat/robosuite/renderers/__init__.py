@@ -46,4 +46,4 @@ class Viewer:
     reset = update = close = render
 
 
-OpenCVViewer = MjviewerRenderer = Viewer
+OpenCVViewer = OpenCVRenderer = MjviewerRenderer = Viewer

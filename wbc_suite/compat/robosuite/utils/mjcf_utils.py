@@ -216,6 +216,30 @@ def find_elements(
     return found or None
 
 
+def find_elements_by_substring(
+    root: Element,
+    tags: str | Iterable[str],
+    substrings: str | Iterable[str],
+    attribs: Mapping[str, str] | None = None,
+    return_first: bool = False,
+) -> Any:
+    """Return elements whose name has one of some texts in it; see `find_elements`."""
+    texts = [substrings] if isinstance(substrings, str) else list(substrings)
+    named = find_elements(root, tags, attribs, return_first=False) or []
+    found = [e for e in named if any(text in e.get("name", "") for text in texts)]
+    return (found[0] if found else None) if return_first else found or None
+
+
+def recolor_collision_geoms(
+    root: Element, rgba: Any, exclude: Callable[[Element], bool] | None = None
+) -> None:
+    """Give all geoms of group 0 a colour instead of their material."""
+    for geom in root.iter("geom"):
+        if geom.get("group", "0") == "0" and not (exclude and exclude(geom)):
+            geom.set("rgba", array_to_string(rgba))
+            geom.attrib.pop("material", None)
+
+
 def find_parent(root: Element, child: Element) -> Element | None:
     """Return the element above another."""
     return next((e for e in root.iter() if child in list(e)), None)

@@ -26,6 +26,11 @@ def get_target_type(base: str) -> type:
     return target_type_mapping[BASE_TARGET_MAPPING.get(base, "FixedBaseRobot")]
 
 
+def check_bimanual(robot_name: str) -> bool:
+    """Whether a robot has two arms."""
+    return REGISTERED_ROBOTS[robot_name]().arm_type == "bimanual"
+
+
 def create_composite_robot(
     name: str,
     robot: str,

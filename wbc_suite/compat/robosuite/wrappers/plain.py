@@ -6,7 +6,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from wbc_suite.errors import ConfigError
+from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.randomisation import Randomisation
 
 _OF_CAMERAS = ("camera_position", "camera_rotation", "camera_fovy")
@@ -70,15 +70,32 @@ class Wrapper:
 
 
 class VisualizationWrapper(Wrapper):
-    """The environment; `indicator_configs` name marks that scenes do not have here."""
+    """The environment; `indicator_configs` name marks, which are not drawn.
+
+    They are one name or dictionary with a `name`, or a list of these. Marks are where
+    `set_indicator_pos` puts them, in `indicator_places`. `wbc_suite.wrappers` has
+    `Indicators`, which draws such.
+    """
 
     def __init__(self, env: Any, indicator_configs: Any = None) -> None:
         super().__init__(env)
         self._settings = dict.fromkeys(env._visualizations, True)
+        given = indicator_configs or []
+        given = given if isinstance(given, list | tuple) else [given]
+        names = [c if isinstance(c, str) else c.get("name") for c in given]
+        self.indicator_places = {
+            name or f"indicator{k}": np.zeros(3) for k, name in enumerate(names)
+        }
 
     def get_indicator_names(self) -> list[str]:
-        """Return no names."""
-        return []
+        """Return the names of the marks."""
+        return list(self.indicator_places)
+
+    def set_indicator_pos(self, indicator: str, pos: Any) -> None:
+        """Move a mark to a place in the world, m; raises for an unknown name."""
+        if indicator not in self.indicator_places:
+            raise UnknownNameError("indicator", indicator, self.indicator_places)
+        self.indicator_places[indicator] = np.array(pos, np.float64)
 
     def get_visualization_settings(self) -> set[str]:
         """Return what can be shown or hidden."""

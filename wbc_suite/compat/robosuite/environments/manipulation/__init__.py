@@ -3,15 +3,19 @@
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from wbc_suite.benchmark import benchmark_names
+from wbc_suite.benchmark.wipe import MARK
 from wbc_suite.compat.robosuite.environments.robot_env import (
     ManipulationEnv,
     RobotEnv,
     TwoArmEnv,
 )
+from wbc_suite.compat.robosuite.environments.task_numbers import DEFAULT_WIPE_CONFIG
 from wbc_suite.compat.robosuite.models.objects.scene import TaskObject
 
-__all__ = ["ManipulationEnv", "RobotEnv", "TwoArmEnv"]
+__all__ = ["DEFAULT_WIPE_CONFIG", "ManipulationEnv", "RobotEnv", "TwoArmEnv"]
 
 
 def _setup_references(self: Any) -> None:
@@ -26,7 +30,22 @@ def _setup_references(self: Any) -> None:
     self.obj_geom_id = {name: sorted(state.geoms) for name, state in states.items()}
     table = getattr(getattr(self.env.benchmark, "config", None), "table", None)
     if table is not None:
-        self.table_full_size, self.table_offset = table.size, table.center
+        self.table_full_size = np.array(table.size)
+        self.table_offset = np.array(table.center)
+
+
+def _draw_height(self: Any) -> None:
+    """Lower Wipe's table by `table_height` of `task_config`, spread by its `_std`."""
+    config = DEFAULT_WIPE_CONFIG | dict(self.arguments.get("task_config") or {})
+    mean, spread = config["table_height"], config["table_height_std"]
+    task, model = self.env.benchmark, self.sim.model
+    self.table_offset = np.array(task.config.table.center, np.float64)
+    self.table_offset[2] += min(0.0, self.rng.normal(mean, spread))
+    model.body_pos[model.body_name2id("table")] = self.table_offset
+    task.marks[:, 2] = self.table_offset[2]
+    for k, place in enumerate(task.marks):
+        model.geom_pos[model.geom_name2id(f"{MARK}{k}")] = place
+    task.wipe(np.zeros(len(task.marks), dtype=np.bool_))
 
 
 def _make(name: str, bases: Sequence[type]) -> type:
@@ -36,6 +55,8 @@ def _make(name: str, bases: Sequence[type]) -> type:
         "__module__": __name__,
         "__doc__": f"Our benchmark {name}; see `tasks/`.",
     }
+    if name == "Wipe":
+        body["_reset_internal"] = _draw_height
     return type(name, tuple(bases), body)
 
 

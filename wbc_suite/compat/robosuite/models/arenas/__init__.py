@@ -1,11 +1,14 @@
-"""Arenas: the empty one, tables, and MJCF files of users."""
+"""Arenas: the empty one, tables, those of tasks, and MJCF files of users."""
 
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, cast
 
+import mujoco
 import numpy as np
 
+from wbc_suite.benchmark import ObjectBenchmark, load_benchmark
+from wbc_suite.compat.robosuite.environments.task_numbers import changed_task
 from wbc_suite.compat.robosuite.models.base import MujocoXML
 from wbc_suite.compat.robosuite.utils.mjcf_utils import (
     array_to_string,
@@ -15,7 +18,15 @@ from wbc_suite.envs.states import write_scene
 from wbc_suite.scene import TableConfig, add_table, add_table_cameras, empty_arena
 from wbc_suite.typing import Vector
 
-__all__ = ["Arena", "EmptyArena", "MultiTableArena", "TableArena"]
+__all__ = [
+    "Arena",
+    "BinsArena",
+    "EmptyArena",
+    "MultiTableArena",
+    "PegsArena",
+    "TableArena",
+    "WipeArena",
+]
 
 _UNNEEDED = ("option", "compiler", "size", "visual", "statistic")
 
@@ -65,11 +76,16 @@ def _table(size: Any, friction: Any, center: Any) -> TableConfig:
 
 
 def _text(tables: dict[str, TableConfig], cameras_at: Any) -> str:
-    """Return our own arena with tables as MJCF, physics options left out."""
+    """Return our own arena with tables as MJCF."""
     spec = empty_arena()
     for name, table in tables.items():
         add_table(spec, table, name)
     add_table_cameras(spec, cameras_at)
+    return _written(spec)
+
+
+def _written(spec: mujoco.MjSpec) -> str:
+    """Return an arena as MJCF, physics options left out."""
     root = ET.fromstring(write_scene(spec))
     for section in _UNNEEDED:
         for element in root.findall(section):
@@ -129,3 +145,76 @@ class MultiTableArena(Arena):
             for k, center in enumerate(self.table_offsets)
         }
         super().__init__(xml or _text(tables, tuple(self.table_offsets.mean(axis=0))))
+
+
+def _furnished(task: str, **arguments: Any) -> str:
+    """Return what stands in one of our tasks with robosuite's arguments, as MJCF."""
+    spec = empty_arena()
+    benchmark = cast(ObjectBenchmark, load_benchmark(changed_task(task, arguments)))
+    benchmark.furnish(spec)
+    return _written(spec)
+
+
+class BinsArena(Arena):
+    """Two bins, `bin1` and `bin2`, as in PickPlace; `bin1_pos` is on its floor, m."""
+
+    def __init__(
+        self,
+        bin1_pos: Sequence[float] = (0.1, -0.5, 0.8),
+        table_full_size: Sequence[float] = (0.39, 0.49, 0.82),
+        table_friction: Sequence[float] = (1, 0.005, 0.0001),
+    ) -> None:
+        super().__init__(_furnished("PickPlace", bin1_pos=bin1_pos))
+        self.table_full_size, self.table_friction = (
+            np.array(table_full_size),
+            table_friction,
+        )
+        self.table_half_size = self.table_full_size / 2
+        bodies = {body.get("name"): body for body in self.worldbody.iter("body")}
+        self.bin1_body, self.bin2_body = bodies["bin1"], bodies["bin2"]
+        self.table_top_abs = np.array(bin1_pos, np.float64)
+        for name in [name for name in bodies if name and name.endswith("_goal")]:
+            self.worldbody.remove(bodies[name])
+
+
+class PegsArena(TableArena):
+    """A table with a square and a round peg, as in NutAssembly."""
+
+    def __init__(
+        self,
+        table_full_size: Sequence[float] = (0.45, 0.69, 0.05),
+        table_friction: Sequence[float] = (1, 0.005, 0.0001),
+        table_offset: Sequence[float] = (0, 0, 0.82),
+        xml: str = "",
+    ) -> None:
+        given: dict[str, Any] = {"table_full_size": table_full_size}
+        given |= {"table_friction": table_friction, "table_offset": table_offset}
+        text = xml or _furnished("NutAssembly", **given)
+        super().__init__(**given, xml=text)
+        bodies = {body.get("name"): body for body in self.worldbody.iter("body")}
+        self.peg1_body, self.peg2_body = bodies["square_peg"], bodies["round_peg"]
+
+
+class WipeArena(TableArena):
+    """A table with marks of dirt; `Wipe` places them at a reset."""
+
+    def __init__(
+        self,
+        table_full_size: Sequence[float] = (0.8, 0.8, 0.05),
+        table_friction: Sequence[float] = (0.01, 0.005, 0.0001),
+        table_offset: Sequence[float] = (0, 0, 0.8),
+        coverage_factor: float = 0.9,
+        num_markers: int = 10,
+        table_friction_std: float = 0,
+        line_width: float = 0.02,
+        two_clusters: bool = False,
+    ) -> None:
+        given: dict[str, Any] = {"table_full_size": table_full_size}
+        given |= {"table_friction": table_friction, "table_offset": table_offset}
+        stroke = {"coverage_factor": coverage_factor, "num_markers": num_markers}
+        stroke |= {"line_width": line_width, "two_clusters": two_clusters}
+        stroke |= {"table_friction_std": table_friction_std}
+        config: dict[str, Any] = given | stroke
+        super().__init__(**given, xml=_furnished("Wipe", task_config=config))
+        self.num_markers, self.line_width = num_markers, line_width
+        self.markers = [f"mark{k}" for k in range(num_markers)]

@@ -60,7 +60,7 @@ class GripperTester:
         world.worldbody.append(box)
 
     def start_simulation(self) -> None:
-        """Compile the world."""
+        """Compile the world, with the gripper up and as it starts an episode."""
         self.sim = MjSim.from_xml_string(self.world.get_xml())
         self.viewer = Viewer(self.sim)
         model = self.sim.model
@@ -68,6 +68,12 @@ class GripperTester:
         self._z_dof = model.get_joint_qvel_addr("gripper_z_joint")
         self._fingers = [model.actuator_name2id(n) for n in self.gripper.actuators]
         self._box = model.body_name2id(self.cube.root_body)
+        data = self.sim.data
+        data.set_joint_qpos("gripper_z_joint", self.heights[0])
+        for joint, value in zip(
+            self.gripper.joints, self.gripper.init_qpos, strict=True
+        ):
+            data.set_joint_qpos(joint, value)
         self._start = self.sim.get_state()
         self.reset()
 

@@ -5,6 +5,12 @@ from wbc_suite.compat.robosuite.models.objects.bodies import (
     MujocoObject,
     MujocoXMLObject,
 )
+from wbc_suite.compat.robosuite.models.objects.composites import (
+    CompositeBodyObject,
+    CompositeObject,
+    ObjectGroup,
+)
+from wbc_suite.compat.robosuite.models.objects.ready_made import READY_MADE
 from wbc_suite.compat.robosuite.models.objects.shapes import (
     BallObject,
     BoxObject,
@@ -17,9 +23,14 @@ __all__ = [
     "BallObject",
     "BoxObject",
     "CapsuleObject",
+    "CompositeBodyObject",
+    "CompositeObject",
     "CylinderObject",
     "MujocoGeneratedObject",
     "MujocoObject",
     "MujocoXMLObject",
+    "ObjectGroup",
     "PrimitiveObject",
 ]
+
+globals().update(READY_MADE)

@@ -13,6 +13,7 @@ import pinocchio as pin
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.compat.robosuite.models.described import DescribedModel, choices_of
 from wbc_suite.compat.robosuite.models.own_files import arm_file, changed, gripper_file
+from wbc_suite.compat.robosuite.models.robots.mounting import Mounting
 from wbc_suite.compat.robosuite.models.robots.passive import with_passive_joints
 from wbc_suite.compat.robosuite.utils.transform_utils import euler2mat
 from wbc_suite.errors import UnknownNameError
@@ -108,9 +109,10 @@ class RobotModel(DescribedModel):
         if cls is not None and not cls.__module__.startswith("wbc_suite."):
             return gripper_file(cls())
         other = "Left" if arm == "right" else "Right"
-        if gripper.endswith(f"{other}Hand"):
+        mirrored = gripper.replace(other, arm.capitalize())
+        if mirrored != gripper and mirrored in GRIPPER_MAPPING:
             log.warning("'%s' is of the other side; its mirror image is used.", gripper)
-            return gripper.replace(other, arm.capitalize())
+            return mirrored
         return gripper
 
     @property
@@ -282,7 +284,7 @@ def _is_overridden(model: RobotModel, name: str) -> bool:
     return getattr(type(model), name) is not getattr(RobotModel, name)
 
 
-class ManipulatorModel(RobotModel):
+class ManipulatorModel(Mounting, RobotModel):
     """A robot with arms; for a user's, `init_qpos` of the MJCF's first key counts."""
 
     @property

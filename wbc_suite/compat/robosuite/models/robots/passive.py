@@ -29,14 +29,23 @@ INERTIAS: dict[str, tuple[float, tuple[float, ...], tuple[float, ...]]] = {
     "panda_link4": (2.0, (-0.04, 0.05, 0), (0.2, 0.2, 0.2)),
     "panda_link5": (2.0, (0, 0, -0.15), (0.2, 0.2, 0.2)),
     "panda_link6": (1.5, (0.06, 0, 0), (0.1, 0.1, 0.1)),
-    "panda_link7": (1.0, (0, 0, 0.093), (0.1, 0.1, 0.1)),  # with its `right_hand`
-    "panda_hand": (0.48, (0, 0, 0.15), (0.09, 0.05, 0.07)),
+    "panda_link7": (1.0, (0, 0, 0.09325), (0.1, 0.1, 0.1)),  # with its `right_hand`
+    "panda_hand": (0.48, (0, 0, 0.1444), (0.09, 0.05, 0.07)),
     "panda_leftfinger": (0.02, (0, 0, 0.05), (0.02, 0.02, 0.02)),
     "panda_rightfinger": (0.02, (0, 0, 0.05), (0.02, 0.02, 0.02)),
 }
 """Mass, kg, its centre, m, and moments of inertia, kg m^2, of links whose values in
 robosuite are invented; those of other arms are the manufacturers', as ours. Its finger
 tips have 0.01 kg m^2 at 10 g: the air drags them as cubes of 2.4 m. So it does ours."""
+
+HAND = {"pos": (0.0, 0.0, 0.1065), "quat": (0.923785245, 0.0, 0.0, -0.382910984)}
+"""Pose of a Panda's hand on its last link in robosuite: ours but 0.5 mm, 0.5 mrad."""
+WRIST = {
+    "link": "panda_hand",
+    "pos": (0.0, 0.0, 0.0),
+    "quat": (0.5**0.5, 0, 0, -(0.5**0.5)),
+}
+"""Pose of robosuite's sensor of force and torque, which bears no link of the arm."""
 
 ACCEPTED = dict.fromkeys(("com", "inertia"), "robosuite's; no such link can have it")
 
@@ -64,5 +73,12 @@ def with_passive_joints(robot: RobotDescription) -> RobotDescription:
             mass, com, moments = INERTIAS[link.name]
             update |= {"mass": mass, "com": com, "accept": ACCEPTED}
             update["inertia"] = (*moments, 0.0, 0.0, 0.0)
+        if link.name == "panda_hand":
+            update |= HAND
         links.append(link.model_copy(update=update) if update else link)
-    return changed(robot, links=tuple(links))
+    frames = robot.frames
+    if any(link.name == "panda_hand" for link in links) and robot.name == "Panda":
+        frames = [
+            f.model_copy(update=WRIST) if f.role == "wrist" else f for f in frames
+        ]
+    return changed(robot, links=tuple(links), frames=tuple(frames))
