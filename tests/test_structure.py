@@ -21,9 +21,9 @@ TREES = {
 }
 
 MAX_LINES, MAX_MODULES = 45_000, 320  # without what is listed in `ADDED`
-GROWTH = 1_600
+GROWTH = 1_700
 """Lines by which the features of `ADDED` made older modules grow, less what they took
-out there: 4,300 and 2,817 on 2026-11-27, by `git diff --numstat 3551367`.
+out there: 4,451 and 2,854 on 2026-11-27, by `git diff --numstat 3551367`.
 """
 ADDED = (
     # walking robots

@@ -286,7 +286,7 @@ def with_soles(robot: RobotDescription) -> RobotDescription:
     shown = join_first([f"'{link.name}'" for link in bare])
     LOG.warning("%s: collides with its visual shapes: %s.", robot.name, shown)
     grey = {"color": "grey"}
-    update = {}
+    update: dict[str, Link] = {}
     for link in bare:
         solid = tuple(shape.model_copy(update=grey) for shape in link.visual)
         update[link.name] = link.model_copy(update={"collision": solid})
