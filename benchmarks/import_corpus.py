@@ -53,7 +53,7 @@ CONFIGURATIONS = 5  # random positions at which poses and mass matrices are comp
 TOLERANCE = 1e-9  # of the largest magnitude, and absolute for magnitudes below 1
 PATIENCE = 120  # s for one file
 UNLIMITED = 1e6  # effort, velocity or range as large as this means none
-UNSEEN_SECTION = "## Robots that were not used in development\n"
+UNSEEN_SECTION = "## Forty public robots\n"
 """Head of what `unseen_robots.py` writes on the same page, and this script keeps."""
 Row = dict[str, Any]
 
