@@ -203,13 +203,14 @@ def operate(robosuite, steps: int) -> None:
 
 
 def _type_on_screen() -> None:
-    """Press keys on the display, for listeners and windows."""
+    """Press keys on the display again and again, for listeners and windows."""
     wait(4.0)
     from pynput.keyboard import Controller, Key
 
-    for key in (Key.up, "1", "r", "w", Key.esc):
-        Controller().tap(key)
-        wait(0.5)
+    while True:  # a listener may start late
+        for key in (Key.up, "1", "r", "w", Key.esc):
+            Controller().tap(key)
+            wait(0.5)
 
 
 if __name__ == "__main__":
