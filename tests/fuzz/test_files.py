@@ -102,7 +102,8 @@ def test_a_damaged_benchmark_works_or_names_the_file(data, tmp_path_factory):
     file.write_text("\n".join(f"{dump(k)} = {dump(v)}" for k, v in task.items()))
     try:
         benchmark = load_benchmark(file)
-        benchmark.arrange([load_robot(r) for r in benchmark.robots], "default")
+        robots = [load_robot(r, gripper=benchmark.gripper) for r in benchmark.robots]
+        benchmark.arrange(robots, "default")
         spec = empty_arena()
         benchmark.build(spec)
         spec.compile()
