@@ -255,17 +255,25 @@ def _scale_simple_inertia(
 Draw: TypeAlias = Callable[[Any, Any, np.random.Generator], None]
 
 
-def _scales(*arrays: str, rows: bool = False) -> tuple[tuple[str, ...], Draw]:
-    """Return a draw that multiplies each value, or row of all arrays, by a factor."""
+def _scales(*arrays: str) -> tuple[tuple[str, ...], Draw]:
+    """Return a draw that multiplies every value of arrays by a factor of its own."""
 
     def draw(model: Any, share: float, rng: np.random.Generator) -> None:
-        factors: Any = None
         for name in arrays:
             values = getattr(model, name)
-            if not rows or factors is None:
-                shape = (len(values), 1) if rows else values.shape
-                factors = rng.uniform(1.0 - share, 1.0 + share, shape)
-            values[:] *= factors
+            values[:] *= rng.uniform(1.0 - share, 1.0 + share, values.shape)
+
+    return arrays, draw
+
+
+def _scales_rows(*arrays: str) -> tuple[tuple[str, ...], Draw]:
+    """Return a draw that multiplies each row, the same in all arrays, by a factor."""
+
+    def draw(model: Any, share: float, rng: np.random.Generator) -> None:
+        rows = len(getattr(model, arrays[0])), 1
+        factors = rng.uniform(1.0 - share, 1.0 + share, rows)
+        for name in arrays:
+            getattr(model, name)[:] *= factors
 
     return arrays, draw
 
@@ -274,7 +282,7 @@ _DRAWS: dict[str, tuple[tuple[str, ...], Draw]] = {
     "color": (("geom_rgba", "mat_rgba"), _color),
     "texture": (("tex_data",), _texture),
     "light_position": (("light_pos", "light_dir"), _light_position),
-    "light_brightness": _scales("light_diffuse", rows=True),
+    "light_brightness": _scales_rows("light_diffuse"),
     "camera_position": (("cam_pos",), _camera_position),
     "camera_rotation": (("cam_quat",), _camera_rotation),
     "camera_fovy": (("cam_fovy",), _camera_fovy),
@@ -283,6 +291,6 @@ _DRAWS: dict[str, tuple[tuple[str, ...], Draw]] = {
     "friction": _scales("geom_friction"),
     "damping": _scales("dof_damping", "dof_frictionloss"),
     "armature": (("dof_armature", "dof_M0"), _armature),
-    "gains": _scales("actuator_gainprm", "actuator_biasprm", rows=True),
+    "gains": _scales_rows("actuator_gainprm", "actuator_biasprm"),
 }
 """Arrays that each property writes, and the function that draws it."""

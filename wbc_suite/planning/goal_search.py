@@ -22,15 +22,16 @@ STEP = 0.1  # s; one iteration goes as far as joints can in this time,
 STRIDE = 0.2  # rad or m; or in the time in which the fastest joint goes this far
 MAX_ITERATIONS = 40  # from one initial configuration
 STARTS = 150  # two arms need dozens: of 10 goals of Nextage's 16 starts met 3
+MORE_STARTS = 24  # once some configuration is known, for a nearer one
 DETOURS = 6  # configurations to which a path around obstacles is searched
-MORE_STARTS = 24  # of them, once some configuration is known, for a nearer one
 QUICK = 0.7  # s; a configuration this near is taken at once, others are compared
 ITERATION_COST = 4e-4  # s; a later one may be farther by this for each iteration
 PATIENCE = 5  # iterations without progress end a start
 NEAR_TIME = 0.5  # s; every second random start lies within this time of the first
 MIN_GAIN = 0.05  # s; a motion must be so much shorter to replace the best
-CLOSE = 0.02  # m and rad; from here on only the targets count, and errors of so much
-# are better than to stay where the robot is
+CLOSE = 0.02
+"""m and rad. Nearer than this only the targets count; and one that is so near is taken
+if no configuration meets them."""
 MET = 1e-7  # m and rad
 
 

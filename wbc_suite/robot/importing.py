@@ -23,11 +23,8 @@ from wbc_suite.robot.missing_data import (
     estimate_motors,
     oversized,
 )
-from wbc_suite.robot.standing_posture import (
-    feet_are_level,
-    level_soles,
-    standing_legs,
-)
+from wbc_suite.robot.sole_inference import level_soles
+from wbc_suite.robot.standing_posture import feet_are_level, standing_legs
 from wbc_suite.robot.validation import RESERVED
 from wbc_suite.robot.working_posture import working_arms
 from wbc_suite.tomlfile import parse_model

@@ -1,13 +1,16 @@
-"""What a foot touches the ground with, by the collision shapes of its rigid body."""
+"""Soles: the shapes that feet touch the ground with, and level frames."""
 
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 from wbc_suite.robot.collision_capsules import collision_spheres
 from wbc_suite.robot.description import RobotDescription
-from wbc_suite.robot.elements import rigid_bodies
-from wbc_suite.robot.poses import poses_in_rigid_bodies, se3_of
+from wbc_suite.robot.elements import Frame, rigid_bodies
+from wbc_suite.robot.poses import pose_fields, poses_in_rigid_bodies, se3_of
+from wbc_suite.robot.standing_posture import at_ready
 from wbc_suite.typing import Matrix
 
 FLAT = 0.004
@@ -15,6 +18,11 @@ FLAT = 0.004
 
 AT_FRAME = 0.01
 """m; greatest distance of a ball's centre from the frame of the foot."""
+
+
+UPRIGHT, AHEAD = 0.98, 0.7
+"""Least cosines of z to up and of x to ahead of a sole that is taken as given."""
+BIPED = 2  # feet at most; those of others are points
 
 
 class Sole(NamedTuple):
@@ -49,6 +57,34 @@ def ball_radius(robot: RobotDescription, frame: str) -> float:
         if radius > 0.0 and np.linalg.norm((x, y, z)) < AT_FRAME:
             return float(radius)
     return 0.0
+
+
+def level_soles(
+    robot: RobotDescription, given: Sequence[Frame], take: Callable[[str, str], str]
+) -> RobotDescription:
+    """Return a biped whose frames of feet have z up and x ahead in `ready`.
+
+    Ahead is x of the first link. A given frame that is turned stays, and loses its role
+    to one beside it, with a name that `take` makes unique.
+    """
+    feet = [frame for frame in robot.frames if frame.role == "foot"]
+    if len(feet) > BIPED:
+        return robot
+    model, data, _ = at_ready(robot)
+    root = data.oMf[model.getFrameId(robot.links[0].name)].rotation
+    to_world = pin.Quaternion(*robot.root.quat).matrix() @ root.T
+    frames = {frame.name: frame for frame in robot.frames}
+    for frame in feet:
+        rotation = to_world @ data.oMf[model.getFrameId(frame.name)].rotation
+        if rotation[2, 2] > UPRIGHT and rotation[0, 0] > AHEAD:
+            continue
+        fields = pose_fields(se3_of(frame) * pin.SE3(rotation.T, np.zeros(3)))
+        name = frame.name
+        if any(frame.name == own.name for own in given):
+            frames[name] = frame.model_copy(update={"role": "other"})
+            name = take(f"{name}_sole", "frame")
+        frames[name] = frame.model_copy(update={"name": name, **fields})
+    return robot.model_copy(update={"frames": tuple(frames.values())})
 
 
 def _spheres(robot: RobotDescription, name: str) -> Matrix:

@@ -1,6 +1,4 @@
-"""Compute a standing posture of legs, knees bent, and level frames of their soles."""
-
-from collections.abc import Callable, Sequence
+"""Compute a standing posture of legs: knees bent, feet below the hips."""
 
 import numpy as np
 import pinocchio as pin
@@ -8,15 +6,10 @@ from scipy.optimize import least_squares
 
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.elements import Frame
-from wbc_suite.robot.poses import pose_fields, se3_of
 from wbc_suite.typing import Vector
 
 LEVEL = 0.02  # largest difference of the heights of feet that stand, m
 TOLERANCE = 0.02  # largest residual in m of a posture that is accepted
-
-UPRIGHT, AHEAD = 0.98, 0.7
-"""Least cosines of z to up and of x to ahead of a sole that is taken as given."""
-BIPED = 2  # feet at most; those of others are points
 
 MIN_COSINE = 0.9  # smallest cosine between the axis of a pitch joint and y
 
@@ -33,7 +26,7 @@ def standing_legs(robot: RobotDescription) -> dict[str, float]:
     posture `ready`, in which other joints stay. A leg without such a posture has no
     entry.
     """
-    model, data, q = _at_ready(robot)
+    model, data, q = at_ready(robot)
     found: dict[str, float] = {}
     for frame in robot.frames:
         if frame.role == "foot":
@@ -43,41 +36,13 @@ def standing_legs(robot: RobotDescription) -> dict[str, float]:
 
 def feet_are_level(robot: RobotDescription) -> bool:
     """Whether all feet have nearly the same height in the posture `ready`."""
-    model, data, _ = _at_ready(robot)
+    model, data, _ = at_ready(robot)
     feet = [frame.name for frame in robot.frames if frame.role == "foot"]
     heights = [data.oMf[model.getFrameId(name)].translation[2] for name in feet]
     return not feet or float(np.ptp(heights)) < LEVEL
 
 
-def level_soles(
-    robot: RobotDescription, given: Sequence[Frame], take: Callable[[str, str], str]
-) -> RobotDescription:
-    """Return a biped whose frames of feet have z up and x ahead in `ready`.
-
-    Ahead is x of the first link. A given frame that is turned stays, and loses its role
-    to one beside it, with a name that `take` makes unique.
-    """
-    feet = [frame for frame in robot.frames if frame.role == "foot"]
-    if len(feet) > BIPED:
-        return robot
-    model, data, _ = _at_ready(robot)
-    root = data.oMf[model.getFrameId(robot.links[0].name)].rotation
-    to_world = pin.Quaternion(*robot.root.quat).matrix() @ root.T
-    frames = {frame.name: frame for frame in robot.frames}
-    for frame in feet:
-        rotation = to_world @ data.oMf[model.getFrameId(frame.name)].rotation
-        if rotation[2, 2] > UPRIGHT and rotation[0, 0] > AHEAD:
-            continue
-        fields = pose_fields(se3_of(frame) * pin.SE3(rotation.T, np.zeros(3)))
-        name = frame.name
-        if any(frame.name == own.name for own in given):
-            frames[name] = frame.model_copy(update={"role": "other"})
-            name = take(f"{name}_sole", "frame")
-        frames[name] = frame.model_copy(update={"name": name, **fields})
-    return robot.model_copy(update={"frames": tuple(frames.values())})
-
-
-def _at_ready(robot: RobotDescription) -> tuple[pin.Model, pin.Data, Vector]:
+def at_ready(robot: RobotDescription) -> tuple[pin.Model, pin.Data, Vector]:
     """Return model, data with the poses of frames, and positions at `ready`."""
     model = robot.to_pinocchio()
     data, q = model.createData(), pin.neutral(model)

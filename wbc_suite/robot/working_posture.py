@@ -58,8 +58,8 @@ def working_arms(robot: RobotDescription) -> dict[str, float]:
         for values in search.candidates(arm, earlier):
             if search.is_clear(arm, values):
                 search.q[arm.q] = values
-                short = values.round(4).clip(arm.low, arm.high)
-                found |= dict(zip(arm.joints, short.tolist(), strict=True))
+                rounded = values.round(4).clip(arm.low, arm.high)
+                found |= dict(zip(arm.joints, rounded.tolist(), strict=True))
                 earlier.append(arm)
                 break
     return found

@@ -19,9 +19,7 @@ class PartController:
 
     def __init__(self, name: str, part: Any, state: RobotState) -> None:
         self.part_name, self._part, self._state = name, part, state
-        config = getattr(part, "config", None)
-        kind = getattr(config, "type", "GRIP").removeprefix("UNCOUPLED_")
-        self.name = kind.removeprefix("VARIABLE_")
+        self.name = _type_of(part)
         self.control_dim = sum(len(s.labels) for s in part.slices)
         self.joint_index = {
             "joints": state.joint_addresses(part.law.joints)[1].tolist(),
@@ -166,10 +164,14 @@ _CLASSES = {
 """robosuite's classes by type of controller."""
 
 
+def _type_of(part: Any) -> str:
+    kind = getattr(getattr(part, "config", None), "type", "GRIP")
+    return kind.removeprefix("UNCOUPLED_").removeprefix("VARIABLE_")
+
+
 def part_controller(name: str, part: Any, state: RobotState) -> PartController:
     """Return the view of a part, of robosuite's class for its type."""
-    view = PartController(name, part, state)
-    kind = _CLASSES.get(view.name, PartController)
+    kind = _CLASSES.get(_type_of(part), PartController)
     if name == "base" and kind is JointVelocityController:
         kind = MobileBaseJointVelocityController
     return kind(name, part, state)

@@ -44,35 +44,35 @@ DEFAULT_WIPE_CONFIG: dict[str, Any] = {
 """robosuite's default `task_config` of Wipe: lengths in m, forces in N."""
 
 _KEYS = {
-    "table_full_size": ("table.size",),
-    "table_friction": ("table.friction",),
-    "table_offset": ("table.center",),
-    "use_latch": ("latch",),
-    "bin1_pos": ("source.center",),
-    "bin2_pos": ("target.center",),
-    "z_rotation": ("region.yaw",),
-    "peg_radius": ("peg.radius",),
-    "peg_length": ("peg.half_length",),
-    "bin_size": ("bin.size",),
-    "coverage_factor": ("stroke.coverage",),
-    "line_width": ("stroke.width",),
-    "num_markers": ("stroke.marks",),
-    "unit_wiped_reward": ("reward.mark",),
-    "wipe_contact_reward": ("reward.contact",),
-    "excess_force_penalty_mul": ("reward.excess",),
-    "distance_multiplier": ("reward.reach",),
-    "distance_th_multiplier": ("reward.reach_scale",),
-    "pressure_threshold": ("reward.least_force",),
-    "pressure_threshold_max": ("reward.most_force",),
+    "table_full_size": "table.size",
+    "table_friction": "table.friction",
+    "table_offset": "table.center",
+    "use_latch": "latch",
+    "bin1_pos": "source.center",
+    "bin2_pos": "target.center",
+    "z_rotation": "region.yaw",
+    "peg_radius": "peg.radius",
+    "peg_length": "peg.half_length",
+    "bin_size": "bin.size",
 }
 """Keys of our files for robosuite's arguments; the values are the same."""
 
+_KEYS_OF_WIPE = _KEYS | {
+    "coverage_factor": "stroke.coverage",
+    "line_width": "stroke.width",
+    "num_markers": "stroke.marks",
+    "unit_wiped_reward": "reward.mark",
+    "wipe_contact_reward": "reward.contact",
+    "excess_force_penalty_mul": "reward.excess",
+    "distance_multiplier": "reward.reach",
+    "distance_th_multiplier": "reward.reach_scale",
+    "pressure_threshold": "reward.least_force",
+    "pressure_threshold_max": "reward.most_force",
+}
+"""The same for keys of `task_config`."""
+
 _CONVERTED = ("nut_type", "object_type", "single_object_mode", "tables_boundary")
-ARGUMENTS = frozenset(
-    {*_KEYS, *_CONVERTED, "task_config", "prehensile", "z_offset"}
-) - frozenset(DEFAULT_WIPE_CONFIG).difference(
-    {"table_full_size", "table_friction", "table_offset"}
-)
+ARGUMENTS = frozenset({*_KEYS, *_CONVERTED, "task_config", "prehensile", "z_offset"})
 """Arguments of robosuite's tasks beside those of all environments."""
 
 _READ_ELSEWHERE = ("table_height", "table_height_std")
@@ -122,7 +122,7 @@ def _changes(name: str, given: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
         elif key == "table_full_size" and name.startswith(("PickPlace", "TwoArmHand")):
             yield from _size_of_other_tables(name, value)
         elif value is not None:
-            yield from ((own, _plain(value)) for own in _KEYS[key])
+            yield _KEYS[key], _plain(value)
 
 
 def _converted(
@@ -161,8 +161,8 @@ def _of_wipe(config: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
             continue
         if key == "arm_limit_collision_penalty":
             yield "reward.collision", -float(value)
-        elif key in _KEYS:
-            yield from ((own, _plain(value)) for own in _KEYS[key])
+        elif key in _KEYS_OF_WIPE:
+            yield _KEYS_OF_WIPE[key], _plain(value)
         else:
             raise ConfigError(
                 f"Wipe: task_config: {key} = {value!r} has no equal here."

@@ -3,7 +3,6 @@
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import mujoco
@@ -151,9 +150,7 @@ _MADE: dict[str, Callable[..., SceneObject]] = {
     "CerealObject": ours.cereal,
     "SquareNutObject": ours.square_nut,
     "RoundNutObject": ours.round_nut,
-    "PlateWithHoleObject": partial(
-        ours.plate_with_hole, half_size=0.12, hole=0.045, half_thickness=0.01
-    ),
+    "PlateWithHoleObject": ours.plate_with_hole,
     "DoorObject": _door,
     "HammerObject": _hammer,
     "PotWithHandlesObject": _pot,
