@@ -69,11 +69,19 @@ def test_a_long_jaw_stays_clear_of_the_door_behind_the_lever():
 
 
 @pytest.mark.slow
-def test_a_base_drives_to_where_both_hands_reach():
-    config = {"robots": "Tiago", "controller_configs": "WHOLE_BODY_IK"}
+@pytest.mark.parametrize("controller", [None, "WHOLE_BODY_IK"])
+def test_a_base_drives_to_where_both_hands_reach(controller):
+    config = {"robots": "Tiago", "controller_configs": controller}
     env = wbc_suite.make("TwoArmLift", horizon=120, **config)
     for seed in (1, 2, 3):
         assert solve(env, seed)[1], f"seed {seed}"
+
+
+@pytest.mark.slow
+def test_thumbs_come_slowly_into_handles():
+    config = {"robots": "GR1", "controller_configs": "WHOLE_BODY_IK"}
+    env = wbc_suite.make("TwoArmLift", horizon=500, **config)
+    assert sum(solve(env, seed)[1] for seed in (100, 102, 103)) >= 2
 
 
 def test_a_tipped_cube_stays_on_its_face():

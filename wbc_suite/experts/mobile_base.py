@@ -1,41 +1,56 @@
 """A base that drives to where hands reach an object."""
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import pinocchio as pin
 
 from wbc_suite.control import RobotState
 from wbc_suite.control.action import ActionSlice
-from wbc_suite.devices.action_ports import LimbPort
+from wbc_suite.devices.action_ports import (
+    LimbKind,
+    SpeedPort,
+    limb_ports,
+    speed_ports,
+)
+from wbc_suite.envs import RobotEnv
 from wbc_suite.typing import Vector
 
 SHARE = 0.5  # of the turn to face an object: the corners of a table keep robots away
 BACK, MOST_BACK = 0.03, 0.6  # m, by which a base stays back from what it meets
+GAIN = 2.0  # 1/s, of a base that is moved by its speed
 ARRIVED, TURNED = 0.02, 0.03  # m, rad
 
 
 class MobileBase:
-    """The planar root of a robot, and the slice of an action that is its goal.
+    """The planar root of a robot, and the slice of an action that moves it.
 
     Args:
-        port: Of the base.
+        measure: Returns its pose in the world.
+        encode: Returns the values of the slice for a goal in the world.
         state: The robot.
         part: The slice.
         hands: The middle of the hands at the start, in the world, m.
     """
 
     def __init__(
-        self, port: LimbPort, state: RobotState, part: ActionSlice, hands: Vector
+        self,
+        measure: Callable[[], pin.SE3],
+        encode: Callable[[pin.SE3], Vector],
+        state: RobotState,
+        part: ActionSlice,
+        hands: Vector,
     ) -> None:
-        self._port, self._state, self._slice = port, state, part
+        self._measure, self._encode = measure, encode
+        self._state, self._slice = state, part
         self._goal: pin.SE3 | None = None
-        self._hands = port.measure().actInv(hands)
+        self._hands = measure().actInv(hands)
 
     @property
     def pose(self) -> pin.SE3:
         """Measured pose in the world."""
-        return self._port.measure()
+        return self._measure()
 
     @property
     def arrived(self) -> bool:
@@ -73,8 +88,51 @@ class MobileBase:
     def write(self, action: Vector) -> None:
         """Write the goal into an action, if there is one."""
         if self._goal is not None:
-            values = self._port.encode(self._goal)
+            values = self._encode(self._goal)
             action[self._slice.start : self._slice.stop] = values
+
+
+def mobile_base(env: RobotEnv, state: RobotState, hands: Vector) -> MobileBase | None:
+    """Return the base of a robot that drives in any direction; None without one.
+
+    The action has its goal, or its speed.
+
+    Args:
+        env: The environment.
+        state: The robot.
+        hands: The middle of its hands at the start, in the world, m.
+    """
+    layout = env.action_layout
+    if state.robot.root.kind != "planar":
+        return None
+    for port in limb_ports(env).values():
+        body = state.model.body(port.body).name
+        if port.kind is LimbKind.PLANAR and body.startswith(state.prefix):
+            part = layout[port.name]
+            return MobileBase(port.measure, port.encode, state, part, hands)
+    measure = partial(_root_pose, state)
+    for name, speed in speed_ports(env).items():
+        own = len(env.robots) == 1 or name.startswith(state.prefix)
+        if own and len(speed.axes) == 3:
+            encode = partial(_speed_towards, speed, measure)
+            return MobileBase(measure, encode, state, layout[name], hands)
+    return None
+
+
+def _root_pose(state: RobotState) -> pin.SE3:
+    """Return the measured pose of a planar root in the world."""
+    joint = state.model.joint(state.prefix + state.robot.root_joint_names[-1])
+    body = state.data.body(state.model.jnt_bodyid[joint.id])
+    return pin.SE3(body.xmat.reshape(3, 3).copy(), body.xpos.copy())
+
+
+def _speed_towards(
+    port: SpeedPort, measure: Callable[[], pin.SE3], goal: pin.SE3
+) -> Vector:
+    """Return the values of a base's speed for a goal in the world."""
+    left = measure().actInv(goal)
+    turn = pin.log3(left.rotation)[2]
+    return port.encode(GAIN * np.array([*left.translation[:2], turn]))
 
 
 def _place(q: Vector) -> pin.SE3:

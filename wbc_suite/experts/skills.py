@@ -217,8 +217,10 @@ def take(
     return cell.holds(arm, name)
 
 
-def close_in(cell: Workcell, name: str, choice: Choice) -> Steps[bool]:
-    """Bring the open hand to a grasp of an object that may move.
+def close_in(
+    cell: Workcell, name: str, choice: Choice, *, speed: float = SPEED
+) -> Steps[bool]:
+    """Bring the open hand to a grasp of an object that may move, at a speed in m/s.
 
     It stays back while it is beside its way, so that no finger comes down on an object
     that barely fits between them.
@@ -233,8 +235,8 @@ def close_in(cell: Workcell, name: str, choice: Choice) -> Steps[bool]:
         back = min(STAYS_BACK * max(0.0, float(beside) - BESIDE), choice.away)
         return goal() * pin.SE3(np.eye(3), -back * UP)
 
-    yield from move(arm, behind)
-    return (yield from move(arm, goal))
+    yield from move(arm, behind, speed=speed)
+    return (yield from move(arm, goal, speed=speed))
 
 
 def come_before(

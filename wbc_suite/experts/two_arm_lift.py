@@ -1,15 +1,28 @@
 """The expert of TwoArmLift."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import pinocchio as pin
 
 from wbc_suite.benchmark.two_arm_lift import HANDLES, POT, TwoArmLift
+from wbc_suite.experts.arm import Arm
 from wbc_suite.experts.grasp_choice import Approach, choose_pair
-from wbc_suite.experts.skills import UP, close_in, come_before, grip, move, shifted
+from wbc_suite.experts.skills import (
+    UP,
+    at_height,
+    close_in,
+    come_before,
+    grip,
+    move,
+    shifted,
+)
 from wbc_suite.experts.two_arms import carry_together, drive_before
-from wbc_suite.experts.workcell import Steps, Workcell, together
+from wbc_suite.experts.workcell import Steps, Workcell, together, wait_until
 
+TRIES = 5
 RISE = 0.15  # m
+SLOW = 0.15  # m/s, of hands that come to the handles: thumbs have little room there
 AWAY = 0.11  # m, from where fingers are clear of the pot's rim
 
 
@@ -20,24 +33,36 @@ def two_arm_lift(cell: Workcell[TwoArmLift]) -> Steps[None]:
     places = [handle.removeprefix(f"{POT}_") for handle in HANDLES]
     ways = [Approach(raised=0.0, away=AWAY, place=place) for place in places]
     yield from drive_before(cell, POT, arms, HANDLES)
-    for _ in range(3):
+    for _ in range(TRIES):
         choices = choose_pair(cell, POT, arms=arms, approaches=ways, then=[goal])
         if choices is None:
             return
         yield from together(*(come_before(cell, choice) for choice in choices))
-        yield from together(*(close_in(cell, POT, choice) for choice in choices))
+        yield from together(
+            *(close_in(cell, POT, choice, speed=SLOW) for choice in choices)
+        )
         held = yield from together(*(grip(cell, arm, POT) for arm in arms))
-        if all(held):
-            now = cell.pose(POT)
-            level = pin.SE3(_upright(now.rotation), goal.translation)
-            yield from carry_together(cell, arms, POT, level)
-            if cell.benchmark.success():
-                return
+        if all(held) and (yield from _raise(cell, arms, goal)):
+            return
         for arm in arms:
             arm.open()
         yield from together(
             *(move(a, shifted(a.pose, 0.08 * UP), most=15) for a in arms)
         )
+
+
+def _raise(
+    cell: Workcell[TwoArmLift], arms: Sequence[Arm], goal: pin.SE3
+) -> Steps[bool]:
+    """Raise the pot level to a goal's height; without success put it down again."""
+    now = cell.pose(POT)
+    up = pin.SE3(_upright(now.rotation), goal.translation)
+    yield from carry_together(cell, arms, POT, up)
+    if (yield from wait_until(cell.benchmark.success, most=20)):
+        return True
+    down = at_height(cell.pose(POT), now.translation.item(2))
+    yield from carry_together(cell, arms, POT, down)
+    return False
 
 
 def _upright(R: np.ndarray) -> np.ndarray:

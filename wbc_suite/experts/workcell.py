@@ -14,7 +14,7 @@ from wbc_suite.devices.action_ports import LimbKind, LimbPort, limb_ports
 from wbc_suite.envs import RobotEnv
 from wbc_suite.errors import ConfigError
 from wbc_suite.experts.arm import Arm
-from wbc_suite.experts.mobile_base import MobileBase
+from wbc_suite.experts.mobile_base import MobileBase, mobile_base
 from wbc_suite.scene.objects import ObjectState
 from wbc_suite.scene.objects.grasp_site import GraspSite
 from wbc_suite.sensing.hands import Hand, pairs_in_contact
@@ -47,7 +47,12 @@ class Workcell(Generic[B]):
         self.period = 1.0 / env.config.control_freq
         ports = [*limb_ports(env).values()]
         self.arms = tuple(self._arms([p for p in ports if p.kind is LimbKind.POSE]))
-        self._bases = self._find_bases([p for p in ports if p.kind is LimbKind.PLANAR])
+        self._bases = {
+            arm.state.prefix: mobile_base(
+                env, arm.state, self._between_hands(arm.state)
+            )
+            for arm in self.arms
+        }
         if not self.arms:
             names = ", ".join(s.name for s in env.action_layout.slices)
             raise ConfigError(
@@ -60,13 +65,13 @@ class Workcell(Generic[B]):
         action = self._env.hold_action
         for arm in self.arms:
             arm.write(action, self.period)
-        for base in self._bases.values():
+        for base in filter(None, self._bases.values()):
             base.write(action)
         return action
 
     def base(self, state: RobotState) -> MobileBase | None:
-        """Return the base of a robot, if it drives by goals."""
-        return self._bases.get(state.prefix)
+        """Return the base of a robot, if it drives in any direction."""
+        return self._bases[state.prefix]
 
     def object(self, name: str) -> ObjectState:
         """Return the state of an object, or of a body attached to one."""
@@ -160,17 +165,10 @@ class Workcell(Generic[B]):
         body = self.model.geom_bodyid[geom]
         return self.model.body(body).name.startswith(state.prefix)
 
-    def _find_bases(self, ports: Sequence[LimbPort]) -> dict[str, MobileBase]:
-        """Return the bases that drive, by the prefixes of their robots."""
-        layout, bases = self._env.action_layout, {}
-        for port in ports:
-            body = self.model.body(port.body).name
-            own = [a for a in self.arms if body.startswith(a.state.prefix)]
-            if own and (state := own[0].state).robot.root.kind == "planar":
-                middle = np.mean([arm.home.translation for arm in own], axis=0)
-                part = layout[port.name]
-                bases[state.prefix] = MobileBase(port, state, part, middle)
-        return bases
+    def _between_hands(self, state: RobotState) -> Vector:
+        """Return the middle of a robot's hands at the start, in the world, m."""
+        own = [arm.home.translation for arm in self.arms if arm.state is state]
+        return np.mean(own, axis=0)
 
     def _arms(self, ports: Sequence[LimbPort]) -> list[Arm]:
         hands = iter(self.benchmark.hands)
