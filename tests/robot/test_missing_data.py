@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from wbc_suite.errors import DescriptionError
 from wbc_suite.robot import load_robot
 from wbc_suite.robot.missing_data import DENSITY, GRAVITY, RESERVE, ROTOR
 
@@ -108,16 +109,26 @@ def test_a_ball_without_mass_gets_that_of_its_volume(tmp_path, caplog):
     assert "most links have no mass; mended" in caplog.text
 
 
-def test_an_inertia_in_other_units_is_mended(tmp_path, caplog):
-    text = ARM.format(effort=1).replace(
-        'ixx="0.01" iyy="0.01" izz="0.01"', 'ixx="1e4" iyy="1e4" izz="1e4"'
-    )
+@pytest.mark.parametrize(
+    ("moment", "fault"),
+    [
+        ("1e4", "a radius of gyration of 122 m is impossible in 0.346 m"),
+        ("1e-8", "a radius of gyration of 0.000122 m is impossible in 0.346 m"),
+    ],
+)
+def test_an_inertia_that_no_body_of_its_size_has_is_mended(
+    tmp_path, caplog, moment, fault
+):
+    tensor = f'ixx="{moment}" iyy="{moment}" izz="{moment}"'
+    text = ARM.format(effort=1).replace('ixx="0.01" iyy="0.01" izz="0.01"', tensor)
     shape = f"<collision>{BALL}</collision></link>"
     text = text.replace(
-        'izz="1e4" ixy="0" ixz="0" iyz="0"/></inertial></link>',
-        f'izz="1e4" ixy="0" ixz="0" iyz="0"/></inertial>{shape}',
+        f'izz="{moment}" ixy="0" ixz="0" iyz="0"/></inertial></link>',
+        f'izz="{moment}" ixy="0" ixz="0" iyz="0"/></inertial>{shape}',
     )
     lower = read(tmp_path, text).link("lower")
     assert lower.inertia == pytest.approx((0.4 * 0.1**2,) * 3 + (0.0,) * 3)
     assert lower.com == (0.0, 0.0, 0.2)
-    assert "a radius of gyration of 122 m is impossible in 0.346 m" in caplog.text
+    assert fault in caplog.text
+    with pytest.raises(DescriptionError, match="is impossible in"):
+        load_robot(tmp_path / "robot.urdf", strict=True)

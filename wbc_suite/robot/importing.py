@@ -21,7 +21,7 @@ from wbc_suite.robot.missing_data import (
     estimate_armatures,
     estimate_masses,
     estimate_motors,
-    oversized,
+    missized,
 )
 from wbc_suite.robot.sole_inference import level_soles
 from wbc_suite.robot.standing_posture import feet_are_level, standing_legs
@@ -227,9 +227,10 @@ def _physical(links: Sequence[Link], source: Path, *, strict: bool) -> list[Link
         if rigid[link.name] in moving and link.mass > 0.0
     }
     faults |= {link.name: fault for link in links if (fault := unphysical(link))}
-    huge = {x.name: fault for x in links if (fault := oversized(x))}
-    faults |= huge
-    links = [ellipsoid(x, x.mass) if x.name in huge else x for x in links]
+    heads = [x for x in links if x.joint or x is links[0]]
+    wrong = {x.name: fault for x in heads if (fault := missized(x))}
+    faults |= wrong
+    links = [ellipsoid(x, x.mass) if x.name in wrong else x for x in links]
     shown = "; ".join(f"link '{n}': {fault}" for n, fault in faults.items())
     if faults and strict:
         raise DescriptionError(

@@ -12,9 +12,10 @@ DENSITY = 1000.0  # kg/m^3; what MuJoCo assumes
 GRAVITY = 9.81  # m/s^2
 RESERVE = 2.0
 """An estimated motor holds so many times the weight of what it moves."""
-OVERSIZED = 10.0
-"""Largest radius of gyration over the diagonal of the link's shapes; some meshes may be
-missing."""
+GYRATION = (0.03, 10.0)
+"""Possible radius of gyration over the diagonal of the link's shapes: a solid has 0.15
+to 0.3, some meshes may be missing, and of 1300 public files four have moving links with
+less, all by mistake."""
 LEAST_EFFORT = 1.0  # N m or N
 LONG = 4  # joints; a limb of more is no pendulum, and its first joint has a motor
 ROTOR = 2e-4
@@ -53,10 +54,10 @@ def ellipsoid(link: Link, mass: float | None = None) -> Link:
     return link.model_copy(update=fields)
 
 
-def oversized(link: Link) -> str | None:
-    """Return what is wrong with an inertia far beyond the link's shapes, or None.
+def missized(link: Link) -> str | None:
+    """Return what is wrong with an inertia that no body of such a size has, or None.
 
-    Files with such tensors have them in other units.
+    Files have such tensors in other units, or as placeholders.
     """
     shapes = (*link.collision, *link.visual)
     if not shapes or link.mass == 0.0:
@@ -65,7 +66,8 @@ def oversized(link: Link) -> str | None:
     size = float(np.linalg.norm(bounds[:, 1].max(axis=0) - bounds[:, 0].min(axis=0)))
     moments = max(0.0, sum(link.inertia[:3]))
     radius = float(np.sqrt(moments / 2.0 / link.mass))
-    if radius <= OVERSIZED * size:
+    lowest, highest = GYRATION
+    if lowest * size <= radius <= highest * size:
         return None
     return f"a radius of gyration of {radius:.3g} m is impossible in {size:.3g} m"
 
