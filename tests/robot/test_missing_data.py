@@ -37,6 +37,31 @@ def test_estimated_motors_hold_twice_the_weight_of_a_stretched_limb(tmp_path, ca
     assert "estimated" in robot.deviations[0]
 
 
+LIFT = """<robot name="lift"><link name="base"/>
+<link name="column"><inertial><mass value="20"/>
+ <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="slide" type="prismatic"><parent link="base"/><child link="column"/>
+ <limit lower="0" upper="1" effort="{effort}" velocity="1"/>
+ <axis xyz="{axis}"/></joint></robot>"""
+
+
+@pytest.mark.parametrize(
+    ("effort", "axis", "estimated"),
+    [(100, "0 0 1", True), (100, "1 0 0", False), (200, "0 0 1", False)],
+)
+def test_a_lift_that_cannot_carry_its_load_gets_another_motor(
+    tmp_path, caplog, effort, axis, estimated
+):
+    robot = read(tmp_path, LIFT.format(effort=effort, axis=axis))
+    wanted = RESERVE * GRAVITY * 20.0 if estimated else effort
+    assert robot.joint("slide").effort == pytest.approx(wanted)
+    message = "efforts of lifts are estimated"
+    assert (message in caplog.text, message in " ".join(robot.deviations)) == (
+        estimated,
+        estimated,
+    )
+
+
 def test_a_file_with_half_of_the_motors_gets_no_others(tmp_path):
     shoulder, slide = read(tmp_path, ARM.format(effort=7)).joints
     assert (shoulder.effort, slide.effort, slide.armature) == (7.0, None, 0.0)

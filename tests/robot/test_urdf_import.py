@@ -804,6 +804,15 @@ def test_a_floating_joint_below_a_solid_link_is_the_root(tmp_path, caplog):
     assert "'base' is the world, and left out" in caplog.text
 
 
+def test_a_world_that_is_not_declared_is_the_world(tmp_path, caplog):
+    text = one_arm(f'<link name="arm">{BODY}</link>', joint("a", "base", "arm"))
+    text = text.replace("</robot>", joint("b", "world", "base", kind="fixed"))
+    robot = wbc_suite.load_robot(write(tmp_path, text + "</robot>", "robot.URDF"))
+    assert robot.root.kind == "fixed"
+    assert robot.joint_names == ("a",)
+    assert "it has no link 'world', which is the world" in caplog.text
+
+
 def test_a_free_robot_collides_with_its_visuals_or_is_refused(tmp_path, caplog):
     ball = '<visual><geometry><sphere radius="0.1"/></geometry></visual>'
     text = f'<robot name="r"><link name="base">{BODY}{{}}</link></robot>'

@@ -19,6 +19,7 @@ from wbc_suite.robot.inertia import implausible, nearest_physical, unphysical
 from wbc_suite.robot.missing_data import (
     ellipsoid,
     estimate_armatures,
+    estimate_lifts,
     estimate_masses,
     estimate_motors,
     missized,
@@ -39,6 +40,7 @@ CARRIER_MASS, END_MASS = 1e-10, 1e-3
 """Mass in kg of a moving link for which the file has none, if it carries others."""
 GYRATION = 0.03  # radius of gyration of such a link, m
 FEW_MOTORS = "efforts and armatures are estimated: the file has few or none"
+WEAK_LIFTS = "efforts of lifts are estimated: those of the file are below their load"
 NO_ARMATURES = "armatures are estimated from efforts: the file has none"
 MAX_MESSAGE = 800  # largest number of characters of a list in a message
 
@@ -109,10 +111,17 @@ def describe_import(
     actuated = {fields["joint"] for fields in others.get("actuators", ())}
     moving = [limb.joints for limb in limbs if limb.kind in ("arm", "leg")]
     driven = estimate_motors(checked, placed, actuated, moving)
-    complete = estimate_armatures(driven)
     if driven != checked:
         LOG.warning("%s: %s.", source, FEW_MOTORS)
-    deviations = {FEW_MOTORS: driven != checked, NO_ARMATURES: complete != driven}
+    lifted, weak = estimate_lifts(driven, actuated)
+    if weak:
+        LOG.warning("%s: %s: %s.", source, WEAK_LIFTS, join_first(weak))
+    complete = estimate_armatures(lifted)
+    deviations = {
+        FEW_MOTORS: driven != checked,
+        WEAK_LIFTS: bool(weak),
+        NO_ARMATURES: complete != lifted,
+    }
     keyframes = others.pop("keyframes", {})
     data: dict[str, Any] = {
         "name": NameTable().take(name, "robot"),

@@ -5,8 +5,9 @@ from collections.abc import Collection, Iterator, Sequence
 import numpy as np
 
 from wbc_suite.robot.elements import Frame, Link, rigid_bodies
+from wbc_suite.robot.poses import se3_of
 from wbc_suite.robot.shape_geometry import shape_bounds
-from wbc_suite.typing import Vector
+from wbc_suite.typing import Matrix, Vector
 
 DENSITY = 1000.0  # kg/m^3; what MuJoCo assumes
 GRAVITY = 9.81  # m/s^2
@@ -108,6 +109,30 @@ def estimate_motors(
             joint = joint.model_copy(update=update)
         changed.append(link.model_copy(update={"joint": joint}))
     return changed
+
+
+def estimate_lifts(
+    links: Sequence[Link], driven: Collection[str] = ()
+) -> tuple[list[Link], list[str]]:
+    """Return links with estimated motors for lifts too weak for their load, and these.
+
+    A lift is a slide without a hinge between it and the root. It carries the same
+    weight in every posture: a smaller effort is a placeholder, or a spindle locks it.
+    """
+    efforts, weak = dict(_efforts(links, ())), list[str]()
+    turned: dict[str | None, Matrix] = {None: np.eye(3)}
+    changed: list[Link] = []
+    for link in links:
+        joint, above = link.joint, turned.get(link.parent)
+        if above is not None and (joint is None or joint.type == "slide"):
+            turned[link.name] = R = above @ se3_of(link).rotation
+            if joint is not None and joint.effort and joint.name not in driven:
+                effort = float(abs((R @ joint.axis)[2])) * efforts[joint.name]
+                if RESERVE * joint.effort < effort:
+                    weak.append(joint.name)
+                    joint = joint.model_copy(update={"effort": round(effort, 2)})
+        changed.append(link.model_copy(update={"joint": joint}))
+    return changed, weak
 
 
 def estimate_armatures(links: Sequence[Link]) -> list[Link]:
