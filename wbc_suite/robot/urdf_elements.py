@@ -16,7 +16,6 @@ from wbc_suite.typing import Vector
 LOG = logging.getLogger(__name__)
 
 XACRO = "xacro:"
-WORLD = "world"
 MAX_LINKS = 500  # largest number of links, as in robot files
 
 
@@ -66,12 +65,9 @@ def read_tree(path: Path) -> tuple[Element, tuple[Branch, ...]]:
         raise DescriptionError(
             f"{path}: {len(links)} links; a robot has between 1 and {MAX_LINKS}."
         )
-    ends = (joint.find("parent") for joint in joints.values())
-    if WORLD not in links and any(
-        x is not None and x.get("link") == WORLD for x in ends
-    ):
-        LOG.warning("%s: it has no link '%s', which is the world.", path, WORLD)
-        links[WORLD] = Element("link", name=WORLD)
+    if "world" in {x.get("link") for x in robot.findall("joint/parent")} - set(links):
+        LOG.warning("%s: it has no link 'world', which is the world.", path)
+        links["world"] = Element("link", name="world")
     above: dict[str, tuple[str, Element]] = {}
     for name, joint in joints.items():
         parent = _end(joint, "parent", links, path)

@@ -65,14 +65,9 @@ def _mass_faults(robot: "RobotDescription") -> Iterator[str]:
     for link in robot.links:
         first = link is robot.links[0] and robot.root.kind != "fixed"
         if first or link.joint is not None:
-            if link.name not in heavy and first:
-                yield (
-                    f"the root is {robot.root.kind}, and its link '{link.name}' has no "
-                    "mass (a trunk in the world body of an MJCF file has none: give it "
-                    "a <body>)"
-                )
-            elif link.name not in heavy:
-                yield f"link '{link.name}' moves and needs a mass"
+            if link.name not in heavy:
+                where = " (a trunk in MJCF's world body has none)" if first else ""
+                yield f"link '{link.name}' moves and needs a mass{where}"
             elif link.name not in turning:
                 yield f"link '{link.name}' moves and needs an inertia"
 
