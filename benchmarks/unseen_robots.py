@@ -231,6 +231,12 @@ unitreerobotics/unitree_mujoco unitree_robots/g1/g1_23dof.xml
 unitreerobotics/unitree_mujoco unitree_robots/h1/h1.xml
 """
 """Robots that were chosen before any of them was loaded."""
+FIRST_RUN = (
+    "- at first, before anything was mended for them: 33 of 40 moved, 16 of 24 reached",
+    "  all goals (200 of 210 goals), 4 of 7 with four feet stood, none ended in a",
+    "  traceback.",
+)
+"""What the first run over `UNSEEN` gave, 2026-11-27."""
 GOALS = 10
 REACHED = 2e-3  # m
 PATIENCE = 30.0  # s of simulation for one goal
@@ -430,7 +436,8 @@ def write_table(rows: list[Row], path: Path) -> None:
         f"- {reached} of {len(armed)} with hands on a root that cannot fall reach all",
         f"  random goals, {GOALS} where so many were found, within 2 mm;",
         f"- {stand} of {len(dogs)} with four feet stand for 10 s;",
-        f"- {broken} end in a traceback.",
+        f"- {broken} end in a traceback;",
+        *FIRST_RUN,
         "",
         "| file | root | s | processor s | goals reached | standing 10 s |",
         "| --- | --- | ---: | ---: | ---: | --- |",
