@@ -1,5 +1,7 @@
 """Estimated masses and motors of files that state none."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -60,6 +62,24 @@ def test_a_lift_that_cannot_carry_its_load_gets_another_motor(
         estimated,
         estimated,
     )
+
+
+def test_a_base_of_joints_without_motors_gets_them(tmp_path):
+    body = ARM[ARM.index("<inertial>") : ARM.index("</link>")]
+    names = ("ground", "x", "y", "theta", *(f"arm{i}" for i in range(1, 7)))
+    limit = '<limit lower="-2" upper="2" effort="{}" velocity="1"/>'
+    text = "".join(f"<link name={name!r}>{body}</link>" for name in names[1:])
+    text += '<link name="ground"/>'
+    for above, name in pairwise(names):
+        kind = "prismatic" if name in ("x", "y") else "revolute"
+        axis = {"x": "1 0 0", "y": "0 1 0", "theta": "0 0 1"}.get(name, "0 1 0")
+        text += f'<joint name="j_{name}" type="{kind}"><parent link="{above}"/>'
+        text += f'<child link="{name}"/><axis xyz="{axis}"/><origin xyz="0 0 .2"/>'
+        text += limit.format(9 if "arm" in name else 0) + "</joint>"
+    robot = read(tmp_path, f'<robot name="mobile">{text}</robot>')
+    assert robot.groups["base"] == ("j_x", "j_y", "j_theta")
+    assert all(robot.joint(name).effort for name in robot.groups["base"])
+    assert robot.joint("j_arm1").effort == 9.0
 
 
 def test_a_file_with_half_of_the_motors_gets_no_others(tmp_path):

@@ -137,7 +137,7 @@ def _with_motors(
     source: Path,
 ) -> tuple[list[Link], tuple[str, ...]]:
     """Return links with estimated motors, lifts and armatures; what was estimated."""
-    moving = [limb.joints for limb in limbs if limb.kind in ("arm", "leg")]
+    moving = [limb.joints for limb in limbs if limb.kind in ("arm", "leg", "base")]
     motors = estimate_motors(links, frames, driven, moving)
     lifts = estimate_lifts(motors, driven)
     complete = estimate_armatures(lifts)
