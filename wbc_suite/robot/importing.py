@@ -23,7 +23,7 @@ from wbc_suite.robot.missing_data import (
     estimate_lifts,
     estimate_masses,
     estimate_motors,
-    missized,
+    gyration_fault,
 )
 from wbc_suite.robot.sole_inference import level_soles
 from wbc_suite.robot.standing_posture import feet_are_level, standing_legs
@@ -245,7 +245,7 @@ def _physical(links: Sequence[Link], source: Path, *, strict: bool) -> list[Link
     }
     faults |= {link.name: fault for link in links if (fault := unphysical(link))}
     heads = [x for x in links if x.joint or x is links[0]]
-    wrong = {x.name: fault for x in heads if (fault := missized(x))}
+    wrong = {x.name: fault for x in heads if (fault := gyration_fault(x))}
     faults |= wrong
     links = [ellipsoid(x, x.mass) if x.name in wrong else x for x in links]
     shown = "; ".join(f"link '{n}': {fault}" for n, fault in faults.items())

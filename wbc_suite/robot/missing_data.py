@@ -54,7 +54,7 @@ def ellipsoid(link: Link, mass: float | None = None) -> Link:
     return link.model_copy(update=fields)
 
 
-def missized(link: Link) -> str | None:
+def gyration_fault(link: Link) -> str | None:
     """Return what is wrong with an inertia that no body of such a size has, or None.
 
     Files have such tensors in other units, or as placeholders.
