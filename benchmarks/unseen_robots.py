@@ -145,10 +145,6 @@ mikeferguson/ubr_reloaded ubr1_description/robots/ubr1_robot.urdf
 doosan-robotics/doosan-robot2 dsr_description2/urdf/m1013.white.urdf
 rex-gym rex_gym-0.2.7/rex_gym/util/pybullet_data/assets/urdf/rex_arm.urdf
 mani_skill mani_skill/assets/robots/xarm7/xarm7_ability_right_hand.urdf
-"""
-"""Package or repository, and file, of robots that what is measured here was improved
-with."""
-UNSEEN = """
 ANYbotics/anymal_c_simple_description urdf/anymal.urdf
 ANYbotics/anymal_d_simple_description urdf/anymal.urdf
 AgibotTech/agibot_x1_train resources/robots/x1/urdf/x1.urdf
@@ -190,7 +186,57 @@ unitreerobotics/unitree_ros robots/aliengo_description/urdf/aliengo.urdf
 unitreerobotics/unitree_ros robots/h1_2_description/h1_2.xml
 unitreerobotics/unitree_ros robots/r1_description/R1.urdf
 """
+"""Package or repository, and file, of robots that what is measured here was improved
+with."""
+UNSEEN = """
+ADVRHumanoids/iit-centauro-ros-pkg centauro_urdf/urdf/centauro.urdf
+AIS-Bonn/humanoid_op_ros src/nimbro/hardware/nimbro_op_model/robots/urdf/igus_op.urdf
+AuboRobot/aubo_robot aubo_description/urdf/aubo_i10.urdf
+HighTorque-Robotics/livelybot_dynamic_control legged_examples/*/*/urdf/hunter.urdf
+Improbable-AI/airobot src/airobot/urdfs/ur5e_2f140_pybullet.urdf
+Improbable-AI/airobot src/airobot/urdfs/yumi_grippers.urdf
+NVlabs/curobo curobo/content/assets/robot/ur_description/dual_ur10e.urdf
+Open-X-Humanoid/TienKung-Lab legged_lab/assets/tienkung2_lite/mjcf/tienkung.xml
+RealManRobot/rm_models GEN72/urdf/gen_72_b_description/urdf/GEN72.urdf
+RealManRobot/rm_models RX75/urdf/RX75-B-V/RXR-B-V/urdf/RXR-B-V.urdf
+RethinkRobotics/baxter_common baxter_description/urdf/baxter.urdf
+RobotLocomotion/models atlas/atlas_convex_hull.urdf
+RobotLocomotion/models iiwa_description/urdf/dual_iiwa14_polytope_collision.urdf
+RobotLocomotion/models jaco_description/urdf/j2s7s300.urdf
+RobotLocomotion/models pr2_description/urdf/pr2_simplified.urdf
+RobotLocomotion/models tri_homecart/homecart_bimanual.urdf
+TopHillRobotics/quadruped-robot robot_description/laikago_description/urdf/laikago.urdf
+TopHillRobotics/quadruped-robot robot_description/lite2_description/urdf/robot.urdf
+ami-iit/ergocub-software urdf/ergoCub/robots/ergoCubSN000/model.urdf
+chvmp/robots configs/astro_config/urdf/quadruped.urdf
+chvmp/robots configs/bruno_config/urdf/quadruped.urdf
+enactic/openarm_mujoco v1/openarm_bimanual.xml
+fiveages-sim/robot_descriptions humanoid/ARX/lift_description/urdf/lift.urdf
+fiveages-sim/robot_descriptions humanoid/Agibot/agibot_g1_description/urdf/G1_120s.urdf
+fiveages-sim/robot_descriptions humanoid/Galaxea/*/urdf/galaxea_r1.urdf
+fiveages-sim/robot_descriptions manipulator/AgileX/*/urdf/agilex_aloha.urdf
+fiveages-sim/robot_descriptions quadruped/deep_robotics/x30_description/urdf/robot.urdf
+iotdesignshop/dexhand_description urdf/dexhand-right.urdf
+isaac-sim/IsaacGymEnvs assets/urdf/kuka_allegro_description/kuka_allegro*sensor.urdf
+kevinzakka/mink examples/stanford_tidybot/mobile_kinova.xml
+kevinzakka/mjctrl kuka_iiwa_14/iiwa14.xml
+leggedrobotics/legged_gym resources/robots/anymal_b/urdf/anymal_b.urdf
+loongOpen/OpenLoong-Dyn-Control models/AzureLoong.urdf
+nasa-jpl/m2020-urdf-models rover/m2020.urdf
+personalrobotics/ada_description ada_description/robots_urdf/ada.urdf
+pollen-robotics/reachy_description urdf/reachy.URDF
+poppy-project/poppy-humanoid hardware/URDF/robots/Poppy_Humanoid.URDF
+shbang91/draco3_description urdf/draco3.urdf
+unitreerobotics/unitree_mujoco unitree_robots/g1/g1_23dof.xml
+unitreerobotics/unitree_mujoco unitree_robots/h1/h1.xml
+"""
 """Robots that were chosen before any of them was loaded."""
+FIRST_RUN = (
+    "- at first, before anything was mended for them: 33 of 40 moved, 16 of 24 reached",
+    "  all goals (200 of 210 goals), 4 of 7 with four feet stood, none ended in a",
+    "  traceback.",
+)
+"""What the first run over `UNSEEN` gave, 2026-11-27."""
 GOALS = 10
 REACHED = 2e-3  # m
 PATIENCE = 30.0  # s of simulation for one goal
@@ -390,7 +436,8 @@ def write_table(rows: list[Row], path: Path) -> None:
         f"- {reached} of {len(armed)} with hands on a root that cannot fall reach all",
         f"  random goals, {GOALS} where so many were found, within 2 mm;",
         f"- {stand} of {len(dogs)} with four feet stand for 10 s;",
-        f"- {broken} end in a traceback.",
+        f"- {broken} end in a traceback;",
+        *FIRST_RUN,
         "",
         "| file | root | s | processor s | goals reached | standing 10 s |",
         "| --- | --- | ---: | ---: | ---: | --- |",

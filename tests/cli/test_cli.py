@@ -13,6 +13,7 @@ from PIL import Image
 from wbc_suite.benchmark import benchmark_names
 from wbc_suite.catalogue import ENVIRONMENT_VARIABLE, Catalogue
 from wbc_suite.cli import main
+from wbc_suite.cli.demo import demo
 from wbc_suite.cli.options import robot_names
 from wbc_suite.robot import load_robot
 
@@ -233,6 +234,17 @@ def test_the_demo_tracks_and_writes_its_pictures(
     assert film.n_frames == 50
     first, later = (np.asarray(_frame(film, k), dtype=float) for k in (0, 10))
     assert np.abs(first - later).max() > 100  # something moved
+
+
+@pytest.mark.slow
+def test_hands_of_a_robot_on_its_feet_move_through_half_of_the_figure(monkeypatch):
+    seen: list[dict[str, float]] = []
+    monkeypatch.setattr("wbc_suite.cli.demo._reach", lambda _e, s, _t: seen.append(s))
+    for name in ("GR1", "GR1FreeBody"):
+        with pytest.raises(TypeError, match="NoneType"):  # there is nothing to report
+            demo(name)
+    fixed, free = seen
+    assert {round(2.0 * free[name] / fixed[name], 9) for name in fixed} == {1.0}
 
 
 def _frame(film: Image.Image, number: int) -> Image.Image:

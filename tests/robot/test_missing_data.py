@@ -1,8 +1,11 @@
 """Estimated masses and motors of files that state none."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
+from wbc_suite.errors import DescriptionError
 from wbc_suite.robot import load_robot
 from wbc_suite.robot.missing_data import DENSITY, GRAVITY, RESERVE, ROTOR
 
@@ -34,6 +37,49 @@ def test_estimated_motors_hold_twice_the_weight_of_a_stretched_limb(tmp_path, ca
     assert shoulder.armature == pytest.approx(ROTOR * (shoulder.effort or 0.0))
     assert "estimated" in caplog.text
     assert "estimated" in robot.deviations[0]
+
+
+LIFT = """<robot name="lift"><link name="base"/>
+<link name="column"><inertial><mass value="20"/>
+ <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="slide" type="prismatic"><parent link="base"/><child link="column"/>
+ <limit lower="0" upper="1" effort="{effort}" velocity="1"/>
+ <axis xyz="{axis}"/></joint></robot>"""
+
+
+@pytest.mark.parametrize(
+    ("effort", "axis", "estimated"),
+    [(100, "0 0 1", True), (100, "1 0 0", False), (200, "0 0 1", False)],
+)
+def test_a_lift_that_cannot_carry_its_load_gets_another_motor(
+    tmp_path, caplog, effort, axis, estimated
+):
+    robot = read(tmp_path, LIFT.format(effort=effort, axis=axis))
+    wanted = RESERVE * GRAVITY * 20.0 if estimated else effort
+    assert robot.joint("slide").effort == pytest.approx(wanted)
+    message = "efforts of lifts are estimated"
+    assert (message in caplog.text, message in " ".join(robot.deviations)) == (
+        estimated,
+        estimated,
+    )
+
+
+def test_a_base_of_joints_without_motors_gets_them(tmp_path):
+    body = ARM[ARM.index("<inertial>") : ARM.index("</link>")]
+    names = ("ground", "x", "y", "theta", *(f"arm{i}" for i in range(1, 7)))
+    limit = '<limit lower="-2" upper="2" effort="{}" velocity="1"/>'
+    text = "".join(f"<link name={name!r}>{body}</link>" for name in names[1:])
+    text += '<link name="ground"/>'
+    for above, name in pairwise(names):
+        kind = "prismatic" if name in ("x", "y") else "revolute"
+        axis = {"x": "1 0 0", "y": "0 1 0", "theta": "0 0 1"}.get(name, "0 1 0")
+        text += f'<joint name="j_{name}" type="{kind}"><parent link="{above}"/>'
+        text += f'<child link="{name}"/><axis xyz="{axis}"/><origin xyz="0 0 .2"/>'
+        text += limit.format(9 if "arm" in name else 0) + "</joint>"
+    robot = read(tmp_path, f'<robot name="mobile">{text}</robot>')
+    assert robot.groups["base"] == ("j_x", "j_y", "j_theta")
+    assert all(robot.joint(name).effort for name in robot.groups["base"])
+    assert robot.joint("j_arm1").effort == 9.0
 
 
 def test_a_file_with_half_of_the_motors_gets_no_others(tmp_path):
@@ -108,16 +154,26 @@ def test_a_ball_without_mass_gets_that_of_its_volume(tmp_path, caplog):
     assert "most links have no mass; mended" in caplog.text
 
 
-def test_an_inertia_in_other_units_is_mended(tmp_path, caplog):
-    text = ARM.format(effort=1).replace(
-        'ixx="0.01" iyy="0.01" izz="0.01"', 'ixx="1e4" iyy="1e4" izz="1e4"'
-    )
+@pytest.mark.parametrize(
+    ("moment", "fault"),
+    [
+        ("1e4", "a radius of gyration of 122 m is impossible in 0.346 m"),
+        ("1e-8", "a radius of gyration of 0.000122 m is impossible in 0.346 m"),
+    ],
+)
+def test_an_inertia_that_no_body_of_its_size_has_is_mended(
+    tmp_path, caplog, moment, fault
+):
+    tensor = f'ixx="{moment}" iyy="{moment}" izz="{moment}"'
+    text = ARM.format(effort=1).replace('ixx="0.01" iyy="0.01" izz="0.01"', tensor)
     shape = f"<collision>{BALL}</collision></link>"
     text = text.replace(
-        'izz="1e4" ixy="0" ixz="0" iyz="0"/></inertial></link>',
-        f'izz="1e4" ixy="0" ixz="0" iyz="0"/></inertial>{shape}',
+        f'izz="{moment}" ixy="0" ixz="0" iyz="0"/></inertial></link>',
+        f'izz="{moment}" ixy="0" ixz="0" iyz="0"/></inertial>{shape}',
     )
     lower = read(tmp_path, text).link("lower")
     assert lower.inertia == pytest.approx((0.4 * 0.1**2,) * 3 + (0.0,) * 3)
     assert lower.com == (0.0, 0.0, 0.2)
-    assert "a radius of gyration of 122 m is impossible in 0.346 m" in caplog.text
+    assert fault in caplog.text
+    with pytest.raises(DescriptionError, match="is impossible in"):
+        load_robot(tmp_path / "robot.urdf", strict=True)

@@ -494,7 +494,10 @@ FAULTS = {
     ),
     "floating in the middle": (
         one_arm(
-            TWO, joint("a", "base", "l0") + joint("b", "l0", "l1", kind="floating")
+            TWO + f'<link name="l2">{BODY}</link>',
+            joint("a", "base", "l0")
+            + joint("b", "l0", "l1", kind="floating")
+            + joint("c", "l1", "l2"),
         ),
         "joint 'b' is floating: only the joint",
     ),
@@ -802,6 +805,32 @@ def test_a_floating_joint_below_a_solid_link_is_the_root(tmp_path, caplog):
     robot = read_urdf(write(tmp_path, text))
     assert (robot.root.kind, robot.links[0].name) == ("free", "l0")
     assert "'base' is the world, and left out" in caplog.text
+
+
+def test_a_part_that_floats_beside_the_robot_is_held_fixed(tmp_path, caplog):
+    parts = joint("a", "base", "l0") + joint("b", "l0", "l1", kind="floating")
+    path = write(tmp_path, one_arm(TWO, parts))
+    assert read_urdf(path).joint_names == ("a",)
+    assert "Link 'l1' floats beside the robot: held fixed" in caplog.text
+    with pytest.raises(DescriptionError, match="joint 'b' is floating"):
+        read_urdf(path, strict=True)
+
+
+def test_a_free_root_without_mass_is_held_fixed(tmp_path, caplog):
+    links = f'<link name="world"/><link name="trunk"/><link name="arm">{BODY}</link>'
+    joints = joint("a", "world", "trunk", kind="floating") + joint("b", "trunk", "arm")
+    path = write(tmp_path, f'<robot name="r">{links}{joints}</robot>')
+    assert read_urdf(path).root.kind == "fixed"
+    assert "its root has no mass: 'trunk' is held fixed" in caplog.text
+
+
+def test_a_world_that_is_not_declared_is_the_world(tmp_path, caplog):
+    text = one_arm(f'<link name="arm">{BODY}</link>', joint("a", "base", "arm"))
+    text = text.replace("</robot>", joint("b", "world", "base", kind="fixed"))
+    robot = wbc_suite.load_robot(write(tmp_path, text + "</robot>", "robot.URDF"))
+    assert robot.root.kind == "fixed"
+    assert robot.joint_names == ("a",)
+    assert "it has no link 'world', which is the world" in caplog.text
 
 
 def test_a_free_robot_collides_with_its_visuals_or_is_refused(tmp_path, caplog):

@@ -24,6 +24,7 @@ FRAMES_PER_SECOND = 10
 ARM = 0.6  # m; length of an arm that moves through the whole figure
 LATE = 0.02  # m; error at rest from which on causes are looked for
 ON_FEET = 0.15  # of the figure, by what moves a robot without hands: its trunk
+STANDING = 0.5  # of the figure, by hands of a robot that stands on its feet
 
 
 def demo(
@@ -77,6 +78,8 @@ def _sizes(
     """Yield each frame that moves and the size of its figure, 1 for a long arm."""
     import numpy as np
 
+    feet = any(frame.role == "foot" for frame in robot.frames)
+    most = STANDING if feet and robot.root.kind == "free" else 1.0
     for frame in config["frame"]:
         if frame.get("kind", "pose") != "pose":
             continue
@@ -84,7 +87,7 @@ def _sizes(
         while link.parent is not None:
             length += float(np.linalg.norm(link.pos))
             link = robot.link(link.parent)
-        yield frame["name"], min(1.0, length / ARM) if length else ON_FEET
+        yield frame["name"], min(most, length / ARM) if length else ON_FEET
 
 
 def _reach(

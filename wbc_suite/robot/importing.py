@@ -2,7 +2,7 @@
 
 import logging
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -10,6 +10,7 @@ from wbc_suite.errors import DescriptionError, join_first, shortened
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.elements import Frame, Link, rigid_bodies
 from wbc_suite.robot.group_inference import (
+    Limb,
     infer_frames,
     infer_limbs,
     infer_ready,
@@ -19,9 +20,10 @@ from wbc_suite.robot.inertia import implausible, nearest_physical, unphysical
 from wbc_suite.robot.missing_data import (
     ellipsoid,
     estimate_armatures,
+    estimate_lifts,
     estimate_masses,
     estimate_motors,
-    oversized,
+    gyration_fault,
 )
 from wbc_suite.robot.sole_inference import level_soles
 from wbc_suite.robot.standing_posture import feet_are_level, standing_legs
@@ -39,6 +41,7 @@ CARRIER_MASS, END_MASS = 1e-10, 1e-3
 """Mass in kg of a moving link for which the file has none, if it carries others."""
 GYRATION = 0.03  # radius of gyration of such a link, m
 FEW_MOTORS = "efforts and armatures are estimated: the file has few or none"
+WEAK_LIFTS = "efforts of lifts are estimated: those of the file are below their load"
 NO_ARMATURES = "armatures are estimated from efforts: the file has none"
 MAX_MESSAGE = 800  # largest number of characters of a list in a message
 
@@ -95,38 +98,25 @@ def describe_import(
     checked = _with_masses(_filled(checked, source, strict), source, strict=strict)
     checked = _physical(checked, source, strict=strict)
     checked = _accept_implausible(checked, source)
-    given = [
-        parse_model(
-            Frame,
-            frame | {"role": infer_role(frame["name"])},
-            source=str(source),
-            error=DescriptionError,
-        )
-        for frame in frames
-    ]
+    how: dict[str, Any] = {"source": str(source), "error": DescriptionError}
+    roles = [x | {"role": infer_role(x["name"])} for x in frames]
+    given = [parse_model(Frame, x, **how) for x in roles]
     limbs = infer_limbs(checked)
     placed = infer_frames(checked, limbs, given, names)
     actuated = {fields["joint"] for fields in others.get("actuators", ())}
-    moving = [limb.joints for limb in limbs if limb.kind in ("arm", "leg")]
-    driven = estimate_motors(checked, placed, actuated, moving)
-    complete = estimate_armatures(driven)
-    if driven != checked:
-        LOG.warning("%s: %s.", source, FEW_MOTORS)
-    deviations = {FEW_MOTORS: driven != checked, NO_ARMATURES: complete != driven}
+    complete, deviations = _with_motors(checked, placed, actuated, limbs, source)
     keyframes = others.pop("keyframes", {})
     data: dict[str, Any] = {
         "name": NameTable().take(name, "robot"),
         "source": f"imported from {source.name}",
-        "root": root,
+        "root": root if strict else _held(root, checked, source),
         "links": complete,
         "frames": placed,
-        "deviations": tuple(text for text, holds in deviations.items() if holds),
+        "deviations": deviations,
         "groups": {limb.name: limb.joints for limb in limbs if limb.joints},
         "keyframes": {"ready": infer_ready(checked)} | keyframes,
     }
-    robot = parse_model(
-        RobotDescription, data | others, source=str(source), error=DescriptionError
-    )
+    robot = parse_model(RobotDescription, data | others, **how)
     if "ready" in keyframes:
         if keyframes["ready"] != keyframes.get("home") or feet_are_level(robot):
             return level_soles(robot, given, names.take)
@@ -137,6 +127,33 @@ def describe_import(
         return _with_ready(level_soles(robot, given, names.take), working_arms)
     except ValueError as error:  # of MuJoCo's compiler
         raise DescriptionError(f"{source}: MuJoCo refuses it: {error}") from error
+
+
+def _with_motors(
+    links: Sequence[Link],
+    frames: Sequence[Frame],
+    driven: Collection[str],
+    limbs: Sequence[Limb],
+    source: Path,
+) -> tuple[list[Link], tuple[str, ...]]:
+    """Return links with estimated motors, lifts and armatures; what was estimated."""
+    moving = [limb.joints for limb in limbs if limb.kind in ("arm", "leg", "base")]
+    motors = estimate_motors(links, frames, driven, moving)
+    lifts = estimate_lifts(motors, driven)
+    complete = estimate_armatures(lifts)
+    said = [FEW_MOTORS] * (motors != links) + [WEAK_LIFTS] * (lifts != motors)
+    for text in said:
+        LOG.warning("%s: %s.", source, text)
+    return complete, (*said, *[NO_ARMATURES] * (complete != lifts))
+
+
+def _held(root: LinkFields, links: Sequence[Link], source: Path) -> LinkFields:
+    """Return the root, fixed if what should move has no mass."""
+    rigid, trunk = rigid_bodies(links), links[0].name
+    if root["kind"] == "fixed" or any(x.mass for x in links if rigid[x.name] == trunk):
+        return root
+    LOG.warning("%s: its root has no mass: '%s' is held fixed.", source, trunk)
+    return {"kind": "fixed"} | {k: root[k] for k in ("pos", "quat") if k in root}
 
 
 def _with_ready(
@@ -227,9 +244,10 @@ def _physical(links: Sequence[Link], source: Path, *, strict: bool) -> list[Link
         if rigid[link.name] in moving and link.mass > 0.0
     }
     faults |= {link.name: fault for link in links if (fault := unphysical(link))}
-    huge = {x.name: fault for x in links if (fault := oversized(x))}
-    faults |= huge
-    links = [ellipsoid(x, x.mass) if x.name in huge else x for x in links]
+    heads = [x for x in links if x.joint or x is links[0]]
+    wrong = {x.name: fault for x in heads if (fault := gyration_fault(x))}
+    faults |= wrong
+    links = [ellipsoid(x, x.mass) if x.name in wrong else x for x in links]
     shown = "; ".join(f"link '{n}': {fault}" for n, fault in faults.items())
     if faults and strict:
         raise DescriptionError(

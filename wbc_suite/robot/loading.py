@@ -95,7 +95,7 @@ def _standing(robot: RobotDescription, path: Path, *, asked: bool) -> RobotDescr
     try:
         return with_soles(robot)
     except DescriptionError as error:
-        if asked or path.suffix != ".urdf":
+        if asked or path.suffix.lower() != ".urdf":
             raise
         LOG.warning("%s It is fixed.", error)
         return robot.with_root("fixed")
@@ -103,7 +103,7 @@ def _standing(robot: RobotDescription, path: Path, *, asked: bool) -> RobotDescr
 
 def _locate(name: str, catalogue: Catalogue) -> Path:
     path = Path(name)
-    if path.suffix in (".toml", ".urdf", ".xml", ".mjcf"):
+    if path.suffix.lower() in (".toml", ".urdf", ".xml", ".mjcf"):
         if not path.is_file():
             raise ConfigError(f"{path}: the file does not exist.")
         return path
@@ -141,7 +141,7 @@ def _read(
 def _import(
     path: Path, skin: bool, *, mesh_root: str | Path | None, strict: bool
 ) -> RobotDescription:
-    if path.suffix == ".urdf":
+    if path.suffix.lower() == ".urdf":
         from wbc_suite.robot.urdf_import import read_urdf
 
         robot = read_urdf(path, mesh_root=mesh_root, strict=strict, skin=skin)

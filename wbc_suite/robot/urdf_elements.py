@@ -65,6 +65,9 @@ def read_tree(path: Path) -> tuple[Element, tuple[Branch, ...]]:
         raise DescriptionError(
             f"{path}: {len(links)} links; a robot has between 1 and {MAX_LINKS}."
         )
+    if "world" in {x.get("link") for x in robot.findall("joint/parent")} - set(links):
+        LOG.warning("%s: it has no link 'world', which is the world.", path)
+        links["world"] = Element("link", name="world")
     above: dict[str, tuple[str, Element]] = {}
     for name, joint in joints.items():
         parent = _end(joint, "parent", links, path)

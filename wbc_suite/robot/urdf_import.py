@@ -142,6 +142,7 @@ class _Importer:
 
     def _root(self) -> tuple[dict[str, Any], tuple[Branch, ...]]:
         """Return the fields of the root, and the branches without the world."""
+        self._hold_loose_parts()
         world, *rest = self._branches
         below = [b for b in rest if b.parent == world.name]
         moving = [b for b in rest if b.kind in ("floating", "planar")]
@@ -165,6 +166,15 @@ class _Importer:
         _refuse_roots([b for b in moving if b is not first])
         kind, self.rooted = ROOT_KINDS[first.kind], True
         return {"kind": kind, **pose_fields(first.pose)}, tuple(rest)
+
+    def _hold_loose_parts(self) -> None:
+        """Fix floating links at the ends of the tree to what carries them."""
+        inner = {b.parent for b in self._branches}
+        for b in self._branches[1:]:
+            loose = b.kind == "floating" and b.name not in inner and not self._strict
+            if loose and b.joint is not None and b.parent != self._branches[0].name:
+                b.joint.set("type", "fixed")
+                LOG.warning("Link '%s' floats beside the robot: held fixed.", b.name)
 
     def _link(self, branch: Branch, *, first: bool) -> LinkFields:
         fields: LinkFields = {"name": self._links[branch.name]}
