@@ -55,6 +55,7 @@ ADDED = (
     *("viewers/page_messages", "kernel_cache", "cli/interrupts"),
     # stacks that cannot come to rest, the page's pictures
     *("qp/obstacle_limit", "control/composite/scene_obstacles"),
+    *("control/composite/commanded_scene", "control/composite/finger_capsules"),
     *("qp/motion", "qp/overshoot", "viewers/camera_pictures", "viewers/tracking_plots"),
 )
 """Rooms that came after the bounds were set."""

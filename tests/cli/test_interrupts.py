@@ -128,6 +128,34 @@ def test_an_exception_that_a_library_makes_of_the_end_is_not_shown():
     )
 
 
+@pytest.mark.parametrize("place", ["import", "compile", "elsewhere"])
+def test_nothing_is_raised_through_imports_and_compilers(place, tmp_path):
+    (tmp_path / "stopped.py").write_text("import os; os.kill(os.getpid(), 15)")
+    run = {
+        "import": "import stopped",
+        "compile": "exec('os.kill(os.getpid(), 15)', {'__name__': 'numba.core'})",
+        "elsewhere": "exec('os.kill(os.getpid(), 15)', {'__name__': 'number'})",
+    }
+    code = (
+        "import os;"
+        "from wbc_suite.cli.interrupts import signals_end_the_process as block\n"
+        "with block():\n"
+        f"    try: {run[place]}\n"
+        "    finally: print('raised', flush=True)\n"
+    ).replace("{'__name__'", "{'os': os, '__name__'")
+    ended = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": f"{Path.cwd()}:{tmp_path}"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert ended.returncode == 143, ended.stderr
+    assert ended.stdout == ("raised\n" if place == "elsewhere" else "")
+    assert "wbc-suite: stopped. " in ended.stderr
+
+
 def test_handlers_are_as_before_after_a_command(monkeypatch, capsys):
     from wbc_suite.cli import main
 

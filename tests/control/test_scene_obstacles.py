@@ -153,6 +153,34 @@ def test_rows_are_the_derivative_of_the_distance():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("name", ["Panda", "GR1"])
+def test_what_slides_fast_is_kept_off_by_its_speed(name):
+    """Planes stand off by 20 ms of the measured speed along them beyond 0.3 m/s."""
+    scene, rng = Scene(name), np.random.default_rng(0)
+    model, data, limit = scene.model, scene.data, scene.obstacles.limit.arrays
+    pairs = scene.obstacles._arrays
+    scene.write(scene.env.simulation.controllers[0].q)
+    scene.obstacles.measure()
+    still, found = limit.plane.copy(), limit.found.copy()
+    data.qvel[:] = rng.normal(size=model.nv)
+    mujoco.mj_forward(model, data)
+    scene.obstacles.measure()
+    np.testing.assert_array_equal(limit.found, found)
+    segment, J, most = np.zeros(6), np.zeros((3, model.nv)), 0.0
+    for row in np.flatnonzero(found >= 0).tolist():
+        obstacle, geom = int(pairs.obstacle[found[row]]), int(pairs.geom[found[row]])
+        mujoco.mj_geomDistance(model, data, obstacle, geom, 9.0, segment)
+        body = int(model.geom_bodyid[geom])
+        mujoco.mj_jac(model, data, J, None, segment[3:], body)
+        velocity, n = J @ data.qvel, limit.plane[row, :3]
+        along = np.linalg.norm(velocity - n * (n @ velocity))
+        off = 0.02 * max(along - 0.3, 0.0)
+        assert limit.plane[row, 3] - still[row, 3] == pytest.approx(off, abs=1e-9)
+        most = max(most, off)
+    assert most > 1e-3
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["Panda", "Tiago"])
 def test_a_hand_sent_through_the_table_stays_out_and_says_so(name):
     scene = Scene(name)

@@ -93,6 +93,17 @@ def test_a_torn_result_file_is_as_good_as_none(tmp_path):
     assert results.read(item) is None
 
 
+@pytest.mark.parametrize("change", [("twice", "twicf"), (": 14", ": 15")])
+def test_a_damaged_result_file_is_as_good_as_none(tmp_path, change):
+    (item,) = items("a")
+    results = ResultFolder(tmp_path)
+    results.write(item, Outcome(name="a", result={"twice": 14, "sum": 0.1}))
+    assert results.read(item) == {"twice": 14, "sum": 0.1}
+    path = tmp_path / "results" / "a.json"
+    path.write_text(path.read_text().replace(*change))
+    assert results.read(item) is None
+
+
 def test_errors_are_told_and_tried_again_next_time(tmp_path):
     outcomes = run_items(failing, items(), folder=tmp_path, executor=Serial())
     assert outcomes[1].error == "ConfigError: b is wrong."

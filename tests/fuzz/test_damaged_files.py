@@ -41,6 +41,8 @@ OF_RECORDINGS = (
     *(f"convert FILE --to {layout} -o {layout}-v0" for layout in LAYOUTS),
     "replay FILE",
     "replay FILE --by states",
+    "replay FILE --film film.webp --size 64",
+    "evaluate Lift --policy FILE --episodes 1 --horizon 3 --executor serial -o out",
     "extract FILE -o extracted.hdf5 --workers 1",
     "record Lift --device hold --episodes 1 --horizon 3 --executor serial -o FILE",
     "multiply FILE -o more.hdf5 --episodes 1 --horizon 3 --executor serial",
@@ -49,15 +51,42 @@ OF_ROBOTS = (
     "check FILE",
     *(f"export FILE --to {form} -o robot.{form}" for form in ("mjcf", "urdf", "toml")),
     "describe-action FILE",
+    "render FILE -o robot.png",
+    "evaluate Lift --robots FILE --policy hold --episodes 1 --horizon 3 "
+    "--executor serial -o out",
 )
 OF_BENCHMARKS = (
     "check FILE",
+    "bench FILE --actions 5",
+    "record FILE --device hold --episodes 1 --horizon 3 --executor serial -o new.hdf5",
     "evaluate FILE --policy hold --episodes 1 --horizon 3 --executor serial -o out",
 )
 OF_CONTROLLERS = ("check FILE", "describe-action GR1 --controller FILE")
+OF_JSON = (
+    "check FILE --robot Panda",
+    "describe-action Panda --controller FILE",
+    "evaluate Lift --controller FILE --policy hold --episodes 1 --horizon 3 "
+    "--executor serial -o out",
+)
 OF_RESULTS = (
     "evaluate Lift --policy hold --episodes 1 --horizon 3 --executor serial -o .",
 )
+JSON = """{
+ "type": "BASIC",
+ "body_parts": {
+  "right": {
+   "type": "OSC_POSE", "input_max": 1, "input_min": -1, "kp": 150,
+   "output_max": [0.05, 0.05, 0.05, 0.5, 0.5, 0.5],
+   "output_min": [-0.05, -0.05, -0.05, -0.5, -0.5, -0.5],
+   "damping_ratio": 1, "impedance_mode": "fixed", "kp_limits": [0, 300],
+   "damping_ratio_limits": [0, 10], "uncouple_pos_ori": true,
+   "input_type": "delta", "input_ref_frame": "base", "ramp_ratio": 0.2,
+   "gripper": {"type": "GRIP"}
+  }
+ }
+}
+"""
+"""A controller file in robosuite's layout."""
 
 
 def recording(path):
@@ -85,6 +114,11 @@ def write_originals(folder):
     copied = {"lift": OF_BENCHMARKS, gr1: OF_CONTROLLERS}
     arm = next(f for f in Catalogue().files("robots/arm") if f.stem == "panda")
     shutil.copy(arm, folder / "panda.toml")
+    whole = next(f for f in Catalogue().files("robots") if f.stem == "ur5e")
+    shutil.copy(whole, folder / "ur5e.toml")
+    (folder / "mine.json").write_text(JSON)
+    assert not run(OF_RESULTS[0], folder)
+    (result,) = (folder / "results").glob("*.json")
     for name in copied:
         shutil.copy(shipped[name], folder / f"{name}.toml")
     return {
@@ -92,6 +126,9 @@ def write_originals(folder):
         "mjcf": (folder / "panda.xml", OF_ROBOTS),
         "urdf": (folder / "panda.urdf", OF_ROBOTS),
         "robot": (folder / "panda.toml", OF_ROBOTS),
+        "assembly": (folder / "ur5e.toml", OF_ROBOTS),
+        "json": (folder / "mine.json", OF_JSON),
+        "results": (result, OF_RESULTS),
         **{k: (folder / f"{k}.toml", commands) for k, commands in copied.items()},
     }
 
@@ -157,7 +194,10 @@ def run(line, folder):
     return f"{line}: {status} after {time.monotonic() - began:.1f} s: {text[-3000:]}"
 
 
-KINDS = ("recording", "mjcf", "urdf", "robot", "lift", "gr1_whole_body_ik")
+KINDS = (
+    *("recording", "mjcf", "urdf", "robot", "assembly", "lift", "gr1_whole_body_ik"),
+    *("json", "results"),
+)
 
 
 @pytest.mark.slow
@@ -174,8 +214,9 @@ def test_a_damaged_file_ends_no_command_in_a_traceback(kind, originals, tmp_path
         folder.mkdir()
         broken = damaged(content, rng)
         for line in chosen:
-            file = folder / original.name
-            file.write_bytes(broken)
+            inside = folder / "results" if kind == "results" else folder
+            inside.mkdir(exist_ok=True)
+            (inside / original.name).write_bytes(broken)
             wrong.append(run(line.replace("FILE", original.name), folder))
         if not any(wrong[-len(chosen) :]):
             shutil.rmtree(folder)

@@ -105,7 +105,9 @@ def _print_table(title: str, found: "dict[str, Vector]") -> None:
         column.justify = "right"
     for name, times in found.items():
         median, tail = np.percentile(times, [50, 99]) / 1e3
-        table.add_row(name, f"{median:.3f}", f"{tail:.3f}", f"{1e3 / median:,.0f}")
+        rate = f"{1e3 / median:,.0f}" if median else "-"  # a clock of whole ticks
+        table.add_row(name, f"{median:.3f}", f"{tail:.3f}", rate)
     Console().print(table)
     step, raw, *_ = (float(np.median(times)) for times in found.values())
-    print(f"A step takes {step / raw:.2f} of its own raw physics.")
+    if raw:
+        print(f"A step takes {step / raw:.2f} of its own raw physics.")

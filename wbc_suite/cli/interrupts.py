@@ -29,6 +29,8 @@ KEPT = {
     "convert": "Nothing half-finished is kept; the same command starts again, or goes "
     "on with an executor.",
 }
+LIBRARIES = ("numba", "llvmlite")
+IMPORTS = "<frozen importlib"
 _SAID = threading.Lock()
 OTHER = "Nothing was changed; the same command starts again."
 
@@ -61,13 +63,28 @@ def signals_end_the_process() -> Iterator[None]:
         os.close(writer)
 
 
-def _stop(received: list[int], number: int, _: FrameType | None) -> NoReturn:
+def _stop(received: list[int], number: int, frame: FrameType | None) -> NoReturn:
     received.append(number)
     for each in SIGNALS:  # another one does not disturb the cleaning up
         signal.signal(each, signal.SIG_IGN)
     sys.unraisablehook = lambda _: None  # if it comes in a callback, which drops it
     _say_what_is_kept()
+    if _builds_a_library(frame):
+        _leave(number)
     raise SystemExit(128 + number)
+
+
+def _builds_a_library(frame: FrameType | None) -> bool:
+    """Return whether the main thread imports a module or compiles a kernel.
+
+    Libraries in C++ call Python then, and crash if it raises.
+    """
+    while frame is not None:
+        package = frame.f_globals.get("__name__", "").partition(".")[0]
+        if package in LIBRARIES or frame.f_code.co_filename.startswith(IMPORTS):
+            return True
+        frame = frame.f_back
+    return False
 
 
 def _say_what_is_kept() -> None:

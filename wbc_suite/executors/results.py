@@ -3,6 +3,7 @@
 import json
 import os
 from collections.abc import Callable, Sequence
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,8 @@ MAX_BYTES = 64 << 20  # larger result files are not read
 class ResultFolder:
     """One JSON file per finished item, in the subfolder `results` of a folder.
 
-    A file is complete or absent: it is written under another name and renamed. Raises
+    A file is complete or absent: it is written under another name and renamed. One that
+    was damaged since then is as good as none, by its checksum. Raises
     DatasetError if the folder, which is made if missing, cannot be written to.
     """
 
@@ -30,6 +32,7 @@ class ResultFolder:
         """Write an item's outcome, in place of an earlier one."""
         record = {"item": item.name, "payload": item.payload}
         record |= {"error": outcome.error, "result": outcome.result}
+        record["sha256"] = _checksum(outcome.result)
         path = self._path(item)
         temporary = path.with_suffix(f".{os.getpid()}.tmp")
         text = json.dumps(record, indent=1, sort_keys=True)
@@ -52,10 +55,16 @@ class ResultFolder:
             return None
         same = record.get("payload") == json.loads(json.dumps(item.payload))
         result = record.get("result")
-        return result if same and isinstance(result, dict) else None
+        whole = same and record.get("sha256") == _checksum(result)
+        return result if whole and isinstance(result, dict) else None
 
     def _path(self, item: WorkItem) -> Path:
         return self._results / f"{item.name}.json"
+
+
+def _checksum(result: Any) -> str:
+    plain = json.loads(json.dumps(result))
+    return sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()
 
 
 def run_items(

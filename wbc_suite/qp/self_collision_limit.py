@@ -58,6 +58,7 @@ class SelfCollisionLimit(RowLimit):
         rate: Approach speed per distance left, 1/s.
 
     Attributes:
+        capsules: The capsules; links that the model has rigid may move in `arrays`.
         found: Pair of each row of the last tick, nearest first; -1 for none.
         distances: Distance of each row's pair, m; inf for none.
 
@@ -88,8 +89,8 @@ class SelfCollisionLimit(RowLimit):
         what = f"{name}: influence, more than the margin,"
         self.influence = check_number(what, influence, above=self.margin)
         self.rate = check_number(f"{name}: rate", rate, above=0.0)
-        self._capsules = tuple(capsules)
-        self._pairs = _capsule_pairs(self._capsules, pairs)
+        self.capsules = tuple(capsules)
+        self._pairs = _capsule_pairs(self.capsules, pairs)
         self._model: pin.Model | None = None  # that the arrays belong to
 
     @classmethod
@@ -139,17 +140,17 @@ class SelfCollisionLimit(RowLimit):
     def _make_arrays(
         self, configuration: Configuration, rows: int, influence: float
     ) -> CapsuleArrays:
-        count, frames = len(self._capsules), configuration.model.frames
-        links = [frames[configuration.frame_id(c.link)] for c in self._capsules]
+        count, frames = len(self.capsules), configuration.model.frames
+        links = [frames[configuration.frame_id(c.link)] for c in self.capsules]
         ends = [
             frame.placement.act(np.array(end))
-            for frame, capsule in zip(links, self._capsules, strict=True)
+            for frame, capsule in zip(links, self.capsules, strict=True)
             for end in (capsule.start, capsule.end)
         ]
         return CapsuleArrays(
             joint=np.array([frame.parentJoint for frame in links], dtype=np.int64),
             ends=np.reshape(ends, (count, 6)),
-            radius=np.array([c.radius for c in self._capsules], dtype=np.float64),
+            radius=np.array([c.radius for c in self.capsules], dtype=np.float64),
             pairs=self._pairs.ravel().copy(),
             moves=joint_movers(configuration),
             margin=self.margin,
@@ -189,7 +190,7 @@ class SelfCollisionLimit(RowLimit):
     def subject(self, row: int) -> LinkPair:
         """Return the two links of a row of the last tick."""
         a, b = (int(k) for k in self._pairs[self.found[row]])
-        return LinkPair(self._capsules[a].link, self._capsules[b].link)
+        return LinkPair(self.capsules[a].link, self.capsules[b].link)
 
 
 def _capsule_pairs(

@@ -8,12 +8,14 @@ import mujoco
 import numpy as np
 
 from wbc_suite.compiling import as_argument, compiled, struct
-from wbc_suite.control.composite.whole_body_config import WholeBodyIKConfig
-from wbc_suite.control.loop.mujoco_functions import (
-    addresses,
-    geom_distance,
-    mj_kinematics,
+from wbc_suite.control.composite.commanded_scene import (
+    CommandedArrays,
+    CommandedScene,
+    joint_bodies,
+    place_commanded,
 )
+from wbc_suite.control.composite.whole_body_config import WholeBodyIKConfig
+from wbc_suite.control.loop.mujoco_functions import geom_distance
 from wbc_suite.control.state import RobotState
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp import LinkPair, ObstacleLimit
@@ -31,6 +33,13 @@ ROWS_OF_BODY = 4
 TOUCHING = 1e-4
 """m; nearer pairs keep their last normal: points are known to 1e-6 m."""
 
+SLIDING = 0.3
+"""m/s; what slides faster is kept off. MuJoCo's contact of friction mu throws off what
+slides at mu times its speed: 1.1 m/s on a table turned a wrist at 5.5 rad/s at once."""
+
+SLIDING_TIME = 0.02
+"""s; distance that is kept over the speed beyond `SLIDING`."""
+
 PLANAR = 3
 """Last joint of a planar root."""
 
@@ -40,21 +49,23 @@ class SceneArrays(NamedTuple):
     """p pairs of geoms, of which the k nearest are measured; views of the simulation.
 
     Attributes:
-        model: Address of the model.
-        data: Address of its data.
+        commanded: The scene with the commanded robot.
         obstacle: Geom of each pair that does not move, shape (p,).
         geom: Geom of each pair that the robot moves.
         body: Body whose frame is that of the joint which moves it.
         centre: Centre of each geom's box in its frame, m, shape (ngeom, 3).
         half: Half its sides.
+        root: Body with the root of each pair's robot geom, shape (p,).
+        own: Body of that geom.
+        cvel: Velocities of bodies at the centre of mass of their tree, angular first.
+        centre_of_mass: That centre, by body of the root, m, shape (nbody, 3).
         bound: Lower bound of the distance of the nearest pairs, m, shape (k,).
         normal: Last normal of each pair, shape (p, 3).
         segment: Nearest points of a pair, of obstacle and robot, m, shape (6,).
         correction: Pose of measured in commanded axes, [R p], shape (12,).
     """
 
-    model: int
-    data: int
+    commanded: CommandedArrays
     xpos: Matrix
     xmat: Matrix
     geom_xpos: Matrix
@@ -65,6 +76,10 @@ class SceneArrays(NamedTuple):
     body: Indices
     centre: Matrix
     half: Matrix
+    root: Indices
+    own: Indices
+    cvel: Matrix
+    centre_of_mass: Matrix
     bound: Vector
     normal: Matrix
     segment: Vector
@@ -76,8 +91,7 @@ class SceneObstacles:
     """Writes the nearest points of a robot and its scene into an obstacle limit.
 
     Obstacles are all geoms without a joint that can touch the robot. Nearest points are
-    those of the simulated robot, with its fingers where they are, of exact shapes; they
-    are then moved with the commanded robot.
+    those of the commanded robot, with its fingers where they are, of exact shapes.
 
     Args:
         state: The robot in its scene.
@@ -87,6 +101,7 @@ class SceneObstacles:
         correction: See `SceneArrays`; a view.
 
     Attributes:
+        commanded: The scene with the commanded robot.
         limit: The limit; without pairs where there is nothing to touch.
         argument: The argument of kernels that stands for the scene.
     """
@@ -99,7 +114,8 @@ class SceneObstacles:
         configuration: Configuration,
         correction: Vector,
     ) -> None:
-        self._model, self._data = model, data = state.model, state.data
+        self.commanded = CommandedScene(state, configuration)
+        model, data = state.model, self.commanded.data
         pairs: list[tuple[int, int, str]] = []
         if config.limits.obstacles:
             pairs += _pairs(state, robot, config, configuration)
@@ -114,10 +130,11 @@ class SceneObstacles:
             nearest=limits.collision_pairs,
         )
         self.limit.bind(configuration)
-        bodies = _joint_bodies(state, configuration)
+        bodies = joint_bodies(state, configuration)
         segment, rows = np.zeros(6), self.limit.dim
+        own = model.geom_bodyid[self._pairs[:, 1]].astype(np.int64)
         self._arrays = SceneArrays(
-            *addresses(model, data),
+            commanded=self.commanded.argument,
             xpos=data.xpos,
             xmat=data.xmat,
             geom_xpos=data.geom_xpos,
@@ -128,6 +145,10 @@ class SceneObstacles:
             body=bodies[self.limit.arrays.joint],
             centre=model.geom_aabb[:, :3].copy(),
             half=model.geom_aabb[:, 3:].copy(),
+            root=model.body_rootid[own].astype(np.int64),
+            own=own,
+            cvel=state.data.cvel,
+            centre_of_mass=state.data.subtree_com,
             bound=np.zeros(rows),
             normal=np.zeros((len(pairs), 3)),
             segment=segment,
@@ -137,15 +158,15 @@ class SceneObstacles:
         self.argument = as_argument(self._arrays)
 
     def measure(self) -> None:
-        """Do what `measure_obstacles` does, in Python."""
-        mujoco.mj_kinematics(self._model, self._data)
+        """Do what `measure_obstacles` does, in Python; places the commanded robot."""
+        self.commanded.place()
         list_nearest(self.argument)
         for row, pair in enumerate(self.limit.arrays.found.tolist()):
             if pair >= 0:
                 first, second = self._pairs[pair]
                 distance = mujoco.mj_geomDistance(
-                    self._model,
-                    self._data,
+                    self.commanded.model,
+                    self.commanded.data,
                     first,
                     second,
                     INFLUENCE,
@@ -157,14 +178,14 @@ class SceneObstacles:
 @compiled
 def measure_obstacles(scene: SceneArrays) -> None:
     """Write the planes between the robot and the obstacles that are nearest to it."""
-    mj_kinematics(scene.model, scene.data)  # a step leaves poses behind the joints
+    place_commanded(scene.commanded)
     list_nearest(scene)
     for row in range(scene.bound.shape[0]):
         pair = scene.limit.found[row]
         if pair >= 0:
             distance = geom_distance(
-                scene.model,
-                scene.data,
+                scene.commanded.model,
+                scene.commanded.data,
                 int(scene.obstacle[pair]),
                 int(scene.geom[pair]),
                 INFLUENCE,
@@ -244,7 +265,7 @@ def write_plane(scene: SceneArrays, row: int, distance: float) -> None:
     if distance >= INFLUENCE or size < 0.5:  # too far, or touching from the start
         limit.found[row] = -1
         return
-    limit.plane[row, 3] = 0.0
+    limit.plane[row, 3] = SLIDING_TIME * max(sliding_speed(scene, pair) - SLIDING, 0.0)
     for i in range(3):
         limit.point[row, i], limit.plane[row, i] = 0.0, 0.0
         at = X[4 * i + 3]
@@ -254,6 +275,19 @@ def write_plane(scene: SceneArrays, row: int, distance: float) -> None:
             limit.plane[row, i] += X[4 * i + j] * normal[j]
             at += X[4 * i + j] * s[j]
         limit.plane[row, 3] += limit.plane[row, i] * at
+
+
+@compiled
+def sliding_speed(scene: SceneArrays, pair: int) -> float:
+    """Return how fast the robot's nearest point moves along the obstacle, m/s."""
+    n, v, s = scene.normal[pair], scene.cvel[scene.own[pair]], scene.segment
+    centre = scene.centre_of_mass[scene.root[pair]]
+    x, y, z = s[3] - centre[0], s[4] - centre[1], s[5] - centre[2]
+    v_x = v[3] + v[1] * z - v[2] * y
+    v_y = v[4] + v[2] * x - v[0] * z
+    v_z = v[5] + v[0] * y - v[1] * x
+    along = v_x * n[0] + v_y * n[1] + v_z * n[2]
+    return np.sqrt(max(v_x * v_x + v_y * v_y + v_z * v_z - along * along, 0.0))
 
 
 def _pairs(
@@ -306,13 +340,6 @@ def _hand_links(robot: RobotDescription) -> set[str]:
         if link.parent in found:
             found.add(link.name)
     return found
-
-
-def _joint_bodies(state: RobotState, configuration: Configuration) -> Indices:
-    """Return the body with each joint of the reduced robot; the world's is 0."""
-    model, names = state.model, configuration.model.names
-    joints = [model.joint(state.prefix + name).id for name in names[1:]]
-    return np.array([0, *model.jnt_bodyid[joints]], dtype=np.int64)
 
 
 def _name(model: mujoco.MjModel, geom: int) -> str:

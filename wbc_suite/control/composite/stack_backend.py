@@ -23,6 +23,7 @@ from wbc_suite.qp import (
     FrameEquality,
     ObstacleLimit,
     PostureTask,
+    SelfCollisionLimit,
     Solution,
     SupportLimit,
     TaskStack,
@@ -38,6 +39,7 @@ class StackBackend:
     Attributes:
         stack: The stack of frames and posture.
         torque_limiter: Limits what it solves for.
+        self_collision: The limit that keeps links apart, if there is one.
         v: Velocity of the last tick, shape (nv,), for whoever solves the next one.
     """
 
@@ -65,6 +67,9 @@ class StackBackend:
         limits = make_limits(robot, config)
         if obstacles.pairs:
             limits.append(obstacles)
+        self.self_collision = next(
+            (x for x in limits if isinstance(x, SelfCollisionLimit)), None
+        )
         self._support = [x for x in limits if isinstance(x, SupportLimit)]
         make_stack = partial(
             TaskStack, commanded, limits=limits, equalities=equalities, escape=False

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from wbc_suite.compiling import compiled, struct
+from wbc_suite.control.composite.finger_capsules import FingerArrays, place_fingers
 from wbc_suite.control.composite.frame_goals import GoalArrays, place_goals
 from wbc_suite.control.composite.frame_targets import (
     CENTRE_OF_MASS,
@@ -85,6 +86,7 @@ class WholeBodyArrays(NamedTuple):
     goals: GoalArrays
     frames: FrameArrays
     scene: SceneArrays
+    fingers: FingerArrays
     posture: PostureArrays
     progress: ProgressArrays
     qp: TickArrays
@@ -115,6 +117,7 @@ def run_tick(
     state, qp, robot = tick.state[0], tick.qp, tick.qp.robot
     place_goals(tick.goals, robot, tick.frames, qpos)
     measure_obstacles(tick.scene)
+    place_fingers(tick.fingers)
     state.event = watch_progress(tick.progress, robot, tick.frames, tick.v)
     if state.event != Event.NONE:
         state.stage = Stage.PLAN.value

@@ -10,6 +10,7 @@ import pinocchio as pin
 from wbc_suite.compiling import as_argument
 from wbc_suite.control.action import ActionLayout
 from wbc_suite.control.composite.backend import IkBackend, IkStep
+from wbc_suite.control.composite.finger_capsules import FingerCapsules
 from wbc_suite.control.composite.frame_goals import FrameGoals, place_goals
 from wbc_suite.control.composite.frame_targets import ControlledFrames
 from wbc_suite.control.composite.ik_report import Commanded, IkReport
@@ -103,6 +104,12 @@ class WholeBodyIK:
         )
         self._backend = backend(
             self.robot, self.config, self._configuration, self._scene.limit
+        )
+        limit = None
+        if isinstance(self._backend, StackBackend):
+            limit = self._backend.self_collision
+        self._fingers = FingerCapsules(
+            state, self._configuration, self._scene.commanded, limit
         )
         self._make_laws(state, float(limits.max()))
         self._state = readable(np.zeros(1, TICK))
@@ -228,6 +235,7 @@ class WholeBodyIK:
         robot, qpos = self._configuration.robot, state.data.qpos
         place_goals(self._goals.argument, robot, self.frames.argument, qpos)
         self._scene.measure()
+        self._fingers.place()
         self._follow_waypoint(self._planner.next(self._answer.v))
         return self._steps_per_solve
 
@@ -243,6 +251,7 @@ class WholeBodyIK:
             goals=self._goals.argument,
             frames=self.frames.argument,
             scene=self._scene.argument,
+            fingers=self._fingers.argument,
             posture=self.frames.posture_argument,
             progress=self._planner.argument,
             qp=backend.stack.arrays,
