@@ -20,10 +20,10 @@ TREES = {
     if "_catalogue" not in path.parts
 }
 
-MAX_LINES, MAX_MODULES = 45_000, 320  # without what is listed in `ADDED`
-GROWTH = 1_700
+MAX_LINES, MAX_MODULES = 45_100, 320  # 45,097 at 3551367, without `ADDED`
+GROWTH = 1_690
 """Lines by which the features of `ADDED` made older modules grow, less what they took
-out there: 4,451 and 2,854 on 2026-11-27, by `git diff --numstat 3551367`.
+out there: 4,621 and 2,934 on 2026-11-27, by `git diff --numstat 3551367`.
 """
 ADDED = (
     # walking robots

@@ -36,7 +36,9 @@ _KERNELS: list[Any] = []
 """All kernels of imported modules, to report how many are compiled."""
 
 
-def compiled(function: Function, *, nogil: bool = False, kept: bool = True) -> Function:
+def compiled(
+    function: Function, *, nogil: bool = False, kept: bool = True, inline: bool = False
+) -> Function:
     """Compile a function on its first call, and keep its machine code on disk.
 
     The function also runs as plain Python: see `plain`, or everything under
@@ -48,11 +50,19 @@ def compiled(function: Function, *, nogil: bool = False, kept: bool = True) -> F
             only: a thread needs up to 50 us to get the lock back.
         kept: Whether the machine code is kept on disk; not where an argument is a
             kernel that is made at run time, whose type no other process knows.
+        inline: Whether it is compiled as lines of the kernels that call it. Otherwise
+            numba compiles it with all that it calls, and all of that again in its
+            caller. Saves time for large kernels with one caller.
     """
     previous = _numba.CACHE_DIR
     _numba.CACHE_DIR = str(cache_folder())
     try:
-        kernel = _njit(cache=kept, error_model="numpy", nogil=nogil)(function)
+        kernel = _njit(
+            cache=kept,
+            error_model="numpy",
+            nogil=nogil,
+            inline="always" if inline else "never",
+        )(function)
     finally:
         _numba.CACHE_DIR = previous
     if not _numba.DISABLE_JIT:
@@ -62,6 +72,7 @@ def compiled(function: Function, *, nogil: bool = False, kept: bool = True) -> F
 
 compiled_nogil = partial(compiled, nogil=True)
 compiled_each_time = partial(compiled, kept=False)
+compiled_inline = partial(compiled, inline=True)
 
 
 def is_compiling() -> bool:

@@ -204,7 +204,7 @@ def test_roots_are_recognised(tmp_path):
     robot = read_mjcf(write(tmp_path, f"{hinge}</worldbody></mujoco>"))
     assert robot.root.kind == "fixed"
     assert [link.name for link in robot.links] == ["base_link", "b"]
-    with pytest.raises(DescriptionError, match="a trunk in MJCF's world body"):
+    with pytest.raises(DescriptionError, match="'base_link' moves and needs a mass"):
         robot.with_root("free")
 
 

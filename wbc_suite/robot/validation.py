@@ -66,8 +66,7 @@ def _mass_faults(robot: "RobotDescription") -> Iterator[str]:
         first = link is robot.links[0] and robot.root.kind != "fixed"
         if first or link.joint is not None:
             if link.name not in heavy:
-                where = " (a trunk in MJCF's world body has none)" if first else ""
-                yield f"link '{link.name}' moves and needs a mass{where}"
+                yield f"link '{link.name}' moves and needs a mass"
             elif link.name not in turning:
                 yield f"link '{link.name}' moves and needs an inertia"
 

@@ -44,7 +44,8 @@ def checked_state(data: mujoco.MjData) -> CheckedState:
 @compiled
 def check_before(state: CheckedState) -> bool:
     """Note the warnings so far; return whether all numbers are usable."""
-    state.warnings_before[:] = state.warnings
+    for i in range(state.warnings.shape[0]):
+        state.warnings_before[i] = state.warnings[i]
     return _all_usable(state)
 
 
