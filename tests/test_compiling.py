@@ -9,7 +9,14 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from wbc_suite.compiling import as_argument, compiled, struct
+from wbc_suite.compiling import (
+    as_argument,
+    compiled,
+    compiled_inline,
+    is_compiling,
+    plain,
+    struct,
+)
 from wbc_suite.typing import Matrix, Vector
 
 
@@ -35,6 +42,22 @@ def push(spring: Spring, force: Vector) -> float:
     return energy
 
 
+@compiled_inline
+def halved(force: Vector) -> float:
+    """Halve a force; return its first component, or -1 where it is none."""
+    if force.shape[0] == 0:
+        return -1.0
+    for i in range(force.shape[0]):
+        force[i] *= 0.5
+    return force[0]
+
+
+@compiled
+def halved_twice(force: Vector) -> float:
+    """Halve a force twice; return the sum of what is returned."""
+    return halved(force) + halved(force)
+
+
 def make():
     return Spring(np.array([1.0, 2.0]), np.array([[2.0, 0.5], [0.5, 3.0]]), 0.25)
 
@@ -46,6 +69,17 @@ def test_records_share_their_arrays_with_kernels():
     assert energy == pytest.approx(0.5 * x @ spring.stiffness @ x)
     np.testing.assert_allclose(force, -spring.stiffness @ x)
     assert spring.position[0] == 2.0
+
+
+def test_inline_kernels_are_compiled_with_their_caller_alone():
+    for kernel in (halved_twice, plain(halved_twice)):
+        force = np.array([8.0, 4.0])
+        assert kernel(force) == 6.0
+        np.testing.assert_array_equal(force, [2.0, 1.0])
+        assert kernel(np.zeros(0)) == -2.0
+    if is_compiling():
+        assert halved_twice.signatures
+        assert not halved.signatures
 
 
 @pytest.mark.slow

@@ -36,7 +36,7 @@ _KERNELS: list[Any] = []
 """All kernels of imported modules, to report how many are compiled."""
 
 
-def compiled(function: Function, *, nogil: bool = False, kept: bool = True) -> Function:
+def compiled(function: Function, *, kept: bool = True, **options: Any) -> Function:
     """Compile a function on its first call, and keep its machine code on disk.
 
     The function also runs as plain Python: see `plain`, or everything under
@@ -44,15 +44,16 @@ def compiled(function: Function, *, nogil: bool = False, kept: bool = True) -> F
 
     Args:
         function: Takes numbers, arrays, tuples, and what `as_argument` returns.
-        nogil: Whether it releases the interpreter's lock while it runs. For long calls
-            only: a thread needs up to 50 us to get the lock back.
         kept: Whether the machine code is kept on disk; not where an argument is a
             kernel that is made at run time, whose type no other process knows.
+        options: Of numba: `nogil` releases the interpreter's lock, for long calls only
+            (a thread needs up to 50 us to get it back); `inline` compiles a kernel only
+            inside its callers, which are else compiled with all that it calls again.
     """
     previous = _numba.CACHE_DIR
     _numba.CACHE_DIR = str(cache_folder())
     try:
-        kernel = _njit(cache=kept, error_model="numpy", nogil=nogil)(function)
+        kernel = _njit(cache=kept, error_model="numpy", **options)(function)
     finally:
         _numba.CACHE_DIR = previous
     if not _numba.DISABLE_JIT:
@@ -62,6 +63,7 @@ def compiled(function: Function, *, nogil: bool = False, kept: bool = True) -> F
 
 compiled_nogil = partial(compiled, nogil=True)
 compiled_each_time = partial(compiled, kept=False)
+compiled_inline = partial(compiled, inline="always")
 
 
 def is_compiling() -> bool:

@@ -24,6 +24,21 @@ def dot(a: Vector, b: Vector, n: int) -> float:
 
 
 @compiled
+def copy_vector(source: Vector, target: Vector) -> None:
+    """Write a vector to the first entries of another one, which may be longer."""
+    # For `target[:n] = source` numba compiles much more: errors, arrays that overlap.
+    for i in range(source.shape[0]):
+        target[i] = source[i]
+
+
+@compiled
+def copy_rows(source: Matrix, target: Matrix) -> None:
+    """Write a matrix to the first rows of another one of as many columns."""
+    for i in range(source.shape[0]):
+        copy_vector(source[i], target[i])
+
+
+@compiled
 def cross(a: Vector, b: Vector) -> Vector:
     """Return the cross product of two vectors, shape (3,)."""
     c = np.empty(3)

@@ -4,8 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wbc_suite.compiling import compiled, struct
+from wbc_suite.compiling import compiled, compiled_inline, struct
 from wbc_suite.kinematics.forward import RobotArrays
+from wbc_suite.linear_algebra import copy_rows
 from wbc_suite.qp.problem import UNBOUNDED
 from wbc_suite.typing import Array, Indices, Matrix, Vector
 
@@ -57,7 +58,7 @@ def self_collision_rows(
         h[row] = min(max(speed, -SEPARATION) * dt, UNBOUNDED)
 
 
-@compiled
+@compiled_inline
 def _find_nearest(robot: RobotArrays, capsules: CapsuleArrays) -> None:
     """Find the nearest pairs within the influence, and their distances."""
     _place_capsules(robot, capsules)
@@ -122,7 +123,7 @@ def _update_list(capsules: CapsuleArrays) -> None:
         is_current = is_current and moved < (0.49 * SKIN) ** 2
     if is_current:
         return
-    known[:] = middle
+    copy_rows(middle, known)
     count = 0
     for pair in range(capsules.listed.shape[0]):
         a, b = capsules.pairs[2 * pair], capsules.pairs[2 * pair + 1]

@@ -2,8 +2,8 @@
 
 from typing import NamedTuple
 
-from wbc_suite.compiling import compiled, struct
-from wbc_suite.linear_algebra import dot, row_space, subtract_projection
+from wbc_suite.compiling import compiled_inline, struct
+from wbc_suite.linear_algebra import copy_rows, dot, row_space, subtract_projection
 from wbc_suite.qp.active_set import QpArrays
 from wbc_suite.qp.problem import UNBOUNDED
 from wbc_suite.qp.task_kernels import TaskArrays
@@ -31,7 +31,7 @@ class LevelArrays(NamedTuple):
     kept_counts: Indices  # (2,), its size, and the greatest rank so far
 
 
-@compiled
+@compiled_inline
 def restrict_level(levels: tuple[LevelArrays, ...], k: int, x: Vector) -> None:
     """State that level k may move in ways that all levels above rate like their step.
 
@@ -42,22 +42,23 @@ def restrict_level(levels: tuple[LevelArrays, ...], k: int, x: Vector) -> None:
     level, first, nv = levels[k], levels[0].qp, x.shape[0]
     qp, p, count = level.qp, first.counts[0], first.counts[1]
     above, rows = level.above, qp.rows
-    above[:count] = first.rows[p : p + count]
+    copy_rows(first.rows[p : p + count], above)
     for j in range(k):
         W = levels[j].qp.W
-        above[count : count + W.shape[0]] = W
+        copy_rows(W, above[count:])
         count += W.shape[0]
     rank = _decided_directions(above, rows[p:], level)
     qp.counts[1] = rank
-    qp.lower[:nv], qp.upper[:nv] = first.lower[:nv], first.upper[:nv]
-    rows[:p] = first.rows[:p]
+    for i in range(nv):
+        qp.lower[i], qp.upper[i] = first.lower[i], first.upper[i]
+    copy_rows(first.rows[:p], rows)
     for row in range(p + rank):
         y = dot(rows[row], x, nv)
         qp.upper[nv + row] = max(first.wanted[row], y) if row < p else y
         qp.lower[nv + row] = -UNBOUNDED if row < p else y
 
 
-@compiled
+@compiled_inline
 def _decided_directions(rows: Matrix, V: Matrix, level: LevelArrays) -> int:
     """Write an orthonormal basis of what the levels above decide; return its size.
 
@@ -76,6 +77,6 @@ def _decided_directions(rows: Matrix, V: Matrix, level: LevelArrays) -> int:
         for i in range(counts[0]):
             subtract_projection(V, rank, kept[i])
         rank += row_space(kept[: counts[0]], _LOST_DIRECTION, V[rank:], lengths)
-    kept[:rank] = V[:rank]
+    copy_rows(V[:rank], kept)
     counts[0] = rank
     return rank

@@ -8,13 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wbc_suite.compiling import compiled, struct
+from wbc_suite.compiling import compiled, compiled_inline, struct
 from wbc_suite.kinematics.forward import (
     RobotArrays,
     compute_com,
     compute_joint_poses,
     multiply_poses,
 )
+from wbc_suite.linear_algebra import copy_rows
 from wbc_suite.qp.kernel import Kernel
 from wbc_suite.qp.lie import FAR, inverse_left_jacobian, log3
 from wbc_suite.typing import Indices, Matrix, Vector
@@ -54,7 +55,7 @@ class TaskArrays(NamedTuple):
     all_finite: Vector  # (1,), output: set to 0 if a target is not finite
 
 
-@compiled
+@compiled_inline
 def write_tasks(
     robot: RobotArrays, tasks: TaskArrays, dt: float, damping: float, curvature: float
 ) -> bool:
@@ -154,8 +155,9 @@ def com_error(
     Joint poses are current; the target may be longer than 3.
     """
     compute_com(robot)
-    jacobian[:] = robot.com_jacobian.T
     for i in range(3):
+        for j in range(jacobian.shape[1]):
+            jacobian[i, j] = robot.com_jacobian[j, i]
         error[i] = target[i] - robot.com[i]
 
 
@@ -206,7 +208,7 @@ def _write_joint_tasks(robot: RobotArrays, tasks: TaskArrays, dt: float) -> None
     """Write the diagonal: squared costs, and squared costs times saturated steps."""
     q, q_index, diagonal = robot.q, tasks.q_index, tasks.diagonal
     nv = q_index.shape[0]
-    diagonal[:] = tasks.bias
+    copy_rows(tasks.bias, diagonal)
     for t in range(tasks.joint_kernel.shape[0]):
         error, weight, total = tasks.joint_error[t], tasks.squared_cost[t], 0.0
         target, is_posture = tasks.joint_target[t], tasks.joint_kernel[t]

@@ -11,8 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wbc_suite.compiling import compiled, struct
+from wbc_suite.compiling import compiled, compiled_inline, struct
 from wbc_suite.kinematics.forward import RobotArrays, compute_joint_poses
+from wbc_suite.linear_algebra import copy_vector
 from wbc_suite.qp.active_set import QpArrays, solve_warm
 from wbc_suite.qp.equality import HeldFrames, hold_frames
 from wbc_suite.qp.floor_limit import SphereArrays, floor_rows
@@ -122,7 +123,7 @@ def finish_level(tick: TickArrays, k: int, dt: float, kept: bool) -> None:
     """
     qp = tick.levels[k].qp
     tick.solved[0] = k + 1
-    tick.x[:] = qp.x
+    copy_vector(qp.x, tick.x)
     if k == 0 and qp.rows.shape[0] > 0:
         tick.pressure_damping[0] *= np.exp(-dt / _PRESSURE_MEMORY)
         if kept:
@@ -130,7 +131,7 @@ def finish_level(tick: TickArrays, k: int, dt: float, kept: bool) -> None:
             tick.pressure_damping[0] = max(tick.pressure_damping[0], pressure)
 
 
-@compiled
+@compiled_inline
 def _begin_tick(tick: TickArrays, dt: float) -> bool:
     """Write bounds and limit rows; return whether the configuration is finite."""
     robot, qp, total = tick.robot, tick.levels[0].qp, 0.0
@@ -148,7 +149,7 @@ def _begin_tick(tick: TickArrays, dt: float) -> bool:
     return True
 
 
-@compiled
+@compiled_inline
 def _write_rows(tick: TickArrays, qp: QpArrays, dt: float) -> None:
     """Write the rows of limits and equalities that have a kernel; relax all limits.
 

@@ -18,6 +18,7 @@ from wbc_suite.control.composite.frame_targets import (
 from wbc_suite.control.composite.whole_body_config import GoalsConfig
 from wbc_suite.kinematics import Configuration
 from wbc_suite.kinematics.forward import RobotArrays, compute_joint_poses
+from wbc_suite.linear_algebra import copy_vector
 from wbc_suite.qp.lie import exp3, log3
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Matrix, Vector
@@ -77,11 +78,11 @@ def place_goals(
         if goals.is_in_base:
             _multiply(goals.base, goals.goal[k], out)
         else:
-            out[:] = goals.goal[k]
+            copy_vector(goals.goal[k], out)
         if np.isfinite(goals.range[k, 0]):
             _bound(out, goals.home[k], goals.range[k])
         if goals.root >= 0:
-            pose[:] = out
+            copy_vector(out, pose)
             _multiply(correction, pose, out)
 
 

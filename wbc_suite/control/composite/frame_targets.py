@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.compiling import as_argument, compiled, struct
+from wbc_suite.compiling import as_argument, compiled, compiled_inline, struct
 from wbc_suite.control.composite.whole_body_config import WholeBodyIKConfig
 from wbc_suite.control.part.approach import approach_speed, step_share
 from wbc_suite.kinematics import Configuration
@@ -20,6 +20,7 @@ from wbc_suite.kinematics.forward import (
     compute_com,
     compute_joint_poses,
 )
+from wbc_suite.linear_algebra import copy_vector
 from wbc_suite.qp.lie import exp3, log3
 from wbc_suite.typing import Indices, Matrix, Vector
 
@@ -79,7 +80,7 @@ class PostureArrays(NamedTuple):
     braking: Vector
 
 
-@compiled
+@compiled_inline
 def write_targets(
     robot: RobotArrays,
     frames: FrameArrays,
@@ -128,7 +129,8 @@ def measure_frames(robot: RobotArrays, frames: FrameArrays) -> float:
         pose, goal, error = frames.pose[k], frames.goal[k], frames.error[k]
         if frames.joint[k] == CENTRE_OF_MASS:
             compute_com(robot)
-            pose[3::4] = robot.com
+            for i in range(3):
+                pose[4 * i + 3] = robot.com[i]
         else:
             write_frame_pose(robot.pose[frames.joint[k]], frames.offset[k], pose)
         for i in range(3):
@@ -190,7 +192,7 @@ def _write_posture_target(
     robot: RobotArrays, posture: PostureArrays, settling: float, rate: float
 ) -> None:
     """Write the next posture; every joint moves by itself."""
-    posture.target[:] = robot.q
+    copy_vector(robot.q, posture.target)
     for j in range(1, robot.kind.shape[0]):
         if robot.kind[j] == JointKind.FREE:
             continue

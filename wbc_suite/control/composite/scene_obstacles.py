@@ -7,7 +7,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from wbc_suite.compiling import as_argument, compiled, struct
+from wbc_suite.compiling import as_argument, compiled, compiled_inline, struct
 from wbc_suite.control.composite.whole_body_config import WholeBodyIKConfig
 from wbc_suite.control.loop.mujoco_functions import (
     addresses,
@@ -154,7 +154,7 @@ class SceneObstacles:
                 write_plane(self.argument, row, distance)
 
 
-@compiled
+@compiled_inline
 def measure_obstacles(scene: SceneArrays) -> None:
     """Write the planes between the robot and the obstacles that are nearest to it."""
     mj_kinematics(scene.model, scene.data)  # a step leaves poses behind the joints

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from wbc_suite.compiling import compiled, struct
+from wbc_suite.compiling import compiled, compiled_inline, struct
 from wbc_suite.control.composite.frame_goals import GoalArrays, place_goals
 from wbc_suite.control.composite.frame_targets import (
     CENTRE_OF_MASS,
@@ -33,6 +33,7 @@ from wbc_suite.control.composite.torque_limiter import TorqueArrays, motors_suff
 from wbc_suite.control.law.reference import set_reference
 from wbc_suite.control.loop.records import CompiledRecords, Records
 from wbc_suite.control.part.spline_reference import SplineArrays, extend_spline
+from wbc_suite.linear_algebra import copy_vector
 from wbc_suite.qp.tick import TickArrays, TickStatus, solve_tick
 from wbc_suite.typing import Indices, Vector
 
@@ -103,7 +104,7 @@ Ticks: TypeAlias = Any
 without any, which leaves them out of the machine code."""
 
 
-@compiled
+@compiled_inline
 def run_tick(
     tick: WholeBodyArrays, qpos: Vector, laws: CompiledRecords, drives: CompiledRecords
 ) -> bool:
@@ -122,7 +123,7 @@ def run_tick(
     record_state(tick.progress, robot, tick.v)
     approach_goals(tick.progress, robot, tick.frames, tick.posture)
     _write_task_targets(tick)
-    qp.v[:] = tick.v
+    copy_vector(tick.v, qp.v)
     state.status, state.level = solve_tick(qp, tick.progress.dt, _FIRST_LEVEL)
     if state.status != TickStatus.SOLVED:
         state.stage = Stage.SOLVE.value
@@ -130,7 +131,7 @@ def run_tick(
     if not motors_suffice(tick.motors, robot, tick.v, qp.v, tick.progress.dt):
         state.stage = Stage.LIMIT.value
         return False
-    tick.v[:] = qp.v
+    copy_vector(qp.v, tick.v)
     extend_spline(tick.spline, tick.v)
     law = tick.joint_law
     own = drives[laws[law].first : laws[law].last]
@@ -150,6 +151,6 @@ def _write_task_targets(tick: WholeBodyArrays) -> None:
             for i in range(3):
                 target[i] = found[4 * i + 3]
         else:
-            target[:12] = found
+            copy_vector(found, target)
     posture = levels[tick.posture_level].tasks.joint_target[0]
-    posture[:] = tick.posture.target[: posture.shape[0]]
+    copy_vector(tick.posture.target[: posture.shape[0]], posture)

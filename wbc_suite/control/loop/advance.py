@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from wbc_suite.compiling import compiled, compiled_nogil
+from wbc_suite.compiling import compiled_inline, compiled_nogil
 from wbc_suite.control.composite.tick import Ticks, run_tick
 from wbc_suite.control.dynamics.state_source import (
     Sources,
@@ -97,7 +97,7 @@ advance_custom_laws = compiled_nogil(_advance, kept=False)
 """The same where there are registered laws."""
 
 
-@compiled
+@compiled_inline
 def _run_ticks(
     physics: Physics, laws: CompiledRecords, drives: CompiledRecords, ticks: Ticks
 ) -> bool:
@@ -110,7 +110,7 @@ def _run_ticks(
     return True
 
 
-@compiled
+@compiled_inline
 def _count_down(ticks: Ticks) -> None:
     """Count the physics steps until the next ticks."""
     if ticks is not None:

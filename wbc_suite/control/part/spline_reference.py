@@ -13,6 +13,7 @@ from wbc_suite.kinematics.tangent_space import (
     integrate,
     integrate_joints,
 )
+from wbc_suite.linear_algebra import copy_rows, copy_vector
 from wbc_suite.typing import Indices, Matrix, Vector
 
 ROUNDING = 1e-9
@@ -151,7 +152,8 @@ def extend_spline(spline: SplineArrays, v: Vector) -> None:
     if window.shape[0] > 1:
         _write_mean(robot, window, points[2])
         difference(robot, points[1], points[2], rates[2])
-        rates[2] /= period
+        for i in range(v.shape[0]):
+            rates[2, i] /= period
     for j in range(spline.q_index.shape[0]):
         q, i = points[0, spline.q_index[j]], spline.v_index[j]
         lead, v_now, a, jerk = _cubic(rates[0, i], rates[1, i], rates[2, i], period)
@@ -180,8 +182,8 @@ def _cubic(
 @compiled
 def _append(rows: Matrix, new: Vector) -> None:
     """Drop the first row, and put a new one after the last."""
-    rows[:-1] = rows[1:]
-    rows[-1] = new
+    copy_rows(rows[1:], rows)
+    copy_vector(new, rows[-1])
 
 
 @compiled
@@ -193,5 +195,5 @@ def _write_mean(robot: RobotArrays, window: Matrix, out: Vector) -> None:
         difference(robot, window[0], window[row], step)
         for i in range(total.shape[0]):
             total[i] += step[i] / count
-    out[:] = window[0]
+    copy_vector(window[0], out)
     integrate(robot, out, total)
