@@ -46,6 +46,7 @@ class ObservationBuffer:
                 place = self.places[key]
                 self._reads.append((self.values[place], reading.bind(data)))
                 self._high[place] = self.bounds[key]
+        self._low: Vector = -self._high
         # A group is a slice of a second copy, so that no two keys share memory.
         self._cuts = [(k, int(k in groups), place) for k, place in self.places.items()]
         boxes: dict[str, gymnasium.Space] = {}
@@ -58,7 +59,8 @@ class ObservationBuffer:
         """Read everything from the simulation into `values`, clipped to the bounds."""
         for place, read in self._reads:
             place[:] = read()
-        np.clip(self.values, -self._high, self._high, out=self.values)
+        np.maximum(self.values, self._low, out=self.values)
+        np.minimum(self.values, self._high, out=self.values)
 
     def observation(self) -> dict[str, Vector]:
         """Return copies of the last readings by key."""

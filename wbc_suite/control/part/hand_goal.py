@@ -66,6 +66,8 @@ class HandGoal:
         self._from_hand = settings.goal_update_mode == "achieved"
         self.position_limits = _limits(settings.position_limits, "position_limits")
         self._turn_limits = _limits(settings.orientation_limits, "orientation_limits")
+        self._turns_are_limited = bool(np.isfinite(self._turn_limits).any())
+        self._reference_axes = np.eye(3)
         self.pose, self.start = pin.SE3.Identity(), np.eye(3)
 
     def reset(self, hand: pin.SE3) -> None:
@@ -74,9 +76,10 @@ class HandGoal:
 
     def set(self, pose: pin.SE3) -> None:
         """Set an absolute goal, moved into the limits component by component."""
-        position = np.clip(pose.translation, *self.position_limits)
+        low, high = self.position_limits
+        position = np.minimum(np.maximum(pose.translation, low), high)
         rotation = pose.rotation
-        if np.isfinite(self._turn_limits).any():
+        if self._turns_are_limited:
             turn = pin.log3(rotation @ self.start.T)
             bounded = np.clip(turn, *self._turn_limits)
             if (bounded != turn).any():
@@ -85,14 +88,14 @@ class HandGoal:
 
     def step(self, step: Vector, hand: pin.SE3) -> None:
         """Move the goal by a step, shape (6,): linear, m, then a rotation vector."""
-        if (np.abs(step) > ROUNDING).any():
+        if any(abs(x) > ROUNDING for x in step.tolist()):
             self.set(self.after(step, hand))
 
     def after(self, step: Vector, hand: pin.SE3) -> pin.SE3:
         """Return the goal after a step, without limits."""
-        moves = np.abs(step) > ROUNDING
+        moves = [abs(x) > ROUNDING for x in step.tolist()]
         start, axes = self.pose, self._axes()
-        if self._from_hand and moves.all():
+        if self._from_hand and all(moves):
             start = hand
         elif self._from_hand:
             to_hand = _step_between(start, hand, axes)
@@ -106,7 +109,7 @@ class HandGoal:
         )
 
     def _axes(self) -> Matrix:
-        return self.pose.rotation if self._in_hand else np.eye(3)
+        return self.pose.rotation if self._in_hand else self._reference_axes
 
 
 def _step_between(start: pin.SE3, target: pin.SE3, axes: Matrix) -> Vector:
