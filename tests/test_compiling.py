@@ -4,12 +4,19 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
-from wbc_suite.compiling import as_argument, compiled, struct
+from wbc_suite.compiling import (
+    as_argument,
+    compiled,
+    compiled_inline,
+    is_compiling,
+    plain,
+    struct,
+)
 from wbc_suite.typing import Matrix, Vector
 
 
@@ -35,6 +42,22 @@ def push(spring: Spring, force: Vector) -> float:
     return energy
 
 
+@compiled_inline
+def halved(force: Vector) -> float:
+    """Halve a force; return its first component, or -1 where it is none."""
+    if force.shape[0] == 0:
+        return -1.0
+    for i in range(force.shape[0]):
+        force[i] *= 0.5
+    return force[0]
+
+
+@compiled
+def halved_twice(force: Vector) -> float:
+    """Halve a force twice; return the sum of what is returned."""
+    return halved(force) + halved(force)
+
+
 def make():
     return Spring(np.array([1.0, 2.0]), np.array([[2.0, 0.5], [0.5, 3.0]]), 0.25)
 
@@ -46,6 +69,17 @@ def test_records_share_their_arrays_with_kernels():
     assert energy == pytest.approx(0.5 * x @ spring.stiffness @ x)
     np.testing.assert_allclose(force, -spring.stiffness @ x)
     assert spring.position[0] == 2.0
+
+
+def test_inline_kernels_are_compiled_with_their_caller_alone():
+    for kernel in (halved_twice, plain(halved_twice)):
+        force = np.array([8.0, 4.0])
+        assert kernel(force) == 6.0
+        np.testing.assert_array_equal(force, [2.0, 1.0])
+        assert kernel(np.zeros(0)) == -2.0
+    if is_compiling():
+        kernels: tuple[Any, Any] = (halved, halved_twice)
+        assert [len(kernel.signatures) for kernel in kernels] == [0, 1]
 
 
 @pytest.mark.slow
@@ -64,7 +98,7 @@ def test_kernels_run_as_plain_python():
 def test_a_record_of_a_module_that_is_gone_does_not_spoil_the_cache(tmp_path):
     """Other processes read the machine code of other records."""
     module = """
-from typing import NamedTuple
+from typing import Any, NamedTuple
 import numpy as np
 from wbc_suite.compiling import as_argument, struct
 from wbc_suite.control.loop.state_checks import CheckedState

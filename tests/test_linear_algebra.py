@@ -5,6 +5,8 @@ import pytest
 
 from wbc_suite.linear_algebra import (
     cholesky,
+    copy_rows,
+    copy_vector,
     inverse_trace,
     lq_factor,
     lq_solve,
@@ -28,6 +30,15 @@ def positive_definite(rng, n):
 def lower(L):
     """Return L with its diagonal as it is, not inverted."""
     return np.tril(L, -1) + np.diag(1.0 / np.diag(L))
+
+
+def test_copies_leave_what_is_longer_and_may_shift_rows_up(rng):
+    A, x = rng.normal(size=(4, 3)), rng.normal(size=4)
+    rows, vector = A.copy(), np.ones(6)
+    copy_rows(rows[1:], rows)
+    np.testing.assert_array_equal(rows, A[[1, 2, 3, 3]])
+    copy_vector(x, vector)
+    np.testing.assert_array_equal(vector, [*x, 1.0, 1.0])
 
 
 @pytest.mark.parametrize("n", [1, 4, 23])

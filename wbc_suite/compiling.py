@@ -36,9 +36,7 @@ _KERNELS: list[Any] = []
 """All kernels of imported modules, to report how many are compiled."""
 
 
-def compiled(
-    function: Function, *, nogil: bool = False, kept: bool = True, inline: bool = False
-) -> Function:
+def compiled(function: Function, *, kept: bool = True, **options: Any) -> Function:
     """Compile a function on its first call, and keep its machine code on disk.
 
     The function also runs as plain Python: see `plain`, or everything under
@@ -46,23 +44,16 @@ def compiled(
 
     Args:
         function: Takes numbers, arrays, tuples, and what `as_argument` returns.
-        nogil: Whether it releases the interpreter's lock while it runs. For long calls
-            only: a thread needs up to 50 us to get the lock back.
         kept: Whether the machine code is kept on disk; not where an argument is a
             kernel that is made at run time, whose type no other process knows.
-        inline: Whether it is compiled as lines of the kernels that call it. Otherwise
-            numba compiles it with all that it calls, and all of that again in its
-            caller. Saves time for large kernels with one caller.
+        options: Of numba: `nogil` releases the interpreter's lock, for long calls only
+            (a thread needs up to 50 us to get it back); `inline` compiles a kernel only
+            inside its callers, which are else compiled with all that it calls again.
     """
     previous = _numba.CACHE_DIR
     _numba.CACHE_DIR = str(cache_folder())
     try:
-        kernel = _njit(
-            cache=kept,
-            error_model="numpy",
-            nogil=nogil,
-            inline="always" if inline else "never",
-        )(function)
+        kernel = _njit(cache=kept, error_model="numpy", **options)(function)
     finally:
         _numba.CACHE_DIR = previous
     if not _numba.DISABLE_JIT:
@@ -72,7 +63,7 @@ def compiled(
 
 compiled_nogil = partial(compiled, nogil=True)
 compiled_each_time = partial(compiled, kept=False)
-compiled_inline = partial(compiled, inline=True)
+compiled_inline = partial(compiled, inline="always")
 
 
 def is_compiling() -> bool:

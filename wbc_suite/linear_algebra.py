@@ -25,11 +25,8 @@ def dot(a: Vector, b: Vector, n: int) -> float:
 
 @compiled
 def copy_vector(source: Vector, target: Vector) -> None:
-    """Write a vector to the first entries of another one, which may be longer.
-
-    `target[:n] = source` also compiles what NumPy does with arrays that overlap or
-    differ in shape, in each kernel that has it and in all kernels above that one.
-    """
+    """Write a vector to the first entries of another one, which may be longer."""
+    # For `target[:n] = source` numba compiles much more: errors, arrays that overlap.
     for i in range(source.shape[0]):
         target[i] = source[i]
 
@@ -38,8 +35,7 @@ def copy_vector(source: Vector, target: Vector) -> None:
 def copy_rows(source: Matrix, target: Matrix) -> None:
     """Write a matrix to the first rows of another one of as many columns."""
     for i in range(source.shape[0]):
-        for j in range(source.shape[1]):
-            target[i, j] = source[i, j]
+        copy_vector(source[i], target[i])
 
 
 @compiled

@@ -3,13 +3,7 @@
 from typing import NamedTuple
 
 from wbc_suite.compiling import compiled_inline, struct
-from wbc_suite.linear_algebra import (
-    copy_rows,
-    copy_vector,
-    dot,
-    row_space,
-    subtract_projection,
-)
+from wbc_suite.linear_algebra import copy_rows, dot, row_space, subtract_projection
 from wbc_suite.qp.active_set import QpArrays
 from wbc_suite.qp.problem import UNBOUNDED
 from wbc_suite.qp.task_kernels import TaskArrays
@@ -55,8 +49,8 @@ def restrict_level(levels: tuple[LevelArrays, ...], k: int, x: Vector) -> None:
         count += W.shape[0]
     rank = _decided_directions(above, rows[p:], level)
     qp.counts[1] = rank
-    copy_vector(first.lower[:nv], qp.lower)
-    copy_vector(first.upper[:nv], qp.upper)
+    for i in range(nv):
+        qp.lower[i], qp.upper[i] = first.lower[i], first.upper[i]
     copy_rows(first.rows[:p], rows)
     for row in range(p + rank):
         y = dot(rows[row], x, nv)

@@ -88,12 +88,13 @@ class HandGoal:
 
     def step(self, step: Vector, hand: pin.SE3) -> None:
         """Move the goal by a step, shape (6,): linear, m, then a rotation vector."""
-        if any(_moves(step)):
+        if any(abs(x) > ROUNDING for x in step.tolist()):
             self.set(self.after(step, hand))
 
     def after(self, step: Vector, hand: pin.SE3) -> pin.SE3:
         """Return the goal after a step, without limits."""
-        moves, start, axes = _moves(step), self.pose, self._axes()
+        moves = [abs(x) > ROUNDING for x in step.tolist()]
+        start, axes = self.pose, self._axes()
         if self._from_hand and all(moves):
             start = hand
         elif self._from_hand:
@@ -109,11 +110,6 @@ class HandGoal:
 
     def _axes(self) -> Matrix:
         return self.pose.rotation if self._in_hand else self._reference_axes
-
-
-def _moves(step: Vector) -> list[bool]:
-    """Return which components of a step are not zero."""
-    return [abs(value) > ROUNDING for value in step.tolist()]
 
 
 def _step_between(start: pin.SE3, target: pin.SE3, axes: Matrix) -> Vector:
