@@ -8,11 +8,11 @@ import mujoco
 import numpy as np
 
 from wbc_suite.compiling import as_argument, compiled, compiled_inline, struct
-from wbc_suite.control.composite.whole_body_config import WholeBodyIKConfig
-from wbc_suite.control.loop.mujoco_functions import (
-    addresses,
-    geom_distance,
-    mj_kinematics,
+from wbc_suite.control.composite.commanded_scene import (
+    CommandedArrays,
+    CommandedScene,
+    joint_bodies,
+    place_commanded,
 )
 from wbc_suite.control.composite.whole_body_config import WholeBodyIKConfig
 from wbc_suite.control.loop.mujoco_functions import geom_distance

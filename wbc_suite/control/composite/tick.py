@@ -15,6 +15,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from wbc_suite.compiling import compiled, compiled_inline, struct
+from wbc_suite.control.composite.finger_capsules import FingerArrays, place_fingers
 from wbc_suite.control.composite.frame_goals import GoalArrays, place_goals
 from wbc_suite.control.composite.frame_targets import (
     CENTRE_OF_MASS,

@@ -6,7 +6,6 @@ import mujoco
 import numpy as np
 
 from wbc_suite.compiling import compiled, struct
-from wbc_suite.linear_algebra import copy_vector
 from wbc_suite.typing import Indices, Vector
 
 LARGEST = float(mujoco.mjMAXVAL)
@@ -45,7 +44,8 @@ def checked_state(data: mujoco.MjData) -> CheckedState:
 @compiled
 def check_before(state: CheckedState) -> bool:
     """Note the warnings so far; return whether all numbers are usable."""
-    copy_vector(state.warnings, state.warnings_before)
+    for i in range(state.warnings.shape[0]):
+        state.warnings_before[i] = state.warnings[i]
     return _all_usable(state)
 
 
