@@ -42,7 +42,7 @@ def test_keys_and_buttons_walk_while_held_and_a_fall_can_be_reset(walker, contex
     start = place(session)
     wait_until(lambda: (place(session) - start)[0] < -0.4, "it walks backwards")
     tab.get_by_text("m/s back").wait_for()
-    assert session.snapshot.balance.footstep is not None
+    wait_until(lambda: session.snapshot.balance.footstep is not None, "it steps")
     viewer.screenshot("teleop_walking")
     keyboard.up("s")
     wait_until(lambda: stands(session), "a released key stops it")
