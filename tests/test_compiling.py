@@ -98,7 +98,7 @@ def test_kernels_run_as_plain_python():
 def test_a_record_of_a_module_that_is_gone_does_not_spoil_the_cache(tmp_path):
     """Other processes read the machine code of other records."""
     module = """
-from typing import Any, NamedTuple
+from typing import NamedTuple
 import numpy as np
 from wbc_suite.compiling import as_argument, struct
 from wbc_suite.control.loop.state_checks import CheckedState

@@ -27,7 +27,6 @@ class MobileBase:
     """The planar root of a robot, and the slice of an action that moves it.
 
     Args:
-        measure: Returns its pose in the world.
         encode: Returns the values of the slice for a goal in the world.
         state: The robot.
         part: The slice.
@@ -36,21 +35,19 @@ class MobileBase:
 
     def __init__(
         self,
-        measure: Callable[[], pin.SE3],
         encode: Callable[[pin.SE3], Vector],
         state: RobotState,
         part: ActionSlice,
         hands: Vector,
     ) -> None:
-        self._measure, self._encode = measure, encode
-        self._state, self._slice = state, part
+        self._encode, self._state, self._slice = encode, state, part
         self._goal: pin.SE3 | None = None
-        self._hands = measure().actInv(hands)
+        self._hands = state.root_pose.actInv(hands)
 
     @property
     def pose(self) -> pin.SE3:
         """Measured pose in the world."""
-        return self._measure()
+        return self._state.root_pose
 
     @property
     def arrived(self) -> bool:
@@ -109,28 +106,18 @@ def mobile_base(env: RobotEnv, state: RobotState, hands: Vector) -> MobileBase |
         body = state.model.body(port.body).name
         if port.kind is LimbKind.PLANAR and body.startswith(state.prefix):
             part = layout[port.name]
-            return MobileBase(port.measure, port.encode, state, part, hands)
-    measure = partial(_root_pose, state)
+            return MobileBase(port.encode, state, part, hands)
     for name, speed in speed_ports(env).items():
         own = len(env.robots) == 1 or name.startswith(state.prefix)
         if own and len(speed.axes) == 3:
-            encode = partial(_speed_towards, speed, measure)
-            return MobileBase(measure, encode, state, layout[name], hands)
+            encode = partial(_speed_towards, speed, state)
+            return MobileBase(encode, state, layout[name], hands)
     return None
 
 
-def _root_pose(state: RobotState) -> pin.SE3:
-    """Return the measured pose of a planar root in the world."""
-    joint = state.model.joint(state.prefix + state.robot.root_joint_names[-1])
-    body = state.data.body(state.model.jnt_bodyid[joint.id])
-    return pin.SE3(body.xmat.reshape(3, 3).copy(), body.xpos.copy())
-
-
-def _speed_towards(
-    port: SpeedPort, measure: Callable[[], pin.SE3], goal: pin.SE3
-) -> Vector:
+def _speed_towards(port: SpeedPort, state: RobotState, goal: pin.SE3) -> Vector:
     """Return the values of a base's speed for a goal in the world."""
-    left = measure().actInv(goal)
+    left = state.root_pose.actInv(goal)
     turn = pin.log3(left.rotation)[2]
     return port.encode(GAIN * np.array([*left.translation[:2], turn]))
 

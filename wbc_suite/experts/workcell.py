@@ -48,10 +48,8 @@ class Workcell(Generic[B]):
         ports = [*limb_ports(env).values()]
         self.arms = tuple(self._arms([p for p in ports if p.kind is LimbKind.POSE]))
         self._bases = {
-            arm.state.prefix: mobile_base(
-                env, arm.state, self._between_hands(arm.state)
-            )
-            for arm in self.arms
+            prefix: mobile_base(env, state, self._between_hands(state))
+            for prefix, state in {a.state.prefix: a.state for a in self.arms}.items()
         }
         if not self.arms:
             names = ", ".join(s.name for s in env.action_layout.slices)

@@ -131,8 +131,12 @@ def estimate_armatures(links: Sequence[Link]) -> list[Link]:
 
     URDF cannot state an armature.
     """
-    given = [x.joint and "armature" in x.joint.model_fields_set for x in links]
-    return [x if own else with_rotor(x) for x, own in zip(links, given, strict=True)]
+    return [
+        with_rotor(link)
+        if link.joint and "armature" not in link.joint.model_fields_set
+        else link
+        for link in links
+    ]
 
 
 def with_rotor(link: Link) -> Link:

@@ -10,6 +10,7 @@ from wbc_suite.control.loop.mujoco_functions import addresses, mj_kinematics
 from wbc_suite.control.state import RobotState
 from wbc_suite.kinematics import Configuration
 from wbc_suite.kinematics.forward import JointKind
+from wbc_suite.linear_algebra import copy_rows, copy_vector
 from wbc_suite.typing import Indices, Matrix, Vector
 
 
@@ -94,9 +95,9 @@ def joint_bodies(state: RobotState, configuration: Configuration) -> Indices:
 @compiled
 def place_commanded(scene: CommandedArrays) -> None:
     """Write the poses of all bodies and geoms."""
-    scene.qpos[:] = scene.measured
-    scene.mocap_pos[:] = scene.measured_mocap_pos
-    scene.mocap_quat[:] = scene.measured_mocap_quat
+    copy_vector(scene.measured, scene.qpos)
+    copy_rows(scene.measured_mocap_pos, scene.mocap_pos)
+    copy_rows(scene.measured_mocap_quat, scene.mocap_quat)
     for k in range(scene.joint.shape[0]):
         scene.qpos[scene.place[k]] = scene.q[scene.joint[k]]
     mj_kinematics(scene.model, scene.data)
