@@ -17,6 +17,7 @@ SCALE = 0.22  # m, of a hand's handle
 @pytest.fixture
 def settled(panda):
     session, page = panda
+    session.enable(HAND, True)  # a test that failed may have left it
     session.reset()
     epoch = session.snapshot.epoch
     wait_until(lambda: session.snapshot.epoch > epoch, "the reset")
@@ -39,12 +40,13 @@ def moved(session, before, name=HAND):
 
 
 def wait_until_still(session):
-    """Wait for the last late message of a drag."""
+    """Wait for the last late message of a drag, and for a target out of reach."""
 
     def is_still():
         before = target(session).translation.copy()
         time.sleep(0.5)
-        return moved(session, before) == 0.0
+        settled = session.limbs[HAND].rest is None
+        return settled and moved(session, before) == 0.0
 
     wait_until(is_still, "the target stands still")
 
