@@ -7,6 +7,7 @@ import pinocchio as pin
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from wbc_suite.control.law.pose_interpolation import pose_vector
 from wbc_suite.control.part.hand_goal import HandGoal
 from wbc_suite.control.part.part_settings import ROUNDING
 from wbc_suite.errors import ConfigError
@@ -24,7 +25,7 @@ def goal_at(pose, *, frame="base", update="desired", position=None, turn=None):
         orientation_limits=turn,
     )
     goal = HandGoal(settings)
-    goal.reset(pose)
+    goal.reset(pose_vector(pose))
     return goal
 
 
@@ -53,7 +54,7 @@ def test_a_step_moves_the_goal_along_its_axes(frame, update, size):
         axes = pose.rotation if frame == "eef" else np.eye(3)
         start = origin(pose, hand, step, axes) if update == "achieved" else pose
         goal = goal_at(pose, frame=frame, update=update)
-        goal.step(step, hand)
+        goal.step(step, pose_vector(hand))
         assert_allclose(goal.pose, stepped(start, step, axes), atol=1e-13)
 
 
@@ -64,7 +65,7 @@ def test_a_step_of_zero_keeps_the_goal_bit_for_bit(update, size):
     pose, hand = random_pose(rng), random_pose(rng)
     goal = goal_at(pose, update=update)
     before = goal.pose.copy()
-    goal.step(np.full(6, size), hand)
+    goal.step(np.full(6, size), pose_vector(hand))
     assert_array_equal(goal.pose, before)
 
 
@@ -73,7 +74,7 @@ def test_components_without_a_step_keep_their_goal():
     turn = pin.exp3(np.array([0.2, 0.0, 0.0]))
     hand = pin.SE3(turn @ pose.rotation, pose.translation + np.array([0.1, 0.2, 0.3]))
     goal = goal_at(pose, update="achieved")
-    goal.step(np.array([0, 1e-3, 0, 0, 0, 0.0]), hand)
+    goal.step(np.array([0, 1e-3, 0, 0, 0, 0.0]), pose_vector(hand))
     assert_allclose(goal.pose.translation, [1.0, 2.201, 3.0])
     assert_allclose(goal.pose.rotation, pose.rotation, atol=1e-15)
 
@@ -88,8 +89,8 @@ def test_the_step_to_a_target_leads_there(frame, update):
         hand = (
             pose if update == "desired" else stepped(pose, 0.1 * np.ones(6), np.eye(3))
         )
-        step = goal.step_to(target, hand)
-        goal.step(step, hand)
+        step = goal.step_to(target, pose_vector(hand))
+        goal.step(step, pose_vector(hand))
         assert_allclose(goal.pose, target, atol=1e-12)
 
 
@@ -98,7 +99,7 @@ def test_steps_of_an_hour_leave_a_rotation():
     pose = random_pose(rng)
     goal = goal_at(pose, frame="eef")
     for _ in range(72_000):
-        goal.step(rng.normal(size=6), pose)
+        goal.step(rng.normal(size=6), pose_vector(pose))
     R = goal.pose.rotation
     assert_allclose(R @ R.T, np.eye(3), atol=1e-12)
 

@@ -8,7 +8,7 @@ import pinocchio as pin
 from wbc_suite.compiling import compiled
 from wbc_suite.control.law.law import Law
 from wbc_suite.control.law.osc_saturation import keep_direction
-from wbc_suite.control.law.pose_interpolation import interpolate_pose
+from wbc_suite.control.law.pose_interpolation import interpolate_pose, pose_vector
 from wbc_suite.control.loop.acceleration_limits import limit_accelerations
 from wbc_suite.control.loop.physics import OscWork, Physics
 from wbc_suite.control.loop.records import CompiledRecords, LawKind
@@ -70,19 +70,24 @@ class OscLaw(Law):
         self.record["speed"] = np.inf
 
     def set_goal(
-        self, goal: pin.SE3, *, start: pin.SE3 | None = None, duration: float = 0.0
+        self,
+        goal: pin.SE3 | Vector,
+        *,
+        start: pin.SE3 | None = None,
+        duration: float = 0.0,
     ) -> None:
-        """Set the goal in the axes of the reference body.
+        """Set the goal, a pose or its `pose_vector`, in the axes of the reference body.
 
         The reference moves there from `start`, by default the goal itself, at constant
         velocities in `duration` seconds.
         """
-        record, origin = self.record, goal if start is None else start
-        record["start"][0] = (*origin.rotation.ravel(), *origin.translation)
-        record["shift"], record["turn"] = 0.0, 0.0
+        vector = pose_vector(goal) if isinstance(goal, pin.SE3) else goal
+        record = self.record
+        record["start"], record["shift"], record["turn"] = vector, 0.0, 0.0
         if start is not None:
-            record["shift"] = goal.translation - start.translation
-            record["turn"] = pin.log3(start.rotation.T @ goal.rotation)
+            record["start"] = pose_vector(start)
+            record["shift"] = vector[9:] - start.translation
+            record["turn"] = pin.log3(start.rotation.T @ vector[:9].reshape(3, 3))
         record["since"], record["duration"] = 0.0, duration
 
     def frames(self, state: RobotState) -> tuple[Matrix, Vector, Matrix, Vector]:

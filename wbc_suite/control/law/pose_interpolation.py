@@ -1,6 +1,7 @@
 """Interpolate the goal of a hand: from its last pose to the next in a given time."""
 
 import numpy as np
+import pinocchio as pin
 
 from wbc_suite.compiling import compiled
 from wbc_suite.control.loop.records import CompiledRecords
@@ -38,3 +39,13 @@ def interpolate_pose(
             p_goal[i] += R_wb[i, k] * (law.start[9 + k] + phase * law.shift[k])
             twist[i] += rate * R_wb[i, k] * law.shift[k]
             twist[3 + i] += rate * R_start[i, k] * law.turn[k]
+
+
+def pose_vector(pose: pin.SE3) -> Vector:
+    """Return the rotation by rows, then the position, m; shape (12,)."""
+    return np.concatenate([pose.rotation.ravel(), pose.translation])
+
+
+def vector_pose(vector: Vector) -> pin.SE3:
+    """Return the pose of a `pose_vector`."""
+    return pin.SE3(vector[:9].reshape(3, 3), vector[9:])

@@ -6,6 +6,9 @@ import numpy as np
 import pinocchio as pin
 from pydantic import BaseModel, model_validator
 
+from wbc_suite.compiling import compiled
+from wbc_suite.control.law.pose_interpolation import pose_vector, vector_pose
+from wbc_suite.control.loop.rigid_body import matrix_product
 from wbc_suite.control.part.part_settings import (
     ROUNDING,
     GoalUpdate,
@@ -15,6 +18,8 @@ from wbc_suite.control.part.part_settings import (
     check_axes,
     limits_of,
 )
+from wbc_suite.linear_algebra import copy_rows
+from wbc_suite.qp.lie import exp3, log3
 from wbc_suite.tomlfile import FROZEN
 from wbc_suite.typing import Matrix, Vector
 
@@ -54,75 +59,138 @@ class HandGoal:
     others keep their goal, since a hand that sags under a load would creep down at
     every step to the side. A step of zero keeps the goal.
 
+    Poses are vectors; see `pose_vector`.
+
     Raises ConfigError if limits have a wrong number of values, or are empty.
 
     Attributes:
-        start: Orientation of the hand at the start, from which turns are limited.
-        position_limits: Least and greatest coordinates, m, shape (2, 3).
+        vector: The goal.
+        start: The hand's pose at the start, from which turns are limited.
+        limits: Least and greatest coordinates, m, and components of the rotation vector
+            from `start`, rad, shape (2, 6).
     """
 
     def __init__(self, settings: HandSettings) -> None:
         self._in_hand = settings.input_ref_frame == "eef"
         self._from_hand = settings.goal_update_mode == "achieved"
-        self.position_limits = _limits(settings.position_limits, "position_limits")
-        self._turn_limits = _limits(settings.orientation_limits, "orientation_limits")
-        self._turns_are_limited = bool(np.isfinite(self._turn_limits).any())
-        self._reference_axes = np.eye(3)
-        self.pose, self.start = pin.SE3.Identity(), np.eye(3)
+        self.limits = np.hstack(
+            [
+                _limits(settings.position_limits, "position_limits"),
+                _limits(settings.orientation_limits, "orientation_limits"),
+            ]
+        )
+        self.vector = pose_vector(pin.SE3.Identity())
+        self.start = self.vector.copy()
 
-    def reset(self, hand: pin.SE3) -> None:
+    @property
+    def pose(self) -> pin.SE3:
+        """The goal; see `set` for goals within the limits."""
+        return vector_pose(self.vector)
+
+    @pose.setter
+    def pose(self, pose: pin.SE3) -> None:
+        self.vector[:] = pose_vector(pose)
+
+    def reset(self, hand: Vector) -> None:
         """Take the hand's pose as the goal."""
-        self.pose, self.start = hand.copy(), hand.rotation.copy()
+        self.vector[:], self.start[:] = hand, hand
 
     def set(self, pose: pin.SE3) -> None:
         """Set an absolute goal, moved into the limits component by component."""
-        low, high = self.position_limits
-        position = np.minimum(np.maximum(pose.translation, low), high)
-        rotation = pose.rotation
-        if self._turns_are_limited:
-            turn = pin.log3(rotation @ self.start.T)
-            bounded = np.clip(turn, *self._turn_limits)
-            if (bounded != turn).any():
-                rotation = pin.exp3(bounded) @ self.start
-        self.pose = pin.SE3(rotation, position)
+        self.pose = pose
+        bound_pose(self.vector, self.start, self.limits)
 
-    def step(self, step: Vector, hand: pin.SE3) -> None:
+    def step(self, step: Vector, hand: Vector) -> None:
         """Move the goal by a step, shape (6,): linear, m, then a rotation vector."""
-        if any(abs(x) > ROUNDING for x in step.tolist()):
-            self.set(self.after(step, hand))
+        if step_pose(self.vector, step, hand, self._in_hand, self._from_hand):
+            bound_pose(self.vector, self.start, self.limits)
 
-    def after(self, step: Vector, hand: pin.SE3) -> pin.SE3:
+    def after(self, step: Vector, hand: Vector) -> pin.SE3:
         """Return the goal after a step, without limits."""
-        moves = [abs(x) > ROUNDING for x in step.tolist()]
-        start, axes = self.pose, self._axes()
-        if self._from_hand and all(moves):
-            start = hand
-        elif self._from_hand:
-            to_hand = _step_between(start, hand, axes)
-            start = _moved(start, np.where(moves, to_hand, 0.0), axes)
-        return _moved(start, step, axes)
+        goal = self.vector.copy()
+        step_pose(goal, step, hand, self._in_hand, self._from_hand)
+        return vector_pose(goal)
 
-    def step_to(self, target: pin.SE3, hand: pin.SE3) -> Vector:
+    def step_to(self, target: pin.SE3, hand: Vector) -> Vector:
         """Return the step that moves the goal to a target, shape (6,)."""
-        return _step_between(
-            hand if self._from_hand else self.pose, target, self._axes()
-        )
-
-    def _axes(self) -> Matrix:
-        return self.pose.rotation if self._in_hand else self._reference_axes
+        axes = self.vector[:9].reshape(3, 3) if self._in_hand else np.eye(3)
+        start, step = hand if self._from_hand else self.vector, np.empty(6)
+        write_step(start, pose_vector(target), axes, step)
+        return step
 
 
-def _step_between(start: pin.SE3, target: pin.SE3, axes: Matrix) -> Vector:
-    """Return the step along axes, shape (6,), that takes a pose to another."""
-    shift = axes.T @ (target.translation - start.translation)
-    turn = axes.T @ pin.log3(target.rotation @ start.rotation.T)
-    return np.concatenate([shift, turn])
+@compiled
+def step_pose(
+    goal: Vector, step: Vector, hand: Vector, in_hand: bool, from_hand: bool
+) -> bool:
+    """Move a goal by a step, see `HandGoal`; return whether any component moves."""
+    moves, axes, start = False, np.eye(3), np.zeros(6)
+    if in_hand:
+        copy_rows(goal[:9].reshape((3, 3)), axes)
+    if from_hand:
+        write_step(goal, hand, axes, start)
+    for i in range(6):
+        if abs(step[i]) > ROUNDING:
+            moves = True
+        else:
+            start[i] = 0.0
+    if moves:
+        _move(goal, start, axes)
+        _move(goal, step, axes)
+    return moves
 
 
-def _moved(pose: pin.SE3, step: Vector, axes: Matrix) -> pin.SE3:
-    """Return a pose moved by a step along axes."""
-    rotation = pin.exp3(axes @ step[3:]) @ pose.rotation
-    return pin.SE3(rotation, pose.translation + axes @ step[:3])
+@compiled
+def write_step(start: Vector, target: Vector, axes: Matrix, step: Vector) -> None:
+    """Write the step along axes, shape (6,), that takes a pose to another."""
+    R, turn = np.empty((3, 3)), np.empty(3)
+    matrix_product(target[:9].reshape((3, 3)), start[:9].reshape((3, 3)).T, R)
+    log3(R, turn)
+    for i in range(3):
+        step[i] = step[3 + i] = 0.0
+        for k in range(3):
+            step[i] += axes[k, i] * (target[9 + k] - start[9 + k])
+            step[3 + i] += axes[k, i] * turn[k]
+
+
+@compiled
+def _move(pose: Vector, step: Vector, axes: Matrix) -> None:
+    """Move a pose by a step along axes."""
+    turn, R, R_moved = np.zeros(3), np.empty((3, 3)), np.empty((3, 3))
+    for i in range(3):
+        for k in range(3):
+            pose[9 + i] += axes[i, k] * step[k]
+            turn[i] += axes[i, k] * step[3 + k]
+    exp3(turn[0], turn[1], turn[2], R)
+    matrix_product(R, pose[:9].reshape((3, 3)), R_moved)
+    copy_rows(R_moved, pose[:9].reshape((3, 3)))
+
+
+@compiled
+def bound_pose(pose: Vector, start: Vector, limits: Matrix) -> None:
+    """Move a pose into the limits of a `HandGoal`, component by component."""
+    turn, R, turned = np.empty(3), np.empty((3, 3)), False
+    matrix_product(pose[:9].reshape((3, 3)), start[:9].reshape((3, 3)).T, R)
+    log3(R, turn)
+    for i in range(3):
+        pose[9 + i] = min(max(pose[9 + i], limits[0, i]), limits[1, i])
+        bounded = min(max(turn[i], limits[0, 3 + i]), limits[1, 3 + i])
+        turned, turn[i] = turned or bounded != turn[i], bounded
+    if turned:
+        exp3(turn[0], turn[1], turn[2], R)
+        matrix_product(R, start[:9].reshape((3, 3)), pose[:9].reshape((3, 3)))
+
+
+@compiled
+def write_relative_pose(
+    R_base: Matrix, p_base: Vector, R: Matrix, p: Vector, pose: Vector
+) -> None:
+    """Write the pose (R, p) in the axes of a base, as a vector."""
+    matrix_product(R_base.T, R, pose[:9].reshape((3, 3)))
+    for i in range(3):
+        pose[9 + i] = 0.0
+        for k in range(3):
+            pose[9 + i] += R_base[k, i] * (p[k] - p_base[k])
 
 
 def _limits(given: Range | None, key: str) -> Matrix:

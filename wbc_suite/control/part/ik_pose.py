@@ -9,6 +9,7 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from wbc_suite.control.action import ActionPart, Axis, SliceKind, Unit
 from wbc_suite.control.law.joint_laws import JointLaw
+from wbc_suite.control.law.pose_interpolation import pose_vector
 from wbc_suite.control.part.approach import approach_pose
 from wbc_suite.control.part.controller import PartController
 from wbc_suite.control.part.feasible_acceleration import feasible_accelerations
@@ -132,7 +133,7 @@ class IkPoseController(PartController[JointLaw]):
     def reset(self, state: RobotState) -> None:
         """Hold the hand where it is, and the posture that it has."""
         self._ik.reset(state)
-        self._goal.reset(self._hand())
+        self._goal.reset(pose_vector(self._hand()))
         self.law.aim(state.data.qpos[self.law.drives["qpos"]])
         self._due = state.time
 
@@ -149,7 +150,7 @@ class IkPoseController(PartController[JointLaw]):
         angle = float(np.linalg.norm(rotation))
         rotation = rotation * min(1.0, self.config.turn_limit / max(angle, ROUNDING))
         step = np.concatenate([self._scaling(values[:3]), rotation])
-        self._goal.step(step, self._hand())
+        self._goal.step(step, pose_vector(self._hand()))
 
     def prepare(self, state: RobotState) -> int:
         """Solve when it is time to; return how many physics steps are left."""

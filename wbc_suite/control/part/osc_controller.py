@@ -9,7 +9,11 @@ from pydantic import NonNegativeFloat, PositiveFloat
 from wbc_suite.control.action import Axis, SliceKind, Unit
 from wbc_suite.control.law.osc import OscLaw
 from wbc_suite.control.part.controller import PartController, PoseInput
-from wbc_suite.control.part.hand_goal import HandGoal, HandSettings
+from wbc_suite.control.part.hand_goal import (
+    HandGoal,
+    HandSettings,
+    write_relative_pose,
+)
 from wbc_suite.control.part.impedance import Gains, Impedance, ImpedanceSettings
 from wbc_suite.control.part.part_settings import (
     REACH,
@@ -90,7 +94,7 @@ class OscController(PartController[OscLaw]):
         self.config, self._state, size = config, state, config.size
         self._impedance = Impedance(part.name, AXES, config)
         self._goal, self._step = HandGoal(config), np.zeros(6)
-        low, high = self._goal.position_limits
+        self._hand_pose, (low, high) = np.zeros(12), self._goal.limits[:, :3]
         turn = np.full(3, np.pi)
         least = np.concatenate([np.maximum(low, -REACH), -turn])[:size]
         greatest = np.concatenate([np.minimum(high, REACH), turn])[:size]
@@ -108,7 +112,7 @@ class OscController(PartController[OscLaw]):
             if joint not in part.joints:
                 raise UnknownNameError(f"joint of '{part.name}'", joint, part.joints)
         self.law = self._make_law(part.joints, part.hand)
-        self._R_body, self._p_body, self._R_site, self._p_site = self.law.frames(state)
+        self._frames = self.law.frames(state)
         self._write_gains()
         self.reset(state)
 
@@ -137,7 +141,7 @@ class OscController(PartController[OscLaw]):
             posture[k] = self.config.posture.get(joint, posture[k])
         self.law.drives["position"] = posture
         self._goal.reset(self._hand())
-        self.law.set_goal(self.goal)
+        self.law.set_goal(self._goal.vector)
 
     def set_goal(self, values: Vector, period: float) -> None:
         """Take a step or a goal, shape (6,) or (3,), and gains as the mode has them."""
@@ -150,9 +154,8 @@ class OscController(PartController[OscLaw]):
             self._step[:size] = self._input.scaling(values[:size])
             self._goal.step(self._step, self._hand())
         else:
-            turn = pin.exp3(values[3:6]) if size == 6 else self._goal.start
-            self._goal.set(pin.SE3(turn, values[:3]))
-        self.law.set_goal(self.goal, start=start, duration=ramp)
+            self._goal.set(self._pose_of(values[:size]))
+        self.law.set_goal(self._goal.vector, start=start, duration=ramp)
 
     @property
     def goal(self) -> pin.SE3:
@@ -177,12 +180,13 @@ class OscController(PartController[OscLaw]):
         wherever that is within a full step.
         """
         action, site = self._input.action, int(self.law.record["site"][0])
+        R_body, p_body, R_site, p_site = self._frames
 
         def reference() -> pin.SE3:
-            return pin.SE3(self._R_body.copy(), self._p_body.copy())
+            return pin.SE3(R_body.copy(), p_body.copy())
 
         def measure() -> pin.SE3:
-            return pin.SE3(self._R_site.copy(), self._p_site.copy())
+            return pin.SE3(R_site.copy(), p_site.copy())
 
         def encode(target: pin.SE3) -> Vector:
             goal = reference().actInv(target)
@@ -198,8 +202,7 @@ class OscController(PartController[OscLaw]):
                 step = np.zeros(6)
                 step[: self.config.size] = self._input.scaling(values)
                 return reference() * self._goal.after(step, self._hand())
-            turn = pin.exp3(values[3:]) if len(values) == 6 else self._goal.start
-            return reference() * pin.SE3(turn, values[:3])
+            return reference() * self._pose_of(values)
 
         fixed = self._state.robot.root.kind == "fixed"
         return PoseInput(
@@ -216,7 +219,13 @@ class OscController(PartController[OscLaw]):
         values = np.concatenate([pose.translation, pin.log3(pose.rotation)])
         return values[: self.config.size]
 
-    def _hand(self) -> pin.SE3:
-        """Return the pose of the hand in the reference."""
-        R_bw = self._R_body.T
-        return pin.SE3(R_bw @ self._R_site, R_bw @ (self._p_site - self._p_body))
+    def _pose_of(self, values: Vector) -> pin.SE3:
+        """Return the pose that absolute values command."""
+        if len(values) == 6:
+            return pin.SE3(pin.exp3(values[3:]), values[:3])
+        return pin.SE3(self._goal.start[:9].reshape(3, 3), values)
+
+    def _hand(self) -> Vector:
+        """Return the pose of the hand in the reference; see `HandGoal`."""
+        write_relative_pose(*self._frames, self._hand_pose)
+        return self._hand_pose
