@@ -20,10 +20,13 @@ TREES = {
     if "_catalogue" not in path.parts
 }
 
-MAX_LINES, MAX_MODULES = 45_100, 320  # 45,097 at 3551367, without `ADDED`
-GROWTH = 1_690
-"""Lines by which the features of `ADDED` made older modules grow, less what they took
-out there: 4,621 and 2,934 on 2026-11-27, by `git diff --numstat 3551367`.
+MAX_LINES, MAX_MODULES = 45_000, 320  # without `ADDED` and `GROWTH`
+GROWTH = 2_116
+"""Lines by which the features of `ADDED` made older modules grow.
+
+By the commit 3551367 walking robots had added 733 lines there that still stood (`git
+blame`), and taken out 304. Since then features have added 4,621 and taken out 2,934, on
+2026-11-27 (`git diff --numstat 3551367`).
 """
 ADDED = (
     # walking robots
