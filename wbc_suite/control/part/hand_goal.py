@@ -79,6 +79,7 @@ class HandGoal:
                 _limits(settings.orientation_limits, "orientation_limits"),
             ]
         )
+        self._reference_axes = np.eye(3)
         self.vector = pose_vector(pin.SE3.Identity())
         self.start = self.vector.copy()
 
@@ -102,31 +103,37 @@ class HandGoal:
 
     def step(self, step: Vector, hand: Vector) -> None:
         """Move the goal by a step, shape (6,): linear, m, then a rotation vector."""
-        if step_pose(self.vector, step, hand, self._in_hand, self._from_hand):
+        if step_pose(self.vector, step, hand, self._axes(), self._from_hand):
             bound_pose(self.vector, self.start, self.limits)
 
     def after(self, step: Vector, hand: Vector) -> pin.SE3:
         """Return the goal after a step, without limits."""
         goal = self.vector.copy()
-        step_pose(goal, step, hand, self._in_hand, self._from_hand)
+        step_pose(goal, step, hand, self._axes(), self._from_hand)
         return vector_pose(goal)
 
     def step_to(self, target: pin.SE3, hand: Vector) -> Vector:
         """Return the step that moves the goal to a target, shape (6,)."""
-        axes = self.vector[:9].reshape(3, 3) if self._in_hand else np.eye(3)
         start, step = hand if self._from_hand else self.vector, np.empty(6)
-        write_step(start, pose_vector(target), axes, step)
+        write_step(start, pose_vector(target), self._axes(), step)
         return step
+
+    def _axes(self) -> Matrix:
+        """Return the axes of steps as columns, shape (3, 3)."""
+        if self._in_hand:
+            return self.vector[:9].reshape(3, 3).copy()
+        return self._reference_axes
 
 
 @compiled
 def step_pose(
-    goal: Vector, step: Vector, hand: Vector, in_hand: bool, from_hand: bool
+    goal: Vector, step: Vector, hand: Vector, axes: Matrix, from_hand: bool
 ) -> bool:
-    """Move a goal by a step, see `HandGoal`; return whether any component moves."""
-    moves, axes, start = False, np.eye(3), np.zeros(6)
-    if in_hand:
-        copy_rows(goal[:9].reshape((3, 3)), axes)
+    """Move a goal by a step along axes; return whether any component moves.
+
+    See `HandGoal`; `from_hand` is whether components that move count from the hand.
+    """
+    moves, start = False, np.zeros(6)
     if from_hand:
         write_step(goal, hand, axes, start)
     for i in range(6):
