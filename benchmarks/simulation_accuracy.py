@@ -33,7 +33,7 @@ from harness.stand import Stand
 from wbc_suite.control.composite.qp_tasks import distance_limits, joint_accelerations
 from wbc_suite.control.composite.whole_body import WholeBodyIK
 from wbc_suite.kinematics import Configuration
-from wbc_suite.planning import LinkDistanceChecker
+from wbc_suite.planning import LimitChecker
 
 ROBOTS = ("Panda", "GR1", "Tiago", "SpotWithArm")
 REACH_TIME = 0.6  # s
@@ -65,7 +65,7 @@ class Bench(Stand):
         frames = self.controller.config.frames
         self.hands = [frame for frame in frames if frame.name.endswith("hand")]
         self.body = Configuration(self.controller.robot.to_pinocchio())
-        self.links = LinkDistanceChecker(
+        self.links = LimitChecker(
             self.controller.robot.to_pinocchio(),
             distance_limits(self.controller.robot, self.controller.config),
         )

@@ -39,7 +39,7 @@ from wbc_suite.envs.env import RobotEnv
 from wbc_suite.envs.hold_check import alone, hold_faults
 from wbc_suite.errors import WbcError
 from wbc_suite.kinematics import Conversion
-from wbc_suite.planning.collision_checker import LinkDistanceChecker
+from wbc_suite.planning.collision_checker import LimitChecker
 from wbc_suite.robot import RobotDescription, load_robot
 from wbc_suite.typing import Vector
 
@@ -332,7 +332,7 @@ def allowed(
     model = reduced.to_pinocchio()
     data = model.createData()
     conversion = Conversion(env.simulation.model, model, prefix="robot0_")
-    links = LinkDistanceChecker(model, distance_limits(reduced, read))
+    links = LimitChecker(model, distance_limits(reduced, read))
     shares = read.limits.weight_shares
     index = [model.joints[model.getJointId(name)].idx_v for name in shares]
     most = [share * (robot.joint(n).effort or 0.0) for n, share in shares.items()]

@@ -7,7 +7,8 @@ import pytest
 
 from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Conversion
-from wbc_suite.planning import SceneCollisionChecker, plan_motion
+from wbc_suite.planning import LimitChecker, SceneCollisionChecker, plan_motion
+from wbc_suite.qp import WeightLimit
 from wbc_suite.robot import load_robot
 
 
@@ -114,3 +115,18 @@ def test_what_cannot_be_planned_is_refused(robot, limits, match):
     q = pin.neutral(model)
     with pytest.raises(ConfigError, match=match):
         plan_motion(model, q, q, clearance=lambda q: 1.0, **limits)
+
+
+def test_a_motor_that_cannot_hold_the_weight_is_no_clearance(scene):
+    model, _ = scene
+    index = model.joints[model.getJointId("joint2")].idx_v
+    checker = LimitChecker(model, (), [WeightLimit({"joint2": 20.0})])
+    data, found = model.createData(), []
+    for lift in np.linspace(-1.5, 1.5, 13):
+        q = turned(model, 0.0)
+        q[1] = lift
+        weight = abs(pin.computeGeneralizedGravity(model, data, q)[index])
+        found.append(weight < 20.0)
+        least = np.inf if weight < 20.0 else 20.0 - weight
+        assert checker.clearance(q) == pytest.approx(least, rel=1e-12)
+    assert 0 < sum(found) < len(found)

@@ -2,7 +2,7 @@
 
 from wbc_suite.planning.collision_checker import (
     Clearance,
-    LinkDistanceChecker,
+    LimitChecker,
     SceneCollisionChecker,
 )
 from wbc_suite.planning.goal_search import GoalProblem, GoalSearch
@@ -17,7 +17,7 @@ __all__ = [
     "Clearance",
     "GoalProblem",
     "GoalSearch",
-    "LinkDistanceChecker",
+    "LimitChecker",
     "Motion",
     "MotionPlanner",
     "ProfileGenerator",

@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.kinematics import Configuration, Conversion
-from wbc_suite.qp import FloorLimit, SelfCollisionLimit
+from wbc_suite.qp import FloorLimit, SelfCollisionLimit, WeightLimit
 from wbc_suite.typing import Matrix, Vector
 
 Clearance: TypeAlias = Callable[[Vector], float]
@@ -71,31 +71,38 @@ def _contacts(data: mujoco.MjData) -> Iterator[tuple[tuple[int, int], float]]:
     yield from zip(pairs, data.contact.dist.tolist(), strict=True)
 
 
-class LinkDistanceChecker:
-    """Checks the distances that the distance limits of a QP keep.
+class LimitChecker:
+    """Checks what limits of a QP keep: distances of links, and the weight on motors.
 
     The limits are bound to a configuration of the checker's own.
     """
 
     def __init__(
-        self, model: pin.Model, limits: Sequence[SelfCollisionLimit | FloorLimit]
+        self,
+        model: pin.Model,
+        distances: Sequence[SelfCollisionLimit | FloorLimit],
+        weights: Sequence[WeightLimit] = (),
     ) -> None:
         self._configuration = Configuration(model)
-        self.limits = tuple(limits)
-        for limit in self.limits:
+        self.distances, self._weights = tuple(distances), tuple(weights)
+        for limit in (*self.distances, *self._weights):
             limit.bind(self._configuration)
-        rows = max((limit.dim for limit in self.limits), default=0)
+        rows = max((limit.dim for limit in self.distances), default=0)
         self._G: Matrix = np.zeros((rows, self._configuration.nv))
         self._h: Vector = np.zeros(rows)
 
     def clearance(self, q: Vector) -> float:
         """Return the least distance beyond a limit's margin, m.
 
-        It is infinite where all links are beyond the limits' influence.
+        It is infinite where all links are beyond the limits' influence. Where motors
+        cannot hold the weight it is below zero, by what they lack, N m or N.
         """
         self._configuration.update(q)
         least = np.inf
-        for limit in self.limits:
+        for limit in self._weights:
+            room = float(limit.room(self._configuration).min())
+            least = room if room <= 0.0 else least
+        for limit in self.distances:
             G, h = self._G[: limit.dim], self._h[: limit.dim]
             limit.rows(self._configuration, 1.0, G, h)
             least = min(least, float(limit.distances.min()) - limit.margin)

@@ -194,13 +194,18 @@ class WeightLimit(RowLimit):
         """Write two rows per joint: upper, then lower."""
         model, data, q = configuration.model, configuration.data, configuration.q
         slope = pin.computeGeneralizedGravityDerivatives(model, data, q)[self._index]
-        torque = pin.computeGeneralizedGravity(model, data, q)[self._index]
         count = len(self.names)
         G[:count], G[count:] = slope, -slope
-        room = np.concatenate([self._torques - torque, self._torques + torque])
         h[:] = dt * np.maximum(
-            WEIGHT_RATE * room, -WEIGHT_RETURN * np.tile(self._torques, 2)
+            WEIGHT_RATE * self.room(configuration),
+            -WEIGHT_RETURN * np.tile(self._torques, 2),
         )
+
+    def room(self, configuration: Configuration) -> Vector:
+        """Return what each joint could hold more, N m or N: upwards, then downwards."""
+        model, data, q = configuration.model, configuration.data, configuration.q
+        torque = pin.computeGeneralizedGravity(model, data, q)[self._index]
+        return np.concatenate([self._torques - torque, self._torques + torque])
 
     def subject(self, row: int) -> str:
         """Return which motor carries all it can."""

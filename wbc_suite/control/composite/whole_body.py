@@ -14,7 +14,11 @@ from wbc_suite.control.composite.finger_capsules import FingerCapsules
 from wbc_suite.control.composite.frame_goals import FrameGoals, place_goals
 from wbc_suite.control.composite.frame_targets import ControlledFrames
 from wbc_suite.control.composite.ik_report import Commanded, IkReport
-from wbc_suite.control.composite.qp_tasks import accelerations, distance_limits
+from wbc_suite.control.composite.qp_tasks import (
+    accelerations,
+    distance_limits,
+    weight_limits,
+)
 from wbc_suite.control.composite.reduced_robot import (
     joint_indices,
     keyframe_posture,
@@ -40,7 +44,7 @@ from wbc_suite.control.part.stance_controller import feet_of, soles_of
 from wbc_suite.control.state import RobotState
 from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Configuration, Conversion
-from wbc_suite.planning import LinkDistanceChecker, SceneCollisionChecker
+from wbc_suite.planning import LimitChecker, SceneCollisionChecker
 from wbc_suite.qp import ObstacleLimit
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Vector
@@ -121,15 +125,16 @@ class WholeBodyIK:
 
     def _make_planner(self, state: RobotState) -> WaypointPlanner:
         scene = SceneCollisionChecker(state.model, state.data, self._conversion)
-        limits = distance_limits(self.robot, self.config)
-        links = LinkDistanceChecker(self._configuration.model, limits)
+        given = self.robot, self.config
+        kept = LimitChecker(
+            self._configuration.model, distance_limits(*given), weight_limits(*given)
+        )
         return WaypointPlanner(
-            self.robot,
-            self.config,
+            *given,
             self._configuration,
             self.frames,
-            clearance=lambda q: min(links.clearance(q), scene.clearance(q)),
-            distance_limits=links.limits,
+            clearance=lambda q: min(kept.clearance(q), scene.clearance(q)),
+            distance_limits=kept.distances,
             dt=self._dt,
         )
 
