@@ -119,8 +119,8 @@ def test_what_cannot_be_planned_is_refused(robot, limits, match):
 
 def test_a_motor_that_cannot_hold_the_weight_is_no_clearance(scene):
     model, _ = scene
-    index = model.joints[model.getJointId("joint2")].idx_v
-    checker = LimitChecker(model, (), [WeightLimit({"joint2": 20.0})])
+    shoulder, index = model.names[2], model.joints[2].idx_v
+    checker = LimitChecker(model, (), [WeightLimit({shoulder: 20.0})])
     data, found = model.createData(), []
     for lift in np.linspace(-1.5, 1.5, 13):
         q = turned(model, 0.0)
