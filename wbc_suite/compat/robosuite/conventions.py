@@ -111,4 +111,4 @@ def place_cameras(model: mujoco.MjModel, task: str) -> None:
         camera = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_CAMERA, name)
         if camera >= 0:
             model.cam_pos[camera] = pos
-            model.cam_quat[camera] = quat / np.linalg.norm(quat)
+            model.cam_quat[camera] = np.array(quat) / np.linalg.norm(quat)
