@@ -43,7 +43,7 @@ bench: $(VENV)/.installed-dev ## run every benchmark: docs/benchmarks.md, artifa
 	$(PY) docs/write_benchmarks.py $(ARGS)
 
 # Peers get environments of their own where they ask for other versions than ours.
-bench-peers: $(VENV)/.installed-peers .venv-placo/.installed .venv-robosuite/.installed .venv-robosuite-demos/.installed .venv-cluster/.installed .venv-datasets/.installed .venv-clients/.installed .venv-accelerators/.installed ## install what benchmarks and tests compare or work with
+bench-peers: $(VENV)/.installed-peers .venv-placo/.installed .venv-robosuite/.installed .venv-robosuite-demos/.installed .venv-cluster/.installed .venv-clients/.installed .venv-accelerators/.installed ## install what benchmarks and tests compare or work with
 
 $(VENV)/.installed-peers: $(VENV)/.installed-dev
 	$(PY) -m pip install --disable-pip-version-check --group peers
@@ -52,6 +52,8 @@ $(VENV)/.installed-peers: $(VENV)/.installed-dev
 .venv-%/.installed: benchmarks/peers/%.txt | $(VENV)/.python
 	@test -x .venv-$*/bin/python || $(PY) -m venv .venv-$*
 	.venv-$*/bin/python -m pip install --disable-pip-version-check -r $<
+	test ! -f $(<:.txt=-no-deps.txt) || .venv-$*/bin/python -m pip install \
+	  --disable-pip-version-check --no-deps -r $(<:.txt=-no-deps.txt)
 	@touch $@
 
 .venv-client-%/.installed: examples/clients/%.txt | $(VENV)/.python

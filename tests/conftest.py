@@ -36,25 +36,16 @@ else:
 
 
 class PeerReaders:
-    """Packages that read datasets, in an environment of their own.
+    """Packages that read datasets, in the environment of the clients."""
 
-    That of the clients has some of them.
-    """
+    python = ROOT / ".venv-clients/bin/python"
 
-    every, some = (ROOT / f".venv-{n}/bin/python" for n in ("datasets", "clients"))
-
-    def python(self, kind):
-        """Return the Python that reads a layout; skip the test if there is none."""
-        if self.every.exists():
-            return self.every
-        if kind in ("minari", "mcap") and self.some.exists():
-            return self.some
-        pytest.skip("Readers of datasets are not installed: make bench-peers")
-
-    def run(self, kind, *arguments):
-        """Run a layout's Python, with our modules; return what it prints last."""
+    def run(self, *arguments):
+        """Run their Python, with our modules; return what it prints last."""
+        if not self.python.exists():
+            pytest.skip("Readers of datasets are not installed: make bench-peers")
         environment = {**os.environ, "PYTHONPATH": str(ROOT), "HF_HUB_OFFLINE": "1"}
-        command = [self.python(kind), *map(str, arguments)]
+        command = [self.python, *map(str, arguments)]
         output = subprocess.run(
             command, capture_output=True, text=True, timeout=PATIENCE, env=environment
         )
@@ -64,11 +55,11 @@ class PeerReaders:
     def read(self, kind, path):
         """Return what `benchmarks/peers/datasets_side.py` tells of a dataset."""
         side = ROOT / "benchmarks/peers/datasets_side.py"
-        return json.loads(self.run(kind, side, kind, path))
+        return json.loads(self.run(side, kind, path))
 
     def convert(self, source, out, layout, *, pieces=1):
         """Convert there: LeRobot's layout needs pyarrow and av."""
-        self.run(layout, "-c", CONVERT, source, out, layout, pieces)
+        self.run("-c", CONVERT, source, out, layout, pieces)
         return out
 
 

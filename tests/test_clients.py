@@ -11,7 +11,8 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 CLIENTS = sorted((ROOT / "examples" / "clients").glob("*.py"))
-SHARED = (ROOT / "benchmarks" / "peers" / "clients.txt").read_text()
+PEERS = ROOT / "benchmarks" / "peers"
+SHARED = "".join(path.read_text() for path in PEERS.glob("clients*.txt"))
 PATIENCE = 900.0  # s; torch takes minutes to be imported for the first time
 
 

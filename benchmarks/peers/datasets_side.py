@@ -2,7 +2,7 @@
 
     python datasets_side.py minari|mcap|robomimic|lerobot PATH
 
-Runs in `.venv-datasets`, where wbc_suite is not installed.
+Runs in `.venv-clients`, and imports nothing of ours.
 """
 
 import json

@@ -226,7 +226,7 @@ def assert_replays(path):
 
 def assert_peers_load(readers, path, tmp_path):
     """robomimic's and LeRobot's dataset classes hold the same, where they are there."""
-    if not readers.every.exists():
+    if not readers.python.exists():
         return
     with Dataset(path) as dataset:
         (episode,) = dataset

@@ -4,8 +4,10 @@ import json
 from pathlib import Path
 from typing import Any
 
+from wbc_suite.compat.robosuite.conventions import OURS
 from wbc_suite.compat.robosuite.environments.base import make
 from wbc_suite.errors import DatasetError
+from wbc_suite.recording.env_source import PACKAGE
 
 
 def make_from_env_args(env_args: str | dict[str, Any]) -> Any:
@@ -13,7 +15,10 @@ def make_from_env_args(env_args: str | dict[str, Any]) -> Any:
     data = json.loads(env_args) if isinstance(env_args, str) else env_args
     if "env_name" not in data:
         raise DatasetError("env_args has no 'env_name'.")
-    return make(**{**data.get("env_kwargs", {}), "env_name": data["env_name"]})
+    arguments = dict(data.get("env_kwargs", {}))
+    if data.get("package") == PACKAGE:
+        arguments.setdefault("conventions", OURS)
+    return make(data["env_name"], **arguments)
 
 
 def make_from_dataset(path: str | Path) -> Any:

@@ -53,7 +53,8 @@ def _write(dataset: Dataset, piece: Piece, out: Path, on_progress: Progress) -> 
 def _header(header: Mapping[str, Fact]) -> dict[str, Fact]:
     """Return attributes with which robomimic makes the environment of robosuite's name.
 
-    `wbc_suite.compat.robosuite` has robosuite's default controllers; ours are named.
+    `wbc_suite.compat.robosuite` has robosuite's default controllers, sites and signs;
+    ours are named.
     """
     if "env_args" not in header:
         return dict(header)
@@ -62,6 +63,7 @@ def _header(header: Mapping[str, Fact]) -> dict[str, Fact]:
         return dict(header)
     given = source.arguments.items()
     arguments = {key: value for key, value in given if key not in _OTHER_ARGUMENTS}
+    arguments["conventions"] = PACKAGE
     if "controller_config" in header:
         controllers = json.loads(str(header["controller_config"]))
         arguments["controller_configs"] = controllers

@@ -12,7 +12,7 @@ from wbc_suite.compat.robosuite.utils.observables import Observable, sensor
 from wbc_suite.compat.robosuite.utils.transform_utils import mat2quat
 from wbc_suite.sensing.cameras import CameraRequest
 from wbc_suite.sensing.proprioception import proprioception
-from wbc_suite.sensing.reading import Reading
+from wbc_suite.sensing.reading import Reading, body_quat
 
 
 class PolledObservables:
@@ -56,8 +56,13 @@ class PolledObservables:
         return np.ascontiguousarray(picture)
 
 
-def robot_observables(robot: Any, rate: float) -> list[Observable]:
-    """Return the observables of one robot; modality `{prefix}proprio`."""
+def robot_observables(
+    robot: Any, rate: float, *, as_there: bool = True
+) -> list[Observable]:
+    """Return the observables of one robot; modality `{prefix}proprio`.
+
+    In robosuite `eef_quat` is that of the last body, in ours that of the grip site.
+    """
     state, prefix = robot._state, robot.robot_model.naming_prefix
     data: mujoco.MjData = state.data
     v = robot._ref_joint_vel_indexes
@@ -70,6 +75,10 @@ def robot_observables(robot: Any, rate: float) -> list[Observable]:
             key = f"{name.removeprefix(prefix)}_site"
             made[key] = reading.bind(data)
     several = len(robot.arms) > 1
+    for arm, name in robot.robot_model.eef_name.items() if as_there else ():
+        body = robot.sim.model.index("body", name)
+        key = f"{arm}_eef_quat" if several else "eef_quat"
+        made[key] = body_quat(body).bind(data)
     for arm in robot.arms:
         key = f"{arm}_gripper" if several else "gripper"
         made |= _gripper(robot, arm, key)

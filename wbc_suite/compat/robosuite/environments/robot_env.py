@@ -7,13 +7,19 @@ from typing import Any
 import numpy as np
 
 from wbc_suite.benchmark import load_benchmark
+from wbc_suite.compat.robosuite.conventions import (
+    THEIRS,
+    check_conventions,
+    place_cameras,
+    with_their_hands,
+)
 from wbc_suite.compat.robosuite.environments.aliases import SceneNames
 from wbc_suite.compat.robosuite.environments.arguments import (
     controller_of,
     one_each,
     ours,
 )
-from wbc_suite.compat.robosuite.environments.base import MujocoEnv
+from wbc_suite.compat.robosuite.environments.base import REGISTERED_ENVS, MujocoEnv
 from wbc_suite.compat.robosuite.environments.observations import (
     PolledObservables,
     camera_observables,
@@ -37,7 +43,6 @@ from wbc_suite.compat.robosuite.utils.sim_utils import (
     check_contact,
     names_of,
 )
-from wbc_suite.compat.robosuite.utils.transform_utils import mat2quat
 from wbc_suite.envs import RobotEnv as Core
 from wbc_suite.errors import UnknownNameError
 from wbc_suite.typing import Vector
@@ -48,9 +53,16 @@ their inertias: a Panda's hand with 2.5 N m at 0.6 rad/s."""
 
 
 class RobotEnv(MujocoEnv):
-    """An environment with robots; arguments are robosuite's or ours."""
+    """An environment with robots; arguments are robosuite's or ours.
 
-    def __init__(self, robots: Any = "Panda", **arguments: Any) -> None:
+    With `conventions="wbc_suite"` grip sites, fingers, cameras and `eef_quat` are ours,
+    for recordings and policies of ours; by default they are robosuite's.
+    """
+
+    def __init__(
+        self, robots: Any = "Panda", *, conventions: str = THEIRS, **arguments: Any
+    ) -> None:
+        self.as_there = check_conventions(conventions) == THEIRS
         given = [robots] if isinstance(robots, str) else list(robots)
         self.robot_names, self.num_robots = given, len(given)
         self.use_camera_obs = arguments.get("use_camera_obs", True)
@@ -84,6 +96,9 @@ class RobotEnv(MujocoEnv):
                 control_freq=self.control_freq,
                 **robot_configs[k],
             )
+            if self.as_there:
+                own = robot.robot_model
+                own.description = with_their_hands(own.description)
             robot.composite_controller_config = controller_of(
                 configs[k], robot.robot_model.description
             )
@@ -131,6 +146,8 @@ class RobotEnv(MujocoEnv):
     def _make_sim(self, core: Core) -> MjSim:
         option = core.simulation.model.opt
         option.density, option.viscosity = AIR
+        if self.as_there and self.benchmark in REGISTERED_ENVS:
+            place_cameras(core.simulation.model, self.benchmark)
         sim = super()._make_sim(core)
         for robot, (state, controller) in zip(
             self.robots, core.simulation.pairs, strict=True
@@ -148,7 +165,7 @@ class RobotEnv(MujocoEnv):
         core, rate = self.env, self.control_freq
         found: list[Observable] = []
         for robot in self.robots:
-            found += robot_observables(robot, rate)
+            found += robot_observables(robot, rate, as_there=self.as_there)
         if self.benchmark is not None and core.config.use_object_obs:
             for prefix, readings in core.benchmark.robot_observables().items():
                 own = object_observables(readings, core.simulation.data, rate)
@@ -301,49 +318,3 @@ class ManipulationEnv(RobotEnv):
     def _eef_xpos(self) -> Vector:
         robot = self.robots[0]
         return self.sim.data.site_xpos[robot.eef_site_id[robot.arms[0]]].copy()
-
-
-class TwoArmEnv(ManipulationEnv):
-    """An environment for one robot with two arms, or two with one each."""
-
-    def _arm(self, k: int) -> tuple[Any, str]:
-        """Return robot and arm of the k-th hand."""
-        if len(self.robots) > 1:
-            return self.robots[k], self.robots[k].arms[0]
-        return self.robots[0], self.robots[0].arms[k]
-
-    def _gripper0_to_target(self, target: Any, target_type: str = "body", **kw: Any):  # noqa: ANN202 - as `_gripper_to_target`
-        robot, arm = self._arm(0)
-        return self._gripper_to_target(robot.gripper[arm], target, target_type, **kw)
-
-    def _gripper1_to_target(self, target: Any, target_type: str = "body", **kw: Any):  # noqa: ANN202 - as `_gripper_to_target`
-        robot, arm = self._arm(1)
-        return self._gripper_to_target(robot.gripper[arm], target, target_type, **kw)
-
-    def _hand(self, k: int, field: str) -> Any:
-        robot, arm = self._arm(k)
-        return getattr(self.sim.data, field)[robot.eef_site_id[arm]].copy()
-
-    @property
-    def _eef0_xpos(self) -> Vector:
-        return self._hand(0, "site_xpos")
-
-    @property
-    def _eef1_xpos(self) -> Vector:
-        return self._hand(1, "site_xpos")
-
-    @property
-    def _eef0_xmat(self) -> Any:
-        return self._hand(0, "site_xmat").reshape(3, 3)
-
-    @property
-    def _eef1_xmat(self) -> Any:
-        return self._hand(1, "site_xmat").reshape(3, 3)
-
-    @property
-    def _eef0_xquat(self) -> Vector:
-        return mat2quat(self._eef0_xmat)
-
-    @property
-    def _eef1_xquat(self) -> Vector:
-        return mat2quat(self._eef1_xmat)

@@ -7,12 +7,9 @@ import numpy as np
 
 from wbc_suite.benchmark import benchmark_names
 from wbc_suite.benchmark.wipe import MARK
-from wbc_suite.compat.robosuite.environments.robot_env import (
-    ManipulationEnv,
-    RobotEnv,
-    TwoArmEnv,
-)
+from wbc_suite.compat.robosuite.environments.robot_env import ManipulationEnv, RobotEnv
 from wbc_suite.compat.robosuite.environments.task_numbers import DEFAULT_WIPE_CONFIG
+from wbc_suite.compat.robosuite.environments.two_arm_env import TwoArmEnv
 from wbc_suite.compat.robosuite.models.objects.scene import TaskObject
 
 __all__ = ["DEFAULT_WIPE_CONFIG", "ManipulationEnv", "RobotEnv", "TwoArmEnv"]
