@@ -50,6 +50,11 @@ LOG = logging.getLogger(__name__)
 MIN_POINT_CONTACTS = 3
 """Fewer points of contact cannot balance a robot; soles can."""
 
+CORRECTION = 100.0
+"""rad/s^2 or m/s^2; most that feedback asks for, 0.11 rad off at a stiffness of 900
+1/s^2, or brakes with at a limit. Neighbours compensate for it even where the joint is
+blocked: with more, GR1's wrists were thrown at 50 rad/s."""
+
 BackendFactory = Callable[
     [RobotDescription, WholeBodyIKConfig, Configuration, ObstacleLimit], IkBackend
 ]
@@ -135,14 +140,17 @@ class WholeBodyIK:
 
     def _make_laws(self, state: RobotState, max_acceleration: float) -> None:
         """Make laws of all joints with a motor; those not solved for are held."""
-        model = self._configuration.model
         moved = moved_joints(self.robot, state)
         driven = {*moved, *(j for g in self._grippers for j in g.law.joints)}
         held = tuple(name for name in state.actuators if name not in driven)
         gains = self.config.joint_law
         self._law = JointLaw(state, (*moved, *held), kp=gains.kp, kd=gains.kd)
+        self._law.keep_limits(state)
+        drives = self._law.drives
+        drives["correction_max"] = drives["deceleration"] = CORRECTION
+        drives["velocity_max"] = np.inf  # the QP keeps it
         self._held_index = state.joint_addresses(held)[0]
-        q_index, v_index = joint_indices(model, moved)
+        q_index, v_index = joint_indices(self._configuration.model, moved)
         mean = window_length(max_acceleration, self.config.limits.jerk, self._dt)
         self._reference = SplineReference(
             self._configuration,
