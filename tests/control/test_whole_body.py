@@ -12,6 +12,7 @@ from wbc_suite.control import (
     register_composite,
 )
 from wbc_suite.control.composite.ik_report import lagging_joint
+from wbc_suite.control.composite.whole_body import CORRECTION
 from wbc_suite.control.composite.whole_body_config import (
     WholeBodyIKConfig,
     default_whole_body_config,
@@ -143,6 +144,33 @@ def test_a_limb_that_gives_way_is_no_goal_out_of_reach(alone):
     limited = lagging_joint(state, joints, elsewhere)
     assert isinstance(limited, TorqueLimit)
     assert str(limited) == f"motor limit: {joints[1]}"
+
+
+@pytest.mark.slow
+def test_a_limb_that_is_held_off_its_command_does_not_throw_its_neighbours(alone):
+    """The shoulder's neighbours compensate for what its feedback asks for."""
+    scene = alone("GR1")
+    scene.simulation.tick(10)
+    data = scene.state.data
+    data.joint("robot0_right_shoulder_yaw_joint").qpos[0] += 0.4
+    scene.simulation.tick(1)
+    asked = np.abs(scene.controller.laws[0].drives["desired"])
+    assert asked.max() == pytest.approx(CORRECTION, rel=0.01)
+
+
+@pytest.mark.slow
+def test_a_blow_does_not_carry_a_wrist_past_its_limit(alone):
+    scene = alone("GR1")
+    scene.simulation.tick(10)
+    model, data = scene.state.model, scene.state.data
+    wrist = data.joint("robot0_right_wrist_pitch_joint")
+    high = model.joint("robot0_right_wrist_pitch_joint").range[1]
+    wrist.qpos[0], wrist.qvel[0] = high - 0.05, 6.0
+    most = -np.inf
+    for _ in range(50):
+        scene.simulation.tick(1)
+        most = max(most, wrist.qpos[0] - high)
+    assert -0.05 < most < 2e-3
 
 
 @pytest.mark.slow

@@ -148,3 +148,21 @@ def test_stops_are_hard():
             passed = max(passed, data.joint(joint).qpos[0] - high)
         assert -STOP_MARGIN < passed < 1e-3
         assert data.joint(joint).qvel[0] < 0.0  # it was thrown back
+
+
+@pytest.mark.parametrize(
+    ("robot", "gripper", "joint", "margin"),
+    [
+        ("GR1", None, "R_thumb_proximal_pitch_joint", STOP_MARGIN),
+        ("GR1", None, "R_thumb_distal_joint", STOP_MARGIN),
+        ("Panda", "Robotiq140Gripper", "finger_joint", 0.0),
+        ("Panda", "Robotiq140Gripper", "right_outer_knuckle_joint", 0.0),
+    ],
+)
+def test_fingers_rest_in_their_limits_and_jaws_before_them(
+    robot, gripper, joint, margin
+):
+    """Jaws meet at the end of their travel; a blow throws fingers of hands past it."""
+    chosen = {"gripper": gripper} if gripper else {}
+    model = wbc_suite.load_robot(robot, **chosen).to_mjspec().compile()
+    assert model.joint(joint).margin.item() == margin

@@ -19,9 +19,10 @@ with a step of 2 ms. With MuJoCo's default of 20 ms a joint overshoots its limit
 STOP_SOLIMP = (0.95, 0.99, 0.001)
 """Smallest and largest impedance of joint limits, and the width between, m or rad."""
 STOP_MARGIN = 3e-3
-"""Distance in rad at which the limit of a limb joint becomes active, since MuJoCo tests
+"""Distance in rad at which the limit of a joint becomes active, since MuJoCo tests
 limits only at the start of a step (2 ms), and contacts accelerate joints to 2.6 rad/s.
-Controllers keep limbs this far inside; fingers rest at their limits and have none."""
+Controllers keep limbs this far inside; fingers of hands rest in the limit, which so
+resists a blow in the same step. Jaws of one synergy meet at their limits: none."""
 ROUNDING = 1e-12
 """Relative reserve of the triangle inequality, which MuJoCo checks without any."""
 SITE_GROUP = 4  # site group of frames, hidden by default
@@ -52,8 +53,8 @@ def build_mjspec(robot: RobotDescription, *, merged: bool = True) -> mujoco.MjSp
     spec.compiler.savecompiled = False
     bodies = {"world": spec.worldbody}
     inertias = _inertias(robot)
-    limbs = robot.groups.keys() - robot.synergies.keys()
-    limb_joints = {joint for name in limbs for joint in robot.groups[name]}
+    grippers = [found for found in robot.synergies.values() if len(found) == 1]
+    jaws = {joint for (synergy,) in grippers for joint in synergy.open}
     visual = VisualGeoms(spec, robot, merged=merged)
     for link in robot.links:
         placed = robot.root if link.parent is None else link
@@ -65,9 +66,10 @@ def build_mjspec(robot: RobotDescription, *, merged: bool = True) -> mujoco.MjSp
         if link.parent is None and robot.root.kind == "free":
             body.add_joint(name="root", type=mujoco.mjtJoint.mjJNT_FREE)
         for joint in robot.root.joints if link.parent is None else ():
-            _add_joint(body, joint, limb=False)
+            _add_joint(body, joint, margin=0.0)
         if link.joint is not None:
-            _add_joint(body, link.joint, limb=link.joint.name in limb_joints)
+            driver = link.joint.mimic.joint if link.joint.mimic else link.joint.name
+            _add_joint(body, link.joint, margin=0.0 if driver in jaws else STOP_MARGIN)
         _set_inertia(body, inertias[link.name])
         visual.add(body, link)
         add_collision_geoms(spec, body, robot, link)
@@ -98,8 +100,8 @@ def write_mjcf(robot: RobotDescription) -> str:
     return spec.to_xml()
 
 
-def _add_joint(body: mujoco.MjsBody, joint: Joint, *, limb: bool) -> None:
-    """Add a joint; hinges of limbs have a margin before their limits."""
+def _add_joint(body: mujoco.MjsBody, joint: Joint, *, margin: float) -> None:
+    """Add a joint; a hinge has a margin before its limits."""
     kinds = mujoco.mjtJoint
     added = body.add_joint(
         name=joint.name,
@@ -116,8 +118,8 @@ def _add_joint(body: mujoco.MjsBody, joint: Joint, *, limb: bool) -> None:
         added.solref_limit = STOP_SOLREF
         added.solimp_limit[:3] = STOP_SOLIMP
         added.range = joint.range
-        if joint.type == "hinge" and limb:
-            added.margin = STOP_MARGIN
+        if joint.type == "hinge":
+            added.margin = margin
 
 
 def _inertias(robot: RobotDescription) -> dict[str, pin.Inertia]:

@@ -5,6 +5,7 @@ from itertools import product
 
 import mujoco
 import numpy as np
+import pinocchio as pin
 
 from wbc_suite.control.composite.reduced_robot import joint_indices, planar_joints
 from wbc_suite.control.composite.whole_body_config import (
@@ -19,6 +20,7 @@ from wbc_suite.control.part.stance_controller import soles_of
 from wbc_suite.errors import UnknownNameError
 from wbc_suite.kinematics import Configuration, Conversion
 from wbc_suite.kinematics.configuration import random_configuration
+from wbc_suite.planning import LimitChecker
 from wbc_suite.qp import (
     AccelerationLimit,
     FloorLimit,
@@ -92,6 +94,14 @@ def weight_limits(
     """Return the limit of what some motors hold, if the config has one."""
     shares = config.limits.weight_shares
     return [WeightLimit(_greatest_weights(robot, shares))] if shares else []
+
+
+def limit_checker(
+    robot: RobotDescription, config: WholeBodyIKConfig, model: pin.Model
+) -> LimitChecker:
+    """Return what checks the limits of distances and weights along a path."""
+    distances = distance_limits(robot, config)
+    return LimitChecker(model, distances, weight_limits(robot, config))
 
 
 def _greatest_weights(

@@ -14,11 +14,7 @@ from wbc_suite.control.composite.finger_capsules import FingerCapsules
 from wbc_suite.control.composite.frame_goals import FrameGoals, place_goals
 from wbc_suite.control.composite.frame_targets import ControlledFrames
 from wbc_suite.control.composite.ik_report import Commanded, IkReport
-from wbc_suite.control.composite.qp_tasks import (
-    accelerations,
-    distance_limits,
-    weight_limits,
-)
+from wbc_suite.control.composite.qp_tasks import accelerations, limit_checker
 from wbc_suite.control.composite.reduced_robot import (
     joint_indices,
     keyframe_posture,
@@ -44,7 +40,7 @@ from wbc_suite.control.part.stance_controller import feet_of, soles_of
 from wbc_suite.control.state import RobotState
 from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Configuration, Conversion
-from wbc_suite.planning import LimitChecker, SceneCollisionChecker
+from wbc_suite.planning import SceneCollisionChecker
 from wbc_suite.qp import ObstacleLimit
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Vector
@@ -53,6 +49,11 @@ LOG = logging.getLogger(__name__)
 
 MIN_POINT_CONTACTS = 3
 """Fewer points of contact cannot balance a robot; soles can."""
+
+CORRECTION = 100.0
+"""rad/s^2 or m/s^2; most that feedback asks for, 0.11 rad off at a stiffness of 900
+1/s^2, or brakes with at a limit. Neighbours compensate for it even where the joint is
+blocked: with more, GR1's wrists were thrown at 50 rad/s."""
 
 BackendFactory = Callable[
     [RobotDescription, WholeBodyIKConfig, Configuration, ObstacleLimit], IkBackend
@@ -125,12 +126,10 @@ class WholeBodyIK:
 
     def _make_planner(self, state: RobotState) -> WaypointPlanner:
         scene = SceneCollisionChecker(state.model, state.data, self._conversion)
-        given = self.robot, self.config
-        kept = LimitChecker(
-            self._configuration.model, distance_limits(*given), weight_limits(*given)
-        )
+        kept = limit_checker(self.robot, self.config, self._configuration.model)
         return WaypointPlanner(
-            *given,
+            self.robot,
+            self.config,
             self._configuration,
             self.frames,
             clearance=lambda q: min(kept.clearance(q), scene.clearance(q)),
@@ -140,14 +139,17 @@ class WholeBodyIK:
 
     def _make_laws(self, state: RobotState, max_acceleration: float) -> None:
         """Make laws of all joints with a motor; those not solved for are held."""
-        model = self._configuration.model
         moved = moved_joints(self.robot, state)
         driven = {*moved, *(j for g in self._grippers for j in g.law.joints)}
         held = tuple(name for name in state.actuators if name not in driven)
         gains = self.config.joint_law
         self._law = JointLaw(state, (*moved, *held), kp=gains.kp, kd=gains.kd)
+        self._law.keep_limits(state)
+        drives = self._law.drives
+        drives["correction_max"] = drives["deceleration"] = CORRECTION
+        drives["velocity_max"] *= 1.1  # the QP keeps it; to catch up takes more
         self._held_index = state.joint_addresses(held)[0]
-        q_index, v_index = joint_indices(model, moved)
+        q_index, v_index = joint_indices(self._configuration.model, moved)
         mean = window_length(max_acceleration, self.config.limits.jerk, self._dt)
         self._reference = SplineReference(
             self._configuration,
