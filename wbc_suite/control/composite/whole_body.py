@@ -147,7 +147,6 @@ class WholeBodyIK:
         self._law.keep_limits(state)
         drives = self._law.drives
         drives["correction_max"] = drives["deceleration"] = CORRECTION
-        drives["velocity_max"] *= 1.1  # the QP keeps it; to catch up takes more
         self._held_index = state.joint_addresses(held)[0]
         q_index, v_index = joint_indices(self._configuration.model, moved)
         mean = window_length(max_acceleration, self.config.limits.jerk, self._dt)
