@@ -321,3 +321,11 @@ def test_states_of_another_robot_with_as_many_joints_are_told(
             assert next(play_states(env, other)) == 0
             assert "elbow' is '" in caplog.text
         assert next(play_states(env, episode)) == 0
+
+
+@pytest.mark.slow
+def test_robomimics_environment_keeps_our_conventions(lift_recording, tmp_path):
+    with Dataset(convert(lift_recording, tmp_path / "out.hdf5", "robomimic")) as found:
+        fields = json.loads(found.header["env_args"])
+    assert fields["type"] == 1
+    assert fields["env_kwargs"]["conventions"] == "wbc_suite"
