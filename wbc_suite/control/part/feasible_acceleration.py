@@ -38,7 +38,7 @@ def feasible_accelerations(
             left = max(joint.effort - float(weight[v]), 0.2 * joint.effort)
             least = LEAST_ACCELERATION
             if weight[v] > joint.effort:  # its weight takes up to `WEIGHT_SHARE`
-                left, least = (1.0 - WEIGHT_SHARE) * joint.effort / effort_share, 0.0
+                left, least = (1.0 - WEIGHT_SHARE) * joint.effort, 0.0
             feasible = effort_share * left / float(inertia[v])
             limit = min(limit, max(feasible, least))
         found[joint.name] = limit
