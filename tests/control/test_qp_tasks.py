@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from wbc_suite.control import load_composite_controller_config
-from wbc_suite.control.composite.qp_tasks import distance_limits, joint_accelerations
+from wbc_suite.control.composite.qp_tasks import distance_limits
 from wbc_suite.control.composite.whole_body_config import read_whole_body
-from wbc_suite.control.part.feasible_acceleration import WEIGHT_SHARE, greatest_loads
 from wbc_suite.envs.hold_check import alone
 from wbc_suite.robot import load_robot
 
@@ -57,17 +56,6 @@ def test_weak_motors_are_asked_for_postures_that_they_can_hold(tmp_path):
         env.step(action)
     q = float(env.simulation.data.joint("robot0_hinge").qpos[0])
     assert np.sin(-q) == pytest.approx(0.45, rel=0.02)  # of the torque when level
-
-
-def test_a_weak_motor_accelerates_by_what_its_weight_leaves_of_its_effort(tmp_path):
-    path = tmp_path / "pendulum.urdf"
-    path.write_text(PENDULUM.format(effort=0.5 * WEIGHT))
-    robot = load_robot(path)
-    (acceleration,) = joint_accelerations(robot, config_of(robot)).values()
-    inertia, _ = greatest_loads(robot.to_pinocchio())
-    held = WEIGHT_SHARE * 0.5 * WEIGHT
-    assert 0.0 < acceleration
-    assert held + inertia[0] * acceleration < 0.5 * WEIGHT
 
 
 def test_strong_motors_have_no_limit_of_weight(tmp_path):

@@ -36,11 +36,8 @@ def feasible_accelerations(
         if joint.effort is not None:
             v = model.joints[model.getJointId(joint.name)].idx_v
             left = max(joint.effort - float(weight[v]), 0.2 * joint.effort)
-            least = LEAST_ACCELERATION
-            if weight[v] > joint.effort:  # its weight takes up to `WEIGHT_SHARE`
-                left, least = (1.0 - WEIGHT_SHARE) * joint.effort, 0.0
             feasible = effort_share * left / float(inertia[v])
-            limit = min(limit, max(feasible, least))
+            limit = min(limit, max(feasible, LEAST_ACCELERATION))
         found[joint.name] = limit
     return found
 
