@@ -6,7 +6,6 @@ import pinocchio as pin
 import pytest
 
 import wbc_suite
-from wbc_suite.robot.mjcf_export import STOP_MARGIN
 
 SHEET = 0.727  # kg
 LINK_7 = 0.99  # kg, of kinova-ros: the wrist's share and the palm
@@ -64,8 +63,7 @@ def test_each_command_moves_its_own_finger(hand, finger):
         assert float(data.joint(f"joint_{other}").qpos[0]) == pytest.approx(
             wanted, abs=5e-3
         )
-        distal = float(data.joint(f"joint_{other}_distal").qpos[0])
-        assert abs(distal) < STOP_MARGIN  # it rests in the margin of its limit
+        assert abs(float(data.joint(f"joint_{other}_distal").qpos[0])) < 2e-3
 
 
 def test_tips_meet_when_closed(hand):

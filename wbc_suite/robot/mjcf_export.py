@@ -22,7 +22,8 @@ STOP_MARGIN = 3e-3
 """Distance in rad at which the limit of a joint becomes active, since MuJoCo tests
 limits only at the start of a step (2 ms), and contacts accelerate joints to 2.6 rad/s.
 Controllers keep limbs this far inside; fingers of hands rest in the limit, which so
-resists a blow in the same step. Jaws of one synergy meet at their limits: none."""
+resists a blow in the same step. Jaws of one synergy meet at their limits, and what
+nothing moves rests there: none."""
 ROUNDING = 1e-12
 """Relative reserve of the triangle inequality, which MuJoCo checks without any."""
 SITE_GROUP = 4  # site group of frames, hidden by default
@@ -53,8 +54,10 @@ def build_mjspec(robot: RobotDescription, *, merged: bool = True) -> mujoco.MjSp
     spec.compiler.savecompiled = False
     bodies = {"world": spec.worldbody}
     inertias = _inertias(robot)
-    grippers = [found for found in robot.synergies.values() if len(found) == 1]
-    jaws = {joint for (synergy,) in grippers for joint in synergy.open}
+    limbs = robot.groups.keys() - robot.synergies.keys()
+    bounded = {joint for name in limbs for joint in robot.groups[name]}
+    hands = [found for found in robot.synergies.values() if len(found) > 1]
+    bounded |= {joint for found in hands for synergy in found for joint in synergy.open}
     visual = VisualGeoms(spec, robot, merged=merged)
     for link in robot.links:
         placed = robot.root if link.parent is None else link
@@ -68,8 +71,10 @@ def build_mjspec(robot: RobotDescription, *, merged: bool = True) -> mujoco.MjSp
         for joint in robot.root.joints if link.parent is None else ():
             _add_joint(body, joint, margin=0.0)
         if link.joint is not None:
-            driver = link.joint.mimic.joint if link.joint.mimic else link.joint.name
-            _add_joint(body, link.joint, margin=0.0 if driver in jaws else STOP_MARGIN)
+            mimic = link.joint.mimic  # one of ratio 0 rests where it is
+            driver = mimic.joint if mimic and mimic.ratio else link.joint.name
+            margin = STOP_MARGIN if driver in bounded else 0.0
+            _add_joint(body, link.joint, margin=margin)
         _set_inertia(body, inertias[link.name])
         visual.add(body, link)
         add_collision_geoms(spec, body, robot, link)
