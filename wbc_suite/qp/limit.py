@@ -29,6 +29,8 @@ class LimitKind(IntEnum):
     OTHER = 9
     """A limit of a user's own that names no kind."""
     OBSTACLE = 10
+    TRACKING = 11
+    """A joint that lags behind its command by as much as it may."""
 
     def __str__(self) -> str:
         """Return the name as reports print it: "self-collision"."""
@@ -101,6 +103,7 @@ class JointBounds(NamedTuple):
     position_gain: Vector  # fraction of the distance to a limit that a step may cover
     v_max: Vector  # speed limits, inf where there is none
     a_max: Vector  # acceleration limits, inf where there is none
+    room: Matrix  # (2, nv), how far each may go down and up for now, >= 0, else inf
 
 
 def unlimited_bounds(configuration: Configuration) -> JointBounds:
@@ -110,10 +113,9 @@ def unlimited_bounds(configuration: Configuration) -> JointBounds:
     for _, joint in named_joints(configuration.model):
         if joint.nq == 1 and joint.nv == 1:
             q_index[joint.idx_v] = joint.idx_q
-    infinite = np.full(nv, np.inf)
-    return JointBounds(
-        q_index, -infinite, infinite, np.ones(nv), infinite.copy(), infinite.copy()
-    )
+    infinite, room = np.full(nv, np.inf), np.full((2, nv), np.inf)
+    none = infinite.copy(), infinite.copy()
+    return JointBounds(q_index, -infinite, infinite, np.ones(nv), *none, room)
 
 
 def joint_values(
@@ -169,19 +171,24 @@ def merge_bounds(
     """
     nv, q_index, gain = lower.shape[0], bounds.q_index, bounds.position_gain
     q_lower, q_upper = bounds.q_lower, bounds.q_upper
-    v_max, a_max = bounds.v_max, bounds.a_max
+    v_max, a_max, room = bounds.v_max, bounds.a_max, bounds.room
     for i in range(nv):
         window = a_max[i] * dt * dt
         lo, hi = v_previous[i] * dt - window, v_previous[i] * dt + window
         lo_kind = hi_kind = LimitKind.ACCELERATION.value
         k = q_index[i]
         if k >= 0:
-            top = _reach(q_upper[i] - q[k], gain[i], a_max[i], dt)
-            bottom = -_reach(q[k] - q_lower[i], gain[i], a_max[i], dt)
+            down, up = q[k] - q_lower[i], q_upper[i] - q[k]
+            kind = LimitKind.POSITION.value
+            if room[0, i] < down or room[1, i] < up:
+                down, up = min(down, room[0, i]), min(up, room[1, i])
+                kind = LimitKind.TRACKING.value
+            bottom = -_reach(down, gain[i], a_max[i], dt)
+            top = _reach(up, gain[i], a_max[i], dt)
             if lo < bottom or lo > top:
-                lo, lo_kind = min(max(lo, bottom), top), LimitKind.POSITION.value
+                lo, lo_kind = min(max(lo, bottom), top), kind
             if hi < bottom or hi > top:
-                hi, hi_kind = min(max(hi, bottom), top), LimitKind.POSITION.value
+                hi, hi_kind = min(max(hi, bottom), top), kind
         step = v_max[i] * dt
         if lo < -step or lo > step:
             lo, lo_kind = min(max(lo, -step), step), LimitKind.VELOCITY.value

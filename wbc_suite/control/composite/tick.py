@@ -33,8 +33,13 @@ from wbc_suite.control.composite.scene_obstacles import SceneArrays, measure_obs
 from wbc_suite.control.composite.torque_limiter import TorqueArrays, motors_suffice
 from wbc_suite.control.law.reference import set_reference
 from wbc_suite.control.loop.records import CompiledRecords, Records
-from wbc_suite.control.part.spline_reference import SplineArrays, extend_spline
+from wbc_suite.control.part.spline_reference import (
+    SplineArrays,
+    extend_spline,
+    spline_target,
+)
 from wbc_suite.linear_algebra import copy_vector
+from wbc_suite.qp.limit import JointBounds
 from wbc_suite.qp.tick import TickArrays, TickStatus, solve_tick
 from wbc_suite.typing import Indices, Vector
 
@@ -116,6 +121,9 @@ def run_tick(
     and drives the records of the loop.
     """
     state, qp, robot = tick.state[0], tick.qp, tick.qp.robot
+    law = tick.joint_law
+    own = drives[laws[law].first : laws[law].last]
+    _limit_lead(qp.bounds, tick.spline, own, qpos)
     place_goals(tick.goals, robot, tick.frames, qpos)
     measure_obstacles(tick.scene)
     place_fingers(tick.fingers)
@@ -136,11 +144,21 @@ def run_tick(
         return False
     copy_vector(qp.v, tick.v)
     extend_spline(tick.spline, tick.v)
-    law = tick.joint_law
-    own = drives[laws[law].first : laws[law].last]
     set_reference(laws[law : law + 1], own, tick.spline.motion)
     state.stage, state.countdown = Stage.DONE.value, tick.steps
     return True
+
+
+@compiled
+def _limit_lead(
+    bounds: JointBounds, spline: SplineArrays, drives: CompiledRecords, qpos: Vector
+) -> None:
+    """Write how far each joint's command may go on ahead of the joint."""
+    for j in range(spline.q_index.shape[0]):
+        most, i = drives[j].windup_max, spline.v_index[j]
+        lead = spline_target(spline, j) - qpos[drives[j].qpos]
+        bounds.room[0, i] = max(most + lead, 0.0)
+        bounds.room[1, i] = max(most - lead, 0.0)
 
 
 @compiled

@@ -55,6 +55,9 @@ CORRECTION = 100.0
 1/s^2, or brakes with at a limit. Neighbours compensate for it even where the joint is
 blocked: with more, GR1's wrists were thrown at 50 rad/s."""
 
+MAX_LEAD = 0.1
+"""rad or m; a command waits for a joint that lags behind by more."""
+
 BackendFactory = Callable[
     [RobotDescription, WholeBodyIKConfig, Configuration, ObstacleLimit], IkBackend
 ]
@@ -147,6 +150,7 @@ class WholeBodyIK:
         self._law.keep_limits(state)
         drives = self._law.drives
         drives["correction_max"] = drives["deceleration"] = CORRECTION
+        drives["windup_max"] = MAX_LEAD
         self._held_index = state.joint_addresses(held)[0]
         q_index, v_index = joint_indices(self._configuration.model, moved)
         mean = window_length(max_acceleration, self.config.limits.jerk, self._dt)

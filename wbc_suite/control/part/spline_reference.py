@@ -134,10 +134,8 @@ class SplineReference:
 
     def targets(self) -> Vector:
         """Return where the driven joints are to be when the next solve is due, (m,)."""
-        arrays = self._arrays
-        change = arrays.rates[2] - arrays.rates[1]
-        lead = arrays.period / 6.0 * change[arrays.v_index]
-        return arrays.points[1][arrays.q_index] + lead
+        count = len(self._arrays.q_index)
+        return np.array([spline_target(self.argument, j) for j in range(count)])
 
 
 @compiled
@@ -164,6 +162,14 @@ def extend_spline(spline: SplineArrays, v: Vector) -> None:
         spline.root[0, i], spline.root[1, i] = lead, v_now
         spline.root[2, i], spline.root[3, i] = a, jerk
     spline.since[0] = 0.0
+
+
+@compiled
+def spline_target(spline: SplineArrays, j: int) -> float:
+    """Return where the j-th driven joint is to be when the next solve is due."""
+    rates, i = spline.rates, spline.v_index[j]
+    change = rates[2, i] - rates[1, i]
+    return spline.points[1, spline.q_index[j]] + spline.period / 6.0 * change
 
 
 @compiled
