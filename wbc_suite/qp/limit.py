@@ -103,7 +103,7 @@ class JointBounds(NamedTuple):
     position_gain: Vector  # fraction of the distance to a limit that a step may cover
     v_max: Vector  # speed limits, inf where there is none
     a_max: Vector  # acceleration limits, inf where there is none
-    room: Matrix  # (2, nv), how far each may go down and up for now, >= 0, else inf
+    room: Matrix  # (2, nv), greatest next step down and up, >= 0, inf where unlimited
 
 
 def unlimited_bounds(configuration: Configuration) -> JointBounds:
@@ -178,13 +178,12 @@ def merge_bounds(
         lo_kind = hi_kind = LimitKind.ACCELERATION.value
         k = q_index[i]
         if k >= 0:
-            down, up = q[k] - q_lower[i], q_upper[i] - q[k]
+            bottom = -braking_step(q[k] - q_lower[i], gain[i], a_max[i], dt)
+            top = braking_step(q_upper[i] - q[k], gain[i], a_max[i], dt)
             kind = LimitKind.POSITION.value
-            if room[0, i] < down or room[1, i] < up:
-                down, up = min(down, room[0, i]), min(up, room[1, i])
+            if -room[0, i] > bottom or room[1, i] < top:
+                bottom, top = max(bottom, -room[0, i]), min(top, room[1, i])
                 kind = LimitKind.TRACKING.value
-            bottom = -_reach(down, gain[i], a_max[i], dt)
-            top = _reach(up, gain[i], a_max[i], dt)
             if lo < bottom or lo > top:
                 lo, lo_kind = min(max(lo, bottom), top), kind
             if hi < bottom or hi > top:
@@ -199,7 +198,7 @@ def merge_bounds(
 
 
 @compiled
-def _reach(distance: float, gain: float, a: float, dt: float) -> float:
+def braking_step(distance: float, gain: float, a: float, dt: float) -> float:
     """Return the greatest step towards a limit that is a distance away.
 
     It is a fraction of the distance, and no more than what can still be braked in the

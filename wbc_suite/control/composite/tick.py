@@ -36,10 +36,10 @@ from wbc_suite.control.loop.records import CompiledRecords, Records
 from wbc_suite.control.part.spline_reference import (
     SplineArrays,
     extend_spline,
-    spline_target,
+    spline_end,
 )
 from wbc_suite.linear_algebra import copy_vector
-from wbc_suite.qp.limit import JointBounds
+from wbc_suite.qp.limit import braking_step
 from wbc_suite.qp.tick import TickArrays, TickStatus, solve_tick
 from wbc_suite.typing import Indices, Vector
 
@@ -113,17 +113,21 @@ without any, which leaves them out of the machine code."""
 
 @compiled_inline
 def run_tick(
-    tick: WholeBodyArrays, qpos: Vector, laws: CompiledRecords, drives: CompiledRecords
+    tick: WholeBodyArrays,
+    qpos: Vector,
+    qvel: Vector,
+    laws: CompiledRecords,
+    drives: CompiledRecords,
 ) -> bool:
     """Run a tick as far as it needs no Python; return whether it is done.
 
-    See `Stage` where it is not. `qpos` are measured positions of the simulation, laws
-    and drives the records of the loop.
+    See `Stage` where it is not. `qpos` and `qvel` are measured in the simulation, laws
+    and drives are the records of the loop.
     """
     state, qp, robot = tick.state[0], tick.qp, tick.qp.robot
     law = tick.joint_law
     own = drives[laws[law].first : laws[law].last]
-    _limit_lead(qp.bounds, tick.spline, own, qpos)
+    _limit_lead(tick, own, qpos, qvel)
     place_goals(tick.goals, robot, tick.frames, qpos)
     measure_obstacles(tick.scene)
     place_fingers(tick.fingers)
@@ -151,14 +155,23 @@ def run_tick(
 
 @compiled
 def _limit_lead(
-    bounds: JointBounds, spline: SplineArrays, drives: CompiledRecords, qpos: Vector
+    tick: WholeBodyArrays, drives: CompiledRecords, qpos: Vector, qvel: Vector
 ) -> None:
-    """Write how far each joint's command may go on ahead of the joint."""
+    """Write the steps that keep each joint's lead: its command less its position.
+
+    A lead e grows by the velocity that the joint lacks. A step so much shorter than
+    the last keeps it, and may be longer by what is braked within the lead that is left.
+    """
+    spline, bounds, dt = tick.spline, tick.qp.bounds, tick.progress.dt
     for j in range(spline.q_index.shape[0]):
-        most, i = drives[j].windup_max, spline.v_index[j]
-        lead = spline_target(spline, j) - qpos[drives[j].qpos]
-        bounds.room[0, i] = max(most + lead, 0.0)
-        bounds.room[1, i] = max(most - lead, 0.0)
+        drive, i = drives[j], spline.v_index[j]
+        position, velocity = spline_end(spline, j)
+        most, lead = drive.windup_max, position - qpos[drive.qpos]
+        kept = dt * (tick.v[i] + qvel[drive.dof] - velocity)
+        for side, sign in enumerate((-1.0, 1.0)):
+            left = max(most - sign * lead, 0.0)
+            longer = braking_step(left, 1.0, bounds.a_max[i], dt)
+            bounds.room[side, i] = max(sign * kept + longer, 0.0)
 
 
 @compiled

@@ -34,6 +34,7 @@ from wbc_suite.control.dynamics.standing import Standing
 from wbc_suite.control.law.joint_laws import JointLaw
 from wbc_suite.control.law.law import Law
 from wbc_suite.control.loop.records import readable
+from wbc_suite.control.part.feasible_acceleration import saturating_errors
 from wbc_suite.control.part.gripper import GripperController
 from wbc_suite.control.part.spline_reference import SplineReference, window_length
 from wbc_suite.control.part.stance_controller import feet_of, soles_of
@@ -50,13 +51,9 @@ LOG = logging.getLogger(__name__)
 MIN_POINT_CONTACTS = 3
 """Fewer points of contact cannot balance a robot; soles can."""
 
-CORRECTION = 100.0
-"""rad/s^2 or m/s^2; most that feedback asks for, 0.11 rad off at a stiffness of 900
-1/s^2, or brakes with at a limit. Neighbours compensate for it even where the joint is
-blocked: with more, GR1's wrists were thrown at 50 rad/s."""
-
-MAX_LEAD = 0.1
-"""rad or m; a command waits for a joint that lags behind by more."""
+MAX_LEAD = 0.25
+"""rad or m; a command waits for a joint that lags behind by more, so that a joint does
+not jump when it comes free. It waits sooner where the motor saturates."""
 
 BackendFactory = Callable[
     [RobotDescription, WholeBodyIKConfig, Configuration, ObstacleLimit], IkBackend
@@ -147,10 +144,9 @@ class WholeBodyIK:
         held = tuple(name for name in state.actuators if name not in driven)
         gains = self.config.joint_law
         self._law = JointLaw(state, (*moved, *held), kp=gains.kp, kd=gains.kd)
-        self._law.keep_limits(state)
-        drives = self._law.drives
-        drives["correction_max"] = drives["deceleration"] = CORRECTION
-        drives["windup_max"] = MAX_LEAD
+        errors = saturating_errors(self.robot, gains.kp)
+        leads = [min(MAX_LEAD, errors.get(j, MAX_LEAD)) for j in self._law.joints]
+        self._law.drives["windup_max"] = leads
         self._held_index = state.joint_addresses(held)[0]
         q_index, v_index = joint_indices(self._configuration.model, moved)
         mean = window_length(max_acceleration, self.config.limits.jerk, self._dt)

@@ -105,7 +105,7 @@ def _run_ticks(
     if ticks is not None:
         for tick in ticks:
             is_due = tick.state[0].countdown <= 0
-            if is_due and not run_tick(tick, physics.qpos, laws, drives):
+            if is_due and not run_tick(tick, physics.qpos, physics.qvel, laws, drives):
                 return False
     return True
 

@@ -1,4 +1,4 @@
-"""Feasible accelerations of joints, from the effort of their motors."""
+"""What motors can do: feasible accelerations and errors of their joints."""
 
 import logging
 from collections.abc import Collection
@@ -39,6 +39,22 @@ def feasible_accelerations(
             feasible = effort_share * left / float(inertia[v])
             limit = min(limit, max(feasible, LEAST_ACCELERATION))
         found[joint.name] = limit
+    return found
+
+
+def saturating_errors(robot: RobotDescription, stiffness: float) -> dict[str, float]:
+    """Return the error at which feedback takes a motor's effort, rad or m, by joint.
+
+    A command that leads its joint by more adds no force, and its neighbours compensate
+    for an acceleration that does not happen. The stiffness is in 1/s^2.
+    """
+    model = robot.to_pinocchio()
+    inertia, _ = greatest_loads(model)
+    found: dict[str, float] = {}
+    for joint in robot.joints:
+        if joint.effort is not None:
+            v = model.joints[model.getJointId(joint.name)].idx_v
+            found[joint.name] = joint.effort / (stiffness * float(inertia[v]))
     return found
 
 

@@ -135,7 +135,7 @@ class SplineReference:
     def targets(self) -> Vector:
         """Return where the driven joints are to be when the next solve is due, (m,)."""
         count = len(self._arrays.q_index)
-        return np.array([spline_target(self.argument, j) for j in range(count)])
+        return np.array([spline_end(self.argument, j)[0] for j in range(count)])
 
 
 @compiled
@@ -165,11 +165,12 @@ def extend_spline(spline: SplineArrays, v: Vector) -> None:
 
 
 @compiled
-def spline_target(spline: SplineArrays, j: int) -> float:
-    """Return where the j-th driven joint is to be when the next solve is due."""
-    rates, i = spline.rates, spline.v_index[j]
-    change = rates[2, i] - rates[1, i]
-    return spline.points[1, spline.q_index[j]] + spline.period / 6.0 * change
+def spline_end(spline: SplineArrays, j: int) -> tuple[float, float]:
+    """Return position and velocity of the j-th driven joint when a solve is due."""
+    i = spline.v_index[j]
+    before, last = spline.rates[1, i], spline.rates[2, i]
+    position = spline.points[1, spline.q_index[j]]
+    return position + spline.period / 6.0 * (last - before), 0.5 * (before + last)
 
 
 @compiled
