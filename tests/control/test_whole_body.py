@@ -12,7 +12,6 @@ from wbc_suite.control import (
     register_composite,
 )
 from wbc_suite.control.composite.ik_report import lagging_joint
-from wbc_suite.control.composite.whole_body import CORRECTION
 from wbc_suite.control.composite.whole_body_config import (
     WholeBodyIKConfig,
     default_whole_body_config,
@@ -147,15 +146,31 @@ def test_a_limb_that_gives_way_is_no_goal_out_of_reach(alone):
 
 
 @pytest.mark.slow
-def test_a_limb_that_is_held_off_its_command_does_not_throw_its_neighbours(alone):
-    """The shoulder's neighbours compensate for what its feedback asks for."""
-    scene = alone("GR1")
-    scene.simulation.tick(10)
-    data = scene.state.data
-    data.joint("robot0_right_shoulder_yaw_joint").qpos[0] += 0.4
-    scene.simulation.tick(1)
-    asked = np.abs(scene.controller.laws[0].drives["desired"])
-    assert asked.max() == pytest.approx(CORRECTION, rel=0.01)
+@pytest.mark.parametrize(
+    ("robot", "name"),
+    [("Panda", "panda_joint4"), ("GR1", "right_elbow_pitch_joint")],
+)
+def test_a_command_waits_for_a_joint_that_is_held(alone, robot, name):
+    """It went on to the goal before, and the joint jumped when it came free."""
+    scene = alone(robot)
+    joint = scene.state.data.joint(f"robot0_{name}")
+    law = scene.controller.laws[0]
+    most = float(law.drives["windup_max"][law.joints.index(name)])
+    held, leads, kinds = float(joint.qpos[0]), [], set()
+    part = scene.controller.layout["right_hand"]
+    goal = scene.controller.hold_action
+    goal[part.start : part.stop] += 5.0 * STEP
+    scene.controller.set_goal(goal)
+    for _ in range(500):
+        scene.simulation.tick(1)
+        joint.qpos[0], joint.qvel[0] = held, 0.0
+        leads.append(abs(scene.controller.joint_targets[name] - held))
+        report = scene.controller.info(scene.state)["ik"]["frames"]["right_hand"]
+        kinds |= {r.kind for r in report["reasons"] if isinstance(r, ActiveLimit)}
+    assert max(leads) == pytest.approx(most, rel=0.02)
+    assert LimitKind.TRACKING in kinds
+    report = scene.act({}, 2.0)["frames"]["right_hand"]
+    assert report["reached"]
 
 
 @pytest.mark.slow

@@ -47,8 +47,8 @@ def describe_reason(reason: Reason) -> str:
             return f"{plain(link)} presses on {plain(other)}"
         case TorqueLimit(joint):
             return f"{plain(joint)} is at its torque limit"
-        case TrackingError(joint):
-            return f"{plain(joint)} lags behind its target"
+        case TrackingError(joint) | ActiveLimit(LimitKind.TRACKING, joint):
+            return f"{plain(str(joint))} lags behind its target"
         case OutOfReach():
             return "out of reach"
     return str(reason)

@@ -157,20 +157,22 @@ def run_tick(
 def _limit_lead(
     tick: WholeBodyArrays, drives: CompiledRecords, qpos: Vector, qvel: Vector
 ) -> None:
-    """Write the steps that keep each joint's lead: its command less its position.
+    """Write the greatest steps with which commands do not lead their joints by more.
 
-    A lead e grows by the velocity that the joint lacks. A step so much shorter than
-    the last keeps it, and may be longer by what is braked within the lead that is left.
+    The lead is e + (kd / kp) e', as feedback measures it. It grows by the velocity that
+    the joint lacks: a step that is shorter than the last by so much keeps it. A step
+    may be longer by what can be braked within the lead that is left.
     """
     spline, bounds, dt = tick.spline, tick.qp.bounds, tick.progress.dt
     for j in range(spline.q_index.shape[0]):
         drive, i = drives[j], spline.v_index[j]
         position, velocity = spline_end(spline, j)
-        most, lead = drive.windup_max, position - qpos[drive.qpos]
-        kept = dt * (tick.v[i] + qvel[drive.dof] - velocity)
+        most, growth = drive.windup_max, velocity - qvel[drive.dof]
+        lead = position - qpos[drive.qpos] + drive.kd / drive.kp * growth
+        kept, a_max = dt * (tick.v[i] - growth), float(bounds.a_max[i])
         for side, sign in enumerate((-1.0, 1.0)):
             left = max(most - sign * lead, 0.0)
-            longer = braking_step(left, 1.0, bounds.a_max[i], dt)
+            longer = braking_step(float(left), 1.0, a_max, dt)
             bounds.room[side, i] = max(sign * kept + longer, 0.0)
 
 
