@@ -2,8 +2,10 @@
 
 from functools import partial
 
+import mujoco
 import numpy as np
 
+from wbc_suite.compiling import as_argument
 from wbc_suite.control.composite.backend import IkStep
 from wbc_suite.control.composite.frame_kinds import NO_SPEED_LIMIT, set_target
 from wbc_suite.control.composite.qp_tasks import (
@@ -13,8 +15,11 @@ from wbc_suite.control.composite.qp_tasks import (
     make_limits,
     travel_costs,
 )
+from wbc_suite.control.composite.tick import limit_lead
 from wbc_suite.control.composite.torque_limiter import TorqueLimiter
 from wbc_suite.control.composite.whole_body_config import WholeBodyIKConfig
+from wbc_suite.control.law.joint_laws import JointLaw
+from wbc_suite.control.part.spline_reference import SplineReference
 from wbc_suite.control.reasons import Reason
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp import (
@@ -116,6 +121,13 @@ class StackBackend:
         self._joint_stack.v_previous[:] = self.v
         self._joint_stack.bounds.room[:] = self.stack.bounds.room
         return self._step(self._joint_stack, self._joint_stack.solve(dt), dt)
+
+    def limit_lead(
+        self, reference: SplineReference, law: JointLaw, data: mujoco.MjData
+    ) -> None:
+        """Limit the next step as `tick.limit_lead` does."""
+        bounds, spline = as_argument(self.stack.bounds), reference.argument
+        limit_lead(bounds, spline, self.v, law.drives, data.qpos, data.qvel)
 
     def finish(self, dt: float, status: int, level: int) -> IkStep:
         """Finish a tick that `solve_tick` has left with a `TickStatus` at a level."""

@@ -39,7 +39,7 @@ from wbc_suite.control.part.spline_reference import (
     spline_end,
 )
 from wbc_suite.linear_algebra import copy_vector
-from wbc_suite.qp.limit import braking_step
+from wbc_suite.qp.limit import JointBounds, braking_step
 from wbc_suite.qp.tick import TickArrays, TickStatus, solve_tick
 from wbc_suite.typing import Indices, Vector
 
@@ -127,7 +127,7 @@ def run_tick(
     state, qp, robot = tick.state[0], tick.qp, tick.qp.robot
     law = tick.joint_law
     own = drives[laws[law].first : laws[law].last]
-    _limit_lead(tick, own, qpos, qvel)
+    limit_lead(qp.bounds, tick.spline, tick.v, own, qpos, qvel)
     place_goals(tick.goals, robot, tick.frames, qpos)
     measure_obstacles(tick.scene)
     place_fingers(tick.fingers)
@@ -154,22 +154,27 @@ def run_tick(
 
 
 @compiled
-def _limit_lead(
-    tick: WholeBodyArrays, drives: CompiledRecords, qpos: Vector, qvel: Vector
+def limit_lead(
+    bounds: JointBounds,
+    spline: SplineArrays,
+    v: Vector,
+    drives: CompiledRecords,
+    qpos: Vector,
+    qvel: Vector,
 ) -> None:
     """Write the greatest steps with which commands do not lead their joints by more.
 
     The lead is e + (kd / kp) e', as feedback measures it. It grows by the velocity that
-    the joint lacks: a step that is shorter than the last by so much keeps it. A step
-    may be longer by what can be braked within the lead that is left.
+    the joint lacks: a step that is shorter than the last, of velocity v, by so much
+    keeps it. A step may be longer by what can be braked within the lead that is left.
     """
-    spline, bounds, dt = tick.spline, tick.qp.bounds, tick.progress.dt
+    dt = spline.period
     for j in range(spline.q_index.shape[0]):
         drive, i = drives[j], spline.v_index[j]
         position, velocity = spline_end(spline, j)
         most, growth = drive.windup_max, velocity - qvel[drive.dof]
         lead = position - qpos[drive.qpos] + drive.kd / drive.kp * growth
-        kept, a_max = dt * (tick.v[i] - growth), float(bounds.a_max[i])
+        kept, a_max = dt * (v[i] - growth), float(bounds.a_max[i])
         for side, sign in enumerate((-1.0, 1.0)):
             left = max(most - sign * lead, 0.0)
             longer = braking_step(float(left), 1.0, a_max, dt)

@@ -239,6 +239,8 @@ class WholeBodyIK:
     def prepare(self, state: RobotState) -> int:
         """Run a tick; return for how many physics steps it is enough."""
         robot, qpos = self._configuration.robot, state.data.qpos
+        if isinstance(self._backend, StackBackend):
+            self._backend.limit_lead(self._reference, self._law, state.data)
         place_goals(self._goals.argument, robot, self.frames.argument, qpos)
         self._scene.measure()
         self._fingers.place()
