@@ -96,6 +96,10 @@ class GoalSearch:
         self._blocked: list[Vector] = []
         self._tried = 0  # of the blocked ones
         self._nearest, self._least = problem.configuration.q.copy(), CLOSE
+        frames = [equality.frame for equality in problem.equalities]
+        supports = [task.support(self._configuration) for task in problem.tasks]
+        supports += [self._configuration.support(frame) for frame in frames]
+        self._moving = {int(v) for support in supports for v in support}
 
     @property
     def is_running(self) -> bool:
@@ -256,7 +260,8 @@ class GoalSearch:
         """Return random joints, within their limits or near q; the root stays.
 
         Endless joints are drawn up to half a turn from q. Those that are kept, by the
-        index of their position, have their value.
+        index of their position, have their value. Those that move no task and no held
+        frame stay: they could only collide.
         """
         model, drawn = self._configuration.model, q.copy()
         low, high = model.lowerPositionLimit, model.upperPositionLimit
@@ -265,7 +270,9 @@ class GoalSearch:
         root = {*self._configuration.root_linear, *self._configuration.root_angular}
         for joint in list(model.joints)[1:]:
             k = joint.idx_q
-            if joint.nq > 1 or joint.idx_v in root or not low[k] < high[k]:
+            if joint.idx_v not in self._moving or joint.idx_v in root:
+                continue
+            if joint.nq > 1 or not low[k] < high[k]:
                 continue
             if k in kept:
                 drawn[k] = kept[k]
