@@ -48,7 +48,8 @@ def exclude_by_sampling(robot: RobotDescription, source: Path) -> RobotDescripti
     if often:
         shown = [f"'{first}' and '{second}'" for first, second in often]
         LOG.warning(
-            "%s: these links overlap in over a quarter of random postures and will not collide: %s.",
+            "%s: these links overlap in over a quarter of random postures and will not "
+            "collide: %s.",
             *(source, join_first(shown, limit=12)),
         )
     apart = [pair for pair in close if pair not in near]
