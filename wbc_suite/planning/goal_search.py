@@ -5,7 +5,7 @@ have local minima in between. The search runs the same QP on a copy of the robot
 several initial configurations, a few iterations at a time.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -159,10 +159,7 @@ class GoalSearch:
         while trial < (MORE_STARTS if self._best else STARTS):
             if trial == MORE_STARTS:
                 yield from self._detour()
-            if trial < len(starts):
-                q = starts[trial]
-            else:
-                q = self._random(starts[0], rng, self._met() if trial % 2 else {})
+            q = starts[trial] if trial < len(starts) else self._random(starts[0], rng)
             trial += 1
             for found in self._descend(q):
                 iterations += 1
@@ -254,14 +251,11 @@ class GoalSearch:
             q = self._configuration.integrate(stack.solve(self._step).dq)
             yield None
 
-    def _random(
-        self, q: Vector, rng: np.random.Generator, kept: Mapping[int, float]
-    ) -> Vector:
+    def _random(self, q: Vector, rng: np.random.Generator) -> Vector:
         """Return random joints, within their limits or near q; the root stays.
 
-        Endless joints are drawn up to half a turn from q. Those that are kept, by the
-        index of their position, have their value. Those that move no task and no held
-        frame stay: they could only collide.
+        Endless joints are drawn up to half a turn from q. Those that move no task and
+        no held frame stay: they could only collide.
         """
         model, drawn = self._configuration.model, q.copy()
         low, high = model.lowerPositionLimit, model.upperPositionLimit
@@ -274,9 +268,6 @@ class GoalSearch:
                 continue
             if joint.nq > 1 or not low[k] < high[k]:
                 continue
-            if k in kept:
-                drawn[k] = kept[k]
-                continue
             turn = np.pi if high[k] > UNLIMITED else np.inf
             far = min(
                 turn, NEAR_TIME * self._problem.speed[joint.idx_v] if near else turn
@@ -284,18 +275,3 @@ class GoalSearch:
             least, most = max(low[k], q[k] - far), min(high[k], q[k] + far)
             drawn[k] = least + draw[k] * (most - least)
         return drawn
-
-    def _met(self) -> dict[int, float]:
-        """Return the joints, by position, that moved only tasks met by the last start.
-
-        Of two arms that meet their targets from a tenth of the starts each, both do
-        from a hundredth. It is empty where all tasks are met.
-        """
-        configuration, model = self._configuration, self._configuration.model
-        moving: dict[bool, set[int]] = {True: set(), False: set()}
-        for task in self._problem.tasks:
-            is_met = bool(np.abs(task.error(configuration)).max() < CLOSE)
-            moving[is_met].update(task.support(configuration).tolist())
-        kept = moving[True] - moving[False] if moving[False] else set[int]()
-        index = [joint.idx_q for joint in model.joints if joint.idx_v in kept]
-        return dict(zip(index, configuration.q[index].tolist(), strict=True))
