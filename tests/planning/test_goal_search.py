@@ -25,7 +25,7 @@ def pose_at(model, q):
     return data.oMf[model.getFrameId("right_tcp")]
 
 
-def search(model, clearance, target):
+def search(model, clearance, target, planner=MotionPlanner):
     configuration = Configuration(model)
     task = FrameTask("right_tcp", max_linear_speed=1e3, max_angular_speed=1e3)
     task.set_target(target)
@@ -39,8 +39,8 @@ def search(model, clearance, target):
         start=PostureTask(0.05, max_speed=1e3, name="start"),
         speed=SPEED,
     )
-    planner = MotionPlanner(model, clearance, speed=SPEED, acceleration=ACCELERATION)
-    return GoalSearch(problem, clearance, planner)
+    made = planner(model, clearance, speed=SPEED, acceleration=ACCELERATION)
+    return GoalSearch(problem, clearance, made)
 
 
 def finish(found, now):
@@ -125,3 +125,34 @@ def test_endless_joints_are_drawn_too():
     motion, _ = finish(found, TimedState(0.0, READY, np.zeros(9)))
     assert motion is not None
     assert motion.goal[0] > 1.0
+    np.testing.assert_array_equal(motion.goal[7:], READY[7:])  # fingers move no hand
+
+
+class LateMotions(MotionPlanner):
+    """Finds no way to the first thirty configurations."""
+
+    asked = 0
+
+    def direct(self, now, goal):
+        self.asked += 1
+        return super().direct(now, goal) if self.asked > 30 else None
+
+    def retrace(self, now, goal, trail):
+        yield from ()
+
+    def around(self, motion, goals):
+        yield from ()
+        return False
+
+
+@pytest.mark.slow
+def test_the_search_goes_on_while_all_configurations_are_blocked(model):
+    goal = READY + np.array([1.2, 0.5, 0.3, 0.6, 0.2, 0.4, 0.5, 0.0, 0.0])
+    target = pose_at(model, goal)
+    found = search(model, lambda q: 1.0, target, LateMotions)
+    found.start([READY], READY)
+    motion, _ = finish(found, TimedState(0.0, READY, np.zeros(9)))
+    assert motion is not None
+    assert len(motion.trajectory.segments) == 1  # direct, not straight after a stop
+    missed = pin.log6(pose_at(model, motion.goal).actInv(target))
+    assert np.linalg.norm(missed.vector) < 1e-6

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from wbc_suite.robot import load_robot
+from wbc_suite.robot.contact_pairs import exclude_by_sampling
 
 LINK = """<link name="{name}"><inertial><origin xyz="0 0 0.15"/><mass value="1"/>
   <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial>
@@ -83,3 +84,19 @@ def test_pairs_that_never_touch_are_excluded_and_others_are_not(tmp_path):
         mujoco.mj_fwdPosition(m, data)
         for pair in m.geom_bodyid[data.contact.geom].tolist():
             assert frozenset(m.body(b).name for b in pair) not in excluded
+
+
+def test_links_whose_hulls_overlap_in_many_postures_are_excluded(tmp_path, caplog):
+    wide = '<cylinder radius="0.03" length="0.2"/>'
+    path = tmp_path / "robot.urdf"
+    links = arm().replace(wide, '<sphere radius="0.3"/>', 1)  # past the second link
+    path.write_text(f'<robot name="r">{LINK.format(name="body")}{links}</robot>')
+    robot = load_robot(path)
+    robot = robot.model_copy(update={"contacts": type(robot.contacts)()})
+    caplog.clear()
+    sampled = exclude_by_sampling(robot, path)
+    assert "overlap in over a quarter of random postures" in caplog.text
+    assert "'arm_link_0' and 'arm_link_2'" in caplog.text
+    excluded = {frozenset(pair) for pair in sampled.contacts.exclude}
+    assert frozenset(("arm_link_0", "arm_link_2")) in excluded
+    assert frozenset(("arm_link_0", "arm_link_5")) not in excluded  # many joints apart

@@ -94,7 +94,12 @@ class GoalSearch:
         self._best: Motion | None = None
         self._stopping: Motion | None = None
         self._blocked: list[Vector] = []
+        self._tried = 0  # of the blocked ones
         self._nearest, self._least = problem.configuration.q.copy(), CLOSE
+        frames = [equality.frame for equality in problem.equalities]
+        supports = [task.support(self._configuration) for task in problem.tasks]
+        supports += [self._configuration.support(frame) for frame in frames]
+        self._moving = {int(v) for support in supports for v in support}
 
     @property
     def is_running(self) -> bool:
@@ -148,9 +153,12 @@ class GoalSearch:
         rng = np.random.default_rng(0)
         self._best = self._stopping = None
         self._blocked.clear()
+        self._tried = 0
         self._least = CLOSE
         iterations, trial = 0, 0
-        while trial < (MORE_STARTS if self._best or self._stopping else STARTS):
+        while trial < (MORE_STARTS if self._best else STARTS):
+            if trial == MORE_STARTS:
+                yield from self._detour()
             q = starts[trial] if trial < len(starts) else self._random(starts[0], rng)
             trial += 1
             for found in self._descend(q):
@@ -198,13 +206,23 @@ class GoalSearch:
             yield self._stopping
 
     def _improve(self) -> Iterator[Motion | None]:
-        """Plan around obstacles if nothing else is known; shorten the motion."""
+        """Plan around obstacles, or else straight; shorten the motion."""
+        yield from self._detour()
         if self._best is None and self._blocked:
             assert self._stopping is not None
-            yield from self._planner.around(self._stopping, self._blocked[:DETOURS])
+            self._planner.straight(self._stopping, self._blocked[0])
             self._best = self._stopping
         if self._best is not None:
             yield from self._planner.shorten(self._best)
+
+    def _detour(self) -> Iterator[None]:
+        """Plan around obstacles to configurations that were found since, if need be."""
+        goals = self._blocked[self._tried :][:DETOURS]
+        if self._best is None and goals:
+            assert self._stopping is not None
+            self._tried = len(self._blocked)
+            if (yield from self._planner.around(self._stopping, goals)):
+                self._best = self._stopping
 
     def _descend(self, q: Vector) -> Iterator[Vector | None]:
         """Yield None after each iteration, and configurations that meet the targets."""
@@ -236,7 +254,8 @@ class GoalSearch:
     def _random(self, q: Vector, rng: np.random.Generator) -> Vector:
         """Return random joints, within their limits or near q; the root stays.
 
-        Endless joints are drawn up to half a turn from q.
+        Endless joints are drawn up to half a turn from q. Those that move no task and
+        no held frame stay: they could only collide.
         """
         model, drawn = self._configuration.model, q.copy()
         low, high = model.lowerPositionLimit, model.upperPositionLimit
@@ -245,7 +264,9 @@ class GoalSearch:
         root = {*self._configuration.root_linear, *self._configuration.root_angular}
         for joint in list(model.joints)[1:]:
             k = joint.idx_q
-            if joint.nq > 1 or joint.idx_v in root or not low[k] < high[k]:
+            if joint.idx_v not in self._moving or joint.idx_v in root:
+                continue
+            if joint.nq > 1 or not low[k] < high[k]:
                 continue
             turn = np.pi if high[k] > UNLIMITED else np.inf
             far = min(

@@ -76,20 +76,26 @@ class MotionPlanner:
         """Return the motion that stops each joint as soon as it can."""
         return self._motion(now, self._generator.stop((np.zeros_like(now.v), now.v)))
 
-    def around(self, motion: Motion, goals: Sequence[Vector]) -> Iterator[None]:
-        """Extend a motion that stops by a path of RRT-Connect, or else straight.
+    def around(
+        self, motion: Motion, goals: Sequence[Vector]
+    ) -> Generator[None, None, bool]:
+        """Extend a motion that stops by a path of RRT-Connect around obstacles.
 
-        It leads to the first of the goals to which there is one.
+        It leads to the first of the goals to which there is one. Return whether there
+        is.
         """
-        path: list[Vector] = []
         for goal in goals if self._is_euclidean else ():
             ends = motion.goal, goal
             for found in self._rrt.search(*ends, max_checks=self._max_checks):
-                path = found or path
+                if found:
+                    motion.trajectory.extend(self._lines(motion, found))
+                    return True
                 yield None
-            if path:
-                break
-        motion.trajectory.extend(self._lines(motion, path or [motion.goal, goals[0]]))
+        return False
+
+    def straight(self, motion: Motion, goal: Vector) -> None:
+        """Extend a motion by the straight line to a goal."""
+        motion.trajectory.extend(self._lines(motion, [motion.goal, goal]))
 
     def plan(self, now: TimedState, goal: Vector) -> Motion | None:
         """Return a shortened motion around obstacles; None if no path was found."""

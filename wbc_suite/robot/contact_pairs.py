@@ -1,6 +1,7 @@
 """Find pairs of links that need not collide, by sampling postures."""
 
 import logging
+from collections import Counter
 from collections.abc import Iterator
 from itertools import combinations
 from pathlib import Path
@@ -17,6 +18,7 @@ LOG = logging.getLogger(__name__)
 OVERLAP = 1e-3  # smallest penetration in m that counts as an overlap
 NEAR = 0.01  # m; links that never come nearer never touch
 POSTURES = 2000
+MAX_OVERLAP_SHARE = 0.25  # of random postures
 MAX_JOINTS_BETWEEN = 3
 """Largest number of joints between links that are excluded from contact. Links farther
 apart, such as an arm and the trunk, overlap because of the posture."""
@@ -24,28 +26,39 @@ ENDLESS = np.pi  # rad; range of a joint without one
 Pair = tuple[str, str]
 
 
-def exclude_never_colliding(robot: RobotDescription) -> RobotDescription:
-    """Return the robot with further pairs excluded from contact.
+def exclude_by_sampling(robot: RobotDescription, source: Path) -> RobotDescription:
+    """Return the robot with further pairs excluded from contact, few joints apart.
 
-    These are links few joints apart that do not come nearer than 1 cm in any of 2000
-    random postures, as setup assistants find them. Controllers keep links apart by
-    capsules, which are larger than hulls, and would take room from the arm.
+    These do not come nearer than 1 cm in any of 2000 random postures, as setup
+    assistants find them, or overlap in more than a quarter of them. Controllers keep
+    links apart by capsules, which are larger than hulls, and would take room from the
+    arm. Links that overlap so often do so by their hulls, not in the machine, whose
+    joint limits allow these postures.
     """
-    near, excluded = set(_near_pairs(robot)), {*map(frozenset, robot.contacts.exclude)}
-    solid = [link.name for link in robot.links if link.collision]
-    apart = tuple(
+    near, overlap = _sampled_contacts(robot)
+    excluded = {*map(frozenset, robot.contacts.exclude)}
+    solid = sorted(link.name for link in robot.links if link.collision)
+    close = [
         pair
         for pair in combinations(solid, 2)
-        if tuple(sorted(pair)) not in near
-        and frozenset(pair) not in excluded
+        if frozenset(pair) not in excluded
         and 2 <= _joints_between(robot, *pair) <= MAX_JOINTS_BETWEEN
-    )
-    exclude = (*robot.contacts.exclude, *apart)
+    ]
+    often = [pair for pair in close if overlap[pair] > MAX_OVERLAP_SHARE * POSTURES]
+    if often:
+        shown = [f"'{first}' and '{second}'" for first, second in often]
+        LOG.warning(
+            "%s: these links overlap in over a quarter of random postures and will not "
+            "collide: %s.",
+            *(source, join_first(shown, limit=12)),
+        )
+    apart = [pair for pair in close if pair not in near]
+    exclude = (*robot.contacts.exclude, *apart, *often)
     return robot.model_copy(update={"contacts": Contacts(exclude=exclude)})
 
 
-def _near_pairs(robot: RobotDescription) -> Iterator[Pair]:
-    """Yield sorted pairs of links that come near to each other in random postures."""
+def _sampled_contacts(robot: RobotDescription) -> tuple[Counter[Pair], Counter[Pair]]:
+    """Return in how many random postures sorted pairs are near, and overlap."""
     m = robot.to_mjspec().compile()
     data, rng = mujoco.MjData(m), np.random.default_rng(0)
     m.geom_margin[:] = NEAR
@@ -53,11 +66,16 @@ def _near_pairs(robot: RobotDescription) -> Iterator[Pair]:
     index = [m.joint(joint.name).qposadr[0] for joint in robot.joints]
     ranges = [joint.range or (-ENDLESS, ENDLESS) for joint in robot.joints]
     low, high = np.array(ranges).reshape(-1, 2).T
-    found: set[tuple[int, int]] = set()
+    near, overlap = Counter[Pair](), Counter[Pair]()
     for _ in range(POSTURES):
         data.qpos[index] = rng.uniform(low, high)
-        found |= contacts(m, data, NEAR)
-    for first, second in found:
+        near.update(_named(contacts(m, data, NEAR), names))
+        overlap.update(_named(_contacts_nearer(m, data, -OVERLAP), names))
+    return near, overlap
+
+
+def _named(pairs: set[tuple[int, int]], names: dict[int, str]) -> Iterator[Pair]:
+    for first, second in pairs:
         a, b = sorted((names[first], names[second]))
         yield a, b
 
@@ -100,6 +118,12 @@ def contacts(
     mujoco.mj_kinematics(m, data)
     mujoco.mj_comPos(m, data)
     mujoco.mj_collision(m, data)
+    return _contacts_nearer(m, data, nearer)
+
+
+def _contacts_nearer(
+    m: mujoco.MjModel, data: mujoco.MjData, nearer: float
+) -> set[tuple[int, int]]:
     deep = data.contact.geom[data.contact.dist < nearer]
     pairs = np.sort(m.geom_bodyid[deep].reshape(-1, 2), axis=1)
     return {(int(first), int(second)) for first, second in pairs}

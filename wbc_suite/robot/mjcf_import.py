@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.errors import DescriptionError, join_first
-from wbc_suite.robot.contact_pairs import exclude_never_colliding, exclude_overlapping
+from wbc_suite.robot.contact_pairs import exclude_by_sampling, exclude_overlapping
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.importing import LinkFields, NameTable, describe_import
 from wbc_suite.robot.inertia import inertia_fields
@@ -71,7 +71,7 @@ def read_mjcf(
     if not _world_children(m):
         raise DescriptionError(f"{path}: the model has no body.")
     robot = _Importer(m, path, strict=strict).robot()
-    return exclude_never_colliding(exclude_overlapping(robot, path))
+    return exclude_by_sampling(exclude_overlapping(robot, path), path)
 
 
 def _robot_roots(m: mujoco.MjModel) -> list[int]:

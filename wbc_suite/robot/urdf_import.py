@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc_suite.errors import DescriptionError, did_you_mean, join_first
-from wbc_suite.robot.contact_pairs import exclude_never_colliding, exclude_overlapping
+from wbc_suite.robot.contact_pairs import exclude_by_sampling, exclude_overlapping
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.importing import (
     LinkFields,
@@ -89,7 +89,7 @@ def read_urdf(
             LOG.warning("%s: its root is fixed: %s", path, error)
     if skin:
         robot = robot.model_copy(update={"skins": importer.skins()})
-    return exclude_never_colliding(exclude_overlapping(robot, path))
+    return exclude_by_sampling(exclude_overlapping(robot, path), path)
 
 
 class _Importer:
