@@ -60,8 +60,8 @@ def fingerprint(certificate: Path) -> str:
         der = ssl.PEM_cert_to_DER_cert(text[text.index(BEGIN) : text.index(END)] + END)
     except ValueError as error:
         raise DeviceError(
-            f"'{certificate}' holds no PEM certificate: {error}. Delete it and its key; "
-            "they are made again."
+            f"'{certificate}' holds no PEM certificate: {error}. Delete it and its "
+            "key; they are made again."
         ) from error
     return hashlib.sha256(der).digest().hex(":").upper()
 

@@ -107,7 +107,7 @@ def skin_triangles(shape: SkinMesh) -> tuple[Matrix, Indices]:
     try:
         with np.load(kept, allow_pickle=False) as data:
             vertices, faces = _checked(data["vertices"], data["faces"])
-    except Exception:  # none yet, or a damaged one, for which numpy raises anything
+    except Exception:  # noqa: BLE001  (numpy raises anything for a damaged file)
         vertices, faces = _decimated(*_read_mesh(path, shape.scale))
         with suppress(OSError):  # the folder cannot be written
             kept.parent.mkdir(parents=True, exist_ok=True)
