@@ -20,7 +20,7 @@ from whole_files import OF_RESULTS, write_originals
 from wbc_suite.cli import main
 from wbc_suite.sensing import gl_backend
 
-FILES = int(os.environ.get("WBC_SUITE_FUZZ", "5"))
+FILES = int(os.environ.get("WBC_SUITE_FUZZ", "2"))
 """Damaged files of each kind: the first for all commands, others for some of them."""
 COMMANDS = 3
 SECONDS = 10.0  # of CPU time
