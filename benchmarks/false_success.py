@@ -41,6 +41,7 @@ ALL = (
 MOVES = ("throw", "throw", "carry", "carry", "push", "none")
 ROBOTS = ("hold", "strike", "strike", "random", "expert", "expert")
 STEPS = 30  # actions after the expert's
+ALONE = 5  # actions without a force of the search, which may hold what cannot stay
 SCENES = 5  # seeds whose experts are recorded
 ELITE, MUTATED, SPREAD = 30, 0.5, 0.12
 GRAVITY = np.array([0.0, 0.0, -9.81])
@@ -85,7 +86,7 @@ class Search:
         self._rng, self._elite = np.random.default_rng(seed), list[Any]()
         self._experts: list[list[Vector]] = []
         self.found: list[dict[str, Any]] = []
-        self.tries = self.done = 0
+        self.tries = self.done = self._free = 0
 
     def recorded(self) -> list[list[Vector]]:
         """Return the actions of experts up to their success, by scene."""
@@ -143,7 +144,7 @@ class Search:
             actions = self.recorded()[attack.scene]
             actions = actions[: draw.whole(len(actions))]
         env.begin(attack.scene)
-        check = self.check()
+        check, self._free = self.check(), 0
         for action in actions:
             yield self._advance(check, action)
         cell = Workcell(env, self.benchmark, np.random.default_rng(0))
@@ -162,8 +163,8 @@ class Search:
         if "physics_error" in info:
             raise PhysicsError(info["physics_error"])
         wrong = check.after_step()
-        free = not self.data.xfrc_applied.any()  # a force may hold what cannot stay
-        if wrong is None and info["success"] and free:
+        self._free = 0 if self.data.xfrc_applied.any() else self._free + 1
+        if wrong is None and info["success"] and self._free > ALONE:
             wrong = check.fault() or ""
         return reward, wrong
 

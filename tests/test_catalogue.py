@@ -44,8 +44,10 @@ def test_case_and_underscores_do_not_matter(own, name):
 def test_declared_names_are_listed_and_stems_of_unreadable_files(own, folders):
     lab = folders / "lab" / "robots" / "arm"
     (lab / "broken.toml").write_text("[[")
+    (lab / "deep.toml").write_text("a = " + "[" * 5000)
     (lab / "nameless.toml").write_text("[component]\nname = 3\n")
-    assert own.called("robots/arm") == ("broken", "nameless", "Other", "TwoLink")
+    names = "broken", "deep", "nameless", "Other", "TwoLink"
+    assert own.called("robots/arm") == names
 
 
 def test_an_unknown_name_gets_the_nearest_one(own):

@@ -204,7 +204,7 @@ def test_machine_code_that_numba_wrote_again_is_kept(machine_code):
     assert len(list(folder.iterdir())) == 2
 
 
-@pytest.mark.parametrize("content", ["", "[1]", "3", '{"a": 1}', "\x00"])
+@pytest.mark.parametrize("content", ["", "[1]", "3", '{"a": 1}', "\x00", "[" * 5000])
 def test_a_damaged_list_of_checked_files_is_written_anew(machine_code, content):
     folder = kernel_cache.cache_folder()
     (folder / "a.1.nbc").write_bytes(pickle.dumps(b"code"))

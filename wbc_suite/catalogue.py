@@ -67,7 +67,7 @@ def _own_name(path: Path) -> str:
     """Return the name that a file declares, or its stem."""
     try:
         content = tomllib.loads(path.read_text("utf-8"))
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return path.stem  # listing names must not fail because of one file
     headers = (content, *map(content.get, ("assembly", "component")))
     names = (header.get("name") for header in headers if isinstance(header, dict))

@@ -86,7 +86,7 @@ def _drop_damaged(folder: Path) -> None:
     """
     try:
         known = dict(json.loads((folder / CHECKED).read_text()))
-    except (OSError, ValueError, TypeError):
+    except (OSError, ValueError, TypeError, RecursionError):
         known = {}
     found = {file: _state(file) for file in folder.rglob("*.nb[ic]")}
     checked = {}
@@ -127,7 +127,7 @@ def _is_whole(file: Path) -> bool:
             while stream.tell() < size:
                 for _ in pickletools.genops(stream):
                     pass
-    except (OSError, ValueError, EOFError):
+    except (OSError, ValueError, EOFError, MemoryError):
         return False
     return size > 0
 

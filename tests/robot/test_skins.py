@@ -167,6 +167,33 @@ def test_meshes_are_decimated_once(package, tmp_path, monkeypatch):
     assert again.nmeshface == model.nmeshface
 
 
+@pytest.mark.parametrize("change", ["cut", "bits", "no vertices", "no file at all"])
+def test_a_damaged_mesh_in_the_cache_is_made_again(package, tmp_path, change):
+    from wbc_suite.robot import mesh_files
+
+    write_meshes(package, ["panda_gripper"])
+    robot = wbc_suite.load_robot("gripper/panda_gripper", skin="meshes")
+    forget = mesh_files.skin_triangles.cache_clear  # pyright: ignore[reportFunctionMemberAccess]
+    forget()
+    whole = robot.to_mjspec().compile()
+    for kept in (tmp_path / "cache" / "wbc_suite" / "skins").glob("*.npz"):
+        content = bytearray(kept.read_bytes())
+        with np.load(kept) as data:
+            faces = data["faces"]
+        match change:
+            case "cut":
+                kept.write_bytes(content[:-30])
+            case "bits":
+                content[len(content) // 2] ^= 255
+                kept.write_bytes(content)
+            case "no vertices":
+                np.savez(kept, vertices=np.zeros((2, 3)), faces=faces)
+            case _:
+                kept.write_bytes(b"")
+    forget()
+    assert robot.to_mjspec().compile().nmeshvert == whole.nmeshvert
+
+
 def test_the_error_of_missing_meshes_names_the_command():
     with pytest.raises(ConfigError, match="pip install --no-deps robosuite"):
         wbc_suite.load_robot("Panda", skin="meshes")

@@ -12,6 +12,7 @@ from wbc_suite.viewers.offscreen import (
     add_studio,
     render_model,
     render_robot,
+    subject_corners,
 )
 
 POLE = """<mujoco><worldbody><body pos="0 0 .5">
@@ -30,6 +31,16 @@ def _studio() -> tuple[mujoco.MjModel, mujoco.MjData]:
 def _red(image):
     red, green, _ = np.moveaxis(image.astype(int), 2, 0)
     return red > green + 60
+
+
+def test_a_model_without_shapes_is_a_point_at_its_bodies():
+    spec = mujoco.MjSpec.from_string(
+        "<mujoco><worldbody><body pos='1 2 3'/></worldbody></mujoco>"
+    )
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    assert subject_corners(model, data)[-1].tolist() == [1.0, 2.0, 3.0]
 
 
 @pytest.mark.parametrize("view", VIEWS)

@@ -11,6 +11,7 @@ from wbc_suite.catalogue import user_config
 from wbc_suite.devices.web_server import reachable_name
 from wbc_suite.errors import DeviceError
 
+BEGIN, END = (f"-----{word} CERTIFICATE-----" for word in ("BEGIN", "END"))
 DAYS = 825  # of validity of a certificate; the most that browsers accept
 
 
@@ -38,7 +39,7 @@ def server_context(certificate: Path, key: Path) -> ssl.SSLContext:
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.minimum_version = ssl.TLSVersion.TLSv1_2
     try:
-        context.load_cert_chain(certificate, key)
+        context.load_cert_chain(certificate, key, password="")  # else it is asked for
     except (OSError, ssl.SSLError) as error:
         raise DeviceError(
             f"Certificate '{certificate}' with key '{key}' cannot be used: {error}. "
@@ -49,8 +50,19 @@ def server_context(certificate: Path, key: Path) -> ssl.SSLContext:
 
 
 def fingerprint(certificate: Path) -> str:
-    """Return the SHA-256 fingerprint of a certificate, as browsers show it."""
-    der = ssl.PEM_cert_to_DER_cert(certificate.read_text("ascii"))
+    """Return the SHA-256 fingerprint of a file's first certificate, as browsers do.
+
+    Raises:
+        DeviceError: If the file holds none.
+    """
+    try:
+        text = certificate.read_text("utf-8", errors="replace")
+        der = ssl.PEM_cert_to_DER_cert(text[text.index(BEGIN) : text.index(END)] + END)
+    except ValueError as error:
+        raise DeviceError(
+            f"'{certificate}' holds no PEM certificate: {error}. Delete it and its "
+            "key; they are made again."
+        ) from error
     return hashlib.sha256(der).digest().hex(":").upper()
 
 

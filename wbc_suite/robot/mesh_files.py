@@ -104,10 +104,10 @@ def skin_triangles(shape: SkinMesh) -> tuple[Matrix, Indices]:
     key = f"{CACHE_VERSION} {path} {state.st_size} {state.st_mtime_ns} {shape.scale}"
     name = hashlib.sha256(key.encode()).hexdigest()[:32]
     kept = user_cache() / "skins" / f"{name}.npz"
-    if kept.is_file():
+    try:
         with np.load(kept, allow_pickle=False) as data:
-            vertices, faces = data["vertices"], data["faces"]
-    else:
+            vertices, faces = _checked(data["vertices"], data["faces"])
+    except Exception:  # noqa: BLE001  (numpy raises anything for a damaged file)
         vertices, faces = _decimated(*_read_mesh(path, shape.scale))
         with suppress(OSError):  # the folder cannot be written
             kept.parent.mkdir(parents=True, exist_ok=True)
@@ -124,16 +124,24 @@ def _read_mesh(path: Path, scale: Vector3) -> tuple[Matrix, Indices]:
     trimesh = _import_extra("trimesh")
     try:
         mesh = trimesh.load_mesh(path, skip_materials=True)
+        mesh.merge_vertices(merge_tex=True, merge_norm=True)
+        factor, times, _ = str(mesh.units).partition(" * ")  # "0.0254 * meters"
+        metres = float(factor) if times else 1.0
+        # a reflection turns the faces inside out
+        faces = mesh.faces[:, ::-1] if np.prod(scale) < 0.0 else mesh.faces
+        vertices = np.asarray(mesh.vertices) * scale * metres
+        return _checked(vertices, np.asarray(faces))
     except Exception as error:  # trimesh raises anything for a malformed file
         raise ConfigError(f"{path}: not a readable mesh: {error}.") from error
-    mesh.merge_vertices(merge_tex=True, merge_norm=True)
-    factor, times, _ = str(mesh.units).partition(" * ")  # "0.0254 * meters"
-    metres = float(factor) if times else 1.0
-    vertices, faces = np.asarray(mesh.vertices) * scale * metres, np.asarray(mesh.faces)
-    if np.prod(scale) < 0.0:  # a reflection turns the faces inside out
-        faces = faces[:, ::-1]
-    if not len(faces) or not np.isfinite(vertices).all():
-        raise ConfigError(f"{path}: not a readable mesh: no finite triangles.")
+
+
+def _checked(vertices: Matrix, faces: Indices) -> tuple[Matrix, Indices]:
+    """Return triangles; raises ValueError if they are none."""
+    shapes = vertices.shape[1:] == faces.shape[1:] == (3,)
+    if not (shapes and faces.size and np.isfinite(vertices).all()):
+        raise ValueError("no finite triangles")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise ValueError("triangles of vertices that it lacks")
     return vertices, faces
 
 

@@ -201,7 +201,7 @@ def _cache_file() -> Path:
 def _remembered() -> GlBackend | None:
     try:
         backend = GlBackend(**json.loads(_cache_file().read_text()))
-    except (OSError, ValueError, TypeError):
+    except (OSError, ValueError, TypeError, RecursionError):
         return None
     gone = backend.name == "wheel" and _wheel_library() is None
     return None if gone else backend

@@ -257,7 +257,7 @@ def subject_corners(
     """
     signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8).T
     names = [model.body(body).name for body in model.geom_bodyid]
-    seen = np.array([name.startswith(subject) for name in names])
+    seen = np.array([name.startswith(subject) for name in names], dtype=bool)
     seen &= model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE
     seen &= model.geom_group < 3  # others are hidden by default in MuJoCo's viewers
     if not seen.any():
