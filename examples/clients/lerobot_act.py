@@ -40,9 +40,16 @@ else:
     subprocess.run(command, check=True)
 data = convert(recording, folder / "lift", "lerobot")
 
-small = {"dim_model": 64, "n_heads": 4, "dim_feedforward": 128} if smoke else {}
+width = 64 if smoke else 128
 policy_config = ACTConfig(
-    device="cpu", push_to_hub=False, chunk_size=20, n_action_steps=10, **small
+    device="cpu",
+    push_to_hub=False,
+    chunk_size=16,
+    n_action_steps=4,
+    dim_model=width,
+    n_heads=4,
+    dim_feedforward=4 * width,
+    optimizer_lr=3e-4,
 )
 config = TrainPipelineConfig(
     dataset=DatasetConfig(repo_id="lift", root=str(data)),

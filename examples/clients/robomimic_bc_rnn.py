@@ -59,7 +59,9 @@ with config.unlocked():
     config.train.num_data_workers, config.train.num_epochs = 0, epochs
     config.train.batch_size, config.train.seq_length = 50, 10
     config.algo.rnn.enabled, config.algo.rnn.horizon = True, 10
-    config.algo.actor_layer_dims, config.algo.gmm.enabled = (), True
+    config.algo.actor_layer_dims, config.algo.gmm.enabled = (), False
+    config.algo.rnn.hidden_dim = 100
+    config.algo.optim_params.policy.learning_rate.initial = 1e-3
     config.observation.modalities.obs.low_dim = OBSERVED
 device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
 train(config, device=device)

@@ -86,7 +86,7 @@ def test_our_conventions_are_those_of_our_own_environment():
     seen, expected = theirs.reset(), own.reset(seed=0)[0]
     for key in ("eef_pos", "eef_quat"):
         one, other = seen[f"robot0_{key}"], expected[f"robot0_{key}"]
-        np.testing.assert_allclose(one, other, atol=1e-3)  # its hand lies 0.5 mm off
+        np.testing.assert_allclose(one, other, atol=1e-9)
     np.testing.assert_allclose(seen["robot0_gripper_qpos"], [0.04, 0.04])
     cameras = (e.model.camera("agentview").pos for e in (theirs.sim, own.simulation))
     np.testing.assert_array_equal(*cameras)
@@ -100,3 +100,20 @@ def test_unknown_conventions_are_refused():
         ConfigError, match="`conventions` is 'wbc_suite' or 'robosuite'"
     ):
         suite.make("Lift", robots="Panda", conventions="other")
+
+
+@pytest.mark.slow
+def test_with_our_conventions_a_robot_moves_as_in_our_recordings():
+    own = wbc_suite.make("Lift", robots="Panda")
+    env = suite.make("Lift", robots="Panda", conventions="wbc_suite", **PLAIN)
+    ours, there = own.unwrapped.simulation.model, env.env.simulation.model
+    for name in ("dof_armature", "dof_damping", "dof_frictionloss", "jnt_range"):
+        np.testing.assert_array_equal(getattr(there, name), getattr(ours, name))
+    of_robot = [b for b in range(ours.nbody) if ours.body(b).name.startswith("robot0")]
+    assert len(of_robot) > 10  # the cube's mass is drawn
+    for name in ("body_mass", "body_inertia", "body_ipos", "body_pos"):
+        one, other = (getattr(model, name)[of_robot] for model in (there, ours))
+        np.testing.assert_allclose(one, other, atol=1e-12)
+    assert (there.opt.density, there.opt.viscosity) == (0.0, 0.0)
+    own.close()
+    env.close()

@@ -99,3 +99,80 @@ def test_parts_and_grippers_tell_what_they_are(suite):
     assert [type(g).__name__ for g in robot.gripper.values()] == ["RethinkGripper"] * 2
     assert robot.robot_model.default_base == "RethinkMinimalMount"
     env.close()
+
+
+@pytest.mark.slow
+def test_an_environment_steps_without_a_reset_before(suite):
+    """As in robosuite's page of sensors, whose filter fills a buffer."""
+    buffers = importlib.import_module("robosuite.utils.buffers")
+    env = suite.make("Lift", robots="Panda", control_freq=10, seed=3, **QUIET)
+    buffer = buffers.RingBuffer(dim=env.robots[0].robot_model.dof, length=10)
+
+    def keep(values):
+        buffer.push(values)
+        return values
+
+    env.modify_observable("robot0_joint_pos", "filter", keep)
+    env.modify_observable("robot0_joint_pos", "sampling_rate", 40)
+    env.step(np.ones(env.action_dim))
+    assert env.timestep == 1
+    assert buffer._size == 4  # one at the start, three later in 0.1 s
+    np.testing.assert_allclose(buffer.current, env.robots[0]._joint_positions, atol=0.1)
+    reached = env.sim.data.qpos.copy()
+    other = suite.make("Lift", robots="Panda", control_freq=10, seed=3, **QUIET)
+    other.reset()
+    other.step(np.ones(env.action_dim))
+    np.testing.assert_array_equal(other.sim.data.qpos, reached)
+    env.close()
+    other.close()
+
+
+@pytest.mark.slow
+def test_a_scene_of_a_text_is_not_reset_by_the_first_step(suite):
+    env = suite.make("Lift", robots="Panda", seed=0, **QUIET)
+    env.reset_from_xml_string(env.sim.model.get_xml())
+    env.sim.data.set_joint_qpos("cube_joint0", [0.2, 0.2, 0.9, 1, 0, 0, 0])
+    env.sim.forward()
+    seen, *_ = env.step(np.zeros(env.action_dim))
+    np.testing.assert_allclose(seen["cube_pos"][:2], [0.2, 0.2], atol=1e-3)
+    env.close()
+
+
+@pytest.mark.slow
+def test_a_disabled_observation_is_not_returned(suite):
+    env = suite.make("Lift", robots="Panda", seed=0, **QUIET)
+    size = env.reset()["object-state"].size
+    env.modify_observable("cube_quat", "enabled", False)
+    seen, *_ = env.step(np.zeros(env.action_dim))
+    assert "cube_quat" not in seen
+    assert seen["object-state"].size == size - 4
+    assert "cube_quat" not in env.enabled_observables
+    assert "cube_quat" in env.active_observables
+    env.close()
+
+
+@pytest.mark.slow
+def test_a_class_of_a_user_moves_on_the_base_that_it_names(suite):
+    robots = importlib.import_module("robosuite.robots")
+    models = importlib.import_module("robosuite.models.robots")
+
+    @robots.register_robot_class("WheeledRobot")
+    class WheeledPanda(models.Panda):
+        @property
+        def default_base(self):
+            return "OmronMobileBase"
+
+    config = suite.load_composite_controller_config(
+        controller="BASIC", robot="WheeledPanda"
+    )
+    env = suite.make("Lift", robots="WheeledPanda", controller_configs=config, **QUIET)
+    env.reset()
+    assert env.action_dim == 11  # as in robosuite: arm, torso, base, gripper
+    action = np.zeros(11)
+    action[7] = 1.0
+    start = np.array(env.sim.data.get_body_xpos("robot0_panda_link0"))
+    for _ in range(5):
+        env.step(action)
+    moved = env.sim.data.get_body_xpos("robot0_panda_link0") - start
+    assert moved[0] > 0.02
+    env.close()

@@ -172,7 +172,6 @@ class MujocoEnv(Observing):
             for name, old in active.items():
                 if name in self._observables:
                     self._observables[name].set_active(old.is_active())
-        self.fresh = False
         self.env.begin(self.seed_of_next)
         self.seed_of_next = None  # the first episode's only
         self._reset_internal()
@@ -180,12 +179,18 @@ class MujocoEnv(Observing):
         return self._begin()
 
     def _begin(self) -> Observation:
-        self.timestep, self.done = 0, False
+        self.timestep, self.done, self.fresh = 0, False, False
         self._reset_observables()
         return self._get_observations(force_update=True)
 
     def step(self, action: Any) -> tuple[Observation, float, bool, dict[str, Any]]:
-        """Advance one control period; raise ValueError if the episode is over."""
+        """Advance one control period, of a first episode if none has begun.
+
+        Raises:
+            ValueError: If the episode is over.
+        """
+        if self.fresh:
+            self.reset()
         if self.done:
             raise ValueError("executing action in terminated episode")
         self.timestep += 1

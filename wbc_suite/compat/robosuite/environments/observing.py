@@ -39,13 +39,13 @@ class Observing:
         )
 
     def _get_observations(self, force_update: bool = False) -> Observation:
-        """Return all active observations, and those of a modality in one vector."""
+        """Return what is enabled and active, and each modality in one vector."""
         if force_update or not self.follows_physics():
             self._update_observables(force=True)
         found: Observation = OrderedDict()
         groups: dict[str, list[Any]] = {}
         for name, observable in self._observables.items():
-            if observable.is_active():
+            if observable.is_enabled() and observable.is_active():
                 found[name] = observable.obs
                 if not observable.modality.startswith("image"):
                     parts = groups.setdefault(observable.modality, [])

@@ -96,9 +96,14 @@ class RobotEnv(MujocoEnv):
                 control_freq=self.control_freq,
                 **robot_configs[k],
             )
+            own = robot.robot_model
             if self.as_there:
-                own = robot.robot_model
                 own.description = with_their_hands(own.description)
+            else:
+                own.as_there = False
+                own.load(
+                    robot.gripper_type, None if bases[k] == "default" else bases[k]
+                )
             robot.composite_controller_config = controller_of(
                 configs[k], robot.robot_model.description
             )
@@ -144,8 +149,9 @@ class RobotEnv(MujocoEnv):
         return arguments
 
     def _make_sim(self, core: Core) -> MjSim:
-        option = core.simulation.model.opt
-        option.density, option.viscosity = AIR
+        if self.as_there:
+            option = core.simulation.model.opt
+            option.density, option.viscosity = AIR
         if self.as_there and self.benchmark in REGISTERED_ENVS:
             place_cameras(core.simulation.model, self.benchmark)
         sim = super()._make_sim(core)

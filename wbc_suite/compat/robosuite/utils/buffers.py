@@ -18,11 +18,12 @@ class RingBuffer:
         """Add a value."""
         self.buf[self._next % self.length] = value
         self._next += 1
+        self._size = min(self._next, self.length)
 
     def clear(self) -> None:
         """Forget all values."""
         self.buf: Array = np.zeros((self.length, self.dim))
-        self._next = 0
+        self._next = self._size = 0
 
     @property
     def current(self) -> Array:
@@ -32,7 +33,7 @@ class RingBuffer:
     @property
     def average(self) -> Array:
         """The mean of the values in the buffer."""
-        return self.buf[: max(min(self._next, self.length), 1)].mean(axis=0)
+        return self.buf[: max(self._size, 1)].mean(axis=0)
 
 
 class DelayBuffer(RingBuffer):

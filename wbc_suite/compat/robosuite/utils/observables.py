@@ -130,7 +130,7 @@ class Observable:
                 self._value = obs_cache[self.name] = np.asarray(value)
                 self._sampled = True
             if self._time >= self._period - 1e-9:
-                self._time = 0.0
+                self._time -= self._period
                 self._delay = self._draw_delay()
                 self._sampled = False
         obs_cache[self.name] = self._value
@@ -149,7 +149,7 @@ class Observable:
         return self._active
 
     def set_enabled(self, enabled: bool) -> None:
-        """Take samples from now on, or keep the last value."""
+        """Take samples from now on, or be no part of observations."""
         self._enabled = enabled
         self.reset()
 

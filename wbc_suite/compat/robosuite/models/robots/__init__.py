@@ -49,10 +49,12 @@ class RobotModel(DescribedModel):
         robot: Catalogue name, or path of an MJCF or URDF file.
         idn: Number of the robot in its scene; `robot0_` starts its names.
         description: Our description of it, with its place.
+        as_there: Whether arms have robosuite's passive values; `load` reads it.
     """
 
     robot: str = ""
     arms: Any = ()
+    as_there = True
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -81,14 +83,13 @@ class RobotModel(DescribedModel):
         if base is None and self.own_file is None:
             own_base = _is_overridden(self, "default_base")
             base = self.default_base if own_base else None
-        if own and (gripper not in (None, "default") or base is not None):
+        if own and (not self.as_there or gripper not in (None, "default") or base):
             chosen = self._choice(gripper)
             loaded = load_robot(own, gripper=chosen, base=base)
-            if self.own_file is None:
+            if self.own_file is None and self.as_there:
                 loaded = with_passive_joints(loaded)
-            self.description = loaded.with_root(
-                self.description.root.kind, pos=root.pos, quat=root.quat
-            )
+            kind = root.kind if base is None else loaded.root.kind
+            self.description = loaded.with_root(kind, pos=root.pos, quat=root.quat)
 
     def _choice(self, gripper: Any) -> Any:
         """Return our choice of grippers: files of users' classes, hands of the side."""
