@@ -16,6 +16,7 @@ from wbc_suite.planning.collision_checker import Clearance
 from wbc_suite.planning.motion_planner import MotionPlanner
 from wbc_suite.planning.trajectory import Motion, TimedState
 from wbc_suite.qp import FrameEquality, Limit, PostureTask, Task, TaskStack
+from wbc_suite.qp.task import JointTask, RowTask
 from wbc_suite.typing import Vector
 
 STEP = 0.1  # s; one iteration goes as far as joints can in this time,
@@ -96,9 +97,12 @@ class GoalSearch:
         self._blocked: list[Vector] = []
         self._tried = 0  # of the blocked ones
         self._nearest, self._least = problem.configuration.q.copy(), CLOSE
-        frames = [equality.frame for equality in problem.equalities]
-        supports = [task.support(self._configuration) for task in problem.tasks]
-        supports += [self._configuration.support(frame) for frame in frames]
+        configuration = self._configuration
+        supports = [configuration.support(e.frame) for e in problem.equalities]
+        if any(isinstance(task, JointTask) for task in problem.tasks):
+            supports.append(np.arange(configuration.nv))
+        rows = [task for task in problem.tasks if isinstance(task, RowTask)]
+        supports += [task.support(configuration) for task in rows]
         self._moving = {int(v) for support in supports for v in support}
 
     @property
