@@ -15,8 +15,15 @@ from wbc_suite.kinematics.configuration import UNLIMITED
 from wbc_suite.planning.collision_checker import Clearance
 from wbc_suite.planning.motion_planner import MotionPlanner
 from wbc_suite.planning.trajectory import Motion, TimedState
-from wbc_suite.qp import FrameEquality, Limit, PostureTask, Task, TaskStack
-from wbc_suite.qp.task import JointTask, RowTask
+from wbc_suite.qp import (
+    FrameEquality,
+    JointTask,
+    Limit,
+    PostureTask,
+    RowTask,
+    Task,
+    TaskStack,
+)
 from wbc_suite.typing import Vector
 
 STEP = 0.1  # s; one iteration goes as far as joints can in this time,
