@@ -323,9 +323,10 @@ def random_goals(
 def allowed(
     env: RobotEnv, robot: RobotDescription, config: dict[str, Any]
 ) -> Callable[[Vector], bool]:
-    """Return whether links keep the controller's distances and motors hold a posture.
+    """Return whether a posture is within all limits of the controller.
 
-    Weight may take as much of a motor's effort as the controller's limit says.
+    These are the ranges of joints less its margin, distances of links, and the part of
+    a motor's effort that weight may take.
     """
     read = read_whole_body(config, robot, robot.name)
     reduced = lock_groups(robot, read.locked)
@@ -335,10 +336,15 @@ def allowed(
     links = LimitChecker(model, distance_limits(reduced, read))
     shares = read.limits.weight_shares
     index = [model.joints[model.getJointId(name)].idx_v for name in shares]
+    margin = read.limits.position_margin
+    low, high = model.lowerPositionLimit + margin, model.upperPositionLimit - margin
+    bounded = low < high
     most = [share * (robot.joint(n).effort or 0.0) for n, share in shares.items()]
 
     def is_allowed(qpos: Vector) -> bool:
         q = conversion.q_to_pinocchio(qpos)
+        if ((q < low) | (q > high))[bounded].any():
+            return False
         weight = np.abs(pin.computeGeneralizedGravity(model, data, q)[index])
         return links.clearance(q) > 0.0 and bool((weight < most).all())
 
