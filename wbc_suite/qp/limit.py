@@ -161,10 +161,10 @@ def merge_bounds(
     """Write bounds of the step dq that are never empty.
 
     The acceleration window `v_previous dt -+ a dt^2` is clipped into the position
-    interval, the result into the velocity interval `-+ v dt`. Clipping an interval into
-    another keeps it non-empty, and is the intersection where there is one: velocity
-    wins over position, position over acceleration. A joint outside a limit therefore
-    returns at its greatest speed.
+    interval, which `room` makes smaller, the result into the velocity interval
+    `-+ v dt`. Clipping an interval into another keeps it non-empty, and is the
+    intersection where there is one: velocity wins over position, position over
+    acceleration. A joint outside a limit therefore returns at its greatest speed.
 
     `kinds`, shape (2 nv,), gets the `LimitKind` that set each lower, then each upper
     bound.
@@ -180,14 +180,17 @@ def merge_bounds(
         if k >= 0:
             bottom = -braking_step(q[k] - q_lower[i], gain[i], a_max[i], dt)
             top = braking_step(q_upper[i] - q[k], gain[i], a_max[i], dt)
-            kind = LimitKind.POSITION.value
-            if -room[0, i] > bottom or room[1, i] < top:
-                bottom, top = max(bottom, -room[0, i]), min(top, room[1, i])
-                kind = LimitKind.TRACKING.value
+            bottom_kind = top_kind = LimitKind.POSITION.value
+            if -room[0, i] > bottom:
+                bottom, bottom_kind = min(-room[0, i], top), LimitKind.TRACKING.value
+            if room[1, i] < top:
+                top, top_kind = max(room[1, i], bottom), LimitKind.TRACKING.value
             if lo < bottom or lo > top:
-                lo, lo_kind = min(max(lo, bottom), top), kind
+                lo_kind = bottom_kind if lo < bottom else top_kind
+                lo = min(max(lo, bottom), top)
             if hi < bottom or hi > top:
-                hi, hi_kind = min(max(hi, bottom), top), kind
+                hi_kind = bottom_kind if hi < bottom else top_kind
+                hi = min(max(hi, bottom), top)
         step = v_max[i] * dt
         if lo < -step or lo > step:
             lo, lo_kind = min(max(lo, -step), step), LimitKind.VELOCITY.value
