@@ -18,7 +18,7 @@ with a step of 2 ms. With MuJoCo's default of 20 ms a joint overshoots its limit
 3.7 mrad at 0.5 rad/s, and a head of 4 kg by 20 mrad; limits of real joints are hard."""
 STOP_SOLIMP = (0.95, 0.99, 0.001)
 """Smallest and largest impedance of joint limits, and the width between, m or rad."""
-STOP_MARGIN = 5e-3
+STOP_MARGIN = 3e-3
 """Distance in rad at which the limit of a joint becomes active, since MuJoCo tests
 limits only at the start of a step (2 ms), and contacts accelerate joints to 2.6 rad/s.
 Controllers keep limbs this far inside; fingers of hands rest in the limit, which so

@@ -34,7 +34,7 @@ from wbc_suite.control.dynamics.standing import Standing
 from wbc_suite.control.law.joint_laws import JointLaw
 from wbc_suite.control.law.law import Law
 from wbc_suite.control.loop.records import readable
-from wbc_suite.control.part.feasible_acceleration import saturating_errors
+from wbc_suite.control.part.feasible_acceleration import greatest_leads
 from wbc_suite.control.part.gripper import GripperController
 from wbc_suite.control.part.spline_reference import SplineReference, window_length
 from wbc_suite.control.part.stance_controller import feet_of, soles_of
@@ -144,8 +144,8 @@ class WholeBodyIK:
         held = tuple(name for name in state.actuators if name not in driven)
         gains = self.config.joint_law
         self._law = JointLaw(state, (*moved, *held), kp=gains.kp, kd=gains.kd)
-        errors = saturating_errors(self.robot, gains.kp)
-        leads = [min(MAX_LEAD, errors.get(j, MAX_LEAD)) for j in self._law.joints]
+        most = greatest_leads(self.robot, gains.kp)
+        leads = [min(MAX_LEAD, most.get(j, MAX_LEAD)) for j in self._law.joints]
         self._law.drives["windup_max"] = leads
         self._held_index = state.joint_addresses(held)[0]
         q_index, v_index = joint_indices(self._configuration.model, moved)

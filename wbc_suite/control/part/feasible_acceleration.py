@@ -1,4 +1,4 @@
-"""What motors can do: feasible accelerations and errors of their joints."""
+"""What motors can do: feasible accelerations, and leads of commands."""
 
 import logging
 from collections.abc import Collection
@@ -35,27 +35,34 @@ def feasible_accelerations(
         limit = most if joint.acceleration is None else min(most, joint.acceleration)
         if joint.effort is not None:
             v = model.joints[model.getJointId(joint.name)].idx_v
-            left = max(joint.effort - float(weight[v]), 0.2 * joint.effort)
+            left = _left_effort(joint.effort, float(weight[v]))
             feasible = effort_share * left / float(inertia[v])
             limit = min(limit, max(feasible, LEAST_ACCELERATION))
         found[joint.name] = limit
     return found
 
 
-def saturating_errors(robot: RobotDescription, stiffness: float) -> dict[str, float]:
-    """Return the error at which feedback takes a motor's effort, rad or m, by joint.
+def greatest_leads(robot: RobotDescription, stiffness: float) -> dict[str, float]:
+    """Return by how much a command may lead its joint, rad or m, by joint.
 
-    A command that leads its joint by more adds no force, and its neighbours compensate
-    for an acceleration that does not happen. The stiffness is in 1/s^2.
+    Feedback of a stiffness, 1/s^2, takes what weight leaves of the motor's effort at
+    half of that, in the posture of greatest inertia. With more the joint gains no
+    force, and its neighbours compensate for an acceleration that does not happen.
     """
     model = robot.to_pinocchio()
-    inertia, _ = greatest_loads(model)
+    inertia, weight = greatest_loads(model)
     found: dict[str, float] = {}
     for joint in robot.joints:
         if joint.effort is not None:
             v = model.joints[model.getJointId(joint.name)].idx_v
-            found[joint.name] = joint.effort / (stiffness * float(inertia[v]))
+            left = _left_effort(joint.effort, float(weight[v]))
+            found[joint.name] = 2.0 * left / (stiffness * float(inertia[v]))
     return found
+
+
+def _left_effort(effort: float, weight: float) -> float:
+    """Return what the greatest weight leaves of a motor's effort, a fifth at least."""
+    return max(effort - weight, 0.2 * effort)
 
 
 def weight_shares(
