@@ -1,6 +1,6 @@
 """Damaged files through every command that reads: an exit code and words, soon.
 
-Each command runs in a fork, so that a crash of a library or a hang is seen as well.
+Each command runs in a process, so that a crash of a library or a hang is seen as well.
 """
 
 import os
@@ -9,6 +9,7 @@ import re
 import resource
 import shutil
 import struct
+import subprocess
 import sys
 import threading
 import time
@@ -80,19 +81,37 @@ def damaged(content, rng):
     return bytes(content)
 
 
-def run(line, folder):
-    """Run a command in a fork; return what is wrong with its end, if anything."""
-    printed = folder / "printed.txt"
+def draws(line):
+    """Whether a command draws; a fork cannot where its parent has done so before."""
+    return line.startswith("render") or "--film" in line
+
+
+def limit_time():
+    resource.setrlimit(resource.RLIMIT_CPU, (int(SECONDS), int(SECONDS)))
+
+
+def started(line, folder, printed):
+    """Start a command in a process of its own; return its id."""
+    program = "from wbc_suite.cli import main; main()"
+    with printed.open("w") as output:
+        return subprocess.Popen(
+            [sys.executable, "-c", program, *line.split()],
+            **{"cwd": folder, "stdout": output, "stderr": output},
+            preexec_fn=limit_time,
+        ).pid
+
+
+def forked(line, printed):
+    """Start a command in a fork, which has all imported; return its id."""
     child = os.fork()
     if child == 0:
-        os.chdir(folder)
+        os.chdir(printed.parent)
         output = os.open(printed, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
         os.dup2(output, 1)
         os.dup2(output, 2)
         sys.stdout, sys.stderr = (os.fdopen(k, "w") for k in (1, 2))
         sys.argv = ["wbc-suite", *line.split()]
-        limit = int(SECONDS)
-        resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
+        limit_time()
         code = 70
         try:
             main()
@@ -103,6 +122,13 @@ def run(line, folder):
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(code)
+    return child
+
+
+def run(line, folder):
+    """Run a command in a process; return what is wrong with its end, if anything."""
+    printed = folder / "printed.txt"
+    child = started(line, folder, printed) if draws(line) else forked(line, printed)
     timer = threading.Timer(PATIENCE, os.kill, (child, 9))
     timer.start()
     began = time.monotonic()
