@@ -339,6 +339,8 @@ def allowed(
     margin = read.limits.position_margin
     low, high = model.lowerPositionLimit + margin, model.upperPositionLimit - margin
     bounded = low < high
+    rest = conversion.q_to_pinocchio(env.simulation.data.qpos)  # of joints not drawn
+    low, high = np.minimum(low, rest), np.maximum(high, rest)
     most = [share * (robot.joint(n).effort or 0.0) for n, share in shares.items()]
 
     def is_allowed(qpos: Vector) -> bool:
