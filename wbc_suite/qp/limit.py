@@ -103,7 +103,9 @@ class JointBounds(NamedTuple):
     position_gain: Vector  # fraction of the distance to a limit that a step may cover
     v_max: Vector  # speed limits, inf where there is none
     a_max: Vector  # acceleration limits, inf where there is none
-    room: Matrix  # (2, nv), greatest next step down and up, >= 0, inf where unlimited
+    step_max: (
+        Matrix  # (2, nv), greatest next step down and up, >= 0, inf where unlimited
+    )
 
 
 def unlimited_bounds(configuration: Configuration) -> JointBounds:
@@ -113,9 +115,9 @@ def unlimited_bounds(configuration: Configuration) -> JointBounds:
     for _, joint in named_joints(configuration.model):
         if joint.nq == 1 and joint.nv == 1:
             q_index[joint.idx_v] = joint.idx_q
-    infinite, room = np.full(nv, np.inf), np.full((2, nv), np.inf)
+    infinite, step_max = np.full(nv, np.inf), np.full((2, nv), np.inf)
     none = infinite.copy(), infinite.copy()
-    return JointBounds(q_index, -infinite, infinite, np.ones(nv), *none, room)
+    return JointBounds(q_index, -infinite, infinite, np.ones(nv), *none, step_max)
 
 
 def joint_values(
@@ -161,7 +163,7 @@ def merge_bounds(
     """Write bounds of the step dq that are never empty.
 
     The acceleration window `v_previous dt -+ a dt^2` is clipped into the position
-    interval, which `room` makes smaller, the result into the velocity interval
+    interval, which `step_max` narrows, the result into the velocity interval
     `-+ v dt`. Clipping an interval into another keeps it non-empty, and is the
     intersection where there is one: velocity wins over position, position over
     acceleration. A joint outside a limit therefore returns at its greatest speed.
@@ -171,7 +173,7 @@ def merge_bounds(
     """
     nv, q_index, gain = lower.shape[0], bounds.q_index, bounds.position_gain
     q_lower, q_upper = bounds.q_lower, bounds.q_upper
-    v_max, a_max, room = bounds.v_max, bounds.a_max, bounds.room
+    v_max, a_max, step_max = bounds.v_max, bounds.a_max, bounds.step_max
     for i in range(nv):
         window = a_max[i] * dt * dt
         lo, hi = v_previous[i] * dt - window, v_previous[i] * dt + window
@@ -181,10 +183,13 @@ def merge_bounds(
             bottom = -braking_step(q[k] - q_lower[i], gain[i], a_max[i], dt)
             top = braking_step(q_upper[i] - q[k], gain[i], a_max[i], dt)
             bottom_kind = top_kind = LimitKind.POSITION.value
-            if -room[0, i] > bottom:
-                bottom, bottom_kind = min(-room[0, i], top), LimitKind.TRACKING.value
-            if room[1, i] < top:
-                top, top_kind = max(room[1, i], bottom), LimitKind.TRACKING.value
+            if -step_max[0, i] > bottom:
+                bottom, bottom_kind = (
+                    min(-step_max[0, i], top),
+                    LimitKind.TRACKING.value,
+                )
+            if step_max[1, i] < top:
+                top, top_kind = max(step_max[1, i], bottom), LimitKind.TRACKING.value
             if lo < bottom or lo > top:
                 lo_kind = bottom_kind if lo < bottom else top_kind
                 lo = min(max(lo, bottom), top)

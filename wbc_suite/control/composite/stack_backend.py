@@ -119,7 +119,7 @@ class StackBackend:
         """Solve one tick of the stack without frames."""
         self._joints.set_target(posture)
         self._joint_stack.v_previous[:] = self.v
-        self._joint_stack.bounds.room[:] = self.stack.bounds.room
+        self._joint_stack.bounds.step_max[:] = self.stack.bounds.step_max
         return self._step(self._joint_stack, self._joint_stack.solve(dt), dt)
 
     def limit_lead(

@@ -178,7 +178,7 @@ def limit_lead(
         for side, sign in enumerate((-1.0, 1.0)):
             left = max(most - sign * lead, 0.0)
             longer = braking_step(float(left), 1.0, a_max, dt)
-            bounds.room[side, i] = max(sign * kept + longer, 0.0)
+            bounds.step_max[side, i] = max(sign * kept + longer, 0.0)
 
 
 @compiled

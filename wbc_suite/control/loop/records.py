@@ -72,7 +72,7 @@ DRIVE = np.dtype(
         ("kp", "f8"),  # 1/s^2
         ("kd", "f8"),  # 1/s
         ("correction_max", "f8"),  # feedback acceleration, rad/s^2 or m/s^2
-        ("windup_max", "f8"),  # distance of an integrated reference from its joint
+        ("windup_max", "f8"),  # distance of an integrated command from its joint
         ("command", "f8"),  # last force of the actuator, or setpoint of a servo law
         # joint limits, see `loop.acceleration_limits`
         ("position_min", "f8"),  # rad or m

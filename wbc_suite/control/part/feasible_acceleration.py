@@ -17,6 +17,9 @@ LOAD_SAMPLES = 50
 WEIGHT_SHARE = 0.9  # of the effort of a motor that cannot hold every posture
 LEAST_ACCELERATION = 2.0
 """rad/s^2 or m/s^2; where holding the load takes nearly the whole effort."""
+LEAD = 2.0
+"""Inertia is less than its greatest in most postures; with 1, TIAGo's arms give up
+early where a pot jams them."""
 
 
 def feasible_accelerations(
@@ -28,15 +31,11 @@ def feasible_accelerations(
     less the greatest gravity torque, over the greatest inertia M_ii of random
     configurations. It is at least `LEAST_ACCELERATION`.
     """
-    model = robot.to_pinocchio()
-    inertia, weight = greatest_loads(model)
-    found: dict[str, float] = {}
+    of_motors, found = _accelerations_of_motors(robot), dict[str, float]()
     for joint in robot.joints:
         limit = most if joint.acceleration is None else min(most, joint.acceleration)
-        if joint.effort is not None:
-            v = model.joints[model.getJointId(joint.name)].idx_v
-            left = _left_effort(joint.effort, float(weight[v]))
-            feasible = effort_share * left / float(inertia[v])
+        if joint.name in of_motors:
+            feasible = effort_share * of_motors[joint.name]
             limit = min(limit, max(feasible, LEAST_ACCELERATION))
         found[joint.name] = limit
     return found
@@ -45,24 +44,26 @@ def feasible_accelerations(
 def greatest_leads(robot: RobotDescription, stiffness: float) -> dict[str, float]:
     """Return by how much a command may lead its joint, rad or m, by joint.
 
-    Feedback of a stiffness, 1/s^2, takes what weight leaves of the motor's effort at
-    half of that, in the posture of greatest inertia. With more the joint gains no
-    force, and its neighbours compensate for an acceleration that does not happen.
+    It is `LEAD` times the error at which feedback of a stiffness, 1/s^2, takes all that
+    weight leaves of the motor's effort, at the greatest inertia. With more the joint
+    gains no force, and its neighbours compensate for an acceleration that does not
+    happen. Joints whose effort is unknown are left out.
     """
+    of_motors = _accelerations_of_motors(robot)
+    return {joint: LEAD * a / stiffness for joint, a in of_motors.items()}
+
+
+def _accelerations_of_motors(robot: RobotDescription) -> dict[str, float]:
+    """Return what weight leaves of each effort, a fifth at least, over the inertia."""
     model = robot.to_pinocchio()
     inertia, weight = greatest_loads(model)
     found: dict[str, float] = {}
     for joint in robot.joints:
         if joint.effort is not None:
             v = model.joints[model.getJointId(joint.name)].idx_v
-            left = _left_effort(joint.effort, float(weight[v]))
-            found[joint.name] = 2.0 * left / (stiffness * float(inertia[v]))
+            left = max(joint.effort - float(weight[v]), 0.2 * joint.effort)
+            found[joint.name] = left / float(inertia[v])
     return found
-
-
-def _left_effort(effort: float, weight: float) -> float:
-    """Return what the greatest weight leaves of a motor's effort, a fifth at least."""
-    return max(effort - weight, 0.2 * effort)
 
 
 def weight_shares(

@@ -134,8 +134,7 @@ class SplineReference:
 
     def targets(self) -> Vector:
         """Return where the driven joints are to be when the next solve is due, (m,)."""
-        count = len(self._arrays.q_index)
-        return np.array([spline_end(self.argument, j)[0] for j in range(count)])
+        return _targets(self.argument)
 
 
 @compiled
@@ -171,6 +170,15 @@ def spline_end(spline: SplineArrays, j: int) -> tuple[float, float]:
     before, last = spline.rates[1, i], spline.rates[2, i]
     position = spline.points[1, spline.q_index[j]]
     return position + spline.period / 6.0 * (last - before), 0.5 * (before + last)
+
+
+@compiled
+def _targets(spline: SplineArrays) -> Vector:
+    """Return the positions of `spline_end`, shape (m,)."""
+    found = np.empty(spline.q_index.shape[0])
+    for j in range(found.shape[0]):
+        found[j], _ = spline_end(spline, j)
+    return found
 
 
 @compiled
