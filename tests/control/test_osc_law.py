@@ -230,7 +230,7 @@ def test_least_change_is_the_qp_s_solution():
         problem.G[:], problem.h[:] = rows, middle + half
         problem.lower[9:] = middle - half
         answer, x = DaqpSolver().solve(problem), np.empty(9)
-        work = np.empty((21, 9))
+        work = np.empty((31, 9))
         assert least_change(rows, middle - half, middle + half, x, work) == (
             answer is not None
         )

@@ -189,6 +189,29 @@ def test_a_blow_does_not_carry_a_wrist_past_its_limit(alone):
 
 
 @pytest.mark.slow
+def test_a_base_brakes_while_a_contact_drives_an_arm_too_fast(alone):
+    scene = alone("Tiago")
+    joint = scene.state.data.joint("robot0_arm_left_5_joint")
+    part, goal = scene.controller.layout["base"], scene.controller.hold_action
+    goal[part.start] += 2.0
+    scene.controller.set_goal(goal)
+
+    def speed(seconds, of_joint):
+        """Return the commanded speed of the base after a time, m/s."""
+        at = []
+        for _ in range(round(seconds / 0.002)):
+            joint.qvel[0] = of_joint
+            scene.simulation.tick(1)
+            at.append(scene.controller.joint_targets["root_x"])
+        return (at[-1] - at[-51]) / 0.1
+
+    fast = speed(0.5, 0.0)
+    assert fast > 0.1
+    assert abs(speed(0.5, 6.0)) < 0.1 * fast
+    assert speed(0.6, 0.0) > 0.5 * fast
+
+
+@pytest.mark.slow
 def test_each_hand_is_told_its_own_collisions(alone):
     scene = alone("GR1")
     back = np.array([-1.0, 0.0, 0.3, 0.0, 0.0, 0.0])

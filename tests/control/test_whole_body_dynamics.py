@@ -333,6 +333,18 @@ def test_a_load_in_the_hands_is_observed_and_held(alone):
     np.testing.assert_allclose(moved, 0.0, atol=2e-3)
 
 
+def test_a_load_that_is_gone_pushes_no_joint_past_its_limit(alone):
+    """Such as that of a hand that slips off the edge of a table."""
+    walker = Walker(alone, "SpotWithArm", input_ref_frame="world").act(0.5)
+    wrist = walker.data.joint("robot0_arm_wr0")
+    high = walker.model.joint("robot0_arm_wr0").range[1]
+    walker.body.load[0, 3:] = -8.0 * walker.data.xaxis[wrist.id]
+    wrist.qpos[0], wrist.qvel[0] = high - 0.15, 2.0
+    passed = []
+    walker.act(0.5, each=lambda: passed.append(wrist.qpos[0] - high))
+    assert -0.15 < max(passed) < -0.03
+
+
 def test_spot_holds_its_hand_in_the_world_while_it_marches(alone):
     walker = Walker(alone, "SpotWithArm", input_ref_frame="world").act(0.5)
     start = walker.data.site_xpos[walker.body.hand].copy()

@@ -14,7 +14,7 @@ def unit_rows(rng, m, n):
 def solve(rows, low, high):
     n = rows.shape[1]
     x = np.empty(n)
-    return least_change(rows, low, high, x, np.empty((2 * n + 3, n))), x
+    return least_change(rows, low, high, x, np.empty((3 * n + 4, n))), x
 
 
 def test_optimum_is_that_of_quadprog(rng):
@@ -52,3 +52,16 @@ def test_bounds_that_exclude_each_other_are_reported(rng):
     rows[1] = rows[0]
     ok, _ = solve(rows, np.array([1.0, -2.0]), np.array([2.0, 0.0]))
     assert not ok
+
+
+def test_nearly_dependent_rows_cost_no_digits(rng):
+    """The point at the bounds of three rows that are 1e-5 from a plane."""
+    for _ in range(20):
+        rows = unit_rows(rng, 3, 5)
+        rows[2] = rows[0] + rows[1] + 1e-5 * rows[2]
+        rows[2] /= np.linalg.norm(rows[2])
+        bounds = np.array([1.0, 1.0, 3.0])
+        ok, x = solve(rows, bounds, bounds)
+        assert ok
+        size = np.abs(x).max()
+        np.testing.assert_allclose(rows @ x, bounds, rtol=0.0, atol=1e-15 * size)

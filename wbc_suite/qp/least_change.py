@@ -3,7 +3,14 @@
 import numpy as np
 
 from wbc_suite.compiling import compiled
-from wbc_suite.linear_algebra import cholesky, dot, solve_lower, solve_upper
+from wbc_suite.linear_algebra import (
+    copy_rows,
+    dot,
+    lq_factor,
+    lq_solve,
+    solve_lower,
+    solve_upper,
+)
 from wbc_suite.typing import Matrix, Vector
 
 _MAX_STEPS = 100
@@ -27,18 +34,16 @@ def least_change(
         low: Lower bounds, shape (m,).
         high: Upper bounds, shape (m,).
         x: Output, shape (n,).
-        work: Scratch, shape (2 n + 3, n).
+        work: Scratch, shape (3 n + 4, n).
 
     Source: Goldfarb, Idnani (1983), "A numerically stable dual method for solving
     strictly convex quadratic programs", Mathematical Programming 27.
     """
-    x[:], count = 0.0, 0
+    x[:], count, bounds = 0.0, 0, work[3 * x.shape[0]]
     for _ in range(_MAX_STEPS):
         row, sign = _most_violated(rows, low, high, x)
         if row < 0:
-            _project_out(1.0, x, work, count)
-            for i in range(x.shape[0]):
-                x[i] -= work[2 * x.shape[0] + 2, i]  # rounding of long steps
+            _least_norm(bounds, x, work, count)
             return True
         bound = low[row] if sign > 0.0 else -high[row]
         count = _activate(rows[row], sign, bound, x, work, count)
@@ -53,8 +58,8 @@ def _activate(  # noqa: C901, one loop
 ) -> int:
     """Make `sign row x >= bound` active; return the number of active rows, or -1."""
     n, own = x.shape[0], 0.0
-    normals, multiplier = work[:n], work[2 * n]
-    r, z = work[2 * n + 1], work[2 * n + 2]
+    normals, bounds, multiplier = work[:n], work[3 * n], work[3 * n + 1]
+    r, z = work[3 * n + 2], work[3 * n + 3]
     while True:
         _project_out(sign, row, work, count)
         length = dot(z, z, n)
@@ -77,11 +82,11 @@ def _activate(  # noqa: C901, one loop
         if step == full:
             for i in range(n):
                 normals[count, i] = sign * row[i]
-            multiplier[count] = own
+            multiplier[count], bounds[count] = own, bound
             return count + 1
         count -= 1
         for k in range(leaving, count):
-            multiplier[k] = multiplier[k + 1]
+            multiplier[k], bounds[k] = multiplier[k + 1], bounds[k + 1]
             for i in range(n):
                 normals[k, i] = normals[k + 1, i]
 
@@ -106,16 +111,33 @@ def _most_violated(
 def _project_out(sign: float, row: Vector, work: Matrix, count: int) -> None:
     """Write r and `z = sign row - N^T r`, orthogonal to the active normals N."""
     n = work.shape[1]
-    normals, gram = work[:n], work[n : 2 * n]
-    r, z = work[2 * n + 1], work[2 * n + 2]
-    for i in range(count):
-        r[i] = sign * dot(normals[i], row, n)
-        for j in range(i + 1):
-            gram[i, j] = dot(normals[i], normals[j], n)
-    cholesky(gram, count, _INDEPENDENT)
-    solve_lower(gram, r, count)
-    solve_upper(gram, r, count)
+    Q, L = _factorise(work, count)
+    r, z = work[3 * n + 2], work[3 * n + 3]
+    r[:count] = 0.0
     for i in range(n):
         z[i] = sign * row[i]
+    for _ in range(2):  # the second time for what rounding left
         for k in range(count):
-            z[i] -= r[k] * normals[k, i]
+            part = dot(Q[k], z, n)
+            r[k] += part
+            for i in range(n):
+                z[i] -= part * Q[k, i]
+    solve_upper(L, r, count)
+
+
+@compiled
+def _least_norm(bounds: Vector, x: Vector, work: Matrix, count: int) -> None:
+    """Write the shortest x at the bounds of the active rows, free of step errors."""
+    Q, L = _factorise(work, count)
+    solve_lower(L, bounds, count)
+    lq_solve(Q, x.shape[0], bounds, x)
+
+
+@compiled
+def _factorise(work: Matrix, count: int) -> tuple[Matrix, Matrix]:
+    """Return the factors Q and L of the active normals, `N = L Q`."""
+    n = work.shape[1]
+    Q, L = work[n : n + count], work[2 * n : 2 * n + count]
+    copy_rows(work[:count], Q)
+    lq_factor(Q, n, L)
+    return Q, L

@@ -47,6 +47,10 @@ _FIRST_LEVEL: int = np.int64(0)  # pyright: ignore[reportAssignmentType]
 """Typed, since a literal would be compiled once more."""
 
 
+OVERSPEED = 1.2
+"""Speed of a joint over its limit at which commands brake."""
+
+
 class Stage(IntEnum):
     """Where a tick is."""
 
@@ -167,8 +171,11 @@ def limit_lead(
     The lead is e + (kd / kp) e', as feedback measures it. It grows by the velocity that
     the joint lacks: a step that is shorter than the last, of velocity v, by so much
     keeps it. A step may be longer by what can be braked within the lead that is left.
+
+    While a contact drives a joint faster than its limit, such as an arm that is jammed
+    before a base that drives on, no command gains speed, and all brake by the excess.
     """
-    dt = spline.period
+    dt, braking = spline.period, _overspeed(bounds, spline, drives, qvel)
     for j in range(spline.q_index.shape[0]):
         drive, i = drives[j], spline.v_index[j]
         position, velocity = spline_end(spline, j)
@@ -178,7 +185,23 @@ def limit_lead(
         for side, sign in enumerate((-1.0, 1.0)):
             left = max(most - sign * lead, 0.0)
             longer = braking_step(float(left), 1.0, a_max, dt)
-            bounds.step_max[side, i] = max(sign * kept + longer, 0.0)
+            most_step = sign * kept + longer
+            if braking > 0.0:
+                slower = sign * v[i] * dt - min(braking, 1.0) * a_max * dt**2
+                most_step = min(most_step, slower)
+            bounds.step_max[side, i] = max(most_step, 0.0)
+
+
+@compiled
+def _overspeed(
+    bounds: JointBounds, spline: SplineArrays, drives: CompiledRecords, qvel: Vector
+) -> float:
+    """Return the relative excess of the fastest joint over `OVERSPEED`, or below 0."""
+    most = 0.0
+    for j in range(spline.v_index.shape[0]):
+        v_max = float(bounds.v_max[spline.v_index[j]])
+        most = max(most, abs(float(qvel[drives[j].dof])) / v_max)
+    return most / OVERSPEED - 1.0
 
 
 @compiled

@@ -36,8 +36,12 @@ STRONGEST_CHANGE = 200.0
 HEAVIEST, HEAVIEST_MOMENT = 120.0, 8.0
 """N and N m; greatest load."""
 
-AT_STOP = 0.01
-"""rad or m; so near to its limit a joint's stop may act, and estimated loads fade."""
+AT_STOP, AHEAD = 0.01, 0.1
+"""rad or m, and s; where a joint is so near to its limit now or after this time, its
+stop may act, and estimated loads fade: they would push it on."""
+
+FADING = 8.0
+"""Rate of fading over `OBSERVER`."""
 
 DAMPING = 1e-3
 """m^2; damps the wrench in directions that the arm does not feel."""
@@ -150,7 +154,7 @@ def _observe_loads(physics: Physics, body: WholeBodyDynamics) -> None:
         write_frame_terms(physics, body, int(physics.site_bodyid[body.hand[k]]), p)
         change = _missing_wrench(body, k, residual)
         if _is_at_stop(physics, body, k):
-            change[:] = -load
+            change[:] = -FADING * load
         for r in range(6):
             part = min(max(change[r], -STRONGEST_CHANGE), STRONGEST_CHANGE)
             most = HEAVIEST if r < 3 else HEAVIEST_MOMENT
@@ -175,11 +179,12 @@ def _observe_loads(physics: Physics, body: WholeBodyDynamics) -> None:
 
 @compiled
 def _is_at_stop(physics: Physics, body: WholeBodyDynamics, k: int) -> bool:
-    """Return whether the stop of a joint may act on the arm of a hand."""
+    """Return whether the stop of a joint may soon act on the arm of a hand."""
     low, high, at_stop = body.limits[0], body.limits[1], False
     for j in range(body.qpos.shape[0]):
         q = physics.qpos[body.qpos[j]]
-        outside = q < low[j] + AT_STOP or q > high[j] - AT_STOP
+        ahead = q + AHEAD * physics.qvel[body.dofs[6 + j]]
+        outside = min(q, ahead) < low[j] + AT_STOP or max(q, ahead) > high[j] - AT_STOP
         at_stop = at_stop or (outside and body.is_arm[k, j] == 1)
     return at_stop
 

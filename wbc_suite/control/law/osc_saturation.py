@@ -51,7 +51,7 @@ def keep_direction(
         return
     R = _cost_factor(work.Q, n, work.L, work.pull, high)
     rows = _bounded_rows(C, n, R, low, high)
-    count, scratch = rows.shape[0], np.empty((2 * size + 3, size))
+    count, scratch = rows.shape[0], np.empty((3 * size + 4, size))
     if least_change(rows, low[:count], high[:count], x[:size], scratch):
         solve_upper(R, x, size)
         solve_upper(C, x, n)
