@@ -84,7 +84,7 @@ class GoalProblem:
 class GoalSearch:
     """Searches for a configuration that meets a problem, and the motion to it.
 
-    Starts from the configurations given, then from random ones, the same in each call.
+    Starts from the configurations given, then from random ones by a seed.
     If none of them leads to a configuration that meets the problem, the nearest that
     was found is taken, if it is nearer than `CLOSE`.
     """
@@ -122,7 +122,12 @@ class GoalSearch:
         self._run = None
 
     def start(
-        self, starts: Sequence[Vector], held: Vector, trail: Sequence[TimedState] = ()
+        self,
+        starts: Sequence[Vector],
+        held: Vector,
+        trail: Sequence[TimedState] = (),
+        *,
+        seed: int = 0,
     ) -> None:
         """Begin at initial configurations, best first; the tasks have their targets.
 
@@ -133,7 +138,7 @@ class GoalSearch:
         self._configuration.update(held)
         for equality in self._problem.equalities:
             equality.set_target(self._configuration.frame_pose(equality.frame))
-        self._run = self._search([q.copy() for q in starts])
+        self._run = self._search([q.copy() for q in starts], seed)
 
     def replan(self, motion: Motion) -> None:
         """Begin to look for another motion to the same goal."""
@@ -159,9 +164,9 @@ class GoalSearch:
                 return found
         return None
 
-    def _search(self, starts: list[Vector]) -> Iterator[Motion | None]:
+    def _search(self, starts: list[Vector], seed: int) -> Iterator[Motion | None]:
         """Yield None after each iteration, and better and better motions."""
-        rng = np.random.default_rng(0)
+        rng = np.random.default_rng(seed)
         self._best = self._stopping = None
         self._blocked.clear()
         self._tried = 0
