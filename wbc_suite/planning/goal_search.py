@@ -84,7 +84,7 @@ class GoalProblem:
 class GoalSearch:
     """Searches for a configuration that meets a problem, and the motion to it.
 
-    Starts from the configurations given, then from random ones by a seed.
+    Starts from the configurations given, then from random ones, the same in each call.
     If none of them leads to a configuration that meets the problem, the nearest that
     was found is taken, if it is nearer than `CLOSE`.
     """
@@ -122,12 +122,7 @@ class GoalSearch:
         self._run = None
 
     def start(
-        self,
-        starts: Sequence[Vector],
-        held: Vector,
-        trail: Sequence[TimedState] = (),
-        *,
-        seed: int = 0,
+        self, starts: Sequence[Vector], held: Vector, trail: Sequence[TimedState] = ()
     ) -> None:
         """Begin at initial configurations, best first; the tasks have their targets.
 
@@ -138,7 +133,7 @@ class GoalSearch:
         self._configuration.update(held)
         for equality in self._problem.equalities:
             equality.set_target(self._configuration.frame_pose(equality.frame))
-        self._run = self._search([q.copy() for q in starts], seed)
+        self._run = self._search([q.copy() for q in starts])
 
     def replan(self, motion: Motion) -> None:
         """Begin to look for another motion to the same goal."""
@@ -164,9 +159,9 @@ class GoalSearch:
                 return found
         return None
 
-    def _search(self, starts: list[Vector], seed: int) -> Iterator[Motion | None]:
+    def _search(self, starts: list[Vector]) -> Iterator[Motion | None]:
         """Yield None after each iteration, and better and better motions."""
-        rng = np.random.default_rng(seed)
+        rng = np.random.default_rng(0)
         self._best = self._stopping = None
         self._blocked.clear()
         self._tried = 0

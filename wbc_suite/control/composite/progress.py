@@ -23,15 +23,11 @@ from wbc_suite.kinematics.forward import RobotArrays
 from wbc_suite.planning import TimedState
 from wbc_suite.typing import Matrix, Vector
 
-STANDSTILL, STANDSTILL_SHARE = 0.02, 0.2
-"""rad/s or m/s, and the share of a joint's greatest speed: what is slower stands. The
-lift of PR2's trunk goes at 0.013 m/s."""
+STANDSTILL = 0.02  # rad/s or m/s
 STUCK_AFTER = 0.1  # s at a standstill
 PROGRESS_WINDOW = 0.2  # s; over which progress is measured
 PROGRESS_TIME = 2.0  # s; a robot that needs longer at its present rate is stuck
 SLOW_SHARE = 1.0 - PROGRESS_WINDOW / PROGRESS_TIME
-MAX_SEARCHES = 4  # for the same goals
-MOVED = 0.1  # rad or m; of a joint, after which another search begins elsewhere
 TRAIL = 60  # states that are recorded
 TRAIL_STEP = 5  # solves between them
 HALF_SPEED_ERROR = 0.2  # of the tolerance; at which lower levels have half their speed
@@ -55,7 +51,7 @@ PROGRESS = np.dtype(
     [
         ("goals_changed", "i8"),  # since the last solve
         ("is_planning", "i8"),  # whether the planner searches or leads a motion
-        ("searches", "i8"),  # for these goals
+        ("has_searched", "i8"),  # for these goals
         ("has_arrived", "i8"),  # level 0, at these goals
         ("standstill", "f8"),  # s
         ("solves", "i8"),
@@ -74,12 +70,10 @@ class ProgressArrays(NamedTuple):
         state: `PROGRESS` record, shape (1,).
         error: Greatest error of level 0 at the last solves, as a multiple of the
             tolerance, newest last.
-        searched: Configuration at the begin of the last search, shape (nq,).
         trail_time: Times of recorded states, s; the newest is at
             `(recorded - 1) % TRAIL`.
         trail_q: Their configurations, shape (TRAIL, nq).
         trail_v: Their velocities, shape (TRAIL, nv).
-        standstill_speed: Speed of each joint below which it stands, shape (nv,).
         far: Distances of a goal from which on a motion is planned, m and rad.
         may_plan: Whether motions are planned at all.
         dt: Time between solves, s.
@@ -89,11 +83,9 @@ class ProgressArrays(NamedTuple):
 
     state: Records
     error: Vector
-    searched: Vector
     trail_time: Vector
     trail_q: Matrix
     trail_v: Matrix
-    standstill_speed: Vector
     far: Vector
     may_plan: bool
     dt: float
@@ -102,11 +94,9 @@ class ProgressArrays(NamedTuple):
 
 
 def progress_arrays(
-    config: WholeBodyIKConfig, nq: int, speed: Vector, dt: float
+    config: WholeBodyIKConfig, nq: int, nv: int, dt: float
 ) -> ProgressArrays:
     """Return the arrays of a controller that solves every dt seconds.
-
-    The speed is each joint's greatest, shape (nv,).
 
     Once frames of level 0 have arrived, motion below must not move them off again where
     joints cannot follow it. A robot on its feet balances by that motion, which is then
@@ -115,11 +105,9 @@ def progress_arrays(
     return ProgressArrays(
         state=readable(np.zeros(1, PROGRESS)),
         error=np.zeros(round(PROGRESS_WINDOW / dt) + 1),
-        searched=np.zeros(nq),
         trail_time=np.zeros(TRAIL),
         trail_q=np.zeros((TRAIL, nq)),
-        trail_v=np.zeros((TRAIL, len(speed))),
-        standstill_speed=np.minimum(STANDSTILL, STANDSTILL_SHARE * speed),
+        trail_v=np.zeros((TRAIL, nv)),
         far=np.array(config.far, dtype=np.float64),
         may_plan=bool(config.planning),
         dt=float(dt),
@@ -138,13 +126,13 @@ def watch_progress(
     """
     if not progress.may_plan:
         return Event.NONE.value
-    state, stands = progress.state[0], True
+    state, fastest = progress.state[0], 0.0
     for i in range(v.shape[0]):
-        stands = stands and abs(v[i]) < progress.standstill_speed[i]
+        fastest = max(fastest, abs(v[i]))
     state.solves += 1
-    state.standstill = state.standstill + progress.dt if stands else 0.0
+    state.standstill = state.standstill + progress.dt if fastest < STANDSTILL else 0.0
     if state.goals_changed:
-        state.goals_changed = state.searches = state.has_arrived = 0
+        state.goals_changed = state.has_searched = state.has_arrived = 0
         state.standstill, state.errors = 0.0, 0
         measure_frames(robot, frames)
         if _is_far(frames, progress.far):
@@ -152,21 +140,9 @@ def watch_progress(
         return Event.NEW_GOALS.value if state.is_planning else Event.NONE.value
     if state.is_planning:
         return Event.PLANNING.value
-    if _may_search(progress, robot.q) and _is_stuck(progress, robot, frames):
+    if not state.has_searched and _is_stuck(progress, robot, frames):
         return Event.STUCK.value
     return Event.NONE.value
-
-
-@compiled_inline
-def _may_search(progress: ProgressArrays, q: Vector) -> bool:
-    """Return whether a search would begin elsewhere than the last one.
-
-    What contact stopped, or what had no path, is often free from where it ended.
-    """
-    searches, furthest = progress.state[0].searches, 0.0
-    for i in range(q.shape[0]):
-        furthest = max(furthest, abs(q[i] - progress.searched[i]))
-    return searches == 0 or (searches < MAX_SEARCHES and furthest > MOVED)
 
 
 @compiled

@@ -125,9 +125,8 @@ class WaypointPlanner:
             acceleration=PLAN_SHARE * limits,
         )
         self._search = GoalSearch(problem, clearance, self._planner)
-        progress = progress_arrays(config, configuration.nq, problem.speed, dt)
-        self._progress, self._state = progress, progress.state
-        self._trail = Trail(progress)
+        progress = progress_arrays(config, configuration.nq, configuration.nv, dt)
+        self._state, self._trail = progress.state, Trail(progress)
         self.argument = as_argument(progress)
         self.reset(configuration.q)
 
@@ -178,12 +177,11 @@ class WaypointPlanner:
 
     def _begin(self) -> None:
         """Begin a search for the present goals."""
-        q, seed = self._configuration.q, int(self._state["searches"][0])
-        self._state["searches"] += 1
-        self._progress.searched[:] = q
+        self._state["has_searched"] = 1
+        q = self._configuration.q
         for k, task in self._goal_tasks.items():
             set_target(task, self._frames.arrays.goal[k])
-        self._search.start([q, self._posture], q, self._trail, seed=seed)
+        self._search.start([q, self._posture], q, self._trail)
 
     def _along(self, motion: Motion, now: TimedState, standstill: float) -> Waypoint:
         """Return the next configuration on a motion; its clock waits for the robot."""
