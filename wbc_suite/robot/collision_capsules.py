@@ -18,8 +18,9 @@ from wbc_suite.robot.shapes import Box, Capsule, Cylinder, Ellipsoid, Shape, Sph
 from wbc_suite.typing import Matrix, Vector
 
 MAX_STRIPS = 4  # largest number of capsules for a flat box
-MAX_CUTS = 3  # of a hull, one in the other
-NEAR_HULL = 0.02  # m; a capsule that reaches less out of the hull is not cut
+NEAR_HULL, WIDE = 0.03, 0.15
+"""m; a capsule that reaches less out of the hull is not cut, others twice, in pieces of
+pieces, and wide ones three times."""
 WORTH = 4e-3  # m; a further capsule must bring all so much nearer to the hull
 
 
@@ -169,7 +170,8 @@ def _around_box(size: Vector) -> list[Segment]:
 def _around_hull(points: Matrix) -> list[Segment]:
     """Return capsules around the hull of points, cut where that brings them nearer."""
     planes = ConvexHull(points, qhull_options="QJ").equations
-    return _pieces(points, planes, MAX_CUTS)[1]
+    reach, _ = _pieces(points, planes, 0)
+    return _pieces(points, planes, 3 if reach > WIDE else 2)[1]
 
 
 def _pieces(points: Matrix, planes: Matrix, cuts: int) -> tuple[float, list[Segment]]:

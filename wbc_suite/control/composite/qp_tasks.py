@@ -179,11 +179,16 @@ def distance_limits(
 def _floor_limit(robot: RobotDescription, config: WholeBodyIKConfig) -> FloorLimit:
     """Return the limit that keeps all links but the legs off the floor.
 
-    Another contact with the floor would take load off the feet, which then slip.
+    Another contact with the floor would take load off the feet, which then slip. Links
+    below a held one, such as the wheel of a leg, are part of the foot.
     """
     spheres = collision_spheres(robot)
-    for held in config.held:
-        link = robot.link(robot.link_of(held.frame))
+    feet = {robot.link_of(held.frame) for held in config.held}
+    for link in robot.links:
+        if link.parent in feet:
+            feet.add(link.name)
+    for foot in feet:
+        link = robot.link(foot)
         while link.parent is not None:
             spheres.pop(link.name, None)
             link = robot.link(link.parent)
