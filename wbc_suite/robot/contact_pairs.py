@@ -20,12 +20,13 @@ LOG = logging.getLogger(__name__)
 OVERLAP = 1e-3  # smallest penetration in m that counts as an overlap
 NEAR = 0.01  # m; links that never come nearer never touch
 POSTURES = 2000
-MAX_OVERLAP_SHARE, MAX_FALSE_SHARE = 0.25, 0.15
+MAX_OVERLAP_SHARE, MAX_FALSE_SHARE = 0.25, 0.2
 """Shares of random postures: in which shapes overlap, and in which capsules do while
 the shapes are not near."""
 MAX_JOINTS_BETWEEN = 3
 """Largest number of joints between links that are excluded from contact. Links farther
 apart, such as an arm and the trunk, overlap because of the posture."""
+SHORTEST = 1e-6  # m; shorter capsules are spheres
 ENDLESS = np.pi  # rad; range of a joint without one
 Pair = tuple[str, str]
 
@@ -74,7 +75,7 @@ def _of_capsules(robot: RobotDescription) -> RobotDescription:
     shapes: dict[str, list[Shape]] = {link.name: [] for link in robot.links}
     for c in enclosing_capsules(robot):
         start, end = tuple(c.start.tolist()), tuple(c.end.tolist())
-        is_ball = np.allclose(c.start, c.end)
+        is_ball = float(np.linalg.norm(c.end - c.start)) < SHORTEST
         ball = Sphere(shape="sphere", pos=start, radius=c.radius)
         long = {"shape": "capsule", "from": start, "to": end, "radius": c.radius}
         shapes[c.link].append(ball if is_ball else Capsule.model_validate(long))
