@@ -74,11 +74,12 @@ def _of_capsules(robot: RobotDescription) -> RobotDescription:
     """Return the robot with the capsules around its collision shapes in their place."""
     shapes: dict[str, list[Shape]] = {link.name: [] for link in robot.links}
     for c in enclosing_capsules(robot):
-        start, end = tuple(c.start.tolist()), tuple(c.end.tolist())
-        is_ball = float(np.linalg.norm(c.end - c.start)) < SHORTEST
-        ball = Sphere(shape="sphere", pos=start, radius=c.radius)
+        start, end = c.start.tolist(), c.end.tolist()
+        ball = {"shape": "sphere", "pos": start, "radius": c.radius}
         long = {"shape": "capsule", "from": start, "to": end, "radius": c.radius}
-        shapes[c.link].append(ball if is_ball else Capsule.model_validate(long))
+        is_ball = float(np.linalg.norm(c.end - c.start)) < SHORTEST
+        kind, fields = (Sphere, ball) if is_ball else (Capsule, long)
+        shapes[c.link].append(kind.model_validate(fields))
     links = tuple(
         link.model_copy(update={"collision": tuple(shapes[link.name])})
         for link in robot.links
