@@ -1,5 +1,6 @@
 """Limits of robots without a controller file: links kept apart, weak motors."""
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -12,7 +13,7 @@ from wbc_suite.robot import load_robot
 CUBE = """<mujoco><worldbody><body name="base"><geom type="box" size=".1 .1 .1"/>
   <body name="arm"><joint name="turn" axis="1 0 0" range="-.1 .1" limited="true"/>
   <inertial pos="0 0 0" mass="1" diaginertia=".01 .01 .01"/>
-  <body name="ball"><joint name="slide" type="slide" axis="1 0 0" range="{low} .3"
+  <body name="ball"><joint name="slide" type="slide" axis="1 0 0" range="{low} {high}"
   limited="true"/><geom size=".02" mass="1"/></body></body></body></worldbody>
   <keyframe><key name="ready" qpos="0 .28"/></keyframe></mujoco>"""
 PENDULUM = """<robot name="p"><link name="base"/><link name="rod"><inertial>
@@ -29,16 +30,23 @@ def config_of(robot):
     return read_whole_body(config, robot, robot.name)
 
 
-@pytest.mark.parametrize(("low", "kept"), [(0.125, 0), (0.08, 1)])
-def test_capsules_that_overlap_without_their_shapes_are_left_out(tmp_path, low, kept):
+@pytest.mark.parametrize(("low", "high", "kept"), [(0.125, 0.3, 0), (0.08, 0.34, 1)])
+def test_controllers_and_the_simulator_leave_out_the_same_capsules(
+    tmp_path, low, high, kept
+):
     # The cube's capsule has a radius of 0.141 m, 0.041 m more than its side. On its way
-    # from 0.125 m on the ball is never nearer than 5 mm to the cube, and in its capsule
-    # for a fifth of the way; from 0.08 m on it is as often in both.
+    # from 0.125 m on the ball hardly comes nearer than 1 cm to the cube, and is in its
+    # capsule for a fifth of the way; from 0.08 m on it is nearly as often in both.
     path = tmp_path / "cube.xml"
-    path.write_text(CUBE.format(low=low))
+    path.write_text(CUBE.format(low=low, high=high))
     robot = load_robot(path)
     limits = distance_limits(robot, config_of(robot))
     assert sum(limit.pair_count for limit in limits) == kept
+    m = robot.to_mjspec().compile()
+    data = mujoco.MjData(m)
+    data.joint("slide").qpos[0] = 0.11  # in the cube
+    mujoco.mj_forward(m, data)
+    assert data.ncon == kept
 
 
 def test_weak_motors_are_asked_for_postures_that_they_can_hold(tmp_path):

@@ -17,6 +17,8 @@ FOOT = """<robot name="foot"><link name="shank"><inertial><mass value="1"/>
 <axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="10" velocity="10"/></joint>
 </robot>"""
 
+WHEEL_TURN = '<origin rpy="1.5708 0 0"/><geometry>'  # its axis is that of the ankle
+
 
 @pytest.fixture
 def foot(tmp_path):
@@ -88,3 +90,17 @@ def test_the_balls_of_spot_are_those_of_its_file():
     robot = load_robot("Spot")
     for told in config["foot"]:
         assert ball_radius(robot, told["frame"]) == pytest.approx(told["radius"])
+
+
+def test_a_wheel_rolls_and_a_foot_with_limits_does_not(foot, tmp_path):
+    shape = '<collision><geometry><cylinder radius="0.08" length="0.1"/></geometry>'
+    wheel = f"{shape.replace('<geometry>', WHEEL_TURN)}</collision>"
+    robot = foot(wheel)
+    name = next(frame.name for frame in robot.frames if frame.role == "foot")
+    assert ball_radius(robot, name) == 0.0
+    limit = '<limit lower="-1" upper="1" effort="10" velocity="10"/>'
+    text = FOOT.format(shapes=wheel).replace(limit, limit.replace('upper="1"', ""))
+    text = text.replace('lower="-1" ', "").replace("revolute", "continuous")
+    file = tmp_path / "wheel.urdf"
+    file.write_text(text)
+    assert ball_radius(load_robot(file), name) == pytest.approx(0.08, rel=1e-3)

@@ -156,3 +156,18 @@ def test_a_dog_let_go_stands_and_moves_its_body(tmp_path):
     np.testing.assert_allclose(trunk.xpos - start, [0.03, 0.02, -0.04], atol=5e-3)
     assert not any(int(w.number) for w in base.simulation.data.warning)
     env.close()
+
+
+def test_legs_on_wheels_stand_on_these(tmp_path):
+    text = dog().replace("_foot", "_wheel")
+    for leg in ("FL", "FR", "RL", "RR"):
+        text = text.replace(
+            f'name="{leg}_wheel_fixed" type="fixed"',
+            f'name="{leg}_wheel_joint" type="continuous"',
+        )
+    robot = read(tmp_path, text)
+    feet = {frame.link for frame in robot.frames if frame.role == "foot"}
+    assert feet == {f"{leg}_wheel" for leg in ("FL", "FR", "RL", "RR")}
+    ready = robot.keyframes["ready"]
+    assert robot.root.kind == "free"
+    assert ready["FL_calf_joint"] < -0.9 < 0.0 == ready["FL_wheel_joint"]

@@ -16,6 +16,9 @@ from wbc_suite.planning.trajectory import Motion, Segment, TimedState, Trajector
 from wbc_suite.typing import Vector
 
 MAX_PATH_TIME = 90.0  # s at full speed; of all lines that RRT-Connect checks
+CHECKED_SPEED = 0.1
+"""rad/s or m/s, at least, by which lines are measured: the lift of PR2's trunk goes at
+0.013 m/s, and alone would take all checks."""
 SHORTCUTS = 600
 MIN_CLEARANCE = 0.015  # m; closer links are slowed down, so a short path takes long
 CATCH_UP_LIMIT = 0.03  # s; with more to catch up, a robot replans
@@ -55,7 +58,10 @@ class MotionPlanner:
         self._spacing = spacing
         self._max_checks = round(MAX_PATH_TIME / path_spacing)
         self._rrt = RRTConnect(
-            model, speed=speed, clearance=clearance, spacing=path_spacing
+            model,
+            speed=np.maximum(speed, CHECKED_SPEED),
+            clearance=clearance,
+            spacing=path_spacing,
         )
         self._is_euclidean = model.nq == model.nv
 

@@ -4,6 +4,7 @@ Each capsule encloses its shape, which the simulator collides exactly.
 """
 
 import itertools
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,9 +17,11 @@ from wbc_suite.robot.shape_geometry import hull_spheres, support_points
 from wbc_suite.robot.shapes import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
 from wbc_suite.typing import Matrix, Vector
 
-MAX_STRIPS = 4  # largest number of capsules for a flat box, or a hull
-TIGHT = 1.4  # a capsule with less of the hull's volume is not cut
-SAVED = 0.8  # of a capsule's volume that its pieces may have together
+MAX_STRIPS = 4  # largest number of capsules for a flat box
+NEAR_HULL, WIDE = 0.03, 0.15
+"""m; a capsule that reaches less out of the hull is not cut, others twice, in pieces of
+pieces, and wide ones three times."""
+WORTH = 4e-3  # m; a further capsule must bring all so much nearer to the hull
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -122,7 +125,7 @@ def _capsules(shape: Shape) -> list[Segment]:
         case Box(size=size):
             return _around_box(np.asarray(size))
         case _:
-            return _around_hull(support_points(shape), MAX_STRIPS)
+            return _around_hull(support_points(shape))
 
 
 def _around_cylinder(start: Vector, end: Vector, radius: float) -> Segment:
@@ -164,27 +167,43 @@ def _around_box(size: Vector) -> list[Segment]:
     return found
 
 
-def _around_hull(points: Matrix, pieces: int) -> list[Segment]:
-    """Return capsules around the hull of points, cut across while that saves much."""
-    whole = _around_points(points)
+def _around_hull(points: Matrix) -> list[Segment]:
+    """Return capsules around the hull of points, cut where that brings them nearer."""
+    planes = ConvexHull(points, qhull_options="QJ").equations
+    reach, _ = _pieces(points, planes, 0)
+    return _pieces(points, planes, 3 if reach > WIDE else 2)[1]
+
+
+def _pieces(points: Matrix, planes: Matrix, cuts: int) -> tuple[float, list[Segment]]:
+    """Return how far capsules of a hull's piece are out of its planes, m, and these.
+
+    A piece is cut in the middle, across the axis of the link that is best for it.
+    """
+    start, end, radius = whole = _around_points(points)
+    reach = np.maximum(planes[:, :3] @ start, planes[:, :3] @ end) + planes[:, 3]
+    found = [(float(reach.max()) + radius, [whole])]
+    if cuts and found[0][0] > NEAR_HULL:
+        for halves in _halves(points):
+            (a, low), (b, high) = (_pieces(half, planes, cuts - 1) for half in halves)
+            found.append((max(a, b), low + high))
+    return min(found, key=lambda piece: piece[0] + WORTH * len(piece[1]))
+
+
+def _halves(points: Matrix) -> Iterator[tuple[Matrix, Matrix]]:
+    """Yield the halves of a hull's points across each axis of the link.
+
+    Both have the points where the cut goes through an edge.
+    """
     hull = ConvexHull(points, qhull_options="QJ")
-    if pieces < 2 or _volume(whole) < TIGHT * hull.volume:
-        return [whole]
-    axis = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][0]
-    along = points @ axis
-    middle = (along.min() + along.max()) / 2
     edges = hull.simplices[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    crossing = edges[(along[edges] < middle).sum(axis=1) == 1]
-    near, far = along[crossing].T - middle
-    share = (near / (near - far))[:, None]
-    cut = points[crossing[:, 0]] * (1 - share) + points[crossing[:, 1]] * share
-    halves = points[along < middle], points[along >= middle]
-    found = [
-        capsule
-        for half in halves
-        for capsule in _around_hull(np.concatenate([half, cut]), pieces // 2)
-    ]
-    return found if sum(map(_volume, found)) < SAVED * _volume(whole) else [whole]
+    for along in points.T:
+        middle = (along.min() + along.max()) / 2
+        low = along < middle
+        crossing = edges[low[edges].sum(axis=1) == 1]
+        near, far = along[crossing].T - middle
+        share = (near / (near - far))[:, None]
+        cut = points[crossing[:, 0]] * (1 - share) + points[crossing[:, 1]] * share
+        yield np.concatenate([points[low], cut]), np.concatenate([points[~low], cut])
 
 
 def _volume(capsule: Segment) -> float:
@@ -194,9 +213,15 @@ def _volume(capsule: Segment) -> float:
 
 
 def _around_points(points: Matrix) -> Segment:
-    """Return a capsule along the longest principal axis of a point cloud."""
+    """Return the smallest capsule along an axis, or the longest principal axis."""
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
-    axis = np.linalg.svd(points - middle, full_matrices=False)[2][0]
+    longest = np.linalg.svd(points - middle, full_matrices=False)[2][0]
+    found = [_along(axis, points, middle) for axis in (longest, *np.eye(3))]
+    return min(found, key=_volume)
+
+
+def _along(axis: Vector, points: Matrix, middle: Vector) -> Segment:
+    """Return the capsule around points on the line through their middle."""
     along = (points - middle) @ axis
     across = np.linalg.norm(points - middle - np.outer(along, axis), axis=1)
     radius = float(across.max())

@@ -10,18 +10,23 @@ import mujoco
 import numpy as np
 
 from wbc_suite.errors import join_first
+from wbc_suite.robot.collision_capsules import enclosing_capsules
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.elements import Contacts
+from wbc_suite.robot.shapes import Capsule, Shape, Sphere
 
 LOG = logging.getLogger(__name__)
 
 OVERLAP = 1e-3  # smallest penetration in m that counts as an overlap
 NEAR = 0.01  # m; links that never come nearer never touch
 POSTURES = 2000
-MAX_OVERLAP_SHARE = 0.25  # of random postures
+MAX_OVERLAP_SHARE, MAX_FALSE_SHARE = 0.25, 0.2
+"""Shares of random postures: in which shapes overlap, and in which capsules do while
+the shapes are not near."""
 MAX_JOINTS_BETWEEN = 3
 """Largest number of joints between links that are excluded from contact. Links farther
 apart, such as an arm and the trunk, overlap because of the posture."""
+SHORTEST = 1e-6  # m; shorter capsules are spheres
 ENDLESS = np.pi  # rad; range of a joint without one
 Pair = tuple[str, str]
 
@@ -30,12 +35,15 @@ def exclude_by_sampling(robot: RobotDescription, source: Path) -> RobotDescripti
     """Return the robot with further pairs excluded from contact, few joints apart.
 
     These do not come nearer than 1 cm in any of 2000 random postures, as setup
-    assistants find them, or overlap in more than a quarter of them. Controllers keep
-    links apart by capsules, which are larger than hulls, and would take room from the
-    arm. Links that overlap so often do so by their hulls, not in the machine, whose
-    joint limits allow these postures.
+    assistants find them, or overlap in more than a quarter of them. Links that overlap
+    so often do so by their hulls, not in the machine, whose joint limits allow these
+    postures. Controllers keep links apart by capsules, which are larger; where
+    only these overlap in many postures, they would take room from the arm. The
+    simulator leaves out such a pair as well: an arm that touches itself where its
+    controller does not expect it sticks there.
     """
-    near, overlap = _sampled_contacts(robot)
+    near, overlap = _sampled_contacts(robot, NEAR, -OVERLAP)
+    (capsules,) = _sampled_contacts(_of_capsules(robot), -OVERLAP)
     excluded = {*map(frozenset, robot.contacts.exclude)}
     solid = sorted(link.name for link in robot.links if link.collision)
     close = [
@@ -44,12 +52,17 @@ def exclude_by_sampling(robot: RobotDescription, source: Path) -> RobotDescripti
         if frozenset(pair) not in excluded
         and 2 <= _joints_between(robot, *pair) <= MAX_JOINTS_BETWEEN
     ]
-    often = [pair for pair in close if overlap[pair] > MAX_OVERLAP_SHARE * POSTURES]
+    often = [
+        pair
+        for pair in close
+        if overlap[pair] > MAX_OVERLAP_SHARE * POSTURES
+        or capsules[pair] - near[pair] > MAX_FALSE_SHARE * POSTURES
+    ]
     if often:
         shown = [f"'{first}' and '{second}'" for first, second in often]
         LOG.warning(
-            "%s: these links overlap in over a quarter of random postures and will not "
-            "collide: %s.",
+            "%s: these links, or the capsules around them, overlap in many random "
+            "postures and will not collide: %s.",
             *(source, join_first(shown, limit=12)),
         )
     apart = [pair for pair in close if pair not in near]
@@ -57,21 +70,41 @@ def exclude_by_sampling(robot: RobotDescription, source: Path) -> RobotDescripti
     return robot.model_copy(update={"contacts": Contacts(exclude=exclude)})
 
 
-def _sampled_contacts(robot: RobotDescription) -> tuple[Counter[Pair], Counter[Pair]]:
-    """Return in how many random postures sorted pairs are near, and overlap."""
+def _of_capsules(robot: RobotDescription) -> RobotDescription:
+    """Return the robot with the capsules around its collision shapes in their place."""
+    shapes: dict[str, list[Shape]] = {link.name: [] for link in robot.links}
+    for c in enclosing_capsules(robot):
+        start, end = c.start.tolist(), c.end.tolist()
+        ball = {"shape": "sphere", "pos": start, "radius": c.radius}
+        long = {"shape": "capsule", "from": start, "to": end, "radius": c.radius}
+        is_ball = float(np.linalg.norm(c.end - c.start)) < SHORTEST
+        kind, fields = (Sphere, ball) if is_ball else (Capsule, long)
+        shapes[c.link].append(kind.model_validate(fields))
+    links = tuple(
+        link.model_copy(update={"collision": tuple(shapes[link.name])})
+        for link in robot.links
+    )
+    return robot.model_copy(update={"links": links})
+
+
+def _sampled_contacts(
+    robot: RobotDescription, *distances: float
+) -> Iterator[Counter[Pair]]:
+    """Yield in how many random postures sorted pairs are nearer than distances, m."""
     m = robot.to_mjspec().compile()
     data, rng = mujoco.MjData(m), np.random.default_rng(0)
-    m.geom_margin[:] = NEAR
+    m.geom_margin[:] = max(0.0, *distances)
     names = {m.body(link.name).id: link.name for link in robot.links}
     index = [m.joint(joint.name).qposadr[0] for joint in robot.joints]
     ranges = [joint.range or (-ENDLESS, ENDLESS) for joint in robot.joints]
     low, high = np.array(ranges).reshape(-1, 2).T
-    near, overlap = Counter[Pair](), Counter[Pair]()
+    found = [Counter[Pair]() for _ in distances]
     for _ in range(POSTURES):
         data.qpos[index] = rng.uniform(low, high)
-        near.update(_named(contacts(m, data, NEAR), names))
-        overlap.update(_named(_contacts_nearer(m, data, -OVERLAP), names))
-    return near, overlap
+        contacts(m, data)
+        for counter, distance in zip(found, distances, strict=True):
+            counter.update(_named(_contacts_nearer(m, data, distance), names))
+    yield from found
 
 
 def _named(pairs: set[tuple[int, int]], names: dict[int, str]) -> Iterator[Pair]:

@@ -125,6 +125,8 @@ def _traits(links: Sequence[Link]) -> dict[str, _Traits]:
             rolls = above.kind == "base" and parent not in driving  # rim of a wheel
             inherits = rolls or above.kind in ("leg", "gripper", "head")
             kind = above.kind if inherits else "arm"
+        if kind == "base" and above.kind == "leg":
+            kind = "leg"  # on wheels
         if kind == "torso" and side_of(words, pairs=False):
             kind = "arm"  # "waist" of the left one of two arms
         same_limb = above.kind in ("arm", "leg", "gripper")

@@ -52,8 +52,18 @@ def guess_sole(robot: RobotDescription, frame: str) -> Sole | None:
 
 
 def ball_radius(robot: RobotDescription, frame: str) -> float:
-    """Return the radius of a foot that is a ball about its frame, m; 0 for others."""
-    for x, y, z, radius in _spheres(robot, frame):
+    """Return the radius of a foot that rolls about its frame, m; 0 for others.
+
+    It is a ball, or a wheel on a hinge without limits through the frame.
+    """
+    spheres, joint = _spheres(robot, frame), robot.link(robot.link_of(frame)).joint
+    at = se3_of(robot.frame(frame))
+    if joint is not None and joint.range is None and len(spheres):
+        axis = np.asarray(joint.axis)
+        if np.linalg.norm(np.cross(axis, at.translation)) < AT_FRAME:
+            across = np.cross(at.rotation.T @ axis, spheres[:, :3])
+            return float((np.linalg.norm(across, axis=1) + spheres[:, 3]).max())
+    for x, y, z, radius in spheres:
         if radius > 0.0 and np.linalg.norm((x, y, z)) < AT_FRAME:
             return float(radius)
     return 0.0

@@ -1,9 +1,7 @@
 """QP tasks, equality rows and limits out of a whole-body config."""
 
-from collections.abc import Callable, Mapping
-from itertools import product
+from collections.abc import Mapping
 
-import mujoco
 import numpy as np
 import pinocchio as pin
 
@@ -18,8 +16,7 @@ from wbc_suite.control.part.feasible_acceleration import (
 )
 from wbc_suite.control.part.stance_controller import soles_of
 from wbc_suite.errors import UnknownNameError
-from wbc_suite.kinematics import Configuration, Conversion
-from wbc_suite.kinematics.configuration import random_configuration
+from wbc_suite.kinematics import Configuration
 from wbc_suite.planning import LimitChecker
 from wbc_suite.qp import (
     AccelerationLimit,
@@ -46,13 +43,6 @@ TRACKING_COST = 10.0
 
 MAX_NEIGHBOUR_JOINTS = 1
 """Links with at most this many joints between them are kept apart by joint limits."""
-
-SAMPLES = 100
-MAX_OVERLAP_SHARE = 0.4
-MAX_FALSE_SHARE = 0.2
-"""Pairs whose capsules overlap in a greater share of random configurations are left
-out, and those whose capsules overlap in a greater share where their shapes do not."""
-FREE = 0.005  # m; distance of shapes that are clearly apart
 
 
 def held_equality(held: HeldFrame) -> FrameEquality:
@@ -189,11 +179,16 @@ def distance_limits(
 def _floor_limit(robot: RobotDescription, config: WholeBodyIKConfig) -> FloorLimit:
     """Return the limit that keeps all links but the legs off the floor.
 
-    Another contact with the floor would take load off the feet, which then slip.
+    Another contact with the floor would take load off the feet, which then slip. Links
+    below a held one, such as the wheel of a leg, are part of the foot.
     """
     spheres = collision_spheres(robot)
-    for held in config.held:
-        link = robot.link(robot.link_of(held.frame))
+    feet = {robot.link_of(held.frame) for held in config.held}
+    for link in robot.links:
+        if link.parent in feet:
+            feet.add(link.name)
+    for foot in feet:
+        link = robot.link(foot)
         while link.parent is not None:
             spheres.pop(link.name, None)
             link = robot.link(link.parent)
@@ -210,7 +205,7 @@ def _self_collision_limit(
 ) -> SelfCollisionLimit:
     """Return the limit that keeps a robot's links apart.
 
-    Pairs whose capsules overlap at the posture are left out.
+    Capsules that overlap at the posture are left out.
     """
     configuration = Configuration(robot.to_pinocchio())
     support = configuration.support
@@ -221,7 +216,7 @@ def _self_collision_limit(
     ]
     limit = SelfCollisionLimit(
         enclosing_capsules(robot),
-        _rarely_overlapping(robot, pairs, configuration),
+        pairs,
         nearest=config.limits.collision_pairs,
         margin=config.limits.collision_distance,
     )
@@ -231,60 +226,3 @@ def _self_collision_limit(
         configuration.update(configuration.model.referenceConfigurations[name])
     limit.drop_touching(configuration)
     return limit
-
-
-def _rarely_overlapping(
-    robot: RobotDescription,
-    pairs: list[tuple[str, str]],
-    configuration: Configuration,
-) -> list[tuple[str, str]]:
-    """Return the pairs whose capsules overlap in few random configurations."""
-    if not pairs:
-        return pairs
-    nearest = 4 * len(pairs)
-    limit = SelfCollisionLimit(
-        enclosing_capsules(robot), pairs, nearest=nearest, margin=0.0, influence=1e-4
-    )
-    limit.bind(configuration)
-    G, h = np.zeros((nearest, configuration.nv)), np.zeros(nearest)
-    touching: dict[tuple[str, str], list[Vector]] = {pair: [] for pair in pairs}
-    rng = np.random.default_rng(0)
-    for _ in range(SAMPLES):
-        q = random_configuration(configuration.model, configuration.q, rng)
-        configuration.update(q)
-        limit.rows(configuration, 1.0, G, h)
-        rows = np.flatnonzero(limit.distances < 0.0).tolist()
-        found = {limit.subject(row) for row in rows}
-        for a, b in {tuple(sorted((x.first, x.second))) for x in found}:
-            touching[a, b].append(q)
-    frequent = [p for p in pairs if len(touching[p]) > MAX_FALSE_SHARE * SAMPLES]
-    out = {p for p in frequent if len(touching[p]) > MAX_OVERLAP_SHARE * SAMPLES}
-    if len(out) < len(frequent):
-        distance = _shape_distance(robot, configuration)
-        for pair in frequent:
-            false = sum(distance(pair, q) > FREE for q in touching[pair])
-            out |= {pair} if false > MAX_FALSE_SHARE * SAMPLES else set()
-    return [pair for pair in pairs if pair not in out]
-
-
-def _shape_distance(
-    robot: RobotDescription, configuration: Configuration
-) -> Callable[[tuple[str, str], Vector], float]:
-    """Return what measures the distance of two links' exact shapes, m, up to 1 cm."""
-    m = robot.to_mjspec().compile()
-    data, conversion = mujoco.MjData(m), Conversion(m, configuration.model)
-    solid = (m.geom_contype | m.geom_conaffinity) > 0
-
-    def distance(pair: tuple[str, str], q: Vector) -> float:
-        conversion.q_to_mujoco(q, data.qpos)
-        mujoco.mj_kinematics(m, data)
-        first, second = (
-            np.flatnonzero(solid & (m.geom_bodyid == m.body(link).id)).tolist()
-            for link in pair
-        )
-        return min(
-            mujoco.mj_geomDistance(m, data, a, b, 2.0 * FREE, None)
-            for a, b in product(first, second)
-        )
-
-    return distance
