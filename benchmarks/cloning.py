@@ -41,7 +41,7 @@ KINDS |= {"both": (1.0, 1.0), "strong": (4.0, 1.0)}
 BENCHMARKS = {
     "Lift": {"noise": 0.05, "pushes": 4.0, "horizon": 100, "steps": 2000},
     "PickPlaceCan": {"noise": 0.05, "pushes": 2.0, "horizon": 400, "steps": 6000},
-    "NutAssemblySquare": {"noise": 0.05, "pushes": 2.0, "horizon": 300, "steps": 16000},
+    "NutAssemblySquare": {"noise": 0.03, "pushes": 4.0, "horizon": 300, "steps": 8000},
 }
 """Noise in full steps, pushes in 100 actions; horizon and gradient steps."""
 METHODS = ("bc", "bc_history", "diffusion")

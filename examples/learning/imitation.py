@@ -74,6 +74,8 @@ class Demonstrations:
         ends = (moves == self.scales["low"]) | (moves == self.scales["high"])
         self.scales["binary"] = ends.all(axis=0)
         self.observations = [normalised(s, self.scales) for s in seen]
+        changes = torch.cat([each.diff(dim=0) for each in self.observations])
+        self.scales["change"] = changes.std(dim=0).numpy() + 1e-3
         self.actions = [scaled(a, self.scales) for a in acted]
 
     def windows(self, history: int, chunk: int) -> tuple[Tensor, Tensor]:
@@ -89,6 +91,16 @@ class Demonstrations:
             seen.append(torch.cat([first, before]).unfold(0, history, 1))
             acted.append(torch.cat([after, last]).unfold(0, chunk, 1))
         return torch.cat(seen).mT.contiguous(), torch.cat(acted).mT.contiguous()
+
+
+def as_changes(seen: Tensor, scales: Mapping[str, np.ndarray]) -> Tensor:
+    """Return the last observations as changes, of unit deviation, and the last one.
+
+    Between two actions a hand moves by hundredths of what it moves in an episode, so
+    that a network hardly sees velocities in the difference of two observations.
+    """
+    changes = seen.diff(dim=-2) / torch.as_tensor(scales["change"]).float()
+    return torch.cat([changes, seen[..., -1:, :]], dim=-2)
 
 
 def normalised(observation: np.ndarray, scales: Mapping[str, np.ndarray]) -> Tensor:
@@ -155,6 +167,7 @@ def train(settings: Settings, method: Method) -> Run:
     run = Run(settings)
     data = Demonstrations(settings.demonstrations, settings.observed, settings.episodes)
     seen, acted = data.windows(settings.history, settings.chunk)
+    seen = as_changes(seen, data.scales)
     sizes = {"inputs": seen.shape[2], "outputs": acted.shape[2]}
     sizes |= {name: settings[name] for name in ("history", "chunk", "width")}
     model = method.network(**sizes)
@@ -193,8 +206,9 @@ class Policies:
             past.extend([now] * (1 if past else self.settings.history))
             del past[: -self.settings.history]
             if not waiting:
+                seen = as_changes(torch.stack(past)[None], self.scales)
                 with torch.inference_mode():
-                    drawn = self.method.draw(self.model, torch.stack(past)[None], rng)
+                    drawn = self.method.draw(self.model, seen, rng)
                 waiting.extend(drawn[0, : self.settings.taken])
             return unscaled(waiting.pop(0), self.scales)
 

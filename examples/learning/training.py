@@ -116,7 +116,9 @@ def fit(
         facts: Further parts of each checkpoint.
     """
     settings, first, average = run.settings, 0, copy.deepcopy(model)
-    optimiser = torch.optim.AdamW(model.parameters(), lr=settings.learning_rate)
+    optimiser = torch.optim.AdamW(
+        model.parameters(), lr=settings.learning_rate, fused=True
+    )
     if (saved := run.resume()) is not None:
         model.load_state_dict(saved["training"])
         average.load_state_dict(saved["model"])

@@ -16,6 +16,7 @@ log = logging.getLogger(__name__)
 
 UP = np.array([0.0, 0.0, 1.0])
 STALLED = 8  # control periods without progress end a motion
+PUSHED = 0.01  # m, by which the error of a hand rises that is pushed off its way
 STOPPED = 2e-4  # rad or m per control period, of fingers
 OPENING = 8  # control periods until a gripper is open
 OUT_OF_REACH = 0.008  # m, error of outlooks; from the start more may be in reach
@@ -43,7 +44,7 @@ def move(
     """Move a hand to a pose; return whether it got within the tolerances, m and rad.
 
     A target that is a function is followed. It ends without success when the hand makes
-    no more progress.
+    no more progress; one that was pushed off its way starts anew.
     """
     best, waited = np.inf, 0
     for _ in range(most):
@@ -52,8 +53,9 @@ def move(
         if distance < tolerance and angle < turn_tolerance:
             return True
         left = distance + 0.1 * angle
-        waited = 0 if left < best - 2e-4 else waited + 1
-        best = min(best, left)
+        pushed = left > best + PUSHED
+        waited = 0 if pushed or left < best - 2e-4 else waited + 1
+        best = left if pushed else min(best, left)
         if waited > STALLED:
             return False
         yield
