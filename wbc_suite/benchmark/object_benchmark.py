@@ -309,12 +309,9 @@ class ObjectBenchmark(ABC):
         return any(hand.grasps(geoms) for hand in self.hands)
 
     def held(self, name: str) -> bool:
-        """Whether one hand alone holds an object, by force closure; see `Hand`."""
-        state = self.states[name]
-        return any(
-            hand.encloses(state.geoms) and hand.slip(state.body) < SLIP
-            for hand in self.hands
-        )
+        """Whether a hand clamps an object, which moves with it."""
+        geoms = self.states[name].geoms
+        return any(self.holds(hand, name, geoms) for hand in self.hands)
 
     def holds(self, hand: Hand, name: str, geoms: Collection[int]) -> bool:
         """Whether a hand clamps geoms of an object, which moves with it."""

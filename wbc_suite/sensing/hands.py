@@ -1,19 +1,17 @@
 """Hands of a robot in a scene: positions and grasps."""
 
+import itertools
 from collections.abc import Collection, Sequence
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from wbc_suite.control import RobotState
 from wbc_suite.robot import RobotDescription
-from wbc_suite.typing import Indices, Matrix, Vector
+from wbc_suite.typing import Vector
 
 OPPOSED = -0.5
 """Greatest product of the normals of contacts from opposite sides."""
-MARGIN = 0.5
-"""Part of the friction that a hold may need: near its limit one creeps and slips."""
 
 
 def pairs_in_contact(data: mujoco.MjData) -> list[list[int]]:
@@ -62,47 +60,17 @@ class Hand:
 
     def clamps(self, geoms: Collection[int]) -> bool:
         """Whether two links touch an object from sides at least 120 degrees apart."""
-        links, _, normals, _ = self._touch(geoms)
-        apart = links[:, None] != links
-        return bool((apart & (normals @ normals.T < OPPOSED)).any())
-
-    def encloses(self, geoms: Collection[int]) -> bool:
-        """Whether a link and others hold an object between them by force closure.
-
-        Two contacts withstand every force when the line between them lies in both
-        friction cones. Either side counts as one contact, with the mean position and
-        normal of its contacts, and only `MARGIN` of the friction counts.
-
-        Source: Nguyen (1988), "Constructing Force-Closure Grasps", IJRR 7(3).
-        """
-        links, points, normals, friction = self._touch(geoms)
-
-        def in_cone(side: NDArray[np.bool_], line: Vector) -> bool:
-            """Whether tan(angle of line and normal) is less than the friction."""
-            inward = normals[side].sum(axis=0)
-            across = float(np.linalg.norm(np.cross(inward, line)))
-            return across < MARGIN * friction[side].min() * float(inward @ line)
-
-        for side in (links == link for link in set(links.tolist())):
-            others = ~side & (normals @ normals[side].sum(axis=0) < 0.0)
-            if others.any():
-                line = points[others].mean(axis=0) - points[side].mean(axis=0)
-                if in_cone(side, line) and in_cone(others, -line):
-                    return True
-        return False
-
-    def _touch(self, geoms: Collection[int]) -> tuple[Indices, Matrix, Matrix, Vector]:
-        """Return links that touch an object; points, inward normals and frictions."""
-        found = [
-            (k, self._body_of[own], sign)
-            for k, pair in enumerate(pairs_in_contact(self._data))
-            for own, other, sign in ((*pair, 1.0), (*pair[::-1], -1.0))
-            if own in self._body_of and other in geoms
-        ]
-        rows, links, signs = np.array(found).reshape(-1, 3).T
-        contact, rows = self._data.contact, rows.astype(int)
-        normals = signs[:, None] * contact.frame[rows, :3]
-        return links.astype(int), contact.pos[rows], normals, contact.friction[rows, 0]
+        touching: list[tuple[int, Vector]] = []
+        for pair, frame in zip(
+            pairs_in_contact(self._data), self._data.contact.frame, strict=True
+        ):
+            for own, other, side in ((*pair, 1.0), (*pair[::-1], -1.0)):
+                if own in self._body_of and other in geoms:
+                    touching.append((self._body_of[own], side * frame[:3]))
+        return any(
+            a != b and float(n @ m) < OPPOSED
+            for (a, n), (b, m) in itertools.combinations(touching, 2)
+        )
 
     def slip(self, body: int) -> float:
         """Return the speed of a body's centre of mass relative to the hand, m/s.
