@@ -17,8 +17,8 @@ log = logging.getLogger(__name__)
 UP = np.array([0.0, 0.0, 1.0])
 STALLED = 8  # control periods without progress end a motion
 PUSHED, PUSHES = 0.01, 4
-"""m, by which the error of a hand rises while it is pushed off its way, and how often it
-counts in one motion: where arms of one trunk hinder each other, errors rise for long."""
+"""m, by which the error of a hand rises while it is pushed off its way, and how often
+that counts in a motion: arms of one trunk that hinder each other raise it for long."""
 STOPPED = 2e-4  # rad or m per control period, of fingers
 OPENING = 8  # control periods until a gripper is open
 OUT_OF_REACH = 0.008  # m, error of outlooks; from the start more may be in reach
