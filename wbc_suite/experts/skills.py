@@ -16,9 +16,8 @@ log = logging.getLogger(__name__)
 
 UP = np.array([0.0, 0.0, 1.0])
 STALLED = 8  # control periods without progress end a motion
-PUSHED, PUSHES = 0.01, 4
-"""m, by which the error of a hand rises while it is pushed off its way, and how often
-that counts in a motion: arms of one trunk that hinder each other raise it for long."""
+PUSHED = 0.01  # m, by which the error rises while a hand is pushed off its way
+PUSHES = 4  # such rises of a motion; where arms hinder each other there are many
 STOPPED = 2e-4  # rad or m per control period, of fingers
 OPENING = 8  # control periods until a gripper is open
 OUT_OF_REACH = 0.008  # m, error of outlooks; from the start more may be in reach
