@@ -103,9 +103,7 @@ class JointBounds(NamedTuple):
     position_gain: Vector  # fraction of the distance to a limit that a step may cover
     v_max: Vector  # speed limits, inf where there is none
     a_max: Vector  # acceleration limits, inf where there is none
-    step_max: (
-        Matrix  # (2, nv), greatest next step down and up, >= 0, inf where unlimited
-    )
+    step_max: Matrix  # (2, nv), greatest next steps down and up, >= 0; inf: none
 
 
 def unlimited_bounds(configuration: Configuration) -> JointBounds:
@@ -184,12 +182,11 @@ def merge_bounds(
             top = braking_step(q_upper[i] - q[k], gain[i], a_max[i], dt)
             bottom_kind = top_kind = LimitKind.POSITION.value
             if -step_max[0, i] > bottom:
-                bottom, bottom_kind = (
-                    min(-step_max[0, i], top),
-                    LimitKind.TRACKING.value,
-                )
+                bottom_kind = LimitKind.TRACKING.value
+                bottom = min(-step_max[0, i], top)
             if step_max[1, i] < top:
-                top, top_kind = max(step_max[1, i], bottom), LimitKind.TRACKING.value
+                top_kind = LimitKind.TRACKING.value
+                top = max(step_max[1, i], bottom)
             if lo < bottom or lo > top:
                 lo_kind = bottom_kind if lo < bottom else top_kind
                 lo = min(max(lo, bottom), top)

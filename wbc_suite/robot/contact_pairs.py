@@ -89,8 +89,8 @@ def _of_capsules(robot: RobotDescription) -> RobotDescription:
 
 def _sampled_contacts(
     robot: RobotDescription, *distances: float
-) -> Iterator[Counter[Pair]]:
-    """Yield in how many random postures sorted pairs are nearer than distances, m."""
+) -> list[Counter[Pair]]:
+    """Return in how many random postures sorted pairs are nearer than distances, m."""
     m = robot.to_mjspec().compile()
     data, rng = mujoco.MjData(m), np.random.default_rng(0)
     m.geom_margin[:] = max(0.0, *distances)
@@ -104,7 +104,7 @@ def _sampled_contacts(
         contacts(m, data)
         for counter, distance in zip(found, distances, strict=True):
             counter.update(_named(_contacts_nearer(m, data, distance), names))
-    yield from found
+    return found
 
 
 def _named(pairs: set[tuple[int, int]], names: dict[int, str]) -> Iterator[Pair]:

@@ -10,15 +10,11 @@ from wbc_suite.robot.collision_capsules import collision_spheres
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.elements import Frame, rigid_bodies
 from wbc_suite.robot.poses import pose_fields, poses_in_rigid_bodies, se3_of
-from wbc_suite.robot.standing_posture import at_ready
+from wbc_suite.robot.standing_posture import AT_FRAME, at_ready, wheel_axis
 from wbc_suite.typing import Matrix
 
 FLAT = 0.004
 """m; what lies at most so much higher than the lowest point belongs to the sole."""
-
-AT_FRAME = 0.01
-"""m; greatest distance of a ball's centre from the frame of the foot."""
-
 
 UPRIGHT, AHEAD = 0.98, 0.7
 """Least cosines of z to up and of x to ahead of a sole that is taken as given."""
@@ -56,13 +52,10 @@ def ball_radius(robot: RobotDescription, frame: str) -> float:
 
     It is a ball, or a wheel on a hinge without limits through the frame.
     """
-    spheres, joint = _spheres(robot, frame), robot.link(robot.link_of(frame)).joint
-    at = se3_of(robot.frame(frame))
-    if joint is not None and joint.range is None and len(spheres):
-        axis = np.asarray(joint.axis)
-        if np.linalg.norm(np.cross(axis, at.translation)) < AT_FRAME:
-            across = np.cross(at.rotation.T @ axis, spheres[:, :3])
-            return float((np.linalg.norm(across, axis=1) + spheres[:, 3]).max())
+    spheres, axis = _spheres(robot, frame), wheel_axis(robot, frame)
+    if axis is not None and len(spheres):
+        across = np.cross(se3_of(robot.frame(frame)).rotation.T @ axis, spheres[:, :3])
+        return float((np.linalg.norm(across, axis=1) + spheres[:, 3]).max())
     for x, y, z, radius in spheres:
         if radius > 0.0 and np.linalg.norm((x, y, z)) < AT_FRAME:
             return float(radius)

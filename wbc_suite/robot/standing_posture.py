@@ -11,7 +11,8 @@ from wbc_suite.typing import Vector
 LEVEL = 0.02  # largest difference of the heights of feet that stand, m
 TOLERANCE = 0.02  # largest residual in m of a posture that is accepted
 
-AT_FRAME = 0.01  # m; a wheel turns about an axle so near to the frame of the foot
+AT_FRAME = 0.01
+"""m; greatest distance of a ball's centre or a wheel's axis from a foot's frame."""
 MIN_COSINE = 0.9  # smallest cosine between the axis of a pitch joint and y
 
 START = {2: ((0.55, -1.1), 0.85), 3: ((-0.3, 0.6, -0.3), 0.95)}
@@ -53,6 +54,16 @@ def at_ready(robot: RobotDescription) -> tuple[pin.Model, pin.Data, Vector]:
     return model, data, q
 
 
+def wheel_axis(robot: RobotDescription, frame: str) -> Vector | None:
+    """Return the axis of a foot's link that turns without limits through its frame."""
+    joint = robot.link(robot.link_of(frame)).joint
+    if joint is None or joint.range is not None:
+        return None
+    axis = np.asarray(joint.axis)
+    away = float(np.linalg.norm(np.cross(axis, robot.frame(frame).pos)))
+    return axis if away < AT_FRAME else None
+
+
 def _bent_leg(
     robot: RobotDescription,
     model: pin.Model,
@@ -64,12 +75,9 @@ def _bent_leg(
     pin.framesForwardKinematics(model, data, q)
     chain = model.supports[model.frames[foot].parentJoint].tolist()
     along = {joint: _along_y(robot, model, data, joint) for joint in chain}
-    hinges = [
-        joint
-        for joint in chain
-        if abs(along[joint]) > MIN_COSINE
-        and not _is_axle(robot, model, data, joint, data.oMf[foot].translation)
-    ]
+    if wheel_axis(robot, frame.name) is not None:
+        chain = chain[:-1]
+    hinges = [joint for joint in chain if abs(along[joint]) > MIN_COSINE]
     if len(hinges) not in START:
         return {}
     angles, left = START[len(hinges)]
@@ -98,14 +106,6 @@ def _bent_leg(
         return {}
     names = [model.names[joint] for joint in hinges]
     return dict(zip(names, best.x.round(4).clip(low, high).tolist(), strict=True))
-
-
-def _is_axle(
-    robot: RobotDescription, model: pin.Model, data: pin.Data, joint: int, foot: Vector
-) -> bool:
-    """Whether a hinge without limits is at the foot, and turns a wheel."""
-    at_foot = np.linalg.norm(data.oMi[joint].translation - foot) < AT_FRAME
-    return bool(at_foot) and robot.joint(model.names[joint]).range is None
 
 
 def _along_y(

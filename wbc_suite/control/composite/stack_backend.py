@@ -15,7 +15,7 @@ from wbc_suite.control.composite.qp_tasks import (
     make_limits,
     travel_costs,
 )
-from wbc_suite.control.composite.tick import limit_lead
+from wbc_suite.control.composite.tick import limit_steps
 from wbc_suite.control.composite.torque_limiter import TorqueLimiter
 from wbc_suite.control.composite.whole_body_config import WholeBodyIKConfig
 from wbc_suite.control.law.joint_laws import JointLaw
@@ -122,12 +122,12 @@ class StackBackend:
         self._joint_stack.bounds.step_max[:] = self.stack.bounds.step_max
         return self._step(self._joint_stack, self._joint_stack.solve(dt), dt)
 
-    def limit_lead(
+    def limit_steps(
         self, reference: SplineReference, law: JointLaw, data: mujoco.MjData
     ) -> None:
-        """Limit the next step as `tick.limit_lead` does."""
+        """Limit the next step as `tick.limit_steps` does."""
         bounds, spline = as_argument(self.stack.bounds), reference.argument
-        limit_lead(bounds, spline, self.v, law.drives, data.qpos, data.qvel)
+        limit_steps(bounds, spline, self.v, law.drives, data.qpos, data.qvel)
 
     def finish(self, dt: float, status: int, level: int) -> IkStep:
         """Finish a tick that `solve_tick` has left with a `TickStatus` at a level."""

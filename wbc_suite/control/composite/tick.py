@@ -131,7 +131,7 @@ def run_tick(
     state, qp, robot = tick.state[0], tick.qp, tick.qp.robot
     law = tick.joint_law
     own = drives[laws[law].first : laws[law].last]
-    limit_lead(qp.bounds, tick.spline, tick.v, own, qpos, qvel)
+    limit_steps(qp.bounds, tick.spline, tick.v, own, qpos, qvel)
     place_goals(tick.goals, robot, tick.frames, qpos)
     measure_obstacles(tick.scene)
     place_fingers(tick.fingers)
@@ -158,7 +158,21 @@ def run_tick(
 
 
 @compiled
-def limit_lead(
+def limit_steps(
+    bounds: JointBounds,
+    spline: SplineArrays,
+    v: Vector,
+    drives: CompiledRecords,
+    qpos: Vector,
+    qvel: Vector,
+) -> None:
+    """Write the greatest steps of commands that wait for their joints."""
+    _limit_lead(bounds, spline, v, drives, qpos, qvel)
+    _brake_overspeed(bounds, spline, v, drives, qvel)
+
+
+@compiled
+def _limit_lead(
     bounds: JointBounds,
     spline: SplineArrays,
     v: Vector,
@@ -171,11 +185,8 @@ def limit_lead(
     The lead is e + (kd / kp) e', as feedback measures it. It grows by the velocity that
     the joint lacks: a step that is shorter than the last, of velocity v, by so much
     keeps it. A step may be longer by what can be braked within the lead that is left.
-
-    While a contact drives a joint faster than its limit, such as an arm that is jammed
-    before a base that drives on, no command gains speed, and all brake by the excess.
     """
-    dt, braking = spline.period, _overspeed(bounds, spline, drives, qvel)
+    dt = spline.period
     for j in range(spline.q_index.shape[0]):
         drive, i = drives[j], spline.v_index[j]
         position, velocity = spline_end(spline, j)
@@ -185,23 +196,32 @@ def limit_lead(
         for side, sign in enumerate((-1.0, 1.0)):
             left = max(most - sign * lead, 0.0)
             longer = braking_step(float(left), 1.0, a_max, dt)
-            most_step = sign * kept + longer
-            if braking > 0.0:
-                slower = sign * v[i] * dt - min(braking, 1.0) * a_max * dt**2
-                most_step = min(most_step, slower)
-            bounds.step_max[side, i] = max(most_step, 0.0)
+            bounds.step_max[side, i] = max(sign * kept + longer, 0.0)
 
 
 @compiled
-def _overspeed(
-    bounds: JointBounds, spline: SplineArrays, drives: CompiledRecords, qvel: Vector
-) -> float:
-    """Return the relative excess of the fastest joint over `OVERSPEED`, or below 0."""
-    most = 0.0
+def _brake_overspeed(
+    bounds: JointBounds,
+    spline: SplineArrays,
+    v: Vector,
+    drives: CompiledRecords,
+    qvel: Vector,
+) -> None:
+    """Brake all commands by the excess of the fastest joint over `OVERSPEED`.
+
+    A contact drives it, such as an arm that is jammed before a base that drives on.
+    """
+    dt, most = spline.period, 0.0
     for j in range(spline.v_index.shape[0]):
         v_max = float(bounds.v_max[spline.v_index[j]])
         most = max(most, abs(float(qvel[drives[j].dof])) / v_max)
-    return most / OVERSPEED - 1.0
+    braking = min(most / OVERSPEED - 1.0, 1.0)
+    if braking <= 0.0:
+        return
+    for i in spline.v_index:
+        for side, sign in enumerate((-1.0, 1.0)):
+            slower = sign * v[i] * dt - braking * bounds.a_max[i] * dt**2
+            bounds.step_max[side, i] = min(bounds.step_max[side, i], max(slower, 0.0))
 
 
 @compiled

@@ -240,7 +240,7 @@ class WholeBodyIK:
         """Run a tick; return for how many physics steps it is enough."""
         robot, qpos = self._configuration.robot, state.data.qpos
         if isinstance(self._backend, StackBackend):
-            self._backend.limit_lead(self._reference, self._law, state.data)
+            self._backend.limit_steps(self._reference, self._law, state.data)
         place_goals(self._goals.argument, robot, self.frames.argument, qpos)
         self._scene.measure()
         self._fingers.place()
