@@ -12,6 +12,7 @@ from wbc_suite.control import (
     register_composite,
 )
 from wbc_suite.control.composite.ik_report import lagging_joint
+from wbc_suite.control.composite.tick import MAX_LEAD
 from wbc_suite.control.composite.whole_body_config import (
     WholeBodyIKConfig,
     default_whole_body_config,
@@ -200,7 +201,8 @@ def test_a_base_brakes_while_a_contact_drives_an_arm_too_fast(alone):
         """Return the commanded speed of the base after a time, m/s."""
         at = []
         for _ in range(round(seconds / 0.002)):
-            joint.qvel[0] = of_joint
+            if of_joint is not None:
+                joint.qvel[0] = of_joint
             scene.simulation.tick(1)
             at.append(scene.controller.joint_targets["root_x"])
         return (at[-1] - at[-51]) / 0.1
@@ -208,7 +210,27 @@ def test_a_base_brakes_while_a_contact_drives_an_arm_too_fast(alone):
     fast = speed(0.5, 0.0)
     assert fast > 0.1
     assert abs(speed(0.5, 6.0)) < 0.1 * fast
-    assert speed(0.6, 0.0) > 0.5 * fast
+    assert speed(2.0, None) > 0.5 * fast
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_command_follows_a_joint_that_a_contact_drives_away(alone, sign):
+    """It stayed, and the QP kept a hand off a table where the hand was not."""
+    scene = alone("GR1")
+    name = "right_wrist_pitch_joint"
+    joint = scene.state.data.joint(f"robot0_{name}")
+    scene.controller.set_goal(scene.controller.hold_action)
+    start = joint.qpos[0]
+    for _ in range(200):
+        joint.qvel[0] = 2.0 * sign * ((joint.qpos[0] - start) * sign < 0.5)
+        scene.simulation.tick(1)
+    assert abs(joint.qpos[0] - start) > 0.45
+    lead = scene.controller.joint_targets[name] - joint.qpos[0]
+    assert 0.05 < -lead * sign < MAX_LEAD  # 0.5 before
+    scene.simulation.tick(1000)
+    report = scene.controller.info(scene.state)["ik"]["frames"]["right_hand"]
+    assert report["reached"]
 
 
 @pytest.mark.slow

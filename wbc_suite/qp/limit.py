@@ -103,7 +103,7 @@ class JointBounds(NamedTuple):
     position_gain: Vector  # fraction of the distance to a limit that a step may cover
     v_max: Vector  # speed limits, inf where there is none
     a_max: Vector  # acceleration limits, inf where there is none
-    step_max: Matrix  # (2, nv), greatest next steps down and up, >= 0; inf: none
+    step_max: Matrix  # (2, nv), greatest next steps down and up; inf: none
 
 
 def unlimited_bounds(configuration: Configuration) -> JointBounds:

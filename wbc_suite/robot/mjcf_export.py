@@ -18,12 +18,10 @@ with a step of 2 ms. With MuJoCo's default of 20 ms a joint overshoots its limit
 3.7 mrad at 0.5 rad/s, and a head of 4 kg by 20 mrad; limits of real joints are hard."""
 STOP_SOLIMP = (0.95, 0.99, 0.001)
 """Smallest and largest impedance of joint limits, and the width between, m or rad."""
-STOP_MARGIN = 5e-3
-"""Distance in rad at which the limit of a limb's joint becomes active: MuJoCo tests
-limits only at the start of a step (2 ms), and contacts accelerate joints to 2.6 rad/s.
-Controllers keep limbs this far inside."""
-FINGER_MARGIN = 3e-3
-"""The same for fingers of hands, which rest in the limit and so stop short of it."""
+STOP_MARGIN = 8e-3
+"""Distance in rad at which limits of limbs' and fingers' joints become active: MuJoCo
+tests them only at the start of a step (2 ms), in which contacts accelerate wrists to
+5 rad/s. Controllers keep limbs this far inside."""
 ROUNDING = 1e-12
 """Relative reserve of the triangle inequality, which MuJoCo checks without any."""
 SITE_GROUP = 4  # site group of frames, hidden by default
@@ -54,7 +52,7 @@ def build_mjspec(robot: RobotDescription, *, merged: bool = True) -> mujoco.MjSp
     spec.compiler.savecompiled = False
     bodies = {"world": spec.worldbody}
     inertias = _inertias(robot)
-    margins = _margins(robot)
+    early = _with_margins(robot)
     visual = VisualGeoms(spec, robot, merged=merged)
     for link in robot.links:
         placed = robot.root if link.parent is None else link
@@ -70,7 +68,7 @@ def build_mjspec(robot: RobotDescription, *, merged: bool = True) -> mujoco.MjSp
         if link.joint is not None:
             mimic = link.joint.mimic  # one of ratio 0 rests where it is
             driver = mimic.joint if mimic and mimic.ratio else link.joint.name
-            _add_joint(body, link.joint, margin=margins.get(driver, 0.0))
+            _add_joint(body, link.joint, margin=STOP_MARGIN * (driver in early))
         _set_inertia(body, inertias[link.name])
         visual.add(body, link)
         add_collision_geoms(spec, body, robot, link)
@@ -101,16 +99,13 @@ def write_mjcf(robot: RobotDescription) -> str:
     return spec.to_xml()
 
 
-def _margins(robot: RobotDescription) -> dict[str, float]:
-    """Return the margins of limits by joint; jaws, of one synergy, have none."""
-    margins: dict[str, float] = {}
-    for synergies in robot.synergies.values():
-        if len(synergies) > 1:
-            joints = [joint for synergy in synergies for joint in synergy.open]
-            margins |= dict.fromkeys(joints, FINGER_MARGIN)
+def _with_margins(robot: RobotDescription) -> set[str]:
+    """Return the joints whose limits have a margin; jaws, of one synergy, have none."""
+    hands = [s for s in robot.synergies.values() if len(s) > 1]
+    joints = {joint for hand in hands for synergy in hand for joint in synergy.open}
     for limb in robot.groups.keys() - robot.synergies.keys():
-        margins |= dict.fromkeys(robot.groups[limb], STOP_MARGIN)
-    return margins
+        joints.update(robot.groups[limb])
+    return joints
 
 
 def _add_joint(body: mujoco.MjsBody, joint: Joint, *, margin: float) -> None:

@@ -47,6 +47,11 @@ _FIRST_LEVEL: int = np.int64(0)  # pyright: ignore[reportAssignmentType]
 """Typed, since a literal would be compiled once more."""
 
 
+MAX_LEAD = 0.25
+"""rad or m; a command waits for a joint that lags behind by more, so that a joint does
+not jump when it comes free. It waits sooner where the motor saturates. Where a contact
+drives the joint away, the command follows it at this distance: the QP would otherwise
+keep a robot off the scene that is elsewhere."""
 OVERSPEED = 1.2
 """Speed of a joint over its limit at which commands brake."""
 
@@ -185,6 +190,7 @@ def _limit_lead(
     The lead is e + (kd / kp) e', as feedback measures it. It grows by the velocity that
     the joint lacks: a step that is shorter than the last, of velocity v, by so much
     keeps it. A step may be longer by what can be braked within the lead that is left.
+    It is negative, and leads back, where the lead is greater than `MAX_LEAD`.
     """
     dt = spline.period
     for j in range(spline.q_index.shape[0]):
@@ -196,7 +202,10 @@ def _limit_lead(
         for side, sign in enumerate((-1.0, 1.0)):
             left = max(most - sign * lead, 0.0)
             longer = braking_step(float(left), 1.0, a_max, dt)
-            bounds.step_max[side, i] = max(sign * kept + longer, 0.0)
+            least = 0.0
+            if sign * lead > MAX_LEAD:
+                least = min(sign * v[i] * dt - a_max * dt**2, 0.0)
+            bounds.step_max[side, i] = max(sign * kept + longer, least)
 
 
 @compiled
@@ -210,6 +219,7 @@ def _brake_overspeed(
     """Brake all commands by the excess of the fastest joint over `OVERSPEED`.
 
     A contact drives it, such as an arm that is jammed before a base that drives on.
+    Commands that have to lead back do so.
     """
     dt, most = spline.period, 0.0
     for j in range(spline.v_index.shape[0]):
@@ -221,7 +231,8 @@ def _brake_overspeed(
     for i in spline.v_index:
         for side, sign in enumerate((-1.0, 1.0)):
             slower = sign * v[i] * dt - braking * bounds.a_max[i] * dt**2
-            bounds.step_max[side, i] = min(bounds.step_max[side, i], max(slower, 0.0))
+            longest = max(slower, -bounds.step_max[1 - side, i], 0.0)
+            bounds.step_max[side, i] = min(bounds.step_max[side, i], longest)
 
 
 @compiled

@@ -23,7 +23,7 @@ from wbc_suite.control.composite.reduced_robot import (
 )
 from wbc_suite.control.composite.scene_obstacles import SceneObstacles
 from wbc_suite.control.composite.stack_backend import StackBackend
-from wbc_suite.control.composite.tick import TICK, Stage, WholeBodyArrays
+from wbc_suite.control.composite.tick import MAX_LEAD, TICK, Stage, WholeBodyArrays
 from wbc_suite.control.composite.waypoint_planner import Waypoint, WaypointPlanner
 from wbc_suite.control.composite.whole_body_config import (
     WholeBodyIKConfig,
@@ -50,10 +50,6 @@ LOG = logging.getLogger(__name__)
 
 MIN_POINT_CONTACTS = 3
 """Fewer points of contact cannot balance a robot; soles can."""
-
-MAX_LEAD = 0.25
-"""rad or m; a command waits for a joint that lags behind by more, so that a joint does
-not jump when it comes free. It waits sooner where the motor saturates."""
 
 BackendFactory = Callable[
     [RobotDescription, WholeBodyIKConfig, Configuration, ObstacleLimit], IkBackend
