@@ -17,7 +17,7 @@ log = logging.getLogger(__name__)
 UP = np.array([0.0, 0.0, 1.0])
 STALLED = 8  # control periods without progress end a motion
 PUSHED = 0.01  # m, by which the error rises while a hand is pushed off its way
-PUSHES = 4  # such rises of a motion; where arms hinder each other there are many
+PUSHES = 4  # such rises of a motion; none of arms that hinder each other
 STOPPED = 2e-4  # rad or m per control period, of fingers
 OPENING = 8  # control periods until a gripper is open
 OUT_OF_REACH = 0.008  # m, error of outlooks; from the start more may be in reach
@@ -47,15 +47,15 @@ def move(
     A target that is a function is followed. It ends without success when the hand makes
     no more progress; one that was pushed off its way starts anew.
     """
-    best, waited, pushes = np.inf, 0, 0
+    best, waited, pushes = np.inf, 0, 0 if arm.hindered else PUSHES
     for _ in range(most):
         arm.aim(target() if callable(target) else target, speed=speed, turn=turn)
         distance, angle = arm.error()
         if distance < tolerance and angle < turn_tolerance:
             return True
         left = distance + 0.1 * angle
-        pushed = left > best + PUSHED and pushes < PUSHES
-        pushes += pushed
+        pushed = left > best + PUSHED and pushes > 0
+        pushes -= pushed
         waited = 0 if pushed or left < best - 2e-4 else waited + 1
         best = left if pushed else min(best, left)
         if waited > STALLED:

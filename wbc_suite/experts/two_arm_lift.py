@@ -30,10 +30,10 @@ def two_arm_lift(cell: Workcell[TwoArmLift]) -> Steps[None]:
     """Grasp a handle with each arm, and raise the pot level."""
     goal = shifted(cell.pose(POT), RISE * UP)
     arms = cell.arms[:2]
-    places = [handle.removeprefix(f"{POT}_") for handle in HANDLES]
-    ways = [Approach(raised=0.0, away=AWAY, place=place) for place in places]
     yield from drive_before(cell, POT, arms, HANDLES)
     for _ in range(TRIES):
+        places = [handle.removeprefix(f"{POT}_") for handle in _nearest(cell, arms)]
+        ways = [Approach(raised=0.0, away=AWAY, place=place) for place in places]
         choices = choose_pair(cell, POT, arms=arms, approaches=ways, then=[goal])
         if choices is None:
             return
@@ -49,6 +49,17 @@ def two_arm_lift(cell: Workcell[TwoArmLift]) -> Steps[None]:
         yield from together(
             *(move(a, shifted(a.pose, 0.08 * UP), most=15) for a in arms)
         )
+
+
+def _nearest(cell: Workcell[TwoArmLift], arms: Sequence[Arm]) -> Sequence[str]:
+    """Return a handle for each arm, so that hands do not cross: hands may turn a pot."""
+
+    def length(handles: Sequence[str]) -> float:
+        pairs = zip(arms, handles, strict=True)
+        gaps = [arm.pose.translation - cell.point(handle) for arm, handle in pairs]
+        return float(np.linalg.norm(gaps, axis=1).sum())
+
+    return min(HANDLES, HANDLES[::-1], key=length)
 
 
 def _raise(

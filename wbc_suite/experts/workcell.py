@@ -1,5 +1,6 @@
 """What an expert sees and moves: arms, objects, and the action of both."""
 
+import itertools
 from collections.abc import Callable, Generator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Generic, TypeAlias, TypeVar
@@ -187,6 +188,8 @@ class Workcell(Generic[B]):
                         joints=_joints(state, controller, hand),
                     )
                 )
+        for arm, other in itertools.permutations(arms, 2):
+            arm.hindered |= arm.shares_joints(other)
         return arms
 
     def _carries(self, port: LimbPort, hand: Hand) -> bool:
