@@ -52,7 +52,7 @@ def two_arm_lift(cell: Workcell[TwoArmLift]) -> Steps[None]:
 
 
 def _nearest(cell: Workcell[TwoArmLift], arms: Sequence[Arm]) -> Sequence[str]:
-    """Return a handle for each arm, so that hands do not cross: hands may turn a pot."""
+    """Return the handle that each arm takes, the nearer: a pot may have been turned."""
 
     def length(handles: Sequence[str]) -> float:
         pairs = zip(arms, handles, strict=True)
