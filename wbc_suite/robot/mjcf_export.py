@@ -19,9 +19,11 @@ with a step of 2 ms. With MuJoCo's default of 20 ms a joint overshoots its limit
 STOP_SOLIMP = (0.95, 0.99, 0.001)
 """Smallest and largest impedance of joint limits, and the width between, m or rad."""
 STOP_MARGIN = 8e-3
-"""Distance in rad at which limits of limbs' and fingers' joints become active: MuJoCo
-tests them only at the start of a step (2 ms), in which contacts accelerate wrists to
+"""Greatest distance in rad at which limits of limbs' and fingers' joints become active.
+MuJoCo tests them only at the start of a step, in which contacts accelerate wrists to
 5 rad/s. Controllers keep limbs this far inside."""
+LONGEST_STEP = 2e-3
+"""s, of physics; the way at its speed limit in it is the margin of a slow joint."""
 ROUNDING = 1e-12
 """Relative reserve of the triangle inequality, which MuJoCo checks without any."""
 SITE_GROUP = 4  # site group of frames, hidden by default
@@ -68,7 +70,7 @@ def build_mjspec(robot: RobotDescription, *, merged: bool = True) -> mujoco.MjSp
         if link.joint is not None:
             mimic = link.joint.mimic  # one of ratio 0 rests where it is
             driver = mimic.joint if mimic and mimic.ratio else link.joint.name
-            _add_joint(body, link.joint, margin=STOP_MARGIN * (driver in early))
+            _add_joint(body, link.joint, margin=_margin(link.joint) * (driver in early))
         _set_inertia(body, inertias[link.name])
         visual.add(body, link)
         add_collision_geoms(spec, body, robot, link)
@@ -106,6 +108,13 @@ def _with_margins(robot: RobotDescription) -> set[str]:
     for limb in robot.groups.keys() - robot.synergies.keys():
         joints.update(robot.groups[limb])
     return joints
+
+
+def _margin(joint: Joint) -> float:
+    """Return the distance in rad at which a joint's limit becomes active."""
+    if joint.velocity is None:
+        return STOP_MARGIN
+    return min(STOP_MARGIN, LONGEST_STEP * joint.velocity)
 
 
 def _add_joint(body: mujoco.MjsBody, joint: Joint, *, margin: float) -> None:
