@@ -52,11 +52,11 @@ def two_arm_lift(cell: Workcell[TwoArmLift]) -> Steps[None]:
 
 
 def _nearest(cell: Workcell[TwoArmLift], arms: Sequence[Arm]) -> Sequence[str]:
-    """Return the handle that each arm takes, the nearer: a pot may have been turned."""
+    """Return the handle that each arm takes, the nearer to its home: a pot may turn."""
 
     def length(handles: Sequence[str]) -> float:
         pairs = zip(arms, handles, strict=True)
-        gaps = [arm.pose.translation - cell.point(handle) for arm, handle in pairs]
+        gaps = [arm.home.translation - cell.point(handle) for arm, handle in pairs]
         return float(np.linalg.norm(gaps, axis=1).sum())
 
     return min(HANDLES, HANDLES[::-1], key=length)
