@@ -7,7 +7,7 @@ import pytest
 
 import wbc_suite
 from wbc_suite.catalogue import Catalogue
-from wbc_suite.robot.mjcf_export import STOP_MARGIN
+from wbc_suite.robot.mjcf_export import FINGER_MARGIN, STOP_MARGIN
 
 ROBOTS = Catalogue().names("robots")
 ROOTS = ("fixed", "planar", "free")
@@ -153,8 +153,10 @@ def test_stops_are_hard():
 @pytest.mark.parametrize(
     ("robot", "gripper", "joint", "margin"),
     [
-        ("GR1", None, "R_thumb_proximal_pitch_joint", STOP_MARGIN),
-        ("GR1", None, "R_thumb_distal_joint", STOP_MARGIN),
+        ("GR1", None, "R_thumb_proximal_pitch_joint", FINGER_MARGIN),
+        ("GR1", None, "R_thumb_distal_joint", FINGER_MARGIN),
+        ("GR1", None, "left_wrist_roll_joint", STOP_MARGIN),
+        ("Panda", None, "panda_joint1", 2e-3 * 2.175),  # rad/s
         ("Panda", "Robotiq140Gripper", "finger_joint", 0.0),
         ("Panda", "Robotiq140Gripper", "right_outer_knuckle_joint", 0.0),
     ],

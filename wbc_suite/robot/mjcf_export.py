@@ -19,9 +19,11 @@ with a step of 2 ms. With MuJoCo's default of 20 ms a joint overshoots its limit
 STOP_SOLIMP = (0.95, 0.99, 0.001)
 """Smallest and largest impedance of joint limits, and the width between, m or rad."""
 STOP_MARGIN = 8e-3
-"""Greatest distance in rad at which limits of limbs' and fingers' joints become active.
-MuJoCo tests them only at the start of a step, in which contacts accelerate wrists to
-5 rad/s. Controllers keep limbs this far inside."""
+"""Greatest distance in rad at which limits of limbs' joints become active: MuJoCo tests
+them only at the start of a step, in which contacts accelerate wrists to 5 rad/s.
+Controllers keep limbs this far inside."""
+FINGER_MARGIN = 5e-3
+"""The same for fingers of hands, which grasp thin bars near the ends of their range."""
 LONGEST_STEP = 2e-3
 """s, of physics; the way at its speed limit in it is the margin of a slow joint."""
 ROUNDING = 1e-12
@@ -54,7 +56,7 @@ def build_mjspec(robot: RobotDescription, *, merged: bool = True) -> mujoco.MjSp
     spec.compiler.savecompiled = False
     bodies = {"world": spec.worldbody}
     inertias = _inertias(robot)
-    early = _with_margins(robot)
+    margins = _margins(robot)
     visual = VisualGeoms(spec, robot, merged=merged)
     for link in robot.links:
         placed = robot.root if link.parent is None else link
@@ -70,7 +72,7 @@ def build_mjspec(robot: RobotDescription, *, merged: bool = True) -> mujoco.MjSp
         if link.joint is not None:
             mimic = link.joint.mimic  # one of ratio 0 rests where it is
             driver = mimic.joint if mimic and mimic.ratio else link.joint.name
-            _add_joint(body, link.joint, margin=_margin(link.joint) * (driver in early))
+            _add_joint(body, link.joint, margin=margins.get(driver, 0.0))
         _set_inertia(body, inertias[link.name])
         visual.add(body, link)
         add_collision_geoms(spec, body, robot, link)
@@ -101,20 +103,17 @@ def write_mjcf(robot: RobotDescription) -> str:
     return spec.to_xml()
 
 
-def _with_margins(robot: RobotDescription) -> set[str]:
-    """Return the joints whose limits have a margin; jaws, of one synergy, have none."""
-    hands = [s for s in robot.synergies.values() if len(s) > 1]
-    joints = {joint for hand in hands for synergy in hand for joint in synergy.open}
+def _margins(robot: RobotDescription) -> dict[str, float]:
+    """Return the margins of limits by joint; jaws, of one synergy, have none."""
+    most: dict[str, float] = {}
+    for synergies in robot.synergies.values():
+        if len(synergies) > 1:
+            joints = [joint for synergy in synergies for joint in synergy.open]
+            most |= dict.fromkeys(joints, FINGER_MARGIN)
     for limb in robot.groups.keys() - robot.synergies.keys():
-        joints.update(robot.groups[limb])
-    return joints
-
-
-def _margin(joint: Joint) -> float:
-    """Return the distance in rad at which a joint's limit becomes active."""
-    if joint.velocity is None:
-        return STOP_MARGIN
-    return min(STOP_MARGIN, LONGEST_STEP * joint.velocity)
+        most |= dict.fromkeys(robot.groups[limb], STOP_MARGIN)
+    speeds = {joint.name: joint.velocity or np.inf for joint in robot.joints}
+    return {joint: min(m, LONGEST_STEP * speeds[joint]) for joint, m in most.items()}
 
 
 def _add_joint(body: mujoco.MjsBody, joint: Joint, *, margin: float) -> None:
