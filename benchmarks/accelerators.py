@@ -137,13 +137,12 @@ def main() -> None:
         sys.exit("not installed: make .venv-accelerators/.installed")
     cases = ("Door", "Lift") if given.quick else given.cases or CASES
     steps, began = 10 if given.quick else given.steps, time.perf_counter()
-    rows = {(row["case"], row["side"]): row for row in kept()}
+    report, rows = Report(), {(row["case"], row["side"]): row for row in kept()}
     for done, case in enumerate(cases):
         progress(done, len(cases), began, case)
         with tempfile.TemporaryDirectory() as folder:
             row = measure(case, given.engine, Path(folder), steps, given.timeout)
         rows[case, given.engine] = row
-        report = Report()
         report.rows = sorted(
             rows.values(), key=lambda row: order.index((row["case"], row["side"]))
         )

@@ -22,6 +22,9 @@ import mujoco
 import numpy as np
 
 os.environ["JAX_PLATFORMS"] = "cpu"
+# Fused, the pose of each body computes those of all its parents anew: a step with an
+# arm of seven joints takes minutes.
+os.environ["XLA_FLAGS"] = "--xla_disable_hlo_passes=fusion"
 Step = Callable[[], np.ndarray]  # makes a step, and returns the positions
 
 
@@ -59,7 +62,8 @@ def in_mjx(model: mujoco.MjModel, data: mujoco.MjData) -> Step:
 def trees_of_positions(model: mujoco.MjModel) -> np.ndarray:
     """Return for each element of `qpos` the tree of bodies that it moves."""
     widths = np.diff(np.append(model.jnt_qposadr, model.nq))
-    return np.repeat(model.body_treeid[model.jnt_bodyid], widths)
+    trees = model.body_treeid[model.jnt_bodyid]
+    return np.repeat(trees, widths.astype(int))
 
 
 def compare(path: Path, engine: Callable[..., Step], steps: int) -> dict | str:
