@@ -1,23 +1,30 @@
-"""mujoco_warp's and MJX's side of tests: models on the CPU, beside MuJoCo.
+"""mujoco_warp's and MJX's side: models on the CPU, beside MuJoCo.
 
 Runs in `.venv-accelerators`, which has no wbc_suite.
-Usage: accelerators_side.py warp|mjx FOUND.json STEPS FOLDER
+Usage: accelerators_side.py warp|mjx FOUND.json STEPS MODEL.mjb ...
 
-The folder has `NAME.mjb`, and `NAME.npz` with the state and the controls. FOUND gets
-for each name the greatest difference of positions in as many steps, or why the engine
-refuses the model. With 0 steps nothing is compiled.
+Beside `NAME.mjb` lies `NAME.npz` with the state and the controls. FOUND gets for each
+name why the engine refuses the model, or the greatest differences of positions, m or
+rad: `apart` of the trees of bodies that have touched nothing so far, `all` of all. A
+robot is one tree, and so is a cube. With 0 steps nothing is compiled.
 """
 
 import json
 import os
+import resource
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
 
 os.environ["JAX_PLATFORMS"] = "cpu"
+# Fused, the pose of each body computes those of all its parents anew: a step with an
+# arm of seven joints takes minutes.
+os.environ["XLA_FLAGS"] = "--xla_disable_hlo_passes=fusion"
 Step = Callable[[], np.ndarray]  # makes a step, and returns the positions
 
 
@@ -35,11 +42,14 @@ def in_warp(model: mujoco.MjModel, data: mujoco.MjData) -> Step:
 
 
 def in_mjx(model: mujoco.MjModel, data: mujoco.MjData) -> Step:
-    """Return the step of MJX from a state."""
+    """Return the step of MJX, its implementation in JAX, from a state."""
     import jax
     from mujoco import mjx
 
-    there, states = mjx.put_model(model), [mjx.put_data(model, data)]
+    # Compiling is what takes long: XLA's passes cost more than they save in 100 steps.
+    jax.config.update("jax_disable_most_optimizations", True)
+    there = mjx.put_model(model, impl="jax")
+    states = [mjx.put_data(model, data, impl="jax")]
     compiled = jax.jit(mjx.step)
 
     def step() -> np.ndarray:
@@ -49,8 +59,15 @@ def in_mjx(model: mujoco.MjModel, data: mujoco.MjData) -> Step:
     return step
 
 
-def compare(path: Path, engine: Callable[..., Step], steps: int) -> float | str:
-    """Return the greatest difference of positions in some steps, or a refusal."""
+def trees_of_positions(model: mujoco.MjModel) -> np.ndarray:
+    """Return for each element of `qpos` the tree of bodies that it moves."""
+    widths = np.diff(np.append(model.jnt_qposadr, model.nq))
+    trees = model.body_treeid[model.jnt_bodyid]
+    return np.repeat(trees, widths.astype(int))
+
+
+def compare(path: Path, engine: Callable[..., Step], steps: int) -> dict | str:
+    """Return the greatest differences of positions in some steps, or a refusal."""
     model = mujoco.MjModel.from_binary_path(str(path))
     data, start = mujoco.MjData(model), np.load(path.with_suffix(".npz"))
     for name in start:
@@ -60,16 +77,29 @@ def compare(path: Path, engine: Callable[..., Step], steps: int) -> float | str:
         step = engine(model, data)
     except (NotImplementedError, ValueError) as error:
         return str(error)
-    worst = 0.0
+    trees, touched = trees_of_positions(model), set[int]()
+    found: dict[str, Any] = {"apart": 0.0, "all": 0.0}
+    times = [time.process_time()]
     for _ in range(steps):
         mujoco.mj_step(model, data)
-        worst = max(worst, float(np.abs(step() - data.qpos).max()))
-    return worst
+        bodies = model.geom_bodyid[data.contact.geom]
+        touched.update(model.body_treeid[bodies].ravel().tolist())
+        away = np.abs(step() - data.qpos)
+        apart = away[~np.isin(trees, list(touched))]
+        found["apart"] = max(found["apart"], float(apart.max(initial=0.0)))
+        found["all"] = max(found["all"], float(away.max()))
+        times.append(time.process_time())
+    if steps:
+        kilobytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        found |= {"first_step_s": times[1] - times[0], "peak_mb": kilobytes // 1000}
+        found |= {"other_steps_s": times[-1] - times[1], "nv": int(model.nv)}
+    return found
 
 
 if __name__ == "__main__":
-    name, found, steps, folder = sys.argv[1:]
+    name, found, steps, *models = sys.argv[1:]
     engine = {"warp": in_warp, "mjx": in_mjx}[name]
-    paths = sorted(Path(folder).glob("*.mjb"))
-    away = {path.stem: compare(path, engine, int(steps)) for path in paths}
-    Path(found).write_text(json.dumps(away))
+    away: dict[str, dict | str] = {}
+    for path in map(Path, models):
+        away[path.stem] = compare(path, engine, int(steps))
+        Path(found).write_text(json.dumps(away))

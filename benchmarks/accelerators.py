@@ -1,0 +1,155 @@
+"""Exported models of every benchmark in mujoco_warp and MJX, on the CPU, beside MuJoCo.
+
+Each case is a benchmark with its usual robots or one of `ROBOTS`. Both sides start from
+the state after a first action that holds, and keep its controls for 100 steps.
+
+Rows are added to artifacts/benchmarks/accelerators.json, in place of older ones of the
+same case and engine; `--table` writes docs/accelerators.md from it, and steps nothing.
+
+Usage: python benchmarks/accelerators.py [CASE ...] [--engine warp] [--steps 100]
+           [--timeout S] [--quick] [--json FILE]
+       python benchmarks/accelerators.py --table
+A case is BENCHMARK, or BENCHMARK-ROBOT for one of the other robots. NUMBA_DISABLE_JIT=1
+saves compiling control loops of which one action is needed.
+"""
+
+import datetime
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+from harness.engines import PYTHON, VARIANTS, step_in, write_models
+from harness.report import Report, cell, machine, options, write_between
+from harness.trials import Case
+from import_corpus import progress
+
+from wbc_suite.errors import WbcError
+from wbc_suite.registration import BENCHMARKS
+
+ROOT = Path(__file__).parent.parent
+FOUND = ROOT / "artifacts" / "benchmarks" / "accelerators.json"
+PAGE = ROOT / "docs" / "accelerators.md"
+ROBOTS = ("GR1", "SpotWithArm", "Tiago")
+WALKING = "GR1FreeBody"
+"""GR1 as it walks, where it is not the usual robot and GR1 on its stand is refused."""
+CASES = (
+    *BENCHMARKS,
+    *(f"{name}-{robot}" for robot in ROBOTS for name in BENCHMARKS),
+    *(f"{name}-{WALKING}" for name in ("LocoLift", "WalkTo")),
+)
+ENGINES = {"warp": "mujoco_warp", "mjx": "MJX"}
+Row = dict[str, Any]
+
+
+def measure(case: str, engine: str, folder: Path, steps: int, timeout: float) -> Row:
+    """Step one case in one engine; say why where it is not possible."""
+    benchmark, _, robot = case.partition("-")
+    row: Row = {"case": case, "side": engine, "steps": steps}
+    row |= {"date": f"{datetime.datetime.now(tz=datetime.UTC):%Y-%m-%d}"}
+    row |= {"machine": machine()}
+    try:
+        env = Case(benchmark=benchmark, robots=(robot,) if robot else ()).make()
+    except WbcError as error:
+        return row | {"not_made": str(error)}
+    write_models(env, folder, case)
+    env.close()
+    try:
+        found = step_in(engine, folder, [case], steps=steps, timeout=timeout)[case]
+    except subprocess.TimeoutExpired:
+        return row | {"refused": f"not in {timeout:.0f} s"}
+    except subprocess.CalledProcessError as error:
+        return row | {"refused": f"ended with {error.returncode}"}
+    return row | (found if isinstance(found, dict) else {"refused": found})
+
+
+def table(rows: list[Row]) -> str:
+    """Return the results as tables in Markdown."""
+    warp = {row["case"]: row for row in rows if row["side"] == "warp"}
+    mjx = [row for row in rows if row["side"] == "mjx" and "not_made" not in row]
+    loaded = sum("refused" not in row or row["steps"] > 0 for row in mjx)
+    lines = [
+        f"mujoco_warp, {sum('all' in row for row in warp.values())} cases:",
+        "",
+        "| benchmark | " + " | ".join(["usual robots", *ROBOTS]) + " |",
+        "|---|" + "---|" * (1 + len(ROBOTS)),
+    ]
+    for name in BENCHMARKS:
+        cells = [shown(warp.get(case)) for case in (name, *robot_cases(name))]
+        lines.append(f"| {name} | " + " | ".join(cells) + " |")
+    lines += ["", f"MJX takes {loaded} of {len(mjx)} cases, and was stepped in these:"]
+    columns = ("nv", "first_step_s", "other_steps_s", "peak_mb")
+    lines += ["", "| case | differences | degrees of freedom | first step, CPU s "]
+    lines[-1] += "| the others, CPU s | peak, MB |"
+    lines += ["|---|---|---|---|---|---|"]
+    for row in (row for row in mjx if row["steps"]):
+        words = [row["case"], shown(row), *(cell(row.get(key)) for key in columns)]
+        lines.append("| " + " | ".join(words) + " |")
+    reasons: dict[str, list[str]] = {}
+    for row in warp.values():
+        if "not_made" in row:
+            reasons.setdefault(row["not_made"], []).append(row["case"])
+    lines += ["", "`make` refuses:", ""]
+    lines += [f"- {', '.join(cases)}: {why}" for why, cases in reasons.items()]
+    about = " and ".join(sorted({f"{row['date']}, {row['machine']}" for row in rows}))
+    return "\n".join([*lines, "", f"`python benchmarks/accelerators.py`, {about}."])
+
+
+def robot_cases(benchmark: str) -> list[str]:
+    """Return the cases of one benchmark with other robots than the usual ones."""
+    cases = [f"{benchmark}-{robot}" for robot in ROBOTS]
+    walking = f"{benchmark}-{WALKING}"
+    return [walking, *cases[1:]] if walking in CASES else cases
+
+
+def shown(row: Row | None) -> str:
+    """Return both differences of a row, or why there are none."""
+    if row is None:
+        return ""
+    if "not_made" in row:
+        return "refused"
+    found = [cell(row[key]) for key in ("apart", "all") if key in row]
+    return ", ".join(found) or row["refused"]
+
+
+def kept() -> list[Row]:
+    """Return the rows that were found before."""
+    return json.loads(FOUND.read_text("utf-8"))["rows"] if FOUND.exists() else []
+
+
+def main() -> None:
+    """Measure what the arguments name."""
+    parser = options(__doc__, "Door and Lift, 10 steps")
+    parser.add_argument("cases", nargs="*", metavar="CASE", help="default: all")
+    parser.add_argument("--engine", choices=VARIANTS, default="warp")
+    parser.add_argument("--steps", type=int, default=100, help="0 loads the model only")
+    parser.add_argument("--timeout", type=float, default=900.0, help="of a case, s")
+    parser.add_argument("--table", action="store_true", help=f"write {PAGE.name}")
+    given = parser.parse_args()
+    order = [(case, engine) for engine in VARIANTS for case in CASES]
+    if given.table:
+        write_between(PAGE, table(kept()))
+        return
+    if not PYTHON.exists():
+        sys.exit("not installed: make .venv-accelerators/.installed")
+    cases = ("Door", "Lift") if given.quick else given.cases or CASES
+    steps, began = 10 if given.quick else given.steps, time.perf_counter()
+    report, rows = Report(), {(row["case"], row["side"]): row for row in kept()}
+    for done, case in enumerate(cases):
+        progress(done, len(cases), began, case)
+        with tempfile.TemporaryDirectory() as folder:
+            row = measure(case, given.engine, Path(folder), steps, given.timeout)
+        rows[case, given.engine] = row
+        report.rows = sorted(
+            rows.values(), key=lambda row: order.index((row["case"], row["side"]))
+        )
+        report.write(FOUND if given.json is None else given.json)
+    print(file=sys.stderr)
+    report.show("positions beside MuJoCo", ["case", "side", "nv", "apart", "all"])
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,55 @@
+"""mujoco_warp and MJX take exported models and step them as MuJoCo does, on the CPU."""
+
+import pytest
+from harness.engines import PYTHON, step_in, write_models
+
+import wbc_suite
+from wbc_suite.registration import BENCHMARKS
+
+CONTACT = 1e-2
+"""Greatest difference of positions after 100 steps in contact, m or rad: the
+solvers of float32 and float64 stop at other places."""
+EXACT = ("Door", "Lift", "TwoArmPegInHole", "Wipe")
+"""Where nothing touches, or a cube rests."""
+ROBOTS = ("GR1", "SpotWithArm", "Tiago")
+CASES = (*BENCHMARKS, *(f"Lift-{robot}" for robot in ROBOTS))
+
+pytestmark = [
+    *(pytest.mark.peer, pytest.mark.slow),
+    pytest.mark.skipif(
+        not PYTHON.exists(), reason="not installed: make .venv-accelerators/.installed"
+    ),
+]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Both variants of every case, with the state after the first action."""
+    out = tmp_path_factory.mktemp("models")
+    for case in CASES:
+        name, _, robot = case.partition("-")
+        env = wbc_suite.make(name, **({"robots": robot} if robot else {}))
+        write_models(env.unwrapped, out, case)
+        env.close()
+    return out
+
+
+def test_mujoco_warp_steps_every_benchmark_as_mujoco(folder):
+    found = step_in("warp", folder, CASES, steps=100, timeout=1800)
+    assert set(found) == set(CASES)
+    refused = {name: why for name, why in found.items() if isinstance(why, str)}
+    assert refused == {}
+    assert max(away["all"] for away in found.values()) < CONTACT, found
+    assert max(away["apart"] for away in found.values()) < 1e-3, found
+    assert max(found[name]["all"] for name in EXACT) < 1e-5  # float32 beside float64
+
+
+def test_mjx_takes_the_accelerator_variant_of_every_benchmark(folder):
+    found = step_in("mjx", folder, CASES, steps=0, timeout=1800)
+    assert found == {case: {"apart": 0.0, "all": 0.0} for case in CASES}
+
+
+def test_mjx_steps_a_small_benchmark_as_mujoco(folder):
+    """Compiling takes 37 s of CPU time, the steps of a robot on four feet 2 s."""
+    found = step_in("mjx", folder, ["WalkTo"], steps=100, timeout=1800)
+    assert found["WalkTo"]["all"] < 1e-3
