@@ -32,7 +32,10 @@ def two_arm_lift(cell: Workcell[TwoArmLift]) -> Steps[None]:
     arms = cell.arms[:2]
     yield from drive_before(cell, POT, arms, HANDLES)
     for _ in range(TRIES):
-        places = [handle.removeprefix(f"{POT}_") for handle in _nearest(cell, arms)]
+        between = cell.point(HANDLES[1]) - cell.point(HANDLES[0])  # hands may turn it
+        crossed = between @ (arms[1].home.translation - arms[0].home.translation) < 0.0
+        handles = HANDLES[::-1] if crossed else HANDLES
+        places = [handle.removeprefix(f"{POT}_") for handle in handles]
         ways = [Approach(raised=0.0, away=AWAY, place=place) for place in places]
         choices = choose_pair(cell, POT, arms=arms, approaches=ways, then=[goal])
         if choices is None:
@@ -49,17 +52,6 @@ def two_arm_lift(cell: Workcell[TwoArmLift]) -> Steps[None]:
         yield from together(
             *(move(a, shifted(a.pose, 0.08 * UP), most=15) for a in arms)
         )
-
-
-def _nearest(cell: Workcell[TwoArmLift], arms: Sequence[Arm]) -> Sequence[str]:
-    """Return the handle that each arm takes, the nearer to its home: a pot may turn."""
-
-    def length(handles: Sequence[str]) -> float:
-        pairs = zip(arms, handles, strict=True)
-        gaps = [arm.home.translation - cell.point(handle) for arm, handle in pairs]
-        return float(np.linalg.norm(gaps, axis=1).sum())
-
-    return min(HANDLES, HANDLES[::-1], key=length)
 
 
 def _raise(
