@@ -7,7 +7,7 @@ from wbc_suite.control.law.joint_laws import JointLaw
 from wbc_suite.control.loop.acceleration_limits import acceleration_limits
 from wbc_suite.control.loop.inverse_dynamics import write_commands
 from wbc_suite.control.loop.physics import bind_physics
-from wbc_suite.robot.mjcf_export import STOP_MARGIN
+from wbc_suite.robot.mjcf_export import LONGEST_STEP, STOP_MARGIN
 
 JOINTS = tuple(f"panda_joint{i}" for i in range(1, 8))
 
@@ -55,7 +55,8 @@ def test_joints_stop_at_their_limits_however_fast_they_come(panda):
     q, v = run(panda, 4.0)
     assert (q <= high + 1e-3).all()
     assert np.abs(v).max(axis=0) == pytest.approx(fastest, abs=0.03)
-    assert q[-1] == pytest.approx(high - STOP_MARGIN, abs=1e-3)
+    margin = np.minimum(STOP_MARGIN, LONGEST_STEP * fastest)
+    assert q[-1] == pytest.approx(high - margin, abs=1e-3)
 
 
 def test_a_joint_outside_its_limits_comes_back(panda):

@@ -6,7 +6,6 @@ import pytest
 from mujoco import rollout
 
 import wbc_suite
-from wbc_suite.scene import compile_scene
 
 AUTORESET = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
 
@@ -26,15 +25,6 @@ def test_the_model_is_a_copy_with_the_automatic_reset(env):
     np.testing.assert_array_equal(model.body_mass, own.body_mass)
     model.body_mass[:] = 0.0
     assert own.body_mass.sum() > 1.0
-
-
-@pytest.mark.parametrize("own", [None, 9])
-def test_mjx_gets_the_nearest_contacts_as_many_as_a_scene_says(own):
-    spec = mujoco.MjSpec()
-    if own is not None:
-        spec.add_numeric(name="max_contact_points", size=1, data=[own])
-    model = compile_scene(spec)
-    assert model.numeric("max_contact_points").data == (own or 64)
 
 
 def test_rollout_gives_the_states_of_mujoco(env):

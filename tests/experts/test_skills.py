@@ -6,8 +6,8 @@ from wbc_suite.experts.skills import STALLED, move
 class FakeArm:
     """A hand whose distance to its target follows a list, m."""
 
-    def __init__(self, distances):
-        self.left = iter(distances)
+    def __init__(self, distances, *, hindered):
+        self.left, self.hindered = iter(distances), hindered
 
     def aim(self, *args, **options):
         pass
@@ -16,8 +16,8 @@ class FakeArm:
         return next(self.left), 0.0
 
 
-def outcome(distances):
-    steps = move(FakeArm(distances), None)
+def outcome(distances, *, hindered=False):
+    steps = move(FakeArm(distances, hindered=hindered), None)
     while True:
         try:
             next(steps)
@@ -29,7 +29,9 @@ def test_a_hand_that_is_pushed_off_its_way_returns_and_does_not_give_up():
     """It was nearer before; the way back takes longer than `STALLED`."""
     back = [0.1 - 0.005 * k for k in range(21)]
     assert len(back) > STALLED
-    assert outcome([0.02, 0.006, 0.03, 0.06, *back])
+    pushed = [0.02, 0.006, 0.03, 0.06, *back]
+    assert outcome(pushed)
+    assert outcome(pushed, hindered=True) is False
 
 
 def test_a_hand_without_progress_gives_up():

@@ -19,8 +19,6 @@ SMALL = 24
 """Degrees of freedom up to which constraint islands cost more than they save: without
 them a step of Lift takes 6 % less at 15 and 18, as long at 30 and 15 % more at 60."""
 
-NEAREST = "max_contact_points"  # MJX solves for so many of each dimension
-
 GROUNDED = 0.03  # depth by which feet and mounts may reach into the floor, m
 LANDED = 0.005  # distance of free feet from the floor that is left as it is, m
 
@@ -142,10 +140,7 @@ def compile_scene(spec: mujoco.MjSpec) -> mujoco.MjModel:
     - MuJoCo's broadphase uses bounding spheres of all geoms, visual ones included.
       Those get radius 0: GR1 has 115 pairs of bodies to test instead of 191.
     - In small scenes all constraints are solved at once, without islands.
-    - MJX solves for the nearest contacts only: of all pairs Lift has 998.
     """
-    if all(numeric.name != NEAREST for numeric in spec.numerics):
-        spec.add_numeric(name=NEAREST, size=1, data=[64])
     model = spec.compile()
     model.geom_rbound[(model.geom_contype | model.geom_conaffinity) == 0] = 0.0
     if model.nv <= SMALL:
