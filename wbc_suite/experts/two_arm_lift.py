@@ -41,10 +41,10 @@ def two_arm_lift(cell: Workcell[TwoArmLift]) -> Steps[None]:
         if choices is None:
             return
         yield from together(*(come_before(cell, choice) for choice in choices))
-        yield from together(
-            *(close_in(cell, POT, choice, speed=SLOW) for choice in choices)
-        )
-        held = yield from together(*(grip(cell, arm, POT) for arm in arms))
+        held = []
+        for choice in choices:  # one after the other: two hands at once turn the pot
+            yield from close_in(cell, POT, choice, speed=SLOW)
+            held.append((yield from grip(cell, choice.arm, POT)))
         if all(held) and (yield from _raise(cell, arms, goal)):
             return
         for arm in arms:
