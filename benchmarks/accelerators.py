@@ -1,7 +1,7 @@
 """Exported models of every benchmark in mujoco_warp and MJX, on the CPU, beside MuJoCo.
 
 Each case is a benchmark with its usual robots or one of `ROBOTS`. Both sides start from
-the state after a first action that holds, and keep its controls for 100 steps.
+the state after a first action of zeros, and keep its controls for 100 steps.
 
 Rows are added to artifacts/benchmarks/accelerators.json, in place of older ones of the
 same case and engine; `--table` writes docs/accelerators.md from it, and steps nothing.
@@ -18,15 +18,14 @@ import json
 import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 from typing import Any
 
 from harness.engines import PYTHON, VARIANTS, step_in, write_models
 from harness.report import Report, cell, machine, options, write_between
 from harness.trials import Case
-from import_corpus import progress
 
+from wbc_suite.cli.options import tracked
 from wbc_suite.errors import WbcError
 from wbc_suite.registration import BENCHMARKS
 
@@ -136,10 +135,9 @@ def main() -> None:
     if not PYTHON.exists():
         sys.exit("not installed: make .venv-accelerators/.installed")
     cases = ("Door", "Lift") if given.quick else given.cases or CASES
-    steps, began = 10 if given.quick else given.steps, time.perf_counter()
+    steps = 10 if given.quick else given.steps
     report, rows = Report(), {(row["case"], row["side"]): row for row in kept()}
-    for done, case in enumerate(cases):
-        progress(done, len(cases), began, case)
+    for case in tracked(cases, "Cases"):
         with tempfile.TemporaryDirectory() as folder:
             row = measure(case, given.engine, Path(folder), steps, given.timeout)
         rows[case, given.engine] = row
@@ -147,7 +145,6 @@ def main() -> None:
             rows.values(), key=lambda row: order.index((row["case"], row["side"]))
         )
         report.write(FOUND if given.json is None else given.json)
-    print(file=sys.stderr)
     report.show("positions beside MuJoCo", ["case", "side", "nv", "apart", "all"])
 
 

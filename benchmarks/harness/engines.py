@@ -25,9 +25,9 @@ VARIANTS = {"warp": "exact", "mjx": "accelerator"}
 
 
 def write_models(env: RobotEnv, folder: Path, name: str) -> None:
-    """Write both variants of a model, with the state after a first action."""
+    """Write both variants of a model, with the state after a first action of zeros."""
     env.reset(seed=0)
-    env.step(env.hold_action)
+    env.step(np.zeros(env.action_layout.size))
     data = env.simulation.data
     for variant in ("exact", "accelerator"):
         path = folder / variant / f"{name}.mjb"

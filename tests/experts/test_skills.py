@@ -6,8 +6,8 @@ from wbc_suite.experts.skills import STALLED, move
 class FakeArm:
     """A hand whose distance to its target follows a list, m."""
 
-    def __init__(self, distances, *, hindered):
-        self.left, self.hindered = iter(distances), hindered
+    def __init__(self, distances, *, coupled):
+        self.left, self.coupled = iter(distances), coupled
 
     def aim(self, *args, **options):
         pass
@@ -16,8 +16,8 @@ class FakeArm:
         return next(self.left), 0.0
 
 
-def outcome(distances, *, hindered=False):
-    steps = move(FakeArm(distances, hindered=hindered), None)
+def outcome(distances, *, coupled=False):
+    steps = move(FakeArm(distances, coupled=coupled), None)
     while True:
         try:
             next(steps)
@@ -31,7 +31,7 @@ def test_a_hand_that_is_pushed_off_its_way_returns_and_does_not_give_up():
     assert len(back) > STALLED
     pushed = [0.02, 0.006, 0.03, 0.06, *back]
     assert outcome(pushed)
-    assert outcome(pushed, hindered=True) is False
+    assert outcome(pushed, coupled=True) is False
 
 
 def test_a_hand_without_progress_gives_up():

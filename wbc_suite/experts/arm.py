@@ -33,7 +33,7 @@ class Arm:
         home: Pose of the hand at the start.
         finger_reach: Returns how far fingers reach beyond the frame of a grasp, m.
         closing: Returns the joints of the gripper from open to closed for a grasp.
-        hindered: Whether other arms of the workcell share joints with it.
+        coupled: Whether other arms of the workcell share joints with it.
     """
 
     def __init__(
@@ -66,7 +66,7 @@ class Arm:
         self._speed, self._turn, self._exact = SPEED, TURN, True
         self._correction, self._turn_correction = np.zeros(3), np.zeros(3)
         self._moves, self._grips = False, False
-        self.hindered = False
+        self.coupled = False
 
     @property
     def pose(self) -> pin.SE3:

@@ -17,7 +17,7 @@ log = logging.getLogger(__name__)
 UP = np.array([0.0, 0.0, 1.0])
 STALLED = 8  # control periods without progress end a motion
 PUSHED = 0.01  # m, by which the error rises while a hand is pushed off its way
-PUSHES = 4  # such rises of a motion; none of arms that hinder each other
+PUSHES = 4  # such rises after which a motion starts anew; none for coupled arms
 STOPPED = 2e-4  # rad or m per control period, of fingers
 OPENING = 8  # control periods until a gripper is open
 OUT_OF_REACH = 0.008  # m, error of outlooks; from the start more may be in reach
@@ -47,7 +47,7 @@ def move(
     A target that is a function is followed. It ends without success when the hand makes
     no more progress; one that was pushed off its way starts anew.
     """
-    best, waited, pushes = np.inf, 0, 0 if arm.hindered else PUSHES
+    best, waited, pushes = np.inf, 0, 0 if arm.coupled else PUSHES
     for _ in range(most):
         arm.aim(target() if callable(target) else target, speed=speed, turn=turn)
         distance, angle = arm.error()

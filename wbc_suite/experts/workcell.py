@@ -189,7 +189,7 @@ class Workcell(Generic[B]):
                     )
                 )
         for arm, other in itertools.permutations(arms, 2):
-            arm.hindered |= arm.shares_joints(other)
+            arm.coupled |= arm.shares_joints(other)
         return arms
 
     def _carries(self, port: LimbPort, hand: Hand) -> bool:
