@@ -49,5 +49,5 @@ def step_in(
     found = folder / f"{engine}.json"
     models = [folder / VARIANTS[engine] / f"{name}.mjb" for name in names]
     command = [PYTHON, SIDE, engine, found, str(steps), *models]
-    subprocess.run(command, check=True, timeout=timeout)
+    subprocess.run(command, check=True, timeout=timeout, stdout=subprocess.DEVNULL)
     return json.loads(found.read_text("utf-8"))

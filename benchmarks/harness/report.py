@@ -111,6 +111,7 @@ class Report:
             "rows": self.rows,
             "ratios": self.ratios,
         }
+        path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
 
 
