@@ -11,8 +11,8 @@ from wbc_suite.control import (
     load_composite_controller_config,
     register_composite,
 )
+from wbc_suite.control.composite.command_lead import MAX_LEAD
 from wbc_suite.control.composite.ik_report import lagging_joint
-from wbc_suite.control.composite.tick import MAX_LEAD
 from wbc_suite.control.composite.whole_body_config import (
     WholeBodyIKConfig,
     default_whole_body_config,

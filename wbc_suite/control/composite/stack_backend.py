@@ -7,6 +7,7 @@ import numpy as np
 
 from wbc_suite.compiling import as_argument
 from wbc_suite.control.composite.backend import IkStep
+from wbc_suite.control.composite.command_lead import limit_steps
 from wbc_suite.control.composite.frame_kinds import NO_SPEED_LIMIT, set_target
 from wbc_suite.control.composite.qp_tasks import (
     TRACKING_COST,
@@ -15,7 +16,6 @@ from wbc_suite.control.composite.qp_tasks import (
     make_limits,
     travel_costs,
 )
-from wbc_suite.control.composite.tick import limit_steps
 from wbc_suite.control.composite.torque_limiter import TorqueLimiter
 from wbc_suite.control.composite.whole_body_config import WholeBodyIKConfig
 from wbc_suite.control.law.joint_laws import JointLaw
@@ -125,7 +125,7 @@ class StackBackend:
     def limit_steps(
         self, reference: SplineReference, law: JointLaw, data: mujoco.MjData
     ) -> None:
-        """Limit the next step as `tick.limit_steps` does."""
+        """Limit the next step as `command_lead.limit_steps` does."""
         bounds, spline = as_argument(self.stack.bounds), reference.argument
         limit_steps(bounds, spline, self.v, law.drives, data.qpos, data.qvel)
 

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from wbc_suite.compiling import compiled, compiled_inline, struct
+from wbc_suite.control.composite.command_lead import limit_steps
 from wbc_suite.control.composite.finger_capsules import FingerArrays, place_fingers
 from wbc_suite.control.composite.frame_goals import GoalArrays, place_goals
 from wbc_suite.control.composite.frame_targets import (
@@ -33,27 +34,13 @@ from wbc_suite.control.composite.scene_obstacles import SceneArrays, measure_obs
 from wbc_suite.control.composite.torque_limiter import TorqueArrays, motors_suffice
 from wbc_suite.control.law.reference import set_reference
 from wbc_suite.control.loop.records import CompiledRecords, Records
-from wbc_suite.control.part.spline_reference import (
-    SplineArrays,
-    extend_spline,
-    spline_end,
-)
+from wbc_suite.control.part.spline_reference import SplineArrays, extend_spline
 from wbc_suite.linear_algebra import copy_vector
-from wbc_suite.qp.limit import JointBounds, braking_step
 from wbc_suite.qp.tick import TickArrays, TickStatus, solve_tick
 from wbc_suite.typing import Indices, Vector
 
 _FIRST_LEVEL: int = np.int64(0)  # pyright: ignore[reportAssignmentType]
 """Typed, since a literal would be compiled once more."""
-
-
-MAX_LEAD = 0.25
-"""rad or m; a command waits for a joint that lags behind by more, so that a joint does
-not jump when it comes free. It waits sooner where the motor saturates. Where a contact
-drives the joint away, the command follows it at this distance: the QP would otherwise
-keep a robot off the scene that is elsewhere."""
-EXCESS = 1.2
-"""Speed or lag of a joint, over its limit or `MAX_LEAD`, at which commands brake."""
 
 
 class Stage(IntEnum):
@@ -160,72 +147,6 @@ def run_tick(
     set_reference(laws[law : law + 1], own, tick.spline.motion)
     state.stage, state.countdown = Stage.DONE.value, tick.steps
     return True
-
-
-@compiled
-def limit_steps(
-    bounds: JointBounds,
-    spline: SplineArrays,
-    v: Vector,
-    drives: CompiledRecords,
-    qpos: Vector,
-    qvel: Vector,
-) -> None:
-    """Write the greatest steps of commands that wait for their joints."""
-    excess = _limit_lead(bounds, spline, v, drives, qpos, qvel)
-    if excess > EXCESS:
-        _brake(bounds, spline, v, min(excess / EXCESS - 1.0, 1.0))
-
-
-@compiled
-def _limit_lead(
-    bounds: JointBounds,
-    spline: SplineArrays,
-    v: Vector,
-    drives: CompiledRecords,
-    qpos: Vector,
-    qvel: Vector,
-) -> float:
-    """Write the greatest steps with which commands do not lead their joints by more.
-
-    The lead is e + (kd / kp) e', as feedback measures it. It grows by the velocity that
-    the joint lacks: a step that is shorter than the last, of velocity v, by so much
-    keeps it. A step may be longer by what can be braked within the lead that is left.
-    It is negative, and leads back, where the lead is greater than `MAX_LEAD`.
-
-    Returns the greatest speed or lag of a joint, relative to its limit or `MAX_LEAD`.
-    """
-    dt, excess = spline.period, 0.0
-    for j in range(spline.q_index.shape[0]):
-        drive, i = drives[j], spline.v_index[j]
-        position, velocity = spline_end(spline, j)
-        most, growth = drive.windup_max, velocity - qvel[drive.dof]
-        lag, v_max = float(position - qpos[drive.qpos]), float(bounds.v_max[i])
-        excess = max(excess, abs(float(qvel[drive.dof])) / v_max, abs(lag) / MAX_LEAD)
-        lead = lag + drive.kd / drive.kp * growth
-        kept, a_max = dt * (v[i] - growth), float(bounds.a_max[i])
-        for side, sign in enumerate((-1.0, 1.0)):
-            left = max(most - sign * lead, 0.0)
-            longer = braking_step(float(left), 1.0, a_max, dt)
-            slower = min(sign * v[i] * dt - a_max * dt**2, 0.0)
-            least = slower if sign * lead > MAX_LEAD else 0.0
-            bounds.step_max[side, i] = max(sign * kept + longer, least)
-    return excess
-
-
-@compiled
-def _brake(bounds: JointBounds, spline: SplineArrays, v: Vector, share: float) -> None:
-    """Brake all commands by a share of their greatest accelerations.
-
-    A contact drives a joint: an arm presses its wrist down, or a base drives on with
-    an arm that is jammed. Commands that have to lead back do so.
-    """
-    dt = spline.period
-    for i in spline.v_index:
-        for side, sign in enumerate((-1.0, 1.0)):
-            slower = sign * v[i] * dt - share * bounds.a_max[i] * dt**2
-            longest = max(slower, -bounds.step_max[1 - side, i], 0.0)
-            bounds.step_max[side, i] = min(bounds.step_max[side, i], longest)
 
 
 @compiled

@@ -10,6 +10,7 @@ import pinocchio as pin
 from wbc_suite.compiling import as_argument
 from wbc_suite.control.action import ActionLayout
 from wbc_suite.control.composite.backend import IkBackend, IkStep
+from wbc_suite.control.composite.command_lead import MAX_LEAD
 from wbc_suite.control.composite.finger_capsules import FingerCapsules
 from wbc_suite.control.composite.frame_goals import FrameGoals, place_goals
 from wbc_suite.control.composite.frame_targets import ControlledFrames
@@ -23,7 +24,7 @@ from wbc_suite.control.composite.reduced_robot import (
 )
 from wbc_suite.control.composite.scene_obstacles import SceneObstacles
 from wbc_suite.control.composite.stack_backend import StackBackend
-from wbc_suite.control.composite.tick import MAX_LEAD, TICK, Stage, WholeBodyArrays
+from wbc_suite.control.composite.tick import TICK, Stage, WholeBodyArrays
 from wbc_suite.control.composite.waypoint_planner import Waypoint, WaypointPlanner
 from wbc_suite.control.composite.whole_body_config import (
     WholeBodyIKConfig,
