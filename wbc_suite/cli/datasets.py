@@ -141,8 +141,10 @@ def filter_episodes(
     success: Annotated[
         bool, typer.Option("--success", help="Only successful episodes.")
     ] = False,
-    shortest: Annotated[int, typer.Option(help="Minimum actions.")] = 0,
-    longest: Annotated[int | None, typer.Option(help="Maximum actions.")] = None,
+    shortest: Annotated[int, typer.Option(help="Least number of actions.")] = 0,
+    longest: Annotated[
+        int | None, typer.Option(help="Greatest number of actions.")
+    ] = None,
     mask: Annotated[str | None, typer.Option(help="Only this filter key.")] = None,
     episode: Annotated[
         list[str] | None, typer.Option(help="Only this episode; may be repeated.")

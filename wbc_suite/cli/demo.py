@@ -32,7 +32,7 @@ def demo(
     output: Annotated[
         Path, typer.Option("--output", "-o", help="Folder for the pictures.")
     ] = Path("artifacts/demo"),
-    figures: Annotated[int, typer.Option(min=1, max=20, help="Curves.")] = 2,
+    figures: Annotated[int, typer.Option(min=1, max=20, help="Number of curves.")] = 2,
     controller: Annotated[
         str, typer.Option(help="WHOLE_BODY_IK or WHOLE_BODY_MINK_IK.")
     ] = "WHOLE_BODY_IK",

@@ -88,7 +88,7 @@ def evaluate(
     robots: RobotsOption,
     policy: PoliciesOption,
     controller: ControllersOption = None,
-    episodes: Annotated[int, typer.Option(min=1, help="Of each case.")] = 400,
+    episodes: Annotated[int, typer.Option(min=1, help="Episodes per case.")] = 400,
     base_seed: BaseOption = 0,
     first_seed: FirstSeedOption = None,
     horizon: HorizonOption = None,

@@ -17,8 +17,8 @@ def expert(
     *,
     robots: options.RobotsOption = None,
     controller: options.ControllerOption = None,
-    episodes: Annotated[int, typer.Option(min=1, help="Episodes.")] = 20,
-    seed: Annotated[int, typer.Option(min=0, help="First seed.")] = 0,
+    episodes: Annotated[int, typer.Option(min=1, help="Number of episodes.")] = 20,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the first episode.")] = 0,
     horizon: Annotated[
         int | None, typer.Option(min=1, help="Maximum steps of an episode.")
     ] = None,
