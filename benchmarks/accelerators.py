@@ -1,16 +1,16 @@
-"""Exported models of every benchmark in mujoco_warp and MJX, on the CPU, beside MuJoCo.
+"""Exported models of every benchmark in mujoco_warp and MJX on the CPU, against MuJoCo.
 
-Each case is a benchmark with its usual robots or one of `ROBOTS`. Both sides start from
+Each case is a benchmark with its usual robots or one of `ROBOTS`. Both engines start in
 the state after a first action of zeros, and keep its controls for 100 steps.
 
 Rows are added to artifacts/benchmarks/accelerators.json, in place of older ones of the
-same case and engine; `--table` writes docs/accelerators.md from it, and steps nothing.
+same case and engine; `--table` writes docs/accelerators.md from it, and runs nothing.
 
 Usage: python benchmarks/accelerators.py [CASE ...] [--engine warp] [--steps 100]
            [--timeout S] [--quick] [--json FILE]
        python benchmarks/accelerators.py --table
 A case is BENCHMARK, or BENCHMARK-ROBOT for one of the other robots. NUMBA_DISABLE_JIT=1
-saves compiling control loops of which one action is needed.
+avoids compiling control loops that run for one action only.
 """
 
 import datetime

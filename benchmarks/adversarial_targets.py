@@ -1,12 +1,12 @@
-"""Targets that mean harm: do robots stay inside their joints' limits and out of things?
+"""Adversarial targets: do robots keep joint limits and stay out of obstacles?
 
 Each robot stands in Lift under its whole-body controller. For 60 s its hands, torso,
-head and base are sent, 20 times a second, where they must not go: they jump, go through
-the table and the floor, behind the robot and metres away, press, shake, turn over, and
-swing joints from stop to stop; grippers open and close. Each motion lasts 0.5 to 3 s.
-After every physics step the positions of the simulated joints are compared with their
-ranges, and contacts of the robot with the scene are read; those with the cube, which
-moves, are listed apart.
+head and base are sent, 20 times a second, to where they must not go: they jump, go
+through the table and the floor, behind the robot and metres away, press, shake, turn
+over, and swing joints from stop to stop; grippers open and close. Each motion lasts 0.5
+to 3 s. After every physics step the positions of the simulated joints are compared with
+their ranges, and contacts of the robot with the scene are read; those with the cube,
+which is free to move, are listed separately.
 
 Usage: python benchmarks/adversarial_targets.py [--quick] [--json FILE] [--seeds N]
            [--seconds S] [--robots NAME ...] [--controller NAME]

@@ -1,13 +1,13 @@
-"""What data teach: success of cloned policies by noise, history and number of episodes.
+"""Behaviour cloning: success by noise, history and number of episodes.
 
 Episodes of the expert are recorded plain, with noise on actions, with recoveries from
 pushes, with both, and with pushes and four times the noise. The scripts of
-examples/learning imitate some of them. Success is that of the last checkpoint, of the
-mean of the last five and of the best of them, over the same unseen scenes. Results are
-added to docs/learning.json; cases that it
-has are not repeated. `--table` writes docs/learning.md and its plot from it.
+examples/learning are trained on some of them. Success is that of the last checkpoint,
+of the mean of the last five and of the best of them, over the same unseen scenes.
+Results are added to docs/learning.json; cases that are in it are not repeated.
+`--table` writes docs/learning.md and its plot from it.
 
-Run it where learning is installed:
+Run it in the environment for learning:
     .venv-learning/bin/python benchmarks/cloning.py Lift --data plain both --seeds 3
     .venv-learning/bin/python benchmarks/cloning.py --table
 

@@ -5,8 +5,8 @@ random actions (parts: +-0.1 of their range; whole-body: +-5 mm and rad around t
 that hold). Each side is also timed against its own raw physics: `mj_step` of its own
 compiled model from the states its steps began in, controls held. Both sides share one
 processor and take turns of 8 steps, three to a block, which begins with a reset; a
-ratio is the median of those of the turns: a processor that changes its speed, as those
-of shared machines do, does so for both. robosuite runs in its own
+ratio is the median of the turns' ratios, since a processor that changes its speed, as
+on shared machines, does so for both sides. robosuite runs in its own
 environment (.venv-robosuite, `make bench-peers`) and is left out where it is missing.
 Times are CPU times of the process. Resets change no structure; robosuite's "hard" one,
 its default, compiles anew.

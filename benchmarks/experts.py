@@ -1,6 +1,6 @@
 """Successes of the experts: benchmark by benchmark, robot by robot.
 
-Episodes are those of seeds that no tuning saw, from 7000 on. An episode counts as a
+Episodes have seeds that were not used for tuning, from 7000 on. An episode counts as a
 success if the benchmark is solved within 500 steps, or 1000 for those with several
 objects. Results are added to docs/experts.json; `--table` writes that into
 docs/experts.md, and measures nothing.

@@ -1,10 +1,10 @@
-"""Search for false successes: a success of a benchmark although its task is not done.
+"""Search for false successes: episodes that succeed although the task is not done.
 
 Each try is a short episode of random moves: of a thing (thrown at a goal, brought near
 it by a force that holds it and lets go, pushed) and of the robots (still, struck at
 things, at random, or as their expert moves up to some step). Forces move things, so
-physics holds. Half of the tries change one that came near: the shaped reward of an
-episode says how near. At a success a check looks whether the task was done, see
+physics holds. Half of the tries vary one that came close, as measured by the shaped
+reward of its episode. At a success a check looks whether the task was done, see
 `harness/task_checks.py`.
 
 Usage: python benchmarks/false_success.py [BENCHMARK ...] [--tries 10000] [--seed 0]

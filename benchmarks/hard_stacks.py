@@ -1,4 +1,4 @@
-"""Stacks that ask for what cannot be had: does the robot come to rest, and how soon?
+"""Infeasible QP stacks: does the robot come to rest, and how soon?
 
 Each seed makes a stack of one, two or three levels for GR1, SpotWithArm, Tiago or
 Panda, of one of the families in `FAMILIES`. Its targets rest from the start, for 20 s

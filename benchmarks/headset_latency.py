@@ -1,4 +1,4 @@
-"""Latency of the headset: from a frame's sending to the joint targets that follow.
+"""Latency of the headset: from sending a frame to the resulting joint targets.
 
 A session runs at 100 Hz as `wbc-suite teleop --device headset` does. A client in a
 process of its own sends frames of two tracked hands 90 times a second, with

@@ -1,13 +1,14 @@
-"""Controllers beside each other: each on every robot, on one set of motions.
+"""Comparison of controllers: each on every robot, with the same motions.
 
-The right hand (or the only one) stands at `ready`, is sent 5 cm and 20 degrees in three
-directions, and round an upright circle of 20 cm in 4 s, at 20 actions per second.
+The right hand (or the only one) starts at `ready`, is moved by 5 cm and 20 degrees in
+three directions, and round an upright circle of 20 cm in 4 s, at 20 actions per second.
 Position controllers hold the orientation. Joint controllers follow the joint angles of
 the same motion, found by damped least squares.
 
-Limits passed: the largest way past a joint's range, and the share of physics steps in
-which a joint is faster than its limit. Chatter is the path of the torques, in full
-ranges per second and motor; energy the sum of |torque x speed| over the motions. The
+Limit violations: how far a joint passes its range at most, and the share of physics
+steps in which a joint is faster than its limit. Chatter is the total variation of the
+torques, in torque ranges per second and motor; energy is the integral of
+|torque x speed| over the motions. The
 tick is a physics step with its control law.
 
 Usage: python benchmarks/leaderboard.py --json artifacts/benchmarks/leaderboard.json

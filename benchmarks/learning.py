@@ -1,12 +1,12 @@
-"""SAC on the nine benchmarks of the paper, beside the curves that were published.
+"""SAC on the nine benchmarks of robosuite's paper, against its published curves.
 
 The table has Panda and Sawyer, two of each for two-armed benchmarks, with OSC_POSE and
 JOINT_VELOCITY. Each run is examples/learning/sac.py with its settings, in a folder of
-its own under artifacts/learning: a stopped one goes on. Results are added to
-docs/learning.json; runs of the same number of steps that it has are not repeated.
+its own under artifacts/learning; a stopped run continues. Results are added to
+docs/learning.json; runs that are in it with as many steps are not repeated.
 `--table` writes docs/learning.md and its plot from it.
 
-Run it where learning is installed:
+Run it in the environment for learning:
     .venv-learning/bin/python benchmarks/learning.py Lift Door --seeds 3
     .venv-learning/bin/python benchmarks/learning.py --table
 

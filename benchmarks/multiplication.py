@@ -1,4 +1,4 @@
-"""Generation rates: how many moved demonstrations succeed in new scenes.
+"""Generation rates: how many adapted demonstrations succeed in new scenes.
 
 Ten successful episodes of the expert are the sources. Each attempt is one scene, with
 the noise of `wbc-suite multiply`; seeds of scenes are those that it takes. Published

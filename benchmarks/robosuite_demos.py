@@ -1,4 +1,4 @@
-"""robosuite's own demos and scripts on our engine, with the import changed.
+"""robosuite's own demos and scripts with the import changed to this package.
 
     python benchmarks/robosuite_demos.py            # all; needs `make bench-peers`
     python benchmarks/robosuite_demos.py demo_control

@@ -14,10 +14,10 @@ at once), and ratios of steps per second, where more is better: above 0.95 of wh
 processes reach, a second process is not worth its memory. Memory is the resident set of
 a process with one environment, and what each more adds.
 
-These are wall times. Where a virtual machine's host takes a processor away, whoever
-holds Python's lock then keeps all threads waiting, but one process of two: such rounds
-say more about the host. So ratios are medians of those rounds in which nothing was
-stolen from either side ("quiet"), and over all rounds as well ("/all").
+These are wall times. When a virtual machine's host takes a processor away, the thread
+that holds Python's lock keeps all threads waiting, but only one process of two: such
+rounds say more about the host. So ratios are medians of those rounds in which nothing
+was stolen from either side ("quiet"), and over all rounds as well ("/all").
 
 Usage: python benchmarks/scaling.py [--quick] [--json FILE] [--rounds N] [--cases TEXT]
 """

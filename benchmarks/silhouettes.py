@@ -1,4 +1,4 @@
-"""Silhouettes of exported URDFs in other readers, beside those of our MJCF.
+"""Silhouettes of exported URDFs in other readers, against those of our MJCF.
 
 Each robot of the catalogue is exported with its meshes and read by MuJoCo, Pinocchio
 and yourdfpy (`pip install yourdfpy`; left out if absent). All models stand at `ready`

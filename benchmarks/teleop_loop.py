@@ -17,8 +17,8 @@ Reported, in ms:
 - behind: how late a step begins, which does not add up (in the JSON)
 - bare: jitter of a process at the same rate that does nothing else, meanwhile: what the
   machine can do
-- load: what waits for a processor, per processor, when the run begins; above 1 the
-  machine is not the session's own, and wall times say more of others than of it
+- load: processes waiting for a processor, per processor, when the run begins; above 1
+  the machine is shared, and wall times say more about other work than about this
 - grown: memory that the processes of session and page hold more at the end than at the
   beginning, MB (bound: 50 in ten minutes, `--seconds 600`)
 - kept: the same once the episode is in its file

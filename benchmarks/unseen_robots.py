@@ -1,4 +1,4 @@
-"""Robots chosen before any was loaded: hands move, reach goals; quadrupeds stand.
+"""Robots chosen before any was loaded: do hands reach goals, do quadrupeds stand?
 
 Each robot is given to `wbc-suite demo FILE`, as a user would. Then the hands of one
 with a fixed base get random goals, the poses of random postures without contact that

@@ -1,4 +1,4 @@
-"""Robots from URDF files on their own feet: stand, then walk forward.
+"""Legged robots from URDF files: stand, then walk forward.
 
 A robot stands for two seconds on the floor of Lift and walks for ten. Its collision
 shapes are those of the file; meshes are used where they are found. Without a file it is

@@ -38,15 +38,15 @@ HEAD = """# Controllers compared
 Written by `docs/write_leaderboard.py` from `docs/leaderboard.json`, which
 `{command}` measured.
 
-The hand is sent 5 cm and 20 degrees in three directions, and round a circle of 20 cm in
-4 s. *Settling*, *overshoot* and *error* are the worst of the three; an empty cell did
-not settle within 2 s. *Past range* is the largest way past a joint's range, *past
-speed* the share of physics steps in which a joint was faster than its limit, *chatter*
-the path of the torques in full ranges per second and motor. A *tick* is a physics step
-with its control law, CPU time of the median and of the 99th percentile. Rows are in
-order of the circle's median. OSC_POSITION leaves the orientation alone; joint
-controllers are sent the joint angles of the same motion, in absolute positions, or as
-the velocities that reach them in one action. On a busy
+The hand is commanded to move by 5 cm and 20 degrees in three directions, and round a
+circle of 20 cm in 4 s. *Settling*, *overshoot* and *error* are the worst of the three;
+an empty cell did not settle within 2 s. *Past range* is how far a joint passed its
+range at most, *past speed* the share of physics steps in which a joint was faster than
+its limit, *chatter* the total variation of the torques, in torque ranges per second and
+motor. A *tick* is a physics step with its control law, CPU time of the median and of
+the 99th percentile. Rows are in order of the circle's median. OSC_POSITION is sent
+positions only; joint controllers are sent the joint angles of the same motion, in
+absolute positions, or as the velocities that reach them in one action. On a busy
 machine the 99th percentile of ticks is high.
 
 Machine: {machine}. Date: {date}. Versions: {versions}.

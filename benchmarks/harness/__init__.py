@@ -1,4 +1,4 @@
-"""What the scripts of this folder share: rows, ratios, tables, timing, peers."""
+"""Code shared by the scripts of this folder: rows, ratios, tables, timing, peers."""
 
 import os
 

@@ -1,4 +1,4 @@
-"""What is told an environment wrongly: refused actions, and bad numbers in physics."""
+"""Wrong input to an environment: refused actions, and bad numbers in physics."""
 
 from collections import Counter
 from collections.abc import Callable

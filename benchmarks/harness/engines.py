@@ -1,4 +1,4 @@
-"""Exported models for other engines, in files, and what the other side found.
+"""Exported models for other engines, in files, and the results of those engines.
 
 The engines have an environment of their own: `make .venv-accelerators/.installed`.
 """

@@ -1,4 +1,4 @@
-"""Memory of a process, as Linux counts it."""
+"""Memory of a process, as counted by Linux."""
 
 import os
 import re

@@ -1,4 +1,4 @@
-"""What processors did, as Linux counts it."""
+"""Processor times, as counted by Linux."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""One episode taken in many ways; every way must end in the same bits."""
+"""One episode run in many ways, which must all end in bit-identical states."""
 
 import copy
 import hashlib

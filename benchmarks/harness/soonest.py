@@ -1,6 +1,6 @@
-"""How soon joints at their top speeds can bring a hand somewhere, by any way.
+"""How soon joints at their top speeds can bring a hand to a pose, on any path.
 
-What no law can beat: accelerations and torques, and the way between, count for nothing.
+A lower bound for every control law: accelerations, torques and paths are not limited.
 """
 
 import mujoco

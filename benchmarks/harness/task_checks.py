@@ -1,8 +1,8 @@
 """Checks whether a task was done, by other means than the benchmark's own success.
 
-They look at geometry and at what physics does next. `after_step` watches an episode;
-`fault` is asked at the first success, returns what is wrong or None, and may change
-the simulation.
+They check geometry and what happens next in the simulation. `after_step` watches an
+episode; `fault` is asked at the first success, returns what is wrong or None, and may
+change the simulation.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""Trials that last: many steps, resets, environments; each says what went wrong.
+"""Long trials: many steps, resets and environments; each reports what went wrong.
 
 Every trial is a function of plain arguments that returns a `Found`, so that it can run
 in a process of its own.

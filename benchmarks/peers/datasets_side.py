@@ -1,4 +1,4 @@
-"""Load a dataset with its layout's own package, and tell what it holds as JSON.
+"""Load a dataset with its layout's own package, and print its content as JSON.
 
     python datasets_side.py minari|mcap|robomimic|lerobot PATH
 

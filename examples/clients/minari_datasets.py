@@ -34,4 +34,4 @@ again.reset(seed=0)
 for action in episode.actions:
     seen, *_ = again.step(action)
 assert np.array_equal(seen["cube_pos"], episode.observations["cube_pos"][-1])
-print(f"wbc_suite {wbc_suite.__version__}: {len(episode)} steps replayed bit by bit")
+print(f"wbc_suite {wbc_suite.__version__}: {len(episode)} steps replayed bit for bit")

@@ -60,7 +60,7 @@ def test_one_robot_stands_at_its_own_place_or_the_default(robots):
 
 @pytest.mark.parametrize(
     ("count", "configuration", "message"),
-    [(2, "default", "takes one robot"), (1, "opposed", "cannot stand 'opposed'")],
+    [(2, "default", "takes one robot"), (1, "opposed", "'opposed' is not for one")],
 )
 def test_one_place_is_for_one_robot(robots, count, configuration, message):
     with pytest.raises(ConfigError, match=message):
@@ -94,8 +94,8 @@ def test_one_robot_with_two_arms_stands_at_its_place(robots):
         (["Panda"], "default", "needs two arms"),
         (["Panda", "Baxter"], "default", "needs two arms"),
         (["Panda"] * 3, "default", "needs two arms"),
-        (["Panda", "Panda"], "single-robot", "cannot stand 'single-robot'"),
-        (["Baxter"], "opposed", "cannot stand 'opposed'"),
+        (["Panda", "Panda"], "single-robot", "'single-robot' is not for 2"),
+        (["Baxter"], "opposed", "'opposed' is not for 1"),
     ],
 )
 def test_what_has_not_two_arms_is_refused(robots, names, configuration, message):

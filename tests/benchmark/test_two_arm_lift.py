@@ -139,8 +139,8 @@ def test_robots_stand_as_they_are_told():
         ({"robots": "Panda"}, "needs two arms"),
         ({"robots": ["Panda"] * 3}, "needs two arms"),
         ({"robots": ["Baxter", "Panda"]}, "needs two arms"),
-        ({"robots": "Baxter", "env_configuration": "opposed"}, "cannot stand"),
-        ({"env_configuration": "single-robot"}, "cannot stand"),
+        ({"robots": "Baxter", "env_configuration": "opposed"}, "is not for 1"),
+        ({"env_configuration": "single-robot"}, "is not for 2"),
     ],
 )
 def test_wrong_arms_and_places_are_refused(arguments, told):

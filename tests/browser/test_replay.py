@@ -68,7 +68,7 @@ def wind(viewer, player):
 def test_a_person_plays_pauses_seeks_and_changes_the_episode(context, replayed):
     player = replayed.player
     viewer = Viewer(context, replayed.site, size=(1100, 700), dots=1.0)
-    viewer.page.get_by_text("bit by bit as recorded").wait_for()
+    viewer.page.get_by_text("bit for bit as recorded").wait_for()
     viewer.page.get_by_role("button", name="Pause").click()
     wait_until(lambda: not player.status.playing, "the player pauses")
 

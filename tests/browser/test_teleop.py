@@ -220,7 +220,7 @@ def test_buttons_pause_and_reset(settled, context):
     viewer.page.get_by_role("button", name="Reset").click()
     wait_until(lambda: session.snapshot.epoch == epoch + 1, "the reset")
     viewer.page.get_by_role("button", name="Record").click()
-    viewer.page.get_by_text("started without a file").wait_for()
+    viewer.page.get_by_text("has no file to record").wait_for()
 
 
 def test_shadows_are_for_whom_they_are_cheap(settled, context, monkeypatch):

@@ -109,7 +109,7 @@ class Wearer:
         return self.page.evaluate(script)
 
     def enter(self):
-        self.page.get_by_role("button", name="Enter the robot's place").click()
+        self.page.get_by_role("button", name="Enter VR").click()
         self.page.wait_for_selector("body[data-session=immersive-vr]")
         self.show()
 

@@ -124,7 +124,7 @@ def test_an_exception_that_a_library_makes_of_the_end_is_not_shown():
     ended = subprocess.run(command, capture_output=True, text=True, check=False)
     assert ended.returncode == 143
     assert ended.stderr == (
-        "\nwbc-suite: stopped. Nothing was changed; the same command starts again.\n"
+        "\nwbc-suite: stopped. No file is left half-written. Run the command again.\n"
     )
 
 

@@ -44,7 +44,7 @@ def test_a_recording_is_made_inspected_and_replayed(command, tmp_path):
     assert colours is None or len(colours) > 100
     film = tmp_path / "film.webp"
     code, out, _ = command("replay", file, "--film", film, "--size", 32)
-    assert "1 of 1 episodes replay bit by bit" in out
+    assert "1 of 1 episodes replay bit for bit" in out
     with Dataset(file) as dataset, Image.open(film) as pictures:
         assert pictures.n_frames > dataset.length("demo_0") // 2  # equal ones are one
 
@@ -101,7 +101,7 @@ def test_few_demonstrations_are_multiplied_on_two_robots(command, tmp_path):
         assert all(dataset.facts(name)["success"] for name in dataset.names)
         assert dataset.facts("demo_0")["policy"] == "few.hdf5"
         assert dataset.facts("demo_0")["noise"] == 0.05
-    assert "3 of 3 episodes replay bit by bit" in command("replay", many)[1]
+    assert "3 of 3 episodes replay bit for bit" in command("replay", many)[1]
     arguments = ("--robots", "UR5e", "--episodes", 1, "-o", other)
     code, out, err = command("multiply", few, *arguments)
     assert (code, err) == (0, "")
@@ -157,7 +157,7 @@ def test_a_person_with_a_device_records(command, tmp_path, monkeypatch):
         "2 of 3).",
         "3 of 3).",
     ]
-    assert any(line.startswith("Took demo_1 back") for line in said)
+    assert any(line.startswith("Deleted demo_1") for line in said)
     assert "Discarded." in said
     with Dataset(file) as dataset:
         assert len(dataset) == 3

@@ -89,7 +89,7 @@ def test_a_biped_keeps_its_balance_while_its_arms_reach(alone):
 def test_a_robot_that_would_fall_is_refused_in_words(alone):
     legs = {"format": 1, "type": "BASIC"}
     legs["body_parts"] = {"legs": {"type": "JOINT_POSITION"}}
-    with pytest.raises(ConfigError, match=r"SpotWithArm is free to fall.*'STANCE'"):
+    with pytest.raises(ConfigError, match=r"SpotWithArm has a free root.*'STANCE'"):
         alone("SpotWithArm", legs)
     one = alone("SpotWithArm", legs | {"may_fall": True})
     steps(one, 40)

@@ -131,7 +131,7 @@ def test_goals_within_limits_are_left_bit_for_bit():
 
 @pytest.mark.parametrize(
     ("limits", "message"),
-    [(((0.0, 1.0), (1.0, 2.0)), "2 values, where 1 or 3"), ((1.0, 0.0), "exceed")],
+    [(((0.0, 1.0), (1.0, 2.0)), "2 values instead of 1 or 3"), ((1.0, 0.0), "exceed")],
 )
 def test_limits_of_goals_are_checked(limits, message):
     with pytest.raises(ConfigError, match=f"position_limits.*{message}"):

@@ -137,7 +137,7 @@ def test_a_base_is_for_controllers_that_drive_one(swing, monkeypatch):
 
 def test_a_robot_with_a_free_root_needs_a_controller_that_holds_it(swing, monkeypatch):
     config = {"format": 1, "type": "BASIC", "body_parts": {"legs": {"type": "ROCKING"}}}
-    with pytest.raises(ConfigError, match="free to fall"):
+    with pytest.raises(ConfigError, match="has a free root"):
         load_composite_controller_config(config, "Spot")
     monkeypatch.setattr(SwingController, "holds_root", True)
     load_composite_controller_config(config, "Spot")

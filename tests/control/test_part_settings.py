@@ -76,7 +76,7 @@ def test_one_number_stands_for_all(values):
 
 
 def test_wrong_numbers_of_values_and_empty_ranges_name_the_key():
-    with pytest.raises(ConfigError, match="key 'kp': 2 values, where 1 or 3"):
+    with pytest.raises(ConfigError, match="key 'kp': 2 values instead of 1 or 3"):
         spread((1.0, 2.0), 3, "kp")
     with pytest.raises(ConfigError, match="key 'kp_limits': least values 2"):
         limits_of((2.0, 1.0), 3, "kp_limits")

@@ -424,7 +424,7 @@ def test_a_robot_without_joints_is_refused_in_words():
 
 
 def test_a_free_robot_that_nothing_holds_is_refused(alone):
-    with pytest.raises(ConfigError, match="UR5e: it is free to fall"):
+    with pytest.raises(ConfigError, match="UR5e: it has a free root"):
         alone(load_robot("UR5e", base="NoActuationBase"))
 
 

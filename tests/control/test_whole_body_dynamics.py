@@ -391,7 +391,7 @@ def test_configs_are_refused_in_words():
 
     with pytest.raises(ConfigError, match="fixed root"):
         load("GR1")
-    with pytest.raises(ConfigError, match="free to fall"):
+    with pytest.raises(ConfigError, match="has a free root"):
         load_composite_controller_config({"type": "WHOLE_BODY_ID"}, "GR1FreeBody")
     with pytest.raises(ConfigError, match="two feet"):
         load("GR1FreeBody", foot=[{"frame": "left_foot"}, {"frame": "right_foot"}])

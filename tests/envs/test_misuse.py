@@ -129,7 +129,7 @@ def test_a_time_step_that_cannot_be_is_an_error(timestep):
 def test_a_size_below_zero_is_named_at_the_reset(array, value):
     env = wbc_suite.make("Lift", robots="Panda").unwrapped
     getattr(env.simulation.model, array)[3] = value
-    with pytest.raises(PhysicsError, match=rf"{array} of the \w+ '.+' is .*below 0"):
+    with pytest.raises(PhysicsError, match=rf"{array} of \w+ '.+' is .*below 0"):
         env.reset(seed=0)
 
 

@@ -70,7 +70,7 @@ def test_physics_options_are_ours_and_robots_of_the_file_are_left_out(kitchen, c
     with caplog.at_level(logging.INFO):
         model = wbc_suite.make("Lift", arena=kitchen).simulation.model
     assert (model.opt.timestep, *model.opt.gravity) == (0.002, 0, 0, -9.81)
-    assert "left out what its motors move: intruder" in caplog.text
+    assert "left out what its actuators move: intruder" in caplog.text
     assert "'top' at 0.900 m is the table" in caplog.text
     assert not any("intruder" in model.body(i).name for i in range(model.nbody))
     joint = model.joint("arena_hinge")
@@ -209,7 +209,7 @@ def test_what_is_wrong_is_said(tmp_path, changes, arena, words):
 def test_missing_files_and_surfaces_without_a_table_are_refused(kitchen):
     with pytest.raises(ConfigError, match=r"none\.xml: cannot be read"):
         wbc_suite.make("Lift", arena="none.xml")
-    with pytest.raises(ConfigError, match="PickPlace has not one table"):
+    with pytest.raises(ConfigError, match="PickPlace does not have exactly one table"):
         wbc_suite.make("PickPlace", arena={"file": kitchen, "surface": "top"})
 
 

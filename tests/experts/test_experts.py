@@ -123,7 +123,7 @@ def test_an_action_without_poses_of_hands_is_refused():
     config = {"type": "BASIC", "body_parts": parts}
     env = wbc_suite.make("Lift", controller_configs=config)
     env.reset(seed=0)
-    with pytest.raises(ConfigError, match="moves hands by their poses"):
+    with pytest.raises(ConfigError, match="needs a controller of hand poses"):
         expert(env, np.random.default_rng(0))
 
 
@@ -146,7 +146,7 @@ def test_what_no_hand_reaches_is_told(caplog):
     policy = make_policy("expert", env, 0)
     for _ in range(60):
         seen, *_ = env.step(policy(seen))
-        if "No hand reaches 'cube'" in caplog.text:
+        if "No hand can reach 'cube'" in caplog.text:
             break
     env.close()
-    assert "No hand reaches 'cube'" in caplog.text
+    assert "No hand can reach 'cube'" in caplog.text

@@ -142,7 +142,7 @@ def test_two_arms_have_segments_of_their_own(tmp_path):
     assert wins >= 3
     single = wbc_suite.make("Lift", robots="Panda")
     single.reset(seed=0)
-    with pytest.raises(DatasetError, match="moves 2 hands"):
+    with pytest.raises(DatasetError, match="recorded with 2 hand"):
         Multiplied(path, single, np.random.default_rng(0))
     env.close()
 

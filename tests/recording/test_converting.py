@@ -6,6 +6,8 @@ import json
 import os
 import signal
 from dataclasses import replace
+from pathlib import Path
+from shutil import rmtree
 
 import h5py
 import numpy as np
@@ -214,6 +216,26 @@ def test_extracting_is_shared_out_to_processes(lift_recording, tmp_path):
     assert list(tmp_path.glob("out.hdf5.work")) == []
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("damage", [Path.unlink, lambda part: part.write_bytes(b"x")])
+def test_a_damaged_work_folder_says_that_it_can_be_deleted(
+    lift_recording, tmp_path, damage
+):
+    class Damaged(Serial):
+        def run(self, work, items, folder):
+            yield from super().run(work, items, folder)
+            damage(folder / f"{items[-1].name}.hdf5")
+
+    out, work = tmp_path / "out.hdf5", tmp_path / "out.hdf5.work"
+    wanted = f"^Finished pieces in '{work}' are damaged. Delete this folder and run"
+    with pytest.raises(DatasetError, match=wanted):
+        extract(lift_recording, out, executor=Damaged(), workers=2)
+    with pytest.raises(DatasetError, match=wanted):
+        extract(lift_recording, out, executor=Serial(), workers=2)
+    rmtree(work)
+    assert extract(lift_recording, out, executor=Serial(), workers=2) == 2
+
+
 ROBOSUITES_PART = {
     "type": "OSC_POSE",
     "input_max": 1,
@@ -284,7 +306,7 @@ def test_robosuites_own_demonstrations_are_imported(lift_recording, tmp_path):
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"robots": ["UR5e"]}, r"states of \d+ numbers, and this"),
+        ({"robots": ["UR5e"]}, r"states of \d+ numbers, but those"),
         ({"robots": ["PandaX"]}, r"cannot be made here.*PandaX"),
         ({"robots": ["/etc/robot.xml"]}, "names a file"),
     ],
@@ -298,7 +320,7 @@ def test_what_cannot_be_imported_is_said(lift_recording, tmp_path, changes, word
 def test_states_of_another_robot_are_refused(small_recording):
     with Dataset(small_recording) as dataset:
         env = rebuild(dataset, robots="Panda")
-        with pytest.raises(DatasetError, match="states of 4 numbers, and this"):
+        with pytest.raises(DatasetError, match="states of 4 numbers, but those"):
             list(play_states(env, dataset.episode("demo_0")))
 
 

@@ -16,7 +16,7 @@ def test_one_changed_number_is_found_and_repair_keeps_the_rest(small_recording):
         file["data/demo_2/actions"][3, 1] += 1e-12
     problems = [f for f in editing.verify(small_recording) if f.problem]
     assert [f.place for f in problems] == ["small.hdf5: demo_2"]
-    assert "not those recorded" in problems[0].problem
+    assert "checksum does not match" in problems[0].problem
     editing.repair(small_recording)
     with Dataset(small_recording) as dataset:
         assert dataset.names == ("demo_0", "demo_1", "demo_3")

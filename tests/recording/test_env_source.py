@@ -69,7 +69,7 @@ def test_texts_that_name_no_environment_are_refused(text):
 
 def test_an_environment_of_another_package_is_refused():
     env = gymnasium.make("CartPole-v1")
-    with pytest.raises(DatasetError, match="Only environments of wbc_suite"):
+    with pytest.raises(DatasetError, match="Only wbc_suite environments"):
         EnvSource.of(env)
     env.close()
 

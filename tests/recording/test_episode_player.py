@@ -127,7 +127,7 @@ def test_actions_that_are_played_say_how_exact_they_are(lift_recording, lift_env
     with Dataset(lift_recording) as dataset:
         player = open_player(dataset, ["demo_1"], lift_env, by_states=False)
         clip, episode = player.advance().clip, dataset.episode("demo_1")
-    assert clip.summary == "no success, bit by bit as recorded"
+    assert clip.summary == "no success, bit for bit as recorded"
     np.testing.assert_array_equal(clip.states[-1], episode.final_state)
     np.testing.assert_allclose(np.diff(clip.times), 0.05, atol=1e-9)
     assert clip.effort.max() == 1.0

@@ -114,9 +114,9 @@ def test_disk_that_fills_up_while_writing_leaves_the_old_file(disk, monkeypatch,
         monkeypatch.setattr(place, "check_folder", lambda folder, needed=0: None)
     disk.fill(leave=room)
     big = replace(make_episode(1, length=BIG // 88), name="demo_0")
-    with pytest.raises(DatasetError, match="as it was"):
+    with pytest.raises(DatasetError, match="file is unchanged"):
         atomic_files.write_bytes(path, bytes(BIG))
-    with pytest.raises(DatasetError, match="as it was"):
+    with pytest.raises(DatasetError, match="file is unchanged"):
         hdf5_writer.write_dataset(path, [big], HEADER)
     disk.filler.unlink()
     assert uids(path) == ["0"]
@@ -156,11 +156,11 @@ def test_files_that_may_not_grow_further_are_said_and_old_ones_stay(
         recording.add(make_episode(0))
     big = replace(make_episode(1, length=BIG // 88), name="demo_0")
     with (
-        pytest.raises(DatasetError, match=r"File too large.*as it was"),
+        pytest.raises(DatasetError, match=r"File too large.*file is unchanged"),
         Store(path, HEADER) as recording,
     ):
         recording.add(big)
-    with pytest.raises(DatasetError, match="as it was"):
+    with pytest.raises(DatasetError, match="file is unchanged"):
         hdf5_writer.write_dataset(path, [big], HEADER)
     rows = RowBuffer(tmp_path)
     with pytest.raises(DatasetError, match="File too large"):

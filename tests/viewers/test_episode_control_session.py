@@ -63,10 +63,10 @@ def test_episodes_of_a_session_are_kept_discarded_taken_back_and_replay(
     )
     ticks(session, 2, EpisodeCommand.RECORD)
     session.reset()
-    assert ticks(session, 1).message == "Discarded: started again."
+    assert ticks(session, 1).message == "Discarded: the scene was reset."
     ticks(session, 2, EpisodeCommand.RECORD)
     assert ticks(session, 1, EpisodeCommand.RECORD).kept == 2
-    assert ticks(session, 1, EpisodeCommand.UNDO).message == "Took demo_1 back."
+    assert ticks(session, 1, EpisodeCommand.UNDO).message == "Deleted demo_1."
     session.env.close()
     with Dataset(tmp_path / "a.hdf5") as dataset:
         episode = dataset.episode("demo_0")

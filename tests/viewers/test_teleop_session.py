@@ -240,7 +240,7 @@ def test_loop_survives_a_device_that_fails_and_says_why():
     says = [DeviceState(time=0.02 * k, limbs=up) for k in range(1, 50)]
     session = TeleopSession(FakeEnv(), period=0.02, device=Faulty(says))
     ticks(session, 5)
-    assert session.snapshot.device[0] == "the device fails: unplugged"
+    assert session.snapshot.device[0] == "device error: unplugged"
     ticks(session, 10)
     held = session.snapshot.limbs["left_hand"].target.translation
     ticks(session, 2)

@@ -61,8 +61,8 @@ def arrange_one(
         raise ConfigError(f"{name} takes one robot, not {len(robots)}.")
     if configuration not in ("default", "single-robot"):
         raise ConfigError(
-            f"{name}: one robot cannot stand '{configuration}'; leave "
-            "env_configuration at 'default'."
+            f"{name}: env_configuration '{configuration}' is not for one robot; use "
+            "'default'."
         )
     (robot,) = robots
     return (place_robot(robot, _own(places, robot), 0.0),)
@@ -91,8 +91,9 @@ def arrange_two_arms(
         configuration = "single-robot" if alone else "opposed"
     if alone != (configuration == "single-robot"):
         raise ConfigError(
-            f"{config.name}: {len(robots)} robot(s) cannot stand '{configuration}'; "
-            "two stand 'opposed' or 'parallel', one is a 'single-robot'."
+            f"{config.name}: env_configuration '{configuration}' is not for "
+            f"{len(robots)} robot(s); two are 'opposed' or 'parallel', one is "
+            "'single-robot'."
         )
     if alone:
         return arrange_one(config.name, robots, configuration, config.places)

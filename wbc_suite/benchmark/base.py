@@ -217,9 +217,9 @@ def _in_arena(config: C, arena: ArenaConfig) -> C:
         return config.model_copy(update={"arena": arena, "table": table})
     if arena.surface is not None:
         raise ConfigError(
-            f"arena: surface = {arena.surface!r}: {getattr(config, 'name', '')} has "
-            "not one table that a surface could replace. Leave `surface` out, and give "
-            "`at` and `yaw`."
+            f"arena: surface = {arena.surface!r}: {getattr(config, 'name', '')} does "
+            "not have exactly one table to replace. Leave `surface` out, and give `at` "
+            "and `yaw`."
         )
     return config.model_copy(update={"arena": arena})
 

@@ -24,19 +24,19 @@ def bench(
     robots: options.RobotsOption = None,
     controller: options.ControllerOption = None,
     rate: Annotated[float, typer.Option(help="Actions per second, Hz.")] = 20.0,
-    actions: Annotated[int, typer.Option(min=BLOCKS, help="How many to time.")] = 200,
+    actions: Annotated[int, typer.Option(min=BLOCKS, help="Actions to time.")] = 200,
     camera: options.CamerasOption = None,
     size: options.PictureSizeOption = 84,
     output: Annotated[
-        Path | None, typer.Option("--json", help="Write the figures here, too.")
+        Path | None, typer.Option("--json", help="Also write the times to this file.")
     ] = None,
     gripper: options.GripperOption = None,
     base: options.BaseOption = None,
     catalogue: options.CatalogueOption = None,
 ) -> None:
-    """Time steps of an environment beside its raw physics, resets and pictures.
+    """Time an environment's steps, resets and images, and compare with raw physics.
 
-    Times are of the processor, so that other programs disturb them little. Example:
+    Times are CPU times, which other programs affect little. Example:
     wbc-suite bench Door --robots GR1 --controller WHOLE_BODY_IK --camera agentview
     """
     import numpy as np
@@ -95,7 +95,7 @@ def _times(env: "RobotEnv", actions: int) -> "dict[str, Vector]":
 
 
 def _print_table(title: str, found: "dict[str, Vector]") -> None:
-    """Print medians, 99th percentiles and rates; then what a step is of its physics."""
+    """Print medians, 99th percentiles and rates; then the ratio of step to physics."""
     import numpy as np
     from rich.console import Console
     from rich.table import Table
@@ -110,4 +110,4 @@ def _print_table(title: str, found: "dict[str, Vector]") -> None:
     Console().print(table)
     step, raw, *_ = (float(np.median(times)) for times in found.values())
     if raw:
-        print(f"A step takes {step / raw:.2f} of its own raw physics.")
+        print(f"A step takes {step / raw:.2f} times as long as its raw physics.")

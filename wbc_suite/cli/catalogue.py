@@ -22,12 +22,12 @@ Row: TypeAlias = tuple[str, ...]
 
 def list_catalogue(
     kind: Annotated[
-        Kind | None, typer.Argument(help="Everything when left out.")
+        Kind | None, typer.Argument(help="What to list; all by default.")
     ] = None,
     as_json: JsonOption = False,
     catalogue: CatalogueOption = None,
 ) -> None:
-    """Show the robots, grippers, bases, benchmarks and controllers there are."""
+    """List robots, grippers, bases, benchmarks and controllers."""
     from rich.console import Console
     from rich.table import Table
 
@@ -93,10 +93,10 @@ def _controllers(files: Sequence[Path]) -> Iterator[Row]:
     from wbc_suite.tomlfile import read_toml
 
     for name in composite_names():
-        yield name, "for any robot, with its file below when there is one"
+        yield name, "for any robot; its file, if it has one, is listed below"
     for name, model in part_models().items():
         about = str(model.__doc__).split("\n")[0].partition(";")[0]
-        yield name, f"of one part: {about}"
+        yield name, f"for one part: {about}"
     for file in files:
         yield file.stem, _controlled(read_toml(file))
 
@@ -126,7 +126,7 @@ def check_file(
     ],
     robot: Annotated[
         str | None,
-        typer.Option(metavar="ROBOT", help="Check a controller's names against it."),
+        typer.Option(metavar="ROBOT", help="Robot to check a controller for."),
     ] = None,
     root: RootOption = None,
     mesh_root: MeshRootOption = None,
@@ -136,10 +136,10 @@ def check_file(
 ) -> None:
     """Check a robot, benchmark or controller file, and print a summary.
 
-    The file is read as loading reads it, and a robot's models are built for both
-    engines. A URDF or MJCF file is also simulated for a second at `ready`, and what
-    moves is named. The first error names the file, the key, the value and the rule. A
-    JSON file is a controller of robosuite, which needs its robot.
+    A robot's models are built for both engines. A robot in a URDF or MJCF file is also
+    simulated for a second in the posture `ready`, with warnings for what falls or
+    moves. The first error names the file, the key, the value and the rule. A JSON file
+    is a controller config of robosuite; it needs --robot.
     """
     from wbc_suite.tomlfile import read_toml
 
@@ -160,9 +160,7 @@ def check_file(
 
         skin = read_skin(file)
         meshes = sum(len(pieces) for pieces in skin.link.values())
-        found = (
-            f"Skin of {len(skin.link)} links with {meshes} meshes of {skin.provider}."
-        )
+        found = f"Skin: {len(skin.link)} links, {meshes} meshes of {skin.provider}."
     else:
         found = _robot(file, root=root, mesh_root=mesh_root, strict=strict)
     if as_json:

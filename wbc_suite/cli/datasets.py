@@ -1,4 +1,4 @@
-"""Commands about recordings, from `inspect` to `convert`, but for `replay`."""
+"""Commands for recordings, from `inspect` to `convert`, except `replay`."""
 
 import json
 from pathlib import Path
@@ -20,20 +20,20 @@ def inspect(
     file: options.RecordingArgument,
     *,
     every: Annotated[
-        bool, typer.Option("--all", help="List every episode, not twenty.")
+        bool, typer.Option("--all", help="List all episodes, not only 20.")
     ] = False,
     columns: Annotated[
-        bool, typer.Option("--columns", help="List what the first episode holds.")
+        bool, typer.Option("--columns", help="List the first episode's columns.")
     ] = False,
     plots: Annotated[
         Path | None, typer.Option(help="Write lengths, actions and rewards as a PNG.")
     ] = None,
     sheet: Annotated[
-        Path | None, typer.Option(help="Write pictures of episodes as one PNG.")
+        Path | None, typer.Option(help="Write a contact sheet as a PNG.")
     ] = None,
     camera: Annotated[str, typer.Option(help="Camera of the sheet.")] = "agentview",
 ) -> None:
-    """Show lengths, success and origin of episodes; write plots, a contact sheet."""
+    """Show origin, lengths and success of episodes; write plots or a contact sheet."""
     from wbc_suite.recording import Dataset
     from wbc_suite.recording.plots import write_plots
     from wbc_suite.recording.video import write_sheet
@@ -93,18 +93,18 @@ def _print_episodes(dataset: "Dataset", most: int) -> None:
 
 
 def verify(file: options.RecordingArgument) -> None:
-    """Read every episode and compare it with the checksum it was written with."""
+    """Read every episode and compare it with its checksum."""
     from wbc_suite.recording import editing
 
     raise typer.Exit(1 if _report(editing.verify(file)) else 0)
 
 
 def repair(file: options.RecordingArgument) -> None:
-    """Restore readable episodes into one file, after a crash or damage."""
+    """Save all readable episodes into one file, after a crash or damage."""
     from wbc_suite.recording import editing
 
     if _report(editing.repair(file)):
-        print(f"What was there before is in {file}.damaged, or still beside it.")
+        print(f"The damaged originals are kept in {file}.damaged or {file}.parts.")
 
 
 def merge(
@@ -112,7 +112,7 @@ def merge(
     *,
     out: OutOption,
 ) -> None:
-    """Put the episodes of several files into one; an episode comes once."""
+    """Merge several files into one; an episode found in several is kept once."""
     from wbc_suite.recording import editing
 
     print(f"{out}: {editing.merge(files, out)} episodes.")
@@ -122,11 +122,11 @@ def split(
     file: options.RecordingArgument,
     *,
     valid: Annotated[
-        float, typer.Option(min=0.0, max=1.0, help="Share kept for validation.")
+        float, typer.Option(min=0.0, max=1.0, help="Share of episodes for validation.")
     ] = 0.1,
-    seed: Annotated[int, typer.Option(min=0, help="Of the draw.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the split.")] = 0,
 ) -> None:
-    """Write the masks `train` and `valid` into a file, as robomimic reads them."""
+    """Add robomimic's filter keys `train` and `valid` to a file."""
     from wbc_suite.recording import editing
 
     masks = editing.split(file, valid=valid, seed=seed)
@@ -139,16 +139,18 @@ def filter_episodes(
     *,
     out: OutOption,
     success: Annotated[
-        bool, typer.Option("--success", help="Only episodes that succeeded.")
+        bool, typer.Option("--success", help="Only successful episodes.")
     ] = False,
-    shortest: Annotated[int, typer.Option(help="Fewest actions.")] = 0,
-    longest: Annotated[int | None, typer.Option(help="Most actions.")] = None,
-    mask: Annotated[str | None, typer.Option(help="Only those of a mask.")] = None,
+    shortest: Annotated[int, typer.Option(help="Least number of actions.")] = 0,
+    longest: Annotated[
+        int | None, typer.Option(help="Greatest number of actions.")
+    ] = None,
+    mask: Annotated[str | None, typer.Option(help="Only this filter key.")] = None,
     episode: Annotated[
-        list[str] | None, typer.Option(help="Only this one; may be repeated.")
+        list[str] | None, typer.Option(help="Only this episode; may be repeated.")
     ] = None,
 ) -> None:
-    """Write the episodes that meet every condition."""
+    """Copy the episodes that meet all conditions into a file."""
     from wbc_suite.errors import UnknownNameError
     from wbc_suite.recording import editing
 
@@ -167,11 +169,11 @@ def filter_episodes(
 
 
 def _report(findings: "list[Finding]") -> int:
-    """Print what is wrong, and how much is right; return the number of problems."""
+    """Print each problem and the number of intact episodes; return the problems'."""
     bad = [finding for finding in findings if finding.problem]
     for finding in bad:
         print(f"  {finding.place}: {finding.problem}")
-    print(f"{len(findings) - len(bad)} episodes are whole, {len(bad)} problems.")
+    print(f"{len(findings) - len(bad)} episodes are intact, {len(bad)} problems.")
     return len(bad)
 
 
@@ -182,12 +184,12 @@ def convert(
     out: OutOption,
     executor: options.ExecutorOption = "serial",
     workers: Annotated[
-        int, typer.Option(min=1, help="At once, for lerobot and npz; others are one.")
+        int, typer.Option(min=1, help="Workers, for lerobot and npz only.")
     ] = 1,
 ) -> None:
     """Write a recording in another layout.
 
-    A stopped command continues when it is given again, but for `serial`.
+    With an executor other than `serial`, a stopped command continues if run again.
     """
     from wbc_suite.executors import make_executor
     from wbc_suite.recording.converting import convert as write
@@ -211,19 +213,19 @@ def extract(
     out: OutOption,
     camera: options.CamerasOption = None,
     size: options.PictureSizeOption = 84,
-    depth: Annotated[bool, typer.Option("--depth", help="See depth too.")] = False,
+    depth: Annotated[bool, typer.Option("--depth", help="Store depth too.")] = False,
     shaped: Annotated[
-        bool, typer.Option("--shaped", help="Reward progress, not success alone.")
+        bool, typer.Option("--shaped", help="Store shaped rewards.")
     ] = False,
     executor: options.ExecutorOption = "process",
     workers: Annotated[
-        int, typer.Option(min=1, help="At once; each makes an environment.")
+        int, typer.Option(min=1, help="Workers, each with its environment.")
     ] = 1,
     trust_files: options.TrustFilesOption = False,
 ) -> None:
-    """Restore recorded states, and store other observations and rewards.
+    """Restore recorded states, and store new observations and rewards.
 
-    A stopped command continues when it is given again.
+    A stopped command continues if it is run again.
     """
     from wbc_suite.executors import make_executor
     from wbc_suite.recording.extracting import extract as extract_observations

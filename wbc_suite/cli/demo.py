@@ -32,7 +32,7 @@ def demo(
     output: Annotated[
         Path, typer.Option("--output", "-o", help="Folder for the pictures.")
     ] = Path("artifacts/demo"),
-    figures: Annotated[int, typer.Option(min=1, max=20, help="How many.")] = 2,
+    figures: Annotated[int, typer.Option(min=1, max=20, help="Number of curves.")] = 2,
     controller: Annotated[
         str, typer.Option(help="WHOLE_BODY_IK or WHOLE_BODY_MINK_IK.")
     ] = "WHOLE_BODY_IK",
@@ -44,7 +44,7 @@ def demo(
 ) -> None:
     """Move a robot's hands along curves; print tracking errors, write pictures.
 
-    The robot is alone on the floor. One without hands moves its trunk, or its end.
+    The robot is alone on the floor. Without hands, it moves its trunk or last link.
     """
     from PIL import Image
 
@@ -118,7 +118,7 @@ def _reach(
             *_, info = env.step(action)
             step_times.append(perf_counter() - begin)
             if fault := info.get("failure") or info.get("physics_error"):
-                raise WbcError(f"{fault} `wbc-suite check` names causes.")
+                raise WbcError(f"{fault} `wbc-suite check` names likely causes.")
             frames = info["ik"]["frames"]
             errors.append([frames[name]["position_error"] for name in sizes])
             if step % (RATE // FRAMES_PER_SECOND) == 0:

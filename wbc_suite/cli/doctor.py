@@ -26,7 +26,7 @@ _MARKS = {"fine": "ok  ", "optional": "note", "broken": "BAD "}
 def doctor(as_json: JsonOption = False) -> None:
     """Check this machine: packages, solvers, rendering, and what is missing.
 
-    Ends with exit code 1 when something that is needed is broken.
+    The exit code is 1 if a required component is broken.
     """
     broken = 0
     if as_json:
@@ -39,9 +39,9 @@ def doctor(as_json: JsonOption = False) -> None:
             print(f"      {'':<11} -> {finding.cure}")
         broken += finding.state == "broken"
     if broken:
-        print("Something that is needed is broken: see BAD above.")
+        print("A required component is broken: see BAD above.")
         raise typer.Exit(1)
-    print("All that is needed is here.")
+    print("All required components work.")
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,6 @@ import typer
 from wbc_suite.cli.options import (
     CatalogueOption,
     ExecutorOption,
-    HostOption,
     progress,
     write_file,
 )
@@ -25,25 +24,25 @@ if TYPE_CHECKING:
     from wbc_suite.executors import Outcome, WorkItem
 
 BenchmarksArgument = Annotated[
-    list[str], typer.Argument(help="Benchmarks, one or more.")
+    list[str], typer.Argument(help="One or more benchmarks.")
 ]
 RobotsOption = Annotated[
     list[str],
     typer.Option(
-        help="Robot; a,b for two in one scene. Repeat it to compare.",
+        help="Robot; A,B for two in one scene. Repeat to compare robots.",
         default_factory=lambda: ["Panda"],
         show_default="Panda",
     ),
 ]
 ControllersOption = Annotated[
     list[str] | None,
-    typer.Option(help="Controller, by name or file. Repeat it to compare."),
+    typer.Option(help="Controller, by name or file. Repeat to compare."),
 ]
 PoliciesOption = Annotated[
     list[str],
     typer.Option(
-        help="expert, random, hold, module:Name or socket://HOST:PORT. Repeat "
-        "it to compare others with the first, scene by scene.",
+        help="expert, random, hold, module:Name, FILE.hdf5 or socket://HOST:PORT. "
+        "Repeat to compare others with the first, scene by scene.",
         default_factory=lambda: ["random"],
         show_default="random",
     ),
@@ -53,34 +52,34 @@ BaseOption = Annotated[
     typer.Option(
         "--base-seed",
         min=0,
-        help="Seeds follow from this number, the benchmark and the episode.",
+        help="Seeds are computed from this, the benchmark and the episode.",
     ),
 ]
 FirstSeedOption = Annotated[
     int | None,
-    typer.Option(min=0, help="Use seeds from this one on, in place of these."),
+    typer.Option(min=0, help="Use consecutive seeds from this one on."),
 ]
 HorizonOption = Annotated[
-    int | None, typer.Option(min=1, help="Steps of an episode at most.")
+    int | None, typer.Option(min=1, help="Maximum steps of an episode.")
 ]
 StopOption = Annotated[
     bool, typer.Option("--stop/--no-stop", help="End an episode at its success.")
 ]
 RecordOption = Annotated[
     bool,
-    typer.Option("--record", help="Record them: one HDF5 file per item of work."),
+    typer.Option("--record", help="Record episodes: an HDF5 file per work item."),
 ]
 OutputOption = Annotated[
     Path,
-    typer.Option("--output", "-o", help="Folder of the results; goes on there."),
+    typer.Option("--output", "-o", help="Folder of the results."),
 ]
 WorkersOption = Annotated[
-    int | None, typer.Option(min=1, help="At once; one per processor by default.")
+    int | None, typer.Option(min=1, help="Workers; one per processor by default.")
 ]
 FilmsOption = Annotated[
     int, typer.Option(min=0, help="Failures of each case to film for the report.")
 ]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print figures as JSON only.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print only JSON.")]
 
 
 def evaluate(
@@ -89,7 +88,7 @@ def evaluate(
     robots: RobotsOption,
     policy: PoliciesOption,
     controller: ControllersOption = None,
-    episodes: Annotated[int, typer.Option(min=1, help="Per case.")] = 400,
+    episodes: Annotated[int, typer.Option(min=1, help="Episodes per case.")] = 400,
     base_seed: BaseOption = 0,
     first_seed: FirstSeedOption = None,
     horizon: HorizonOption = None,
@@ -100,11 +99,11 @@ def evaluate(
     output: OutputOption = Path("artifacts/evaluation"),
     executor: ExecutorOption = "process",
     workers: WorkersOption = None,
-    chunk: Annotated[int, typer.Option(min=1, help="Episodes per item of work.")] = 10,
+    chunk: Annotated[int, typer.Option(min=1, help="Episodes per work item.")] = 10,
     as_json: JsonOption = False,
     catalogue: CatalogueOption = None,
 ) -> None:
-    """Play many episodes and count successes; stop and go on whenever you like.
+    """Run many episodes and report success rates; a stopped command can continue.
 
     Writes summary.json, eval_info.json (LeRobot's fields) and report.html. Example:
     wbc-suite evaluate Lift Door --robots Panda --robots UR5e --policy my_module:Policy
@@ -146,27 +145,29 @@ def evaluate(
 
 def serve_policy(
     policy: Annotated[
-        str, typer.Argument(help="expert, random, hold, or module:Name.")
+        str, typer.Argument(help="expert, random, hold, module:Name or FILE.hdf5.")
     ],
     *,
-    host: HostOption = "127.0.0.1",
+    host: Annotated[
+        str, typer.Option(help="Address to listen on; access needs no token.")
+    ] = "127.0.0.1",
     port: Annotated[
-        int, typer.Option(min=0, max=65535, help="0 for any free one.")
+        int, typer.Option(min=0, max=65535, help="Port; 0 for any free one.")
     ] = 5555,
 ) -> None:
     """Serve a policy to `wbc-suite evaluate --policy socket://HOST:PORT`.
 
-    Anyone who reaches the port can use the policy. Your own server is
-    `wbc_suite.evaluation.PolicyServer`.
+    Anyone who can reach the port can use the policy. To serve a policy from your own
+    code, use `wbc_suite.evaluation.PolicyServer`.
     """
     from wbc_suite.evaluation import PolicyServer, replicate
 
     with PolicyServer(replicate(policy), host=host, port=port) as server:
-        print(f"{policy}: {server.address}\nCtrl-C ends it.", flush=True)
+        print(f"{policy}: {server.address}\nPress Ctrl-C to stop.", flush=True)
         try:
             server.serve_forever()
         except KeyboardInterrupt:
-            print("Ended.")
+            print("Stopped.")
 
 
 def _finish(
@@ -226,7 +227,7 @@ def _report(results: "Results", output: Path, *, as_json: bool) -> None:
         print(f"Written: {', '.join(files)} in {output}; every episode in results/.")
     if results.failed:
         count = f"{results.failed} of {results.items}"
-        text = f"{count} items failed; the same command does them again."
+        text = f"{count} items failed; run the same command to retry them."
         print(text, file=sys.stderr)
         raise typer.Exit(1)
 
@@ -239,7 +240,7 @@ def _print_tables(results: "Results") -> None:
     for case, s in results.summaries.items():
         low, high = s.wilson
         shares = f"{s.success_rate:.1%}", f"{low:.1%} to {high:.1%}"
-        broken = f" ({s.physics_errors} broken)" if s.physics_errors else ""
+        broken = f" ({s.physics_errors} diverged)" if s.physics_errors else ""
         steps = f"{s.mean_steps:.0f}{broken}", f"{s.steps_per_second:.0f}"
         row = str(s.episodes), *shares, f"{s.mean_return:.3g}", *steps
         table.add_row(case.title, *row)
@@ -248,7 +249,8 @@ def _print_tables(results: "Results") -> None:
     for (first, second), found in results.comparisons.items():
         low, high = found.interval
         print(
-            f"{second} is {found.verdict} beside {first}: {found.difference:+.1%} "
-            f"({low:+.1%} to {high:+.1%}) on {found.pairs} equal scenes, p = "
-            f"{found.p_value:.2g}; false alarms at most {found.false_alarms:.0%}."
+            f"{second}, compared with {first}, is {found.verdict}: "
+            f"{found.difference:+.1%} ({low:+.1%} to {high:+.1%}) on {found.pairs} "
+            f"common scenes, p = {found.p_value:.2g}; at most "
+            f"{found.false_alarms:.0%} false alarms."
         )

@@ -17,10 +17,10 @@ def expert(
     *,
     robots: options.RobotsOption = None,
     controller: options.ControllerOption = None,
-    episodes: Annotated[int, typer.Option(min=1, help="How many.")] = 20,
-    seed: Annotated[int, typer.Option(min=0, help="Of the first episode.")] = 0,
+    episodes: Annotated[int, typer.Option(min=1, help="Number of episodes.")] = 20,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the first episode.")] = 0,
     horizon: Annotated[
-        int | None, typer.Option(min=1, help="Steps of an episode at most.")
+        int | None, typer.Option(min=1, help="Maximum steps of an episode.")
     ] = None,
     view: Annotated[
         bool, typer.Option("--view", help="Show it in the browser, in real time.")
@@ -29,7 +29,7 @@ def expert(
     base: options.BaseOption = None,
     catalogue: options.CatalogueOption = None,
 ) -> None:
-    """Solve a benchmark by its expert, and count successes.
+    """Run the expert of a benchmark, and count successes.
 
     Example: wbc-suite expert Stack --robots UR5e --episodes 50
     """

@@ -21,18 +21,18 @@ from typing import NoReturn
 GRACE = 0.7  # s, for cleaning up
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 KEPT = {
-    "record": "Finished episodes are kept; the same command goes on.",
-    "multiply": "Finished episodes are kept; the same command goes on.",
+    "record": "Finished episodes are kept; run the same command to continue.",
+    "multiply": "Finished episodes are kept; run the same command to continue.",
     "teleop": "Finished episodes are kept; --record with the same file adds more.",
-    "evaluate": "Finished episodes are kept; the same command goes on.",
-    "extract": "Finished parts are kept; the same command goes on.",
-    "convert": "Nothing half-finished is kept; the same command starts again, or goes "
-    "on with an executor.",
+    "evaluate": "Finished episodes are kept; run the same command to continue.",
+    "extract": "Finished parts are kept; run the same command to continue.",
+    "convert": "Run the same command to continue with --executor process, ray or "
+    "slurm, which keeps finished parts; without one it starts again.",
 }
 LIBRARIES = ("numba", "llvmlite")
 IMPORTS = "<frozen importlib"
 _SAID = threading.Lock()
-OTHER = "Nothing was changed; the same command starts again."
+OTHER = "No file is left half-written. Run the command again."
 
 
 @contextmanager

@@ -21,30 +21,30 @@ def multiply(
     file: options.RecordingArgument,
     *,
     out: OutOption,
-    episodes: Annotated[int, typer.Option(min=1, help="How many to keep.")] = 1000,
+    episodes: Annotated[int, typer.Option(min=1, help="Episodes to keep.")] = 1000,
     robots: options.RobotsOption = None,
     controller: options.ControllerOption = None,
     gripper: options.GripperOption = None,
     base: options.BaseOption = None,
     benchmark: Annotated[
         str | None,
-        typer.Option(help="Another variant of the benchmark, by name or file."),
+        typer.Option(help="Variant of the benchmark, by name or file."),
     ] = None,
     horizon: HorizonOption = None,
     noise: NoiseOption = 0.05,
-    seed: Annotated[int, typer.Option(min=0, help="Of the first scene.")] = 100_000,
+    seed: Annotated[int, typer.Option(min=0, help="First seed.")] = 100_000,
     next_obs: NextObsOption = False,
     executor: options.ExecutorOption = "process",
     workers: WorkersOption = None,
     catalogue: options.CatalogueOption = None,
 ) -> None:
-    """Make many demonstrations from few, in new scenes, in the manner of MimicGen.
+    """Make many demonstrations from few, in new scenes, by the method of MimicGen.
 
-    Recorded episodes are divided where fingers begin and cease to hold an object. Each
-    piece is moved with its object to a new scene, the pieces are joined, and the result
-    is played, with noise on actions. Only episodes that succeed are kept; the share of
-    them is printed. With --robots, the hands of other robots do the same. A command
-    that was stopped goes on when it is given again.
+    Recorded episodes are divided where fingers start or stop holding an object. The
+    segments are moved with their objects to a new scene, joined, and executed with
+    noise on the actions. Only episodes that succeed are kept; their share is printed.
+    --robots does the same with the hands of other robots. A stopped command continues
+    if it is run again.
 
     Example: wbc-suite record Stack --episodes 10 --only-success -o ten.hdf5; wbc-suite
     multiply ten.hdf5 --episodes 1000 -o thousand.hdf5

@@ -29,11 +29,11 @@ GripperOption = Annotated[
     str | None,
     typer.Option(
         metavar="NAME",
-        help="Another gripper; one for each side: right=NAME,left=NAME; or none.",
+        help="Gripper: NAME, or right=NAME,left=NAME, or none for no gripper.",
     ),
 ]
 BaseOption = Annotated[
-    str | None, typer.Option(metavar="NAME", help="Another base, or none.")
+    str | None, typer.Option(metavar="NAME", help="Base, or none for no base.")
 ]
 ExecutorOption = Annotated[
     str, typer.Option(metavar="NAME", help="process, serial, ray or slurm.")
@@ -41,7 +41,7 @@ ExecutorOption = Annotated[
 RootOption = Annotated[
     Literal["fixed", "planar", "free"] | None,
     typer.Option(
-        help="Another root. By default that of the file, and free for a URDF with "
+        help="Root of the robot; by default as in the file, but free for a URDF with "
         "four feet or more."
     ),
 ]
@@ -56,18 +56,18 @@ MeshRootOption = Annotated[
     Path | None,
     typer.Option(
         metavar="DIR",
-        help="Where a URDF or MJCF file may read meshes from; else its own package.",
+        help="Folder to read meshes from; by default the file's own package.",
     ),
 ]
 StrictOption = Annotated[
     bool,
     typer.Option(
-        "--strict", help="Refuse a URDF or MJCF file with faults instead of mending it."
+        "--strict", help="Refuse a faulty URDF or MJCF file instead of mending it."
     ),
 ]
 RobotsOption = Annotated[
     list[str] | None,
-    typer.Option(help="Robot; several with commas between them: Panda,Panda."),
+    typer.Option(help="Robot, or several in one scene: Panda,Panda."),
 ]
 ControllerOption = Annotated[
     str | None, typer.Option(help="Controller, by name or file.")
@@ -76,14 +76,12 @@ CamerasOption = Annotated[
     list[str] | None, typer.Option("--camera", help="Camera; may be repeated.")
 ]
 PictureSizeOption = Annotated[
-    int, typer.Option(min=8, max=2048, help="Of camera pictures, pixels.")
+    int, typer.Option(min=8, max=2048, help="Width and height of images, pixels.")
 ]
 RecordingArgument = Annotated[Path, typer.Argument(help="Recording.")]
 TrustFilesOption = Annotated[
     bool,
-    typer.Option(
-        "--trust-files", help="Let the recording name files to read robots from."
-    ),
+    typer.Option("--trust-files", help="Read robot files that the recording names."),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 DeviceOptions = Annotated[
@@ -95,22 +93,22 @@ DeviceOptions = Annotated[
     ),
 ]
 ScaleOption = Annotated[
-    float, typer.Option(help="Motion of a hand per motion of the device.", min=0.01)
+    float, typer.Option(help="Hand motion over device motion.", min=0.01)
 ]
 MirrorOption = Annotated[
-    bool, typer.Option("--mirror", help="Face the robot: swap left and right.")
+    bool, typer.Option("--mirror", help="Swap left and right, to face the robot.")
 ]
 HostOption = Annotated[
     str,
     typer.Option(
-        help="Address to listen on. Other than 127.0.0.1, the page asks for a token."
+        help="Address to listen on. On any but 127.0.0.1 a token is required."
     ),
 ]
 PortOption = Annotated[
     int | None,
     typer.Option(
-        help="Port to listen on, 0 for any free one; the first free from 8080 on "
-        "when left out.",
+        help="Port to listen on; 0 for any free one. By default the first free one "
+        "from 8080.",
         min=0,
         max=65535,
     ),
@@ -136,7 +134,7 @@ CatalogueOption = Annotated[
     typer.Option(
         "--catalogue",
         metavar="DIR",
-        help="Further folder with robots/, tasks/, controllers/; may be repeated.",
+        help="Another folder with robots/, tasks/, controllers/; repeatable.",
         callback=_add_to_catalogue,
     ),
 ]
@@ -235,6 +233,6 @@ def serve_until_interrupted(
     """Print the address of a page, and wait for `until`, or for ever."""
     print(f"{title}\n\n    {site.url}\n", flush=True)
     if site.token is not None:
-        print("Anyone with this address may use the page.", flush=True)
-    print("Ctrl-C ends it.", flush=True)
+        print("Anyone who has this address can use the page.", flush=True)
+    print("Press Ctrl-C to stop.", flush=True)
     (until or threading.Event()).wait()

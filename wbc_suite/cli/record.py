@@ -27,22 +27,22 @@ SHOWN = 10  # episodes without success
 
 
 OutOption = Annotated[
-    Path, typer.Option("--out", "-o", help="File; episodes are added to those in it.")
+    Path, typer.Option("--out", "-o", help="File; new episodes are added to it.")
 ]
 PolicyOption = Annotated[
     str,
     typer.Option(
-        help="Policy: expert, random, hold, FILE.hdf5 (see multiply), or yours: "
-        "module:function; or an input device: keyboard, stream, spacemouse, gamepad, "
-        "dualsense, mjgui, or yours: module:Class."
+        help="Policy: expert, random, hold, FILE.hdf5 (see multiply) or your own "
+        "module:function; or an input device: headset, keyboard, stream, spacemouse, "
+        "gamepad, dualsense, mjgui or your own module:Class."
     ),
 ]
 HorizonOption = Annotated[
-    int | None, typer.Option(min=1, help="Actions in an episode at most.")
+    int | None, typer.Option(min=1, help="Maximum actions of an episode.")
 ]
 RateOption = Annotated[
     float | None,
-    typer.Option(help="Actions per second, Hz: 20, and 100 with a device."),
+    typer.Option(help="Actions per second; default 20, with a device 100."),
 ]
 OnlySuccessOption = Annotated[
     bool, typer.Option("--only-success", help="Discard episodes that fail.")
@@ -55,7 +55,7 @@ NoiseOption = Annotated[
     typer.Option(
         min=0.0,
         help="Standard deviation of noise on actions, in full steps (5 cm, 0.5 rad); "
-        "what the policy meant is recorded as `intended`.",
+        "the policy's own actions are recorded as `intended`.",
     ),
 ]
 RecoveriesOption = Annotated[
@@ -63,12 +63,12 @@ RecoveriesOption = Annotated[
     typer.Option(
         min=0.0,
         max=100.0,
-        help="Pushes of hands in 100 actions, which the policy corrects; recorded as "
-        "`disturbed`.",
+        help="Mean number of pushes of the hands in 100 actions, which the policy "
+        "corrects; marked as `disturbed`.",
     ),
 ]
 WorkersOption = Annotated[
-    int | None, typer.Option(min=1, help="At once; one per processor by default.")
+    int | None, typer.Option(min=1, help="Workers; one per processor by default.")
 ]
 PageOption = Annotated[bool, typer.Option(help="Serve a page that shows the scene.")]
 
@@ -79,11 +79,11 @@ def record(
     out: OutOption,
     robots: options.RobotsOption = None,
     device: PolicyOption = "expert",
-    episodes: Annotated[int, typer.Option(min=1, help="How many to keep.")] = 10,
+    episodes: Annotated[int, typer.Option(min=1, help="Episodes to keep.")] = 10,
     controller: options.ControllerOption = None,
     horizon: HorizonOption = None,
     rate: RateOption = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the first episode.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="First seed.")] = 0,
     only_success: OnlySuccessOption = False,
     next_obs: NextObsOption = False,
     noise: NoiseOption = 0.0,
@@ -104,9 +104,9 @@ def record(
 ) -> None:
     """Record episodes in robomimic's HDF5 layout; each is safe once it is kept.
 
-    Episodes of a policy are divided among processes or a cluster. A command that was
-    stopped goes on when it is given again. Example: wbc-suite record Lift --episodes
-    1000 --only-success --noise 0.1 --recoveries 3 -o lift.hdf5
+    Episodes of a policy are divided among processes or a cluster. A stopped command
+    continues if it is run again. Example: wbc-suite record Lift --episodes 1000
+    --only-success --noise 0.1 --recoveries 3 -o lift.hdf5
     """
     from wbc_suite.devices import is_device
     from wbc_suite.evaluation.generation import Plan
@@ -177,7 +177,7 @@ def record_policy(
         f"succeeded ({wins / played:.1%}, 95 % interval {low:.1f} to {high:.1f} %)."
     )
     if found.kept < episodes:
-        print(f"Gave up: {found.kept} of {episodes} are kept.", file=sys.stderr)
+        print(f"Too few successes: kept {found.kept} of {episodes}.", file=sys.stderr)
 
 
 def _timing(rate: float, horizon: int | None, *, by_hand: bool) -> dict[str, Any]:

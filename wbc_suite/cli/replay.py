@@ -19,25 +19,25 @@ def replay(
     *,
     by: Annotated[
         Literal["states", "actions"],
-        typer.Option(help="States as recorded, or actions, open loop."),
+        typer.Option(help="Set recorded states, or apply recorded actions."),
     ] = "actions",
     episode: Annotated[
-        list[str] | None, typer.Option(help="Episode; all when left out.")
+        list[str] | None, typer.Option(help="Episode; repeatable. All by default.")
     ] = None,
     show: Annotated[
         Literal["browser", "screen"] | None,
-        typer.Option(help="Play them in a page, or in MuJoCo's own window."),
+        typer.Option(help="Play them in a page, or in MuJoCo's viewer."),
     ] = None,
     film: Annotated[
-        Path | None, typer.Option(help="Write a film: .mp4, .webp or .gif.")
+        Path | None, typer.Option(help="Write a video: .mp4, .webp or .gif.")
     ] = None,
-    camera: Annotated[str, typer.Option(help="Camera of the film.")] = "agentview",
+    camera: Annotated[str, typer.Option(help="Camera of the video.")] = "agentview",
     size: Annotated[int, typer.Option(min=16, max=2048, help="Pixels.")] = 256,
     trust_files: options.TrustFilesOption = False,
     host: options.HostOption = "127.0.0.1",
     port: options.PortOption = None,
 ) -> None:
-    """Play episodes again, and say whether they come out as they were recorded."""
+    """Replay episodes, and report whether they match the recording bit for bit."""
     from wbc_suite.recording import Dataset, rebuild
     from wbc_suite.recording.video import check_video
     from wbc_suite.viewers.episode_player import open_player
@@ -67,7 +67,7 @@ def replay(
         finally:
             env.close()
     if not by_states:
-        print(f"{sum(exact)} of {len(exact)} episodes replay bit by bit.")
+        print(f"{sum(exact)} of {len(exact)} episodes replay bit for bit.")
 
 
 def _show(
@@ -93,7 +93,7 @@ def _play(env: "RobotEnv", episode: "Episode", *, by_states: bool) -> bool:
     else:
         found = divergence(env, episode)
         success, exact = found.success, found.exact
-        result = f"{found.steps} actions, bit by bit as recorded"
+        result = f"{found.steps} actions, bit for bit as recorded"
         if not exact:
             result = (
                 f"{found.steps} actions, differs from action {found.first} on, by "

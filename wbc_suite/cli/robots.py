@@ -116,7 +116,7 @@ def export_robot(
 ZEROS = {
     "base": "stands still",
     "velocity": "stands still",
-    "torque": "only its own weight is carried",
+    "torque": "no torque but that against gravity",
     "gripper": "half closed",
     "stiffness": "limp: no stiffness",
     "damping": "no damping",
@@ -129,15 +129,15 @@ def describe_action(
     *,
     controller: Annotated[
         str | None,
-        typer.Option(help="Name or file of a controller; else the robot's usual one."),
+        typer.Option(help="Controller, by name or file; by default the robot's own."),
     ] = None,
-    benchmark: Annotated[str, typer.Option(help="Where the robot stands.")] = "Lift",
+    benchmark: Annotated[str, typer.Option(help="Scene of the robot.")] = "Lift",
     as_json: options.JsonOption = False,
     gripper: options.GripperOption = None,
     base: options.BaseOption = None,
     catalogue: options.CatalogueOption = None,
 ) -> None:
-    """Show the slices of an action: names, places, units, bounds, and what 0 means."""
+    """Show the slices of an action: names, indices, units, bounds, what zeros mean."""
     import wbc_suite
 
     built = wbc_suite.load_robot(robot, gripper=options.chosen(gripper), base=base)
@@ -176,9 +176,9 @@ def _slice(part: "ActionSlice", held: "Vector") -> dict[str, object]:
 def _zeros(part: "ActionSlice", held: "Vector") -> str:
     """Return what zeros mean in a slice; `held` are values that keep its goal."""
     if part.name == "base_mode":
-        return "goals of hands ride on the base"
+        return "goals of hands move with the base"
     if part.kind == "base" and len(held) == 3 and held.any():
-        return "go to the origin; hold_action stays"
+        return "drive to the origin; hold_action holds"
     if part.kind in ZEROS:
         return ZEROS[part.kind]
     if not held.any():

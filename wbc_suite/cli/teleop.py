@@ -41,34 +41,34 @@ WholeBodyOption = Annotated[
     str | None,
     typer.Option(
         help="Whole-body controller, by name or TOML file; by default WHOLE_BODY_ID "
-        "for robots that walk, else WHOLE_BODY_IK."
+        "for robots that walk, otherwise WHOLE_BODY_IK."
     ),
 ]
 TargetRateOption = Annotated[
-    float, typer.Option(help="Targets taken per second, Hz.", min=5.0, max=200.0)
+    float, typer.Option(help="Control rate, Hz.", min=5.0, max=200.0)
 ]
 DeviceOption = Annotated[
     str | None,
     typer.Option(
-        help="A device beside the page's handles: headset, keyboard, stream, "
-        "spacemouse, gamepad, dualsense, mjgui, or yours: module:Class."
+        help="Input device, besides the page's handles: headset, keyboard, stream, "
+        "spacemouse, gamepad, dualsense, mjgui or your own module:Class."
     ),
 ]
 TlsCertOption = Annotated[
     Path | None,
-    typer.Option(help="Your own certificate for the headset's page, a PEM file."),
+    typer.Option(help="Certificate for the headset's page, a PEM file."),
 ]
 TlsKeyOption = Annotated[
-    Path | None, typer.Option(help="The key of --tls-cert, a PEM file.")
+    Path | None, typer.Option(help="Private key of --tls-cert, a PEM file.")
 ]
 RecordOption = Annotated[
     Path | None,
-    typer.Option(help="File that the page's button Record adds episodes to."),
+    typer.Option(help="File for episodes recorded with the page's button Record."),
 ]
 
 
 def teleop(
-    benchmark: Annotated[str, typer.Argument(help="Benchmark to play in.")] = "Lift",
+    benchmark: Annotated[str, typer.Argument(help="Benchmark to run.")] = "Lift",
     others: Annotated[list[str] | None, typer.Argument(hidden=True)] = None,
     robots: RobotsOption = None,
     controller: WholeBodyOption = None,

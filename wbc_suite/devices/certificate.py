@@ -43,8 +43,8 @@ def server_context(certificate: Path, key: Path) -> ssl.SSLContext:
     except (OSError, ssl.SSLError) as error:
         raise DeviceError(
             f"Certificate '{certificate}' with key '{key}' cannot be used: {error}. "
-            "Both are PEM files without a password; those of this installation are "
-            "made again after they are deleted."
+            "Both must be PEM files without a password. If they were made by this "
+            "package, delete both to have new ones made."
         ) from error
     return context
 
@@ -61,7 +61,7 @@ def fingerprint(certificate: Path) -> str:
     except ValueError as error:
         raise DeviceError(
             f"'{certificate}' holds no PEM certificate: {error}. Delete it and its "
-            "key; they are made again."
+            "key to have new ones made."
         ) from error
     return hashlib.sha256(der).digest().hex(":").upper()
 

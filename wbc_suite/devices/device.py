@@ -75,7 +75,7 @@ class ButtonReader:
         except Exception as error:
             if not self.faults:
                 log.exception("A device failed")
-            self.faults = (f"the device fails: {error}",)
+            self.faults = (f"device error: {error}",)
         return self._last, frozenset()
 
 

@@ -53,7 +53,7 @@ class HeadsetView(Protocol):
 class Headset(Stream):
     """Serve a WebXR page, whose head, hands and sticks are those of a `DeviceState`.
 
-    Browsers give access to a headset on secure pages only: on `localhost`, which `adb
+    Browsers allow WebXR only on secure pages: on `localhost`, which `adb
     reverse` forwards to this machine, or with TLS. On an address other than a loopback
     one it uses TLS, and clients need a token.
 
@@ -103,7 +103,7 @@ class Headset(Stream):
         return (
             (
                 "By cable.",
-                "Switch on the developer mode of the headset and connect it by USB. "
+                "Enable developer mode on the headset and connect it by USB. "
                 f"Run `adb reverse tcp:{self._port} tcp:{self._port}`, then open "
                 f"`{local}` in the headset.",
             ),
@@ -111,8 +111,8 @@ class Headset(Stream):
             (
                 "With your own certificate.",
                 "Start with `--device-option host=0.0.0.0 --tls-cert FILE.pem "
-                "--tls-key FILE.pem`, and open the name of this machine in the "
-                "certificate, with port and token.",
+                "--tls-key FILE.pem`, and open `https://NAME:PORT/?token=TOKEN` with "
+                "the name in the certificate.",
             ),
         )
 

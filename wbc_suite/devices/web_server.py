@@ -208,9 +208,7 @@ class AccessRules:
         origin = request.headers.get(hdrs.ORIGIN)
         if origin is not None and urlsplit(origin).netloc != host:
             logger.warning("Refused a request from a page of %s.", origin)
-            return _response(
-                HTTPStatus.FORBIDDEN, "Requests of other sites are refused."
-            )
+            return _response(HTTPStatus.FORBIDDEN, "Cross-site requests are refused.")
         return None if self._token is None else self._check_token(self._token, request)
 
     def _check_token(self, token: str, request: web.Request) -> web.Response | None:

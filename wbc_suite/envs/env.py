@@ -223,7 +223,7 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         )
 
     def set_state(self, state: EnvState) -> Observation:
-        """Repeat the steps of an episode, bit by bit, to continue it.
+        """Repeat the steps of an episode, bit for bit, to continue it.
 
         The environment must be made with the same arguments. Values written directly
         into the simulation are not part of the state.

@@ -111,7 +111,7 @@ class PhysicsWatch:
             raise PhysicsError(
                 f"MuJoCo reported {', '.join(_NAMES[k] for k in raised)} at "
                 f"{self._time} (index {int(self._data.warning.lastinfo[raised[0]])}). "
-                "The state is no longer to be trusted: reset."
+                "The state is no longer reliable: reset."
             ) from cause
 
     def _raise_numbers(self) -> None:
@@ -121,7 +121,7 @@ class PhysicsWatch:
                 finite = np.isfinite(values).all()
                 what = f"Beyond {most:g}" if finite else "Not finite"
                 raise PhysicsError(
-                    f"{what}: {name} at {self._time}. Reset, and look at what was "
+                    f"{what}: {name} at {self._time}. Reset, and check what was "
                     "written into the simulation."
                 )
 
@@ -140,6 +140,4 @@ def check_model(model: mujoco.MjModel) -> None:
             row = int(np.argwhere(~(values >= 0.0))[0, 0])
             part = name.partition("_")[0]
             owner = getattr(model, part)(row).name or f"number {row}"
-            raise PhysicsError(
-                f"{name} of the {part} '{owner}' is {values[row]}, below 0."
-            )
+            raise PhysicsError(f"{name} of {part} '{owner}' is {values[row]}, below 0.")

@@ -14,7 +14,7 @@ from wbc_suite.evaluation.rollouts import run_episode
 from wbc_suite.executors import Executor, WorkItem
 from wbc_suite.recording import Dataset, Store
 from wbc_suite.recording.dataset import parts_folder
-from wbc_suite.recording.resumable_work import run_pieces, work_folder
+from wbc_suite.recording.resumable_work import reading_pieces, run_pieces, work_folder
 from wbc_suite.wrappers import DataCollection, Disturbance
 
 PART = 20  # episodes of a work item
@@ -100,7 +100,8 @@ def generate(
             for item, result in done
             for name in result["kept"]
         ][:episodes]
-    total = _add_to(out, names)
+    with reading_pieces(out):
+        total = _add_to(out, names)
     shutil.rmtree(work_folder(out), ignore_errors=True)
     played = [each for _, result in done for each in result["episodes"]]
     return Generated(played=played, kept=len(names), total=total)

@@ -70,8 +70,8 @@ def make_policy(name: str, env: RobotEnv, seed: int) -> Policy:
         make = getattr(importlib.import_module(module), function)
     except (ImportError, AttributeError) as error:
         raise ConfigError(
-            f"The policy '{name}' cannot be found: {error}. It reads package.module:"
-            "Name; the module must be importable (PYTHONPATH) by every worker."
+            f"The policy '{name}' cannot be found: {error}. Write package.module:"
+            "Name; every worker must be able to import the module (PYTHONPATH)."
         ) from error
     return make(env, rng)
 
@@ -105,7 +105,7 @@ def replicate(name: str) -> Callable[[Mapping[str, Any]], Policy]:
     """Return what a `PolicyServer` begins episodes with, for a policy of this machine.
 
     The policy acts in an environment of its own, made and stepped like the client's:
-    so policies that read the simulation can be served too, and every action is, bit by
+    so policies that read the simulation can be served too, and every action is, bit for
     bit, the one that the policy takes without a socket.
     """
     from wbc_suite.envs import make

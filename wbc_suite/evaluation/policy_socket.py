@@ -92,7 +92,7 @@ class SocketPolicy:
             _send(self._file, message)
             answer = _receive(self._file)
         except (OSError, ValueError) as error:
-            text = f"The policy at {self._place} is gone: {error}."
+            text = f"Lost the policy at {self._place}: {error}."
             raise DeviceError(text) from error
         if answer is None:
             raise DeviceError(f"The policy at {self._place} closed the connection.")
@@ -155,7 +155,7 @@ class _Connection(socketserver.StreamRequestHandler):
                 return {"action": encode(np.asarray(action))}
         except Exception as error:  # noqa: BLE001 - the client is told
             return {"error": f"{type(error).__name__}: {error}"}
-        return {"error": "A request is a reset; and then, an observation."}
+        return {"error": "Send a reset first, then observations."}
 
 
 def encode(value: Any) -> Message:

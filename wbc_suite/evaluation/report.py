@@ -52,7 +52,7 @@ def _overall(results: Results) -> str:
         f"<b>{figures['success_rate']:.1%}</b> of {figures['episodes']} episodes "
         f"succeeded ({_percent(figures['intervals']['wilson'])} by Wilson, "
         f"{_percent(figures['intervals']['exact'])} exact, {low:.1%} to {high:.1%} by "
-        "a bootstrap of each case)."
+        "a stratified bootstrap)."
     )
 
 
@@ -102,11 +102,11 @@ def _comparisons(results: Results) -> str:
     ]
     alarms = max(found.false_alarms for found in results.comparisons.values())
     return (
-        "<h2>Comparison on equal scenes</h2>"
+        "<h2>Comparison on the same scenes</h2>"
         + _table(PAIRS, rows)
-        + "<p>McNemar's exact test of the scenes that one policy solves and the other "
-        f"does not. Of comparisons of equal policies, at most {alarms:.0%} are not "
-        "'undecided'.</p>"
+        + "<p>McNemar's exact test on the scenes that one policy solves and the other "
+        f"does not. Two equal policies are called better or worse in at most "
+        f"{alarms:.0%} of comparisons.</p>"
     )
 
 

@@ -16,9 +16,9 @@ MAX_BYTES = 64 << 20  # larger result files are not read
 class ResultFolder:
     """One JSON file per finished item, in the subfolder `results` of a folder.
 
-    A file is complete or absent: it is written under another name and renamed. One that
-    was damaged since then is as good as none, by its checksum. Raises
-    DatasetError if the folder, which is made if missing, cannot be written to.
+    A file is complete or absent: it is written under another name and renamed. One with
+    a wrong checksum counts as absent. The folder is made if missing; DatasetError is
+    raised if it cannot be written to.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -86,7 +86,7 @@ def run_items(
     """
     by_name = {item.name: item for item in items}
     if len(by_name) != len(items):
-        raise DatasetError("Two items have the same name: their results would be one.")
+        raise DatasetError("Two work items have the same name.")
     results = ResultFolder(folder)
     outcomes: dict[str, Outcome] = {}
 

@@ -62,8 +62,8 @@ class Multiplied:
         hands = len(demos[0].tracks)
         if len(self._cell.arms) != hands:
             raise DatasetError(
-                f"'{path}' moves {hands} hands, and {env.benchmark.name} has "
-                f"{len(self._cell.arms)} here."
+                f"'{path}' was recorded with {hands} hand(s), but this environment has "
+                f"{len(self._cell.arms)}."
             )
         self._steps = multiply(self._cell, demos)
         self.finished = False

@@ -186,7 +186,7 @@ def pick(
             return None
         if choice.outlook.error > FAR:
             short = 1e3 * choice.outlook.error
-            log.warning("No hand reaches '%s' on its way: %.0f mm short.", name, short)
+            log.warning("No hand can reach '%s': it stops %.0f mm short.", name, short)
         if (yield from take(cell, name, choice, raised=way.raised, over=over)):
             return choice
         choice.arm.open()

@@ -55,8 +55,8 @@ class Workcell(Generic[B]):
         if not self.arms:
             names = ", ".join(s.name for s in env.action_layout.slices)
             raise ConfigError(
-                f"An expert moves hands by their poses, such as OSC_POSE; the action "
-                f"has {names}."
+                f"An expert needs a controller of hand poses, such as OSC_POSE; this "
+                f"action has {names}."
             )
 
     def action(self) -> Vector:

@@ -208,8 +208,8 @@ class WeightLimit(RowLimit):
         return np.concatenate([self._torques - torque, self._torques + torque])
 
     def subject(self, row: int) -> str:
-        """Return which motor carries all it can."""
-        return f"{self.names[row % len(self.names)]} carries all it can"
+        """Return which motor is at its torque limit."""
+        return f"{self.names[row % len(self.names)]} at its torque limit"
 
 
 def _pressure_map(configuration: Configuration, omega: float, mass: float) -> Matrix:

@@ -65,8 +65,8 @@ def replace_file(path: Path, write: Callable[[Path], object]) -> None:
             temporary.unlink(missing_ok=True)
     except OSError as error:
         raise DatasetError(
-            f"'{path}' cannot be written: {error.strerror or error}. What was there "
-            "before is as it was."
+            f"'{path}' cannot be written: {error.strerror or error}. Any "
+            "existing file is unchanged."
         ) from error
 
 

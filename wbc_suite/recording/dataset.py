@@ -143,9 +143,7 @@ class Dataset:
                     f"{len(columns['actions'])} actions."
                 )
             if written is not None and written != fingerprint(columns, final):
-                raise DatasetError(
-                    f"'{name}' is damaged: its numbers are not those recorded."
-                )
+                raise DatasetError(f"'{name}' is damaged: its checksum does not match.")
         return Episode(name=name, columns=columns, facts=facts, final_state=final)
 
     def _find(self, name: str) -> tuple[Path, h5py.Group]:

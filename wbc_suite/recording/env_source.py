@@ -47,7 +47,7 @@ class EnvSource:
         inner = env.unwrapped
         if not isinstance(inner, RobotEnv):
             raise DatasetError(
-                f"Only environments of wbc_suite are recorded, not {inner}."
+                f"Only wbc_suite environments are recorded, not {inner}."
             )
         benchmark, given = inner.made_of
         kept = {k: v for k, v in given.items() if k not in _SHOWN}
@@ -68,7 +68,7 @@ class EnvSource:
             raise DatasetError("`env_args` does not name an environment.")
         name, arguments = fields["env_name"], fields.get("env_kwargs", {})
         if not isinstance(name, str) or not isinstance(arguments, dict):
-            raise DatasetError("`env_args` has no name, or no arguments by name.")
+            raise DatasetError("`env_args`: env_name or env_kwargs has a wrong type.")
         return cls(
             benchmark=name,
             arguments=arguments,
@@ -103,7 +103,7 @@ class EnvSource:
         if lost:
             raise DatasetError(
                 f"The dataset does not contain {', '.join(sorted(lost))}: make the "
-                "environment yourself and replay in that."
+                "environment yourself, and replay in it."
             )
         taken = set(EnvConfig.model_fields) - _SHOWN
         known = {k: v for k, v in self.arguments.items() if k in taken}

@@ -103,7 +103,7 @@ class EpisodeControl:
             commands, self._commands = self._commands, []
         if self._was_recording and not self._recorder.recording:
             self._was_recording = False
-            self._set_message("Discarded: started again.")
+            self._set_message("Discarded: the scene was reset.")
         for command in commands:
             self._try(lambda command=command: self._apply(command, reset))
         if self._plan is not None:
@@ -139,7 +139,7 @@ class EpisodeControl:
         recorder, planned = self._recorder, self._plan is not None
         if command is EpisodeCommand.UNDO and (planned or not recorder.recording):
             name = recorder.undo()
-            return f"Took {name} back." if name else "There is nothing to take back."
+            return f"Deleted {name}." if name else "There is nothing to undo."
         if not recorder.recording:
             if command is EpisodeCommand.RECORD:
                 return self._begin(reset)

@@ -17,7 +17,7 @@ from wbc_suite.recording.env_source import EnvSource, rebuild
 from wbc_suite.recording.episode import Episode
 from wbc_suite.recording.hdf5_writer import write_dataset
 from wbc_suite.recording.replaying import play_states
-from wbc_suite.recording.resumable_work import run_pieces, work_folder
+from wbc_suite.recording.resumable_work import reading_pieces, run_pieces, work_folder
 
 PART = 10  # maximum number of episodes of a work item; each item makes an environment
 
@@ -66,10 +66,11 @@ def extract(
             with Dataset(part, alone=True, checked=True) as dataset:
                 yield from dataset
 
-    with Dataset(parts[0], alone=True, checked=True) as first:
-        header = first.header
-    needed = sum(part.stat().st_size for part in parts)
-    write_dataset(out, episodes(), header, masks=masks, needed=needed)
+    with reading_pieces(out):
+        with Dataset(parts[0], alone=True, checked=True) as first:
+            header = first.header
+        needed = sum(part.stat().st_size for part in parts)
+        write_dataset(out, episodes(), header, masks=masks, needed=needed)
     shutil.rmtree(folder, ignore_errors=True)
     return len(names)
 

@@ -47,7 +47,7 @@ def open_safely(path: Path, *, checked: bool = False) -> h5py.File:
     if not h5py.is_hdf5(path):
         raise DatasetError(
             f"'{path}' is not an HDF5 file, or its start is damaged. If it was "
-            "being recorded, `wbc-suite repair` restores what is beside it."
+            "being recorded, `wbc-suite repair` restores finished episodes."
         )
     if not checked:
         check_files([path])

@@ -53,7 +53,7 @@ def reading(path: Path) -> Iterator[None]:
         reason = " ".join(str(error).split())[:160]
         raise DatasetError(
             f"'{path}' cannot be read: {reason}. It may be damaged: `wbc-suite verify` "
-            "lists what is left, `wbc-suite repair` saves it."
+            "lists intact episodes, `wbc-suite repair` saves them."
         ) from error
 
 
@@ -185,5 +185,5 @@ def _check_storage(dataset: h5py.Dataset) -> None:
     if claimed > MAX_BYTES or chunk > MAX_BYTES or claimed > stored * ratio:
         raise DatasetError(
             f"'{dataset.name}' claims {claimed} bytes in a shape of {dataset.shape}, "
-            f"and {stored} are stored."
+            f"but only {stored} are stored."
         )

@@ -48,9 +48,9 @@ def start_as(env: RobotEnv, episode: Episode) -> None:
     state = episode.columns["states"][0]
     if state.size != env.physics_state.size:
         raise DatasetError(
-            f"'{episode.name}' has states of {state.size} numbers, and this "
-            f"environment's have {env.physics_state.size}: its robot or its objects "
-            "differ, and it cannot be replayed here."
+            f"'{episode.name}' has states of {state.size} numbers, but those of "
+            f"this environment have {env.physics_state.size}: robot or objects differ, "
+            "so it cannot be replayed here."
         )
     _check_joints(env, episode)
     generator = episode.facts.get("rng_state")
@@ -90,8 +90,8 @@ def play_actions(
     states, actions = episode.columns["states"], episode.columns["actions"]
     if actions.shape[1] != env.action_layout.size:
         raise DatasetError(
-            f"'{episode.name}' has actions of {actions.shape[1]} numbers, and this "
-            f"environment's have {env.action_layout.size}: it can be replayed by "
+            f"'{episode.name}' has actions of {actions.shape[1]} numbers, but those of "
+            f"this environment have {env.action_layout.size}: it can be replayed by "
             "states only."
         )
     for k, action in enumerate(actions):
@@ -129,7 +129,7 @@ def _check_joints(env: RobotEnv, episode: Episode) -> None:
     words = f"{len(differing)} joints have other names: {', '.join(differing[:3])}"
     if "uid" in episode.facts:  # of this package
         raise DatasetError(
-            f"'{episode.name}' is of another robot or other objects, though its states "
-            f"have as many numbers; {words}."
+            f"'{episode.name}' was recorded with another robot or objects, though its "
+            f"states have the same size; {words}."
         )
     log.warning("'%s': %s; states are taken in order", episode.name, words)

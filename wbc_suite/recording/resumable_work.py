@@ -1,6 +1,7 @@
 """Work on a recording that is split into pieces and continues after a stop."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,20 @@ def work_folder(out: Path) -> Path:
     return out.with_name(out.name + ".work")
 
 
+@contextmanager
+def reading_pieces(out: Path) -> Iterator[None]:
+    """Say what to do if finished pieces are damaged or missing, by a DatasetError."""
+    try:
+        yield
+    except (DatasetError, OSError) as error:
+        if str(folder := work_folder(out)) not in str(error):
+            raise
+        raise DatasetError(
+            f"Finished pieces in '{folder}' are damaged. Delete this folder and run "
+            "the same command to begin again."
+        ) from error
+
+
 def run_pieces(
     work: Work,
     payloads: Sequence[Mapping[str, Any]],
@@ -27,17 +42,16 @@ def run_pieces(
     """Run the pieces that are not finished; return all, in order, with their results.
 
     Results of another source, or of one that changed, are not used. The source is in
-    every payload. `on_piece` is called with every finished piece
-    and its result.
+    every payload. `on_piece` is called with every finished piece and its result.
 
     Raises:
         DatasetError: If a piece fails; results of the others are kept.
     """
     folder = work_folder(out)
     check_folder(folder)
-    stat = source.stat() if source.exists() else None
-    written = None if stat is None else [stat.st_size, stat.st_mtime_ns]
-    common = {"source": str(source.resolve()), "written": written}
+    common: dict[str, Any] = {"source": str(source.resolve()), "written": None}
+    if source.exists():
+        common["written"] = [source.stat().st_size, source.stat().st_mtime_ns]
     items = [
         WorkItem.with_digest(f"{k:06d}", {**common, **payload})
         for k, payload in enumerate(payloads)

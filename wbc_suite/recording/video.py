@@ -34,9 +34,7 @@ def check_video(path: Path) -> None:
     if suffix == ".mp4":
         import_extra("av", "video")
     elif suffix not in PILLOW:
-        raise DatasetError(
-            f"'{path}': videos are .mp4, .webp or .gif, not '{path.suffix}'."
-        )
+        raise DatasetError(f"'{path}': a video is .mp4, .webp or .gif.")
 
 
 def episode_pictures(

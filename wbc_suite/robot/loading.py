@@ -90,14 +90,14 @@ def _standing(robot: RobotDescription, path: Path, *, asked: bool) -> RobotDescr
 
     feet = any(frame.role == "foot" for frame in robot.frames)
     if robot.hands and not feet and not asked:
-        LOG.warning("%s: its root is planar: it is free, but has no feet.", path)
+        LOG.warning("%s: a free robot without feet; its root is made planar.", path)
         return robot.with_root("planar")
     try:
         return with_soles(robot)
     except DescriptionError as error:
         if asked or path.suffix.lower() != ".urdf":
             raise
-        LOG.warning("%s It is fixed.", error)
+        LOG.warning("%s Its root is made fixed.", error)
         return robot.with_root("fixed")
 
 

@@ -151,7 +151,7 @@ class _Importer:
             if first.kind != "floating":
                 first = None
             else:
-                LOG.warning("Link '%s' is the world, and left out.", world.name)
+                LOG.warning("Link '%s' is the world: left out.", world.name)
         if first is None or first.kind not in ROOT_KINDS:
             _refuse_roots(moving)
             return {"kind": "fixed"}, self._branches

@@ -92,21 +92,16 @@ class MeshFolder:
         found = len(files) - len(missing)
         LOG.info("%s: %d of %d meshes found.", self._urdf, found, len(files))
         if missing:
+            counts, shown = (len(missing), len(files)), join_first(missing)
             LOG.warning(
-                "%s: %d of %d meshes are not in %s: %s. Another folder is given by "
+                "%s: %d of %d meshes are not in %s: %s. Give another folder by "
                 "--mesh-root.",
-                *(
-                    self._urdf,
-                    len(missing),
-                    len(files),
-                    self._root,
-                    join_first(missing),
-                ),
+                *(self._urdf, *counts, self._root, shown),
             )
         if unread:
             LOG.warning(
-                "%s: %d meshes are not read, STL and OBJ are; others need: "
-                "pip install 'wbc-suite[skins]': %s.",
+                "%s: left out %d meshes that are not STL or OBJ (to read them: "
+                "pip install 'wbc-suite[skins]'): %s.",
                 *(self._urdf, len(unread), join_first(unread)),
             )
 

@@ -62,8 +62,8 @@ def _on_the_floor(robot: RobotDescription) -> RobotDescription:
     if (abs(height) < LANDED) if stands else (height > -GROUNDED):
         return robot
     log.warning(
-        "%s has its lowest point %.3f m over the floor, and is put on it. Set [root] "
-        "pos in its file.",
+        "%s has its lowest point %.3f m above the floor, and is moved onto it. Set "
+        "[root] pos in its file.",
         *(robot.name, height),
     )
     x, y, z = robot.root.pos

@@ -153,7 +153,7 @@ class ArenaConfig(FrozenModel):
         side = free_side(m, data, top)
         if side is None:
             raise ConfigError(
-                f"{self.file}: before each side of '{top.name}' something stands. Give "
+                f"{self.file}: no side of '{top.name}' has room for a robot. Give "
                 "`yaw`, or name another `surface`."
             )
         return side
@@ -170,7 +170,7 @@ class ArenaConfig(FrozenModel):
         if dropped := _drop_robots(spec, m):
             log.log(
                 level,
-                "%s: left out what its motors move: %s. Robots come from `robots`.",
+                "%s: left out what its actuators move: %s. Choose robots by `robots`.",
                 *(self.file, join_first(dropped)),
             )
         for key in list(spec.keys):

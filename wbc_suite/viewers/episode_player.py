@@ -187,7 +187,7 @@ def load_clip(env: RobotEnv, episode: Episode, *, by_states: bool) -> Clip:
             states.append(env.physics_state)
             worst = max(worst, float(np.abs(difference).max()))
         inexact = f"replayed actions, largest difference {worst:.1e}"
-        words.append("bit by bit as recorded" if worst == 0.0 else inexact)
+        words.append("bit for bit as recorded" if worst == 0.0 else inexact)
     count = len(states)
     stacked = np.array(states)
     passed = stacked[:, 0] - stacked[0, 0]

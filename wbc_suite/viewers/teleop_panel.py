@@ -28,16 +28,16 @@ if TYPE_CHECKING:
     from wbc_suite.viewers.page_process import Session
 
 RECORD_NOTE = (
-    "This session was started without a file to record into. "
-    "`wbc-suite teleop --record FILE` records."
+    "This session has no file to record into. Start it by "
+    "`wbc-suite teleop --record FILE`."
 )
 BUTTON_HINT = (
     "Keys: P pause, 0 reset, C record or keep, Y keep as a success, X discard, "
     "U delete the last episode"
 )
-CLUTCH_HINT = "Engaged: the limb follows its handle. Otherwise only the handle moves."
+CLUTCH_HINT = "Engaged: the limb follows its handle. Released: the handle moves alone."
 BALANCE_HINT = "Feet, capture point, next footstep and contact forces."
-SHADOW_HINT = "Two thirds of the rendering time without a graphics card."
+SHADOW_HINT = "Without a graphics card, two thirds of the rendering time."
 HELP = "Keys and gestures"
 RECORD_KEYS = {
     "C": (EpisodeCommand.RECORD, "Record or keep the episode"),
@@ -165,7 +165,7 @@ class TeleopPanel:
             "Bring handles to the limbs",
             icon=Icon.ARROWS_MINIMIZE,
             color="gray",
-            hint="After a handle was moved with its clutch disengaged. Key: H",
+            hint="For handles that were moved with the clutch released. Key: H",
         )
 
         def set_mode(chosen: HandleMode) -> None:

@@ -174,7 +174,7 @@ def check_basic(
     stands = any(kind.holds_root for kind in kinds)
     if robot.root.kind == "free" and not (stands or read.may_fall):
         raise ConfigError(
-            f"{source}: key 'body_parts': {robot.name} is free to fall, and no part "
+            f"{source}: key 'body_parts': {robot.name} has a free root, and no part "
             "keeps it on its feet. Give its legs the type 'STANCE', or the robot a "
             "root 'fixed' or 'planar'; 'may_fall = true' lets it fall."
         )

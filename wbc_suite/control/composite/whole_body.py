@@ -169,15 +169,15 @@ class WholeBodyIK:
         config, name, reference = self.config, self.robot.name, self._reference
         if not config.held:
             raise ConfigError(
-                f"{name}: it is free to fall, and the controller holds no foot "
-                "([[held]]). Name its feet there, or let it stand on something: "
-                "root 'fixed' or 'planar', or another base."
+                f"{name}: it has a free root, and the controller holds no foot, so it "
+                "would fall. Name its feet as [[held]], or choose the root 'fixed' or "
+                "'planar', or another base."
             )
         if not soles_of(config.held) and len(config.held) < MIN_POINT_CONTACTS:
             LOG.warning(
                 "%s: it stands on %d feet whose soles are unknown ([[held]] sole), so "
-                "nothing keeps it from tipping over when its hands move: see 'On its "
-                "own feet' in docs/robots.md.",
+                "nothing keeps it from tipping over when its hands move: see 'Legged "
+                "robots with a free root' in docs/robots.md.",
                 name,
                 len(config.held),
             )

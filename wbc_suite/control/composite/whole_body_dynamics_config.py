@@ -193,7 +193,7 @@ def _check_root(
     """Raise ConfigError unless a free root, and no other, has feet and sensors."""
     stands = robot.root.kind == "free"
     if stands and len(config.feet) < 2:
-        raise ConfigError(f"{source}: {robot.name} is free to fall: name its [[foot]].")
+        raise ConfigError(f"{source}: {robot.name} has a free root: name its [[foot]].")
     if not stands and (config.feet or not config.sensors.is_exact):
         raise ConfigError(
             f"{source}: {robot.name} has a {robot.root.kind} root: it needs no "

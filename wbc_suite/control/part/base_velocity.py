@@ -67,9 +67,7 @@ class BaseVelocityController(PartController[VelocityLaw]):
     ) -> None:
         robot, root = state.robot, state.robot.root
         if root.kind != "planar" or not root.actuated:
-            raise ConfigError(
-                f"{robot.name}: part '{part.name}': it has no driven base."
-            )
+            raise ConfigError(f"{robot.name}: part '{part.name}' has no driven base.")
         self.config = config
         most = config.acceleration, config.acceleration, config.turning_acceleration
         self._accelerations: Vector = np.array(most)

@@ -85,7 +85,7 @@ def weight_shares(
     ]
     if weak:
         names = join_first([f"'{name}'" for name in weak])
-        LOG.warning("%s: too weak to hold every posture: %s.", robot.name, names)
+        LOG.warning("%s: motors cannot hold every posture: %s.", robot.name, names)
     return dict.fromkeys(weak, WEIGHT_SHARE)
 
 

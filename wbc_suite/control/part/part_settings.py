@@ -192,9 +192,7 @@ def spread(values: Numbers, size: int, key: str) -> Vector:
     """
     array = np.asarray(values, dtype=np.float64)
     if array.shape not in ((), (1,), (size,)):
-        raise ConfigError(
-            f"key '{key}': {array.size} values, where 1 or {size} are needed."
-        )
+        raise ConfigError(f"key '{key}': {array.size} values instead of 1 or {size}.")
     return np.broadcast_to(array, size)
 
 

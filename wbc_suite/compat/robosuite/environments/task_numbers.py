@@ -116,7 +116,7 @@ def _changes(name: str, given: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
             yield from _of_wipe({} if value is None else value)
         elif key in ("prehensile", "z_offset"):
             if value != {"prehensile": True, "z_offset": 0.0}[key]:
-                raise ConfigError(f"{name}: {key} = {value!r} has no equal here.")
+                raise ConfigError(f"{name}: {key} = {value!r} is not supported.")
         elif key in _CONVERTED:
             yield from _converted(key, value, given)
         elif key == "table_full_size" and name.startswith(("PickPlace", "TwoArmHand")):
@@ -164,9 +164,7 @@ def _of_wipe(config: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
         elif key in _KEYS_OF_WIPE:
             yield _KEYS_OF_WIPE[key], _plain(value)
         else:
-            raise ConfigError(
-                f"Wipe: task_config: {key} = {value!r} has no equal here."
-            )
+            raise ConfigError(f"Wipe: task_config: {key} = {value!r} is not supported.")
 
 
 def _plain(value: Any) -> Any:

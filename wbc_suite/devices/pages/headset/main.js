@@ -73,7 +73,7 @@ async function supported(mode) {
 
 async function look() {
   if (!window.isSecureContext) {
-    $("note").textContent = "Browsers give access to a headset on secure pages only. Use one of the three ways below.";
+    $("note").textContent = "Browsers allow WebXR only on secure pages. Use one of the three ways below.";
     return;
   }
   const [vr, ar] = [await supported("immersive-vr"), await supported("immersive-ar")];

@@ -38,7 +38,7 @@ class ReadyMade(MujocoXMLObject):
             made = type(self).make(OURS, **own)
         except TypeError as error:
             raise ConfigError(
-                f"{type(self).__name__}: {', '.join(own)}: not all have an equal here."
+                f"{type(self).__name__}: unsupported arguments among {', '.join(own)}."
             ) from error
         self._made = replace(made, motion="fixed")
         joints = self.joints_by_default if joints is None else joints
