@@ -277,6 +277,14 @@ def test_hand_that_is_not_seen_lets_go(room, wearer):
     assert np.linalg.norm(measured(session) - start) < 1e-3
 
 
+def test_page_that_draws_for_long_keeps_its_connection(wearer):
+    socket = wearer.page.evaluate_handle("headset.connection.socket")
+    for _ in range(3):
+        wearer.tell("{ const end = Date.now() + 3000; while (Date.now() < end); }")
+        time.sleep(0.7)  # two checks, and what came meanwhile
+    assert wearer.page.evaluate("kept => kept === headset.connection.socket", socket)
+
+
 def test_lost_connection_stops_the_robot_and_is_taken_up_again(room, wearer):
     session, device = room
     wearer.press("squeeze", 1)
