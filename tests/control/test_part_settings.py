@@ -123,8 +123,9 @@ def test_ramps_take_a_part_of_the_period_with_interpolation_only():
     assert Settings(ramp_ratio=0.5, interpolation="linear").ramp(0.1) == 0.05
 
 
-def test_feasible_accelerations_need_no_more_than_the_share_of_effort():
-    robot = load_robot("Panda")
+@pytest.mark.parametrize("name", ["Panda", "PR2"])
+def test_feasible_accelerations_need_no_more_than_the_share_of_effort(name):
+    robot = load_robot(name)
     feasible = feasible_accelerations(robot, most=50.0, effort_share=0.6)
     model = robot.to_pinocchio()
     inertia, weight = greatest_loads(model)

@@ -60,8 +60,11 @@ def test_weak_motors_are_asked_for_postures_that_they_can_hold(tmp_path):
     name = config["frame"][0]["name"]
     goal = np.array([0.0, 0.0, 1.5, 0.0, -np.pi / 2, 0.0])  # level
     action = env.action_layout.pack({name: goal}, base=env.hold_action)
+    most = 0.0
     for _ in range(60):
         env.step(action)
+        most = max(most, abs(float(env.simulation.data.qfrc_actuator[0])))
+    assert most < 0.95 * 0.5 * WEIGHT  # it brakes with what its weight leaves
     q = float(env.simulation.data.joint("robot0_hinge").qpos[0])
     assert np.sin(-q) == pytest.approx(0.45, rel=0.02)  # of the torque when level
 

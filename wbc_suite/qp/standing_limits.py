@@ -17,7 +17,9 @@ GRAVITY = 9.81  # m/s^2
 RETURN_SPEED = 0.05  # m/s, from outside the limit
 JUMP = 2.0  # m/s; a root that moved faster was put elsewhere
 MOVED = 1e-3  # m; soles that moved by less keep their polygon
-WEIGHT_RATE = 5.0  # 1/s; how fast what is left of a motor's effort may be used up
+WEIGHT_RATE = 2.0
+"""1/s; how fast what is left of a motor's effort may be used up. With r a pendulum of
+length l brakes by r^2 l / g of what is left: no more than that for 2.4 m and r = 2."""
 WEIGHT_RETURN = 0.1  # of the effort per second, from beyond it
 
 

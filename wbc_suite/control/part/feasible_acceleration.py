@@ -15,8 +15,9 @@ LOG = logging.getLogger(__name__)
 
 LOAD_SAMPLES = 50
 WEIGHT_SHARE = 0.9  # of the effort of a motor that cannot hold every posture
-LEAST_ACCELERATION = 2.0
-"""rad/s^2 or m/s^2; where holding the load takes nearly the whole effort."""
+LEAST_ACCELERATION = 0.2
+"""rad/s^2 or m/s^2, where holding the load takes nearly the whole effort: 1 rad from
+rest to rest in 4.5 s. With 2 the torso of Galaxea R1 could not brake, and fell."""
 LEAD = 2.0
 """Inertia is less than its greatest in most postures; with 1, TIAGo's arms give up
 early where a pot jams them."""
