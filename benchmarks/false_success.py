@@ -134,9 +134,9 @@ class Search:
         )
 
     def run(self, attack: Attack) -> Iterator[tuple[float, str | None]]:
-        """Yield reward and checkment after each action; the latter ends a try.
+        """Yield reward and verdict after each action; the latter ends a try.
 
-        The checkment is None without a success, "" for one that is deserved, or else
+        The verdict is None without a success, "" for one that is deserved, or else
         what is wrong with it.
         """
         env, draw, actions = self.env, Draw(attack.numbers), list[Vector]()
