@@ -111,8 +111,8 @@ class Headset(Stream):
             (
                 "With your own certificate.",
                 "Start with `--device-option host=0.0.0.0 --tls-cert FILE.pem "
-                "--tls-key FILE.pem`, and open `https://NAME:PORT/?token=TOKEN` with "
-                "the name in the certificate.",
+                "--tls-key FILE.pem`, and open the printed address with the name in "
+                "the certificate in place of the host.",
             ),
         )
 

@@ -17,9 +17,6 @@ GRAVITY = 9.81  # m/s^2
 RETURN_SPEED = 0.05  # m/s, from outside the limit
 JUMP = 2.0  # m/s; a root that moved faster was put elsewhere
 MOVED = 1e-3  # m; soles that moved by less keep their polygon
-WEIGHT_RATE = 2.0
-"""1/s; how fast what is left of a motor's effort may be used up. With r a pendulum of
-length l brakes by r^2 l / g of what is left: no more than that for 2.4 m and r = 2."""
 WEIGHT_RETURN = 0.1  # of the effort per second, from beyond it
 
 
@@ -168,17 +165,20 @@ class WeightLimit(RowLimit):
 
     Args:
         torques: Greatest torque or force of each joint by name, N m or N.
+        rate: How fast what is left may be used up, 1/s. A pendulum of length l brakes
+            by rate^2 l / g of what is left: no more than that for 2.4 m and 2 /s.
 
     Raises:
-        ConfigError: If a limit is not positive.
+        ConfigError: If a number is not positive.
     """
 
     kind = LimitKind.EFFORT
     unit = "N m"
 
-    def __init__(self, torques: Mapping[str, float]) -> None:
-        for name, value in torques.items():
+    def __init__(self, torques: Mapping[str, float], rate: float = 2.0) -> None:
+        for name, value in {**torques, "rate": rate}.items():
             check_number(f"WeightLimit: '{name}'", value, above=0.0)
+        self.rate = rate
         self.names = tuple(torques)
         self._torques: Vector = np.array(list(torques.values()), dtype=np.float64)
         self.dim = 2 * len(self.names)
@@ -199,7 +199,7 @@ class WeightLimit(RowLimit):
         count = len(self.names)
         G[:count], G[count:] = slope, -slope
         h[:] = dt * np.maximum(
-            WEIGHT_RATE * self.room(configuration),
+            self.rate * self.room(configuration),
             -WEIGHT_RETURN * np.tile(self._torques, 2),
         )
 

@@ -58,7 +58,7 @@ def test_arguments_of_objects_count_and_unknown_ones_are_errors():
     rng = np.random.default_rng(3)
     hammers = [READY_MADE["HammerObject"]("h", rng=rng) for _ in range(2)]
     assert hammers[0].top_offset[2] != hammers[1].top_offset[2]
-    with pytest.raises(ConfigError, match="ngeoms2: not all have an equal"):
+    with pytest.raises(ConfigError, match="unsupported arguments among ngeoms2"):
         READY_MADE["HollowCylinderObject"]("tube", ngeoms2=3)
 
 

@@ -82,8 +82,8 @@ def weight_limits(
     robot: RobotDescription, config: WholeBodyIKConfig
 ) -> list[WeightLimit]:
     """Return the limit of what some motors hold, if the config has one."""
-    shares = config.limits.weight_shares
-    return [WeightLimit(_greatest_weights(robot, shares))] if shares else []
+    shares, rate = config.limits.weight_shares, config.limits.weight_rate
+    return [WeightLimit(_greatest_weights(robot, shares), rate)] if shares else []
 
 
 def limit_checker(

@@ -141,13 +141,12 @@ class LimitsConfig(FrozenModel):
         self_collision: Whether links are kept apart.
         collision_pairs: How many of the nearest pairs of links are watched.
         collision_distance: Distance kept between links, m.
-        floor: Height in the world of what a robot on its feet stands on, m; all but its
-            legs keep the same distance from it.
+        floor: Height of the floor in the world, m; all but legs keep that distance.
         obstacles: Whether the robot keeps out of the scene's fixed things.
         obstacle_distance: Distance kept from them, m.
-        press_depth: How far inside of them links of hands may be commanded, m: what
-            stops them there is what they press on.
+        press_depth: How far links of hands may be commanded into them, m, to press.
         weight_shares: Part of a joint's effort that holding still may take, by joint.
+        weight_rate: How fast what is left of that may be used up, 1/s.
         balance_margin: Distance kept from the edges of the soles, m.
     """
 
@@ -166,6 +165,7 @@ class LimitsConfig(FrozenModel):
     obstacle_distance: NonNegativeFloat = 0.002
     press_depth: NonNegativeFloat = 0.001
     weight_shares: dict[Name, PositiveFloat] = {}
+    weight_rate: PositiveFloat = 2.0
     balance_margin: NonNegativeFloat = 0.03
 
 
