@@ -69,7 +69,6 @@ def table(rows: list[Row]) -> str:
     """Return the results as tables in Markdown."""
     warp = {row["case"]: row for row in rows if row["side"] == "warp"}
     mjx = [row for row in rows if row["side"] == "mjx" and "not_made" not in row]
-    loaded = sum("refused" not in row or row["steps"] > 0 for row in mjx)
     lines = [
         f"mujoco_warp, {sum('all' in row for row in warp.values())} cases:",
         "",
@@ -79,14 +78,7 @@ def table(rows: list[Row]) -> str:
     for name in BENCHMARKS:
         cells = [shown(warp.get(case)) for case in (name, *robot_cases(name))]
         lines.append(f"| {name} | " + " | ".join(cells) + " |")
-    lines += ["", f"MJX takes {loaded} of {len(mjx)} cases, and was stepped in these:"]
-    columns = ("nv", "first_step_s", "other_steps_s", "peak_mb")
-    lines += ["", "| case | differences | degrees of freedom | first step, CPU s "]
-    lines[-1] += "| the others, CPU s | peak, MB |"
-    lines += ["|---|---|---|---|---|---|"]
-    for row in (row for row in mjx if row["steps"]):
-        words = [row["case"], shown(row), *(cell(row.get(key)) for key in columns)]
-        lines.append("| " + " | ".join(words) + " |")
+    lines += mjx_table(mjx) if mjx else []
     reasons: dict[str, list[str]] = {}
     for row in warp.values():
         if "not_made" in row:
@@ -95,6 +87,21 @@ def table(rows: list[Row]) -> str:
     lines += [f"- {', '.join(cases)}: {why}" for why, cases in reasons.items()]
     about = " and ".join(sorted({f"{row['date']}, {row['machine']}" for row in rows}))
     return "\n".join([*lines, "", f"`python benchmarks/accelerators.py`, {about}."])
+
+
+def mjx_table(rows: list[Row]) -> list[str]:
+    """Return what MJX takes, and the lines of its table."""
+    loaded = sum("refused" not in row or row["steps"] > 0 for row in rows)
+    lines = ["", f"MJX takes {loaded} of the {len(rows)} cases that it was given, and"]
+    lines[-1] += " was stepped in these:"
+    columns = ("nv", "first_step_s", "other_steps_s", "peak_mb")
+    lines += ["", "| case | differences | degrees of freedom | first step, CPU s "]
+    lines[-1] += "| the others, CPU s | peak, MB |"
+    lines += ["|---|---|---|---|---|---|"]
+    for row in (row for row in rows if row["steps"]):
+        words = [row["case"], shown(row), *(cell(row.get(key)) for key in columns)]
+        lines.append("| " + " | ".join(words) + " |")
+    return lines
 
 
 def robot_cases(benchmark: str) -> list[str]:

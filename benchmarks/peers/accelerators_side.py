@@ -86,8 +86,8 @@ def compare(path: Path, engine: Callable[..., Step], steps: int) -> dict | str:
         touched.update(model.body_treeid[bodies].ravel().tolist())
         away = np.abs(step() - data.qpos)
         apart = away[~np.isin(trees, list(touched))]
-        found["apart"] = max(found["apart"], float(apart.max(initial=0.0)))
-        found["all"] = max(found["all"], float(away.max()))
+        for key, values in (("apart", apart), ("all", away)):  # NaN stays NaN
+            found[key] = float(np.maximum(found[key], values.max(initial=0.0)))
         times.append(time.process_time())
     if steps:
         kilobytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
