@@ -5,8 +5,8 @@ and yourdfpy (`pip install yourdfpy`; left out if absent). All models stand at `
 on a fixed root; MuJoCo draws their visual shapes from three sides. The intersection of
 two silhouettes over their union is at least 0.97.
 
-Usage: python benchmarks/silhouettes.py [--quick] [--only TEXT] [--json FILE]
-       [--keep DIR] [--table]
+Usage: MUJOCO_GL=egl python benchmarks/silhouettes.py [--quick] [--only TEXT]
+       [--json FILE] [--keep DIR] [--table]
 """
 
 import datetime
