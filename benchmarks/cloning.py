@@ -221,6 +221,7 @@ def draw(rows: list[dict[str, Any]]) -> None:
             ylim=(-3, 103),
         )
         axis.set_xticks(SIZES, [str(n) for n in SIZES])
+        axis.minorticks_off()
         axis.grid(alpha=0.3)
         axis.legend(fontsize=7)
     figure.tight_layout()
