@@ -176,9 +176,10 @@ class WeightLimit(RowLimit):
     unit = "N m"
 
     def __init__(self, torques: Mapping[str, float], rate: float = 2.0) -> None:
-        for name, value in {**torques, "rate": rate}.items():
+        for name, value in torques.items():
             check_number(f"WeightLimit: '{name}'", value, above=0.0)
-        self.rate = rate
+        check_number("WeightLimit: rate", rate, above=0.0)
+        self._rate = rate
         self.names = tuple(torques)
         self._torques: Vector = np.array(list(torques.values()), dtype=np.float64)
         self.dim = 2 * len(self.names)
@@ -199,7 +200,7 @@ class WeightLimit(RowLimit):
         count = len(self.names)
         G[:count], G[count:] = slope, -slope
         h[:] = dt * np.maximum(
-            self.rate * self.room(configuration),
+            self._rate * self.room(configuration),
             -WEIGHT_RETURN * np.tile(self._torques, 2),
         )
 

@@ -49,9 +49,9 @@ def run_pieces(
     """
     folder = work_folder(out)
     check_folder(folder)
-    common: dict[str, Any] = {"source": str(source.resolve()), "written": None}
-    if source.exists():
-        common["written"] = [source.stat().st_size, source.stat().st_mtime_ns]
+    stat = source.stat() if source.exists() else None
+    written = None if stat is None else [stat.st_size, stat.st_mtime_ns]
+    common = {"source": str(source.resolve()), "written": written}
     items = [
         WorkItem.with_digest(f"{k:06d}", {**common, **payload})
         for k, payload in enumerate(payloads)

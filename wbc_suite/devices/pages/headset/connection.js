@@ -2,7 +2,8 @@
 
 const RETRY = 250;  // ms
 const CHECK = 300;  // ms; the server sends at least ten times a second
-const SILENCE = 5;  // checks without a message. Neither runs while the page is drawing.
+// Checks without a message. They are counted, not timed: neither runs while the page draws.
+const SILENCE = 10, ATTEMPT = 5;  // once connected, and before
 const MAX_WAITING = 16384;  // bytes; a frame that would wait behind them is dropped
 
 export class Connection {
@@ -41,7 +42,7 @@ export class Connection {
   // A network that is gone closes no socket: silence tells.
   check() {
     this.silent += 1;
-    if (this.silent < SILENCE) return;
+    if (this.silent < (this.connected ? SILENCE : ATTEMPT)) return;
     this.silent = 0;
     const lost = this.socket;
     lost.close();
