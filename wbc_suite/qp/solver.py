@@ -89,7 +89,7 @@ class QpsolversSolver:
 
     _OPTIONS: ClassVar[dict[str, dict[str, Any]]] = {
         "proxqp": {**_EXACT, "backend": "dense", "max_iter": 100},
-        "osqp": {**_EXACT, "eps_abs": 1e-8, "max_iter": 1000},
+        "osqp": {**_EXACT, "eps_abs": 1e-8, "max_iter": 100},
         "clarabel": {"max_iter": 25},
         "piqp": _EXACT,
     }
