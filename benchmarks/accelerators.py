@@ -3,8 +3,8 @@
 Each case is a benchmark with its usual robots or one of `ROBOTS`. Both engines start in
 the state after a first action of zeros, and keep its controls for 100 steps.
 
-Rows are added to artifacts/benchmarks/accelerators.json, in place of older ones of the
-same case and engine; `--table` writes docs/accelerators.md from it, and runs nothing.
+Rows are added to docs/accelerators.json, in place of older ones of the same case and
+engine; `--table` writes docs/accelerators.md from it, and runs nothing.
 
 Usage: python benchmarks/accelerators.py [CASE ...] [--engine warp] [--steps 100]
            [--timeout S] [--quick] [--json FILE]
@@ -19,6 +19,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from harness.engines import PYTHON, VARIANTS, step_in, write_models
@@ -30,7 +31,7 @@ from wbc_suite.errors import WbcError
 from wbc_suite.registration import BENCHMARKS
 
 ROOT = Path(__file__).parent.parent
-FOUND = ROOT / "artifacts" / "benchmarks" / "accelerators.json"
+FOUND = ROOT / "docs" / "accelerators.json"
 PAGE = ROOT / "docs" / "accelerators.md"
 ROBOTS = ("GR1", "SpotWithArm", "Tiago")
 WALKING = "GR1FreeBody"
@@ -40,6 +41,7 @@ CASES = (
     *(f"{name}-{robot}" for robot in ROBOTS for name in BENCHMARKS),
     *(f"{name}-{WALKING}" for name in ("LocoLift", "WalkTo")),
 )
+COSTS = "first_step_s", "other_steps_s"
 ENGINES = {"warp": "mujoco_warp", "mjx": "MJX"}
 Row = dict[str, Any]
 
@@ -67,41 +69,41 @@ def measure(case: str, engine: str, folder: Path, steps: int, timeout: float) ->
 
 def table(rows: list[Row]) -> str:
     """Return the results as tables in Markdown."""
-    warp = {row["case"]: row for row in rows if row["side"] == "warp"}
-    mjx = [row for row in rows if row["side"] == "mjx" and "not_made" not in row]
-    lines = [
-        f"mujoco_warp, {sum('all' in row for row in warp.values())} cases:",
-        "",
-        "| benchmark | " + " | ".join(["usual robots", *ROBOTS]) + " |",
-        "|---|" + "---|" * (1 + len(ROBOTS)),
-    ]
-    for name in BENCHMARKS:
-        cells = [shown(warp.get(case)) for case in (name, *robot_cases(name))]
-        lines.append(f"| {name} | " + " | ".join(cells) + " |")
-    lines += mjx_table(mjx) if mjx else []
-    reasons: dict[str, list[str]] = {}
-    for row in warp.values():
+    lines: list[str] = []
+    for engine, name in ENGINES.items():
+        found = {row["case"]: row for row in rows if row["side"] == engine}
+        stepped = [row for row in found.values() if "all" in row]
+        if stepped:
+            lines += [f"{name}, {len(stepped)} cases. {costs(stepped)}", ""]
+            lines += [*of_engine(found), ""]
+    reasons: dict[str, dict[str, None]] = {}
+    for row in rows:
         if "not_made" in row:
-            reasons.setdefault(row["not_made"], []).append(row["case"])
-    lines += ["", "`make` refuses:", ""]
+            reasons.setdefault(row["not_made"], {})[row["case"]] = None
+    lines += ["`make` refuses:", ""]
     lines += [f"- {', '.join(cases)}: {why}" for why, cases in reasons.items()]
     about = " and ".join(sorted({f"{row['date']}, {row['machine']}" for row in rows}))
     return "\n".join([*lines, "", f"`python benchmarks/accelerators.py`, {about}."])
 
 
-def mjx_table(rows: list[Row]) -> list[str]:
-    """Return what MJX takes, and the lines of its table."""
-    loaded = sum("refused" not in row or row["steps"] > 0 for row in rows)
-    lines = ["", f"MJX takes {loaded} of the {len(rows)} cases that it was given, and"]
-    lines[-1] += " was stepped in these:"
-    columns = ("nv", "first_step_s", "other_steps_s", "peak_mb")
-    lines += ["", "| case | differences | degrees of freedom | first step, CPU s "]
-    lines[-1] += "| the others, CPU s | peak, MB |"
-    lines += ["|---|---|---|---|---|---|"]
-    for row in (row for row in rows if row["steps"]):
-        words = [row["case"], shown(row), *(cell(row.get(key)) for key in columns)]
-        lines.append("| " + " | ".join(words) + " |")
+def of_engine(found: dict[str, Row]) -> list[str]:
+    """Return the lines of the table of one engine."""
+    lines = ["| benchmark | " + " | ".join(["usual robots", *ROBOTS]) + " |"]
+    lines.append("|---|" + "---|" * (1 + len(ROBOTS)))
+    for name in BENCHMARKS:
+        cells = [shown(found.get(case)) for case in (name, *robot_cases(name))]
+        lines.append(f"| {name} | " + " | ".join(cells) + " |")
     return lines
+
+
+def costs(rows: list[Row]) -> str:
+    """Return what the first step, with its compilation, and the others cost."""
+    first, others = ([row[key] for row in rows] for key in COSTS)
+    return (
+        f"CPU time: {median(first):.0f} s in the median for the first step, which "
+        f"compiles ({max(first):.0f} s at most), {median(others):.1f} s for the others "
+        f"({max(others):.1f} s); at most {max(row['peak_mb'] for row in rows)} MB."
+    )
 
 
 def robot_cases(benchmark: str) -> list[str]:

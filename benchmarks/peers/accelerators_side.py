@@ -22,9 +22,8 @@ import mujoco
 import numpy as np
 
 os.environ["JAX_PLATFORMS"] = "cpu"
-# Fused, the pose of each body computes those of all its parents anew: a step with an
-# arm of seven joints takes minutes.
-os.environ["XLA_FLAGS"] = "--xla_disable_hlo_passes=fusion"
+# With the newer emitters compiling takes six times as long, or a step takes minutes.
+os.environ["XLA_FLAGS"] = "--xla_cpu_use_fusion_emitters=false"
 Step = Callable[[], np.ndarray]  # makes a step, and returns the positions
 
 
@@ -46,8 +45,6 @@ def in_mjx(model: mujoco.MjModel, data: mujoco.MjData) -> Step:
     import jax
     from mujoco import mjx
 
-    # Compiling is what takes long: XLA's passes cost more than they save in 100 steps.
-    jax.config.update("jax_disable_most_optimizations", True)
     there = mjx.put_model(model, impl="jax")
     states = [mjx.put_data(model, data, impl="jax")]
     compiled = jax.jit(mjx.step)

@@ -29,8 +29,10 @@ def export_model(
             switched on again, and sparse Jacobians above 60 degrees of freedom:
             mujoco_warp refuses models without. `accelerator` has capsules in place of
             long cylinders that collide, and boxes in place of flat ones, since MJX does
-            not collide cylinders with boxes. Masses and inertias stay; contacts differ
-            at the edges, by at most the radius.
+            not collide cylinders with boxes; and pyramidal friction cones, since with
+            elliptic ones MJX makes a dense matrix of all possible contacts: 10 GB for
+            GR1. Masses and inertias stay; contacts differ at the edges, by at most the
+            radius, and friction by its direction.
     """
     simulation = env.unwrapped.simulation
     model = copy.deepcopy(simulation.model)
@@ -38,6 +40,7 @@ def export_model(
     if model.nv > MOST_DENSE:
         model.opt.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
     if variant == "accelerator":
+        model.opt.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
         _replace_cylinders(model)
     return model
 
