@@ -90,7 +90,7 @@ class QpsolversSolver:
     _OPTIONS: ClassVar[dict[str, dict[str, Any]]] = {
         "proxqp": {**_EXACT, "backend": "dense", "max_iter": 100},
         "osqp": {**_EXACT, "eps_abs": 1e-8, "max_iter": 100},
-        "clarabel": {"max_iter": 25},
+        "clarabel": {"max_iter": 12, "iterative_refinement_enable": False},
         "piqp": _EXACT,
     }
 
