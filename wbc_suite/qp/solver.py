@@ -91,7 +91,7 @@ class QpsolversSolver:
         "proxqp": {**_EXACT, "backend": "dense", "max_iter": 100},
         "osqp": {**_EXACT, "eps_abs": 1e-8, "max_iter": 100},
         "clarabel": {"max_iter": 12, "iterative_refinement_enable": False},
-        "piqp": _EXACT,
+        "piqp": {**_EXACT, "max_iter": 50},
     }
 
     def __init__(self, name: str) -> None:
