@@ -67,33 +67,37 @@ def measure(case: str, engine: str, folder: Path, steps: int, timeout: float) ->
     return row | (found if isinstance(found, dict) else {"refused": found})
 
 
-def table(rows: list[Row]) -> str:
-    """Return the results as tables in Markdown."""
-    lines: list[str] = []
+def write_page(rows: list[Row]) -> None:
+    """Write what each engine found, and why some cases do not exist."""
     for engine, name in ENGINES.items():
-        found = {row["case"]: row for row in rows if row["side"] == engine}
-        stepped = [row for row in found.values() if "all" in row]
-        if stepped:
-            lines += [f"{name}, {len(stepped)} cases. {costs(stepped)}", ""]
-            lines += [*of_engine(found), ""]
+        if found := {row["case"]: row for row in rows if row["side"] == engine}:
+            write_between(PAGE, table(name, found), marks(engine))
     reasons: dict[str, dict[str, None]] = {}
     for row in rows:
         if "not_made" in row:
             reasons.setdefault(row["not_made"], {})[row["case"]] = None
-    lines += ["`make` refuses:", ""]
-    lines += [f"- {', '.join(cases)}: {why}" for why, cases in reasons.items()]
-    about = " and ".join(sorted({f"{row['date']}, {row['machine']}" for row in rows}))
-    return "\n".join([*lines, "", f"`python benchmarks/accelerators.py`, {about}."])
+    lines = [f"- {', '.join(cases)}: {why}" for why, cases in reasons.items()]
+    write_between(PAGE, "\n".join(lines), marks("refused"))
 
 
-def of_engine(found: dict[str, Row]) -> list[str]:
-    """Return the lines of the table of one engine."""
-    lines = ["| benchmark | " + " | ".join(["usual robots", *ROBOTS]) + " |"]
+def marks(part: str) -> tuple[str, str]:
+    """Return the marks of a part of the page."""
+    return f"<!-- {part} -->", f"<!-- end of {part} -->"
+
+
+def table(name: str, found: dict[str, Row]) -> str:
+    """Return the results of an engine in Markdown."""
+    stepped = [row for row in found.values() if "all" in row]
+    lines = [f"{name}, {len(stepped)} cases. {costs(stepped)}", ""]
+    lines.append("| benchmark | " + " | ".join(["usual robots", *ROBOTS]) + " |")
     lines.append("|---|" + "---|" * (1 + len(ROBOTS)))
-    for name in BENCHMARKS:
-        cells = [shown(found.get(case)) for case in (name, *robot_cases(name))]
-        lines.append(f"| {name} | " + " | ".join(cells) + " |")
-    return lines
+    for benchmark in BENCHMARKS:
+        cases = benchmark, *robot_cases(benchmark)
+        cells = [shown(found.get(case)) for case in cases]
+        lines.append(f"| {benchmark} | " + " | ".join(cells) + " |")
+    about = {f"{row['date']}, {row['machine']}" for row in found.values()}
+    command = f"`python benchmarks/accelerators.py --engine {stepped[0]['side']}`"
+    return "\n".join([*lines, "", f"{command}, {' and '.join(sorted(about))}."])
 
 
 def costs(rows: list[Row]) -> str:
@@ -139,7 +143,7 @@ def main() -> None:
     given = parser.parse_args()
     order = [(case, engine) for engine in VARIANTS for case in CASES]
     if given.table:
-        write_between(PAGE, table(kept()))
+        write_page(kept())
         return
     if not PYTHON.exists():
         sys.exit("not installed: make .venv-accelerators/.installed")

@@ -1,4 +1,4 @@
-"""Behaviour cloning: a network that imitates demonstrations, action by action.
+"""Behaviour cloning: a network that gives the next actions of demonstrations.
 
 Record first, then train; a stopped run goes on where it stopped:
 
