@@ -8,6 +8,7 @@ from wbc_suite.robot import mesh_files
 from wbc_suite.robot.mesh_files import read_points, write_stl
 from wbc_suite.robot.triangle_meshes import box_mesh
 
+SIGNALLING = b"\0\0\xa0\x7f"  # NaN, of which numpy warns in a cast
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-2, 2) for z in (-3, 3)])
 
 
@@ -53,6 +54,11 @@ def test_text_files_are_read(tmp_path):
         ("a.obj", b"v 1 2 x\n", "not a readable mesh: could not convert"),
         ("a.obj", b"v 1 2\nv 1 2 3\n", "not a readable mesh"),
         ("a.stl", b"\0" * 80 + b"\1\0\0\0" + b"\xff" * 50, "no finite points"),
+        (
+            "a.stl",
+            b"\0" * 80 + b"\1\0\0\0" + b"\0\0\xa0\x7f" * 12 + b"\0\0",
+            "no finite",
+        ),
     ],
 )
 def test_broken_files_are_refused(tmp_path, name, content, message):

@@ -222,10 +222,14 @@ def test_a_component_that_extends_another_wears_its_skin(tmp_path):
     assert plain.skins == dexterous.skins != {}
 
 
-def test_a_broken_mesh_names_the_file(package):
+ONE_TRIANGLE = bytes(80) + b"\1\0\0\0" + np.eye(4, 3, -1, "<f4").tobytes() + b"\0\0"
+
+
+@pytest.mark.parametrize("content", [b"solid nothing\n", ONE_TRIANGLE])
+def test_a_broken_mesh_names_the_file(package, content):
     write_meshes(package, ["panda_gripper"])
     path = next(package.rglob("hand_vis.stl"))
-    path.write_bytes(b"solid nothing\n")
+    path.write_bytes(content)
     robot = wbc_suite.load_robot("gripper/panda_gripper", skin="meshes")
     with pytest.raises(ConfigError, match=r"hand_vis\.stl"):
         robot.to_mjspec()

@@ -73,14 +73,14 @@ def read_points(path: Path) -> Matrix:
             points = _text_points(data, b"v")
         elif size == HEADER + count * TRIANGLE.itemsize:
             records = np.frombuffer(data, dtype=TRIANGLE, offset=HEADER)
-            points = records["corners"].reshape(-1, 3).astype(np.float64)
+            points = records["corners"].reshape(-1, 3)
         else:
             points = _text_points(data, b"vertex")
     except ValueError as error:
         raise DescriptionError(f"{path}: not a readable mesh: {error}.") from error
     if len(points) == 0 or not np.isfinite(points).all():
         raise DescriptionError(f"{path}: not a readable mesh: no finite points.")
-    return np.unique(points, axis=0)
+    return np.unique(points.astype(np.float64), axis=0)
 
 
 def _text_points(data: bytes, keyword: bytes) -> Matrix:
@@ -140,6 +140,8 @@ def _checked(vertices: Matrix, faces: Indices) -> tuple[Matrix, Indices]:
     shapes = vertices.shape[1:] == faces.shape[1:] == (3,)
     if not (shapes and faces.size and np.isfinite(vertices).all()):
         raise ValueError("no finite triangles")
+    if len(vertices) < 4:
+        raise ValueError("fewer than 4 vertices, which MuJoCo refuses")
     if faces.min() < 0 or faces.max() >= len(vertices):
         raise ValueError("triangles of vertices that it lacks")
     return vertices, faces
