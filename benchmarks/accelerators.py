@@ -41,7 +41,6 @@ CASES = (
     *(f"{name}-{robot}" for robot in ROBOTS for name in BENCHMARKS),
     *(f"{name}-{WALKING}" for name in ("LocoLift", "WalkTo")),
 )
-COSTS = "first_step_s", "other_steps_s"
 ENGINES = {"warp": "mujoco_warp", "mjx": "MJX"}
 Row = dict[str, Any]
 
@@ -69,14 +68,14 @@ def measure(case: str, engine: str, folder: Path, steps: int, timeout: float) ->
 
 def write_page(rows: list[Row]) -> None:
     """Write what each engine found, and why some cases do not exist."""
-    for engine, name in ENGINES.items():
+    for engine in ENGINES:
         if found := {row["case"]: row for row in rows if row["side"] == engine}:
-            write_between(PAGE, table(name, found), marks(engine))
-    reasons: dict[str, dict[str, None]] = {}
-    for row in rows:
-        if "not_made" in row:
-            reasons.setdefault(row["not_made"], {})[row["case"]] = None
-    lines = [f"- {', '.join(cases)}: {why}" for why, cases in reasons.items()]
+            write_between(PAGE, table(engine, found), marks(engine))
+    refused = {row["case"]: row["not_made"] for row in rows if "not_made" in row}
+    lines = [
+        f"- {', '.join(case for case in refused if refused[case] == why)}: {why}"
+        for why in dict.fromkeys(refused.values())
+    ]
     write_between(PAGE, "\n".join(lines), marks("refused"))
 
 
@@ -85,10 +84,10 @@ def marks(part: str) -> tuple[str, str]:
     return f"<!-- {part} -->", f"<!-- end of {part} -->"
 
 
-def table(name: str, found: dict[str, Row]) -> str:
+def table(engine: str, found: dict[str, Row]) -> str:
     """Return the results of an engine in Markdown."""
     stepped = [row for row in found.values() if "all" in row]
-    lines = [f"{name}, {len(stepped)} cases. {costs(stepped)}", ""]
+    lines = [f"{ENGINES[engine]}, {len(stepped)} cases. {costs(stepped)}", ""]
     lines.append("| benchmark | " + " | ".join(["usual robots", *ROBOTS]) + " |")
     lines.append("|---|" + "---|" * (1 + len(ROBOTS)))
     for benchmark in BENCHMARKS:
@@ -96,13 +95,14 @@ def table(name: str, found: dict[str, Row]) -> str:
         cells = [shown(found.get(case)) for case in cases]
         lines.append(f"| {benchmark} | " + " | ".join(cells) + " |")
     about = {f"{row['date']}, {row['machine']}" for row in found.values()}
-    command = f"`python benchmarks/accelerators.py --engine {stepped[0]['side']}`"
+    command = f"`python benchmarks/accelerators.py --engine {engine}`"
     return "\n".join([*lines, "", f"{command}, {' and '.join(sorted(about))}."])
 
 
 def costs(rows: list[Row]) -> str:
     """Return what the first step, with its compilation, and the others cost."""
-    first, others = ([row[key] for row in rows] for key in COSTS)
+    first = [row["first_step_s"] for row in rows]
+    others = [row["other_steps_s"] for row in rows]
     return (
         f"CPU time: {median(first):.0f} s in the median for the first step, which "
         f"compiles ({max(first):.0f} s at most), {median(others):.1f} s for the others "

@@ -54,11 +54,7 @@ def test_text_files_are_read(tmp_path):
         ("a.obj", b"v 1 2 x\n", "not a readable mesh: could not convert"),
         ("a.obj", b"v 1 2\nv 1 2 3\n", "not a readable mesh"),
         ("a.stl", b"\0" * 80 + b"\1\0\0\0" + b"\xff" * 50, "no finite points"),
-        (
-            "a.stl",
-            b"\0" * 80 + b"\1\0\0\0" + b"\0\0\xa0\x7f" * 12 + b"\0\0",
-            "no finite",
-        ),
+        ("a.stl", bytes(80) + b"\1\0\0\0" + SIGNALLING * 12 + b"\0\0", "no finite"),
     ],
 )
 def test_broken_files_are_refused(tmp_path, name, content, message):

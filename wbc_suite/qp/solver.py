@@ -82,7 +82,7 @@ class QpsolversSolver:
     proxqp runs at 1e-9: at its default it reports success with x off by 0.2 in flat
     directions when warm-started. Its dense form takes half the time of the sparse one.
     Iterations are capped, as daqp's are; daqp solves the problems on which these give
-    up.
+    up. Iterative refinement would take a fifth of clarabel's time and change nothing.
     """
 
     _SPARSE = ("osqp", "clarabel")
