@@ -62,9 +62,7 @@ class Problem:
 
     def set_equalities(self, b: Vector) -> None:
         """Set b, shape (equalities,), in both bound vectors."""
-        if len(b):
-            self.lower[-len(b) :] = b
-            self.upper[-len(b) :] = b
+        self.b[:] = self.lower[len(self.lower) - len(b) :] = b
 
     def copy(self, *, equalities: bool = True) -> "Problem":
         """Return a copy, with or without its equality rows."""

@@ -83,9 +83,8 @@ class QpsolversSolver:
     directions when warm-started. Its dense form takes half the time of the sparse one.
     Iterations are capped, as daqp's are; daqp solves the problems on which these give
     up. Iterative refinement would take a fifth of clarabel's time and change nothing.
+    Its bounds of x are stated as rows of G here: qpsolvers would take 0.3 ms for that.
     """
-
-    _SPARSE = ("osqp", "clarabel")
 
     _OPTIONS: ClassVar[dict[str, dict[str, Any]]] = {
         "proxqp": {**_EXACT, "backend": "dense", "max_iter": 100},
@@ -106,13 +105,15 @@ class QpsolversSolver:
         import qpsolvers
         from scipy.sparse import csc_matrix
 
-        used = problem.h < UNBOUNDED
-        matrix = csc_matrix if self.name in self._SPARSE else np.array
-        qp = qpsolvers.Problem(
-            matrix(problem.H), problem.c, lb=problem.lb, ub=problem.ub
-        )
-        if used.any():
-            qp.G, qp.h = matrix(problem.G[used]), problem.h[used]
+        nv, used = problem.nv, problem.h < UNBOUNDED
+        rows, h, lb, ub = problem.G[used], problem.h[used], problem.lb, problem.ub
+        if self.name == "clarabel":
+            rows = np.vstack([rows, np.eye(nv), -np.eye(nv)])
+            h, lb, ub = np.hstack([h, ub, -lb]), None, None
+        matrix = csc_matrix if self.name in ("osqp", "clarabel") else np.array
+        qp = qpsolvers.Problem(matrix(problem.H), problem.c, lb=lb, ub=ub)
+        if len(h):
+            qp.G, qp.h = matrix(rows), h
         if problem.equalities:
             qp.A, qp.b = matrix(problem.A), problem.b
         try:
@@ -126,13 +127,15 @@ class QpsolversSolver:
             return None
         if not solution.found or solution.x is None or solution.z_box is None:
             return None
+        z, z_box = np.array(solution.z), solution.z_box
+        if self.name == "clarabel":
+            z, above, below = np.split(z, [-2 * nv, -nv])
+            z_box = above - below
         multipliers = np.zeros(len(problem.upper))
-        nv, rows = problem.nv, len(problem.G)
-        multipliers[:nv] = solution.z_box
-        if used.any():
-            multipliers[nv : nv + rows][used] = solution.z
+        multipliers[:nv] = z_box
+        multipliers[nv : nv + len(used)][used] = z
         if problem.equalities:
-            multipliers[nv + rows :] = solution.y
+            multipliers[nv + len(used) :] = solution.y
         return np.array(solution.x), multipliers
 
 
