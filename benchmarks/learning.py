@@ -41,6 +41,8 @@ BENCHMARKS = (
     *("TwoArmLift", "TwoArmPegInHole", "TwoArmHandover"),
 )
 CONTROLLERS = ("OSC_POSE", "JOINT_VELOCITY")
+OPTIONS = {("Door", "OSC_POSE"): {"kp": 150.0}}
+"""Of controllers; 150 /s^2 is robosuite's stiffness, and that of the published runs."""
 EPOCHS = (5, 10, 20, 30, 50, 75, 100, 150, 200, 250, 300, 350, 400, 450, 500)
 KEY = ("benchmark", "robots", "controller", "seed", "steps")
 
@@ -90,7 +92,7 @@ def measure(
         "folder": str(folder / name),
         "benchmark": benchmark,
         "robots": robots.split(",") if "," in robots else robots,
-        "controller": controller,
+        "controller": {"type": controller, **OPTIONS.get((benchmark, controller), {})},
         "seed": seed,
         "steps": steps,
         "evaluate": evaluate,
@@ -138,8 +140,9 @@ def add(row: dict[str, Any]) -> None:
 def table(rows: list[dict[str, Any]]) -> str:
     """Return the results as a table in Markdown, one line per run."""
     lines = [
-        "| benchmark | robots | controller | seed | steps | return | success | hours "
-        "| published return at as many steps (five seeds) | published hours | date |",
+        "| benchmark | robots | controller | seed | steps | return | success "
+        "| hours (steps/s) | published return at as many steps (five seeds) "
+        "| published hours | date |",
         "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     for row in rows:
@@ -151,11 +154,12 @@ def table(rows: list[dict[str, Any]]) -> str:
             hours = (
                 f"{np.median(theirs['hours']):.0f} for {theirs['steps'][-1]:,} steps"
             )
+        rate = row["steps"] / max(3600 * row["hours"], 1.0)
         lines.append(
             f"| {row['benchmark']} | {row['robots']} | {row['controller']} "
             f"| {row['seed']} | {row['steps']:,} | {row['return']:.0f} "
-            f"| {100 * row['success']:.0f} % | {row['hours']:.2f} | {beside} | {hours} "
-            f"| {row['date']} |"
+            f"| {100 * row['success']:.0f} % | {row['hours']:.2f} ({rate:.0f}) "
+            f"| {beside} | {hours} | {row['date']} |"
         )
     machines = ", ".join(sorted({row["machine"] for row in rows}))
     commands = ", ".join(sorted({f"`{row['command']}`" for row in rows}))

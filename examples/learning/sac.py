@@ -84,6 +84,9 @@ def train(settings: Settings) -> tuple[Any, Path]:
     (folder / "settings.json").write_text(text, encoding="utf-8")
     envs: VecEnv = SubprocVecEnv([partial(make_env, settings)] * settings.envs)
     envs.seed(settings.seed)
+    network: dict[str, Any] = {"net_arch": list(settings.layers)}
+    if settings.library == "sbx":
+        network["layer_norm"] = settings.layer_norm
     model = resumed(settings, envs) or algorithm(settings)(
         "MlpPolicy",
         envs,
@@ -95,7 +98,8 @@ def train(settings: Settings) -> tuple[Any, Path]:
         learning_starts=settings.learning_starts,
         train_freq=1,
         gradient_steps=settings.gradient_steps,
-        policy_kwargs={"net_arch": list(settings.layers)},
+        n_steps=settings.returns,
+        policy_kwargs=network,
         tensorboard_log=str(folder / "tensorboard"),
     )
     checkpoints = CheckpointCallback(
