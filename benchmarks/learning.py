@@ -41,8 +41,8 @@ BENCHMARKS = (
     *("TwoArmLift", "TwoArmPegInHole", "TwoArmHandover"),
 )
 CONTROLLERS = ("OSC_POSE", "JOINT_VELOCITY")
-OPTIONS = {("Door", "OSC_POSE"): {"kp": 150.0}}
-"""Of controllers; 150 /s^2 is robosuite's stiffness, and that of the published runs."""
+CONTROLLER_OPTIONS = {("Door", "OSC_POSE"): {"kp": 150.0}}
+"""150 /s^2 is robosuite's stiffness, and that of the published runs; ours is 400."""
 EPOCHS = (5, 10, 20, 30, 50, 75, 100, 150, 200, 250, 300, 350, 400, 450, 500)
 KEY = ("benchmark", "robots", "controller", "seed", "steps")
 
@@ -92,7 +92,10 @@ def measure(
         "folder": str(folder / name),
         "benchmark": benchmark,
         "robots": robots.split(",") if "," in robots else robots,
-        "controller": {"type": controller, **OPTIONS.get((benchmark, controller), {})},
+        "controller": {
+            "type": controller,
+            **CONTROLLER_OPTIONS.get((benchmark, controller), {}),
+        },
         "seed": seed,
         "steps": steps,
         "evaluate": evaluate,

@@ -98,7 +98,7 @@ def train(settings: Settings) -> tuple[Any, Path]:
         learning_starts=settings.learning_starts,
         train_freq=1,
         gradient_steps=settings.gradient_steps,
-        n_steps=settings.returns,
+        n_steps=settings.n_steps,
         policy_kwargs=network,
         tensorboard_log=str(folder / "tensorboard"),
     )

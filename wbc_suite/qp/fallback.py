@@ -180,7 +180,8 @@ def _solve_with_slack(problem: Problem, damping: float) -> tuple[Vector, Vector]
     result = checked_solve(DaqpSolver(), relaxed)
     if result is None:
         return None
-    return result[0], np.hstack([result[1], weight * (A @ result[0] - b)])
+    x, multipliers = result
+    return x, np.concatenate([multipliers, weight * (A @ x - b)])
 
 
 @compiled

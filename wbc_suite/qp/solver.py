@@ -81,9 +81,8 @@ class QpsolversSolver:
 
     proxqp runs at 1e-9: at its default it reports success with x off by 0.2 in flat
     directions when warm-started. Its dense form takes half the time of the sparse one.
-    Iterations are capped, as daqp's are; daqp solves the problems on which these give
-    up. Iterative refinement would take a fifth of clarabel's time and change nothing.
-    Its bounds of x are stated as rows of G here: qpsolvers would take 0.3 ms for that.
+    Iterations are capped, as daqp's are; daqp solves what is left. clarabel's iterative
+    refinement would change nothing; qpsolvers takes 0.3 ms to state its bounds as rows.
     """
 
     _OPTIONS: ClassVar[dict[str, dict[str, Any]]] = {
