@@ -10,8 +10,10 @@ checkpoint and replay buffer. TensorBoard files and a curve are in the folder.
 import json
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
+from pickle import UnpicklingError
 from typing import Any
 
 import gymnasium
@@ -51,6 +53,17 @@ def algorithm(settings: Settings) -> Any:
     import stable_baselines3
 
     return stable_baselines3.SAC
+
+
+class Checkpoints(CheckpointCallback):
+    """Deletes all replay buffers but the last two: each takes up to a gigabyte."""
+
+    def _on_step(self) -> bool:
+        goes_on = super()._on_step()
+        if self.n_calls % self.save_freq == 0:
+            for path in saved(self.save_path)[:-2]:
+                buffer_of(path).unlink(missing_ok=True)
+        return goes_on
 
 
 class Curve(BaseCallback):
@@ -102,7 +115,7 @@ def train(settings: Settings) -> tuple[Any, Path]:
         policy_kwargs=network,
         tensorboard_log=str(folder / "tensorboard"),
     )
-    checkpoints = CheckpointCallback(
+    checkpoints = Checkpoints(
         save_freq=max(1, settings.save_every // settings.envs),
         save_path=str(folder),
         name_prefix="sac",
@@ -121,18 +134,26 @@ def train(settings: Settings) -> tuple[Any, Path]:
     return model, folder
 
 
+def saved(folder: str) -> list[Path]:
+    """Return the checkpoints, oldest first."""
+    found = Path(folder).glob("sac_*_steps.zip")
+    return sorted(found, key=lambda path: int(path.stem.split("_")[1]))
+
+
+def buffer_of(checkpoint: Path) -> Path:
+    """Return the file of a checkpoint's replay buffer."""
+    _, step, _ = checkpoint.stem.split("_")
+    return checkpoint.with_name(f"sac_replay_buffer_{step}_steps.pkl")
+
+
 def resumed(settings: Settings, envs: VecEnv) -> Any:
-    """Return the model of the last checkpoint, or None."""
-    found = sorted(
-        Path(settings.folder).glob("sac_*_steps.zip"),
-        key=lambda path: int(path.stem.split("_")[1]),
-    )
-    if not found:
-        return None
-    model = algorithm(settings).load(found[-1], env=envs)
-    step = found[-1].stem.split("_")[1]
-    model.load_replay_buffer(found[-1].with_name(f"sac_replay_buffer_{step}_steps.pkl"))
-    return model
+    """Return the model of the last checkpoint with a whole replay buffer, or None."""
+    for path in reversed(saved(settings.folder)):
+        with suppress(FileNotFoundError, EOFError, UnpicklingError):
+            model = algorithm(settings).load(path, env=envs)
+            model.load_replay_buffer(buffer_of(path))
+            return model
+    return None
 
 
 def evaluate(settings: Settings, act: Callable[[Any], Any]) -> list[tuple[float, bool]]:

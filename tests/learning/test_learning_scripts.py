@@ -115,3 +115,9 @@ def test_sac_trains_goes_on_and_is_evaluated(library, tmp_path):
     steps = [json.loads(line)["step"] for line in (tmp_path / "curve.jsonl").open()]
     assert steps == sorted(set(steps))
     assert steps[-1] > 160
+    whole, cut = (tmp_path / f"sac_replay_buffer_{n}_steps.pkl" for n in (160, 240))
+    assert set(tmp_path.glob("*.pkl")) == {whole, cut}
+    cut.write_bytes(cut.read_bytes()[:1000])
+    run("sac", *changes, "steps=320")
+    lines = (tmp_path / "curve.jsonl").read_text().splitlines()
+    assert json.loads(lines[len(steps)])["step"] <= 240  # goes on from 160
