@@ -21,7 +21,8 @@ SHORT += ["evaluate=1", "buffer=400", "layers=[16]", "envs=2"]
 def python(*arguments):
     if PYTHON is None:
         pytest.skip("torch is not installed: make .venv-learning/.installed")
-    environment = os.environ | {"PYTHONPATH": f"{ROOT}{os.pathsep}{SCRIPTS}"}
+    paths = f"{ROOT}{os.pathsep}{SCRIPTS}"
+    environment = os.environ | {"PYTHONPATH": paths, "OMP_NUM_THREADS": "1"}
     command = [PYTHON, *arguments]
     return subprocess.check_output(command, text=True, env=environment, timeout=400)
 
