@@ -52,6 +52,29 @@ def test_a_cube_that_flies_through_a_hand_is_not_lifted(env, speed, held):
     assert lift.success() == held
 
 
+AT_EDGES = [  # false successes that benchmarks/false_success.py found
+    (
+        [-0.01, 0.0137, 0.8815, 0.3914, 0.174, 0.1465, 0.8916],
+        [-0.016, 0.7722, 0.052, -2.0354, -0.116, 2.7873, 0.4514, 0.0216, 0.0219],
+    ),
+    (
+        [-0.0418, 0.0197, 0.9829, 0.3602, -0.2014, -0.1162, 0.9034],
+        [-0.0213, 0.397, 0.0431, -2.4239, -0.0407, 2.902, 0.6741, 0.0182, 0.0185],
+    ),
+]
+
+
+@pytest.mark.parametrize(("cube", "robot"), AT_EDGES)
+def test_a_cube_that_fingers_clamp_at_an_edge_is_not_lifted(env, cube, robot):
+    env.reset(seed=0)
+    env.benchmark.states["cube"].resize_box([0.021459] * 3, density=700.0)
+    env.simulation.data.qpos[:] = cube + robot
+    mujoco.mj_forward(env.simulation.model, env.simulation.data)
+    hand = env.benchmark.hands[0]
+    assert hand.clamps(env.benchmark.states["cube"].geoms, opposed=-0.5)
+    assert not env.benchmark.success()
+
+
 def test_a_cube_in_the_air_that_no_hand_holds_is_not_lifted(env):
     env.reset(seed=0)
     assert not put_cube(env, [0.0, 0.0, 0.9]).success()

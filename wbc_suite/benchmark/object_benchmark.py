@@ -42,8 +42,7 @@ log = logging.getLogger(__name__)
 TRIES = 50
 """Placements that are drawn if a robot touches the objects of the first."""
 PRESSED = 1e-3  # depth from which an object is in the arena, and not on it, m
-PARKED = (8.0, 8.0)
-"""Place of objects that are not used in an episode, m."""
+PARKED = (8.0, 8.0)  # place of objects that are not used in an episode, m
 SLIP = 0.2  # m/s, between a hand and what it holds, at most
 BELOW_ONE = float(np.nextafter(1.0, 0.0))
 
@@ -90,6 +89,7 @@ class ObjectBenchmark(ABC):
     robots: Sequence[str] = ("Panda",)
     gripper: str | None = None
     needs_gripper = True
+    opposed = -0.5  # most of the product of the normals from two sides of a grip
     pushes: Sequence[Push] = ()
 
     def __init__(self, config: ObjectBenchmarkConfig) -> None:
@@ -315,7 +315,8 @@ class ObjectBenchmark(ABC):
 
     def holds(self, hand: Hand, name: str, geoms: Collection[int]) -> bool:
         """Whether a hand clamps geoms of an object, which moves with it."""
-        return hand.clamps(geoms) and hand.slip(self.states[name].body) < SLIP
+        slip = hand.slip(self.states[name].body)
+        return hand.clamps(geoms, self.opposed) and slip < SLIP
 
     def rests(self, name: str) -> bool:
         """Whether an object lies still on something that is no robot."""

@@ -10,9 +10,6 @@ from wbc_suite.control import RobotState
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Vector
 
-OPPOSED = -0.5
-"""Greatest product of the normals of contacts from opposite sides."""
-
 
 def pairs_in_contact(data: mujoco.MjData) -> list[list[int]]:
     """Return the two geoms of each contact."""
@@ -58,8 +55,8 @@ class Hand:
         }
         return len(touching - {None}) >= 2
 
-    def clamps(self, geoms: Collection[int]) -> bool:
-        """Whether two links touch an object from sides at least 120 degrees apart."""
+    def clamps(self, geoms: Collection[int], opposed: float) -> bool:
+        """Whether two links touch an object, their normals' product below `opposed`."""
         touching: list[tuple[int, Vector]] = []
         for pair, frame in zip(
             pairs_in_contact(self._data), self._data.contact.frame, strict=True
@@ -68,7 +65,7 @@ class Hand:
                 if own in self._body_of and other in geoms:
                     touching.append((self._body_of[own], side * frame[:3]))
         return any(
-            a != b and float(n @ m) < OPPOSED
+            a != b and float(n @ m) < opposed
             for (a, n), (b, m) in itertools.combinations(touching, 2)
         )
 
