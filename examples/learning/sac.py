@@ -24,6 +24,10 @@ from stable_baselines3.common.callbacks import (
     CheckpointCallback,
 )
 from stable_baselines3.common.monitor import Monitor
+from stable_baselines3.common.noise import (
+    OrnsteinUhlenbeckActionNoise,
+    VectorizedActionNoise,
+)
 from stable_baselines3.common.vec_env import SubprocVecEnv, VecEnv
 from training import Settings, arguments
 
@@ -112,6 +116,7 @@ def train(settings: Settings) -> tuple[Any, Path]:
         train_freq=1,
         gradient_steps=settings.gradient_steps,
         n_steps=settings.n_steps,
+        action_noise=exploration_noise(settings, envs) if settings.noise else None,
         policy_kwargs=network,
         tensorboard_log=str(folder / "tensorboard"),
     )
@@ -132,6 +137,18 @@ def train(settings: Settings) -> tuple[Any, Path]:
     model.save(folder / "last")
     envs.close()
     return model, folder
+
+
+def exploration_noise(settings: Settings, envs: VecEnv) -> VectorizedActionNoise:
+    """Return noise for the actions of each environment.
+
+    It is an Ornstein-Uhlenbeck process with the standard deviation `noise`, whose
+    correlation falls to 1/e in `noise_steps`.
+    """
+    size, keep = envs.action_space.shape[0], np.exp(-1.0 / settings.noise_steps)
+    sigma = np.full(size, settings.noise * np.sqrt(1.0 - keep**2))
+    one = OrnsteinUhlenbeckActionNoise(np.zeros(size), sigma, theta=1.0 - keep, dt=1.0)
+    return VectorizedActionNoise(one, envs.num_envs)
 
 
 def saved(folder: str) -> list[Path]:

@@ -15,7 +15,7 @@ PYTHON = next((python for python in ENVIRONMENTS if python.exists()), None)
 CLONING = ("bc", "bc_history", "diffusion")
 SMALL = ["save_every=20", "evaluate=1", "horizon=20", "width=32"]
 SHORT = ["horizon=20", "learning_starts=40", "save_every=80", "log_every=40"]
-SHORT += ["evaluate=1", "buffer=400", "layers=[16]", "envs=2"]
+SHORT += ["evaluate=1", "buffer=400", "layers=[16]", "envs=2", "noise=0.5"]
 
 
 def python(*arguments):

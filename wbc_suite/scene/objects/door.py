@@ -27,7 +27,7 @@ def door(name: str, *, latch: bool = True) -> SceneObject:
     Its origin is on the floor, below the middle of the panel. The panel is the body
     `{name}_panel`, the lever `{name}_handle`; their joints are `{name}_panel_joint` (0
     closed) and `{name}_handle_joint` (0 level). Sites: `{name}_handle_grip`. With a
-    latch, a bolt behind the far post keeps it shut until the lever is turned by 80
+    latch, a bolt behind the far post keeps it shut until the lever is turned by 72
     degrees; otherwise the lever is fixed.
     """
     hinge_x = -(HALF_WIDTH + GAP)
