@@ -76,6 +76,27 @@ def test_accelerator_holds_still_as_the_exact_model_does(env):
     np.testing.assert_allclose(ends[0], ends[1], atol=1e-3)
 
 
+def test_accelerator_damps_joints_as_servos_below_their_limit_do():
+    env = wbc_suite.make("Lift", robots="GR1")
+    env.reset(seed=0)
+    forces = []
+    for variant in ("exact", "accelerator"):
+        model = wbc_suite.export_model(env, variant=variant)
+        servos = model.actuator_biastype == mujoco.mjtBias.mjBIAS_AFFINE
+        damped = servos & (model.actuator_biasprm[:, 2] != 0.0)
+        assert damped.sum() == (12 if variant == "exact" else 0)
+        data = mujoco.MjData(model)
+        data.qpos[:] = env.simulation.data.qpos
+        data.qvel[:] = 0.1
+        mujoco.mj_forward(model, data)
+        data.ctrl[:] = data.actuator_length * servos
+        mujoco.mj_forward(model, data)
+        assert (abs(data.actuator_force) < model.actuator_forcerange[:, 1]).all()
+        forces.append(data.qfrc_actuator + data.qfrc_passive)
+    np.testing.assert_allclose(*forces, atol=1e-12)
+    assert abs(forces[0]).max() > 0.01
+
+
 @pytest.mark.parametrize(
     ("arguments", "mode"),
     [

@@ -31,8 +31,10 @@ def export_model(
             long cylinders that collide, and boxes in place of flat ones, since MJX does
             not collide cylinders with boxes; and pyramidal friction cones, since with
             elliptic ones MJX makes a dense matrix of all possible contacts: 10 GB for
-            GR1. Masses and inertias stay; contacts differ at the edges, by at most the
-            radius, and friction by its direction.
+            GR1. Joints have the damping of their servos, since MJX's implicit
+            integrator counts a servo's damping also at its force limit, and MuJoCo's
+            does not. Masses and inertias stay; contacts differ at the edges, by at most
+            the radius, friction by its direction, and servos where they are saturated.
     """
     simulation = env.unwrapped.simulation
     model = copy.deepcopy(simulation.model)
@@ -42,6 +44,7 @@ def export_model(
     if variant == "accelerator":
         model.opt.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
         _replace_cylinders(model)
+        _damp_joints(model)
     return model
 
 
@@ -63,3 +66,14 @@ def _replace_cylinders(model: mujoco.MjModel) -> None:
         if model.geom_type[geom] == GEOMS.mjGEOM_CAPSULE:
             low = np.array([radius, radius, half])
         model.geom_aabb[geom, 3:] = low
+
+
+def _damp_joints(model: mujoco.MjModel) -> None:
+    """Write the damping of servos with a force limit as damping of their joints."""
+    of_joints = model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT
+    affine = model.actuator_biastype == mujoco.mjtBias.mjBIAS_AFFINE
+    for servo in np.flatnonzero(of_joints & affine & (model.actuator_forcelimited > 0)):
+        dof = model.jnt_dofadr[model.actuator_trnid[servo, 0]]
+        damping = -model.actuator_biasprm[servo, 2] * model.actuator_gear[servo, 0] ** 2
+        model.dof_damping[dof] += damping
+        model.actuator_biasprm[servo, 2] = 0.0
