@@ -16,7 +16,7 @@ HOLDING = [(True, True), (True, False), (False, True), (False, False)]
 def hold(monkeypatch, task, holding):
     for hand, holds in zip(task.hands, holding, strict=True):
         for measure in ("grasps", "clamps"):
-            monkeypatch.setattr(hand, measure, lambda geoms, holds=holds: holds)
+            monkeypatch.setattr(hand, measure, lambda *_, holds=holds: holds)
 
 
 @pytest.mark.parametrize(("robots", "way"), WAYS)
