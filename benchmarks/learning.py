@@ -41,8 +41,8 @@ BENCHMARKS = (
     *("TwoArmLift", "TwoArmPegInHole", "TwoArmHandover"),
 )
 CONTROLLERS = ("OSC_POSE", "JOINT_VELOCITY")
-OPTIONS = {"Door": {"noise": 0.5}}
-"""Settings beside sac.toml. Without the noise the lever is turned, but never pulled."""
+SETTINGS = {"Door": {"noise": 0.5}}
+"""In place of those in sac.toml. Without it the lever is turned, but never pulled."""
 CONTROLLER_OPTIONS = {("Door", "OSC_POSE"): {"kp": 150.0}}
 """150 /s^2 is robosuite's stiffness, and that of the published runs; ours is 400."""
 EPOCHS = (5, 10, 20, 30, 50, 75, 100, 150, 200, 250, 300, 350, 400, 450, 500)
@@ -101,7 +101,7 @@ def measure(
         "seed": seed,
         "steps": steps,
         "evaluate": evaluate,
-        **OPTIONS.get(benchmark, {}),
+        **SETTINGS.get(benchmark, {}),
     }
     settings = Settings(settings)
     model, run = sac.train(settings)

@@ -55,7 +55,7 @@ class Lift(ObjectBenchmark):
     Unlike there, a cube that is thrown or batted up is not lifted: a hand must hold it.
     """
 
-    opposed = -0.94  # cos(160 deg): fingers that clamp an edge lose it in 0.1 s
+    grip_angle = math.radians(160.0)  # from an edge, the cube slips away in 0.1 s
 
     def __init__(self, path: Source) -> None:
         self.config = load_config(LiftConfig, path)

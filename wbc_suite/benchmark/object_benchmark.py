@@ -89,7 +89,7 @@ class ObjectBenchmark(ABC):
     robots: Sequence[str] = ("Panda",)
     gripper: str | None = None
     needs_gripper = True
-    opposed = -0.5  # most of the product of the normals from two sides of a grip
+    grip_angle = math.radians(120.0)  # between the sides of a grip, at least
     pushes: Sequence[Push] = ()
 
     def __init__(self, config: ObjectBenchmarkConfig) -> None:
@@ -315,8 +315,8 @@ class ObjectBenchmark(ABC):
 
     def holds(self, hand: Hand, name: str, geoms: Collection[int]) -> bool:
         """Whether a hand clamps geoms of an object, which moves with it."""
-        slip = hand.slip(self.states[name].body)
-        return hand.clamps(geoms, self.opposed) and slip < SLIP
+        body = self.states[name].body
+        return hand.clamps(geoms, self.grip_angle) and hand.slip(body) < SLIP
 
     def rests(self, name: str) -> bool:
         """Whether an object lies still on something that is no robot."""

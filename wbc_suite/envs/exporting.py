@@ -31,10 +31,10 @@ def export_model(
             long cylinders that collide, and boxes in place of flat ones, since MJX does
             not collide cylinders with boxes; and pyramidal friction cones, since with
             elliptic ones MJX makes a dense matrix of all possible contacts: 10 GB for
-            GR1. Joints have the damping of their servos, since MJX's implicit
-            integrator counts a servo's damping also at its force limit, and MuJoCo's
-            does not. Masses and inertias stay; contacts differ at the edges, by at most
-            the radius, friction by its direction, and servos where they are saturated.
+            GR1. Damping of servos with a force limit is damping of their joints, since
+            MJX's implicit integrator counts it at the limit too, and MuJoCo's does not.
+            Masses and inertias stay; contacts differ at the edges, by at most the
+            radius, friction by its direction, and servos where they are saturated.
     """
     simulation = env.unwrapped.simulation
     model = copy.deepcopy(simulation.model)

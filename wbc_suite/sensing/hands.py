@@ -55,8 +55,8 @@ class Hand:
         }
         return len(touching - {None}) >= 2
 
-    def clamps(self, geoms: Collection[int], opposed: float) -> bool:
-        """Whether two links touch an object, their normals' product below `opposed`."""
+    def clamps(self, geoms: Collection[int], angle: float) -> bool:
+        """Whether two links touch an object from sides at least an angle apart, rad."""
         touching: list[tuple[int, Vector]] = []
         for pair, frame in zip(
             pairs_in_contact(self._data), self._data.contact.frame, strict=True
@@ -65,7 +65,7 @@ class Hand:
                 if own in self._body_of and other in geoms:
                     touching.append((self._body_of[own], side * frame[:3]))
         return any(
-            a != b and float(n @ m) < opposed
+            a != b and float(n @ m) < np.cos(angle)
             for (a, n), (b, m) in itertools.combinations(touching, 2)
         )
 
