@@ -40,6 +40,11 @@ def headset():
     headset.stop()
 
 
+class NoRedirect(urllib.request.HTTPRedirectHandler):
+    def redirect_request(self, *_):
+        return None
+
+
 def get(url, **options):
     return urllib.request.urlopen(url, timeout=PATIENCE, **options)
 
@@ -65,8 +70,10 @@ def test_every_file_is_served_and_names_no_other_site(headset):
             addresses = set(re.findall(r"(?:https?:)?//[\w.-]+", text))
             assert {a for a in addresses if "localhost" not in a and "127.0" not in a
                     and not a.startswith("// ")} == set()  # fmt: skip
+        policies = answer.headers.get_all("Content-Security-Policy")
+        assert any("frame-ancestors 'none'" in policy for policy in policies)
         if name != "qr.svg":
-            assert "connect-src 'self'" in answer.headers["Content-Security-Policy"]
+            assert any("connect-src 'self'" in policy for policy in policies)
     with pytest.raises(urllib.error.HTTPError, match="404"):
         get(headset.url + "three.LICENSE")
 
@@ -149,6 +156,11 @@ def test_for_others_it_uses_tls_and_a_token(tmp_path, monkeypatch):
             urllib.request.HTTPCookieProcessor(),
         )
         address = f"{here}page.css?token={headset.token}"
+        with pytest.raises(urllib.error.HTTPError) as redirect:
+            urllib.request.build_opener(
+                urllib.request.HTTPSHandler(context=trust), NoRedirect()
+            ).open(address, timeout=PATIENCE)
+        assert "; Secure" in redirect.value.headers["Set-Cookie"]
         assert b"main canvas" in opener.open(address, timeout=PATIENCE).read()
         assert "█" in headset.help
         assert "SHA-256" in headset.help

@@ -95,6 +95,7 @@ def test_token_in_the_address_becomes_a_cookie_that_admits(token_server):
     cookie = answer.headers["Set-Cookie"]
     assert "HttpOnly" in cookie
     assert "SameSite=Lax" in cookie
+    assert "Secure" not in cookie  # it is plain HTTP
     answer, body = get(token_server, Cookie=cookie.split(";")[0])
     assert (answer.status, body) == (200, "page")
 
@@ -117,6 +118,40 @@ def test_page_of_another_site_is_refused(server, served):
     own = f"http://127.0.0.1:{server.port}"
     assert get(server, Upgrade="websocket", Origin=own)[0].status == 200
     assert len(served) == 1
+
+
+@pytest.mark.parametrize(
+    ("site", "loads", "status"),
+    [
+        ("cross-site", "iframe", 403),
+        ("same-site", "iframe", 403),  # another port of this machine
+        ("cross-site", "image", 403),
+        ("cross-site", "script", 403),
+        ("cross-site", "document", 200),  # a link to the page
+        ("none", "document", 200),
+        ("same-origin", "script", 200),
+    ],
+)
+def test_pages_of_other_sites_may_link_but_not_load(server, site, loads, status):
+    asked = {"Sec_Fetch_Site": site, "Sec_Fetch_Dest": loads}
+    assert get(server, **asked)[0].status == status
+
+
+@pytest.mark.parametrize("origin", ["null", "http://[", "\x9b31m", "//", ""])
+def test_what_is_no_origin_is_refused(server, caplog, origin):
+    assert get(server, Origin=origin)[0].status == 403
+    assert caplog.text.replace("\n", "").isprintable()
+
+
+@pytest.mark.parametrize("path", ["/", "/missing", "/?token=wrong"])
+def test_every_answer_keeps_the_page_out_of_frames(token_server, path):
+    for cookie in ("", f"wbc_token_{token_server.port}={TOKEN}"):
+        headers = get(token_server, path, Cookie=cookie)[0].headers
+        assert "frame-ancestors 'none'" in headers["Content-Security-Policy"]
+        assert headers["X-Frame-Options"] == "DENY"
+        assert headers["X-Content-Type-Options"] == "nosniff"
+        assert headers["Referrer-Policy"] == "no-referrer"
+        assert headers["Cross-Origin-Resource-Policy"] == "same-origin"
 
 
 def test_name_that_points_at_this_machine_is_refused(server):

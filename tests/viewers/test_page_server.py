@@ -1,6 +1,9 @@
 """viser through its proxy: pages and messages pass, the share tunnel does not."""
 
 import gzip
+import os
+import stat
+import sys
 import threading
 import time
 import urllib.error
@@ -10,11 +13,15 @@ import msgspec
 import pytest
 import viser
 import websockets
+import websockets.asyncio.server
 from websockets.sync.client import connect
-from websockets.sync.server import serve
+from websockets.sync.server import unix_serve
 from websockets.typing import Subprotocol
 
+from tests.listening import listening
 from wbc_suite.devices.web_server import WebServer
+from wbc_suite.errors import DeviceError
+from wbc_suite.viewers import private_viser
 from wbc_suite.viewers.page_server import PageServer, proxy
 
 PATIENCE = 60.0  # s, for a busy machine
@@ -36,7 +43,7 @@ def open_site():
 
 
 @pytest.fixture
-def echo():
+def echo(tmp_path):
     """The port of a proxy in front of a server that sends every message back."""
 
     def answer(connection):
@@ -48,18 +55,16 @@ def echo():
             else:
                 connection.send(message)
 
-    upstream = serve(
+    upstream = unix_serve(
         answer,
-        "127.0.0.1",
-        0,
+        str(tmp_path / "echo"),
         subprotocols=[Subprotocol("b")],
         select_subprotocol=lambda _, offered: offered[-1] if offered else None,
         max_size=None,
     )
     thread = threading.Thread(target=upstream.serve_forever, daemon=True)
     thread.start()
-    port = upstream.socket.getsockname()[1]
-    routes = proxy(port, admits=lambda message: message != "bad")
+    routes = proxy(tmp_path / "echo", admits=lambda message: message != "bad")
     server = WebServer("127.0.0.1", 0, routes, token=None)
     yield server.port
     server.stop()
@@ -119,6 +124,49 @@ def test_open_address_has_a_token_and_needs_it(open_site):
         socket_to(open_site.port)
     with socket_to(open_site.port, f"/?token={open_site.token}") as client:
         assert len(client.recv(timeout=PATIENCE)) > 16
+
+
+on_linux = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+
+
+@on_linux
+def test_only_the_proxy_listens_where_others_reach_it():
+    before = set(listening(os.getpid()))
+    site = PageServer(port=0)
+    found = set(listening(os.getpid())) - before
+    folder = site.server.path.parent
+    mode = stat.S_IMODE(folder.stat().st_mode)
+    site.stop()
+    assert found == {
+        ("tcp", "127.0.0.1", site.port),
+        ("unix", str(site.server.path), 0),
+    }
+    assert mode == 0o700
+    assert not folder.exists()
+
+
+@on_linux
+def test_viser_that_listens_elsewhere_is_stopped(monkeypatch):
+    """A release of viser that does not call `serve` where this one does."""
+    other = type("Module", (), {"serve": None})
+    monkeypatch.setattr(private_viser, "websockets_server", other)
+    before = set(listening(os.getpid()))
+    with pytest.raises(DeviceError, match="listening on a port"):
+        PageServer(port=0)
+    assert set(listening(os.getpid())) == before
+
+
+def test_other_servers_of_websockets_are_left_alone(site):
+    assert websockets.asyncio.server.serve.__module__ == "websockets.asyncio.server"
+    assert isinstance(site.server, viser.ViserServer)
+
+
+def test_long_name_of_the_temporary_folder_is_told(monkeypatch, tmp_path):
+    long = tmp_path / ("x" * 100)
+    long.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(long))
+    with pytest.raises(DeviceError, match="TMPDIR"):
+        PageServer(port=0)
 
 
 def test_share_tunnel_cannot_be_requested(monkeypatch):
@@ -195,8 +243,9 @@ def test_relayed_drag_at_100_hz_comes_back_within_a_frame(echo):
     assert sorted(delays)[len(delays) // 2] < 0.02
 
 
-def test_page_server_that_is_gone_is_a_bad_gateway():
-    server = WebServer("127.0.0.1", 0, proxy(9, admits=bool), token=None)
+def test_page_server_that_is_gone_is_a_bad_gateway(tmp_path):
+    routes = proxy(tmp_path / "gone", admits=bool)
+    server = WebServer("127.0.0.1", 0, routes, token=None)
     try:
         with pytest.raises(urllib.error.HTTPError, match="502"):
             urllib.request.urlopen(f"http://127.0.0.1:{server.port}/", timeout=PATIENCE)

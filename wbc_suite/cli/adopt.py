@@ -58,5 +58,7 @@ def adopt(
     said = [line.removeprefix(f"{file}: ") for line in notes.lines]
     site = PageServer(host, port)
     page = AdoptPage(robot, site, notes=said, folder=output, say=print)
-    options.serve_until_interrupted(site, f"Adopt {robot.name}")
-    page.stop()
+    try:
+        options.serve_until_interrupted(site, f"Adopt {robot.name}")
+    finally:
+        page.stop()

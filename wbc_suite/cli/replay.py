@@ -80,8 +80,10 @@ def _show(
     site = PageServer(host, port)
     page = ReplayPage(player, env, site, label=f"Replay · {file.name}")
     page.start()
-    options.serve_until_interrupted(page.site, f"Replay of {file}:")
-    page.stop()
+    try:
+        options.serve_until_interrupted(page.site, f"Replay of {file}:")
+    finally:
+        page.stop()
 
 
 def _play(env: "RobotEnv", episode: "Episode", *, by_states: bool) -> bool:

@@ -34,8 +34,11 @@ def view(
         robot, gripper=chosen, base=base, skin=skin, mesh_root=mesh_root
     )
     page = RobotPage(description, PageServer(host, port))
-    options.serve_until_interrupted(page.site, description.title or description.name)
-    page.stop()
+    title = description.title or description.name
+    try:
+        options.serve_until_interrupted(page.site, title)
+    finally:
+        page.stop()
 
 
 def render(

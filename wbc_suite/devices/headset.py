@@ -29,7 +29,7 @@ FILES = (
 )
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
-    "connect-src 'self'; form-action 'none'; frame-ancestors 'none'"
+    "connect-src 'self'"
 )
 
 

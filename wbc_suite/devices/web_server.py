@@ -3,6 +3,8 @@
 - A page of another site in the user's browser must not reach the server: the `Origin`
   of a request must be the host that it asks for. Without a token that host must be a
   loopback address, which stops DNS names that point at 127.0.0.1.
+- Such a page must not get files or show pages of the server as its own either: its
+  requests other than links are refused, and `HEADERS` keep pages out of frames.
 - Clients on other machines need the token. The address that opens the page carries it
   once; the answer replaces it by a cookie that scripts cannot read.
 """
@@ -31,6 +33,20 @@ logger = logging.getLogger(__name__)
 CONNECTIONS = 256  # at a time; a browser opens one, and a few more while it loads
 HEAD_TIMEOUT = 10.0  # s, to the first and between two complete requests
 SHUTDOWN_TIMEOUT = 0.2  # s; handlers of open WebSockets are cancelled after it
+
+HEADERS = {
+    hdrs.CONTENT_SECURITY_POLICY: "frame-ancestors 'none'; base-uri 'none'; "
+    "form-action 'none'; object-src 'none'",
+    "X-Frame-Options": "DENY",
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",  # the address may hold the token
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+}
+"""Headers of every answer. A page may add a stricter policy: browsers keep both.
+
+Source: OWASP, HTTP Security Response Headers Cheat Sheet
+"""
 
 
 def is_loopback(host: str) -> bool:
@@ -104,6 +120,7 @@ class WebServer:
         self._loop, self._stopping = asyncio.get_running_loop(), asyncio.Event()
         app = web.Application(middlewares=[self._admit])
         app.add_routes(self._routes)
+        app.on_response_prepare.append(_add_headers)
         runner = web.AppRunner(
             app,
             access_log=None,
@@ -153,6 +170,11 @@ class WebServer:
         self._no_request_yet.discard(request.protocol)
         refusal = self._rules.refusal(request)
         return await handler(request) if refusal is None else refusal
+
+
+async def _add_headers(_: web.Request, response: web.StreamResponse) -> None:
+    for name, value in HEADERS.items():
+        response.headers.add(name, value)
 
 
 class _Refused(asyncio.Protocol):
@@ -205,9 +227,7 @@ class AccessRules:
                 HTTPStatus.FORBIDDEN,
                 "This page is served to this machine only: open it as 127.0.0.1.",
             )
-        origin = request.headers.get(hdrs.ORIGIN)
-        if origin is not None and urlsplit(origin).netloc != host:
-            logger.warning("Refused a request from a page of %s.", origin)
+        if _is_foreign(request, host):
             return _response(HTTPStatus.FORBIDDEN, "Cross-site requests are refused.")
         return None if self._token is None else self._check_token(self._token, request)
 
@@ -226,8 +246,26 @@ class AccessRules:
         response = _response(HTTPStatus.SEE_OTHER)
         path = request.rel_url.raw_path.lstrip("/\\")  # a redirect to this host only
         response.headers[hdrs.LOCATION] = f"/{path}"
-        response.set_cookie(self._cookie, token, httponly=True, samesite="Lax")
+        response.set_cookie(
+            self._cookie, token, httponly=True, samesite="Lax", secure=request.secure
+        )
         return response
+
+
+def _is_foreign(request: web.Request, host: str) -> bool:
+    """Return whether a page of another site sent a request, but for a followed link.
+
+    Browsers send the origin with WebSockets, and `Sec-Fetch-*` with what a page loads.
+    """
+    origin = request.headers.get(hdrs.ORIGIN)
+    if origin is not None and origin.partition("://")[2] != host:
+        logger.warning("Refused a request from a page of %.200r.", origin)
+        return True
+    site = request.headers.get("Sec-Fetch-Site", "none")
+    return (
+        site not in ("same-origin", "none")
+        and request.headers.get("Sec-Fetch-Dest") != "document"
+    )
 
 
 def _response(status: HTTPStatus, text: str = "") -> web.Response:

@@ -1,22 +1,22 @@
 """The server of every browser page: viser, behind a reverse proxy that checks access.
 
-viser serves pages and messages on 127.0.0.1 without tokens or origins. The proxy
-listens where clients connect, admits them by `AccessRules`, fetches pages and relays
-WebSocket messages. A client that sends an invalid one is disconnected. The proxy adds
-the script of `HeldKeys` to the page, and style and script of `pages/page.*`.
+viser has neither tokens nor checks of origins, so it listens on a Unix socket of this
+user only, see `PrivateViser`. The proxy listens where clients connect, admits them by
+`AccessRules`, fetches pages and relays WebSocket messages. A client that sends an
+invalid one is disconnected. The proxy adds the script of `HeldKeys` to the page, and
+style and script of `pages/page.*`.
 """
 
 import asyncio
-import contextlib
 import html
-import io
 import logging
 import threading
 import time
 from collections.abc import Callable, Sequence
 from http import HTTPStatus
 from importlib import resources
-from typing import TYPE_CHECKING, TypeAlias
+from pathlib import Path
+from typing import TypeAlias
 from urllib.parse import quote
 
 import aiohttp
@@ -26,9 +26,6 @@ from wbc_suite.devices.web_server import WebServer, page_url, token_for
 from wbc_suite.errors import DeviceError
 from wbc_suite.viewers import page_messages
 from wbc_suite.viewers.held_keys import HeldKeys
-
-if TYPE_CHECKING:
-    import viser
 
 log = logging.getLogger(__name__)
 
@@ -64,8 +61,10 @@ class PageServer:
     """
 
     def __init__(self, host: str = "127.0.0.1", port: int | None = None) -> None:
+        from wbc_suite.viewers.private_viser import PrivateViser  # viser is heavy
+
         self.host, self.token = host, token_for(host)
-        self.server, self.keys = _start_viser(), HeldKeys()
+        self.server, self.keys = PrivateViser(), HeldKeys()
         self.title = "wbc_suite"
         try:
             self._proxy = self._start_proxy(PORTS if port is None else [port])
@@ -95,8 +94,7 @@ class PageServer:
         if self._updates is not None:
             self._updates.join()
         self._proxy.stop()
-        with contextlib.redirect_stdout(io.StringIO()):
-            self.server.stop()
+        self.server.stop()
 
     def _run_updates(self, update: Callable[[int], None]) -> None:
         count = 0
@@ -123,9 +121,7 @@ class PageServer:
         routes = [
             *self.keys.routes,
             *(web.get(path, _send_own) for path in OWN),
-            *proxy(
-                self.server.get_port(), self._rewrite, admits=page_messages.is_valid
-            ),
+            *proxy(self.server.path, self._rewrite, admits=page_messages.is_valid),
         ]
         for port in ports:
             try:
@@ -144,54 +140,44 @@ async def _send_own(request: web.Request) -> web.Response:
     )
 
 
-def _start_viser() -> "viser.ViserServer":
-    """Start viser on 127.0.0.1, silent and without its public share tunnel."""
-    import viser
-
-    class Server(viser.ViserServer):
-        """A server whose clients cannot publish it through viser's share service."""
-
-        def request_share_url(self, verbose: bool = True) -> str | None:
-            return None
-
-    with contextlib.redirect_stdout(io.StringIO()):
-        return Server(host="127.0.0.1", port=0, verbose=False)
-
-
 def proxy(
-    port: int,
+    path: Path,
     rewrite: Callable[[bytes], bytes] = bytes,
     *,
     admits: Callable[[str | bytes], bool],
 ) -> list[web.AbstractRouteDef]:
-    """Return routes that pass every GET request on to a port of 127.0.0.1.
+    """Return routes that pass every GET request on to a Unix socket.
 
     Args:
-        port: The port.
+        path: The socket.
         rewrite: Changes the page at `/`.
         admits: Whether a client may send a message; others end its connection.
     """
 
     async def handle(request: web.Request) -> web.StreamResponse:
-        target = f"http://127.0.0.1:{port}{quote(request.path)}"
+        target = f"http://localhost{quote(request.path)}"
+        upstream = aiohttp.ClientSession(
+            connector=aiohttp.UnixConnector(str(path), force_close=True),
+            auto_decompress=request.path == "/",
+        )
         try:
-            if request.headers.get(hdrs.UPGRADE, "").lower() == "websocket":
-                return await _relay(request, target, admits)
-            if request.path == "/":
-                return await _fetch_page(target, rewrite)
-            return await _fetch(request, target)
+            async with upstream:
+                if request.headers.get(hdrs.UPGRADE, "").lower() == "websocket":
+                    return await _relay(request, upstream, target, admits)
+                if request.path == "/":
+                    return await _fetch_page(upstream, target, rewrite)
+                return await _fetch(request, upstream, target)
         except (aiohttp.ClientError, TimeoutError):
             return web.Response(status=HTTPStatus.BAD_GATEWAY)
 
     return [web.get("/{path:.*}", handle, allow_head=False)]
 
 
-async def _fetch_page(target: str, rewrite: Callable[[bytes], bytes]) -> web.Response:
+async def _fetch_page(
+    upstream: aiohttp.ClientSession, target: str, rewrite: Callable[[bytes], bytes]
+) -> web.Response:
     """Fetch the page; it is decoded, changed and compressed."""
-    async with (
-        aiohttp.ClientSession() as session,
-        session.get(target, allow_redirects=False) as answer,
-    ):
+    async with upstream.get(target, allow_redirects=False) as answer:
         kind = answer.headers.get(hdrs.CONTENT_TYPE, "text/html")
         page = web.Response(
             status=answer.status,
@@ -202,17 +188,13 @@ async def _fetch_page(target: str, rewrite: Callable[[bytes], bytes]) -> web.Res
         return page
 
 
-async def _fetch(request: web.Request, target: str) -> web.Response:
+async def _fetch(
+    request: web.Request, upstream: aiohttp.ClientSession, target: str
+) -> web.Response:
     """Fetch a page or a file; its encoding is left as it is."""
     encoding = request.headers.get(hdrs.ACCEPT_ENCODING, "identity")
-    async with (
-        aiohttp.ClientSession(
-            auto_decompress=False,
-            connector=aiohttp.TCPConnector(force_close=True),
-            headers={hdrs.ACCEPT_ENCODING: encoding},
-        ) as session,
-        session.get(target, allow_redirects=False) as answer,
-    ):
+    accepted = {hdrs.ACCEPT_ENCODING: encoding}
+    async with upstream.get(target, headers=accepted, allow_redirects=False) as answer:
         kept = (hdrs.CONTENT_TYPE, hdrs.CONTENT_ENCODING)
         headers = {k: answer.headers[k] for k in kept if k in answer.headers}
         body = await answer.read()
@@ -220,28 +202,28 @@ async def _fetch(request: web.Request, target: str) -> web.Response:
 
 
 async def _relay(
-    request: web.Request, target: str, admits: Callable[[str | bytes], bool]
+    request: web.Request,
+    upstream: aiohttp.ClientSession,
+    target: str,
+    admits: Callable[[str | bytes], bool],
 ) -> web.WebSocketResponse:
     """Relay the messages of a WebSocket both ways until one side closes it."""
     offered = request.headers.get(hdrs.SEC_WEBSOCKET_PROTOCOL, "").split(",")
-    async with (
-        aiohttp.ClientSession() as session,
-        session.ws_connect(
-            target,
-            protocols=[name.strip() for name in offered if name.strip()],
-            max_msg_size=MESSAGE_LIMIT,
-        ) as upstream,
-    ):
+    async with upstream.ws_connect(
+        target,
+        protocols=[name.strip() for name in offered if name.strip()],
+        max_msg_size=MESSAGE_LIMIT,
+    ) as server:
         client = web.WebSocketResponse(
-            protocols=[upstream.protocol] if upstream.protocol else (),
+            protocols=[server.protocol] if server.protocol else (),
             max_msg_size=page_messages.MAX_BYTES,
             heartbeat=HEARTBEAT,
             compress=False,
         )
         await client.prepare(request)
         await asyncio.gather(
-            _copy(client, upstream, admits),
-            _copy(upstream, client, lambda _: True),
+            _copy(client, server, admits),
+            _copy(server, client, lambda _: True),
             return_exceptions=True,
         )
         return client
