@@ -7,6 +7,7 @@ import ssl
 import time
 import urllib.error
 import urllib.request
+from contextlib import ExitStack
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ from wbc_suite.devices.pose_frame import (
     PoseLimb,
     frame_schema,
 )
-from wbc_suite.devices.stream import Stream
+from wbc_suite.devices.stream import SENDERS, Stream
 from wbc_suite.devices.stream_client import StreamClient
 from wbc_suite.errors import DeviceError
 
@@ -140,7 +141,7 @@ def test_first_sender_holds_until_it_leaves(stream):
 
 
 def test_a_silent_sender_gives_way(stream, monkeypatch):
-    monkeypatch.setattr("wbc_suite.devices.stream.HOLD", 0.2)
+    monkeypatch.setattr("wbc_suite.devices.stream.HOLD", 0.03)
     with StreamClient(stream.url) as lost, StreamClient(stream.url) as back:
         lost.send(frame(1.0))
         said_at(stream, 1.0)
@@ -150,6 +151,45 @@ def test_a_silent_sender_gives_way(stream, monkeypatch):
             return stream.read().time == 2.0
 
         wait_for(taken_up)
+
+
+@pytest.mark.parametrize("nonsense", ["{}", "", '{"format": "wbc-pose-frame/1"}'])
+def test_a_sender_of_nonsense_does_not_lock_the_operator_out(stream, nonsense):
+    with StreamClient(stream.url) as hostile, StreamClient(stream.url) as operator:
+        for number in range(1, 20):
+            hostile._socket.send(nonsense)
+            assert "error" in hostile.receive(PATIENCE)
+            operator.send(frame(float(number)))
+            said_at(stream, float(number))
+
+
+def test_silent_senders_make_room_for_the_operator(stream):
+    with ExitStack() as stack:
+        silent = [stack.enter_context(StreamClient(stream.url)) for _ in range(SENDERS)]
+        operator = stack.enter_context(StreamClient(stream.url))
+        operator.send(frame(1.0))
+        said_at(stream, 1.0)
+        with pytest.raises(ConnectionClosed, match=r"1013.*Silent"):
+            silent[0].receive(PATIENCE)
+        later = stack.enter_context(StreamClient(stream.url))
+        with pytest.raises(ConnectionClosed, match="1013"):
+            silent[1].receive(PATIENCE)
+        operator.send(frame(2.0))  # it was not the one to leave
+        said_at(stream, 2.0)
+        later.send(frame(3.0))
+        assert "Another sender" in later.receive(PATIENCE)["error"]
+
+
+def test_busy_senders_keep_their_places(stream, monkeypatch):
+    monkeypatch.setattr("wbc_suite.devices.stream.SENDERS", 1)
+    monkeypatch.setattr("wbc_suite.devices.stream.HOLD", PATIENCE)
+    with StreamClient(stream.url) as only:
+        only.send(frame(1.0))
+        said_at(stream, 1.0)
+        with pytest.raises(DeviceError, match="503"):
+            StreamClient(stream.url)
+        only.send(frame(2.0))
+        said_at(stream, 2.0)
 
 
 @pytest.mark.slow

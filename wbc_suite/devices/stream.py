@@ -1,7 +1,9 @@
 """The stream: pose frames over WebSocket, and the page that sends them."""
 
+import asyncio
 import contextlib
 import json
+import math
 import ssl
 import threading
 import time
@@ -21,7 +23,7 @@ SOCKET = "/frames"
 SENDERS = 8  # connected at a time; only one of them moves the robot
 FLOOD = 2000  # messages in a second that end a connection; a headset sends 90
 HEARTBEAT = 6.0  # s; a sender that is gone is disconnected after 1.5 times this
-HOLD = 1.0  # s; a sender that is silent for so long gives way to another one
+HOLD = 1.0  # s; a sender without a valid frame for so long gives way to another one
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
     "connect-src 'self'"
@@ -29,7 +31,7 @@ POLICY = (
 
 
 class Stream:
-    """A device that listens: the first client that sends frames moves the robot.
+    """A device that listens: the first client that sends a frame moves the robot.
 
     It listens on 127.0.0.1 by default; on any other address clients need a token. Port
     0 is any free one. `tls` encrypts with the certificate of this installation.
@@ -50,8 +52,9 @@ class Stream:
         self._pressed: set[str] = set()
         self._state = DeviceState(time=0.0)
         self._holder: web.WebSocketResponse | None = None
-        self._heard = 0.0  # when the holder sent something last, monotonic, s
-        self._senders = 0
+        self._heard: dict[web.WebSocketResponse, float] = {}
+        """All senders, and when each sent its last valid frame, monotonic, s."""
+        self._closing: set[asyncio.Task[None]] = set()
         self._server: WebServer | None = None
 
     @property
@@ -108,7 +111,7 @@ class Stream:
 
     async def _receive(self, request: web.Request) -> web.StreamResponse:
         """Keep the newest frame of the sender that moves the robot."""
-        if self._senders >= SENDERS:
+        if len(self._heard) >= SENDERS and not self._make_room():
             return web.Response(
                 status=HTTPStatus.SERVICE_UNAVAILABLE, text="Too many senders."
             )
@@ -116,14 +119,28 @@ class Stream:
             max_msg_size=MAX_BYTES, heartbeat=HEARTBEAT, compress=False, timeout=1.0
         )
         await sender.prepare(request)
-        self._senders += 1
+        self._heard[sender] = -math.inf
         try:
             await self._receive_frames(sender)
         finally:
-            self._senders -= 1
-            if self._holder is sender:
-                self._holder = None
+            self._forget(sender)
         return sender
+
+    def _make_room(self) -> bool:
+        """Disconnect the sender that is silent for longest; False if none is silent."""
+        silent = min(self._heard, key=self._heard.__getitem__)
+        if time.monotonic() - self._heard[silent] < HOLD:
+            return False
+        self._forget(silent)
+        closing = asyncio.create_task(_give_way(silent))
+        self._closing.add(closing)
+        closing.add_done_callback(self._closing.discard)
+        return True
+
+    def _forget(self, sender: web.WebSocketResponse) -> None:
+        self._heard.pop(sender, None)
+        if self._holder is sender:
+            self._holder = None
 
     async def _receive_frames(self, sender: web.WebSocketResponse) -> None:
         began, count = time.monotonic(), 0
@@ -134,15 +151,24 @@ class Stream:
             if count > FLOOD:
                 reason = f"More than {FLOOD} messages a second".encode()
                 await sender.close(code=WSCloseCode.POLICY_VIOLATION, message=reason)
-            elif self._holder not in (None, sender) and now - self._heard < HOLD:
+            elif self._is_held(now, besides=sender):
                 await _report(sender, "Another sender moves the robot.")
             elif message.type in (WSMsgType.TEXT, WSMsgType.BINARY):
-                self._holder, self._heard = sender, now
                 try:
-                    self._keep(PoseFrame.parse(message.data))
+                    frame = PoseFrame.parse(message.data)
                 except DeviceError as error:
                     self.refused = str(error)
                     await _report(sender, self.refused)
+                    continue
+                if sender in self._heard:  # it was not told to leave
+                    self._holder, self._heard[sender] = sender, now
+                    self._keep(frame)
+
+    def _is_held(self, now: float, *, besides: web.WebSocketResponse) -> bool:
+        """Return whether another sender moves the robot."""
+        if self._holder is None or self._holder is besides:
+            return False
+        return now - self._heard[self._holder] < HOLD
 
     def _keep(self, frame: PoseFrame) -> None:
         with self._lock:
@@ -154,3 +180,9 @@ class Stream:
 async def _report(sender: web.WebSocketResponse, text: str) -> None:
     with contextlib.suppress(ConnectionError):
         await sender.send_str(json.dumps({"error": text}))
+
+
+async def _give_way(sender: web.WebSocketResponse) -> None:
+    with contextlib.suppress(ConnectionError):
+        reason = b"Silent, while others wait"
+        await sender.close(code=WSCloseCode.TRY_AGAIN_LATER, message=reason)
