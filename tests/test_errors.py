@@ -10,8 +10,11 @@ from wbc_suite.errors import (
     WbcError,
     did_you_mean,
     join_first,
+    printable,
     shortened,
 )
+
+CLEARS = "a\x1b[2J\x9b31m\x07\r\u202eb"  # clears a terminal, colours it, turns it round
 
 
 def test_an_unknown_name_lists_what_is_known_and_the_nearest():
@@ -73,3 +76,18 @@ def test_lists_are_joined_and_the_rest_is_counted(count, expected):
 def test_texts_are_cut_to_the_limit():
     assert shortened("abcdef", 6) == "abcdef"
     assert shortened("abcdefg", 6) == "abc..."
+
+
+@pytest.mark.parametrize(
+    "text", ["", "plain", "two\nlines\tand a tab", "1 ± 2 °, ü, 漢", "'quoted' \\ [x]"]
+)
+def test_plain_text_is_printed_as_it_is(text):
+    assert printable(text) == text
+
+
+def test_control_characters_are_escaped():
+    shown = r"a\x1b[2J\x9b31m\x07\r\u202eb"
+    assert printable(CLEARS) == shown
+    assert printable("\udc9b\x00") == r"\udc9b\x00"
+    assert str(WbcError(f"No file {CLEARS}.")) == f"No file {shown}."
+    assert shown in str(UnknownNameError("robot", CLEARS, [CLEARS]))

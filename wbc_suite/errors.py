@@ -33,8 +33,22 @@ def shortened(text: str, limit: int = 80) -> str:
     return text if len(text) <= limit else text[: limit - 3] + "..."
 
 
+def printable(text: str) -> str:
+    """Return a text for a terminal: control characters but new lines are escaped."""
+    if text.isprintable():
+        return text
+    return "".join(
+        c if c.isprintable() or c in "\n\t" else c.encode("unicode_escape").decode()
+        for c in text
+    )
+
+
 class WbcError(Exception):
     """Base class of all errors that this package raises."""
+
+    def __str__(self) -> str:
+        """Return the message, `printable`: names in it may come from anywhere."""
+        return printable(super().__str__())
 
 
 class ConfigError(WbcError, ValueError):

@@ -42,6 +42,8 @@ HOSTILE = [
     UPDATE | {"position": "here", "wxyz": None},
     UPDATE,
     *(GUI | {"updates": {"value": x}} for x in (math.nan, -math.inf, "x" * 10_000, [])),
+    *(GUI | {"updates": {"value": x}} for x in ("\x1b[2J", "\x9b1m", "a\nb", "\x00")),
+    UPDATE | DRAG | {"name": "/gizmos/\x1b[2J"},
     *(GUI | {"updates": {name: 0}} for name in ("sync_cb", "update_cb", "removed")),
     CAMERA | {"position": (0, math.nan, 0)},
     CAMERA | {"image_height": -1},

@@ -1,6 +1,5 @@
 """Base of benchmarks with objects: placement, observations, grasps, rewards."""
 
-import logging
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -10,6 +9,7 @@ import mujoco
 import numpy as np
 from pydantic import BaseModel, PositiveInt
 
+from wbc_suite import logs
 from wbc_suite.benchmark.arrangement import (
     Places,
     TwoArmPlaces,
@@ -37,7 +37,7 @@ from wbc_suite.sensing.reading import (
 from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Vector
 
-log = logging.getLogger(__name__)
+log = logs.logger(__name__)
 
 TRIES = 50
 """Placements that are drawn if a robot touches the objects of the first."""

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from wbc_suite.cli import options
+from wbc_suite.cli.output import print
 
 
 class _Notes(logging.Handler):

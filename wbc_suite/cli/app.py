@@ -25,6 +25,7 @@ from wbc_suite.cli import (
     robots,
     teleop,
 )
+from wbc_suite.cli.output import print
 from wbc_suite.errors import WbcError
 from wbc_suite.sensing import gl_backend
 

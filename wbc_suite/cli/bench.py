@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from wbc_suite.cli import options
+from wbc_suite.cli.output import print
 
 if TYPE_CHECKING:
     from wbc_suite.envs import RobotEnv

@@ -15,6 +15,8 @@ from wbc_suite.cli.options import (
     RootOption,
     StrictOption,
 )
+from wbc_suite.cli.output import print
+from wbc_suite.errors import printable
 
 Kind = Literal["robots", "grippers", "bases", "benchmarks", "controllers"]
 Row: TypeAlias = tuple[str, ...]
@@ -52,7 +54,7 @@ def list_catalogue(
             side = "right" if column.endswith(("dof", "kg")) else "left"
             table.add_column(column, justify=side, no_wrap=column == "name")
         for row in rows(catalogued.files(folder)):
-            table.add_row(*row)
+            table.add_row(*map(printable, row))
         console.print(table)
 
 

@@ -13,6 +13,7 @@ from typing import Literal
 import typer
 
 from wbc_suite.cli.options import JsonOption
+from wbc_suite.cli.output import print
 from wbc_suite.errors import WbcError
 
 BASE_SOLVERS = ("daqp", "proxqp", "osqp")  # of the package; names of `qpsolvers`

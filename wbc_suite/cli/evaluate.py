@@ -17,6 +17,8 @@ from wbc_suite.cli.options import (
     progress,
     write_file,
 )
+from wbc_suite.cli.output import print
+from wbc_suite.errors import printable
 
 if TYPE_CHECKING:
     from wbc_suite.evaluation import Case
@@ -243,7 +245,7 @@ def _print_tables(results: "Results") -> None:
         broken = f" ({s.physics_errors} diverged)" if s.physics_errors else ""
         steps = f"{s.mean_steps:.0f}{broken}", f"{s.steps_per_second:.0f}"
         row = str(s.episodes), *shares, f"{s.mean_return:.3g}", *steps
-        table.add_row(case.title, *row)
+        table.add_row(printable(case.title), *row)
     console = Console()
     console.print(table)
     for (first, second), found in results.comparisons.items():

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from wbc_suite.cli import options
+from wbc_suite.cli.output import print
 
 if TYPE_CHECKING:
     from wbc_suite.envs import RobotEnv

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 import typer
 
 from wbc_suite.catalogue import ENVIRONMENT_VARIABLE
+from wbc_suite.cli.output import print
 from wbc_suite.errors import ConfigError, WbcError
 
 if TYPE_CHECKING:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from wbc_suite.cli import options
+from wbc_suite.cli.output import print
 from wbc_suite.cli.teleop import (
     ONE_DAY,
     default_controller,

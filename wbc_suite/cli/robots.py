@@ -1,12 +1,14 @@
 """`wbc-suite view | render | export | describe-action`: commands about one robot."""
 
 import json
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from wbc_suite.cli import options
+from wbc_suite.cli.output import print
 from wbc_suite.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -103,7 +105,7 @@ def export_robot(
         strict=strict,
     )
     if output is None:
-        print(getattr(description, f"to_{to}")())
+        sys.stdout.write(getattr(description, f"to_{to}")() + "\n")  # as it is
         return
     if not output.parent.is_dir():
         raise ConfigError(f"'{output}' cannot be written: no folder '{output.parent}'.")

@@ -23,6 +23,7 @@ from wbc_suite.cli.options import (
     robot_names,
     serve_until_interrupted,
 )
+from wbc_suite.cli.output import print
 
 if TYPE_CHECKING:
     import gymnasium

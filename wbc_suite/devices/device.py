@@ -1,15 +1,15 @@
 """The protocol of devices, and their registry by name."""
 
 import importlib
-import logging
 import time
 from collections.abc import Callable, Iterable
 from typing import Any, Protocol
 
+from wbc_suite import logs
 from wbc_suite.devices.state import DeviceState
 from wbc_suite.errors import ConfigError, DeviceError, UnknownNameError
 
-log = logging.getLogger(__name__)
+log = logs.logger(__name__)
 
 
 class Device(Protocol):

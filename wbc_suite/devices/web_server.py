@@ -26,9 +26,10 @@ from urllib.parse import urlsplit
 from aiohttp import hdrs, web
 from aiohttp.typedefs import Handler
 
+from wbc_suite import logs
 from wbc_suite.errors import DeviceError
 
-logger = logging.getLogger(__name__)
+logger = logs.logger(__name__)
 
 CONNECTIONS = 256  # at a time; a browser opens one, and a few more while it loads
 HEAD_TIMEOUT = 10.0  # s, to the first and between two complete requests

@@ -1,7 +1,6 @@
 """Errors for what goes wrong inside MuJoCo."""
 
 import functools
-import logging
 import math
 from collections.abc import Callable
 from types import TracebackType
@@ -10,6 +9,7 @@ from typing import Any, TypeVar, cast
 import mujoco
 import numpy as np
 
+from wbc_suite import logs
 from wbc_suite.compiling import as_argument
 from wbc_suite.control.loop.state_checks import (
     FASTEST,
@@ -20,7 +20,7 @@ from wbc_suite.control.loop.state_checks import (
 )
 from wbc_suite.errors import PhysicsError
 
-log = logging.getLogger(__name__)
+log = logs.logger(__name__)
 
 _NAMES = [
     name.removeprefix("mjWARN_")

@@ -1,18 +1,18 @@
 """Skills of one arm: move, grasp, carry, release."""
 
-import logging
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
+from wbc_suite import logs
 from wbc_suite.experts.arm import SPEED, TURN, Arm
 from wbc_suite.experts.grasp_choice import Approach, Choice, choose_grasp
 from wbc_suite.experts.workcell import Steps, Workcell, wait_until
 from wbc_suite.typing import Vector
 
-log = logging.getLogger(__name__)
+log = logs.logger(__name__)
 
 UP = np.array([0.0, 0.0, 1.0])
 STALLED = 8  # control periods without progress end a motion

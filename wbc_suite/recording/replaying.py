@@ -1,7 +1,6 @@
 """Replay of episodes by their states or by their actions."""
 
 import json
-import logging
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -10,13 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from wbc_suite import logs
 from wbc_suite.envs import RobotEnv
 from wbc_suite.envs.states import write_physics
 from wbc_suite.errors import DatasetError, WbcError
 from wbc_suite.recording.episode import Episode
 from wbc_suite.typing import Vector
 
-log = logging.getLogger(__name__)
+log = logs.logger(__name__)
 
 _JOINT = re.compile(r'<(?:free)?joint\b[^<>]*?\bname="([^"<>]{1,200})"')
 

@@ -1,6 +1,5 @@
 """Find pairs of links that need not collide, by sampling postures."""
 
-import logging
 from collections import Counter
 from collections.abc import Iterator
 from itertools import combinations
@@ -9,13 +8,14 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from wbc_suite import logs
 from wbc_suite.errors import join_first
 from wbc_suite.robot.collision_capsules import enclosing_capsules
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.elements import Contacts
 from wbc_suite.robot.shapes import Capsule, Shape, Sphere
 
-LOG = logging.getLogger(__name__)
+LOG = logs.logger(__name__)
 
 OVERLAP = 1e-3  # smallest penetration in m that counts as an overlap
 NEAR = 0.01  # m; links that never come nearer never touch

@@ -1,11 +1,11 @@
 """Common steps of the URDF and MJCF import: names, checks, inferred groups."""
 
-import logging
 import re
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from wbc_suite import logs
 from wbc_suite.errors import DescriptionError, join_first, shortened
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.elements import Frame, Link, rigid_bodies
@@ -31,7 +31,7 @@ from wbc_suite.robot.validation import RESERVED
 from wbc_suite.robot.working_posture import working_arms
 from wbc_suite.tomlfile import parse_model
 
-LOG = logging.getLogger(__name__)
+LOG = logs.logger(__name__)
 
 LinkFields: TypeAlias = dict[str, Any]  # fields of one `Link`, before validation
 

@@ -1,9 +1,9 @@
 """`load_robot`: read a robot from the catalogue or from a TOML, URDF or MJCF file."""
 
-import logging
 from pathlib import Path
 from typing import Literal
 
+from wbc_suite import logs
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.errors import ConfigError, DescriptionError, UnknownNameError
 from wbc_suite.robot.assembly import assemble, describe_component
@@ -13,7 +13,7 @@ from wbc_suite.robot.robot_file import Component, read_robot_file
 from wbc_suite.robot.skins import SkinFinder
 from wbc_suite.typing import RobotName
 
-LOG = logging.getLogger(__name__)
+LOG = logs.logger(__name__)
 
 FOLDERS = ("gripper", "base", "arm", "body")
 

@@ -1,6 +1,5 @@
 """Read an MJCF file into a robot description."""
 
-import logging
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -9,6 +8,7 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
+from wbc_suite import logs
 from wbc_suite.errors import DescriptionError, join_first
 from wbc_suite.robot.contact_pairs import exclude_by_sampling, exclude_overlapping
 from wbc_suite.robot.description import RobotDescription
@@ -32,7 +32,7 @@ from wbc_suite.robot.mjcf_import_elements import (
 from wbc_suite.robot.poses import joint_motion, pose_at, pose_fields
 from wbc_suite.typing import Vector
 
-LOG = logging.getLogger(__name__)
+LOG = logs.logger(__name__)
 
 DUMMY = {"mass": 1e-10, "inertia": (1e-13, 1e-13, 1e-13, 0.0, 0.0, 0.0)}
 """Negligible mass and inertia of the links between the joints of one body."""

@@ -1,6 +1,5 @@
 """Read geoms and actuators of a compiled MuJoCo model as fields of a description."""
 
-import logging
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
@@ -9,12 +8,13 @@ import numpy as np
 import pinocchio as pin
 from scipy.spatial.transform import Rotation
 
+from wbc_suite import logs
 from wbc_suite.robot.importing import NameTable
 from wbc_suite.robot.poses import pose_at, pose_fields
 from wbc_suite.robot.shape_geometry import fit_hull
 from wbc_suite.typing import Vector
 
-LOG = logging.getLogger(__name__)
+LOG = logs.logger(__name__)
 
 VISUAL_GROUPS = 3  # groups 0, 1 and 2 are drawn, as in MuJoCo's own viewer
 GEOM = mujoco.mjtGeom

@@ -7,7 +7,6 @@ a folder of the user. Physics does not change.
 
 import importlib.util
 import itertools
-import logging
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -17,13 +16,14 @@ from typing import Literal
 
 from pydantic import Field
 
+from wbc_suite import logs
 from wbc_suite.catalogue import Catalogue, user_cache_root
 from wbc_suite.errors import ConfigError, UnknownNameError, look_up
 from wbc_suite.robot.elements import Name
 from wbc_suite.robot.shapes import Color, Posed, SkinMesh, Vector3
 from wbc_suite.tomlfile import FrozenModel, load_model
 
-log = logging.getLogger(__name__)
+log = logs.logger(__name__)
 
 MESHES = "meshes"
 """Name of the skin from installed packages; any other skin is a folder."""

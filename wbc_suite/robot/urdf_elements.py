@@ -1,6 +1,5 @@
 """Read the XML elements of a URDF file: the tree of links, numbers and poses."""
 
-import logging
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -9,11 +8,12 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
+from wbc_suite import logs
 from wbc_suite.errors import ConfigError, DescriptionError, did_you_mean, join_first
 from wbc_suite.robot.xml_files import Element, read_xml
 from wbc_suite.typing import Vector
 
-LOG = logging.getLogger(__name__)
+LOG = logs.logger(__name__)
 
 XACRO = "xacro:"
 MAX_LINKS = 500  # largest number of links, as in robot files

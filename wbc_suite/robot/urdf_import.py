@@ -1,12 +1,12 @@
 """Read a URDF file into a robot description."""
 
-import logging
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
+from wbc_suite import logs
 from wbc_suite.errors import DescriptionError, did_you_mean, join_first
 from wbc_suite.robot.contact_pairs import exclude_by_sampling, exclude_overlapping
 from wbc_suite.robot.description import RobotDescription
@@ -29,7 +29,7 @@ from wbc_suite.robot.urdf_export import ROOT_TYPES, UNLIMITED
 from wbc_suite.robot.urdf_import_shapes import MeshFolder, UrdfShapes
 from wbc_suite.robot.xml_files import Element, model_root
 
-LOG = logging.getLogger(__name__)
+LOG = logs.logger(__name__)
 
 UNLIMITED_RANGE = 1e4
 """A position limit at least as large, in rad or m, means that there is none."""

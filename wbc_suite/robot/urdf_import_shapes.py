@@ -1,6 +1,5 @@
 """Read the shapes, meshes and colours of a URDF file."""
 
-import logging
 from collections.abc import Iterator
 from functools import cached_property
 from itertools import islice
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from wbc_suite import logs
 from wbc_suite.errors import DescriptionError, join_first
 from wbc_suite.robot.importing import NameTable
 from wbc_suite.robot.mesh_files import COLLADA, GLTF, READABLE, can_read, read_points
@@ -20,7 +20,7 @@ from wbc_suite.robot.urdf_elements import numbers, pose_of
 from wbc_suite.robot.xml_files import MAX_ABOVE, Element
 from wbc_suite.typing import Vector
 
-LOG = logging.getLogger(__name__)
+LOG = logs.logger(__name__)
 
 MIN_SIZE = 2e-6  # smallest size of a shape in m; smaller ones are left out
 ENDING, MAX_FILES = 3, 20_000

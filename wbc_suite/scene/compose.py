@@ -1,11 +1,10 @@
 """Robots, their cameras and objects put into one MuJoCo specification."""
 
-import logging
-
 import mujoco
 import numpy as np
 import pinocchio as pin
 
+from wbc_suite import logs
 from wbc_suite.control import RobotState
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.poses import pose_at, pose_fields, se3_of
@@ -13,7 +12,7 @@ from wbc_suite.robot.shapes import Vector3
 from wbc_suite.scene.objects.scene_object import TORSION, SceneObject
 from wbc_suite.typing import Indices, Matrix, Vector
 
-log = logging.getLogger(__name__)
+log = logs.logger(__name__)
 
 SMALL = 24
 """Degrees of freedom up to which constraint islands cost more than they save: without

@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
+from wbc_suite import logs
 from wbc_suite.errors import ConfigError, UnknownNameError, join_first
 from wbc_suite.robot.mjcf_compile import compile_mjcf
 from wbc_suite.robot.poses import pose_at, pose_fields
@@ -37,7 +38,7 @@ from wbc_suite.scene.surfaces import (
 from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Vector
 
-log = logging.getLogger(__name__)
+log = logs.logger(__name__)
 
 PREFIX = "arena_"
 """Text before every name of the file in the composed scene."""

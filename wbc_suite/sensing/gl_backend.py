@@ -9,7 +9,6 @@ import functools
 import hashlib
 import importlib
 import json
-import logging
 import os
 import platform
 import subprocess
@@ -20,10 +19,11 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from wbc_suite import logs
 from wbc_suite.catalogue import user_cache
 from wbc_suite.errors import DeviceError
 
-logger = logging.getLogger(__name__)
+logger = logs.logger(__name__)
 
 APT_COMMAND = "sudo apt-get install libegl1 libegl-mesa0 libgl1-mesa-dri libgles2"
 """Makes a Debian or Ubuntu machine draw."""

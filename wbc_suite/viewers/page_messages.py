@@ -13,7 +13,10 @@ MAX_BYTES = 16_384  # of a message; a browser sends less than 1 kB
 FAR = 1e6  # greatest absolute value, in any unit
 
 Number: TypeAlias = Annotated[float, msgspec.Meta(ge=-FAR, le=FAR)]
-Text: TypeAlias = Annotated[str, msgspec.Meta(max_length=256)]
+Text: TypeAlias = Annotated[
+    str, msgspec.Meta(max_length=256, pattern=r"\A[^\x00-\x1f\x7f-\x9f]*\Z")
+]
+"""Without control characters: viser prints errors about what it gets."""
 Point: TypeAlias = tuple[Number, Number, Number]
 Quaternion: TypeAlias = tuple[Number, Number, Number, Number]
 Pixels: TypeAlias = Annotated[int, msgspec.Meta(ge=0, le=100_000)]

@@ -8,7 +8,6 @@ answer only where it needs one: fast drags do not wait for the loop.
 
 import contextlib
 import functools
-import logging
 import multiprocessing
 import signal
 import threading
@@ -19,12 +18,13 @@ from typing import Any, TypeAlias
 
 import pinocchio as pin
 
+from wbc_suite import logs
 from wbc_suite.errors import DeviceError
 from wbc_suite.viewers.loop_timing import raise_priority
 from wbc_suite.viewers.session_state import SessionInfo, Snapshot
 from wbc_suite.viewers.teleop_session import TeleopSession
 
-log = logging.getLogger(__name__)
+log = logs.logger(__name__)
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 POLL_PERIOD = 0.05  # s

@@ -9,7 +9,6 @@ style and script of `pages/page.*`.
 
 import asyncio
 import html
-import logging
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -22,12 +21,13 @@ from urllib.parse import quote
 import aiohttp
 from aiohttp import WSMsgType, hdrs, web
 
+from wbc_suite import logs
 from wbc_suite.devices.web_server import WebServer, page_url, token_for
 from wbc_suite.errors import DeviceError
 from wbc_suite.viewers import page_messages
 from wbc_suite.viewers.held_keys import HeldKeys
 
-log = logging.getLogger(__name__)
+log = logs.logger(__name__)
 
 UPDATE_RATE = 25.0  # Hz
 PORTS = range(8080, 8100)  # tried in turn if no port is given

@@ -1,15 +1,14 @@
 """The page of render mode `human`: a scene in the browser."""
 
-import logging
-
 import mujoco
 
+from wbc_suite import logs
 from wbc_suite.typing import Matrix
 from wbc_suite.viewers.model_scene import ModelScene
 from wbc_suite.viewers.page_server import PageServer
 from wbc_suite.viewers.scene_setup import set_camera, set_up_scene
 
-log = logging.getLogger(__name__)
+log = logs.logger(__name__)
 
 
 class WatchPage:

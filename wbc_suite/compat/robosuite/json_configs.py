@@ -9,11 +9,11 @@ The config of one part alone, `{"type": "OSC_POSE", ...}`, applies to all arms.
 Source of the keys: robosuite's documentation and its public default files.
 """
 
-import logging
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from wbc_suite import logs
 from wbc_suite.compat.robosuite.controllers.uncoupled_osc import UNCOUPLED
 from wbc_suite.compat.robosuite.controllers.variable_impedance import VARIABLE_JOINTS
 from wbc_suite.control.part.registry import is_part_controller, part_models
@@ -21,7 +21,7 @@ from wbc_suite.control.robot_parts import hands_of, parts_of
 from wbc_suite.errors import ConfigError, UnknownNameError, did_you_mean
 from wbc_suite.robot import RobotDescription
 
-log = logging.getLogger(__name__)
+log = logs.logger(__name__)
 
 SPECIFIC = "composite_controller_specific_configs"
 PARTS = ("right", "left", "torso", "head", "base", "legs")

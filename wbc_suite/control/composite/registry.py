@@ -1,11 +1,11 @@
 """Composite controllers: what drives a whole robot, and where they are found."""
 
 import importlib
-import logging
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypeAlias
 
+from wbc_suite import logs
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.control.composite.protocols import CompositeController
 from wbc_suite.control.part.registry import (
@@ -20,7 +20,7 @@ from wbc_suite.robot import RobotDescription, load_robot
 from wbc_suite.tomlfile import located, read_json, read_toml
 from wbc_suite.typing import RobotName
 
-log = logging.getLogger(__name__)
+log = logs.logger(__name__)
 
 CompositeControllerName: TypeAlias = Literal[
     "BASIC",

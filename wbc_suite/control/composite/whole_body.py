@@ -1,12 +1,12 @@
 """Whole-body inverse kinematics over joint-position control, for any robot."""
 
-import logging
 from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
+from wbc_suite import logs
 from wbc_suite.compiling import as_argument
 from wbc_suite.control.action import ActionLayout
 from wbc_suite.control.composite.backend import IkBackend, IkStep
@@ -47,7 +47,7 @@ from wbc_suite.qp import ObstacleLimit
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Vector
 
-LOG = logging.getLogger(__name__)
+LOG = logs.logger(__name__)
 
 MIN_POINT_CONTACTS = 3
 """Fewer points of contact cannot balance a robot; soles can."""

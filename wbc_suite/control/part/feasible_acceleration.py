@@ -1,17 +1,17 @@
 """What motors can do: feasible accelerations, and leads of commands."""
 
-import logging
 from collections.abc import Collection
 
 import numpy as np
 import pinocchio as pin
 
+from wbc_suite import logs
 from wbc_suite.errors import join_first
 from wbc_suite.kinematics.configuration import random_configuration
 from wbc_suite.robot import RobotDescription
 from wbc_suite.typing import Vector
 
-LOG = logging.getLogger(__name__)
+LOG = logs.logger(__name__)
 
 LOAD_SAMPLES = 50
 WEIGHT_SHARE = 0.9  # of the effort of a motor that cannot hold every posture

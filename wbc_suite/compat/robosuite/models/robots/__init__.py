@@ -3,13 +3,13 @@
 A class of a user derives from `ManipulatorModel` and gives the path of its MJCF file.
 """
 
-import logging
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
+from wbc_suite import logs
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.compat.robosuite.models.described import DescribedModel, choices_of
 from wbc_suite.compat.robosuite.models.own_files import arm_file, changed, gripper_file
@@ -22,7 +22,7 @@ from wbc_suite.robot.poses import pose_fields
 from wbc_suite.sensing.hands import gripper_links
 from wbc_suite.typing import Vector
 
-log = logging.getLogger(__name__)
+log = logs.logger(__name__)
 
 __all__ = [
     "REGISTERED_ROBOTS",
