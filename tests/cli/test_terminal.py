@@ -13,18 +13,6 @@ from wbc_suite.cli import main, output
 
 HOSTILE = "a\x1b[2J\x9b31m\x07"  # clears the screen, colours it and rings
 SHOWN = r"a\x1b[2J\x9b31m\x07"
-ROBOT = """
-[component]
-kind = "robot"
-name = "{name}"
-title = "{name}"
-[root]
-kind = "fixed"
-[[link]]
-name = "base"
-mass = 1.0
-inertia = [1.0, 1.0, 1.0]
-"""
 
 
 def said_by(monkeypatch, capfd, *arguments):
@@ -41,7 +29,7 @@ def said_by(monkeypatch, capfd, *arguments):
 def test_recordings_command_no_terminal(monkeypatch, capfd, tmp_path):
     path = tmp_path / "hostile.hdf5"
     with h5py.File(path, "w") as file:
-        file.create_group(f"mask/{HOSTILE}")
+        file[f"mask/{HOSTILE}"] = [f"demo_{HOSTILE}".encode()]
         data = file.create_group("data")
         data.attrs["date"] = data.attrs["versions"] = HOSTILE
         data.attrs["env_args"] = f'{{"env_name": "{HOSTILE[:1]}\\u001b[2J"}}'
@@ -55,16 +43,13 @@ def test_recordings_command_no_terminal(monkeypatch, capfd, tmp_path):
         said_by(monkeypatch, capfd, command, path)
 
 
-@pytest.mark.slow
-def test_robot_files_command_no_terminal(monkeypatch, capfd, tmp_path):
+def test_the_catalogue_commands_no_terminal(monkeypatch, capfd, tmp_path):
     monkeypatch.setenv(ENVIRONMENT_VARIABLE, "")
-    path = tmp_path / "robots" / "hostile.toml"
-    path.parent.mkdir()
-    path.write_text(ROBOT.replace("{name}", HOSTILE.encode("unicode_escape").decode()
-                    .replace("\\x", "\\u00")))  # fmt: skip
-    assert SHOWN in said_by(monkeypatch, capfd, "check", path)
+    (tmp_path / "tasks").mkdir()
+    title = HOSTILE.encode("unicode_escape").decode().replace("\\x", "\\u00")
+    (tmp_path / "tasks/lift.toml").write_text(f'name = "Lift"\ntitle = "{title}"')
     extra = "--catalogue", tmp_path
-    assert SHOWN in said_by(monkeypatch, capfd, "list", "robots", *extra)
+    assert SHOWN in said_by(monkeypatch, capfd, "list", "benchmarks", *extra)
 
 
 def test_every_command_prints_that_way():
