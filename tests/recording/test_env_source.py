@@ -84,6 +84,9 @@ def test_an_environment_of_another_package_is_refused():
         {"controller_configs": {"body_parts": {"right": {"file": "a/b"}}}},
         {"gripper_types": [["x.xml"]]},
         {"base_types": "module.py"},
+        {"base_types": "module:Base"},
+        {"arena": "scene"},
+        {"arena": {"file": "scene"}},
     ],
 )
 def test_paths_are_refused_wherever_they_stand(arguments):
@@ -94,6 +97,8 @@ def test_paths_are_refused_wherever_they_stand(arguments):
 def test_a_benchmark_that_is_a_path_is_refused():
     with pytest.raises(DatasetError, match="names a file"):
         parse("/tmp/task.toml").build()
+    with pytest.raises(DatasetError, match="names a file"):
+        parse("module:Benchmark").build()
 
 
 def test_a_trusted_path_is_read_and_its_error_is_reported():

@@ -14,6 +14,7 @@ import typer
 from wbc_suite.cli.options import (
     CatalogueOption,
     ExecutorOption,
+    HostOption,
     progress,
     write_file,
 )
@@ -150,21 +151,27 @@ def serve_policy(
         str, typer.Argument(help="expert, random, hold, module:Name or FILE.hdf5.")
     ],
     *,
-    host: Annotated[
-        str, typer.Option(help="Address to listen on; access needs no token.")
-    ] = "127.0.0.1",
+    host: HostOption = "127.0.0.1",
     port: Annotated[
         int, typer.Option(min=0, max=65535, help="Port; 0 for any free one.")
     ] = 5555,
+    connections: Annotated[
+        int, typer.Option(min=1, help="Episodes that are served at a time.")
+    ] = 64,
+    trust_files: Annotated[
+        bool,
+        typer.Option("--trust-files", help="Read robot files that clients name."),
+    ] = False,
 ) -> None:
     """Serve a policy to `wbc-suite evaluate --policy socket://HOST:PORT`.
 
-    Anyone who can reach the port can use the policy. To serve a policy from your own
-    code, use `wbc_suite.evaluation.PolicyServer`.
+    On 127.0.0.1 every program of this machine can use the policy. To serve a policy
+    from your own code, use `wbc_suite.evaluation.PolicyServer`.
     """
     from wbc_suite.evaluation import PolicyServer, replicate
 
-    with PolicyServer(replicate(policy), host=host, port=port) as server:
+    begin = replicate(policy, trust_files=trust_files)
+    with PolicyServer(begin, host=host, port=port, connections=connections) as server:
         print(f"{policy}: {server.address}\nPress Ctrl-C to stop.", flush=True)
         try:
             server.serve_forever()

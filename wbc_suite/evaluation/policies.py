@@ -11,6 +11,7 @@ from wbc_suite.envs import RobotEnv
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.evaluation.policy_socket import SCHEME, SocketPolicy
 from wbc_suite.experts import Multiplied, expert
+from wbc_suite.recording import EnvSource
 from wbc_suite.typing import Vector
 
 Policy: TypeAlias = Callable[[Mapping[str, Any]], Vector]
@@ -101,29 +102,42 @@ def _plain(value: Any) -> Any:
     return value if isinstance(value, str | int | float | None) else str(value)
 
 
-def replicate(name: str) -> Callable[[Mapping[str, Any]], Policy]:
+def replicate(
+    name: str, *, trust_files: bool = False
+) -> Callable[[Mapping[str, Any]], Policy]:
     """Return what a `PolicyServer` begins episodes with, for a policy of this machine.
 
     The policy acts in an environment of its own, made and stepped like the client's:
     so policies that read the simulation can be served too, and every action is, bit for
-    bit, the one that the policy takes without a socket.
+    bit, the one that the policy takes without a socket. With `trust_files`, clients may
+    name files of this machine, such as those of robots.
     """
-    from wbc_suite.envs import make
 
     def begin(episode: Mapping[str, Any]) -> Policy:
         given = {key: value for key, value in episode.items() if key != "action"}
         seed, benchmark = int(given.pop("seed")), str(given.pop("benchmark"))
-        env = make(benchmark, **given).unwrapped
-        assert isinstance(env, RobotEnv), "`make` made it"
+        source = EnvSource(benchmark=benchmark, arguments=given)
+        env = source.build(trust_files=trust_files)
         env.reset(seed=seed)
-        policy, taken = make_policy(name, env, seed), list[Vector]()
-
-        def act(observation: Mapping[str, Any]) -> Vector:
-            if taken:
-                env.step(taken[-1])
-            taken.append(np.array(policy(observation), dtype=np.float64))
-            return taken[-1]
-
-        return act
+        return Replica(env, make_policy(name, env, seed))
 
     return begin
+
+
+class Replica:
+    """A policy in an environment of its own, which makes the same steps as another."""
+
+    def __init__(self, env: RobotEnv, policy: Policy) -> None:
+        self._env, self._policy = env, policy
+        self._taken: Vector | None = None
+
+    def __call__(self, observation: Mapping[str, Any]) -> Vector:
+        """Return the policy's next action."""
+        if self._taken is not None:
+            self._env.step(self._taken)
+        self._taken = np.array(self._policy(observation), dtype=np.float64)
+        return self._taken
+
+    def close(self) -> None:
+        """Close the environment."""
+        self._env.close()

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
-from typing import Any
+from typing import Any, NoReturn
 
 from wbc_suite import __version__
 from wbc_suite.control import load_composite_controller_config
@@ -22,8 +22,8 @@ PACKAGES = ("mujoco", "pin", "numpy", "gymnasium", "h5py", "daqp")
 MAX_TEXT = 1_000_000  # characters of env_args
 _SHOWN = {"render_mode", "render_camera", "render_size", "render_preset", "skin"}
 """Arguments of rendering, which do not change an episode."""
-_PATH = re.compile(r"[/\\]|\.(toml|json|xml|urdf|py)\Z", re.IGNORECASE)
-_NAMES = ("robots", "arena", "controller_configs", "gripper_types", "base_types")
+_PATH = re.compile(r"[/\\:]|\.(toml|json|xml|urdf|py)\Z", re.IGNORECASE)
+_NAMES = ("robots", "controller_configs", "gripper_types", "base_types")
 _SIZES = ("camera_heights", "camera_widths")
 MAX_PIXELS = 2048  # of a camera's side, unless the dataset is trusted
 
@@ -93,8 +93,8 @@ class EnvSource:
     def build(self, *, trust_files: bool = False, **changes: Any) -> RobotEnv:
         """Make the environment for replay; rendering arguments are left out.
 
-        With `trust_files`, names in the dataset may be paths of files here. `changes`
-        replace recorded arguments.
+        With `trust_files`, names may be paths of files here, and modules. `changes`
+        replace given arguments.
 
         Raises:
             DatasetError: If it cannot be made from the description.
@@ -109,6 +109,8 @@ class EnvSource:
         known = {k: v for k, v in self.arguments.items() if k in taken}
         if not trust_files:
             _refuse_paths([self.benchmark, *(known.get(k) for k in _NAMES)])
+            if known.get("arena") is not None:
+                _refuse_path(known["arena"])  # it has no name but its file
             _refuse_sizes([known.get(k) for k in _SIZES if k not in changes])
         try:
             return RobotEnv(self.benchmark, **{**known, **changes})
@@ -191,17 +193,23 @@ def _plain(value: Any) -> Any:
 
 
 def _refuse_paths(values: list[Any]) -> None:
-    """Refuse arguments that would make the package read files named by a dataset."""
-    for value in values:
+    """Refuse arguments that would make the package read files which others name."""
+    waiting = list(values)
+    while waiting:
+        value = waiting.pop()
         if isinstance(value, dict):
-            _refuse_paths(list(value.values()))
+            waiting += value.values()
         elif isinstance(value, list):
-            _refuse_paths(value)
+            waiting += value
         elif isinstance(value, str) and _PATH.search(value):
-            raise DatasetError(
-                f"The dataset names a file, '{value[:80]}'. If you trust it, use "
-                "--trust-files."
-            )
+            _refuse_path(value)
+
+
+def _refuse_path(value: Any) -> NoReturn:
+    raise DatasetError(
+        f"The description of the environment names a file, '{value!s:.80}'. If you trust "
+        "it, use --trust-files."
+    )
 
 
 def _refuse_sizes(values: list[Any]) -> None:
@@ -212,6 +220,6 @@ def _refuse_sizes(values: list[Any]) -> None:
             isinstance(side, int | float) and side > MAX_PIXELS for side in sides
         ):
             raise DatasetError(
-                f"The dataset asks for pictures of {value!s:.60} pixels; at most "
+                f"The description asks for pictures of {value!s:.60} pixels; at most "
                 f"{MAX_PIXELS} are taken. If you trust it, use --trust-files."
             )
