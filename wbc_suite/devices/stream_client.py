@@ -30,8 +30,16 @@ class StreamClient:
         self._socket.send(frame.model_dump_json())
 
     def receive(self, timeout: float) -> dict[str, Any]:
-        """Return a reply of the stream, `{"error": ...}`; raises TimeoutError."""
-        return json.loads(self._socket.recv(timeout=timeout))
+        """Return a reply of the stream, `{"error": ...}`.
+
+        Raises:
+            TimeoutError: If none comes in time, s.
+            DeviceError: If it is not JSON.
+        """
+        try:
+            return json.loads(self._socket.recv(timeout=timeout))
+        except (ValueError, RecursionError) as error:
+            raise DeviceError(f"The stream's reply is not JSON: {error}.") from error
 
     def __enter__(self) -> "StreamClient":
         return self

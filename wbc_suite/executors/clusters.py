@@ -29,7 +29,7 @@ class RayCluster:
         self._ray = ray = _import("ray", extra="ray")
         self._attempts = attempts
         if not ray.is_initialized():
-            ray.init(log_to_driver=False)
+            ray.init(log_to_driver=False, include_dashboard=False)  # it has no password
         self._workers = workers or max(1, int(ray.cluster_resources().get("CPU", 1)))
 
     def run(
