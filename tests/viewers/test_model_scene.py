@@ -2,7 +2,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from wbc_suite.viewers.model_scene import ModelScene, relative_poses
+from wbc_suite.viewers.model_scene import ModelScene, relative_poses, robot_box
 
 ARM = """
 <mujoco><worldbody>
@@ -76,3 +76,12 @@ def test_one_mesh_per_body_kind_and_colour(scene):
     assert len(scene.collision_shapes) == 1
     assert not scene.collision_shapes[0].visible
     assert scene.nodes[3] == "/world/upper/fore/hand"
+
+
+def test_robot_without_shapes_has_a_box_around_its_bodies():
+    bare = """<mujoco><worldbody><body pos="0 0 1"><joint/>
+    <inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody></mujoco>"""
+    m = mujoco.MjModel.from_xml_string(bare)
+    low, high = robot_box(m, *posed(m, 0.0))
+    assert (low < [0.0, 0.0, 1.0]).all()
+    assert (high > [0.0, 0.0, 1.0]).all()

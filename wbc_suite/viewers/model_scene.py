@@ -22,6 +22,7 @@ Rgba: TypeAlias = tuple[float, float, float, float]
 
 COLLISION_GROUP = 3  # geoms of this group and above are collision geoms
 TOLERANCE = 1e-4  # m, and quaternion units: 0.2 mm at a distance of 1 m
+BARE = 0.2  # m, around the bodies of a robot without shapes
 DEFAULT_COLOR = (0.5, 0.5, 0.5, 1.0)
 """Of a geom without a colour of its own; its material's is drawn then."""
 
@@ -96,14 +97,17 @@ def robot_box(
 ) -> tuple[Vector, Vector]:
     """Return two corners of a box around the first robot, m.
 
-    Robots in a scene carry the prefix `robot0_`; a model without it is all robot. It
-    has at least one geom that is not a plane. For poses see `ModelScene.update`.
+    Robots in a scene carry the prefix `robot0_`; a model without it is all robot. One
+    without shapes is around its bodies. For poses see `ModelScene.update`.
     """
     names = [model.body(body).name for body in range(model.nbody)]
     prefix = "robot0_" if any(n.startswith("robot0_") for n in names) else ""
     own = np.array([body > 0 and n.startswith(prefix) for body, n in enumerate(names)])
     bodies = model.geom_bodyid
     drawn = own[bodies] & (model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE)
+    if not drawn.any():
+        low, high = positions[own].min(axis=0), positions[own].max(axis=0)
+        return low - BARE, high + BARE
     rotations = Rotation.from_quat(quaternions[bodies], scalar_first=True)
     centres = (positions[bodies] + rotations.apply(model.geom_pos))[drawn]
     reach = np.abs(model.geom_aabb[drawn, :3]) + model.geom_aabb[drawn, 3:]
