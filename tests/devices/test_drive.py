@@ -46,13 +46,17 @@ class Driver:
     def __init__(self, **config):
         self.env = WalkingEnv()
         config = {"base_speed": (2.0, 2.0), "ramp": 0.0} | config
-        self.pipeline, self.time = Pipeline(self.env, PipelineConfig(**config)), 0.0
+        self.time = self.now = 0.0
+        self.pipeline = Pipeline(
+            self.env, PipelineConfig(**config), clock=lambda: self.now
+        )
 
     def drive(self, velocity, ticks, *, base=None):
         """Return walk and height of each tick, shape (ticks, 4)."""
         rows = []
         for _ in range(ticks):
             self.time += DT
+            self.now += DT
             state = DeviceState(time=self.time, base=base)
             action = self.pipeline.update(state, np.array(velocity, dtype=float))
             values = self.env.action_layout.unpack(action)
@@ -126,6 +130,7 @@ def test_a_silent_device_stops_what_it_drove_and_the_page_still_drives(driver):
     driver.drive(np.zeros(4), 100, base=np.array([0.5, 0.0, 0.0]))
     for velocity, expected in ((0.0, 0.0), (-0.3, -0.3)):
         for _ in range(200):  # its time stands still
+            driver.now += DT
             action = driver.pipeline.update(
                 DeviceState(time=driver.time), np.array([velocity, 0, 0, 0])
             )

@@ -27,9 +27,20 @@ def shifted(pose, *offset):
     return pin.SE3(pose.rotation, pose.translation + np.array(offset))
 
 
+class Clock:
+    """A clock that `ticks` advances by a period at each tick."""
+
+    now = 0.0
+
+    def __call__(self):
+        return self.now
+
+
 def ticks(session, n):
     for _ in range(n):
         session.tick()
+        if isinstance(session._clock, Clock):
+            session._clock.now += session.period
 
 
 def error(session, name="right_hand"):
@@ -236,16 +247,24 @@ def test_loop_survives_a_device_that_fails_and_says_why():
             return told[-1]
 
     told = []
-    up = {"left": LimbInput(twist=np.array([0, 0, 0.1, 0, 0, 0]))}
-    says = [DeviceState(time=0.02 * k, limbs=up) for k in range(1, 50)]
-    session = TeleopSession(FakeEnv(), period=0.02, device=Faulty(says))
+    says = [
+        DeviceState(
+            time=0.02 * k,
+            limbs={"left": LimbInput(twist=np.array([0, 0, speed, 0, 0, 0]))},
+        )
+        for k, speed in enumerate([0.1] * 7 + [0.0] + [0.1] * 10, start=1)
+    ]
+    session = TeleopSession(FakeEnv(), period=0.02, device=Faulty(says), clock=Clock())
     ticks(session, 5)
     assert session.snapshot.device[0] == "device error: unplugged"
     ticks(session, 10)
     held = session.snapshot.limbs["left_hand"].target.translation
     ticks(session, 2)
     assert session.snapshot.limbs["left_hand"].target.translation == pytest.approx(held)
-    ticks(session, 10)
+    ticks(session, 7)  # it works again, but its key is still held
+    assert session.snapshot.limbs["left_hand"].target.translation == pytest.approx(held)
+    assert "released first" in session.snapshot.device[0]
+    ticks(session, 5)  # it was released and pressed again
     assert session.snapshot.device == ()
     assert session.snapshot.limbs["left_hand"].target.translation[2] > held[2]
     assert np.isfinite(session.env.actions).all()
@@ -321,7 +340,11 @@ def test_page_takes_a_limb_over_from_a_device_that_went_silent():
     ]
     stages = stages_of("stream", scale=1.0, mirror=False)
     session = TeleopSession(
-        FakeEnv(), period=0.02, device=Scripted(says), pipeline=stages
+        FakeEnv(),
+        period=0.02,
+        device=Scripted(says),
+        pipeline=stages.model_copy(update={"return_after": 10.0}),
+        clock=Clock(),
     )
     ticks(session, 200)
     start = session.snapshot.limbs["right_hand"].target
@@ -329,7 +352,7 @@ def test_page_takes_a_limb_over_from_a_device_that_went_silent():
     for k in range(600):  # longer than the time after which the limb would move home
         lower = start.translation - [0.0, 0.0, min(0.2, 0.002 * k)]
         session.drag("right_hand", ALICE, pin.SE3(start.rotation, lower))
-        session.tick()
+        ticks(session, 1)
     moved = (
         session.snapshot.limbs["right_hand"].measured.translation - start.translation
     )
@@ -352,7 +375,9 @@ def test_device_moves_a_hand_beside_the_page_and_presses_buttons():
     up = LimbInput(twist=np.array([0, 0, 0.2, 0, 0, 0]))
     says = [DeviceState(time=float(k), limbs={"left": up}) for k in range(1, 40)]
     last = DeviceState(time=99.0, buttons=frozenset({"pause"}))
-    session = TeleopSession(FakeEnv(), period=0.02, device=Scripted([*says, last]))
+    session = TeleopSession(
+        FakeEnv(), period=0.02, device=Scripted([*says, last]), clock=Clock()
+    )
     start = session.snapshot.limbs["left_hand"].measured.translation[2]
     ticks(session, 40)
     moved = session.snapshot.limbs["left_hand"].measured.translation[2] - start

@@ -81,7 +81,7 @@ class TeleopSession:
         env.reset(seed=seed)
         controller = env.unwrapped.controllers[0]  # type: ignore[attr-defined]
         self._balance = BalanceReader(self.model, self._simulation.data, controller)
-        self._pipeline = Pipeline(env, pipeline)
+        self._pipeline = Pipeline(env, pipeline, clock=clock)
         self.limbs = {n: LimbTarget(limb) for n, limb in self._pipeline.limbs.items()}
         self._open_grippers()
         self.info = SessionInfo(
@@ -225,7 +225,10 @@ class TeleopSession:
             self.episode_control.update(self._reset)
             if self.episode_control.finished:
                 self.quit.set()
-        if not self._paused:
+        if self._paused:
+            with self._lock:
+                self._pipeline.hold(state)
+        else:
             self._step(state, inputs)
         self._publish()
 
