@@ -115,6 +115,8 @@ class Snapshot:
         selected: Limb that a device for one hand moves; empty if none is used.
         recording: State of the recording; None if the session cannot record.
         velocity: Commanded velocity forward, left (m/s), turn (rad/s), up (m/s).
+        drive_waits: Whether a velocity is commanded by a key that was held while the
+            connection dropped, in a pause or in a reset, and has to be released first.
         rides: Whether targets of hands move with the body.
         balance: Balance of a robot that walks, if a client displays it.
         fell: When and why the robot fell; empty while it has not.
@@ -140,6 +142,7 @@ class Snapshot:
     selected: str
     recording: EpisodeStatus | None
     velocity: Vector
+    drive_waits: bool
     rides: bool
     balance: BalanceStatus | None
     fell: str

@@ -133,7 +133,10 @@ class TeleopSession:
             self._drive.leave(client)
 
     def drive(self, client: int, velocity: Vector) -> None:
-        """Drive by forward, left (m/s), turn (rad/s), up (m/s); see `HeldCommand`."""
+        """Drive by forward, left (m/s), turn (rad/s), up (m/s); see `HeldCommand`.
+
+        A client sends zeros first.
+        """
         now = self._clock()
         with self._lock:
             if self._drive.set(velocity, client=client, now=now):
@@ -325,6 +328,7 @@ class TeleopSession:
             }
             grippers = {name: goal.copy() for name, goal in self.grippers.items()}
             balance = self._balance.status()
+            drive_waits = self._drive.waits(now)
         self.snapshot = Snapshot(
             tick=self._tick,
             epoch=self._epoch,
@@ -346,6 +350,7 @@ class TeleopSession:
             selected=self._selected,
             recording=self.episode_control and self.episode_control.status,
             velocity=self._pipeline.drive.velocity,
+            drive_waits=drive_waits,
             rides=all(limb.stages.rides for limb in self.limbs.values()),
             balance=balance,
             fell=self._balance.fell,
