@@ -281,5 +281,6 @@ def test_page_of_another_process_shows_and_pauses_the_session(settled, context):
             tab.get_by_role("button", name=button).click()
             wait_until(lambda now=paused: session.snapshot.paused is now, button)
     finally:
-        session.pause(False)
+        owner = session.snapshot.paused_by
+        session.pause(0 if owner is None else owner, False)
         page.stop()

@@ -49,9 +49,9 @@ def test_episodes_of_a_session_are_kept_discarded_taken_back_and_replay(
     session.grab("right_hand", 1, hand)
     hand.translation += [0.0, 0.05, 0.05]
     session.drag("right_hand", 1, hand)
-    session.pause(True)
+    session.pause(1, True)
     assert ticks(session, 5).length == 3
-    session.pause(False)
+    session.pause(1, False)
     assert ticks(session, 6).length == 9
     assert (
         ticks(session, 1, EpisodeCommand.SUCCESS).message

@@ -172,13 +172,40 @@ def test_reset_brings_hands_and_targets_back(session):
 
 
 def test_nothing_moves_while_paused(session):
-    session.pause(True)
+    session.pause(ALICE, True)
     ticks(session, 3)
     assert session.env.actions == []
     assert session.snapshot.paused
-    session.pause(False)
+    session.pause(ALICE, False)
     session.tick()
     assert len(session.env.actions) == 1
+
+
+def test_only_who_paused_resumes_and_anybody_after_they_have_left(session):
+    assert session.pause(ALICE, True)
+    assert session.pause(BOB, True)
+    assert not session.pause(BOB, False)
+    ticks(session, 2)
+    assert session.snapshot.paused_by == ALICE
+    session.leave(BOB)
+    session.leave(ALICE)
+    ticks(session, 2)
+    assert (session.snapshot.paused, session.snapshot.paused_by) == (True, None)
+    assert session.env.actions == []
+    assert session.pause(BOB, False)
+    ticks(session, 2)
+    assert len(session.env.actions) == 2
+
+
+def test_key_that_is_held_through_a_pause_does_not_drive_after_it(session):
+    session.drive(ALICE, np.zeros(4))
+    session.pause(BOB, True)
+    session.drive(ALICE, np.array([1.0, 0.0, 0.0, 0.0]))
+    session.tick()
+    session.pause(BOB, False)
+    session.drive(ALICE, np.array([1.0, 0.0, 0.0, 0.0]))
+    session.tick()
+    assert session.snapshot.drive_waits
 
 
 def test_latency_counts_from_input_to_the_end_of_its_step():
@@ -382,10 +409,15 @@ def test_device_moves_a_hand_beside_the_page_and_presses_buttons():
     ticks(session, 40)
     moved = session.snapshot.limbs["left_hand"].measured.translation[2] - start
     assert moved == pytest.approx(39 * 0.02 * 0.2, abs=0.02)
-    assert session.snapshot.paused
-    session.pause(False)
-    ticks(session, 10)
+    assert session.snapshot.paused_by == "device"
+    assert not session.pause(ALICE, False)
+    ticks(session, round(20.1 / 0.02))  # it is silent for so long that it has left
     assert session.snapshot.device == ("no data from the device: holding",)
+    assert (session.snapshot.paused, session.snapshot.paused_by) == (True, None)
+    moved = len(session.env.actions)
+    assert session.pause(ALICE, False)
+    ticks(session, 1)
+    assert len(session.env.actions) == moved + 1
 
 
 def test_limbs_say_which_of_them_a_device_for_one_hand_moves():

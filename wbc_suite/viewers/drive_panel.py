@@ -69,7 +69,7 @@ class DrivePanel:
             hold.on_click(lambda _: session.ride(hold.value.strip("• ") == IN_BODY))
 
     def receive(self, client: int, axes: Vector | None) -> None:
-        """Drive by axes forward, left, turn and up, -1 .. 1, shape (4,); None leaves."""
+        """Drive by axes forward, left, turn, up, -1 .. 1, shape (4,); None: it left."""
         if axes is None:
             self._session.leave(client)
             return

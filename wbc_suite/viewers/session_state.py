@@ -3,6 +3,7 @@
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Literal, TypeAlias
 
 import mujoco
 import pinocchio as pin
@@ -12,6 +13,9 @@ from wbc_suite.devices.action_ports import LimbKind
 from wbc_suite.recording.episode_control import EpisodeStatus
 from wbc_suite.typing import Matrix, Vector
 from wbc_suite.viewers.balance_status import BalanceStatus
+
+PauseOwner: TypeAlias = int | Literal["device"]
+"""Who paused: a client, or the device beside the page."""
 
 
 def plain(name: str) -> str:
@@ -110,6 +114,8 @@ class Snapshot:
         step_time: Duration of a step of control and physics, s.
         latency: Median time from an input to its joint target, s; nan before any.
         speed: Simulated time per wall time.
+        paused_by: Who paused, and alone may resume; None if they have left, and anybody
+            may, or if the session is not paused.
         message: Message to the user, possibly empty.
         device: State of the device beside the page, as the pipeline reports it.
         selected: Limb that a device for one hand moves; empty if none is used.
@@ -136,6 +142,7 @@ class Snapshot:
     latency: float
     speed: float
     paused: bool
+    paused_by: PauseOwner | None
     success: bool
     message: str
     device: tuple[str, ...]

@@ -104,6 +104,17 @@ def status_html(
     )
 
 
+def pause_text(snapshot: Snapshot) -> str:
+    """Return that the session is paused, and who may resume it."""
+    match snapshot.paused_by:
+        case None:
+            return "Paused: anybody may resume"
+        case "device":
+            return "Paused: the device may resume"
+        case client:
+            return f"Paused: viewer {client + 1} may resume"
+
+
 def task_html(task: str) -> str:
     """Return the task as the heading of the page."""
     return (
@@ -162,7 +173,7 @@ def _state(snapshot: Snapshot, info: SessionInfo) -> tuple[str, str]:
     if snapshot.fell:
         return "Fallen", RED
     if snapshot.paused:
-        return "Paused", YELLOW
+        return pause_text(snapshot), YELLOW
     if snapshot.device:
         return ", ".join(snapshot.device).capitalize(), YELLOW
     if snapshot.success:

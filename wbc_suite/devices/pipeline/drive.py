@@ -34,8 +34,9 @@ class HeldCommand:
         self._refused = -np.inf  # when a command came from another one, s
 
     def set(self, values: ArrayLike, *, client: int, now: float) -> bool:
-        """Take a command; False if it is invalid, another client has one, or the
-        client has to send zeros first.
+        """Take a command; False if it is refused.
+
+        That is if it is invalid, another client has one, or zeros have to come first.
 
         Args:
             values: The command; zeros end it.

@@ -159,6 +159,11 @@ class Pipeline:
         robot = robot_of(self.selected) if self.selected else min(self._drives)
         return self._drives[robot]
 
+    @property
+    def silence(self) -> float:
+        """Time since the device sent new data, s; infinite before any."""
+        return self._watchdog.silence
+
     def leave(self, name: str) -> None:
         """Leave a limb to other inputs while the device sends nothing for it."""
         self._driven.discard(name)

@@ -27,6 +27,9 @@ class Watchdog:
         hold_after: Time without new data before limbs are held, s.
         return_after: Time without new data before limbs move home, s; None for never.
         clock: Source of time that never goes back, s.
+
+    Attributes:
+        silence: Time without new data at the last check, s; infinite before any.
     """
 
     def __init__(
@@ -42,7 +45,7 @@ class Watchdog:
     def reset(self) -> None:
         """Wait for a first state."""
         self._latest, self._last = -math.inf, -math.inf
-        self._heard, self._silent = -math.inf, math.inf
+        self._heard, self.silence = -math.inf, math.inf
         self._fault = ""
 
     @property
@@ -53,9 +56,9 @@ class Watchdog:
     @property
     def phase(self) -> Phase:
         """What the pipeline has to do."""
-        if self._silent <= self._hold:
+        if self.silence <= self._hold:
             return Phase.LIVE
-        silent = self._silent if self.has_data else 0.0
+        silent = self.silence if self.has_data else 0.0
         return Phase.RETURN if silent > self._return else Phase.HOLD
 
     @property
@@ -71,7 +74,7 @@ class Watchdog:
     def check(self, state: DeviceState) -> DeviceState | None:
         """Return the state if it is new, else None."""
         now = self._clock()
-        self._silent = now - self._heard
+        self.silence = now - self._heard
         if not state.finite:
             self._fault = "the device sends invalid numbers"
             return None
@@ -82,6 +85,6 @@ class Watchdog:
         self._last = state.time
         if not moved_on:
             return None
-        self._latest, self._heard, self._silent = state.time, now, 0.0
+        self._latest, self._heard, self.silence = state.time, now, 0.0
         self._fault = ""
         return state
