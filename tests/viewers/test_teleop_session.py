@@ -11,7 +11,12 @@ from wbc_suite.cli.teleop import stages_of
 from wbc_suite.devices import DeviceState, LimbInput, Scripted
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.viewers.scene_setup import limb_colours
-from wbc_suite.viewers.status_text import limbs_html, status_html, task_html
+from wbc_suite.viewers.status_text import (
+    limbs_html,
+    status_html,
+    task_html,
+    timing_text,
+)
 from wbc_suite.viewers.teleop_session import TeleopSession
 
 ALICE, BOB = 1, 2
@@ -222,6 +227,35 @@ def test_latency_counts_from_input_to_the_end_of_its_step():
     np.testing.assert_allclose(session.latencies(), [0.03, 0.023])
     session.tick()
     assert len(session.latencies()) == 2
+
+
+def test_step_time_is_that_of_a_step_and_overruns_are_counted_apart():
+    """At 100 Hz; the sixth step takes 35 ms, all others 2."""
+    clock = Clock()
+    env = FakeEnv()
+    step, taken = env.step, iter([0.002] * 5 + [0.035] + [0.002] * 4)
+
+    def slow(action):
+        clock.now += next(taken)
+        return step(action)
+
+    env.step = slow
+    session = TeleopSession(env, period=0.01, clock=clock)
+    session.timer._sleep = lambda seconds: setattr(clock, "now", clock.now + seconds)
+    session.timer.start()
+    for k in range(10):
+        session.tick()
+        session.timer.finish_step()
+        if k == 4:
+            assert session.snapshot.step_time == pytest.approx(0.002)
+            assert session.snapshot.step_period == pytest.approx(0.010)
+    snapshot = session.snapshot
+    assert (snapshot.overruns, snapshot.skipped) == (1, 2)
+    assert 0.002 < snapshot.step_time < 0.004
+    assert 0.010 < snapshot.step_period < 0.012
+    text = status_html(snapshot, session.info, limb_colours(session.limbs))
+    assert "1 (2 skipped)" in text
+    assert timing_text(snapshot).endswith("1 overruns, 2 periods skipped.")
 
 
 def test_loop_runs_in_its_own_thread_and_stops(session):

@@ -200,6 +200,7 @@ def drive(
     from wbc_suite.viewers.headset_view import SessionView
     from wbc_suite.viewers.loop_timing import prepare_interpreter
     from wbc_suite.viewers.page_process import PageProcess
+    from wbc_suite.viewers.status_text import timing_text
     from wbc_suite.viewers.teleop_session import TeleopSession
 
     session = TeleopSession(
@@ -236,6 +237,8 @@ def drive(
             page.check()
     finally:
         session.stop()
+        if session.snapshot.tick > 1:
+            print(timing_text(session.snapshot), flush=True)
         if page is not None:
             page.stop()
         if device is not None:

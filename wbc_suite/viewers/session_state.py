@@ -111,7 +111,10 @@ class Snapshot:
         body_quaternions: Their orientations (wxyz), shape (nbody, 4).
         limbs: Status by limb name.
         grippers: Commanded closing of each gripper's synergies, -1 open .. 1 closed.
-        step_time: Duration of a step of control and physics, s.
+        step_time: Measured time of a step of control and physics, s; nan before any.
+        step_period: Measured time between two steps, s; nan before two.
+        overruns: Number of steps that ended after the next one was due.
+        skipped: Number of periods that were skipped for them.
         latency: Median time from an input to its joint target, s; nan before any.
         speed: Simulated time per wall time.
         paused_by: Who paused, and alone may resume; None if they have left, and anybody
@@ -139,6 +142,9 @@ class Snapshot:
     limbs: Mapping[str, LimbStatus]
     grippers: Mapping[str, Vector]
     step_time: float
+    step_period: float
+    overruns: int
+    skipped: int
     latency: float
     speed: float
     paused: bool

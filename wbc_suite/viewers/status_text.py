@@ -71,9 +71,12 @@ def status_html(
     snapshot: Snapshot, info: SessionInfo, colours: Mapping[str, Colour]
 ) -> str:
     """Return the state of a session, with reasons of limbs that miss their target."""
+    skipped = f" ({snapshot.skipped} skipped)" if snapshot.skipped else ""
     figures = (
         ("input to joint target", _or_dash(1e3 * snapshot.latency, "ms")),
         ("step time", _or_dash(1e3 * snapshot.step_time, "ms", digits=1)),
+        ("period", _or_dash(1e3 * snapshot.step_period, "ms", digits=1)),
+        ("overruns", f"{snapshot.overruns}{skipped}"),
         ("real time", _or_dash(snapshot.speed, "x", digits=2)),
     )
     cells = "".join(
@@ -99,8 +102,20 @@ def status_html(
     return (
         "<div style='padding:0 .7em .6em'>"
         f"{_state_html(snapshot, info)}"
-        f"<div style='display:flex;gap:.4em'>{cells}</div>"
+        f"<div style='display:flex;flex-wrap:wrap;gap:.4em 1em'>{cells}</div>"
         f"{_recording_html(snapshot)}{fall}{reasons}</div>"
+    )
+
+
+def timing_text(snapshot: Snapshot) -> str:
+    """Return how the loop kept its period, for the end of a session."""
+    step, period = (
+        f"{1e3 * seconds:.1f} ms"
+        for seconds in (snapshot.step_time, snapshot.step_period)
+    )
+    return (
+        f"{snapshot.tick} steps, the last of {step} every {period}; "
+        f"{snapshot.overruns} overruns, {snapshot.skipped} periods skipped."
     )
 
 

@@ -299,12 +299,13 @@ class TeleopSession:
         action = self._act(state)
         self._selected = self._pipeline.selected if "hand" in state.limbs else ""
         self.timer.wait_for_step()
+        begun = self._clock()
         try:
             *_, info = self.env.step(action)
         except DatasetError as error:  # the disk is full; teleoperation goes on
             info, self._message = {}, str(error)
         now = self._clock()
-        self._times.end_step(inputs, now)
+        self._times.end_step(inputs, begun, now)
         self._balance.take(info.get("balance", {}))
         self._ik, self._success = info.get("ik", {}), bool(info.get("success", False))
         if self._success and np.isnan(self._solved_at):
@@ -330,6 +331,7 @@ class TeleopSession:
         self._solved_at = np.nan
         self._balance.take({})
         self._times.restart()
+        self.timer.restart()
         self._epoch += 1
 
     def _open_grippers(self) -> None:
@@ -357,9 +359,12 @@ class TeleopSession:
             body_quaternions=data.xquat.copy(),
             limbs=limbs,
             grippers=grippers,
-            step_time=self._times.mean,
+            step_time=self._times.duration,
+            step_period=self._times.period,
+            overruns=self.timer.overruns,
+            skipped=self.timer.skipped,
             latency=self._times.latency,
-            speed=self.period / max(self._times.mean, 1e-9),
+            speed=self.period / max(self._times.period, 1e-9),
             paused=self._paused,
             paused_by=self._paused_by,
             success=self._success,
