@@ -12,6 +12,18 @@ pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 HAND, OTHER = "right_hand", "left_hand"
 SCALE = 0.22  # m, of a hand's handle
+ENDS = {
+    "hidden": """
+        Object.defineProperty(document, 'hidden', { get: () => true, configurable: true })
+        document.dispatchEvent(new Event('visibilitychange'))
+    """,
+    "pagehide": "dispatchEvent(new Event('pagehide'))",
+    "pointercancel": "document.querySelector('canvas').dispatchEvent("
+    "new PointerEvent('pointercancel', {pointerId: 1, bubbles: true}))",
+    "missed": "document.querySelector('canvas').dispatchEvent("
+    "new PointerEvent('pointermove', {pointerId: 1, buttons: 0, bubbles: true}))",
+}
+"""How a drag ends without a release that the page sees."""
 
 
 @pytest.fixture
@@ -207,6 +219,22 @@ def test_closing_a_tab_gives_back_what_it_held(settled, context):
     hold_and_drag(viewer, session, 40)
     viewer.page.close()
     wait_until(lambda: session.snapshot.limbs[HAND].holder is None, "it is given back")
+
+
+@pytest.mark.parametrize("end", ENDS)
+def test_drag_whose_release_is_not_seen_ends(settled, context, monkeypatch, end):
+    session, page = settled
+    monkeypatch.setattr(session.limbs[HAND].ownership, "timeout", np.inf)
+    viewer = Viewer(context, page.site)
+    hold_and_drag(viewer, session, 40)
+    viewer.page.evaluate(ENDS[end])
+    wait_until(lambda: session.snapshot.limbs[HAND].holder is None, "it is released")
+    wait_until_still(session)
+    held = target(session).translation.copy()
+    viewer.page.mouse.move(300, 300)
+    viewer.draw()
+    assert moved(session, held) < 1e-9
+    viewer.page.mouse.up()
 
 
 def test_buttons_pause_and_reset(settled, context):

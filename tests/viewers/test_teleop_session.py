@@ -10,6 +10,7 @@ from fake_env import REACH, FakeEnv, upper_limit
 from wbc_suite.cli.teleop import stages_of
 from wbc_suite.devices import DeviceState, LimbInput, Scripted
 from wbc_suite.errors import ConfigError, UnknownNameError
+from wbc_suite.viewers.limb_targets import HOLD_TIMEOUT
 from wbc_suite.viewers.scene_setup import limb_colours
 from wbc_suite.viewers.status_text import (
     limbs_html,
@@ -133,6 +134,23 @@ def test_clients_cannot_fight_over_a_limb(session):
     assert session.snapshot.limbs["right_hand"].holder == ALICE
     assert error(session) < 1e-9
     session.leave(ALICE)
+    assert session.grab("right_hand", BOB, hand)
+
+
+def test_client_that_went_silent_lets_go_and_has_to_grab_again():
+    session = TeleopSession(FakeEnv(), period=0.02, clock=Clock())
+    hand = session.snapshot.limbs["right_hand"].target
+    session.grab("right_hand", ALICE, hand)
+    session.drag("right_hand", ALICE, shifted(hand, 0, 0, 0.1))
+    ticks(session, round((HOLD_TIMEOUT + 1.0) / 0.02))  # its connection is stuck
+    status = session.snapshot.limbs["right_hand"]
+    assert status.holder is None
+    assert not session.drag("right_hand", ALICE, shifted(hand, 0, 0, -0.3))
+    ticks(session, 5)
+    np.testing.assert_array_equal(
+        session.snapshot.limbs["right_hand"].target.translation,
+        status.target.translation,
+    )
     assert session.grab("right_hand", BOB, hand)
 
 
