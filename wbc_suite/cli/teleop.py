@@ -51,7 +51,8 @@ DeviceOption = Annotated[
     str | None,
     typer.Option(
         help="Input device, besides the page's handles: headset, keyboard, stream, "
-        "spacemouse, gamepad, dualsense, mjgui or your own module:Class."
+        "spacemouse, gamepad or dualsense (move while L1 is held), mjgui or your own "
+        "module:Class."
     ),
 ]
 TlsCertOption = Annotated[
