@@ -14,7 +14,7 @@ HAND, OTHER = "right_hand", "left_hand"
 SCALE = 0.22  # m, of a hand's handle
 ENDS = {
     "hidden": """
-        Object.defineProperty(document, 'hidden', { get: () => true, configurable: true })
+        Object.defineProperty(document, 'hidden', { get: () => true })
         document.dispatchEvent(new Event('visibilitychange'))
     """,
     "pagehide": "dispatchEvent(new Event('pagehide'))",
@@ -242,6 +242,14 @@ def test_buttons_pause_and_reset(settled, context):
     viewer = Viewer(context, page.site)
     viewer.page.get_by_role("button", name="Pause").click()
     wait_until(lambda: session.snapshot.paused, "the pause")
+    number = viewer.client.client_id + 1
+    other = Viewer(context, page.site, watching=False)
+    other.page.get_by_role("button", name="Resume").click()
+    other.page.get_by_text("Only who paused may resume").wait_for()
+    other.page.get_by_text(f"Paused: viewer {number} may resume").first.wait_for()
+    assert session.snapshot.paused
+    other.page.close()
+    viewer.page.bring_to_front()
     viewer.page.get_by_role("button", name="Resume").click()
     wait_until(lambda: not session.snapshot.paused, "it goes on")
     epoch = session.snapshot.epoch
@@ -249,6 +257,19 @@ def test_buttons_pause_and_reset(settled, context):
     wait_until(lambda: session.snapshot.epoch == epoch + 1, "the reset")
     viewer.page.get_by_role("button", name="Record").click()
     viewer.page.get_by_text("has no file to record").wait_for()
+
+
+def test_pause_whose_owner_has_left_is_ended_by_anybody(settled, context):
+    session, page = settled
+    first = Viewer(context, page.site, watching=False)
+    first.page.get_by_role("button", name="Pause").click()
+    wait_until(lambda: session.snapshot.paused, "the pause")
+    first.page.close()
+    second = Viewer(context, page.site)
+    second.page.get_by_text("Paused: anybody may resume").wait_for()
+    assert session.snapshot.paused
+    second.page.get_by_role("button", name="Resume").click()
+    wait_until(lambda: not session.snapshot.paused, "it goes on")
 
 
 def test_shadows_are_for_whom_they_are_cheap(settled, context, monkeypatch):

@@ -64,7 +64,10 @@ TlsKeyOption = Annotated[
 ]
 RecordOption = Annotated[
     Path | None,
-    typer.Option(help="File for episodes recorded with the page's button Record."),
+    typer.Option(
+        help="File for episodes recorded with the page's button Record, which returns "
+        "the robot to its start."
+    ),
 ]
 
 

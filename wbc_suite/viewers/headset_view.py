@@ -73,7 +73,7 @@ class SessionView:
         for name in self._hands:
             if _state(snapshot, snapshot.limbs[name]) == "limited":
                 return f"{self._titles[name]}: {snapshot.limbs[name].acting[0]}", AMBER
-        return "", GREY
+        return "" if snapshot.recording is None else snapshot.recording.message, GREY
 
 
 def _state(snapshot: Snapshot, limb: LimbStatus) -> str:

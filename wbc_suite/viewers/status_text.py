@@ -28,6 +28,8 @@ FIRST_DRAG = "Drag an arrow of a handle: the limb follows."
 FIRST_GRIP = "The sliders below open and close grippers."
 FIRST_WALK = "Hold W A S D to move, Q E to turn."
 FIRST_KEY = "Key ? shows all keys."
+RECORD_MOVES = "Record starts a new episode: the robot returns to its start."
+RECORD_MOVED = "The robot was returned to its start."
 
 
 def describe_reason(reason: Reason) -> str:
@@ -198,16 +200,22 @@ def _state(snapshot: Snapshot, info: SessionInfo) -> tuple[str, str]:
 
 
 def _recording_html(snapshot: Snapshot) -> str:
-    """Return the state of the recording; empty before its first command."""
+    """Return the state of the recording, and what Record will do."""
     status = snapshot.recording
-    if status is None or not (status.message or status.recording):
+    if status is None:
         return ""
-    dot, episodes = "", f"{status.kept} episode{'s' * (status.kept != 1)} in the file."
-    text = f"{status.message} {episodes}"
+    dot, note, text = "", RECORD_MOVES, ""
     if status.recording:
         dot = f"<span style='color:{RED}'>&#9679;</span> "
         text = f"Recording episode {status.kept + 1}: {status.length} actions"
-    return f"<div style='margin-top:.5em'>{dot}{html.escape(text)}</div>"
+        note = RECORD_MOVED
+    elif status.message:
+        episodes = f"{status.kept} episode{'s' * (status.kept != 1)} in the file."
+        text = f"{status.message} {episodes}"
+    return (
+        f"<div style='margin-top:.5em'>{dot}{html.escape(text)}</div>"
+        f"<div style='font-size:.88em;opacity:.75'>{note}</div>"
+    )
 
 
 def _notes(snapshot: Snapshot, name: str, client: int) -> str:

@@ -39,14 +39,14 @@ RECORD_NOTE = (
 PAUSE_NOTE = "Only who paused may resume; anybody once they have left."
 BUTTON_HINT = (
     "Keys: P pause, 0 reset, C record or keep, Y keep as a success, X discard, "
-    "U delete the last episode"
+    "U delete the last episode. Reset and Record return the robot to its start."
 )
 CLUTCH_HINT = "Engaged: the limb follows its handle. Released: the handle moves alone."
 BALANCE_HINT = "Feet, capture point, next footstep and contact forces."
 SHADOW_HINT = "Without a graphics card, two thirds of the rendering time."
 HELP = "Keys and gestures"
 RECORD_KEYS = {
-    "C": (EpisodeCommand.RECORD, "Record or keep the episode"),
+    "C": (EpisodeCommand.RECORD, "Record from the robot's start, or keep the episode"),
     "Y": (EpisodeCommand.SUCCESS, "Keep the episode as a success"),
     "X": (EpisodeCommand.DISCARD, "Discard the episode"),
     "U": (EpisodeCommand.UNDO, "Delete the last episode"),
