@@ -59,7 +59,9 @@ class Room:
             collection,
             period=1.0 / RATE,
             device=self.stream,
-            pipeline=stages_of("stream", scale=1.0, mirror=False),
+            pipeline=stages_of("stream", scale=1.0, mirror=False).model_copy(
+                update={"hold_after": 3.0}  # a busy machine is not a lost connection
+            ),
             episode_control=self.episode_control,
         )
         self.session.tick()

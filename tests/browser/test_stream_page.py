@@ -50,3 +50,59 @@ def test_held_keys_and_buttons_move_the_hand_and_let_it_go(stream, context):
     wait_until(lambda: "next" in says(stream)[2].buttons, "the next hand")
     assert stream.refused == ""
     assert faults == []
+
+
+GAMEPAD = """
+    window.pad = { mapping: "standard", axes: [0, 0, 0, 0],
+                   buttons: [...Array(17)].map(() => ({ pressed: false, value: 0 })) }
+    navigator.getGamepads = () => [window.pad]
+    window.sockets = []
+    window.WebSocket = class extends WebSocket {
+        constructor(...options) { super(...options); sockets.push(this) }
+    }
+"""
+PRESS = "([number, pressed]) => { pad.buttons[number] = { pressed, value: +pressed } }"
+
+
+@pytest.fixture
+def page(stream, context):
+    page = context.new_page()
+    page.add_init_script(GAMEPAD)
+    page.goto(stream.url)
+    page.get_by_text("connected").wait_for()
+    return page
+
+
+def test_gamepad_moves_the_hand_while_its_enable_button_is_held(stream, page):
+    page.evaluate("pad.axes = [0, -1, 0, 0]")
+    page.evaluate(PRESS, [0, True])
+    page.evaluate(PRESS, [3, True])
+    wait_until(lambda: "next" in says(stream)[2].buttons, "the gamepad is read")
+    assert says(stream)[2].at_rest
+    assert "grip" not in says(stream)[2].buttons
+    page.evaluate(PRESS, [4, True])
+    wait_until(lambda: says(stream)[0][0] > 0, "it moves the hand")
+    wait_until(lambda: "grip" in says(stream)[2].buttons, "it grips")
+    page.evaluate(PRESS, [4, False])
+    wait_until(lambda: says(stream)[2].at_rest, "it stops")
+
+
+def test_what_is_held_while_the_connection_drops_has_to_be_pressed_anew(stream, page):
+    page.keyboard.down("w")
+    wait_until(lambda: says(stream)[0][0] > 0, "the key moves the hand")
+    page.evaluate("sockets.at(-1).close()")
+    page.get_by_text("waiting for the robot").wait_for()
+    page.get_by_text("connected").wait_for()
+    wait_until(lambda: says(stream)[2].at_rest, "nothing moves")
+    page.keyboard.up("w")
+    page.keyboard.down("w")
+    wait_until(lambda: says(stream)[0][0] > 0, "the key moves the hand again")
+
+
+def test_key_with_another_sign_when_it_is_released_is_released(stream, page):
+    """Comma is `<` while shift is held, on most keyboards."""
+    page.keyboard.down(",")
+    wait_until(lambda: not says(stream)[2].at_rest, "the base moves")
+    page.keyboard.down("Shift")
+    page.keyboard.up("<")  # the same key
+    wait_until(lambda: says(stream)[2].at_rest, "the base stops")

@@ -12,6 +12,18 @@ pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 HAND, OTHER = "right_hand", "left_hand"
 SCALE = 0.22  # m, of a hand's handle
+ENDS = {
+    "hidden": """
+        Object.defineProperty(document, 'hidden', { get: () => true })
+        document.dispatchEvent(new Event('visibilitychange'))
+    """,
+    "pagehide": "dispatchEvent(new Event('pagehide'))",
+    "pointercancel": "document.querySelector('canvas').dispatchEvent("
+    "new PointerEvent('pointercancel', {pointerId: 1, bubbles: true}))",
+    "missed": "document.querySelector('canvas').dispatchEvent("
+    "new PointerEvent('pointermove', {pointerId: 1, buttons: 0, bubbles: true}))",
+}
+"""How a drag ends without a release that the page sees."""
 
 
 @pytest.fixture
@@ -209,11 +221,35 @@ def test_closing_a_tab_gives_back_what_it_held(settled, context):
     wait_until(lambda: session.snapshot.limbs[HAND].holder is None, "it is given back")
 
 
+@pytest.mark.parametrize("end", ENDS)
+def test_drag_whose_release_is_not_seen_ends(settled, context, monkeypatch, end):
+    session, page = settled
+    monkeypatch.setattr(session.limbs[HAND].ownership, "timeout", np.inf)
+    viewer = Viewer(context, page.site)
+    hold_and_drag(viewer, session, 40)
+    viewer.page.evaluate(ENDS[end])
+    wait_until(lambda: session.snapshot.limbs[HAND].holder is None, "it is released")
+    wait_until_still(session)
+    held = target(session).translation.copy()
+    viewer.page.mouse.move(300, 300)
+    viewer.draw()
+    assert moved(session, held) < 1e-9
+    viewer.page.mouse.up()
+
+
 def test_buttons_pause_and_reset(settled, context):
     session, page = settled
     viewer = Viewer(context, page.site)
     viewer.page.get_by_role("button", name="Pause").click()
     wait_until(lambda: session.snapshot.paused, "the pause")
+    number = viewer.client.client_id + 1
+    other = Viewer(context, page.site, watching=False)
+    other.page.get_by_role("button", name="Resume").click()
+    other.page.get_by_text("Only who paused may resume").wait_for()
+    other.page.get_by_text(f"Paused: viewer {number} may resume").first.wait_for()
+    assert session.snapshot.paused
+    other.page.close()
+    viewer.page.bring_to_front()
     viewer.page.get_by_role("button", name="Resume").click()
     wait_until(lambda: not session.snapshot.paused, "it goes on")
     epoch = session.snapshot.epoch
@@ -221,6 +257,19 @@ def test_buttons_pause_and_reset(settled, context):
     wait_until(lambda: session.snapshot.epoch == epoch + 1, "the reset")
     viewer.page.get_by_role("button", name="Record").click()
     viewer.page.get_by_text("has no file to record").wait_for()
+
+
+def test_pause_whose_owner_has_left_is_ended_by_anybody(settled, context):
+    session, page = settled
+    first = Viewer(context, page.site, watching=False)
+    first.page.get_by_role("button", name="Pause").click()
+    wait_until(lambda: session.snapshot.paused, "the pause")
+    first.page.close()
+    second = Viewer(context, page.site)
+    second.page.get_by_text("Paused: anybody may resume").wait_for()
+    assert session.snapshot.paused
+    second.page.get_by_role("button", name="Resume").click()
+    wait_until(lambda: not session.snapshot.paused, "it goes on")
 
 
 def test_shadows_are_for_whom_they_are_cheap(settled, context, monkeypatch):
@@ -281,5 +330,6 @@ def test_page_of_another_process_shows_and_pauses_the_session(settled, context):
             tab.get_by_role("button", name=button).click()
             wait_until(lambda now=paused: session.snapshot.paused is now, button)
     finally:
-        session.pause(False)
+        owner = session.snapshot.paused_by
+        session.pause(0 if owner is None else owner, False)
         page.stop()

@@ -298,12 +298,40 @@ def test_lost_connection_stops_the_robot_and_is_taken_up_again(room, wearer):
     wearer.page.get_by_text("Waiting for the robot").wait_for(state="attached")
     device.start()
     began = time.monotonic()
-    wait_until(lambda: follows(session), "it is connected again")
+    wait_until(lambda: not session.snapshot.device, "it is connected again")
     note(headset_reconnects_after=round(time.monotonic() - began, 2))
+    wearer.move(np.array([0.0, 0.0, 0.05]))  # still squeezed, but not again
+    wait_for_rest(session)
+    assert not follows(session)
+    assert np.linalg.norm(measured(session) - start) < 1e-3
+    wearer.press("squeeze", 0)
+    wait_until(lambda: wearer.tell("!headset.hands.right.waits"), "it is released")
+    wearer.press("squeeze", 1)
+    wait_until(lambda: follows(session), "the hand follows again")
     wait_for_rest(session)
     assert np.linalg.norm(measured(session) - start) < 1e-3
     wearer.move(np.array([0.0, 0.0, 0.05]))
     wait_until(lambda: measured(session)[2] > start[2] + 0.045, "it goes on")
+
+
+def test_thumbstick_drives_while_its_trigger_is_held(wearer):
+    read = """async () => {
+        const { readControls } = await import('./hands.js')
+        return readControls(headset.session.inputSources).base
+    }"""
+    wearer.tell("device.controllers.left.updateAxes('thumbstick', 0, -1)")
+    wait_until(
+        lambda: wearer.tell(
+            "[...headset.session.inputSources].some(s => s.gamepad.axes[3] < -0.9)"
+        ),
+        "the stick is pushed",
+    )
+    assert wearer.tell(read) == [0, 0, 0]
+    wearer.press("trigger", 1, side="left")
+    wait_until(lambda: wearer.tell(read)[0] > 0.5, "it drives")
+    wearer.press("trigger", 0, side="left")
+    wait_until(lambda: wearer.tell(read) == [0, 0, 0], "it stops")
+    wearer.tell("device.controllers.left.updateAxes('thumbstick', 0, 0)")
 
 
 def test_cube_is_lifted_with_a_tracked_hand(context, room, packages):

@@ -46,13 +46,17 @@ class Driver:
     def __init__(self, **config):
         self.env = WalkingEnv()
         config = {"base_speed": (2.0, 2.0), "ramp": 0.0} | config
-        self.pipeline, self.time = Pipeline(self.env, PipelineConfig(**config)), 0.0
+        self.time = self.now = 0.0
+        self.pipeline = Pipeline(
+            self.env, PipelineConfig(**config), clock=lambda: self.now
+        )
 
     def drive(self, velocity, ticks, *, base=None):
         """Return walk and height of each tick, shape (ticks, 4)."""
         rows = []
         for _ in range(ticks):
             self.time += DT
+            self.now += DT
             state = DeviceState(time=self.time, base=base)
             action = self.pipeline.update(state, np.array(velocity, dtype=float))
             values = self.env.action_layout.unpack(action)
@@ -126,6 +130,7 @@ def test_a_silent_device_stops_what_it_drove_and_the_page_still_drives(driver):
     driver.drive(np.zeros(4), 100, base=np.array([0.5, 0.0, 0.0]))
     for velocity, expected in ((0.0, 0.0), (-0.3, -0.3)):
         for _ in range(200):  # its time stands still
+            driver.now += DT
             action = driver.pipeline.update(
                 DeviceState(time=driver.time), np.array([velocity, 0, 0, 0])
             )
@@ -140,7 +145,10 @@ def test_reset_stops_at_once(driver):
 
 
 def command():
-    return HeldCommand(4, timeout=0.5)
+    held = HeldCommand(4, timeout=0.5)
+    for client in (ALICE, BOB):
+        held.set(np.zeros(4), client=client, now=0.0)
+    return held
 
 
 def test_command_that_is_not_repeated_ends():
@@ -168,8 +176,46 @@ def test_one_client_drives_until_it_ends_or_leaves():
     np.testing.assert_array_equal(held.read(0.2), [1, 0, 0, 0])
     held.leave(ALICE)
     assert not held.read(0.2).any()
+    held.set(np.zeros(4), client=BOB, now=0.3)
     assert held.set([-1, 0, 0, 0], client=BOB, now=0.3)
+    held.set(np.zeros(4), client=ALICE, now=0.9)
     assert held.set([1, 0, 0, 0], client=ALICE, now=0.9)  # Bob is silent
+
+
+FORWARD = [1.0, 0, 0, 0]
+
+
+def test_first_command_of_a_client_counts_once_it_has_sent_zeros():
+    held = HeldCommand(4, timeout=0.5)
+    assert not held.set(FORWARD, client=ALICE, now=0.0)  # held while it connects
+    assert not held.read(0.0).any()
+    assert held.waits(0.1)
+    held.set(np.zeros(4), client=ALICE, now=0.2)
+    assert held.set(FORWARD, client=ALICE, now=0.3)
+    assert not held.waits(0.6)
+
+
+@pytest.mark.parametrize("end", ["silence", "clear", "leave", "other"])
+def test_key_that_is_held_while_its_command_ends_has_to_be_pressed_anew(end):
+    """After silence, a pause or a reset, on a new connection, or after another one."""
+    held, now = command(), 1.0
+    if end == "other":
+        held.set(FORWARD, client=BOB, now=0.0)
+        assert not held.set(FORWARD, client=ALICE, now=0.1)
+        held.set(np.zeros(4), client=BOB, now=0.2)
+    else:
+        held.set(FORWARD, client=ALICE, now=0.0 if end == "silence" else 0.9)
+    if end == "clear":
+        held.clear()
+    if end == "leave":
+        held.leave(ALICE)
+    for _ in range(5):
+        now += 0.1
+        assert not held.set(FORWARD, client=ALICE, now=now)
+        assert not held.read(now).any()
+    held.set(np.zeros(4), client=ALICE, now=now)
+    assert held.set(FORWARD, client=ALICE, now=now)
+    np.testing.assert_array_equal(held.read(now), FORWARD)
 
 
 @pytest.mark.parametrize("bad", [[np.nan, 0, 0, 0], [np.inf, 0, 0, 0], [1, 0], 1.0])

@@ -1,5 +1,6 @@
 import os
 import struct
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -66,10 +67,25 @@ def test_joystick_events_change_what_they_name():
 
 def test_pad_moves_the_hand_and_says_its_buttons():
     down = frozenset({"south", "l1"})
-    state = pad_state(0.0, Pad(left=(0.0, 1.0), cross=(1, 0), down=down), {"north"})
-    assert (np.sign(state.limbs["hand"].twist) == [1, 0, 0, -1, 0, 0]).all()
+    pad = Pad(left=(0.0, 1.0), right=(1.0, 0.0), cross=(1, 0), down=down)
+    state = pad_state(0.0, pad, {"north"})
+    assert (np.sign(state.limbs["hand"].twist) == [1, 0, 0, 0, 0, -1]).all()
     assert (np.sign(state.base) == [0, 0, -1]).all()
     assert state.buttons == {"grip", "next"}
+    state = pad_state(0.0, replace(pad, down=down | {"r1"}))
+    assert (np.sign(state.limbs["hand"].twist) == [1, 0, 0, 1, 0, 0]).all()
+
+
+@pytest.mark.parametrize("drives", [False, True])
+def test_pad_moves_nothing_unless_its_enable_button_is_held(drives):
+    down = frozenset({"south", "west", "north", "east", "start", "select", "r1"})
+    pad = Pad((1.0, 1.0), (1.0, 1.0), (0.3, 1.0), (1, 1), down)
+    state = pad_state(0.0, pad, drives=drives)
+    assert state.at_rest
+    assert state.buttons == {"next", "discard", "keep", "reset"}
+    enabled = pad_state(0.0, replace(pad, down=down | {"l1"}), drives=drives)
+    assert not enabled.at_rest
+    assert {"grip", "home"} < enabled.buttons
 
 
 def test_both_sticks_drive_after_a_press_of_the_left_one(tmp_path):
@@ -78,7 +94,7 @@ def test_both_sticks_drive_after_a_press_of_the_left_one(tmp_path):
     gamepad = Gamepad(file)
     gamepad.start()
     with file.open("wb", buffering=0) as writer:
-        writer.write(event(1, 9, 1) + event(1, 9, 0))
+        writer.write(event(1, 4, 1) + event(1, 9, 1) + event(1, 9, 0))
         writer.write(event(2, 1, -32767) + event(2, 3, 32767) + event(2, 4, 32767))
         state = gamepad.read()
         assert state.base[0] > 0.0 > state.base[2]
@@ -98,8 +114,9 @@ def test_dualsense_names_presses_of_its_sticks():
 
 
 def test_small_deflections_are_rest():
-    state = pad_state(0.0, Pad(left=(0.06, 0.06), right=(0.0, -0.09)))
-    assert not state.limbs["hand"].twist.any()
+    down = frozenset({"l1"})
+    state = pad_state(0.0, Pad(left=(0.06, 0.06), right=(0.0, -0.09), down=down))
+    assert state.at_rest
 
 
 def test_gamepad_reads_the_kernels_file(tmp_path):
@@ -108,28 +125,47 @@ def test_gamepad_reads_the_kernels_file(tmp_path):
     gamepad = Gamepad(file)
     gamepad.start()
     with file.open("wb", buffering=0) as writer:
-        writer.write(event(2, 1, -32767) + event(1, 0, 1) + event(1, 0, 0))
+        writer.write(event(1, 4, 1) + event(2, 1, -32767))
+        writer.write(event(1, 0, 1) + event(1, 0, 0))
         state = gamepad.read()
         assert state.limbs["hand"].twist[0] > 0
         assert state.buttons == {"grip"}  # though it is up again
         state = gamepad.read()
         assert state.limbs["hand"].twist[0] > 0  # it is still held
         assert state.buttons == frozenset()
+        writer.write(event(1, 4, 0))
+        assert gamepad.read().at_rest
     gamepad.stop()
 
 
+class Hid:
+    """Holds reports until they are read."""
+
+    def __init__(self, waiting):
+        self.waiting, self.closed = waiting, False
+
+    def read(self, _):
+        return self.waiting.pop(0) if self.waiting else b""
+
+    def close(self):
+        self.closed = True
+
+
+def test_dualsense_that_lost_its_connection_with_a_stick_held_has_no_new_data():
+    now, held = [5.0], dualsense((127, 0), rest=1)
+    full = held + bytes(64 - len(held))
+    hid = Hid([full, full])
+    pad = DualSense(find=lambda: [hid], clock=lambda: now[0])
+    pad.start()
+    assert not pad.read().at_rest
+    now[0] = 6.0
+    assert pad.read().time == 5.0
+    hid.waiting = [full]
+    assert pad.read().time == 6.0
+
+
 def test_dualsense_takes_the_newest_of_many_reports():
-    class Hid:
-        waiting = [dualsense((255, 127)), dualsense((127, 0))]
-        closed = False
-
-        def read(self, _):
-            return self.waiting.pop(0) if self.waiting else b""
-
-        def close(self):
-            self.closed = True
-
-    hid = Hid()
+    hid = Hid([dualsense((255, 127), rest=1), dualsense((127, 0), rest=1)])
     pad = DualSense(find=lambda: [hid])
     pad.start()
     twist = pad.read().limbs["hand"].twist

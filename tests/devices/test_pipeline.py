@@ -1,5 +1,7 @@
 """The pipeline as a whole: what a device says becomes an action."""
 
+import itertools
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -16,8 +18,9 @@ class Person:
     """Says things at the pipeline's rate, and lets the environment follow."""
 
     def __init__(self, env, **config):
-        self.env, self.time = env, 0.0
-        self.pipeline = Pipeline(env, PipelineConfig(**({"ramp": 0.0} | config)))
+        self.env, self.time, self.now = env, 0.0, 0.0
+        settings = PipelineConfig(**({"ramp": 0.0} | config))
+        self.pipeline = Pipeline(env, settings, clock=lambda: self.now)
 
     def say(self, ticks=1, *, buttons=(), base=None, **limbs):
         for _ in range(ticks):
@@ -34,6 +37,7 @@ class Person:
         return self
 
     def tick(self, state):
+        self.now += DT
         self.action = self.pipeline.update(state)
         self.env.step(self.action)
 
@@ -156,6 +160,35 @@ def test_silence_holds_and_then_brings_the_hand_home():
     assert "device" not in person.pipeline.acting
 
 
+def test_lost_connection_moves_no_hand_home_unless_asked(person):
+    person.say(right=LimbInput(pose=hand()))
+    person.say(100, right=LimbInput(pose=hand(y=0.1)))
+    person.now += 3600.0
+    person.silent(100)
+    np.testing.assert_allclose(person.target()[:3], [0.4, -0.1, 1.0], atol=1e-3)
+    assert person.pipeline.acting["device"] == ("no data from the device: holding",)
+
+
+@pytest.mark.parametrize("pause", [False, True])
+def test_velocity_that_was_held_in_a_silence_or_a_pause_moves_nothing(person, pause):
+    up = LimbInput(twist=np.array([0, 0, 0.2, 0, 0, 0]))
+    person.say(20, right=up, base=np.array([0.0, 0.0, 0.5]))
+    if pause:
+        person.time += DT
+        person.pipeline.hold(DeviceState(time=person.time, limbs={"right": up}))
+    else:
+        person.silent(30)
+    person.say(50, right=up)
+    before = person.target()[2]
+    person.say(50, right=up)
+    assert person.target()[2] == pytest.approx(before, abs=1e-6)
+    (note,) = person.pipeline.acting["device"]
+    assert "released first" in note
+    person.say(right=LimbInput(twist=np.zeros(6))).say(50, right=up)
+    assert person.target()[2] > before + 0.05
+    assert "device" not in person.pipeline.acting
+
+
 def test_start_ramp_begins_slowly():
     quick, slow = Person(FloatingEnv()), Person(FloatingEnv(), ramp=2.0)
     for person in (quick, slow):
@@ -260,7 +293,8 @@ def test_no_device_makes_a_target_exceed_its_limits(messages, absolute):
     env = FloatingEnv()
     mode = "absolute" if absolute else "relative"
     config = PipelineConfig(mode=mode, return_after=0.5, jump=None, jump_angle=None)
-    pipeline = Pipeline(env, config)
+    clock = (DT * k for k in itertools.count()).__next__  # read once a tick
+    pipeline = Pipeline(env, config, clock=clock)
     time, path, grips = 0.0, [env.action_layout.unpack(pipeline.update(SILENT))], []
     for step, kind, numbers, engaged, button, count in messages:
         time += step

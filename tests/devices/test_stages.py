@@ -99,52 +99,81 @@ def test_one_euro_filter_turns_along_the_shortest_arc():
     assert 0.0 < turned[2] < 2 * np.pi - 6.0
 
 
-def watch(*times, ticks=1):
-    """A watchdog that has read states of these times, and how many were new."""
-    dog, new = Watchdog(0.055, 0.205, DT), 0
-    for time in times:
-        for _ in range(ticks):
-            new += dog.check(state(time)) is not None
-    return dog, new
+class Watch:
+    """A watchdog on a clock that advances by a period at each check.
+
+    Args:
+        times: Of the states that it reads first, s.
+        ticks: How often each is read.
+
+    Attributes:
+        new: How many of these were new.
+    """
+
+    def __init__(self, *times, ticks=1):
+        self.now, self.dog = 50.0, Watchdog(0.055, 0.205, lambda: self.now)
+        read = [self.check(time) for time in times for _ in range(ticks)]
+        self.new = sum(state is not None for state in read)
+
+    def check(self, time, *, after=DT, **values):
+        self.now += after
+        return self.dog.check(state(time, **values))
+
+    @property
+    def phase(self):
+        return self.dog.phase
+
+    @property
+    def acting(self):
+        return self.dog.acting
 
 
 def test_watchdog_waits_for_a_first_state_without_returning():
-    dog, new = watch(*[math.nan] * 100)
-    assert new == 0
-    assert (dog.phase, dog.acting) == (Phase.HOLD, "waiting for the device")
+    watch = Watch(*[math.nan] * 100)
+    assert watch.new == 0
+    assert (watch.phase, watch.acting) == (Phase.HOLD, "waiting for the device")
 
 
 def test_watchdog_reads_a_repeated_state_once():
-    dog, new = watch(1.0, 2.0, ticks=3)
-    assert new == 2
-    assert (dog.phase, dog.acting) == (Phase.LIVE, "")
+    watch = Watch(1.0, 2.0, ticks=3)
+    assert watch.new == 2
+    assert (watch.phase, watch.acting) == (Phase.LIVE, "")
 
 
 def test_watchdog_holds_and_then_returns():
-    dog, _ = watch(1.0)
-    phases = []
+    watch, phases = Watch(1.0), []
     for _ in range(25):
-        dog.check(state(1.0))
-        phases.append(dog.phase)
+        watch.check(1.0)
+        phases.append(watch.phase)
     assert phases == [Phase.LIVE] * 5 + [Phase.HOLD] * 15 + [Phase.RETURN] * 5
 
 
+def test_watchdog_measures_silence_by_its_clock_and_not_by_calls():
+    watch = Watch(1.0)
+    watch.check(1.0, after=0.05)  # a loop that runs at 20 Hz in place of 100
+    assert watch.phase is Phase.LIVE
+    watch.check(1.0, after=0.05)
+    assert watch.phase is Phase.HOLD
+    watch.check(1.0, after=0.2)
+    assert watch.phase is Phase.RETURN
+    assert watch.check(1.3, after=5.0) is not None  # it has sent something meanwhile
+    assert watch.phase is Phase.LIVE
+
+
 def test_watchdog_reports_time_that_goes_backwards_until_it_advances():
-    dog, new = watch(5.0, 4.0)
-    assert new == 1
-    assert "backwards" in dog.acting
-    assert dog.check(state(5.1)) is not None
-    assert dog.acting == ""
+    watch = Watch(5.0, 4.0)
+    assert watch.new == 1
+    assert "backwards" in watch.acting
+    assert watch.check(5.1) is not None
+    assert watch.acting == ""
 
 
 def test_watchdog_accepts_a_restarted_device_after_the_hold():
-    dog, _ = watch(5.0)
-    for _ in range(10):
-        dog.check(state(5.0))
-    assert dog.phase is Phase.HOLD
-    dog.check(state(0.01))
-    assert dog.check(state(0.02)) is not None
-    assert dog.phase is Phase.LIVE
+    watch = Watch(*[5.0] * 11)
+    assert watch.phase is Phase.HOLD
+    watch.check(0.01)
+    assert watch.check(0.02) is not None
+    assert watch.phase is Phase.LIVE
 
 
 @pytest.mark.parametrize(
@@ -159,9 +188,9 @@ def test_watchdog_accepts_a_restarted_device_after_the_hold():
     ],
 )
 def test_watchdog_refuses_every_number_that_is_not_finite(values):
-    dog, _ = watch(1.0)
-    assert dog.check(state(2.0, **values)) is None
-    assert "invalid numbers" in dog.acting
+    watch = Watch(1.0)
+    assert watch.check(2.0, **values) is None
+    assert "invalid numbers" in watch.acting
 
 
 LIMBS = [f"robot{i}_{name}" for i in range(2) for name in ("head", "right", "left")]

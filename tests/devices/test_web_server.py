@@ -218,17 +218,18 @@ def test_connection_beyond_the_limit_closes_the_one_that_waits_longest(
     raise AssertionError("closed connections are still counted")
 
 
-def test_slow_connections_do_not_lock_visitors_out(server):
-    """The one that waits longest for its first request makes room."""
+def test_slow_connections_do_not_lock_visitors_out(served, monkeypatch):
+    """The one that waits longest for its first request makes room; none times out."""
+    monkeypatch.setattr(web_server, "HEAD_TIMEOUT", 1e6)
+    server = serve(served)
     slow = [client_of(server) for _ in range(300)]
     for client in slow:
         with contextlib.suppress(OSError):
             client.sendall(b"GET / HTTP/1.1\r\n")
-    start = time.monotonic()
     assert get(server)[0].status == 200
-    assert time.monotonic() - start < 1.0
     for client in slow:
         client.close()
+    server.stop()
 
 
 def test_connection_without_a_request_is_closed_after_a_while(served, monkeypatch):

@@ -39,19 +39,23 @@ def test_episodes_of_a_session_are_kept_discarded_taken_back_and_replay(
 ):
     ticks(session, 2)
     assert _buttons(session.snapshot)[2:] == ("Record",)
+    colours = limb_colours(session.limbs)
+    assert "Record starts a new episode: the robot returns to its start" in status_html(
+        session.snapshot, session.info, colours
+    )
     status = ticks(session, 3, EpisodeCommand.RECORD)
     assert (status.recording, status.length) == (True, 3)
     assert _buttons(session.snapshot)[2:] == ("Keep", "Discard")
-    assert "Recording episode 1: 3 actions" in status_html(
-        session.snapshot, session.info, limb_colours(session.limbs)
-    )
+    text = status_html(session.snapshot, session.info, colours)
+    assert "Recording episode 1: 3 actions" in text
+    assert "The robot was returned to its start" in text
     hand = session.snapshot.limbs["right_hand"].target
     session.grab("right_hand", 1, hand)
     hand.translation += [0.0, 0.05, 0.05]
     session.drag("right_hand", 1, hand)
-    session.pause(True)
+    session.pause(1, True)
     assert ticks(session, 5).length == 3
-    session.pause(False)
+    session.pause(1, False)
     assert ticks(session, 6).length == 9
     assert (
         ticks(session, 1, EpisodeCommand.SUCCESS).message

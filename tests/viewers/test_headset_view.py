@@ -52,7 +52,7 @@ def test_view_of_a_session_tells_bodies_eyes_and_how_hands_follow():
     np.testing.assert_allclose(poses[-1, :3], hand.target.translation, atol=1e-6)
     status = json.loads(view.status())
     assert status["hands"]["right_hand"]["state"] in ("released", "following")
-    session.pause(True)
+    session.pause(0, True)
     session.tick()
-    assert json.loads(view.status())["text"] == "Paused"
+    assert json.loads(view.status())["text"] == "Paused: viewer 1 may resume"
     env.close()

@@ -25,7 +25,7 @@ class Listener:
 
     def __call__(self, client, axes):
         with self.changed:
-            self.received.append((client, axes.tolist()))
+            self.received.append((client, None if axes is None else axes.tolist()))
             self.changed.notify_all()
 
     def wait(self, count):
@@ -73,7 +73,7 @@ def test_axes_arrive_and_a_client_that_goes_ends_its_motion(site, listener):
         socket.send(json.dumps([1, 0, -0.5, 0]))
         socket.send(json.dumps([0, 7, 0, 0]))
         assert listener.wait(2)[:2] == [(-1, [1, 0, -0.5, 0]), (-1, [0, 1, 0, 0])]
-    assert listener.wait(3)[2] == (-1, [0, 0, 0, 0])
+    assert listener.wait(3)[2] == (-1, None)
     with connect(socket_of(site)) as socket:
         socket.send("[0, 0, 0, 1]")
         assert listener.wait(4)[3] == (-2, [0, 0, 0, 1])
@@ -86,7 +86,7 @@ def test_invalid_message_ends_the_connection_and_the_motion(site, listener, mess
         socket.send(message)
         with pytest.raises(ConnectionClosed):
             socket.recv(timeout=PATIENCE)
-    assert listener.wait(2)[-1] == (-1, [0, 0, 0, 0])
+    assert listener.wait(2)[-1] == (-1, None)
 
 
 @pytest.mark.parametrize(
@@ -114,3 +114,4 @@ def test_velocity_is_said_in_words():
     text = velocity_html(np.array([0.0, 0.2, -1.0, 0.05]))
     assert "0.20 m/s left, 1.00 rad/s to the right, 0.05 m/s up" in text
     assert "Hold a key" in velocity_html(np.full(4, 1e-4))
+    assert "press it again" in velocity_html(np.zeros(4), waits=True)

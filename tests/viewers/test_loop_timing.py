@@ -2,7 +2,7 @@
 
 import pytest
 
-from wbc_suite.viewers.loop_timing import LEAD, MAX_BACKLOG, LoopTimer
+from wbc_suite.viewers.loop_timing import LEAD, LoopTimer
 
 PERIOD = 0.01  # s
 
@@ -54,19 +54,44 @@ def test_steps_are_one_period_apart_however_long_getting_ready_takes(timer, cloc
     assert others == pytest.approx(due)
 
 
-def test_late_step_begins_at_once_and_the_next_ones_catch_up(timer, clock):
+def test_late_step_begins_at_once_and_the_next_one_when_it_is_due(timer, clock):
     timer.start()
-    works = [(0.0, 0.025), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0)]
-    first, second, third, fourth = steps(timer, clock, works)
-    assert second == third == pytest.approx(first + 0.025)
-    assert fourth == pytest.approx(first + 3 * PERIOD)
+    first, second, third = steps(timer, clock, [(0.0, 0.012), (0.0, 0.0), (0.0, 0.0)])
+    assert second == pytest.approx(first + 0.012)
+    assert third == pytest.approx(first + 2 * PERIOD)
+    assert (timer.overruns, timer.skipped) == (1, 0)
 
 
-def test_loop_that_is_far_behind_does_not_race_after_the_time_it_lost(timer, clock):
+@pytest.mark.parametrize("lost", [1.5, 4.5, 700.5])
+def test_periods_that_a_stall_has_taken_are_skipped_and_counted(timer, clock, lost):
     timer.start()
-    works = [(0.0, (MAX_BACKLOG + 2) * PERIOD), (0.0, 0.0), (0.0, 0.0)]
-    _, second, third = steps(timer, clock, works)
-    assert third - second == pytest.approx(PERIOD)
+    works = [(0.0, lost * PERIOD), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0)]
+    first, second, *others = steps(timer, clock, works)
+    assert second == pytest.approx(first + lost * PERIOD)  # at once, and no burst:
+    due = [second + 0.5 * PERIOD, second + 1.5 * PERIOD]
+    assert others == pytest.approx(due)
+    assert (timer.overruns, timer.skipped) == (1, int(lost) - 1)
+
+
+def test_steps_that_always_take_too_long_follow_each_other_and_are_counted(
+    timer, clock
+):
+    timer.start()
+    begun = steps(timer, clock, [(0.0, 1.25 * PERIOD)] * 9)
+    assert begun == pytest.approx([begun[0] + 1.25 * PERIOD * k for k in range(9)])
+    assert (timer.overruns, timer.skipped) == (9, 2)
+
+
+def test_reset_of_the_scene_is_no_overrun(timer, clock):
+    timer.start()
+    steps(timer, clock, [(0.0, 0.0)])
+    clock.now += 50 * PERIOD
+    timer.restart()
+    again = clock.now
+    assert steps(timer, clock, [(0.0, 0.0)] * 2) == pytest.approx(
+        [again, again + PERIOD]
+    )
+    assert (timer.overruns, timer.skipped) == (0, 0)
 
 
 def test_loop_rests_between_ticks_and_not_within(timer, clock):

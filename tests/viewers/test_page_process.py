@@ -241,7 +241,7 @@ def test_remote_session_asks_for_what_the_session_does_and_stands_a_loss(session
     remote.leave(3)
     remote.enable(HAND, False)
     remote.set_gripper("right_gripper", 1, 0.5)
-    remote.pause(True)
+    remote.pause(3, True)
     remote.reset()
     remote.command_episode(EpisodeCommand.RECORD)
     thread.join()

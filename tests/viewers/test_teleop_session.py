@@ -10,8 +10,14 @@ from fake_env import REACH, FakeEnv, upper_limit
 from wbc_suite.cli.teleop import stages_of
 from wbc_suite.devices import DeviceState, LimbInput, Scripted
 from wbc_suite.errors import ConfigError, UnknownNameError
+from wbc_suite.viewers.limb_targets import HOLD_TIMEOUT
 from wbc_suite.viewers.scene_setup import limb_colours
-from wbc_suite.viewers.status_text import limbs_html, status_html, task_html
+from wbc_suite.viewers.status_text import (
+    limbs_html,
+    status_html,
+    task_html,
+    timing_text,
+)
 from wbc_suite.viewers.teleop_session import TeleopSession
 
 ALICE, BOB = 1, 2
@@ -27,9 +33,20 @@ def shifted(pose, *offset):
     return pin.SE3(pose.rotation, pose.translation + np.array(offset))
 
 
+class Clock:
+    """A clock that `ticks` advances by a period at each tick."""
+
+    now = 0.0
+
+    def __call__(self):
+        return self.now
+
+
 def ticks(session, n):
     for _ in range(n):
         session.tick()
+        if isinstance(session._clock, Clock):
+            session._clock.now += session.period
 
 
 def error(session, name="right_hand"):
@@ -120,6 +137,23 @@ def test_clients_cannot_fight_over_a_limb(session):
     assert session.grab("right_hand", BOB, hand)
 
 
+def test_client_that_went_silent_lets_go_and_has_to_grab_again():
+    session = TeleopSession(FakeEnv(), period=0.02, clock=Clock())
+    hand = session.snapshot.limbs["right_hand"].target
+    session.grab("right_hand", ALICE, hand)
+    session.drag("right_hand", ALICE, shifted(hand, 0, 0, 0.1))
+    ticks(session, round((HOLD_TIMEOUT + 1.0) / 0.02))  # its connection is stuck
+    status = session.snapshot.limbs["right_hand"]
+    assert status.holder is None
+    assert not session.drag("right_hand", ALICE, shifted(hand, 0, 0, -0.3))
+    ticks(session, 5)
+    np.testing.assert_array_equal(
+        session.snapshot.limbs["right_hand"].target.translation,
+        status.target.translation,
+    )
+    assert session.grab("right_hand", BOB, hand)
+
+
 @pytest.mark.parametrize("value", [np.nan, np.inf, 1e300])
 def test_invalid_input_moves_nothing_and_takes_nothing(session, value):
     hand = session.snapshot.limbs["right_hand"].target
@@ -161,13 +195,40 @@ def test_reset_brings_hands_and_targets_back(session):
 
 
 def test_nothing_moves_while_paused(session):
-    session.pause(True)
+    session.pause(ALICE, True)
     ticks(session, 3)
     assert session.env.actions == []
     assert session.snapshot.paused
-    session.pause(False)
+    session.pause(ALICE, False)
     session.tick()
     assert len(session.env.actions) == 1
+
+
+def test_only_who_paused_resumes_and_anybody_after_they_have_left(session):
+    assert session.pause(ALICE, True)
+    assert session.pause(BOB, True)
+    assert not session.pause(BOB, False)
+    ticks(session, 2)
+    assert session.snapshot.paused_by == ALICE
+    session.leave(BOB)
+    session.leave(ALICE)
+    ticks(session, 2)
+    assert (session.snapshot.paused, session.snapshot.paused_by) == (True, None)
+    assert session.env.actions == []
+    assert session.pause(BOB, False)
+    ticks(session, 2)
+    assert len(session.env.actions) == 2
+
+
+def test_key_that_is_held_through_a_pause_does_not_drive_after_it(session):
+    session.drive(ALICE, np.zeros(4))
+    session.pause(BOB, True)
+    session.drive(ALICE, np.array([1.0, 0.0, 0.0, 0.0]))
+    session.tick()
+    session.pause(BOB, False)
+    session.drive(ALICE, np.array([1.0, 0.0, 0.0, 0.0]))
+    session.tick()
+    assert session.snapshot.drive_waits
 
 
 def test_latency_counts_from_input_to_the_end_of_its_step():
@@ -184,6 +245,35 @@ def test_latency_counts_from_input_to_the_end_of_its_step():
     np.testing.assert_allclose(session.latencies(), [0.03, 0.023])
     session.tick()
     assert len(session.latencies()) == 2
+
+
+def test_step_time_is_that_of_a_step_and_overruns_are_counted_apart():
+    """At 100 Hz; the sixth step takes 35 ms, all others 2."""
+    clock = Clock()
+    env = FakeEnv()
+    step, taken = env.step, iter([0.002] * 5 + [0.035] + [0.002] * 4)
+
+    def slow(action):
+        clock.now += next(taken)
+        return step(action)
+
+    env.step = slow
+    session = TeleopSession(env, period=0.01, clock=clock)
+    session.timer._sleep = lambda seconds: setattr(clock, "now", clock.now + seconds)
+    session.timer.start()
+    for k in range(10):
+        session.tick()
+        session.timer.finish_step()
+        if k == 4:
+            assert session.snapshot.step_time == pytest.approx(0.002)
+            assert session.snapshot.step_period == pytest.approx(0.010)
+    snapshot = session.snapshot
+    assert (snapshot.overruns, snapshot.skipped) == (1, 2)
+    assert 0.002 < snapshot.step_time < 0.004
+    assert 0.010 < snapshot.step_period < 0.012
+    text = status_html(snapshot, session.info, limb_colours(session.limbs))
+    assert "1 (2 skipped)" in text
+    assert timing_text(snapshot).endswith("1 overruns, 2 periods skipped.")
 
 
 def test_loop_runs_in_its_own_thread_and_stops(session):
@@ -236,16 +326,24 @@ def test_loop_survives_a_device_that_fails_and_says_why():
             return told[-1]
 
     told = []
-    up = {"left": LimbInput(twist=np.array([0, 0, 0.1, 0, 0, 0]))}
-    says = [DeviceState(time=0.02 * k, limbs=up) for k in range(1, 50)]
-    session = TeleopSession(FakeEnv(), period=0.02, device=Faulty(says))
+    says = [
+        DeviceState(
+            time=0.02 * k,
+            limbs={"left": LimbInput(twist=np.array([0, 0, speed, 0, 0, 0]))},
+        )
+        for k, speed in enumerate([0.1] * 7 + [0.0] + [0.1] * 10, start=1)
+    ]
+    session = TeleopSession(FakeEnv(), period=0.02, device=Faulty(says), clock=Clock())
     ticks(session, 5)
     assert session.snapshot.device[0] == "device error: unplugged"
     ticks(session, 10)
     held = session.snapshot.limbs["left_hand"].target.translation
     ticks(session, 2)
     assert session.snapshot.limbs["left_hand"].target.translation == pytest.approx(held)
-    ticks(session, 10)
+    ticks(session, 7)  # it works again, but its key is still held
+    assert session.snapshot.limbs["left_hand"].target.translation == pytest.approx(held)
+    assert "released first" in session.snapshot.device[0]
+    ticks(session, 5)  # it was released and pressed again
     assert session.snapshot.device == ()
     assert session.snapshot.limbs["left_hand"].target.translation[2] > held[2]
     assert np.isfinite(session.env.actions).all()
@@ -321,7 +419,11 @@ def test_page_takes_a_limb_over_from_a_device_that_went_silent():
     ]
     stages = stages_of("stream", scale=1.0, mirror=False)
     session = TeleopSession(
-        FakeEnv(), period=0.02, device=Scripted(says), pipeline=stages
+        FakeEnv(),
+        period=0.02,
+        device=Scripted(says),
+        pipeline=stages.model_copy(update={"return_after": 10.0}),
+        clock=Clock(),
     )
     ticks(session, 200)
     start = session.snapshot.limbs["right_hand"].target
@@ -329,7 +431,7 @@ def test_page_takes_a_limb_over_from_a_device_that_went_silent():
     for k in range(600):  # longer than the time after which the limb would move home
         lower = start.translation - [0.0, 0.0, min(0.2, 0.002 * k)]
         session.drag("right_hand", ALICE, pin.SE3(start.rotation, lower))
-        session.tick()
+        ticks(session, 1)
     moved = (
         session.snapshot.limbs["right_hand"].measured.translation - start.translation
     )
@@ -352,15 +454,22 @@ def test_device_moves_a_hand_beside_the_page_and_presses_buttons():
     up = LimbInput(twist=np.array([0, 0, 0.2, 0, 0, 0]))
     says = [DeviceState(time=float(k), limbs={"left": up}) for k in range(1, 40)]
     last = DeviceState(time=99.0, buttons=frozenset({"pause"}))
-    session = TeleopSession(FakeEnv(), period=0.02, device=Scripted([*says, last]))
+    session = TeleopSession(
+        FakeEnv(), period=0.02, device=Scripted([*says, last]), clock=Clock()
+    )
     start = session.snapshot.limbs["left_hand"].measured.translation[2]
     ticks(session, 40)
     moved = session.snapshot.limbs["left_hand"].measured.translation[2] - start
     assert moved == pytest.approx(39 * 0.02 * 0.2, abs=0.02)
-    assert session.snapshot.paused
-    session.pause(False)
-    ticks(session, 10)
+    assert session.snapshot.paused_by == "device"
+    assert not session.pause(ALICE, False)
+    ticks(session, round(20.1 / 0.02))  # it is silent for so long that it has left
     assert session.snapshot.device == ("no data from the device: holding",)
+    assert (session.snapshot.paused, session.snapshot.paused_by) == (True, None)
+    moved = len(session.env.actions)
+    assert session.pause(ALICE, False)
+    ticks(session, 1)
+    assert len(session.env.actions) == moved + 1
 
 
 def test_limbs_say_which_of_them_a_device_for_one_hand_moves():

@@ -41,7 +41,9 @@ class Player:
         self.session = TeleopSession(self.env, period=1.0 / RATE, clock=self.clock)
 
     def run(self, seconds, velocity=None, *, client=PAGE):
-        """Step; a velocity is repeated every 0.1 s, as pages do."""
+        """Step; a velocity is repeated every 0.1 s after zeros, as pages do."""
+        if velocity is not None:
+            self.session.drive(client, np.zeros(4))
         for k in range(round(seconds * RATE)):
             if velocity is not None and k % 5 == 0:
                 self.session.drive(client, velocity)
@@ -246,8 +248,13 @@ def test_page_in_its_own_process_drives_and_its_end_stops_the_robot():
                 socket.send("[-1, 0, 0, 0]")
                 return session.snapshot.velocity[0] < -0.3
 
+            socket.send("[0, 0, 0, 0]")
             wait_until(is_driven)
             wait_until(lambda: not session.snapshot.velocity.any())  # no more messages
+            assert not is_driven()  # the same key again, which was not released
+            wait_until(lambda: session.snapshot.drive_waits)
+            assert not session.snapshot.velocity.any()
+            socket.send("[0, 0, 0, 0]")
             wait_until(is_driven)
         wait_until(lambda: not session.snapshot.velocity.any())
         assert session.running

@@ -35,7 +35,7 @@ PolicyOption = Annotated[
     typer.Option(
         help="Policy: expert, random, hold, FILE.hdf5 (see multiply) or your own "
         "module:function; or an input device: headset, keyboard, stream, spacemouse, "
-        "gamepad, dualsense, mjgui or your own module:Class."
+        "gamepad or dualsense (move while L1 is held), mjgui or your own module:Class."
     ),
 ]
 HorizonOption = Annotated[

@@ -52,7 +52,8 @@ DeviceOption = Annotated[
     str | None,
     typer.Option(
         help="Input device, besides the page's handles: headset, keyboard, stream, "
-        "spacemouse, gamepad, dualsense, mjgui or your own module:Class."
+        "spacemouse, gamepad or dualsense (move while L1 is held), mjgui or your own "
+        "module:Class."
     ),
 ]
 TlsCertOption = Annotated[
@@ -64,7 +65,10 @@ TlsKeyOption = Annotated[
 ]
 RecordOption = Annotated[
     Path | None,
-    typer.Option(help="File for episodes recorded with the page's button Record."),
+    typer.Option(
+        help="File for episodes recorded with the page's button Record, which returns "
+        "the robot to its start."
+    ),
 ]
 
 
@@ -201,6 +205,7 @@ def drive(
     from wbc_suite.viewers.headset_view import SessionView
     from wbc_suite.viewers.loop_timing import prepare_interpreter
     from wbc_suite.viewers.page_process import PageProcess
+    from wbc_suite.viewers.status_text import timing_text
     from wbc_suite.viewers.teleop_session import TeleopSession
 
     session = TeleopSession(
@@ -237,6 +242,8 @@ def drive(
             page.check()
     finally:
         session.stop()
+        if session.snapshot.tick > 1:
+            print(timing_text(session.snapshot), flush=True)
         if page is not None:
             page.stop()
         if device is not None:

@@ -55,7 +55,9 @@ def drive(
             paused ^= "pause" in new
             if "reset" in new:
                 restart()
-            if not paused:
+            if paused:
+                pipeline.hold(state)
+            else:
                 *_, done, _, info = env.step(pipeline.update(state))
                 taken += 1
                 if on_step is not None:
@@ -63,7 +65,7 @@ def drive(
                 if done:
                     restart()
             if real_time:
-                due = max(due + period, time.perf_counter() - period)
+                due = max(due + period, time.perf_counter())
                 time.sleep(max(0.0, due - time.perf_counter()))
     finally:
         device.stop()

@@ -1,4 +1,8 @@
-"""Gamepads: DualSense by its HID reports, others by Linux' joystick files."""
+"""Gamepads: DualSense by its HID reports, others by Linux' joystick files.
+
+A gamepad moves the robot only while its enable button is held: a stick that drifts, or
+is pushed by accident, moves nothing.
+"""
 
 import errno
 import os
@@ -19,7 +23,11 @@ from wbc_suite.typing import Vector
 DEAD = 0.1  # dead zone, as a fraction of a stick's range
 SPEED, TURN = 0.3, 1.0  # m/s and rad/s at full deflection
 DRIVE, SPIN, RISE = 0.4, 0.6, 0.1  # of the base, and of the body up and down
+FULL_REPORT = 64  # bytes; shorter ones may come on changes only
 SONY, DUALSENSE = (0x054C,), (0x0CE6, 0x0DF2)
+
+ENABLE = "l1"  # held to move the robot
+MOVING = frozenset({"grip", "home"})  # buttons that need it too
 
 BUTTONS = {
     "south": "grip", "north": "next", "west": "home", "east": "discard",
@@ -112,7 +120,9 @@ def pad_state(
     *,
     drives: bool = False,
 ) -> DeviceState:
-    """Return velocities of the selected hand and the base.
+    """Return velocities of the selected hand and the base, zero without `ENABLE`.
+
+    While r1 is held the right stick rolls the hand in place of yawing it.
 
     Args:
         time: s.
@@ -120,6 +130,9 @@ def pad_state(
         pressed: Buttons that were pressed since the last state.
         drives: Whether the sticks drive the robot; else they move the hand.
     """
+    buttons = frozenset(BUTTONS[n] for n in (pad.down | pressed) & BUTTONS.keys())
+    if ENABLE not in pad.down:
+        pad, buttons = Pad(), buttons - MOVING
     (lx, ly), (rx, ry) = _without_dead_zone(pad.left), _without_dead_zone(pad.right)
     base = np.array([DRIVE * pad.cross[1], 0.0, -SPIN * pad.cross[0]])
     height = 0.0
@@ -127,15 +140,16 @@ def pad_state(
         base += [DRIVE * ly, -DRIVE * lx, -SPIN * rx]
         height, (lx, ly), (rx, ry) = RISE * ry, (0.0, 0.0), (0.0, 0.0)
     rise = pad.triggers[1] - pad.triggers[0]
-    roll = float("r1" in pad.down) - float("l1" in pad.down)
-    linear, angular = np.array([ly, -lx, rise]), np.array([roll, ry, -rx])
+    rolls = "r1" in pad.down
+    linear = np.array([ly, -lx, rise])
+    angular = np.array([rx * rolls, ry, -rx * (not rolls)])
     twist: Vector = np.concatenate([SPEED * linear, TURN * angular])
     return DeviceState(
         time=time,
         limbs={"hand": LimbInput(twist=twist)},
         base=base,
         height=height,
-        buttons=frozenset(BUTTONS[n] for n in (pad.down | pressed) & BUTTONS.keys()),
+        buttons=buttons,
     )
 
 
@@ -152,9 +166,9 @@ class Gamepad:
     """
 
     help = (
-        "Gamepad: left stick and triggers move the hand, right stick turns it, "
-        "south button closes, north: next hand, the D-pad drives. Press the left "
-        "stick: both sticks drive.\n"
+        "Gamepad: hold L1 to move the robot. Left stick and triggers move the hand, "
+        "right stick turns it (with R1 it rolls it), south button closes, north: next "
+        "hand, the D-pad drives. Press the left stick: both sticks drive.\n"
     )
 
     def __init__(
@@ -219,19 +233,27 @@ class DualSense:
         self._clock, self._drives = clock, drives
         self._hid: Any = None
         self._pad = Pad()
+        self._heard: float | None = None  # when a full report came, s
 
     def start(self) -> None:
         """Open the gamepad; raises DeviceError if there is none."""
         self._hid = self._find()[0]
 
     def read(self) -> DeviceState:
-        """Return the state of the gamepad."""
+        """Return the state of the gamepad, at the time of its last full report.
+
+        Full reports come without a break: a gamepad that has lost its connection while
+        a stick is held is one without new data, and not one whose stick is held.
+        """
         pressed: frozenset[str] = frozenset()
         for report in waiting_reports(self._hid):
+            if len(report) >= FULL_REPORT:
+                self._heard = self._clock()
             before, self._pad = self._pad, parse_dualsense(report) or self._pad
             pressed |= self._pad.down
             self._drives ^= "l3" in self._pad.down - before.down
-        return pad_state(self._clock(), self._pad, pressed, drives=self._drives)
+        now = self._clock() if self._heard is None else self._heard
+        return pad_state(now, self._pad, pressed, drives=self._drives)
 
     def stop(self) -> None:
         """Close the gamepad."""

@@ -96,6 +96,20 @@ class DeviceState:
         limbs = all(limb.finite for limb in self.limbs.values())
         return limbs and bool(np.isfinite(numbers).all())
 
+    @property
+    def at_rest(self) -> bool:
+        """Whether no velocity is commanded."""
+        base = self.base is not None and bool(self.base.any())
+        twists = [limb.twist for limb in self.limbs.values()]
+        turns = any(twist is not None and twist.any() for twist in twists)
+        return not (turns or base or self.height)
+
+
+def without_velocities(state: DeviceState) -> DeviceState:
+    """Return a state that commands no velocity."""
+    limbs = {name: replace(limb, twist=None) for name, limb in state.limbs.items()}
+    return replace(state, limbs=limbs, base=None, height=0.0)
+
 
 def mirrored(state: DeviceState) -> DeviceState:
     """Return a state with left and right swapped, for a user who faces the robot."""

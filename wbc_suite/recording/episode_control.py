@@ -171,7 +171,7 @@ class EpisodeControl:
         self._recorder.begin()
         self._length = self._success_steps = 0
         if self._plan is None:
-            return "Recording."
+            return "Recording: the robot was returned to its start."
         return (
             f"Recording {self._planned_kept + 1} of {self._plan.episodes}, seed {seed}."
         )

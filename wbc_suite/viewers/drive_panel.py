@@ -29,6 +29,7 @@ IN_BODY, IN_WORLD = "Body", "World"
 HOLD_HINT = (
     "Body: targets of hands move with the robot. World: they stay where they are."
 )
+RELEASE_FIRST = "Release the key or the button, and press it again"
 SPEED_HINT = "Percentage of top speed, for keys, buttons and sticks."
 
 
@@ -67,14 +68,17 @@ class DrivePanel:
             hold = self._hold
             hold.on_click(lambda _: session.ride(hold.value.strip("• ") == IN_BODY))
 
-    def receive(self, client: int, axes: Vector) -> None:
-        """Drive by axes forward, left, turn and up, -1 .. 1, shape (4,)."""
+    def receive(self, client: int, axes: Vector | None) -> None:
+        """Drive by axes forward, left, turn, up, -1 .. 1, shape (4,); None: it left."""
+        if axes is None:
+            self._session.leave(client)
+            return
         share = np.array([self._speed.value / 100.0] * 3 + [1.0])
         self._session.drive(client, axes * share * self._info.drive)
 
     def update(self, snapshot: Snapshot) -> None:
         """Display the commanded velocity."""
-        self._readout.content = velocity_html(snapshot.velocity)
+        self._readout.content = velocity_html(snapshot.velocity, snapshot.drive_waits)
         if self._hold is not None:
             self._hold.options = _marked(snapshot.rides)
 
@@ -95,8 +99,8 @@ def pad_html(limits: Vector) -> str:
     )
 
 
-def velocity_html(velocity: Vector) -> str:
-    """Return the commanded velocity in words."""
+def velocity_html(velocity: Vector, waits: bool = False) -> str:
+    """Return the commanded velocity in words, or what has to be done first."""
     forward, left, turn, up = velocity
     parts = [
         f"{abs(value):.2f} {unit} {positive if value > 0 else negative}"
@@ -108,7 +112,8 @@ def velocity_html(velocity: Vector) -> str:
         )
         if abs(value) > MOVING
     ]
-    text = ", ".join(parts) or "Hold a key or a button"
+    idle = RELEASE_FIRST if waits else "Hold a key or a button"
+    text = ", ".join(parts) or idle
     return f"<div style='padding:0 .9em;font-size:.82em;opacity:.7'>{text}</div>"
 
 

@@ -12,6 +12,7 @@ from wbc_suite.robot.triangle_meshes import TriangleMesh, merge
 from wbc_suite.typing import Vector
 from wbc_suite.viewers.model_scene import body_meshes
 from wbc_suite.viewers.session_state import LimbStatus, Snapshot
+from wbc_suite.viewers.status_text import pause_text
 from wbc_suite.viewers.teleop_session import TeleopSession
 
 CREASE = np.cos(np.deg2rad(40.0))  # faces that meet at a larger angle have an edge
@@ -64,7 +65,7 @@ class SessionView:
         if snapshot.success:
             return "Done: the task is solved", GREEN
         if snapshot.paused:
-            return "Paused", GREY
+            return pause_text(snapshot), GREY
         for name in self._hands:
             limb = snapshot.limbs[name]
             if _state(snapshot, limb) == "unreachable":
@@ -72,7 +73,7 @@ class SessionView:
         for name in self._hands:
             if _state(snapshot, snapshot.limbs[name]) == "limited":
                 return f"{self._titles[name]}: {snapshot.limbs[name].acting[0]}", AMBER
-        return "", GREY
+        return "" if snapshot.recording is None else snapshot.recording.message, GREY
 
 
 def _state(snapshot: Snapshot, limb: LimbStatus) -> str:

@@ -3,7 +3,8 @@
 viser reports presses of hotkeys, but neither that a key is held nor its release. So the
 proxy adds a script to viser's page. It sends messages through a WebSocket of its own,
 `[forward, left, turn, up]` with values -1 .. 1, while keys, buttons with an attribute
-`data-drive` or sticks of a gamepad are held, every 0.1 s, and zeros once afterwards.
+`data-drive` or sticks of a gamepad are held, every 0.1 s, and zeros once afterwards and
+at the start. When the connection drops the script lets go of all of them.
 """
 
 import asyncio
@@ -22,7 +23,7 @@ MAX_BYTES = 200  # of a message
 HEARTBEAT = 6.0  # s; a page that is gone is disconnected after 1.5 times this
 AXES = 4  # forward, left, turn, up
 
-Receiver = Callable[[int, Vector], None]
+Receiver = Callable[[int, Vector | None], None]
 
 
 class HeldKeys:
@@ -44,7 +45,7 @@ class HeldKeys:
         """Add the script to pages, and pass on what it sends.
 
         Args:
-            receive: Called with a client and its axes, shape (4,), -1 .. 1; with zeros
+            receive: Called with a client and its axes, shape (4,), -1 .. 1; with None
                 when the client has gone.
         """
         self._receive = receive
@@ -77,10 +78,10 @@ class HeldKeys:
                     break
                 await self._pass_on(client, axes)
         finally:
-            await self._pass_on(client, np.zeros(AXES))
+            await self._pass_on(client, None)
         return socket
 
-    async def _pass_on(self, client: int, axes: Vector) -> None:
+    async def _pass_on(self, client: int, axes: Vector | None) -> None:
         if self._receive is not None:  # in a thread: it may wait for the control loop
             await asyncio.to_thread(self._receive, client, axes)
 

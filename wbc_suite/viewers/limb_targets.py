@@ -33,9 +33,15 @@ class Ownership:
 
     def holder(self, now: float) -> int | None:
         """Return the client that holds the limb at time `now`, or None."""
-        if self._holder is not None and now - self._last_input > self.timeout:
-            self._holder = None
+        self.expire(now)
         return self._holder
+
+    def expire(self, now: float) -> bool:
+        """Release the limb if its holder has gone silent; return whether it had."""
+        silent = self._holder is not None and now - self._last_input > self.timeout
+        if silent:
+            self._holder = None
+        return silent
 
     def take(self, client: int, now: float) -> bool:
         """Take or keep the limb; False if another client holds it."""
@@ -93,7 +99,7 @@ class LimbTarget:
             orientation_error=float(report.get("orientation_error", turn)),
             reached=bool(report.get("reached", True)),
             reasons=tuple(report.get("reasons", ())),
-            holder=self.ownership.holder(now),
+            holder=self.holder(now),
             enabled=self.enabled,
             acting=self.stages.acting,
             moved=self.stages.moved,
@@ -116,12 +122,16 @@ class LimbTarget:
     def drag(
         self, client: int, T_world_input: pin.SE3, *, now: float, grab: bool = False
     ) -> bool:
-        """Take the limb and move its target with the input at wall time `now`, s.
+        """Move the target with the input of the client that holds it, at `now`, s.
 
-        With `grab` the input is latched first; the target does not move then. False if
-        another client holds the limb, or the pose is invalid.
+        With `grab` the client takes the limb, and the input is latched first; the
+        target does not move then. False if another client holds the limb, the client
+        has lost it by its silence, or the pose is invalid.
         """
-        if not (_is_valid(T_world_input) and self.ownership.take(client, now)):
+        holder = self.holder(now)
+        if not _is_valid(T_world_input) or (holder != client and not grab):
+            return False
+        if not self.ownership.take(client, now):
             return False
         if self.enabled:
             if grab:
@@ -129,11 +139,20 @@ class LimbTarget:
             self.stages.follow(LimbInput(pose=T_world_input), by_hand=True)
         return True
 
+    def holder(self, now: float) -> int | None:
+        """Return the client that holds the limb; one that went silent releases it."""
+        if self.ownership.expire(now):
+            self._let_go()
+        return self.ownership.holder(now)
+
     def release(self, client: int) -> None:
         """Release the limb; its target stays, and the limb goes on towards it."""
         if self.ownership.release(client):
-            self.stages.release()
-            self.rest = 0
+            self._let_go()
+
+    def _let_go(self) -> None:
+        self.stages.release()
+        self.rest = 0
 
     def enable(self, enabled: bool) -> None:
         """Engage or disengage the clutch; the target does not move."""
@@ -157,7 +176,7 @@ class LimbTarget:
             and before.orientation_error < MAX_ORIENTATION_ERROR
         )
         reached = before.reached if self.reported else is_near
-        if self.ownership.holder(now) is not None or reached:
+        if self.holder(now) is not None or reached:
             self.rest = None
         elif self.rest * period > REST_TIME:
             self.rest = None

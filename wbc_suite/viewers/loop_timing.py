@@ -9,7 +9,6 @@ import time
 from collections.abc import Callable
 
 LEAD = 3e-3  # s; for GR1 1 ms is enough, 2 ms on a shared processor
-MAX_BACKLOG = 5  # periods; a loop that is further behind does not catch up
 SWITCH_INTERVAL = 1e-4  # s; at 1 ms, or Python's own 5, other threads delay the loop
 
 
@@ -27,7 +26,13 @@ class LoopTimer:
             timer.finish_step()
         timer.stop()
 
+    A step that ends after the next one is due is an overrun. The next one begins at
+    once; periods that have passed entirely are skipped, so that steps never follow each
+    other in a burst.
+
     Attributes:
+        overruns: Number of overruns since the start.
+        skipped: Number of periods that were skipped since the start.
         idle: Set while the loop sleeps between two ticks or does not run. Other threads
             then take Python's lock without delaying it.
     """
@@ -40,13 +45,19 @@ class LoopTimer:
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
         self._period, self._clock, self._sleep = period, clock, sleep
+        self.overruns = self.skipped = 0
         self.idle = threading.Event()
         self.stop()
 
     def start(self) -> None:
         """Start; the first step is due after `LEAD`."""
         self.idle.clear()
+        self.overruns = self.skipped = 0
         self._due = self._clock() + LEAD
+
+    def restart(self) -> None:
+        """Leave out the time since the last step was due, which was no step's."""
+        self._due = max(self._due, self._clock())
 
     def stop(self) -> None:
         """Stop; `wait_for_step` returns at once from now on."""
@@ -60,8 +71,11 @@ class LoopTimer:
     def finish_step(self) -> None:
         """Sleep until the next step has to be prepared."""
         self._due += self._period
-        if self._due < self._clock() - MAX_BACKLOG * self._period:
-            self._due = self._clock()
+        late = self._clock() - self._due
+        if late > 0.0:
+            missed = int(late / self._period)
+            self.overruns, self.skipped = self.overruns + 1, self.skipped + missed
+            self._due += missed * self._period
         self.idle.set()
         self._sleep_until(self._due - LEAD)
         self.idle.clear()

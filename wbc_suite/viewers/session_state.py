@@ -3,6 +3,7 @@
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Literal, TypeAlias
 
 import mujoco
 import pinocchio as pin
@@ -12,6 +13,9 @@ from wbc_suite.devices.action_ports import LimbKind
 from wbc_suite.recording.episode_control import EpisodeStatus
 from wbc_suite.typing import Matrix, Vector
 from wbc_suite.viewers.balance_status import BalanceStatus
+
+PauseOwner: TypeAlias = int | Literal["device"]
+"""Who paused: a client, or the device beside the page."""
 
 
 def plain(name: str) -> str:
@@ -107,14 +111,21 @@ class Snapshot:
         body_quaternions: Their orientations (wxyz), shape (nbody, 4).
         limbs: Status by limb name.
         grippers: Commanded closing of each gripper's synergies, -1 open .. 1 closed.
-        step_time: Duration of a step of control and physics, s.
+        step_time: Measured time of a step of control and physics, s; nan before any.
+        step_period: Measured time between two steps, s; nan before two.
+        overruns: Number of steps that ended after the next one was due.
+        skipped: Number of periods that were skipped for them.
         latency: Median time from an input to its joint target, s; nan before any.
         speed: Simulated time per wall time.
+        paused_by: Who paused, and alone may resume; None if they have left, and anybody
+            may, or if the session is not paused.
         message: Message to the user, possibly empty.
         device: State of the device beside the page, as the pipeline reports it.
         selected: Limb that a device for one hand moves; empty if none is used.
         recording: State of the recording; None if the session cannot record.
         velocity: Commanded velocity forward, left (m/s), turn (rad/s), up (m/s).
+        drive_waits: Whether a velocity is commanded by a key that was held while the
+            connection dropped, in a pause or in a reset, and has to be released first.
         rides: Whether targets of hands move with the body.
         balance: Balance of a robot that walks, if a client displays it.
         fell: When and why the robot fell; empty while it has not.
@@ -131,15 +142,20 @@ class Snapshot:
     limbs: Mapping[str, LimbStatus]
     grippers: Mapping[str, Vector]
     step_time: float
+    step_period: float
+    overruns: int
+    skipped: int
     latency: float
     speed: float
     paused: bool
+    paused_by: PauseOwner | None
     success: bool
     message: str
     device: tuple[str, ...]
     selected: str
     recording: EpisodeStatus | None
     velocity: Vector
+    drive_waits: bool
     rides: bool
     balance: BalanceStatus | None
     fell: str

@@ -28,6 +28,8 @@ FIRST_DRAG = "Drag an arrow of a handle: the limb follows."
 FIRST_GRIP = "The sliders below open and close grippers."
 FIRST_WALK = "Hold W A S D to move, Q E to turn."
 FIRST_KEY = "Key ? shows all keys."
+RECORD_MOVES = "Record starts a new episode: the robot returns to its start."
+RECORD_MOVED = "The robot was returned to its start."
 
 
 def describe_reason(reason: Reason) -> str:
@@ -71,9 +73,12 @@ def status_html(
     snapshot: Snapshot, info: SessionInfo, colours: Mapping[str, Colour]
 ) -> str:
     """Return the state of a session, with reasons of limbs that miss their target."""
+    skipped = f" ({snapshot.skipped} skipped)" if snapshot.skipped else ""
     figures = (
         ("input to joint target", _or_dash(1e3 * snapshot.latency, "ms")),
         ("step time", _or_dash(1e3 * snapshot.step_time, "ms", digits=1)),
+        ("period", _or_dash(1e3 * snapshot.step_period, "ms", digits=1)),
+        ("overruns", f"{snapshot.overruns}{skipped}"),
         ("real time", _or_dash(snapshot.speed, "x", digits=2)),
     )
     cells = "".join(
@@ -99,9 +104,32 @@ def status_html(
     return (
         "<div style='padding:0 .7em .6em'>"
         f"{_state_html(snapshot, info)}"
-        f"<div style='display:flex;gap:.4em'>{cells}</div>"
+        f"<div style='display:flex;flex-wrap:wrap;gap:.4em 1em'>{cells}</div>"
         f"{_recording_html(snapshot)}{fall}{reasons}</div>"
     )
+
+
+def timing_text(snapshot: Snapshot) -> str:
+    """Return how the loop kept its period, for the end of a session."""
+    step, period = (
+        f"{1e3 * seconds:.1f} ms"
+        for seconds in (snapshot.step_time, snapshot.step_period)
+    )
+    return (
+        f"{snapshot.tick} steps, the last of {step} every {period}; "
+        f"{snapshot.overruns} overruns, {snapshot.skipped} periods skipped."
+    )
+
+
+def pause_text(snapshot: Snapshot) -> str:
+    """Return that the session is paused, and who may resume it."""
+    match snapshot.paused_by:
+        case None:
+            return "Paused: anybody may resume"
+        case "device":
+            return "Paused: the device may resume"
+        case client:
+            return f"Paused: viewer {client + 1} may resume"
 
 
 def task_html(task: str) -> str:
@@ -162,7 +190,7 @@ def _state(snapshot: Snapshot, info: SessionInfo) -> tuple[str, str]:
     if snapshot.fell:
         return "Fallen", RED
     if snapshot.paused:
-        return "Paused", YELLOW
+        return pause_text(snapshot), YELLOW
     if snapshot.device:
         return ", ".join(snapshot.device).capitalize(), YELLOW
     if snapshot.success:
@@ -172,16 +200,22 @@ def _state(snapshot: Snapshot, info: SessionInfo) -> tuple[str, str]:
 
 
 def _recording_html(snapshot: Snapshot) -> str:
-    """Return the state of the recording; empty before its first command."""
+    """Return the state of the recording, and what Record will do."""
     status = snapshot.recording
-    if status is None or not (status.message or status.recording):
+    if status is None:
         return ""
-    dot, episodes = "", f"{status.kept} episode{'s' * (status.kept != 1)} in the file."
-    text = f"{status.message} {episodes}"
+    dot, note, text = "", RECORD_MOVES, ""
     if status.recording:
         dot = f"<span style='color:{RED}'>&#9679;</span> "
         text = f"Recording episode {status.kept + 1}: {status.length} actions"
-    return f"<div style='margin-top:.5em'>{dot}{html.escape(text)}</div>"
+        note = RECORD_MOVED
+    elif status.message:
+        episodes = f"{status.kept} episode{'s' * (status.kept != 1)} in the file."
+        text = f"{status.message} {episodes}"
+    return (
+        f"<div style='margin-top:.5em'>{dot}{html.escape(text)}</div>"
+        f"<div style='font-size:.88em;opacity:.75'>{note}</div>"
+    )
 
 
 def _notes(snapshot: Snapshot, name: str, client: int) -> str:

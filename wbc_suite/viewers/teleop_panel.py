@@ -19,7 +19,12 @@ from wbc_suite.viewers.scene_setup import (
     set_dark,
 )
 from wbc_suite.viewers.session_state import SessionInfo, Snapshot
-from wbc_suite.viewers.status_text import limbs_html, status_html, task_html
+from wbc_suite.viewers.status_text import (
+    limbs_html,
+    pause_text,
+    status_html,
+    task_html,
+)
 from wbc_suite.viewers.tracking_plots import TrackingPlots
 
 if TYPE_CHECKING:
@@ -31,16 +36,17 @@ RECORD_NOTE = (
     "This session has no file to record into. Start it by "
     "`wbc-suite teleop --record FILE`."
 )
+PAUSE_NOTE = "Only who paused may resume; anybody once they have left."
 BUTTON_HINT = (
     "Keys: P pause, 0 reset, C record or keep, Y keep as a success, X discard, "
-    "U delete the last episode"
+    "U delete the last episode. Reset and Record return the robot to its start."
 )
 CLUTCH_HINT = "Engaged: the limb follows its handle. Released: the handle moves alone."
 BALANCE_HINT = "Feet, capture point, next footstep and contact forces."
 SHADOW_HINT = "Without a graphics card, two thirds of the rendering time."
 HELP = "Keys and gestures"
 RECORD_KEYS = {
-    "C": (EpisodeCommand.RECORD, "Record or keep the episode"),
+    "C": (EpisodeCommand.RECORD, "Record from the robot's start, or keep the episode"),
     "Y": (EpisodeCommand.SUCCESS, "Keep the episode as a success"),
     "X": (EpisodeCommand.DISCARD, "Discard the episode"),
     "U": (EpisodeCommand.UNDO, "Delete the last episode"),
@@ -216,10 +222,10 @@ class TeleopPanel:
                 case "Discard":
                     self._command_episode(EpisodeCommand.DISCARD, event.client)
                 case _:
-                    self._toggle()
+                    self._toggle(event.client)
 
         gui.add_command("Pause or resume", hotkey="P").on_trigger(
-            lambda _: self._toggle()
+            lambda event: self._toggle(event.client)
         )
         gui.add_command("Reset", hotkey="0").on_trigger(lambda _: self._session.reset())
 
@@ -237,8 +243,17 @@ class TeleopPanel:
         elif client is not None:
             client.add_notification("Record", RECORD_NOTE, auto_close_seconds=8.0)
 
-    def _toggle(self) -> None:
-        self._session.pause(not self._session.snapshot.paused)
+    def _toggle(self, client: "viser.ClientHandle | None") -> None:
+        """Pause; resume if this client paused, or whoever did has left."""
+        if client is None:
+            return
+        snapshot = self._session.snapshot
+        if snapshot.paused and snapshot.paused_by not in (None, client.client_id):
+            client.add_notification(
+                pause_text(snapshot), PAUSE_NOTE, auto_close_seconds=8.0
+            )
+            return
+        self._session.pause(client.client_id, not snapshot.paused)
 
 
 def _add_checkbox(

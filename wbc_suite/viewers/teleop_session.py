@@ -25,9 +25,10 @@ from wbc_suite.typing import Vector
 from wbc_suite.viewers.balance_status import BalanceReader
 from wbc_suite.viewers.limb_targets import LimbTarget
 from wbc_suite.viewers.loop_timing import LoopTimer, raise_priority
-from wbc_suite.viewers.session_state import SessionInfo, Snapshot
+from wbc_suite.viewers.session_state import PauseOwner, SessionInfo, Snapshot
 from wbc_suite.viewers.step_times import StepTimes
 
+DEVICE_GONE = 20.0  # s; a device that is silent for so long no longer owns a pause
 DRIVE_TIMEOUT = 0.5  # s; a robot stops if the page does not repeat a velocity
 
 
@@ -71,6 +72,7 @@ class TeleopSession:
         self._lock = threading.Lock()
         self._inputs: list[float] = []  # arrival times since the last tick
         self._reset_requested = self._paused = False
+        self._paused_by: PauseOwner | None = None
         self._epoch = self._tick = self._solved = 0
         self._thread: threading.Thread | None = None
         self._stopping, self.quit = threading.Event(), threading.Event()
@@ -81,7 +83,7 @@ class TeleopSession:
         env.reset(seed=seed)
         controller = env.unwrapped.controllers[0]  # type: ignore[attr-defined]
         self._balance = BalanceReader(self.model, self._simulation.data, controller)
-        self._pipeline = Pipeline(env, pipeline)
+        self._pipeline = Pipeline(env, pipeline, clock=clock)
         self.limbs = {n: LimbTarget(limb) for n, limb in self._pipeline.limbs.items()}
         self._open_grippers()
         self.info = SessionInfo(
@@ -131,9 +133,14 @@ class TeleopSession:
         self.watch_balance(client, False)
         with self._lock:
             self._drive.leave(client)
+            if self._paused_by == client:
+                self._paused_by = None
 
     def drive(self, client: int, velocity: Vector) -> None:
-        """Drive by forward, left (m/s), turn (rad/s), up (m/s); see `HeldCommand`."""
+        """Drive by forward, left (m/s), turn (rad/s), up (m/s); see `HeldCommand`.
+
+        A client sends zeros first.
+        """
         now = self._clock()
         with self._lock:
             if self._drive.set(velocity, client=client, now=now):
@@ -171,9 +178,20 @@ class TeleopSession:
         """Goal of each gripper's synergies, -1 open .. 1 closed."""
         return {name: grip.goal for name, grip in self._pipeline.grips.items()}
 
-    def pause(self, paused: bool) -> None:
-        """Pause or resume the simulation."""
-        self._paused = paused
+    def pause(self, owner: PauseOwner, paused: bool) -> bool:
+        """Pause, or resume: only who paused may, and anybody after they have left.
+
+        A pause lasts until somebody resumes, also after its owner has left. Commands
+        that were held meanwhile move nothing. Returns whether the session now is as
+        asked.
+        """
+        with self._lock:
+            if self._paused and self._paused_by not in (None, owner):
+                return paused
+            self._paused, self._paused_by = paused, owner if paused else None
+            if not paused:
+                self._drive.clear()
+            return True
 
     def reset(self) -> None:
         """Reset the environment at the next tick."""
@@ -225,7 +243,12 @@ class TeleopSession:
             self.episode_control.update(self._reset)
             if self.episode_control.finished:
                 self.quit.set()
-        if not self._paused:
+        if self._paused:
+            with self._lock:
+                self._pipeline.hold(state)
+                if self._paused_by == "device" and self._pipeline.silence > DEVICE_GONE:
+                    self._paused_by = None
+        else:
             self._step(state, inputs)
         self._publish()
 
@@ -237,7 +260,7 @@ class TeleopSession:
         """Return the device's state; handle the buttons of the session."""
         state, pressed = self._device.read()
         if "pause" in pressed:
-            self._paused = not self._paused
+            self.pause("device", not self._paused)
         if "reset" in pressed:
             self._reset()
         if "quit" in pressed:
@@ -276,12 +299,13 @@ class TeleopSession:
         action = self._act(state)
         self._selected = self._pipeline.selected if "hand" in state.limbs else ""
         self.timer.wait_for_step()
+        begun = self._clock()
         try:
             *_, info = self.env.step(action)
         except DatasetError as error:  # the disk is full; teleoperation goes on
             info, self._message = {}, str(error)
         now = self._clock()
-        self._times.end_step(inputs, now)
+        self._times.end_step(inputs, begun, now)
         self._balance.take(info.get("balance", {}))
         self._ik, self._success = info.get("ik", {}), bool(info.get("success", False))
         if self._success and np.isnan(self._solved_at):
@@ -307,6 +331,7 @@ class TeleopSession:
         self._solved_at = np.nan
         self._balance.take({})
         self._times.restart()
+        self.timer.restart()
         self._epoch += 1
 
     def _open_grippers(self) -> None:
@@ -322,6 +347,7 @@ class TeleopSession:
             }
             grippers = {name: goal.copy() for name, goal in self.grippers.items()}
             balance = self._balance.status()
+            drive_waits = self._drive.waits(now)
         self.snapshot = Snapshot(
             tick=self._tick,
             epoch=self._epoch,
@@ -333,16 +359,21 @@ class TeleopSession:
             body_quaternions=data.xquat.copy(),
             limbs=limbs,
             grippers=grippers,
-            step_time=self._times.mean,
+            step_time=self._times.duration,
+            step_period=self._times.period,
+            overruns=self.timer.overruns,
+            skipped=self.timer.skipped,
             latency=self._times.latency,
-            speed=self.period / max(self._times.mean, 1e-9),
+            speed=self.period / max(self._times.period, 1e-9),
             paused=self._paused,
+            paused_by=self._paused_by,
             success=self._success,
             message=self._message,
             device=self._device.faults + self._pipeline.acting.get("device", ()),
             selected=self._selected,
             recording=self.episode_control and self.episode_control.status,
             velocity=self._pipeline.drive.velocity,
+            drive_waits=drive_waits,
             rides=all(limb.stages.rides for limb in self.limbs.values()),
             balance=balance,
             fell=self._balance.fell,

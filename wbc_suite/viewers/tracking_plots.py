@@ -1,4 +1,4 @@
-"""Plots of the last seconds: distances to targets, and the time of a step."""
+"""Plots of the last seconds: distances to targets, step time and period."""
 
 import time
 from collections import deque
@@ -19,7 +19,7 @@ SECONDS = 10.0
 POINTS = 150
 ROWS = 300  # more than SECONDS at the rate of the page's updates
 LEAST_TOP = 10.0  # mm and ms, of an axis: it does not show the noise at rest
-STEP_COLOUR = "#4a6fa5"
+STEP_CURVES = {"step": "#4a6fa5", "period": "#9aa5b1"}
 IDLE = (
     "<div style='padding:.3em .8em;opacity:.7;font-size:.88em'>"
     "The distance to the target is plotted once a limb is moved.</div>"
@@ -39,10 +39,10 @@ class TrackingPlots:
         if curves:
             self._idle = gui.add_html(IDLE)
             self._errors = Plot(gui, "Distance to target [mm]", curves, visible=False)
-        self._steps = Plot(gui, "Time of a step [ms]", {"step": STEP_COLOUR})
+        self._steps = Plot(gui, "Step time (blue) and period [ms]", STEP_CURVES)
 
     def record(self, snapshot: Snapshot) -> None:
-        """Append the errors and the step time of a tick."""
+        """Append the errors, step time and period of a tick."""
         if snapshot.tick == self._last_tick:
             return
         if snapshot.epoch != self._epoch:
@@ -50,7 +50,8 @@ class TrackingPlots:
         self._last_tick, self._epoch = snapshot.tick, snapshot.epoch
         limbs = snapshot.limbs.values()
         errors = [limb.position_error for limb in limbs]
-        self._rows.append([time.monotonic(), snapshot.step_time, *errors])
+        steps = snapshot.step_time, snapshot.step_period
+        self._rows.append([time.monotonic(), *steps, *errors])
         self._moved = [limb.moved for limb in limbs]
 
     def update(self) -> None:
@@ -62,9 +63,9 @@ class TrackingPlots:
         rows, ago = rows[ago > -SECONDS], ago[ago > -SECONDS]
         step = max(1, len(rows) // POINTS)
         rows, ago = rows[::-step][::-1], ago[::-step][::-1]
-        self._steps.update(ago, 1e3 * rows[:, 1:2], [True])
+        self._steps.update(ago, 1e3 * rows[:, 1:3], [True, True])
         if self._errors is not None:
-            self._errors.update(ago, 1e3 * rows[:, 2:], self._moved)
+            self._errors.update(ago, 1e3 * rows[:, 3:], self._moved)
             self._idle.visible = not any(self._moved)
 
 

@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
+from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
 from wbc_suite.tomlfile import FrozenModel
 
@@ -91,7 +91,7 @@ class PipelineConfig(FrozenModel):
         ramp: Time over which the permitted speed rises after a reset, s.
         hold_after: Time without new data after which limbs are held, s.
         return_after: Time without new data after which limbs move home, s; None for
-            never.
+            never: nobody may be watching then.
     """
 
     mode: Literal["relative", "absolute"] = "relative"
@@ -112,7 +112,7 @@ class PipelineConfig(FrozenModel):
     base_rise: RatesConfig = RatesConfig(speed=2.0, acceleration=20.0, jerk=600.0)
     ramp: NonNegativeFloat = 2.0
     hold_after: PositiveFloat = 0.15
-    return_after: PositiveFloat | None = Field(default=10.0)
+    return_after: PositiveFloat | None = None
 
 
 DRAGGED = PipelineConfig(
@@ -123,6 +123,5 @@ DRAGGED = PipelineConfig(
     angular=RatesConfig(speed=6.0, acceleration=90.0, jerk=4500.0),
     base_speed=(1.0, 1.0),
     ramp=0.0,
-    return_after=None,
 )
 """The pipeline of handles that a mouse drags, alone."""

@@ -18,7 +18,9 @@ class HeldCommand:
     """A command that counts for as long as it is repeated: a dead-man switch.
 
     The first client that sends one has it until it sends zeros, leaves, or has sent
-    nothing for `timeout`.
+    nothing for `timeout`. Commands of a client count once it has sent zeros: when it
+    comes, and again after a command of its own ended in another way or was refused. So
+    a key that is held while the connection drops moves nothing when it is back.
 
     Args:
         size: Number of values.
@@ -28,9 +30,13 @@ class HeldCommand:
     def __init__(self, size: int, timeout: float) -> None:
         self.timeout = timeout
         self._values, self._client, self._time = np.zeros(size), -1, -np.inf
+        self._released: set[int] = set()  # clients whose commands count
+        self._refused = -np.inf  # when a command came from another one, s
 
     def set(self, values: ArrayLike, *, client: int, now: float) -> bool:
-        """Take a command; False if it is invalid or another client has one.
+        """Take a command; False if it is refused.
+
+        That is if it is invalid, another client has one, or zeros have to come first.
 
         Args:
             values: The command; zeros end it.
@@ -40,24 +46,39 @@ class HeldCommand:
         array = np.array(values, dtype=np.float64)
         if array.shape != self._values.shape or not np.isfinite(array).all():
             return False
-        if client != self._client and self.read(now).any():
+        held = self.read(now).any()
+        if not array.any():
+            self._released.add(client)
+        elif client not in self._released:
+            self._refused = now
+            return False
+        if held and client != self._client:
+            if array.any():
+                self._released.discard(client)
             return False
         self._values, self._client, self._time = array, client, now
         return True
 
+    def waits(self, now: float) -> bool:
+        """Return whether a client commands that has to send zeros first."""
+        return now - self._refused <= self.timeout
+
     def leave(self, client: int) -> None:
-        """Set the command to zero if it is this client's."""
+        """Forget a client; the command becomes zero if it is its own."""
         if client == self._client:
-            self.clear()
+            self._values[:] = 0.0
+        self._released.discard(client)
 
     def clear(self) -> None:
-        """Set the command to zero."""
+        """Set the command to zero; its client has to send zeros before the next one."""
+        if self._values.any():
+            self._released.discard(self._client)
         self._values[:] = 0.0
 
     def read(self, now: float) -> Vector:
         """Return the command; zeros if it is older than `timeout`."""
         if now - self._time > self.timeout:
-            self._values[:] = 0.0
+            self.clear()
         return self._values.copy()
 
 

@@ -1,6 +1,7 @@
 """The pipeline: from the states of a device to actions."""
 
-from collections.abc import Iterable, Sequence
+import time
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -25,11 +26,17 @@ from wbc_suite.devices.pipeline.limb_pipeline import LimbPipeline
 from wbc_suite.devices.pipeline.part_targets import GripTarget, JointTargets
 from wbc_suite.devices.pipeline.retarget import retarget
 from wbc_suite.devices.pipeline.watchdog import Phase, Watchdog
-from wbc_suite.devices.state import DeviceState, LimbInput, mirrored
+from wbc_suite.devices.state import (
+    DeviceState,
+    LimbInput,
+    mirrored,
+    without_velocities,
+)
 from wbc_suite.errors import ConfigError
 from wbc_suite.typing import Matrix, Vector
 
 FIRST_PACE = 0.1  # of the speed limits, at the start of the ramp
+HELD_KEYS = "keys and sticks have to be released first"
 
 
 class Pipeline:
@@ -39,9 +46,15 @@ class Pipeline:
     workspace, leash, filter and motion limit. Whatever the device sends, `update`
     returns an action whose targets keep the limits of `PipelineConfig`.
 
+    After a silence of the device, and after `hold`, poses are latched anew, and
+    velocities count only once the device has sent a state that commands none: a key
+    that was held meanwhile, or whose release was lost, moves nothing.
+
     Args:
         env: Environment to act in.
         config: Settings of the stages.
+        clock: Source of time that never goes back, s; it tells how long the device
+            has been silent.
 
     Raises:
         ConfigError: If no slice of the action can be commanded by a device.
@@ -52,7 +65,13 @@ class Pipeline:
         acting: What stages did at the last `update`, by limb and for the `device`.
     """
 
-    def __init__(self, env: Any, config: PipelineConfig | None = None) -> None:
+    def __init__(
+        self,
+        env: Any,
+        config: PipelineConfig | None = None,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
         self._env, self._config = env.unwrapped, config or PipelineConfig()
         self._layout, settings = self._env.action_layout, self._config
         self._dt = dt = 1.0 / self._env.config.control_freq
@@ -80,7 +99,7 @@ class Pipeline:
             )
         self._drives = self._make_drives(speeds.values(), heights.values())
         self._selector = LimbSelector(list(ports), _hands(ports, self.grips))
-        self._watchdog = Watchdog(settings.hold_after, settings.return_after, dt)
+        self._watchdog = Watchdog(settings.hold_after, settings.return_after, clock)
         self.reset()
 
     def _make_drives(
@@ -119,6 +138,7 @@ class Pipeline:
         self._time, self._velocity = 0.0, np.zeros(4)
         self._inputs: dict[str, LimbInput] = {}
         self._driven: set[str] = set()
+        self._let_go = True  # whether velocities of the device count
         self.acting: dict[str, tuple[str, ...]] = {}
 
     @property
@@ -139,6 +159,11 @@ class Pipeline:
         robot = robot_of(self.selected) if self.selected else min(self._drives)
         return self._drives[robot]
 
+    @property
+    def silence(self) -> float:
+        """Time since the device sent new data, s; infinite before any."""
+        return self._watchdog.silence
+
     def leave(self, name: str) -> None:
         """Leave a limb to other inputs while the device sends nothing for it."""
         self._driven.discard(name)
@@ -154,15 +179,29 @@ class Pipeline:
         new = self._watchdog.check(state)
         if new is not None:
             self._press(new.buttons)
-            self._read(mirrored(new) if self._mirror else new)
+            self._let_go = self._let_go or new.at_rest
+            counted = new if self._let_go else without_velocities(new)
+            self._read(mirrored(counted) if self._mirror else counted)
         if self._watchdog.phase is not Phase.LIVE:
             self._hold_or_return()
         self._steer(drive)
         action = self._layout.pack(self._move(), base=self._env.hold_action)
-        notes = {name: limb.acting for name, limb in self.limbs.items()}
-        notes["device"] = tuple(filter(None, [self._watchdog.acting]))
-        self.acting = {name: texts for name, texts in notes.items() if texts}
+        self._report()
         return action
+
+    def hold(self, state: DeviceState) -> None:
+        """Read the device without a step, as in a pause, and let go of its limbs."""
+        self._watchdog.check(state)
+        self._pressed = state.buttons
+        self._release()
+        self._report()
+
+    def _report(self) -> None:
+        """Set what the stages did."""
+        device = self._watchdog.acting or ("" if self._let_go else HELD_KEYS)
+        notes = {name: limb.acting for name, limb in self.limbs.items()}
+        notes["device"] = (device,) if device else ()
+        self.acting = {name: texts for name, texts in notes.items() if texts}
 
     def _press(self, buttons: frozenset[str]) -> None:
         """Handle the buttons that were not pressed before."""
@@ -264,15 +303,19 @@ class Pipeline:
 
     def _hold_or_return(self) -> None:
         """Hold the limbs that the device moved, or move them home."""
-        self._inputs, self._velocity = {}, np.zeros(4)
-        for joints in self._joints.values():
-            joints.hold()
+        self._release()
         if self._watchdog.phase is Phase.RETURN:
             for name in self._driven:
                 self.limbs[name].go_home()
-        else:
-            for name in self._driven:
-                self.limbs[name].release()
+
+    def _release(self) -> None:
+        """Let go of what the device moves; its velocities have to become zero."""
+        self._inputs, self._velocity = {}, np.zeros(4)
+        self._let_go = self._let_go and not self._watchdog.has_data
+        for joints in self._joints.values():
+            joints.hold()
+        for name in self._driven:
+            self.limbs[name].release()
 
 
 class LimbSelector:

@@ -1,6 +1,7 @@
 """The watchdog: it detects devices that send no valid new data."""
 
 import math
+from collections.abc import Callable
 from enum import StrEnum
 
 from wbc_suite.devices.state import DeviceState
@@ -15,37 +16,49 @@ class Phase(StrEnum):
 
 
 class Watchdog:
-    """Detects whether a device sends new data, by the device's own time.
+    """Detects whether a device sends new data.
 
-    A state is new if its time is later than all before and all its numbers are finite.
-    So a device that stalls, repeats itself, goes back in time or sends NaN has no new
-    data. After `hold_after` its time may start again: the device was restarted.
+    A state is new if its time, on the device's clock, is later than all before and all
+    its numbers are finite. So a device that stalls, repeats itself, goes back in time
+    or sends NaN has no new data. After `hold_after` its time may start again: the
+    device was restarted. Silence is measured by `clock`, however slowly the loop runs.
 
     Args:
         hold_after: Time without new data before limbs are held, s.
         return_after: Time without new data before limbs move home, s; None for never.
-        dt: Time between two calls of `check`, s.
+        clock: Source of time that never goes back, s.
+
+    Attributes:
+        silence: Time without new data at the last check, s; infinite before any.
     """
 
     def __init__(
-        self, hold_after: float, return_after: float | None, dt: float
+        self,
+        hold_after: float,
+        return_after: float | None,
+        clock: Callable[[], float],
     ) -> None:
-        self._hold, self._dt = hold_after, dt
+        self._hold, self._clock = hold_after, clock
         self._return = math.inf if return_after is None else return_after
         self.reset()
 
     def reset(self) -> None:
         """Wait for a first state."""
         self._latest, self._last = -math.inf, -math.inf
-        self._silent, self._has_data = math.inf, False
+        self._heard, self.silence = -math.inf, math.inf
         self._fault = ""
+
+    @property
+    def has_data(self) -> bool:
+        """Whether there was a state since the reset."""
+        return self._heard > -math.inf
 
     @property
     def phase(self) -> Phase:
         """What the pipeline has to do."""
-        if self._silent <= self._hold:
+        if self.silence <= self._hold:
             return Phase.LIVE
-        silent = self._silent if self._has_data else 0.0
+        silent = self.silence if self.has_data else 0.0
         return Phase.RETURN if silent > self._return else Phase.HOLD
 
     @property
@@ -53,14 +66,15 @@ class Watchdog:
         """What the watchdog reports; empty while the device sends new data."""
         if self.phase is Phase.LIVE:
             return self._fault
-        if not self._has_data:
+        if not self.has_data:
             return "waiting for the device"
         doing = "returning" if self.phase is Phase.RETURN else "holding"
         return f"{self._fault or 'no data from the device'}: {doing}"
 
     def check(self, state: DeviceState) -> DeviceState | None:
         """Return the state if it is new, else None."""
-        self._silent += self._dt
+        now = self._clock()
+        self.silence = now - self._heard
         if not state.finite:
             self._fault = "the device sends invalid numbers"
             return None
@@ -71,6 +85,6 @@ class Watchdog:
         self._last = state.time
         if not moved_on:
             return None
-        self._latest, self._silent, self._has_data = state.time, 0.0, True
+        self._latest, self._heard, self.silence = state.time, now, 0.0
         self._fault = ""
         return state

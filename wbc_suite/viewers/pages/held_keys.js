@@ -1,12 +1,16 @@
 // Tells the server which way the user drives while keys, buttons or sticks are held.
 // A message is [forward, left, turn, up], -1 .. 1, repeated until all are released.
+// Whatever is held while the connection drops, or while the page is hidden or loses its
+// focus, counts as released: it has to be pressed anew. So does what is held when a page
+// connects: the first message is zeros. Sticks of a gamepad count while ENABLE is held.
 "use strict";
 (() => {
   const PERIOD = 100, DEAD = 0.12;  // ms; dead zone of a stick
+  const ENABLE = 4;  // L1 or LB, in the browsers' standard mapping
   const AXES = { KeyW: [0, 1], KeyS: [0, -1], KeyA: [1, 1], KeyD: [1, -1],
                  KeyQ: [2, 1], KeyE: [2, -1], KeyR: [3, 1], KeyF: [3, -1] };
   const keys = new Set(), pointers = new Map();
-  let socket = null, last = "";
+  let socket = null, last = "", ready = false;  // whether the next press of ENABLE counts
 
   const style = document.createElement("style");
   style.textContent = `
@@ -24,8 +28,9 @@
   function axes() {
     const sum = [0, 0, 0, 0], held = new Set([...keys, ...pointers.values()]);
     for (const key of held) sum[AXES[key][0]] += AXES[key][1];
-    const pad = document.hasFocus() && [...navigator.getGamepads()].find(p => p && p.mapping === "standard");
-    if (pad) [1, 0, 2, 3].forEach((axis, k) => { sum[k] -= stick(pad.axes[axis]); });
+    const pad = [...navigator.getGamepads()].find(p => p && p.mapping === "standard");
+    if (!pad || !pad.buttons[ENABLE].pressed) ready = true;
+    else if (ready && document.hasFocus()) [1, 0, 2, 3].forEach((axis, k) => { sum[k] -= stick(pad.axes[axis]); });
     return sum.map(x => Math.min(Math.max(x, -1), 1));
   }
   function send() {
@@ -39,7 +44,7 @@
       button.classList.toggle("held", held.has(button.dataset.drive));
     send();
   }
-  function releaseAll() { keys.clear(); pointers.clear(); update(); }
+  function releaseAll() { keys.clear(); pointers.clear(); ready = false; update(); }
 
   const isText = e => e.target.closest?.("input:not([type=checkbox]), textarea, select, [contenteditable=true]");
   addEventListener("keydown", e => {
@@ -47,7 +52,10 @@
     e.stopPropagation();  // the same keys would move the camera
     if (!e.repeat) { keys.add(e.code); update(); }
   }, true);
-  addEventListener("keyup", e => { if (keys.delete(e.code)) update(); }, true);
+  addEventListener("keyup", e => {
+    if (e.key === "Meta") releaseAll();  // browsers report no releases while it is held
+    else if (keys.delete(e.code)) update();
+  }, true);
   addEventListener("pointerdown", e => {
     const button = e.target.closest?.("[data-drive]");
     if (!button || button.disabled || e.button > 0) return;
@@ -64,8 +72,8 @@
 
   function connect() {
     socket = new WebSocket(location.origin.replace("http", "ws") + "/held_keys");
-    socket.onopen = () => { last = ""; };
-    socket.onclose = () => setTimeout(connect, 1000);
+    socket.onopen = () => { last = ""; releaseAll(); };
+    socket.onclose = () => { releaseAll(); setTimeout(connect, 1000); };
   }
   connect();
   setInterval(send, PERIOD);

@@ -1,4 +1,5 @@
-// Names for screen readers, folders for keyboards, and the key "?", which viser lacks.
+// Names for screen readers, folders for keyboards, the key "?", and the end of drags whose
+// release is not seen: what viser lacks.
 "use strict";
 (() => {
   const HELP = "Keys and gestures";
@@ -10,6 +11,24 @@
     const buttons = [...document.querySelectorAll("button")];
     buttons.find(b => b.textContent.trim() === HELP)?.click();
   });
+
+  // viser ends a drag by `pointerup` alone. A page that is hidden, or whose pointer was
+  // released elsewhere, does not get it: the handle would stick to the pointer.
+  const pressed = new Map();  // the element that each pointer was pressed on
+  function letGo(id) {
+    const target = pressed.get(id);
+    pressed.delete(id);
+    target?.dispatchEvent(new PointerEvent("pointerup", { pointerId: id, bubbles: true }));
+  }
+  function letGoAll() { for (const id of [...pressed.keys()]) letGo(id); }
+  addEventListener("pointerdown", e => {
+    if (e.target.tagName === "CANVAS") pressed.set(e.pointerId, e.target);
+  }, true);
+  addEventListener("pointerup", e => pressed.delete(e.pointerId), true);
+  addEventListener("pointercancel", e => letGo(e.pointerId), true);
+  addEventListener("pointermove", e => { if (!e.buttons) letGo(e.pointerId); }, true);
+  addEventListener("pagehide", letGoAll);
+  document.addEventListener("visibilitychange", () => { if (document.hidden) letGoAll(); });
 
   // The label of the row that an element stands in.
   function labelOf(element) {

@@ -24,6 +24,7 @@ export class Hand {
     this.following = false;  // a bare hand: switched by a touch of thumb and little finger
     this.touching = false;
     this.latched = null;  // where the user was when the robot began to follow
+    this.waits = false;  // until squeeze is released: it was held in a lost connection
     this.joints = [];  // transforms of a bare hand, to draw it
     this.grip = null;  // transform of a controller, to draw it
     this.pulsed = 0;
@@ -46,6 +47,12 @@ export class Hand {
     this.latched = null;
     this.following = false;
     return RELEASED;
+  }
+
+  /** Let the robot go until the user engages anew: by the sign, or by squeezing again. */
+  letGo() {
+    this.release();
+    this.waits = true;
   }
 
   readBare(source, frame, space) {
@@ -72,9 +79,11 @@ export class Hand {
     if (!at || at.emulatedPosition || !source.gamepad) return null;
     this.grip = at.transform;
     const [trigger, squeeze] = source.gamepad.buttons;
+    const squeezed = Boolean(squeeze && squeeze.pressed);
+    this.waits = this.waits && squeezed;
     return {
       transform: at.transform,
-      engaged: Boolean(squeeze && squeeze.pressed),
+      engaged: squeezed && !this.waits,
       grip: 2 * (trigger ? trigger.value : 0) - 1,
     };
   }
@@ -89,13 +98,18 @@ export class Hand {
   }
 }
 
-/** Return what thumbsticks and buttons command: `base`, `height`, `buttons`. */
+/**
+ * Return what thumbsticks and buttons command: `base`, `height`, `buttons`.
+ *
+ * A thumbstick counts while the trigger or squeeze of its controller is held.
+ */
 export function readControls(sources) {
   const base = [0, 0, 0], buttons = [];
   let height = 0;
   for (const { handedness, gamepad, hand } of sources) {
     if (!gamepad || hand || !(handedness in BUTTONS)) continue;
-    const x = stick(gamepad.axes[2] || 0), y = stick(gamepad.axes[3] || 0);
+    const enabled = gamepad.buttons.slice(0, 2).some(button => button.pressed);
+    const [x, y] = [2, 3].map(axis => enabled ? stick(gamepad.axes[axis] || 0) : 0);
     if (handedness === "left") [base[0], base[1]] = [-y * WALK, -x * WALK];
     else [base[2], height] = [-x * TURN, -y * RISE];
     for (const [index, name] of Object.entries(BUTTONS[handedness]))

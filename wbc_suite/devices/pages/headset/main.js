@@ -14,7 +14,9 @@ const connection = new Connection({
     $("link").className = connected ? "good" : "bad";
     document.body.dataset.connected = connected;
     if (connected && !view.description) load();
-    if (!connected) view.show({ text: "Connection lost: the robot stops", colour: "#d23b3b" });
+    if (connected) return;
+    session.letGo();
+    view.show({ text: "Connection lost: the robot stops", colour: "#d23b3b" });
   },
 });
 const session = new Session(view, connection);

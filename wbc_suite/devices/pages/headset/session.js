@@ -59,6 +59,7 @@ export class Session {
 
   read(frame, space, placement, viewer) {
     const visible = this.session.visibilityState === "visible";
+    if (!visible) this.letGo();
     const limbs = { head: { pose: this.headPlacement(placement).pose(viewer.transform) } };
     for (const [side, hand] of Object.entries(this.hands))
       limbs[side] = hand.read(visible ? this.sourceOf(side) : null, frame, space, placement);
@@ -82,6 +83,11 @@ export class Session {
     const names = Object.entries(this.status.hands || {});
     const found = names.find(([name]) => name.split("_").includes(side));
     return found && found[1].state;
+  }
+
+  /** Let the robot go: the user has to engage each hand anew. */
+  letGo() {
+    for (const hand of Object.values(this.hands)) hand.letGo();
   }
 
   end() {
