@@ -122,6 +122,7 @@ def _checked(folder: Path) -> dict[str, list[int]]:
         return {
             str(name): [int(number) for number in state]
             for name, state in json.loads((folder / CHECKED).read_text()).items()
+            if len(state) == 3
         }
     except (OSError, ValueError, TypeError, AttributeError, RecursionError):
         return {}
