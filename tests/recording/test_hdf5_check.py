@@ -111,6 +111,24 @@ def test_what_ends_the_child_is_reported(
         check_files([small_recording])
 
 
+@pytest.mark.parametrize(("size", "seconds"), [(1000, 10), (55_000_000, 15)])
+def test_a_child_has_10_s_and_one_more_for_10_mb_and_ten_times_as_long_to_wait(
+    tmp_path, monkeypatch, size, seconds
+):
+    path, given = tmp_path / "a.hdf5", {}
+    with path.open("wb") as file:
+        file.truncate(size)
+
+    def run(command, **options):
+        given.update(options, seconds=command[-1])
+        return subprocess.CompletedProcess(command, 0, b"", b"")
+
+    monkeypatch.setattr(hdf5_check.subprocess, "run", run)
+    check_files([path])
+    assert given["seconds"] == str(seconds)
+    assert given["timeout"] == 10 * seconds
+
+
 @pytest.mark.slow
 def test_a_child_that_waits_is_killed(small_recording, monkeypatch, child_code):
     child_code("import signal; signal.pause()")
