@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from wbc_suite.compiling import plain
-from wbc_suite.control.composite import progress
+from wbc_suite.control.composite import commanded_scene, progress
 from wbc_suite.control.composite.ik_report import contacts_of
 from wbc_suite.control.composite.progress import (
     PROGRESS,
@@ -23,7 +23,10 @@ from wbc_suite.control.composite.progress import (
     watch_progress,
 )
 from wbc_suite.control.dynamics import solve_tick, terms
+from wbc_suite.control.law import osc
 from wbc_suite.control.loop import acceleration_limits as limits
+from wbc_suite.control.part.joint_controllers import JointPositionController
+from wbc_suite.control.part.osc_controller import OscConfig
 
 
 def record(**fields):
@@ -251,3 +254,81 @@ class TestProgress:
             np.testing.assert_array_equal(trail[k].v, [2.0 * solve, 0.0])
         with pytest.raises(IndexError):
             trail[TRAIL]
+
+
+@pytest.mark.parametrize("flag", [0.0, 1.0])
+def test_osc_keeps_the_direction_of_the_hand_where_it_is_asked_to(flag, monkeypatch):
+    """And limits accelerations in any case, last."""
+    called, n = [], 7
+    for name in ("write_hand_task", "solve_lower", "lq_solve", "solve_upper"):
+        monkeypatch.setattr(osc, name, lambda *_: None)
+    monkeypatch.setattr(osc, "_write_damped_factors", lambda *_: None)
+    for name in ("keep_direction", "limit_accelerations"):
+        monkeypatch.setattr(osc, name, lambda *_, name=name: called.append(name))
+    work = record(
+        J=np.zeros((6, n)),
+        C=np.eye(n),
+        wanted=np.zeros(6),
+        posture=np.arange(7.0),
+        z=np.full(n, 2.0),
+        L=np.eye(6),
+        Q=np.zeros((6, n + 6)),
+        column=np.zeros(n),
+        dofs=np.arange(n)[::-1],
+    )
+    physics = record(osc=work, acceleration=np.zeros(n))
+    plain(osc.osc_law)(physics, record(first=0, last=n, keep_direction=flag), None)
+    assert called == ["keep_direction"] * bool(flag) + ["limit_accelerations"]
+    np.testing.assert_array_equal(physics.acceleration[::-1], np.arange(7.0) + 2.0)
+
+
+def test_the_commanded_scene_has_the_commanded_joints_and_the_measured_rest(
+    monkeypatch,
+):
+    called = []
+    monkeypatch.setattr(
+        commanded_scene, "mj_kinematics", lambda *given: called.append(given)
+    )
+    scene = record(
+        measured=np.arange(6.0),
+        qpos=np.zeros(6),
+        measured_mocap_pos=np.arange(6.0).reshape(2, 3),
+        mocap_pos=np.zeros((2, 3)),
+        measured_mocap_quat=np.arange(8.0).reshape(2, 4),
+        mocap_quat=np.zeros((2, 4)),
+        joint=np.array([1, 0]),
+        place=np.array([4, 2]),
+        q=np.array([10.0, 20.0]),
+        model=1,
+        data=2,
+    )
+    plain(commanded_scene.place_commanded)(scene)
+    np.testing.assert_array_equal(scene.qpos, [0, 1, 10, 3, 20, 5])
+    np.testing.assert_array_equal(scene.mocap_pos, scene.measured_mocap_pos)
+    np.testing.assert_array_equal(scene.mocap_quat, scene.measured_mocap_quat)
+    assert called == [(1, 2)]
+
+
+def test_joints_whose_step_is_zero_keep_their_goals():
+    """Also where the others start from where they are."""
+    goal, q = np.array([0.1, 0.2, 0.3]), np.array([0.0, 0.5, 0.6])
+    for mode, start in (("target", goal), ("achieved", q)):
+        part = record(
+            goal=goal.copy(),
+            config=record(goal_update_mode=mode),
+            law=record(drives={"qpos": np.arange(3)}),
+            _state=record(data=record(qpos=q)),
+            _input=record(clip=lambda x: np.minimum(x, 0.55)),
+        )
+        JointPositionController._step(part, np.array([0.05, 0.0, 0.2]))
+        expected = [start[0] + 0.05, 0.2, min(start[2] + 0.2, 0.55)]
+        np.testing.assert_allclose(part.goal, expected)
+
+
+def test_poses_have_six_values_and_positions_three():
+    for kind, size in (("OSC_POSE", 6), ("OSC_POSITION", 3)):
+        config = OscConfig(type=kind)
+        assert config.size == size
+        low, high = config.outputs()
+        assert (np.size(low), np.size(high)) == (size, size)
+        np.testing.assert_allclose(low, np.negative(high))
