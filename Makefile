@@ -50,14 +50,14 @@ $(VENV)/.installed-peers: $(VENV)/.installed-dev
 	@touch $@
 
 .venv-%/.installed: benchmarks/peers/%.txt | $(VENV)/.python
-	@test -x .venv-$*/bin/python || $(PY) -m venv .venv-$*
+	@test -x .venv-$*/bin/python || $(PY) -m venv --upgrade-deps .venv-$*
 	.venv-$*/bin/python -m pip install --disable-pip-version-check -r $<
 	test ! -f $(<:.txt=-no-deps.txt) || .venv-$*/bin/python -m pip install \
 	  --disable-pip-version-check --no-deps -r $(<:.txt=-no-deps.txt)
 	@touch $@
 
 .venv-client-%/.installed: examples/clients/%.txt | $(VENV)/.python
-	@test -x .venv-client-$*/bin/python || $(PY) -m venv .venv-client-$*
+	@test -x .venv-client-$*/bin/python || $(PY) -m venv --upgrade-deps .venv-client-$*
 	.venv-client-$*/bin/python -m pip install --disable-pip-version-check -e . -r $<
 	@touch $@
 
@@ -87,7 +87,7 @@ $(VENV)/.python: .ci/find-python
 	@python=$$(.ci/find-python) || exit 1; \
 	if $(PY) -c 'import sys, pip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then :; \
 	else echo "Making $(VENV) with $$python"; "$$python" -m venv --clear $(VENV); fi
-	@$(PY) -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"
+	@$(PY) -m pip install --quiet --disable-pip-version-check --upgrade "pip>=26.2.2" "setuptools>=78.1.1"
 	@touch $@
 
 $(VENV)/.installed: $(VENV)/.python pyproject.toml

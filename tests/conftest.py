@@ -69,7 +69,8 @@ def peer_readers():
 
 
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT") == "1"
-INTERPRETED_LIMIT = 1.0  # s of CPU time
+INTERPRETED_LIMIT = float(os.environ.get("WBC_SUITE_INTERPRETED_LIMIT", "1.0"))
+"""s of CPU time."""
 
 
 def _too_slow(*_: object) -> None:

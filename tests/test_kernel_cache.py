@@ -179,17 +179,43 @@ def test_damaged_files_are_deleted_and_whole_ones_kept(
     assert kept == FILES - {name}
 
 
-def test_machine_code_that_was_changed_after_the_check_is_deleted(machine_code):
-    """One flipped byte leaves a whole pickle."""
+def flip(file, *, keep_time):
+    """Change one bit of a file, which stays a whole pickle; size and time are kept."""
+    content, found = bytearray(file.read_bytes()), file.stat()
+    content[len(content) // 2] ^= 1
+    file.write_bytes(content)
+    if keep_time:
+        os.utime(file, ns=(found.st_atime_ns, found.st_mtime_ns))
+
+
+@pytest.mark.parametrize("keep_time", [True, False])
+@pytest.mark.parametrize("name", ["a.1.nbc", "a.nbi"])
+def test_a_flipped_bit_is_found(machine_code, name, keep_time):
     folder = kernel_cache.cache_folder() / "wbc_suite_1"
     folder.mkdir()
-    (folder / "a.1.nbc").write_bytes(pickle.dumps(b"code" * 100))
+    for each in FILES:
+        (folder / each).write_bytes(pickle.dumps(b"code" * 100))
     kernel_cache.cache_folder.cache_clear()
     kernel_cache.cache_folder()
-    (folder / "a.1.nbc").write_bytes(pickle.dumps(b"evil" * 100))
+    flip(folder / name, keep_time=keep_time)
     kernel_cache.cache_folder.cache_clear()
     kernel_cache.cache_folder()
-    assert not (folder / "a.1.nbc").exists()
+    assert {file.name for file in folder.iterdir()} == FILES - {name}
+
+
+def test_a_copied_cache_is_used(machine_code):
+    """A copy has other times, as in an image or after a checkout."""
+    folder = kernel_cache.cache_folder() / "wbc_suite_1"
+    folder.mkdir()
+    for each in FILES:
+        (folder / each).write_bytes(pickle.dumps(b"code" * 100))
+    kernel_cache.cache_folder.cache_clear()
+    kernel_cache.cache_folder()
+    for each in FILES:
+        os.utime(folder / each, (1.0, 1.0))
+    kernel_cache.cache_folder.cache_clear()
+    kernel_cache.cache_folder()
+    assert {file.name for file in folder.iterdir()} == FILES
 
 
 def test_machine_code_that_numba_wrote_again_is_kept(machine_code):
@@ -204,7 +230,10 @@ def test_machine_code_that_numba_wrote_again_is_kept(machine_code):
     assert len(list(folder.iterdir())) == 2
 
 
-@pytest.mark.parametrize("content", ["", "[1]", "3", '{"a": 1}', "\x00", "[" * 5000])
+@pytest.mark.parametrize(
+    "content",
+    [*("", "[1]", "3", '{"a": 1}', "\x00", "[" * 5000), '{"a": [1, "b"]}', '{"a": {}}'],
+)
 def test_a_damaged_list_of_checked_files_is_written_anew(machine_code, content):
     folder = kernel_cache.cache_folder()
     (folder / "a.1.nbc").write_bytes(pickle.dumps(b"code"))
@@ -225,6 +254,19 @@ def test_a_process_starts_with_a_damaged_cache(run, tmp_path, kind):
         file.write_bytes(file.read_bytes()[:-100])
     assert run(**cache) == (folder, 0)
     assert run(**cache) == (folder, 1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["nbi", "nbc"])
+def test_a_process_starts_after_a_bit_was_flipped(run, tmp_path, kind):
+    """Also where no process has started since the one that compiled."""
+    cache = {"XDG_CACHE_HOME": str(tmp_path / "cache")}
+    folder, _ = run(**cache)
+    for _ in range(2):
+        for file in folder.rglob(f"*double*.{kind}"):
+            flip(file, keep_time=True)
+        assert run(**cache) == (folder, 0)
+        assert run(**cache) == (folder, 1)
 
 
 @pytest.mark.slow

@@ -10,11 +10,13 @@ from typing import Any, TypeAlias
 import numpy as np
 import torch
 from torch import Tensor, nn
-from training import Run, Settings, fit, last_checkpoint
+from training import TRAINED, Run, Settings, fit, last_checkpoint, read_checkpoint
 
 import wbc_suite
 from wbc_suite.evaluation import episode_seeds, success_interval
 from wbc_suite.recording import Dataset
+
+SAVED = (*TRAINED, "sizes", "scales", "keys")  # of a checkpoint
 
 Act: TypeAlias = Callable[[Mapping[str, Any]], np.ndarray]
 """From an observation to an action of the environment."""
@@ -176,7 +178,8 @@ def train(settings: Settings, method: Method) -> Run:
         rows = torch.as_tensor(rng.integers(len(seen), size=settings.batch))
         return method.loss(model, seen[rows], acted[rows], rng)
 
-    facts = {"sizes": sizes, "scales": data.scales, "keys": data.keys}
+    scales = {name: torch.as_tensor(value) for name, value in data.scales.items()}
+    facts = {"sizes": sizes, "scales": scales, "keys": data.keys}
     fit(run, model, batch_loss, facts)
     return run
 
@@ -191,8 +194,8 @@ class Policies:
         self.model, self.method = method.network(**saved["sizes"]), method
         self.model.load_state_dict(saved["model"])
         self.model.eval()
-        self.settings, self.scales = Settings(saved["settings"]), saved["scales"]
-        self.keys = saved["keys"]
+        self.settings, self.keys = Settings(saved["settings"]), saved["keys"]
+        self.scales = {name: value.numpy() for name, value in saved["scales"].items()}
         torch.set_num_threads(self.settings.threads)
 
     def __call__(self, env: Any, rng: np.random.Generator) -> Act:
@@ -223,7 +226,7 @@ def last_policy(method: Method, folder: str) -> Callable[[Any, Any], Act]:
 
     @cache
     def load() -> Policies:
-        return Policies(torch.load(last_checkpoint(folder), weights_only=False), method)
+        return Policies(read_checkpoint(last_checkpoint(folder), SAVED), method)
 
     def make(env: Any, rng: np.random.Generator) -> Act:
         return load()(env, rng)
@@ -259,7 +262,7 @@ def evaluate(run: Run, method: Method) -> dict[str, float]:
     """
     rates = []
     for path in run.checkpoints():
-        saved = torch.load(path, weights_only=False)
+        saved = read_checkpoint(path, SAVED)
         rates.append(success_rate(Policies(saved, method), run.settings))
         run.log(saved["step"], success=rates[-1])
     return {"last": rates[-1], "mean": float(np.mean(rates)), "best": max(rates)}

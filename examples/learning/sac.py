@@ -10,26 +10,21 @@ checkpoint and replay buffer. TensorBoard files and a curve are in the folder.
 import json
 import time
 from collections.abc import Callable
-from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from pickle import UnpicklingError
 from typing import Any
 
 import gymnasium
 import numpy as np
-from stable_baselines3.common.callbacks import (
-    BaseCallback,
-    CallbackList,
-    CheckpointCallback,
-)
+from sac_checkpoints import Checkpoints, parameters, resume
+from stable_baselines3.common.callbacks import BaseCallback, CallbackList
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.noise import (
     OrnsteinUhlenbeckActionNoise,
     VectorizedActionNoise,
 )
 from stable_baselines3.common.vec_env import SubprocVecEnv, VecEnv
-from training import Settings, arguments
+from training import Settings, arguments, write_checkpoint
 
 import wbc_suite
 from wbc_suite.evaluation import episode_seeds, success_interval
@@ -57,17 +52,6 @@ def algorithm(settings: Settings) -> Any:
     import stable_baselines3
 
     return stable_baselines3.SAC
-
-
-class Checkpoints(CheckpointCallback):
-    """Deletes all replay buffers but the last two: each takes up to a gigabyte."""
-
-    def _on_step(self) -> bool:
-        goes_on = super()._on_step()
-        if self.n_calls % self.save_freq == 0:
-            for path in saved(self.save_path)[:-2]:
-                buffer_of(path).unlink(missing_ok=True)
-        return goes_on
 
 
 class Curve(BaseCallback):
@@ -104,7 +88,7 @@ def train(settings: Settings) -> tuple[Any, Path]:
     network: dict[str, Any] = {"net_arch": list(settings.layers)}
     if settings.library == "sbx":
         network["layer_norm"] = settings.layer_norm
-    model = resumed(settings, envs) or algorithm(settings)(
+    model = algorithm(settings)(
         "MlpPolicy",
         envs,
         seed=settings.seed,
@@ -120,12 +104,8 @@ def train(settings: Settings) -> tuple[Any, Path]:
         policy_kwargs=network,
         tensorboard_log=str(folder / "tensorboard"),
     )
-    checkpoints = Checkpoints(
-        save_freq=max(1, settings.save_every // settings.envs),
-        save_path=str(folder),
-        name_prefix="sac",
-        save_replay_buffer=True,
-    )
+    resume(model, folder)
+    checkpoints = Checkpoints(folder, max(1, settings.save_every // settings.envs))
     curve = Curve(folder / "curve.jsonl", settings.log_every)
     missing = settings.steps - model.num_timesteps
     if missing > 0:
@@ -134,7 +114,7 @@ def train(settings: Settings) -> tuple[Any, Path]:
             callback=CallbackList([checkpoints, curve]),
             reset_num_timesteps=False,
         )
-    model.save(folder / "last")
+    write_checkpoint(folder / "last.pt", parameters(model))
     envs.close()
     return model, folder
 
@@ -149,28 +129,6 @@ def exploration_noise(settings: Settings, envs: VecEnv) -> VectorizedActionNoise
     sigma = np.full(size, settings.noise * np.sqrt(1.0 - keep**2))
     one = OrnsteinUhlenbeckActionNoise(np.zeros(size), sigma, theta=1.0 - keep, dt=1.0)
     return VectorizedActionNoise(one, envs.num_envs)
-
-
-def saved(folder: str) -> list[Path]:
-    """Return the checkpoints, oldest first."""
-    found = Path(folder).glob("sac_*_steps.zip")
-    return sorted(found, key=lambda path: int(path.stem.split("_")[1]))
-
-
-def buffer_of(checkpoint: Path) -> Path:
-    """Return the file of a checkpoint's replay buffer."""
-    _, step, _ = checkpoint.stem.split("_")
-    return checkpoint.with_name(f"sac_replay_buffer_{step}_steps.pkl")
-
-
-def resumed(settings: Settings, envs: VecEnv) -> Any:
-    """Return the model of the last checkpoint with a whole replay buffer, or None."""
-    for path in reversed(saved(settings.folder)):
-        with suppress(FileNotFoundError, EOFError, UnpicklingError):
-            model = algorithm(settings).load(path, env=envs)
-            model.load_replay_buffer(buffer_of(path))
-            return model
-    return None
 
 
 def evaluate(settings: Settings, act: Callable[[Any], Any]) -> list[tuple[float, bool]]:

@@ -5,7 +5,7 @@ import json
 import math
 import os
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from torch import Tensor, nn
 from torch.utils.tensorboard import SummaryWriter
 
 CHECKPOINTS = "checkpoint_*.pt"
+TRAINED = ("step", "model", "training", "optimiser", "settings")  # keys of a checkpoint
 WARM_UP = 100  # gradient steps
 
 
@@ -52,11 +53,9 @@ class Run:
         self.log_file = self.folder / "log.jsonl"
 
     def save(self, step: int, state: Mapping[str, Any]) -> Path:
-        """Save a checkpoint; the oldest are removed."""
+        """Save a checkpoint of tensors and plain values; the oldest are removed."""
         path = self.folder / f"checkpoint_{step:08d}.pt"
-        temporary = path.with_suffix(".tmp")
-        torch.save({"step": step, **state}, temporary)
-        temporary.replace(path)
+        write_checkpoint(path, {"step": step, **state})
         for old in self.checkpoints()[: -self.settings.keep]:
             old.unlink()
         return path
@@ -68,7 +67,7 @@ class Run:
     def resume(self) -> dict[str, Any] | None:
         """Return the last checkpoint, if there is one."""
         found = self.checkpoints()
-        return torch.load(found[-1], weights_only=False) if found else None
+        return read_checkpoint(found[-1], TRAINED) if found else None
 
     def log(self, step: int, **values: float) -> None:
         """Add scalars to the TensorBoard file and to log.jsonl."""
@@ -148,6 +147,32 @@ def fit(
             run.log(step, loss=float(np.mean(losses)))
             print(f"step {step}: loss {np.mean(losses):.4f}", flush=True)
             losses.clear()
+
+
+def write_checkpoint(path: Path, state: Mapping[str, Any]) -> None:
+    """Write a file that is complete, or absent."""
+    temporary = path.with_suffix(".tmp")
+    torch.save(dict(state), temporary)
+    temporary.replace(path)
+
+
+def read_checkpoint(path: Path, keys: Collection[str]) -> dict[str, Any]:
+    """Read a file of `write_checkpoint`; SystemExit if it is none, or lacks a key.
+
+    Tensors, numbers, text and containers of them are restored. Nothing in a file is
+    executed, as the pickles that torch reads without `weights_only` would be.
+    """
+    try:
+        saved = torch.load(path, weights_only=True)
+    except Exception as error:  # torch raises a dozen kinds
+        raise SystemExit(
+            f"'{path}' is damaged, or holds objects besides tensors, numbers and text, "
+            "which are not loaded. Delete it, or name another folder."
+        ) from error
+    missing = set(keys) - set(saved if isinstance(saved, dict) else ())
+    if missing:
+        raise SystemExit(f"'{path}' has no {', '.join(sorted(missing))}.")
+    return saved
 
 
 def last_checkpoint(folder: str) -> Path:

@@ -29,6 +29,7 @@ from wbc_suite.viewers.page_process import PageProcess
 from wbc_suite.viewers.teleop_session import TeleopSession
 
 MESSAGES = int(os.environ.get("WBC_SUITE_MESSAGES", "10000"))
+PATIENCE = 60.0  # s, after which the loop has stopped
 VALUES = (0, 1, -1, 0.5, 1e6, 1e300, math.nan, math.inf, -math.inf, "a", None, [], {})
 TYPES = (
     "ViewerCameraMessage",
@@ -105,6 +106,15 @@ class TimedEnv(FakeEnv):
         return super().step(action)
 
 
+def tick_after(session, tick):
+    """Wait for another tick of the loop, and return its number."""
+    deadline = time.monotonic() + PATIENCE
+    while session.snapshot.tick <= tick:
+        assert time.monotonic() < deadline, f"the loop stands at tick {tick}"
+        time.sleep(0.001)
+    return session.snapshot.tick
+
+
 def megabytes(pid):
     """Return what a process has in memory."""
     status = Path(f"/proc/{pid}/status").read_text()
@@ -131,22 +141,22 @@ def test_ten_thousand_messages_stop_neither_the_loop_nor_a_viewer(kind):
     viewer = connect(address, max_size=None, **options)
     page_attacker = Attacker(address, **options)
     attacker = Attacker(device.url.rstrip("/").replace("http", "ws") + "/frames")
-    rng, began, before = random.Random(0), time.monotonic(), megabytes(os.getpid())
+    rng, before, ticks = random.Random(0), megabytes(os.getpid()), [0]
     for index in range(MESSAGES // 2):
         page_attacker.send(page_message(rng))
         attacker.send(frame(rng, index))
-    spent, ticks = time.monotonic() - began, session.snapshot.tick
+        if index % (MESSAGES // 20) == 0:
+            ticks.append(tick_after(session, ticks[-1]))
     try:
         assert session.running
         assert page_attacker.connections > 20  # most messages ended a connection
-        assert ticks * session.period > 0.2 * spent  # the rest is a busy machine
         assert np.isfinite(env.actions).all()
         viewer.ping().wait(10.0)
         assert viewer.protocol.state.name == "OPEN"
         page.check()
         grown = megabytes(os.getpid()) - before
         print(
-            f"{ticks} ticks in {spent:.2f} s, at most "
+            f"{ticks[-1]} ticks, at most "
             f"{1e3 * np.diff(env.times).max():.0f} ms apart; the page has "
             f"{megabytes(page.pid):.0f} MB, the loop {grown:.0f} MB more"
         )

@@ -70,8 +70,126 @@ def test_orientations_are_columns_and_windows_stay_in_their_episode():
     python("-c", TRUTH)
 
 
+HOSTILE = """
+import pathlib, pickle, sys
+import numpy as np, torch
+import imitation, training
+from sac_checkpoints import read_buffer, write_buffer
+from stable_baselines3.common.buffers import ReplayBuffer
+from gymnasium.spaces import Box
+
+class Evil:
+    def __reduce__(self):
+        return pathlib.Path.touch, (folder / "executed",)
+
+folder = pathlib.Path(sys.argv[1])
+path = folder / "checkpoint_00000020.pt"
+
+def refused(read, *arguments):
+    try:
+        read(*arguments)
+    except SystemExit as reason:
+        return str(reason)
+    raise AssertionError("was read")
+
+settings = training.Settings(folder=str(folder), keep=1)
+whole = dict.fromkeys(imitation.SAVED, 0)
+for content in (Evil(), whole | {"model": Evil()}, {"step": np.zeros(3)}):
+    torch.save(content, path)
+    assert "holds objects besides tensors" in refused(training.Run(settings).resume)
+    policy = imitation.last_policy(None, str(folder))
+    assert str(path) in refused(policy, None, None)
+torch.save(whole | {"model": torch.ones(2)}, path)
+for size in range(0, path.stat().st_size, 50):
+    path.with_name("checkpoint_00000030.pt").write_bytes(path.read_bytes()[:size])
+    assert "damaged" in refused(training.Run(settings).resume)
+path.with_name("checkpoint_00000030.pt").unlink()
+torch.save({"step": 1}, path)
+assert "no model" in refused(training.Run(settings).resume)
+
+box, path = Box(-1.0, 1.0, (3,), np.float32), folder / "buffer.npz"
+buffer, other = (ReplayBuffer(n, box, box, "cpu", n_envs=2) for n in (8, 12))
+rng = np.random.default_rng(0)
+def add(buffer, n):
+    for _ in range(n):
+        a, b, c = rng.uniform(-1.0, 1.0, (3, 2, 3))
+        buffer.add(a, b, c, np.array([1.0, 2.0]), np.array([0, 1]), [{}, {}])
+for n in (3, 3):  # rows; partly filled, then full and begun again
+    add(buffer, n)
+    write_buffer(path, buffer)
+    again = ReplayBuffer(8, box, box, "cpu", n_envs=2)
+    read_buffer(path, again)
+    assert (again.pos, again.full) == (buffer.pos, buffer.full)
+    for name in ("observations", "next_observations", "actions", "rewards", "dones"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(buffer, name))
+assert "another size" in refused(read_buffer, path, other)
+arrays = dict(np.load(path))
+for changes in ({"rewards": np.array([Evil()])}, {"next": np.array(9)}, {"dones": 0}):
+    np.savez(path, allow_pickle=True, **(arrays | changes))
+    refused(read_buffer, path, again)
+path.write_bytes(pickle.dumps(Evil()))
+assert "no replay buffer" in refused(read_buffer, path, again)
+assert not (folder / "executed").exists()
+"""
+
+
+@pytest.mark.peer
+@pytest.mark.slow
+def test_checkpoints_and_buffers_of_others_are_refused_and_not_executed(tmp_path):
+    python("-c", HOSTILE, tmp_path)
+
+
+KEPT = """
+import sys
+from pathlib import Path
+import gymnasium, numpy as np
+from sac_checkpoints import parameters, resume, restore, write_buffer, buffer_of
+from training import write_checkpoint
+
+def model(width):
+    if sys.argv[1] == "sbx":
+        from sbx import SAC
+    else:
+        from stable_baselines3 import SAC
+    return SAC("MlpPolicy", gymnasium.make("Pendulum-v1"), learning_starts=10, seed=0,
+        buffer_size=100, policy_kwargs={"net_arch": [width]})
+
+first, path = model(8), Path(sys.argv[2]) / "sac_40_steps.pt"
+first.learn(40)
+write_buffer(buffer_of(path), first.replay_buffer)
+write_checkpoint(path, parameters(first))
+again = model(8)
+seen = np.random.default_rng(0).uniform(-1.0, 1.0, (5, 3)).astype(np.float32)
+acts = lambda each: each.predict(seen, deterministic=True)[0]
+assert not np.allclose(acts(again), acts(first))
+resume(again, path.parent)
+np.testing.assert_array_equal(acts(again), acts(first))
+assert (again.num_timesteps, again.replay_buffer.pos) == (40, 40)
+one, two = parameters(first), parameters(again)
+flat = lambda x: [y for v in (x.values() if isinstance(x, dict) else x) for y in
+    (flat(v) if isinstance(v, (dict, list)) else [v])]
+for a, b in zip(flat(one), flat(two), strict=True):
+    np.testing.assert_array_equal(np.asarray(a), np.asarray(b))
+try:
+    resume(model(9), path.parent)
+except SystemExit as reason:
+    assert "network" in str(reason), reason
+else:
+    raise AssertionError("other networks were accepted")
+"""
+
+
+@pytest.mark.peer
+@pytest.mark.slow
+@pytest.mark.parametrize("library", ["sbx", "sb3"])
+def test_a_resumed_model_is_the_saved_one(library, tmp_path):
+    """Parameters, optimisers, entropy, random state, replay buffer and steps."""
+    python("-c", KEPT, library, tmp_path)
+
+
 def test_every_script_has_its_settings():
-    scripts = {path.stem for path in SCRIPTS.glob("*.py")} - {"training", "imitation"}
+    shared = {"training", "imitation", "sac_checkpoints"}
+    scripts = {path.stem for path in SCRIPTS.glob("*.py")} - shared
     assert scripts == {path.stem for path in SCRIPTS.glob("*.toml")}
     assert scripts == {"sac", *CLONING}
 
@@ -112,13 +230,13 @@ def test_sac_trains_goes_on_and_is_evaluated(library, tmp_path):
     changes = [f'folder="{tmp_path}"', f'library="{library}"', *SHORT]
     assert "1 episodes" in run("sac", *changes, "steps=160")
     run("sac", *changes, "steps=240")
-    assert (tmp_path / "sac_240_steps.zip").exists()
+    assert (tmp_path / "sac_240_steps.pt").exists()
     steps = [json.loads(line)["step"] for line in (tmp_path / "curve.jsonl").open()]
     assert steps == sorted(set(steps))
     assert steps[-1] > 160
-    whole, cut = (tmp_path / f"sac_replay_buffer_{n}_steps.pkl" for n in (160, 240))
-    assert set(tmp_path.glob("*.pkl")) == {whole, cut}
+    whole, cut = (tmp_path / f"sac_replay_buffer_{n}_steps.npz" for n in (160, 240))
+    assert set(tmp_path.glob("*.npz")) == {whole, cut}
     cut.write_bytes(cut.read_bytes()[:1000])
-    run("sac", *changes, "steps=320")
+    assert f"'{cut}' is no replay buffer" in run("sac", *changes, "steps=320")
     lines = (tmp_path / "curve.jsonl").read_text().splitlines()
     assert json.loads(lines[len(steps)])["step"] <= 240  # goes on from 160

@@ -70,6 +70,31 @@ def started(body):
     return estimate
 
 
+def test_a_filter_begins_anew_at_a_pose_without_knowledge_of_feet():
+    body = Body()
+    estimate, fresh = started(body), started(body)
+    run(body, estimate, 0.1, noise=0.1)
+    begin_estimate(estimate, fresh.p, fresh.R, fresh.v)
+    for name in ("p", "v", "R", "acceleration_bias", "gyro_bias", "standing", "P"):
+        np.testing.assert_array_equal(getattr(estimate, name), getattr(fresh, name))
+    sizes = np.repeat([0.01, 0.1, 0.01, 0.05, 0.005, 0.0, 0.0, 0.0, 0.0], 3)
+    np.testing.assert_allclose(fresh.P, np.diag(sizes**2), atol=1e-12)
+    np.testing.assert_array_equal(fresh.standing, -1.0)
+
+
+def test_the_covariance_follows_its_transition_and_the_noise():
+    """P' = F P F^T + Q, with the noise of the IMU and of slipping feet."""
+    body, dt = Body(), 0.01
+    estimate = started(body)
+    run(body, estimate, 0.1)
+    before, noise = estimate.P.copy(), np.array(EstimatorNoise())
+    propagate(estimate, *body.step(), GRAVITY, dt)
+    F = estimate.F
+    spread = [0.0, noise[0], noise[1], noise[2], noise[3], *[noise[4]] * 4]
+    Q = dt * np.diag(np.repeat(spread, 3) ** 2)
+    np.testing.assert_allclose(estimate.P, F @ before @ F.T + Q, rtol=1e-9, atol=1e-15)
+
+
 def test_an_exact_imu_is_integrated_exactly():
     body = Body()
     estimate = started(body)

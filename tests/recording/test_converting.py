@@ -78,6 +78,16 @@ def test_lerobots_layout_or_what_to_install(small_recording, tmp_path):
         actions = np.concatenate([e.columns["actions"] for e in dataset])
     np.testing.assert_allclose(np.array(table["action"].to_pylist()), actions, 1e-6)
     assert table["frame_index"].to_pylist() == 4 * list(range(5))
+    assert table["index"].to_pylist() == list(range(20))
+    assert table["episode_index"].to_pylist() == [k for k in range(4) for _ in range(5)]
+    times = np.array(table["timestamp"].to_pylist())
+    np.testing.assert_allclose(times, 4 * [k / info["fps"] for k in range(5)])
+    stats = json.loads((out / "meta/stats.json").read_text())["action"]
+    for name in ("min", "max", "mean", "std"):
+        expected = getattr(actions.astype(np.float32), name)(axis=0)
+        np.testing.assert_allclose(stats[name], expected, rtol=1e-5)
+    np.testing.assert_allclose(stats["q50"], np.median(actions, axis=0), rtol=1e-5)
+    assert stats["count"] == [20]
     with pytest.raises(DatasetError, match="not empty"):
         convert(small_recording, out, "lerobot")
 

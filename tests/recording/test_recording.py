@@ -8,10 +8,11 @@ import gymnasium
 import h5py
 import numpy as np
 import pytest
+from random_episodes import make_episode
 
 import wbc_suite
 from wbc_suite.errors import DatasetError, UnknownNameError
-from wbc_suite.recording import Dataset, EnvSource, rebuild
+from wbc_suite.recording import Dataset, EnvSource, rebuild, replaying
 from wbc_suite.recording.recorder import Recorder
 from wbc_suite.recording.replaying import divergence, play_states
 from wbc_suite.recording.step_buffer import BLOCK_BYTES
@@ -217,3 +218,34 @@ def test_unknown_episodes_and_columns_are_named(lift_recording):
             dataset.episode("demo1")
         with pytest.raises(UnknownNameError, match="Did you mean 'actions'"):
             dataset.column("demo_0", "action")
+
+
+class Played:
+    """An environment that notes the order in which a replay calls it."""
+
+    def __init__(self):
+        self.calls, self.model, self.data = [], None, None
+        self.simulation = self.benchmark = self.observables = self
+
+    def forward(self):
+        self.calls.append("forward")
+
+    def after_step(self):
+        self.calls.append("after_step")
+
+    def update(self):
+        self.calls.append("update")
+
+
+def test_a_replay_by_states_measures_each_as_a_step_does(monkeypatch):
+    """Benchmarks count marks and rest after a step, and observables read the state."""
+    env, episode = Played(), make_episode(0, length=3)
+    written = []
+    monkeypatch.setattr(replaying, "start_as", lambda env, episode: None)
+    monkeypatch.setattr(
+        replaying, "write_physics", lambda model, data, state: written.append(state)
+    )
+    assert list(play_states(env, episode)) == [0, 1, 2, 3]
+    states = [*episode.columns["states"], episode.final_state]
+    np.testing.assert_array_equal(written, states)
+    assert env.calls == 4 * ["forward", "after_step", "update"]

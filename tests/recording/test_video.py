@@ -9,7 +9,7 @@ from PIL import Image
 from random_episodes import HEADER, make_episode
 
 from wbc_suite.errors import DatasetError
-from wbc_suite.recording import Dataset, Store
+from wbc_suite.recording import Dataset, Store, video
 from wbc_suite.recording.plots import HEIGHT, WIDTH, write_plots
 from wbc_suite.recording.video import (
     LABEL,
@@ -71,6 +71,40 @@ def test_a_path_that_cannot_be_written_is_named(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(DatasetError, match="cannot be written"):
         write_video(pictures(RED), tmp_path / "file" / "a.gif", rate=10.0)
+
+
+@pytest.mark.parametrize(
+    ("options", "drawn"), [({}, [0, 1, 2, 3, 4]), ({"every": 2}, [0, 2, 4])]
+)
+@pytest.mark.parametrize("by_states", [True, False])
+def test_every_state_or_every_so_many_are_drawn(monkeypatch, options, drawn, by_states):
+    class Env:
+        now = None
+
+        def render(self):
+            return np.full((2, 2, 3), self.now)
+
+    def play(env, episode):
+        for env.now in range(episode):
+            yield env.now
+
+    name = "play_states" if by_states else "play_actions"
+    monkeypatch.setattr(video, name, play)
+    pictures = video.episode_pictures(Env(), 5, by_states=by_states, **options)
+    assert [picture[0, 0, 0] for picture in pictures] == drawn
+
+
+def test_a_sheet_has_12_episodes_at_most(tmp_path):
+    path = tmp_path / "many.hdf5"
+    with Store(path, HEADER) as store:
+        for seed in range(14):
+            episode = make_episode(seed)
+            shown = {"obs/agentview_image": np.zeros((5, 8, 8, 3), dtype=np.uint8)}
+            store.add(replace(episode, columns=episode.columns | shown))
+    with Dataset(path) as dataset:
+        write_sheet(dataset, tmp_path / "a.png")
+    with Image.open(tmp_path / "a.png") as sheet:
+        assert sheet.size == (6 * 128, 12 * (128 + LABEL))
 
 
 @pytest.fixture

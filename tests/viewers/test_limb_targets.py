@@ -82,3 +82,84 @@ def test_shown_target_takes_what_is_not_commanded_from_the_measured_pose():
     assert seen[LimbKind.POSITION] == pin.SE3(np.eye(3), T.translation)
     assert seen[LimbKind.ORIENTATION] == pin.SE3(T.rotation, np.zeros(3))
     assert seen[LimbKind.PLANAR] == pin.SE3(T.rotation, np.array([1.0, 2.0, 0.0]))
+
+
+class Released:
+    """A limb that was dragged out of reach and let go; it moves at a speed, m/s."""
+
+    def __init__(self, away, turn=0.0):
+        self.place = pin.SE3.Identity()
+        port = LimbPort(
+            name="x",
+            kind=LimbKind.POSE,
+            body=-1,
+            measure=lambda: self.place.copy(),
+            encode=lambda target: values(LimbKind.POSE, target),
+            decode=lambda values: self.place.copy(),
+        )
+        self.limb = LimbTarget(LimbPipeline(port, PipelineConfig(), dt=0.01))
+        far = pin.SE3(pin.exp3(np.array([0, 0, turn])), np.array([away, 0.0, 0.0]))
+        self.limb.stages.place(far)
+        assert self.limb.drag(1, far, now=0.0)
+        self.limb.stages.place(far)
+        self.limb.release(1)
+
+    def settle(self, seconds, speed=0.0, report=None):
+        """Let ticks pass; return the time at which the target came back, or None."""
+        for k in range(round(seconds / 0.01)):
+            before = self.limb.status(report or {}, now=0.0)
+            self.place.translation += np.array([0.0, 0.01 * speed, 0.0])
+            self.limb.settle(before, period=0.01, now=0.0)
+            if np.allclose(self.limb.stages.clutch.target, self.place):
+                return 0.01 * (k + 1)
+        return None
+
+
+def test_a_target_out_of_reach_comes_back_when_its_limb_has_rested_for_0_4_s():
+    assert Released(away=0.5).settle(1.0) == pytest.approx(0.41)
+    assert Released(away=0.0, turn=0.5).settle(1.0) == pytest.approx(0.41)
+
+
+@pytest.mark.parametrize(("speed", "back"), [(0.019, 0.41), (0.021, None)])
+def test_a_limb_rests_below_2_cm_per_second(speed, back):
+    assert Released(away=0.5).settle(1.0, speed) == (back and pytest.approx(back))
+
+
+def test_a_limb_that_moves_on_rests_anew():
+    released = Released(away=0.5)
+    assert released.settle(0.3) is None
+    assert released.settle(0.05, speed=0.1) is None
+    assert released.settle(1.0) == pytest.approx(0.41)
+
+
+@pytest.mark.parametrize(
+    ("away", "turn", "back"),
+    [(0.029, 0.0, False), (0.031, 0.0, True), (0.0, 0.19, False), (0.0, 0.21, True)],
+)
+def test_a_target_that_is_near_stays(away, turn, back):
+    assert (Released(away=away, turn=turn).settle(1.0) is not None) == back
+
+
+def test_a_target_stays_where_the_controller_reports_it_as_reached_or_it_is_held():
+    released = Released(away=0.5)
+    assert released.settle(1.0, report={"reached": True}) is None
+    assert released.limb.rest is None
+    held = Released(away=0.5)
+    assert held.limb.ownership.take(2, now=0.0)
+    assert held.settle(1.0) is None
+    assert Released(away=0.5).settle(1.0, report={"reached": False}) is not None
+
+
+@pytest.mark.parametrize(
+    ("T", "valid"),
+    [
+        (pin.SE3(np.eye(3), np.array([999.0, 0, 0])), True),
+        (pin.SE3(np.eye(3), np.array([0, -1001.0, 0])), False),
+        (pin.SE3(np.eye(3), np.array([0, np.nan, 0])), False),
+        (pin.SE3(np.full((3, 3), np.inf), np.zeros(3)), False),
+    ],
+)
+def test_poses_that_cannot_be_take_no_limb(T, valid):
+    target = limb("x", LimbKind.POSE, pin.SE3.Identity())
+    assert target.drag(1, T, now=0.0) == valid
+    assert target.ownership.holder(0.0) == (1 if valid else None)

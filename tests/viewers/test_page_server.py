@@ -5,7 +5,6 @@ import os
 import stat
 import sys
 import threading
-import time
 import urllib.error
 import urllib.request
 
@@ -231,16 +230,13 @@ def test_reason_for_which_the_page_server_closes_arrives(echo):
             client.recv(timeout=PATIENCE)
 
 
-def test_relayed_drag_at_100_hz_comes_back_within_a_frame(echo):
-    delays = []
+def test_each_message_of_a_drag_is_relayed_before_the_next_is_sent(echo):
+    """Nothing is gathered on the way; benchmarks/teleop_loop.py measures the time."""
+    sent = [bytes([k]) * 200 for k in range(60)]
     with socket_to(echo, protocol="b") as client:
-        for _ in range(60):
-            began = time.perf_counter()
-            client.send(b"x" * 200)
-            client.recv(timeout=PATIENCE)
-            delays.append(time.perf_counter() - began)
-            time.sleep(0.01)
-    assert sorted(delays)[len(delays) // 2] < 0.02
+        for message in sent:
+            client.send(message)
+            assert client.recv(timeout=PATIENCE) == message
 
 
 def test_page_server_that_is_gone_is_a_bad_gateway(tmp_path):

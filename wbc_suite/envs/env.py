@@ -5,7 +5,6 @@ import os
 from collections import deque
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from threading import RLock
 from typing import Any, Unpack
 
 import gymnasium
@@ -27,7 +26,7 @@ from wbc_suite.envs.building import (
 )
 from wbc_suite.envs.config import EnvArguments, checked_seed, parse_env_config
 from wbc_suite.envs.states import EnvState, write_physics, write_scene
-from wbc_suite.envs.watch import one_thread_at_a_time
+from wbc_suite.envs.thread_lock import one_thread_at_a_time, thread_lock
 from wbc_suite.errors import ConfigError, PhysicsError
 from wbc_suite.scene import Push
 from wbc_suite.scene.pushes import PushSchedule
@@ -70,7 +69,7 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         benchmark: str | Path | Callable[[], Benchmark] = "Lift",
         **arguments: Unpack[EnvArguments],
     ) -> None:
-        self._given, self.lock = (benchmark, dict(arguments)), RLock()
+        self._given, self.lock = (benchmark, dict(arguments)), thread_lock()
         self.benchmark = load_benchmark(benchmark, arena=arguments.get("arena"))
         robots = list(self.benchmark.robots)
         self.config = parse_env_config({"robots": robots, **arguments})

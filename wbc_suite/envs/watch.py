@@ -1,10 +1,7 @@
 """Errors for what goes wrong inside MuJoCo."""
 
-import functools
 import math
-from collections.abc import Callable
 from types import TracebackType
-from typing import Any, TypeVar, cast
 
 import mujoco
 import numpy as np
@@ -27,22 +24,6 @@ _NAMES = [
     for name, value in mujoco.mjtWarning.__members__.items()
     if value != mujoco.mjtWarning.mjNWARNING
 ]
-
-Method = TypeVar("Method", bound=Callable[..., Any])
-
-
-def one_thread_at_a_time(method: Method) -> Method:
-    """Let other threads wait for the `lock` of a method's object.
-
-    MuJoCo's state is shared: two threads that step it would crash the process.
-    """
-
-    @functools.wraps(method)
-    def locked(owner: Any, *arguments: Any, **named: Any) -> Any:
-        with owner.lock:
-            return method(owner, *arguments, **named)
-
-    return cast("Method", locked)
 
 
 class PhysicsWatch:

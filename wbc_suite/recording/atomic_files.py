@@ -17,7 +17,10 @@ RESERVE = 1 << 20  # bytes that must be left on the disk after a file is written
 def check_folder(folder: Path, needed: int = 0) -> None:
     """Make a folder if missing; raise DatasetError if `needed` bytes do not fit."""
     try:
+        new = [path for path in (folder, *folder.parents) if not path.exists()]
         folder.mkdir(parents=True, exist_ok=True)
+        for path in new:  # a power failure takes away what its folder does not name
+            _sync(path.parent)
         with tempfile.TemporaryFile(dir=folder):
             pass
         free = shutil.disk_usage(folder).free
