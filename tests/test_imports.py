@@ -18,6 +18,7 @@ BASE = (
     "timing",
     "tomlfile",
     "catalogue",
+    "registry",
     "registration",
     "kernel_cache",
     "compiling",

@@ -6,9 +6,11 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import Any
 
 from wbc_suite import __version__
+from wbc_suite.benchmark import BENCHMARKS
 from wbc_suite.control import load_composite_controller_config
 from wbc_suite.envs import RobotEnv
 from wbc_suite.envs.config import EnvConfig
@@ -22,8 +24,9 @@ PACKAGES = ("mujoco", "pin", "numpy", "gymnasium", "h5py", "daqp")
 MAX_TEXT = 1_000_000  # characters of env_args
 _SHOWN = {"render_mode", "render_camera", "render_size", "render_preset", "skin"}
 """Arguments of rendering, which do not change an episode."""
-_PATH = re.compile(r"[/\\]|\.(toml|json|xml|urdf|py)\Z", re.IGNORECASE)
+_PATH = re.compile(r"[/\\:]|\.(toml|json|xml|urdf|py)\Z", re.IGNORECASE)
 _NAMES = ("robots", "arena", "controller_configs", "gripper_types", "base_types")
+_NAMES += ("placement_initializer",)
 _SIZES = ("camera_heights", "camera_widths")
 MAX_PIXELS = 2048  # of a camera's side, unless the dataset is trusted
 
@@ -53,9 +56,10 @@ class EnvSource:
         kept = {k: v for k, v in given.items() if k not in _SHOWN}
         plain = {k: v for k, v in kept.items() if _is_plain(v)}
         missing = sorted(set(kept) - set(plain))
-        if not isinstance(benchmark, str):
+        if not isinstance(benchmark, str | Path):
             missing.append("benchmark")
-        name = inner.benchmark.name
+            benchmark = inner.benchmark.name
+        name = _lasting_name(str(benchmark))
         return cls(benchmark=name, arguments=plain, missing=tuple(missing))
 
     @classmethod
@@ -93,8 +97,8 @@ class EnvSource:
     def build(self, *, trust_files: bool = False, **changes: Any) -> RobotEnv:
         """Make the environment for replay; rendering arguments are left out.
 
-        With `trust_files`, names in the dataset may be paths of files here. `changes`
-        replace recorded arguments.
+        With `trust_files`, names in the dataset may be paths of files and modules
+        here. `changes` replace recorded arguments.
 
         Raises:
             DatasetError: If it cannot be made from the description.
@@ -119,6 +123,13 @@ class EnvSource:
             ) from error
 
 
+def _lasting_name(benchmark: str) -> str:
+    """Return a benchmark's name as registered, and a file's with its folder."""
+    if benchmark.endswith(".toml"):
+        return str(Path(benchmark).resolve())
+    return BENCHMARKS.spelled(benchmark) if benchmark in BENCHMARKS else benchmark
+
+
 def header_of(env: Any) -> dict[str, Fact]:
     """Return the attributes of `data`, common to all episodes of an environment."""
     inner = env.unwrapped
@@ -136,7 +147,7 @@ def header_of(env: Any) -> dict[str, Fact]:
     ]
     return {
         "env_args": source.text,
-        "env": source.benchmark,
+        "env": inner.benchmark.name,
         "control_freq": float(inner.config.control_freq),
         "repository_version": __version__,
         "versions": json.dumps(versions),
@@ -191,7 +202,7 @@ def _plain(value: Any) -> Any:
 
 
 def _refuse_paths(values: list[Any]) -> None:
-    """Refuse arguments that would make the package read files named by a dataset."""
+    """Refuse arguments that would make the package read files, or import modules."""
     for value in values:
         if isinstance(value, dict):
             _refuse_paths(list(value.values()))
@@ -199,8 +210,8 @@ def _refuse_paths(values: list[Any]) -> None:
             _refuse_paths(value)
         elif isinstance(value, str) and _PATH.search(value):
             raise DatasetError(
-                f"The dataset names a file, '{value[:80]}'. If you trust it, use "
-                "--trust-files."
+                f"The dataset names a file or a module, '{value[:80]}'. If you trust "
+                "it, use --trust-files."
             )
 
 
