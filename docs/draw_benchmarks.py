@@ -8,7 +8,7 @@ import numpy as np
 from PIL import Image
 
 import wbc_suite
-from wbc_suite.benchmark import benchmark_names, load_benchmark
+from wbc_suite.benchmark import BENCHMARKS, load_benchmark
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.sensing.renderer import make_renderer
 from wbc_suite.tomlfile import read_toml
@@ -125,7 +125,7 @@ def cell(name: str) -> tuple[str, str]:
 
 def page() -> str:
     """Write the page."""
-    lines, names = [HEAD], benchmark_names()
+    lines, names = [HEAD], sorted(BENCHMARKS)
     for k in range(0, len(names), COLUMNS):
         cells = [cell(name) for name in names[k : k + COLUMNS]]
         images, words = zip(*cells, strict=True)
@@ -141,7 +141,7 @@ def main() -> None:
     parser.add_argument("only", nargs="*", help="names to draw; all by default")
     only = {name.casefold() for name in parser.parse_args().only}
     FOLDER.mkdir(parents=True, exist_ok=True)
-    for name in benchmark_names():
+    for name in sorted(BENCHMARKS):
         if not only or name.casefold() in only:
             print(f"drawing {name}", flush=True)
             draw(name)

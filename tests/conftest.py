@@ -11,6 +11,8 @@ import pytest
 from hypothesis import HealthCheck, settings
 from xdist.scheduler import LoadScopeScheduling
 
+from wbc_suite.catalogue import name_key
+
 settings.register_profile(
     "suite",
     deadline=None,  # a busy machine is no failure
@@ -33,6 +35,15 @@ if int(pieces) == 1:
 else:
     convert(source, out, layout, executor=Serial(), workers=int(pieces))
 """
+
+
+@pytest.fixture
+def forget():
+    """Return a function: a registry forgets names at the end of the test."""
+    names = []
+    yield lambda registry, *own: names.extend((registry, name) for name in own)
+    for registry, name in names:
+        registry._items.pop(name_key(name), None)
 
 
 class PeerReaders:

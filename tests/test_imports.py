@@ -19,6 +19,7 @@ BASE = (
     "timing",
     "tomlfile",
     "catalogue",
+    "registry",
     "registration",
     "kernel_cache",
     "compiling",

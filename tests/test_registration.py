@@ -7,8 +7,8 @@ import gymnasium
 import pytest
 
 import wbc_suite
-from wbc_suite.benchmark import benchmark_names
-from wbc_suite.registration import BENCHMARKS, environment_id, register_environments
+from wbc_suite.benchmark import BENCHMARKS
+from wbc_suite.registration import WITH_ID, environment_id, register_environments
 
 
 def run(code):
@@ -23,8 +23,8 @@ def run(code):
 
 
 def test_every_benchmark_has_an_id():
-    assert set(BENCHMARKS) == set(benchmark_names())
-    for name in BENCHMARKS:
+    assert set(WITH_ID) == set(BENCHMARKS)
+    for name in WITH_ID:
         assert environment_id(name) in gymnasium.registry
 
 

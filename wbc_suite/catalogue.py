@@ -9,9 +9,11 @@ command line or the variable `WBC_SUITE_CATALOGUE`; its files take precedence.
 import os
 import tempfile
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 from wbc_suite.errors import ConfigError, UnknownNameError
 
@@ -58,20 +60,42 @@ def _default_extra() -> tuple[Path, ...]:
     return tuple(Path(p) for p in value.split(os.pathsep) if p)
 
 
-def _key(name: str) -> str:
+def name_key(name: str) -> str:
     """Normalise a name: `SpotWithArm`, `spot_with_arm` and `spotwitharm` are equal."""
     return name.casefold().replace("_", "").replace("-", "")
+
+
+def merge(base: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the content of a file over that which it extends.
+
+    Tables are merged key by key, also within tables; one of another `type`, and every
+    other value, such as a list, replaces that of the base.
+    """
+    merged = dict(base)
+    for key, value in own.items():
+        below = merged.get(key)
+        if isinstance(value, Mapping) and isinstance(below, Mapping):
+            same = value.get("type", below.get("type")) == below.get("type")
+            merged[key] = merge(below, value) if same else value
+        else:
+            merged[key] = value
+    return merged
 
 
 def _own_name(path: Path) -> str:
     """Return the name that a file declares, or its stem."""
     try:
-        content = tomllib.loads(path.read_text("utf-8"))
+        return _declared_name(path.read_text("utf-8")) or path.stem
     except (OSError, ValueError, RecursionError):
         return path.stem  # listing names must not fail because of one file
+
+
+@lru_cache(maxsize=512)
+def _declared_name(text: str) -> str | None:
+    content = tomllib.loads(text)
     headers = (content, *map(content.get, ("assembly", "component")))
     names = (header.get("name") for header in headers if isinstance(header, dict))
-    return next((name for name in names if isinstance(name, str)), path.stem)
+    return next((name for name in names if isinstance(name, str)), None)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -107,13 +131,15 @@ class Catalogue:
         return tuple(_own_name(path) for path in self.files(folder))
 
     def holds(self, folder: str, name: str) -> bool:
-        """Whether `find` finds a file with this name."""
-        return _key(name) in map(_key, self.names(folder))
+        """Whether a file has this name."""
+        return name_key(name) in map(name_key, self.names(folder))
 
     def find(
         self, folder: str, name: str, *, kind: str, side: str | None = None
     ) -> Path:
         """Return the file with a name, ignoring case and underscores.
+
+        It is that of the file, or else the one that it declares.
 
         A side is inserted into a name that lacks it: on the right, `InspireHand` is the
         file `inspire_right_hand`.
@@ -124,15 +150,59 @@ class Catalogue:
         """
         if ".." in Path(str(folder)).parts:
             raise ConfigError(f"'{folder}/{name}' lies outside the catalogue.")
-        found = {_key(p.stem): p for p in self._files(folder)}
-        wanted = _key(str(name))
+        found = {name_key(p.stem): p for p in self._files(folder)}
+        wanted = name_key(str(name))
         path = found.get(wanted)
         if path is None and side is not None:
             paired = (p for k, p in found.items() if k.replace(side, "", 1) == wanted)
             path = next(paired, None)
         if path is None:
+            named = {name_key(_own_name(file)): file for file in found.values()}
+            path = named.get(wanted)
+        if path is None:
             raise UnknownNameError(kind, name, self.called(folder))
         return path
+
+    def chain(
+        self,
+        folder: str,
+        path: Path,
+        *,
+        kind: str,
+        base_of: Callable[[Path], str | None],
+        key: str = "extends",
+    ) -> list[Path]:
+        """Return a file, the file that it extends, the one that this extends, ...
+
+        A base lies beside its file or in the catalogue. A file may extend one of its
+        own name, that over which it takes precedence.
+
+        Args:
+            folder: Folder of the catalogue, such as `tasks`.
+            path: The file.
+            kind: What a file is called in messages.
+            base_of: Returns the name of a file's base, None for a file without.
+            key: Where a file has that name.
+
+        Raises:
+            ConfigError: If there is no base of a name, or a file extends itself.
+        """
+        from wbc_suite.tomlfile import located  # not at the top: pydantic is slow
+
+        chain = [path]
+        while (name := base_of(chain[-1])) is not None:
+            seen = {file.resolve() for file in chain}
+            files = [*self._files(folder), *sorted(chain[-1].parent.glob("*.toml"))]
+            new = {name_key(f.stem): f for f in files if f.resolve() not in seen}
+            if name_key(name) in new:
+                chain.append(new[name_key(name)])
+                continue
+            fault = str(UnknownNameError(kind, name, {f.stem for f in new.values()}))
+            if name_key(name) in (name_key(file.stem) for file in chain):
+                fault = "the files form a loop."
+            where = located(key, str(chain[-1]))
+            raise ConfigError(f"{chain[-1]}: {where} = '{name}': {fault}")
+        return chain
 
     def is_ours(self, file: Path) -> bool:
         """Whether a file came with this package and not from an extra folder."""

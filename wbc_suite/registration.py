@@ -12,7 +12,7 @@ from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec
 from types import ModuleType
 
-BENCHMARKS = (
+WITH_ID = (
     "Carry",
     "Door",
     "Lift",
@@ -59,7 +59,7 @@ def register_environments() -> None:
 def _register() -> None:
     from gymnasium.envs.registration import register, registry
 
-    for name in BENCHMARKS:
+    for name in WITH_ID:
         if environment_id(name) not in registry:
             register(
                 id=environment_id(name),

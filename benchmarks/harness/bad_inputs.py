@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from harness.trials import Case, Found
-from wbc_suite.control.part.registry import part_models
+from wbc_suite.control.part.registry import PART_CONTROLLERS
 from wbc_suite.envs.env import RobotEnv
 from wbc_suite.errors import ActionError
 from wbc_suite.typing import Vector
@@ -30,7 +30,7 @@ OF_ARMS = ("OSC", "IK", "JOINT")
 
 def controlled(benchmark: str) -> list[Case]:
     """Return a case for each controller, with a robot that it is for."""
-    parts = [name for name in part_models() if name.startswith(OF_ARMS)]
+    parts = [name for name in PART_CONTROLLERS if name.startswith(OF_ARMS)]
     kinds = COMPOSITES | {name: ("Panda",) for name in parts}
     return [
         Case(benchmark=benchmark, robots=robots, controller=name)

@@ -5,7 +5,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from wbc_suite.control.composite.frame_kinds import find_frame_kind
+from wbc_suite.control.composite.frame_kinds import FRAME_KINDS
 
 HANDS = ("right_hand", "left_hand")
 
@@ -20,9 +20,7 @@ def random_pose(rng):
 
 def send(scene, poses):
     layout = scene.controller.layout
-    values = {
-        name: find_frame_kind("pose").values(pose) for name, pose in poses.items()
-    }
+    values = {name: FRAME_KINDS["pose"].values(pose) for name, pose in poses.items()}
     action = layout.pack(values, base=scene.controller.hold_action)
     scene.controller.set_goal(layout.clip(action)[0])
 

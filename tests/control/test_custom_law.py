@@ -6,11 +6,17 @@ import numpy as np
 import pytest
 
 from wbc_suite.compiling import compiled
-from wbc_suite.control.law.custom import custom_kernel, register_law
+from wbc_suite.control.law.custom import (
+    LAWS,
+    custom_kernel,
+    law_kind,
+    register_law,
+)
 from wbc_suite.control.law.joint_laws import JointLaw
 from wbc_suite.control.law.law import Law
 from wbc_suite.control.loop.records import LawKind
 from wbc_suite.envs import Simulation
+from wbc_suite.errors import ConfigError
 
 
 @compiled
@@ -30,6 +36,21 @@ def brake(physics, law, drives):
         physics.acceleration[dof] = -physics.qvel[dof] / law.parameters[0]
 
 
+@pytest.fixture(autouse=True)
+def laws(forget):
+    forget(LAWS, "OSCILLATOR", "BRAKE")
+    register_law("OSCILLATOR", oscillator)
+    register_law("BRAKE", brake)
+
+
+def test_a_replaced_law_runs_in_place_of_the_first():
+    kinds = np.array([law_kind("BRAKE")])
+    first = custom_kernel(kinds)
+    register_law("brake", oscillator, replace=True)
+    assert law_kind("BRAKE") == kinds[0]
+    assert custom_kernel(kinds) is not first
+
+
 class OwnController:
     """A controller that is nothing but laws."""
 
@@ -46,9 +67,9 @@ def simulated(alone, *, is_compiled, steps):
     state, part = robot.state, robot.controller.parts["right"]
     rest = [law for law in robot.controller.laws if law is not part.law]
     joints = part.law.joints
-    swing = Law(register_law(oscillator), state, joints[:1])
+    swing = Law("OSCILLATOR", state, joints[:1])
     swing.record["parameters"][0, 0] = 100.0
-    stop = Law(register_law(brake), state, joints[1:])
+    stop = Law("BRAKE", state, joints[1:])
     stop.record["parameters"][0, 0] = 0.01
     pairs = [(state, OwnController(swing, stop, *rest))]
     simulation = Simulation(state.model, state.data, pairs, compiled=is_compiled)
@@ -78,10 +99,10 @@ def test_a_registered_law_runs_as_plain_python(alone):
     np.testing.assert_allclose(plain_q, compiled_q, atol=1e-12)
 
 
-def test_a_kernel_has_one_kind():
-    kind = register_law(oscillator)
-    assert kind == register_law(oscillator) >= LawKind.CUSTOM
-    assert register_law(brake) != kind
+def test_a_law_has_one_kind():
+    assert law_kind("brake") > law_kind("OSCILLATOR") >= LawKind.CUSTOM
+    with pytest.raises(ConfigError, match="law named 'BRAKE' exists already"):
+        register_law("brake", oscillator)
     assert custom_kernel(np.array([int(LawKind.JOINT), int(LawKind.OSC)])) is None
 
 
@@ -91,7 +112,7 @@ def test_joint_limits_hold_for_a_registered_law(alone):
     state, part = robot.state, robot.controller.parts["right"]
     rest = [law for law in robot.controller.laws if law is not part.law]
     joints = part.law.joints
-    swing = Law(register_law(oscillator), state, joints[:1])
+    swing = Law("OSCILLATOR", state, joints[:1])
     hold = JointLaw(state, joints[1:], kp=400.0, kd=40.0)
     swing.keep_limits(state)
     swing.record["parameters"][0, 0] = 100.0

@@ -4,13 +4,12 @@ import pytest
 
 import wbc_suite
 from wbc_suite.control import (
+    FRAME_KINDS,
     FrameKind,
     SliceKind,
-    frame_kind_names,
     register_frame_kind,
 )
-from wbc_suite.control.composite import frame_kinds
-from wbc_suite.control.composite.frame_kinds import find_frame_kind, set_target
+from wbc_suite.control.composite.frame_kinds import set_target
 from wbc_suite.devices.action_ports import LimbKind, limb_ports
 from wbc_suite.errors import ConfigError, UnknownNameError
 
@@ -24,7 +23,7 @@ LABELS = {
 
 
 @pytest.fixture
-def height():
+def height(forget):
     """Register a kind of one's own for one test: the height of a frame."""
 
     class Height(FrameKind):
@@ -32,8 +31,8 @@ def height():
         labels = ("z",)
         slice_kind = SliceKind.POSITION
 
-    yield register_frame_kind(Height)
-    del frame_kinds._KINDS["height"]
+    forget(FRAME_KINDS, "height")
+    return register_frame_kind(Height)
 
 
 def random_pose(rng):
@@ -41,12 +40,12 @@ def random_pose(rng):
 
 
 def test_the_kinds_of_the_documentation_exist():
-    assert {*LABELS} <= {*frame_kind_names()}
+    assert {*LABELS} <= {*FRAME_KINDS}
 
 
 @pytest.mark.parametrize("name", LABELS)
 def test_values_of_a_pose_command_it_again(name):
-    kind, rng = find_frame_kind(name), np.random.default_rng(0)
+    kind, rng = FRAME_KINDS[name], np.random.default_rng(0)
     assert kind.labels == LABELS[name]
     for _ in range(20):
         wanted, now = random_pose(rng), random_pose(rng)
@@ -68,7 +67,7 @@ def test_values_of_a_pose_command_it_again(name):
 
 @pytest.mark.parametrize("name", LABELS)
 def test_steps_move_a_goal_in_the_given_axes(name):
-    kind, rng = find_frame_kind(name), np.random.default_rng(1)
+    kind, rng = FRAME_KINDS[name], np.random.default_rng(1)
     for _ in range(20):
         goal, axes = random_pose(rng), pin.exp3(rng.uniform(-1.5, 1.5, 3))
         step = dict(
@@ -85,7 +84,7 @@ def test_steps_move_a_goal_in_the_given_axes(name):
 
 @pytest.mark.parametrize("name", LABELS)
 def test_the_task_costs_the_components_that_count(name):
-    kind = find_frame_kind(name)
+    kind = FRAME_KINDS[name]
     config = wbc_suite.control.composite.whole_body_config.ControlledFrame(
         name="a",
         frame="right_tcp" if kind.needs_frame else None,
@@ -131,7 +130,7 @@ def test_a_kind_of_ones_own_moves_a_robot(height):
 
 def test_an_unknown_kind_is_named_with_the_nearest():
     with pytest.raises(UnknownNameError, match="Did you mean 'pose'"):
-        find_frame_kind("poze")
+        FRAME_KINDS["poze"]
     config = {"format": 1, "frame": [{"name": "a", "frame": "b", "kind": "poze"}]}
     with pytest.raises(ConfigError, match="Did you mean 'pose'"):
         wbc_suite.load_composite_controller_config(
@@ -149,4 +148,4 @@ def test_names_and_labels_of_kinds_are_checked(height):
 
     with pytest.raises(ConfigError, match="No component named 'w'"):
         register_frame_kind(Wrong)
-    assert "wrong" not in frame_kind_names()
+    assert "wrong" not in FRAME_KINDS

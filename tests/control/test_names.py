@@ -6,17 +6,20 @@ import pytest
 
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.control import (
-    composite_names,
     load_composite_controller_config,
     register_config_converter,
 )
-from wbc_suite.control.composite.registry import _CONVERTERS, CompositeControllerName
+from wbc_suite.control.composite.registry import (
+    COMPOSITES,
+    CONVERTERS,
+    CompositeControllerName,
+)
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.typing import RobotName
 
 
 def test_composite_names_are_those_registered_by_the_package():
-    assert {*get_args(CompositeControllerName)} <= {*composite_names()}
+    assert {*get_args(CompositeControllerName)} <= {*COMPOSITES}
 
 
 def test_robot_names_are_those_of_the_catalogue():
@@ -47,16 +50,14 @@ def convert(config, robot, source, named):
     return ours | {"body_parts": {"right": {"type": config["arms"]}}}
 
 
-def test_another_layout_is_read_by_its_converter():
+def test_another_layout_is_read_by_its_converter(forget):
     config = {"type": "BASIC", "arms": "JOINT_TORQUE"}
     with pytest.raises(ConfigError, match="body_parts"):
         load_composite_controller_config(config, "Panda")
-    register_config_converter("test_names:convert")
-    try:
-        found = load_composite_controller_config(config, "Panda")
-        plain = load_composite_controller_config("BASIC", "Panda")
-    finally:
-        _CONVERTERS.remove("test_names:convert")
+    forget(CONVERTERS, "arms")
+    register_config_converter("arms", "test_names:convert")
+    found = load_composite_controller_config(config, "Panda")
+    plain = load_composite_controller_config("BASIC", "Panda")
     assert found["body_parts"] == {"right": {"type": "JOINT_TORQUE"}}
     assert plain["body_parts"]["right"]["type"] == "OSC_POSE"
 

@@ -18,11 +18,10 @@ from wbc_suite.control import (
     load_part_controller_config,
     register_part_controller,
 )
-from wbc_suite.control.law.custom import register_law
+from wbc_suite.control.law.custom import LAWS, register_law
 from wbc_suite.control.law.joint_laws import JointLaw
 from wbc_suite.control.law.law import Law
-from wbc_suite.control.part import registry
-from wbc_suite.control.part.registry import PartControllerName, part_models
+from wbc_suite.control.part.registry import PART_CONTROLLERS, PartControllerName
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.tomlfile import FrozenModel
 
@@ -67,10 +66,9 @@ class SwingController(PartController[JointLaw]):
 
 
 @pytest.fixture
-def swing():
+def swing(forget):
+    forget(PART_CONTROLLERS, "ROCKING")
     register_part_controller("ROCKING", SwingController, SwingConfig)
-    yield
-    del registry._KINDS["ROCKING"]
 
 
 def test_a_registered_controller_runs_by_name_in_make(swing):
@@ -151,7 +149,8 @@ class Typeless(FrozenModel):
     ("name", "config", "message"),
     [
         ("ROCKING", SwingConfig, "'ROCKING' exists already"),
-        ("rocking2", SwingConfig, "'rocking2' needs a name in capitals"),
+        ("rocking", SwingConfig, "'ROCKING' exists already"),
+        ("", SwingConfig, "'' cannot be the name of a part controller"),
         ("OTHER", SwingConfig, r"needs the field type: Literal\['OTHER'\]"),
         ("OTHER", Typeless, r"Typeless: .*needs the field type"),
     ],
@@ -159,19 +158,20 @@ class Typeless(FrozenModel):
 def test_registration_is_checked(swing, name, config, message):
     with pytest.raises(ConfigError, match=message):
         register_part_controller(name, SwingController, config)
-    assert "OTHER" not in part_models()
+    assert "OTHER" not in PART_CONTROLLERS
 
 
 def test_the_type_of_names_lists_the_built_in_controllers():
     names = get_args(PartControllerName)
-    assert tuple(part_models())[: len(names)] == names  # then those of other modules
+    assert tuple(PART_CONTROLLERS)[: len(names)] == names  # then those of other modules
 
 
 @pytest.mark.parametrize("name", get_args(PartControllerName))
 def test_defaults_of_each_controller_are_a_config_of_it(name):
     config = load_part_controller_config(name)
     assert config["type"] == name
-    assert part_models()[name].model_validate(config).model_dump()["type"] == name
+    model = PART_CONTROLLERS[name].config
+    assert model.model_validate(config).model_dump()["type"] == name
 
 
 def test_an_unknown_part_controller_is_refused_with_the_nearest_name():
@@ -199,7 +199,7 @@ class DamperController(PartController[Law]):
 
     def __init__(self, part, config, state):
         self.slices = ()
-        self.law = Law(register_law(damper), state, part.joints)
+        self.law = Law("DAMPER", state, part.joints)
         self.law.record["parameters"][0, 0] = config.rate
 
     def reset(self, state):
@@ -214,22 +214,22 @@ class DamperController(PartController[Law]):
 
 
 @pytest.mark.slow
-def test_a_controller_with_a_law_of_its_own_runs_in_the_loop():
+def test_a_controller_with_a_law_of_its_own_runs_in_the_loop(forget):
     """Inverse dynamics make a law `a = -r v` exact: velocities decay by exp(-r t)."""
+    forget(PART_CONTROLLERS, "DAMPER")
+    forget(LAWS, "DAMPER")
+    register_law("DAMPER", damper)
     register_part_controller("DAMPER", DamperController, DamperConfig)
-    try:
-        part = {"type": "DAMPER", "rate": 4.0, "gripper": None}
-        config = {"format": 1, "type": "BASIC", "body_parts": {"right": part}}
-        env = wbc_suite.make("Lift", robots="Panda", controller_configs=config)
-        env.reset(seed=0)
-        data, arm = env.simulation.data, env.controllers[0].parts["right"]
-        dofs = arm.law.drives["dof"]
-        data.qvel[dofs] = start = 0.2 * np.array([1, -1, 1, -1, 1, -1, 1.0])
-        begin = data.time
-        for _ in range(10):
-            env.step(env.hold_action)
-        expected = start * np.exp(-4.0 * (data.time - begin))
-        np.testing.assert_allclose(data.qvel[dofs], expected, rtol=0.02, atol=1e-4)
-        env.close()
-    finally:
-        del registry._KINDS["DAMPER"]
+    part = {"type": "damper", "rate": 4.0, "gripper": None}
+    config = {"format": 1, "type": "BASIC", "body_parts": {"right": part}}
+    env = wbc_suite.make("Lift", robots="Panda", controller_configs=config)
+    env.reset(seed=0)
+    data, arm = env.simulation.data, env.controllers[0].parts["right"]
+    dofs = arm.law.drives["dof"]
+    data.qvel[dofs] = start = 0.2 * np.array([1, -1, 1, -1, 1, -1, 1.0])
+    begin = data.time
+    for _ in range(10):
+        env.step(env.hold_action)
+    expected = start * np.exp(-4.0 * (data.time - begin))
+    np.testing.assert_allclose(data.qvel[dofs], expected, rtol=0.02, atol=1e-4)
+    env.close()

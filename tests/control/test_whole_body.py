@@ -6,8 +6,8 @@ import pytest
 import wbc_suite
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.control import (
+    COMPOSITES,
     build_composite_controller,
-    composite_names,
     load_composite_controller_config,
     register_composite,
 )
@@ -468,8 +468,9 @@ def test_unknown_names_get_suggestions(alone):
 
 
 @pytest.mark.slow
-def test_a_composite_of_ones_own_can_be_registered(alone):
+def test_a_composite_of_ones_own_can_be_registered(alone, forget):
     made = []
+    forget(COMPOSITES, "MY_OWN")
 
     def build(config, state):
         made.append(config["type"])
@@ -481,7 +482,7 @@ def test_a_composite_of_ones_own_can_be_registered(alone):
         family="whole_body_ik",
         default=lambda _: {},
     )
-    assert "MY_OWN" in composite_names()
+    assert "MY_OWN" in COMPOSITES
     assert alone("Tiago", "my_own").act({}, 0.1)["reached"]
     assert made == ["MY_OWN"]
     with pytest.raises(ConfigError, match="exists already"):

@@ -9,23 +9,24 @@ from floating import FloatingEnv
 import wbc_suite
 from wbc_suite.cli.options import device_options
 from wbc_suite.devices import (
+    DEVICES,
     DeviceState,
     LimbInput,
     Pipeline,
     PipelineConfig,
     Scripted,
-    device_names,
     drive,
     make_device,
     register_device,
 )
 from wbc_suite.devices.action_ports import joint_ports, speed_ports
 from wbc_suite.devices.mjgui import MjGui
-from wbc_suite.errors import ConfigError, DeviceError, UnknownNameError
+from wbc_suite.errors import ConfigError, UnknownNameError
 
 
-def test_devices_are_made_by_name():
-    assert {"keyboard", "spacemouse", "gamepad", "stream"} <= set(device_names())
+def test_devices_are_made_by_name(forget):
+    forget(DEVICES, "Nodding")
+    assert {"keyboard", "spacemouse", "gamepad", "stream"} <= set(DEVICES)
     with pytest.raises(UnknownNameError, match="Did you mean 'keyboard'"):
         make_device("keybord")
     register_device("Nodding", lambda: Scripted([]))
@@ -144,9 +145,9 @@ def test_device_of_a_users_own_module_is_found(tmp_path, monkeypatch):
     )
     monkeypatch.syspath_prepend(tmp_path)
     assert make_device("my_devices:Stick", gain=2.0).gain == 2.0
-    with pytest.raises(DeviceError, match="module:Class"):
+    with pytest.raises(ConfigError, match="'my_devices:Stock' cannot be found"):
         make_device("my_devices:Stock")
-    with pytest.raises(DeviceError, match="PYTHONPATH"):
+    with pytest.raises(ConfigError, match="PYTHONPATH"):
         make_device("my_devises:Stick")
 
 

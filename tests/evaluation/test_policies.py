@@ -69,7 +69,7 @@ def test_a_policy_of_a_users_module_gets_environment_and_generator(monkeypatch):
 
 @pytest.mark.parametrize("name", ["my.missing.module:f", "math:no_such_function"])
 def test_modules_and_functions_that_do_not_exist_are_named(name):
-    with pytest.raises(ConfigError, match=f"'{name}' cannot be found"):
+    with pytest.raises(ConfigError, match=f"policy '{name}' cannot be found"):
         make(name, Lift())
 
 

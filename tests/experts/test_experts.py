@@ -7,7 +7,7 @@ import pytest
 import wbc_suite
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.evaluation import make_policy
-from wbc_suite.experts import expert, expert_names, register_expert
+from wbc_suite.experts import EXPERTS, expert, register_expert
 from wbc_suite.experts.stack import aligned
 
 SINGLE = (
@@ -127,7 +127,7 @@ def test_an_action_without_poses_of_hands_is_refused():
         expert(env, np.random.default_rng(0))
 
 
-def test_an_expert_of_your_own_is_found_by_its_benchmark(monkeypatch):
+def test_an_expert_of_your_own_is_found_by_its_benchmark(forget):
     class MyLift(wbc_suite.benchmark.Lift):
         pass
 
@@ -135,9 +135,11 @@ def test_an_expert_of_your_own_is_found_by_its_benchmark(monkeypatch):
         cell.arms[0].open()
         yield
 
-    monkeypatch.setattr("wbc_suite.experts.registry._EXPERTS", {})
+    forget(EXPERTS, "MyLift")
     register_expert(MyLift, wave)
-    assert expert_names() == ("MyLift",)
+    assert EXPERTS["mylift"] == (MyLift, wave)
+    with pytest.raises(ConfigError, match="expert named 'MyLift' exists already"):
+        register_expert(MyLift, wave)
 
 
 def test_what_no_hand_reaches_is_told(caplog):

@@ -65,7 +65,8 @@ URDF = """<robot name="one">
 <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
 <visual><geometry><sphere radius="0.1"/></geometry></visual></link>
 <joint name="turn" type="revolute"><parent link="base"/><child link="arm"/>
-<origin xyz="0 0 0.5"/><axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="9" velocity="1"/></joint>
+<origin xyz="0 0 0.5"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="1" effort="9" velocity="1"/></joint>
 </robot>"""
 
 CAMERA = {

@@ -22,7 +22,7 @@ from wbc_suite.control.dynamics.arrays import for_plain_python
 from wbc_suite.control.loop.inverse_dynamics import needed_kernels, write_commands
 from wbc_suite.control.loop.physics import bind_physics
 from wbc_suite.control.loop.records import gather
-from wbc_suite.control.part.registry import part_models
+from wbc_suite.control.part.registry import PART_CONTROLLERS
 from wbc_suite.control.robot_parts import hands_of, parts_of
 from wbc_suite.errors import ActionError, WbcError
 from wbc_suite.scene import attach_robot, empty_arena
@@ -35,7 +35,13 @@ NAMES = st.one_of(
     st.sampled_from(["right", "OSC_POSE", "world", "eef", "variable", "absolute"]),
 )
 KEYS = st.sampled_from(
-    sorted({key for model in part_models().values() for key in model.model_fields})
+    sorted(
+        {
+            key
+            for kind in PART_CONTROLLERS
+            for key in PART_CONTROLLERS[kind].config.model_fields
+        }
+    )
 )
 VALUES = st.one_of(
     NUMBERS,

@@ -217,7 +217,7 @@ class TestAssemblies:
             'format = 1\n[assembly]\nname = "Ring"\nextends = "ring"\n'
         )
         catalogue = wbc_suite.Catalogue(extra=(tmp_path,))
-        with pytest.raises(DescriptionError, match="'extends' forms a loop"):
+        with pytest.raises(ConfigError, match="= 'ring': the files form a loop"):
             load_robot("ring", catalogue=catalogue)
 
 

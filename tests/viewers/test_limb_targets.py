@@ -2,7 +2,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from wbc_suite.control.composite.frame_kinds import find_frame_kind
+from wbc_suite.control.composite.frame_kinds import FRAME_KINDS as KINDS
 from wbc_suite.devices import PipelineConfig
 from wbc_suite.devices.action_ports import LimbKind, LimbPort
 from wbc_suite.devices.pipeline.limb_pipeline import LimbPipeline
@@ -18,7 +18,7 @@ FRAME_KINDS = {
 
 
 def values(kind, T):
-    return find_frame_kind(FRAME_KINDS[kind]).values(T)
+    return KINDS[FRAME_KINDS[kind]].values(T)
 
 
 def limb(name, kind, T):

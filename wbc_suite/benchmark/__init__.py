@@ -1,8 +1,8 @@
 """Benchmarks: scenes with a goal. Their numbers live in `tasks/*.toml`."""
 
 from wbc_suite.benchmark.base import (
+    BENCHMARKS,
     Benchmark,
-    benchmark_names,
     load_benchmark,
     register_benchmark,
 )
@@ -25,6 +25,7 @@ from wbc_suite.benchmark.walk_to import WalkTo
 from wbc_suite.benchmark.wipe import Wipe
 
 __all__ = [
+    "BENCHMARKS",
     "Benchmark",
     "Carry",
     "Door",
@@ -44,7 +45,6 @@ __all__ = [
     "TwoArmTransport",
     "WalkTo",
     "Wipe",
-    "benchmark_names",
     "load_benchmark",
     "register_benchmark",
 ]

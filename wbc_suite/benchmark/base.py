@@ -1,7 +1,9 @@
 """The interface of benchmarks, their registry, and how their files are loaded."""
 
+import inspect
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import reduce
 from pathlib import Path
 from typing import Any, Protocol, TypeAlias, TypeVar
 
@@ -9,9 +11,10 @@ import mujoco
 import numpy as np
 from pydantic import BaseModel
 
-from wbc_suite.catalogue import Catalogue
+from wbc_suite.catalogue import Catalogue, merge
 from wbc_suite.control import RobotState
 from wbc_suite.errors import ConfigError, UnknownNameError
+from wbc_suite.registry import Registry
 from wbc_suite.robot import RobotDescription
 from wbc_suite.scene import ArenaConfig, Push, TableConfig
 from wbc_suite.sensing.reading import Reading
@@ -23,14 +26,45 @@ Arena: TypeAlias = str | Path | Mapping[str, Any]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class InArena:
-    """A benchmark's file, and an arena in place of that in the file."""
+class BenchmarkFile:
+    """A benchmark's file, merged with those that it extends.
+
+    Attributes:
+        path: Where it is.
+        data: Its content.
+        names: The names in it and in those that it extends, its own first.
+        arena: An arena in place of that in the file, if there is one.
+    """
 
     path: Path
-    arena: Arena
+    data: Mapping[str, Any]
+    names: tuple[str, ...]
+    arena: Arena | None = None
+
+    @classmethod
+    def read(cls, path: Path, catalogue: Catalogue | None = None) -> "BenchmarkFile":
+        """Read a file, and those that it extends, from its folder or the catalogue.
+
+        Raises:
+            ConfigError: If one of them is missing or is not TOML.
+        """
+        layers: list[dict[str, Any]] = []
+
+        def base_of(file: Path) -> str | None:
+            layers.append(data := read_toml(file))
+            if isinstance(arena := data.get("arena"), dict) and "file" in arena:
+                data["arena"] = arena | {"file": str(file.parent / str(arena["file"]))}
+            base = data.pop("extends", None)
+            return None if base is None else str(base)
+
+        catalogue = catalogue or Catalogue()
+        catalogue.chain("tasks", path, kind="benchmark file", base_of=base_of)
+        names = (str(data["name"]) for data in layers if "name" in data)
+        merged = reduce(merge, reversed(layers))
+        return cls(path=path, data=merged, names=tuple(names))
 
 
-Source: TypeAlias = Path | InArena
+Source: TypeAlias = Path | BenchmarkFile
 
 
 class Benchmark(Protocol):
@@ -117,20 +151,17 @@ class Benchmark(Protocol):
         ...
 
 
-_BUILDERS: dict[str, Callable[[Any], Benchmark]] = {}
+BENCHMARKS: Registry[Callable[..., Benchmark]] = Registry("benchmark")
+"""Classes of benchmarks, or functions that make them, by name.
 
+Those that take an argument get the `BenchmarkFile` of `tasks/{name}.toml` in the
+catalogue, which `load_config` takes.
+"""
 
-def register_benchmark(name: str, build: Callable[[Any], Benchmark]) -> None:
-    """Register a benchmark; `build` gets the path of `tasks/{name}.toml`.
+register_benchmark = BENCHMARKS.register
 
-    In an arena it gets an `InArena`; `load_config` takes both.
-    """
-    _BUILDERS[name] = build
-
-
-def benchmark_names() -> tuple[str, ...]:
-    """Return the names of all benchmarks."""
-    return tuple(sorted(_BUILDERS))
+_MEMBERS = ["name", "horizon", "robots"]
+_MEMBERS += [method for method in vars(Benchmark) if not method.startswith("_")]
 
 
 def load_benchmark(
@@ -141,32 +172,66 @@ def load_benchmark(
 ) -> Benchmark:
     """Make a benchmark by its name, without regard to case, or from its file.
 
-    A class of your own, or a function that returns a benchmark, is called. It brings
-    its own table into an arena.
+    A file of the catalogue that extends that of a benchmark is a benchmark, too. A
+    class of your own, or a function that returns a benchmark, also as `module:Name`, is
+    called. It brings its own table into an arena.
 
     Raises:
         UnknownNameError: If there is no such benchmark.
-        ConfigError: If its file is wrong.
+        ConfigError: If its file is wrong, or it lacks a method.
     """
+    if callable(name):
+        return _made(name, getattr(name, "__name__", "benchmark"), arena)
     if not isinstance(name, str | Path):
-        if not callable(name):
-            raise UnknownNameError("benchmark", name, _BUILDERS)
-        own = name()
-        if arena is not None:
-            own.arena = parse_arena(arena)
-        return own
-    if str(name).endswith(".toml"):
-        path = Path(name)
+        raise UnknownNameError("benchmark", name, BENCHMARKS)
+    asked, catalogue = str(name), catalogue or Catalogue()
+    if not asked.endswith(".toml"):
+        is_registered = asked in BENCHMARKS
+        if ":" in asked or (is_registered and not _takes_file(BENCHMARKS[asked])):
+            return _made(BENCHMARKS.find(asked), asked, arena)
         try:
-            known = _find(str(read_toml(path).get("name")))
+            path = catalogue.find("tasks", asked, kind="benchmark")
         except UnknownNameError as error:
-            where = f"{path}: {located('name', str(path))}"
-            raise ConfigError(f"{where}: {error}") from error
+            if is_registered:
+                raise
+            known = {*BENCHMARKS, *error.known}
+            raise UnknownNameError("benchmark", asked, known) from None
     else:
-        known = _find(str(name))
-        path = (catalogue or Catalogue()).find("tasks", known, kind="benchmark file")
-    build = _BUILDERS[known]
-    return build(path if arena is None else InArena(path=path, arena=arena))
+        path = Path(asked)
+    file = BenchmarkFile.read(path, catalogue)
+    builds = [BENCHMARKS[n] for n in (asked, *file.names) if n in BENCHMARKS]
+    if not builds:
+        fault = "missing key 'name'"
+        if file.names:
+            unknown = UnknownNameError("benchmark", file.names[-1], BENCHMARKS)
+            fault = f"{located('name', str(path))}: {unknown}"
+        raise ConfigError(f"{path}: {fault}")
+    return builds[0](replace(file, arena=arena))
+
+
+def _takes_file(build: Callable[..., Benchmark]) -> bool:
+    """Whether a class or function needs an argument: the file of its benchmark."""
+    parameters = inspect.signature(build).parameters.values()
+    return any(
+        p.default is p.empty and p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)
+        for p in parameters
+    )
+
+
+def _made(build: Callable[..., Benchmark], name: str, arena: Arena | None) -> Benchmark:
+    """Call a class or function that takes no file, and check what it returns."""
+    if not callable(build) or _takes_file(build):
+        raise ConfigError(
+            f"{name}: a benchmark is a class or a function without arguments. One that "
+            f"takes a file is registered: register_benchmark('Name', {name})."
+        )
+    own = build()
+    missing = [m for m in _MEMBERS if not hasattr(own, m)]
+    if missing:
+        raise ConfigError(f"{name} is no benchmark: it lacks {', '.join(missing)}.")
+    if arena is not None:
+        own.arena = parse_arena(arena)
+    return own
 
 
 def parse_arena(arena: Arena, *, source: Path | None = None) -> ArenaConfig:
@@ -183,30 +248,23 @@ def parse_arena(arena: Arena, *, source: Path | None = None) -> ArenaConfig:
     return config.model_copy(update={"file": folder / config.file})
 
 
-def _find(name: str) -> str:
-    for known in _BUILDERS:
-        if known.casefold() == name.casefold():
-            return known
-    raise UnknownNameError("benchmark", name, _BUILDERS)
-
-
 def load_config(model: type[C], source: Source) -> C:
-    """Read a benchmark's file; one that `extends` another has only the differences.
+    """Check a benchmark's file; one that `extends` another has only the differences.
 
     In an arena with a surface, that is the table.
 
     Raises:
-        ConfigError: If it is wrong, or extends a file outside its folder.
+        ConfigError: If it is wrong, or a file that it extends is missing.
     """
-    path = source.path if isinstance(source, InArena) else source
-    data = _read(path)
+    file = BenchmarkFile.read(source) if isinstance(source, Path) else source
+    data = dict(file.data)
     arena = data.pop("arena", None)
-    config = parse_model(model, data, source=str(path))
-    if isinstance(source, InArena):
-        return _in_arena(config, parse_arena(source.arena))
+    config = parse_model(model, data, source=str(file.path))
+    if file.arena is not None:
+        return _in_arena(config, parse_arena(file.arena))
     if arena is None:
         return config
-    return _in_arena(config, parse_arena(arena, source=path))
+    return _in_arena(config, parse_arena(arena, source=file.path))
 
 
 def _in_arena(config: C, arena: ArenaConfig) -> C:
@@ -222,20 +280,3 @@ def _in_arena(config: C, arena: ArenaConfig) -> C:
             "and `yaw`."
         )
     return config.model_copy(update={"arena": arena})
-
-
-def _read(path: Path) -> dict[str, Any]:
-    data = read_toml(path)
-    base = data.pop("extends", None)
-    if base is not None:
-        name = str(base)
-        if name != Path(name).name:
-            raise ConfigError(
-                f"{path}: key 'extends' = {name!r}: name a file of the same folder, "
-                "without folder and ending."
-            )
-        try:
-            data = read_toml(path.with_name(f"{name}.toml")) | data
-        except ConfigError as error:
-            raise ConfigError(f"{path}: key 'extends' = {name!r}: {error}") from error
-    return data

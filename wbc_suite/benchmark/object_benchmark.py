@@ -57,6 +57,8 @@ class ObjectBenchmarkConfig(BaseModel):
         places: Position of each robot, m.
         one_table: Whether `table`, if there is one, is the only table.
         arena: The scene around it; None for an empty floor.
+        placement: A sampler of start poses in place of the benchmark's own, a table of
+            `make_sampler`.
     """
 
     model_config = FrozenModel.model_config
@@ -68,6 +70,7 @@ class ObjectBenchmarkConfig(BaseModel):
     horizon: PositiveInt
     places: Places
     arena: ArenaConfig | None = None
+    placement: dict[str, Any] | None = None
 
 
 class ObjectBenchmark(ABC):
@@ -78,6 +81,7 @@ class ObjectBenchmark(ABC):
 
     Attributes:
         sampler: Draws the start poses; may be replaced by a sampler of your own.
+        placement: The table of a sampler that an environment puts in its place.
         arena: The scene around it; None for an empty floor.
         states: The objects and the arena's things in the simulation, by name, after
             `bind`.
@@ -91,11 +95,12 @@ class ObjectBenchmark(ABC):
     needs_gripper = True
     grip_angle = math.radians(120.0)  # between the sides of a grip, at least
     pushes: Sequence[Push] = ()
+    sampler: Sampler | None
 
     def __init__(self, config: ObjectBenchmarkConfig) -> None:
         self.name, self.title, self.horizon = config.name, config.title, config.horizon
         self._placement, self.arena = config, config.arena
-        self.sampler: Sampler | None = None
+        self.placement, self.sampler = config.placement, None
 
     @abstractmethod
     def furnish(self, spec: mujoco.MjSpec) -> None:

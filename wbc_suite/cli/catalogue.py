@@ -90,14 +90,15 @@ def _benchmarks(files: Sequence[Path]) -> Iterator[Row]:
 
 
 def _controllers(files: Sequence[Path]) -> Iterator[Row]:
-    from wbc_suite.control import composite_names
-    from wbc_suite.control.part.registry import part_models
+    from wbc_suite.control import COMPOSITES, PART_CONTROLLERS
     from wbc_suite.tomlfile import read_toml
 
-    for name in composite_names():
+    for name in COMPOSITES:
         yield name, "for any robot; its file, if it has one, is listed below"
-    for name, model in part_models().items():
-        about = str(model.__doc__).split("\n")[0].partition(";")[0]
+    for name in PART_CONTROLLERS:
+        about = (
+            str(PART_CONTROLLERS[name].config.__doc__).split("\n")[0].partition(";")[0]
+        )
         yield name, f"for one part: {about}"
     for file in files:
         yield file.stem, _controlled(read_toml(file))

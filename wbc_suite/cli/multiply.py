@@ -36,6 +36,7 @@ def multiply(
     next_obs: NextObsOption = False,
     executor: options.ExecutorOption = "process",
     workers: WorkersOption = None,
+    trust_files: options.TrustFilesOption = False,
     catalogue: options.CatalogueOption = None,
 ) -> None:
     """Make many demonstrations from few, in new scenes, by the method of MimicGen.
@@ -54,7 +55,9 @@ def multiply(
 
     with Dataset(file) as dataset:
         source = EnvSource.parse(str(dataset.header.get("env_args", "")))
-        rebuild(dataset).close()  # refuses what must not be made
+        rebuild(
+            dataset, trust_files=trust_files
+        ).close()  # refuses what must not be made
     given: dict[str, Any] = options.environment_arguments(
         robots=robots, controller=controller, gripper=gripper, base=base
     )

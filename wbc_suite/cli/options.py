@@ -82,7 +82,9 @@ PictureSizeOption = Annotated[
 RecordingArgument = Annotated[Path, typer.Argument(help="Recording.")]
 TrustFilesOption = Annotated[
     bool,
-    typer.Option("--trust-files", help="Read robot files that the recording names."),
+    typer.Option(
+        "--trust-files", help="Read files and import modules that the recording names."
+    ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 DeviceOptions = Annotated[

@@ -146,9 +146,9 @@ def default_controller(*robots: str) -> str:
 
 def device_maker(name: str, pairs: list[str] | None) -> DeviceMaker:
     """Return a function that makes a device with options `NAME=VALUE`."""
-    from wbc_suite.devices import find_device
+    from wbc_suite.devices import DEVICES
 
-    make, options = find_device(name), device_options(pairs)
+    make, options = DEVICES.find(name), device_options(pairs)
 
     def build(env: "gymnasium.Env[Any, Any]") -> "Device":
         if name.lower() == "mjgui":

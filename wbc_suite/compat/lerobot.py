@@ -24,7 +24,7 @@ from gymnasium.vector import (
 from wbc_suite.envs import RobotEnv, make
 from wbc_suite.errors import UnknownNameError
 from wbc_suite.evaluation.results import Results
-from wbc_suite.registration import BENCHMARKS
+from wbc_suite.registration import WITH_ID
 
 SUITE = "wbc_suite"
 NEW_ROLLOUT = "lerobot_new_rollout"  # option of `reset` that LeRobot gives
@@ -163,12 +163,12 @@ def make_env(
         UnknownNameError: If there is no such benchmark.
     """
     chosen = getattr(cfg, "task", None)
-    names = [name.strip() for name in chosen.split(",")] if chosen else BENCHMARKS
+    names = [name.strip() for name in chosen.split(",")] if chosen else WITH_ID
     for name in names:
-        if name not in BENCHMARKS:
-            raise UnknownNameError("benchmark", name, BENCHMARKS)
+        if name not in WITH_ID:
+            raise UnknownNameError("benchmark", name, WITH_ID)
     made = {
-        BENCHMARKS.index(name): LazyVectorEnv(
+        WITH_ID.index(name): LazyVectorEnv(
             partial(LeRobotEnv, name, **arguments), n_envs, many=use_async_envs
         )
         for name in names

@@ -10,8 +10,8 @@ from wbc_suite.control.action import (
 )
 from wbc_suite.control.composite.basic import BasicController, default_basic_config
 from wbc_suite.control.composite.frame_kinds import (
+    FRAME_KINDS,
     FrameKind,
-    frame_kind_names,
     register_frame_kind,
 )
 from wbc_suite.control.composite.protocols import (
@@ -19,21 +19,22 @@ from wbc_suite.control.composite.protocols import (
     SteppedController,
 )
 from wbc_suite.control.composite.registry import (
+    COMPOSITES,
     CompositeControllerName,
     build_composite_controller,
-    composite_names,
     default_composite,
     load_composite_controller_config,
     register_composite,
     register_config_converter,
 )
-from wbc_suite.control.law.custom import register_law
+from wbc_suite.control.law.custom import LAWS, register_law
 from wbc_suite.control.law.joint_laws import JointLaw, VelocityLaw
 from wbc_suite.control.law.law import Law, ServoLaw, TorqueLaw
 from wbc_suite.control.law.osc import OscLaw
 from wbc_suite.control.part.controller import PartController, PoseInput
 from wbc_suite.control.part.part_settings import PartSettings
 from wbc_suite.control.part.registry import (
+    PART_CONTROLLERS,
     PartControllerName,
     load_part_controller_config,
     register_part_controller,
@@ -42,6 +43,10 @@ from wbc_suite.control.robot_parts import RobotPart
 from wbc_suite.control.state import RobotState
 
 __all__ = [
+    "COMPOSITES",
+    "FRAME_KINDS",
+    "LAWS",
+    "PART_CONTROLLERS",
     "ActionLayout",
     "ActionPart",
     "ActionSlice",
@@ -66,10 +71,8 @@ __all__ = [
     "Unit",
     "VelocityLaw",
     "build_composite_controller",
-    "composite_names",
     "default_basic_config",
     "default_composite",
-    "frame_kind_names",
     "load_composite_controller_config",
     "load_part_controller_config",
     "register_composite",

@@ -1,10 +1,9 @@
 """Input devices, and the pipeline from their states to actions."""
 
 from wbc_suite.devices.device import (
+    DEVICES,
     Device,
     Scripted,
-    device_names,
-    find_device,
     is_device,
     make_device,
     register_device,
@@ -14,6 +13,7 @@ from wbc_suite.devices.pipeline import Clutch, Pipeline, PipelineConfig
 from wbc_suite.devices.state import DeviceState, LimbInput
 
 __all__ = [
+    "DEVICES",
     "Clutch",
     "Device",
     "DeviceState",
@@ -21,9 +21,7 @@ __all__ = [
     "Pipeline",
     "PipelineConfig",
     "Scripted",
-    "device_names",
     "drive",
-    "find_device",
     "is_device",
     "make_device",
     "register_device",

@@ -1,13 +1,13 @@
 """The protocol of devices, and their registry by name."""
 
-import importlib
 import time
 from collections.abc import Callable, Iterable
 from typing import Any, Protocol
 
 from wbc_suite import logs
 from wbc_suite.devices.state import DeviceState
-from wbc_suite.errors import ConfigError, DeviceError, UnknownNameError
+from wbc_suite.errors import ConfigError, UnknownNameError
+from wbc_suite.registry import Registry
 
 log = logs.logger(__name__)
 
@@ -79,67 +79,39 @@ class ButtonReader:
         return self._last, frozenset()
 
 
-_DEVICES: dict[str, str | Callable[..., Device]] = {
-    "dualsense": "wbc_suite.devices.gamepad:DualSense",
-    "gamepad": "wbc_suite.devices.gamepad:Gamepad",
-    "headset": "wbc_suite.devices.headset:Headset",
-    "keyboard": "wbc_suite.devices.keyboard:Keyboard",
-    "mjgui": "wbc_suite.devices.mjgui:MjGui",
-    "spacemouse": "wbc_suite.devices.spacemouse:SpaceMouse",
-    "stream": "wbc_suite.devices.stream:Stream",
-}
-"""Class or factory by name; those of a text are imported when one is created."""
+DEVICES: Registry[Callable[..., Device]] = Registry("device")
+"""Classes of devices, or functions that make them, by name: for `--device`."""
 
+register_device = DEVICES.register
 
-def register_device(name: str, make: Callable[..., Device]) -> None:
-    """Register a device for `make_device` and `--device`; case is ignored.
-
-    Raises:
-        ConfigError: If the name is taken.
-    """
-    if name.lower() in device_names():
-        raise ConfigError(f"A device named '{name}' exists already.")
-    _DEVICES[name.lower()] = make
-
-
-def device_names() -> tuple[str, ...]:
-    """Return the names of all devices."""
-    return tuple(sorted(_DEVICES))
-
-
-def find_device(name: str) -> Callable[..., Device]:
-    """Return the class or factory of a device by its name, or of `module:Class`.
-
-    Raises:
-        UnknownNameError: If there is no device of this name.
-        DeviceError: If the module cannot be imported, or lacks the class.
-    """
-    found = _DEVICES.get(name.lower(), name)
-    if callable(found):
-        return found
-    module, colon, kind = found.partition(":")
-    if not colon:
-        raise UnknownNameError("device", name, device_names())
-    try:
-        return getattr(importlib.import_module(module), kind)
-    except (ImportError, AttributeError) as error:
-        raise DeviceError(
-            f"Device '{name}': {error}. A device of your own is named module:Class, "
-            "and its module must be importable (see PYTHONPATH)."
-        ) from error
+for _name, _place in (
+    ("dualsense", "gamepad:DualSense"),
+    ("gamepad", "gamepad:Gamepad"),
+    ("headset", "headset:Headset"),
+    ("keyboard", "keyboard:Keyboard"),
+    ("mjgui", "mjgui:MjGui"),
+    ("spacemouse", "spacemouse:SpaceMouse"),
+    ("stream", "stream:Stream"),
+):
+    register_device(_name, f"wbc_suite.devices.{_place}")
 
 
 def is_device(name: str) -> bool:
-    """Return whether a name is that of a device."""
-    if name.lower() in device_names():
+    """Return whether a name is that of a device, or `module:Class` of one."""
+    if name in DEVICES:
         return True
     try:
-        found = find_device(name)
-    except (DeviceError, UnknownNameError):
+        found = DEVICES.find(name)
+    except (ConfigError, UnknownNameError):
         return False
     return all(hasattr(found, method) for method in ("start", "read", "stop"))
 
 
 def make_device(name: str, **options: Any) -> Device:
-    """Create a device by its name; `start` opens it. For errors see `find_device`."""
-    return find_device(name)(**options)
+    """Create a device by its name, or `module:Class`; `start` opens it.
+
+    Raises:
+        UnknownNameError: If there is no device of this name.
+        ConfigError: If the module cannot be imported, or lacks the class.
+    """
+    return DEVICES.find(name)(**options)

@@ -31,6 +31,7 @@ from wbc_suite.scene import (
     robot_prefix,
 )
 from wbc_suite.scene.mjcf_arena import PREFIX, clear_views
+from wbc_suite.scene.placement import make_sampler
 from wbc_suite.sensing.cameras import Cameras
 from wbc_suite.sensing.observables import Observables
 from wbc_suite.sensing.projection import camera_id
@@ -47,14 +48,17 @@ WATCH_PAGE = "wbc_suite.viewers.watch_page"
 
 
 def use_sampler(benchmark: Benchmark, config: EnvConfig) -> None:
-    """Replace the benchmark's sampler by that of the arguments, if there is one."""
-    if config.placement_initializer is None:
+    """Replace the benchmark's sampler by that of the arguments, or of its file."""
+    given = config.placement_initializer
+    if given is None and isinstance(benchmark, ObjectBenchmark):
+        given = benchmark.placement
+    if given is None:
         return
     if not isinstance(benchmark, ObjectBenchmark):
         raise ConfigError(
             f"placement_initializer: {benchmark.name} has no sampler to replace."
         )
-    benchmark.sampler = config.placement_initializer
+    benchmark.sampler = make_sampler(given)
 
 
 def place_robots(

@@ -62,7 +62,7 @@ class EnvArguments(TypedDict, total=False):
     arena: str | Path | Mapping[str, Any] | None
     env_configuration: Configuration
     controller_configs: Controller | Sequence[Controller | None] | None
-    placement_initializer: Sampler | None
+    placement_initializer: Sampler | str | Mapping[str, Any] | None
     gripper_types: str | Mapping[str, str] | None
     base_types: str | None
     skin: str | Path | None
@@ -104,8 +104,9 @@ class EnvConfig(FrozenModel):
             `parallel`, one `single-robot`.
         controller_configs: Composite controller: a name, a file or a config; one for
             all robots, or one for each.
-        placement_initializer: Sampler of start poses in place of the benchmark's; see
-            `wbc_suite.scene.placement`.
+        placement_initializer: Sampler of start poses in place of the benchmark's, its
+            registered name, `module:Name`, or its table; see
+            `wbc_suite.scene.placement.make_sampler`.
         gripper_types: Another gripper, one for all hands or one for each; "none" for
             none; "default" for the benchmark's choice, most often the robot's own.
         base_types: Another base; "default" for the robot's own.
@@ -178,7 +179,8 @@ class EnvConfig(FrozenModel):
     @field_validator("placement_initializer")
     @classmethod
     def _draws_places(cls, sampler: Any) -> Any:
-        if sampler is not None and not callable(getattr(sampler, "sample", None)):
+        named = sampler is None or isinstance(sampler, str | Mapping)
+        if not named and not callable(getattr(sampler, "sample", None)):
             raise ValueError(
                 "a sampler has a method `sample`, as those of wbc_suite.scene.placement"
             )

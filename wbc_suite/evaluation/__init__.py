@@ -1,7 +1,14 @@
 """Policies, many episodes of them, and statistics that can be cited."""
 
 from wbc_suite.evaluation.comparison import Comparison, compare
-from wbc_suite.evaluation.policies import POLICIES, Policy, make_policy, replicate
+from wbc_suite.evaluation.policies import (
+    POLICIES,
+    Policy,
+    check_policy,
+    make_policy,
+    register_policy,
+    replicate,
+)
 from wbc_suite.evaluation.policy_socket import PolicyServer
 from wbc_suite.evaluation.rollouts import Case, plan_rollouts, run_rollouts
 from wbc_suite.evaluation.seeds import episode_seed, episode_seeds
@@ -22,6 +29,7 @@ __all__ = [
     "Policy",
     "PolicyServer",
     "Summary",
+    "check_policy",
     "compare",
     "episode_seed",
     "episode_seeds",
@@ -30,6 +38,7 @@ __all__ = [
     "make_policy",
     "plan_rollouts",
     "probability_of_improvement",
+    "register_policy",
     "replicate",
     "run_rollouts",
     "stratified_bootstrap",

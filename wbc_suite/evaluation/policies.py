@@ -1,6 +1,5 @@
 """Policies by name: our own, a user's own functions and classes, and served ones."""
 
-import importlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -11,7 +10,7 @@ from wbc_suite.envs import RobotEnv
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.evaluation.policy_socket import SCHEME, SocketPolicy
 from wbc_suite.experts import Multiplied, expert
-from wbc_suite.recording import EnvSource
+from wbc_suite.registry import Registry
 from wbc_suite.typing import Vector
 
 Policy: TypeAlias = Callable[[Mapping[str, Any]], Vector]
@@ -32,19 +31,44 @@ def random(env: RobotEnv, rng: np.random.Generator) -> Policy:
     return lambda _: rng.uniform(low, high)
 
 
-POLICIES: Mapping[str, Callable[[RobotEnv, np.random.Generator], Policy]] = {
-    "hold": hold,
-    "random": random,
-    "expert": expert,
-}
+PolicyMaker: TypeAlias = Callable[[RobotEnv, np.random.Generator], Policy]
+
+POLICIES: Registry[PolicyMaker] = Registry("policy")
+"""Functions or classes that make the policy of an episode, by name.
+
+They get the environment, which was reset, and a generator that follows from the seed of
+the episode.
+"""
+
+register_policy = POLICIES.register
+register_policy("hold", hold)
+register_policy("random", random)
+register_policy("expert", expert)
+
+
+def check_policy(name: str) -> None:
+    """Raise what `make_policy` raises for a name, as far as it is known without it."""
+    if name.endswith(RECORDING) and not Path(name).is_file():
+        raise ConfigError(
+            f"The policy '{name}' cannot be found: there is no such file."
+        )
+    if not name.startswith(SCHEME) and not name.endswith(RECORDING):
+        _maker(name)
+
+
+def _maker(name: str) -> PolicyMaker:
+    try:
+        return POLICIES.find(name)
+    except UnknownNameError:
+        known = (*POLICIES, "package.module:Name", "FILE.hdf5")
+        raise UnknownNameError("policy", name, known) from None
 
 
 def make_policy(name: str, env: RobotEnv, seed: int) -> Policy:
     """Make a policy for one episode of an environment that was reset.
 
-    The name is one of `POLICIES`, or `package.module:Name` of your own, a function or a
-    class that takes the environment and a generator, which follows from the seed of the
-    episode, and returns the policy; `socket://HOST:PORT` of a `PolicyServer`; or a
+    The name is one of `POLICIES`, or `package.module:Name` of your own;
+    `socket://HOST:PORT` of a `PolicyServer`; or a
     recording, `FILE.hdf5`, whose episodes are moved to the scene, see `Multiplied`. A
     policy with a method `close` is closed after its episode, and one whose attribute
     `finished` becomes true ends it.
@@ -60,21 +84,7 @@ def make_policy(name: str, env: RobotEnv, seed: int) -> Policy:
     rng = np.random.default_rng([seed, 1])
     if name.endswith(RECORDING):
         return Multiplied(Path(name), env, rng)
-    if ":" not in name:
-        if name not in POLICIES:
-            raise UnknownNameError(
-                "policy", name, (*POLICIES, "package.module:name", "FILE.hdf5")
-            )
-        return POLICIES[name](env, rng)
-    module, _, function = name.partition(":")
-    try:
-        make = getattr(importlib.import_module(module), function)
-    except (ImportError, AttributeError) as error:
-        raise ConfigError(
-            f"The policy '{name}' cannot be found: {error}. Write package.module:"
-            "Name; every worker must be able to import the module (PYTHONPATH)."
-        ) from error
-    return make(env, rng)
+    return _maker(name)(env, rng)
 
 
 def describe(env: RobotEnv, seed: int) -> dict[str, Any]:
@@ -112,6 +122,7 @@ def replicate(
     bit, the one that the policy takes without a socket. With `trust_files`, clients may
     name files of this machine, such as those of robots.
     """
+    from wbc_suite.recording import EnvSource
 
     def begin(episode: Mapping[str, Any]) -> Policy:
         given = {key: value for key, value in episode.items() if key != "action"}

@@ -1,14 +1,14 @@
 """Experts: scripted policies that solve the benchmarks, with any robot that can."""
 
 from wbc_suite.experts.multiplication import Multiplied
-from wbc_suite.experts.registry import expert, expert_names, register_expert
+from wbc_suite.experts.registry import EXPERTS, expert, register_expert
 from wbc_suite.experts.workcell import Steps, Workcell
 
 __all__ = [
+    "EXPERTS",
     "Multiplied",
     "Steps",
     "Workcell",
     "expert",
-    "expert_names",
     "register_expert",
 ]

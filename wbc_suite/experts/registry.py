@@ -33,22 +33,23 @@ from wbc_suite.experts.two_arm_peg_in_hole import two_arm_peg_in_hole
 from wbc_suite.experts.two_arm_transport import two_arm_transport
 from wbc_suite.experts.wipe import wipe
 from wbc_suite.experts.workcell import Steps, Workcell
+from wbc_suite.registry import Registry
 from wbc_suite.typing import Vector
 
 Expert: TypeAlias = Callable[[Workcell[Any]], Steps[None]]
 """Program of a benchmark: it moves arms by skills, one control period per `yield`."""
 
-_EXPERTS: dict[type, Expert] = {}
+EXPERTS: Registry[tuple[type, Expert]] = Registry("expert")
+"""Classes of benchmarks and their experts, by the name of the class."""
 
 
-def register_expert(benchmark: type, expert: Expert) -> None:
-    """Register the expert of a class of benchmarks, and of those derived from it."""
-    _EXPERTS[benchmark] = expert
+def register_expert(benchmark: type, expert: Expert, *, replace: bool = False) -> None:
+    """Register the expert of a class of benchmarks, and of those derived from it.
 
-
-def expert_names() -> tuple[str, ...]:
-    """Return the names of the benchmarks that have an expert, without variants."""
-    return tuple(sorted(benchmark.__name__ for benchmark in _EXPERTS))
+    Raises:
+        ConfigError: If a class of this name has an expert.
+    """
+    EXPERTS.register(benchmark.__name__, (benchmark, expert), replace=replace)
 
 
 def expert(
@@ -64,10 +65,11 @@ def expert(
         ConfigError: If the action has no poses of hands.
     """
     benchmark = env.benchmark
-    known = (_EXPERTS[k] for k in type(benchmark).__mro__ if k in _EXPERTS)
-    program = next(known, None)
+    known = dict(EXPERTS[name] for name in EXPERTS)
+    kinds = type(benchmark).__mro__
+    program = next((known[kind] for kind in kinds if kind in known), None)
     if program is None or not isinstance(benchmark, ObjectBenchmark):
-        raise UnknownNameError("expert", benchmark.name, expert_names())
+        raise UnknownNameError("expert", benchmark.name, EXPERTS)
     cell = Workcell(env, benchmark, rng)
     steps = program(cell)
 

@@ -6,9 +6,11 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import Any, NoReturn
 
 from wbc_suite import __version__
+from wbc_suite.benchmark import BENCHMARKS
 from wbc_suite.control import load_composite_controller_config
 from wbc_suite.envs import RobotEnv
 from wbc_suite.envs.config import EnvConfig
@@ -23,7 +25,8 @@ MAX_TEXT = 1_000_000  # characters of env_args
 _SHOWN = {"render_mode", "render_camera", "render_size", "render_preset", "skin"}
 """Arguments of rendering, which do not change an episode."""
 _PATH = re.compile(r"[/\\:]|\.(toml|json|xml|urdf|py)\Z", re.IGNORECASE)
-_NAMES = ("robots", "controller_configs", "gripper_types", "base_types")
+_NAMES = ("robots", "arena", "controller_configs", "gripper_types", "base_types")
+_NAMES += ("placement_initializer",)
 _SIZES = ("camera_heights", "camera_widths")
 MAX_PIXELS = 2048  # of a camera's side, unless the dataset is trusted
 
@@ -53,9 +56,10 @@ class EnvSource:
         kept = {k: v for k, v in given.items() if k not in _SHOWN}
         plain = {k: v for k, v in kept.items() if _is_plain(v)}
         missing = sorted(set(kept) - set(plain))
-        if not isinstance(benchmark, str):
+        if not isinstance(benchmark, str | Path):
             missing.append("benchmark")
-        name = inner.benchmark.name
+            benchmark = inner.benchmark.name
+        name = _lasting_name(str(benchmark))
         return cls(benchmark=name, arguments=plain, missing=tuple(missing))
 
     @classmethod
@@ -93,7 +97,7 @@ class EnvSource:
     def build(self, *, trust_files: bool = False, **changes: Any) -> RobotEnv:
         """Make the environment for replay; rendering arguments are left out.
 
-        With `trust_files`, names may be paths of files here, and modules. `changes`
+        With `trust_files`, names may be paths of files and modules here. `changes`
         replace given arguments.
 
         Raises:
@@ -121,6 +125,13 @@ class EnvSource:
             ) from error
 
 
+def _lasting_name(benchmark: str) -> str:
+    """Return a benchmark's name as registered, and a file's with its folder."""
+    if benchmark.endswith(".toml"):
+        return str(Path(benchmark).resolve())
+    return BENCHMARKS.spelled(benchmark) if benchmark in BENCHMARKS else benchmark
+
+
 def header_of(env: Any) -> dict[str, Fact]:
     """Return the attributes of `data`, common to all episodes of an environment."""
     inner = env.unwrapped
@@ -138,7 +149,7 @@ def header_of(env: Any) -> dict[str, Fact]:
     ]
     return {
         "env_args": source.text,
-        "env": source.benchmark,
+        "env": inner.benchmark.name,
         "control_freq": float(inner.config.control_freq),
         "repository_version": __version__,
         "versions": json.dumps(versions),
@@ -193,7 +204,7 @@ def _plain(value: Any) -> Any:
 
 
 def _refuse_paths(values: list[Any]) -> None:
-    """Refuse arguments that would make the package read files which others name."""
+    """Refuse arguments that would make the package read files, or import modules."""
     waiting = list(values)
     while waiting:
         value = waiting.pop()
@@ -207,8 +218,8 @@ def _refuse_paths(values: list[Any]) -> None:
 
 def _refuse_path(value: Any) -> NoReturn:
     raise DatasetError(
-        f"The description of the environment names a file, '{value!s:.80}'. If you trust "
-        "it, use --trust-files."
+        "The description of the environment names a file or a module, "
+        f"'{value!s:.80}'. If you trust it, use --trust-files."
     )
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from wbc_suite.catalogue import Catalogue
-from wbc_suite.errors import ConfigError, DescriptionError, UnknownNameError
+from wbc_suite.errors import DescriptionError, UnknownNameError
 from wbc_suite.robot.assembly_steps import (
     LISTS,
     depth_first,
@@ -14,7 +14,7 @@ from wbc_suite.robot.assembly_steps import (
     recolored,
     with_colors,
 )
-from wbc_suite.robot.component_choice import Choice, choose, is_bare, is_path
+from wbc_suite.robot.component_choice import Choice, choose, is_bare
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.elements import Elements, Frame, Link, Mount, Root, Synergy
 from wbc_suite.robot.poses import compose
@@ -24,6 +24,7 @@ from wbc_suite.robot.robot_file import (
     Component,
     Header,
     Part,
+    is_path,
     read_robot_file,
 )
 from wbc_suite.robot.shapes import SkinMesh
@@ -106,30 +107,12 @@ def assemble(
     return builder.finish(assembly)
 
 
-def read_assembly(path: Path, catalogue: Catalogue, depth: int = 0) -> Assembly:
-    """Read an assembly together with the one that it extends."""
-    if depth > 5:
-        raise DescriptionError(f"{path}: 'extends' forms a loop.")
-    own = read_robot_file(path)
-    if not isinstance(own, Assembly):
+def read_assembly(path: Path, catalogue: Catalogue) -> Assembly:
+    """Read an assembly together with those that it extends."""
+    found = read_robot_file(path, catalogue)
+    if not isinstance(found, Assembly):
         raise DescriptionError(f"{path}: this is a component, not an assembly.")
-    parts = tuple(_located(part, path.parent) for part in own.parts)
-    if "parts" in own.model_fields_set:
-        own = own.model_copy(update={"parts": parts})
-    if own.assembly.extends is None:
-        return own
-    base = catalogue.find("robots", own.assembly.extends, kind="robot")
-    parent = read_assembly(base, catalogue, depth + 1)
-    given = {key: getattr(own, key) for key in own.model_fields_set}
-    for key in ("frames", "cameras", "sensors", "lock"):
-        given[key] = (*getattr(parent, key), *getattr(own, key))
-    given["keyframes"] = parent.keyframes | own.keyframes
-    given["contacts"] = parent.contacts.model_copy(
-        update={"exclude": (*parent.contacts.exclude, *own.contacts.exclude)}
-    )
-    header = parent.assembly.model_dump() | own.assembly.model_dump(exclude_unset=True)
-    given["assembly"] = type(own.assembly).model_validate(header)
-    return parent.model_copy(update=given)
+    return found
 
 
 class _Builder:
@@ -201,7 +184,7 @@ class _Builder:
                 kind=folder or "component",
                 side=part.side,
             )
-        component = read_robot_file(path)
+        component = read_robot_file(path, self._catalogue)
         if not isinstance(component, Component):
             raise DescriptionError(f"{path}: a part must be a component.")
         return component
@@ -266,16 +249,3 @@ def _joined(texts: Iterable[str]) -> str:
 
 def _names(link: Link) -> tuple[str, ...]:
     return (link.name,) if link.joint is None else (link.name, link.joint.name)
-
-
-def _located(part: Part, folder: Path) -> Part:
-    """Return the part with an absolute path below the assembly's folder."""
-    if not is_path(part.component):
-        return part
-    path = (folder / part.component).resolve()
-    if not path.is_relative_to(folder.resolve()):
-        raise ConfigError(
-            f"'{part.component}' lies outside the folder {folder}: components must be "
-            "in the folder of the assembly, below it, or in the catalogue."
-        )
-    return part.model_copy(update={"component": str(path)})

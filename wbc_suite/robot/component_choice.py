@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping
 
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.errors import ConfigError, DescriptionError, UnknownNameError
-from wbc_suite.robot.robot_file import Assembly, Component, Part
+from wbc_suite.robot.robot_file import Assembly, Component, Part, is_path
 
 Choice = str | Mapping[str, str] | None
 """A component for every side, or one per side; None keeps those of the assembly."""
@@ -36,11 +36,6 @@ def choose(
     if any(part.choice == "base" for part in assembly.parts):
         return chosen.model_copy(update={"root": None})  # the root of the base
     return _on_bare_root(chosen, str(base), read=read, catalogue=catalogue)
-
-
-def is_path(name: str) -> bool:
-    """Whether a component is given by a file and not by its catalogue name."""
-    return name.endswith(".toml")
 
 
 def is_bare(component: Component) -> bool:

@@ -128,7 +128,7 @@ def _read(
     base: Choice,
     skins: SkinFinder | None,
 ) -> RobotDescription:
-    content = read_robot_file(path)
+    content = read_robot_file(path, catalogue)
     if not isinstance(content, Component):
         return assemble(
             path, catalogue=catalogue, gripper=gripper, base=base, skins=skins

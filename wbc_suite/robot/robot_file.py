@@ -3,13 +3,15 @@
 `docs/robots.md` is the reference of all keys.
 """
 
-from functools import lru_cache
+from collections.abc import Mapping, Sequence
+from functools import lru_cache, reduce
 from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import Field
 
-from wbc_suite.errors import ConfigError, DescriptionError, UnknownNameError
+from wbc_suite.catalogue import Catalogue, merge
+from wbc_suite.errors import ConfigError, DescriptionError
 from wbc_suite.robot.elements import (
     Camera,
     Contacts,
@@ -38,6 +40,9 @@ class Header(FrozenModel):
     license: str = ""
     deviations: tuple[str, ...] = ()
 
+
+ADDED = ("frame", "camera", "sensor", "lock")
+"""Lists of an assembly that follow those of the assembly that it extends."""
 
 SOURCES = ("name", "title", "source", "license", "deviations")
 """Fields of a component's header that its robot has as well."""
@@ -92,21 +97,36 @@ class Assembly(FrozenModel):
     contacts: Contacts = Contacts()
 
 
-def read_robot_file(path: Path) -> Component | Assembly:
-    """Read a file that holds a component or an assembly; parsed once for equal text.
+def read_robot_file(
+    path: Path, catalogue: Catalogue | None = None
+) -> Component | Assembly:
+    """Read a file that holds a component or an assembly; parsed once for equal texts.
+
+    Its tables are merged with those of the file that it extends. Lists of an assembly
+    that name what it adds (`lock`, frames, cameras, sensors, contacts that are left
+    out) follow those of its base; every other list replaces that of the base.
 
     Raises:
-        ConfigError: If the file is neither, or violates the format.
-        UnknownNameError: If it extends a component that does not exist.
+        ConfigError: If the file is neither, violates the format, or extends a file that
+            does not exist.
     """
-    text = read_text(path)
-    name = as_table(_tables(str(path), text).get("component")).get("extends")
-    if not isinstance(name, str):
-        return _parsed(str(path), text, None)
-    beside = [p.stem for p in path.parent.glob("*.toml") if p != path]
-    if name not in beside:
-        raise UnknownNameError("component to extend", name, beside)
-    return _parsed(str(path), text, read_text(path.with_name(f"{name}.toml")))
+    texts: dict[str, str] = {}
+
+    def base_of(file: Path) -> str | None:
+        texts[str(file)] = read_text(file)
+        name = _header(str(file), texts[str(file)])[1].get("extends")
+        return name if isinstance(name, str) else None
+
+    kind, header = _header(str(path), read_text(path))
+    folder = f"robots/{header.get('kind', path.parent.name)}"
+    (catalogue or Catalogue()).chain(
+        "robots" if kind == "assembly" else folder,
+        path,
+        kind=f"{kind} to extend",
+        base_of=base_of,
+        key=f"{kind}.extends",
+    )
+    return _parsed(tuple(texts.items()))
 
 
 @lru_cache(maxsize=256)
@@ -115,28 +135,62 @@ def _tables(source: str, text: str) -> dict[str, Any]:
     return parse_toml(text, source=source)
 
 
-@lru_cache(maxsize=256)
-def _parsed(source: str, text: str, base: str | None) -> Component | Assembly:
-    """Parse the text of a robot file, and that of the component it extends."""
+def _header(source: str, text: str) -> tuple[str, dict[str, Any]]:
+    """Return whether a file is a component or an assembly, and its header."""
     data = _tables(source, text)
-    if "component" in data:
-        if base is not None:
-            header, inherited = data["component"], _tables(source, base)
-            above = as_table(inherited.get("component"))
-            if "extends" in above:
-                raise ConfigError(
-                    f"{source}: '{header['extends']}' itself extends another "
-                    f"component; extend '{above['extends']}' instead."
-                )
-            data = inherited | data | {"component": above | header}
+    kind = "component" if "component" in data else "assembly"
+    return kind, as_table(data.get(kind))
+
+
+@lru_cache(maxsize=256)
+def _parsed(files: tuple[tuple[str, str], ...]) -> Component | Assembly:
+    """Parse a robot file and those that it extends, given by path and text."""
+    (source, _), *bases = files
+    layers = [_tables(*file) for file in files]
+    own, data = layers[0], {**reduce(merge, reversed(layers))}
+    if "component" in own:
+        if bases:  # the skins of links are listed under the name of the first one
+            data["component"]["extends"] = Path(bases[-1][0]).stem
         component = parse_model(Component, data, source=source, error=DescriptionError)
         return reflect_component(component, source=source)
-    if "assembly" in data:
-        return parse_model(Assembly, data, source=source, error=DescriptionError)
+    if "assembly" in own:
+        for key in ADDED:
+            data[key] = _joined(layers, key)
+        excluded = _joined([as_table(x.get("contacts")) for x in layers], "exclude")
+        data["contacts"] = as_table(data.get("contacts")) | {"exclude": excluded}
+        assembly = parse_model(Assembly, data, source=source, error=DescriptionError)
+        mine = next((s for s, text in files if "part" in _tables(s, text)), source)
+        parts = tuple(_located(part, Path(mine).parent) for part in assembly.parts)
+        return assembly.model_copy(update={"parts": parts})
     raise ConfigError(
         f"{source}: a robot file needs a table [component] (links and joints) or "
-        f"[assembly] (parts); found {', '.join(sorted(data)) or 'nothing'}."
+        f"[assembly] (parts); found {', '.join(sorted(own)) or 'nothing'}."
     )
+
+
+def _joined(layers: Sequence[Mapping[str, Any]], key: str) -> Any:
+    """Return the lists of all layers, that of the base first; what is no list as is."""
+    given = [layer[key] for layer in reversed(layers) if key in layer]
+    wrong = (value for value in given if not isinstance(value, list))
+    return next(wrong, [item for value in given for item in value])
+
+
+def _located(part: Part, folder: Path) -> Part:
+    """Return the part with an absolute path below the assembly's folder."""
+    if not is_path(part.component):
+        return part
+    path = (folder / part.component).resolve()
+    if not path.is_relative_to(folder.resolve()):
+        raise ConfigError(
+            f"'{part.component}' lies outside the folder {folder}: components must be "
+            "in the folder of the assembly, below it, or in the catalogue."
+        )
+    return part.model_copy(update={"component": str(path)})
+
+
+def is_path(name: str) -> bool:
+    """Whether a component is given by a file and not by its catalogue name."""
+    return name.endswith(".toml")
 
 
 RPY: dict[str, Any] = {

@@ -3,15 +3,16 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
 from numpy.random import Generator
 
-from wbc_suite.errors import PlacementError
+from wbc_suite.errors import ConfigError, PlacementError
+from wbc_suite.registry import Registry
 from wbc_suite.robot.shapes import Interval, Real, Vector3
 from wbc_suite.scene.objects.object_state import Extent, ObjectState
 from wbc_suite.scene.objects.scene_object import STANDING, Quat
-from wbc_suite.tomlfile import FrozenModel
+from wbc_suite.tomlfile import FrozenModel, parse_model
 
 TRIES = 300  # poses drawn for one object before all objects are placed again
 LAYOUTS = 20  # how often all objects of a sampler are placed before an error
@@ -193,3 +194,46 @@ class RejectionSampler:
             f"In {TRIES} tries there was no place for {', '.join(found)} where "
             f"{self.wanted}. Change the region, or the sizes of the objects."
         )
+
+
+SAMPLERS: Registry[Callable[..., Sampler]] = Registry("sampler")
+"""Classes of samplers, or functions that make them, by name.
+
+One that is named in `make(placement_initializer=...)` is called without arguments, one
+in a table by the table's other keys.
+"""
+
+register_sampler = SAMPLERS.register
+register_sampler("uniform", UniformSampler)
+register_sampler("sequential", SequentialSampler)
+register_sampler("on_top", OnTopSampler)
+
+
+def make_sampler(given: Sampler | str | Mapping[str, Any]) -> Sampler:
+    """Return a sampler from its name, `module:Name`, or table; a sampler as it is.
+
+    A table has the name as `type`, such as `{"type": "uniform", "names": ["cube"],
+    "region": {"x": [-0.1, 0.1], "y": [0, 0]}, "origin": [0, 0, 0.8]}`. A `region` is a
+    table of `Region`, and `samplers` are tables.
+
+    Raises:
+        UnknownNameError: If there is no sampler of this name.
+        ConfigError: If a key or a value is wrong.
+    """
+    if isinstance(given, str):
+        return SAMPLERS.find(given)()
+    if not isinstance(given, Mapping):
+        return given
+    options = dict(given)
+    make = SAMPLERS[options.pop("type", None)]
+    if "region" in options:
+        region = options["region"]
+        options["region"] = parse_model(
+            Region, region, source="sampler", within="region"
+        )
+    if isinstance(parts := options.get("samplers"), list | tuple):
+        options["samplers"] = [make_sampler(part) for part in parts]
+    try:
+        return make(**options)
+    except TypeError as error:
+        raise ConfigError(f"sampler '{given['type']}': {error}.") from error

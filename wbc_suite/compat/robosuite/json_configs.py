@@ -16,7 +16,7 @@ from typing import Any
 from wbc_suite import logs
 from wbc_suite.compat.robosuite.controllers.uncoupled_osc import UNCOUPLED
 from wbc_suite.compat.robosuite.controllers.variable_impedance import VARIABLE_JOINTS
-from wbc_suite.control.part.registry import is_part_controller, part_models
+from wbc_suite.control.part.registry import PART_CONTROLLERS
 from wbc_suite.control.robot_parts import hands_of, parts_of
 from wbc_suite.errors import ConfigError, UnknownNameError, did_you_mean
 from wbc_suite.robot import RobotDescription
@@ -84,7 +84,7 @@ def convert(
     Raises:
         ConfigError: If a key is neither robosuite's nor ours, or a value is wrong.
     """
-    one_part = "body_parts" not in config and is_part_controller(config.get("type"))
+    one_part = "body_parts" not in config and config.get("type") in PART_CONTROLLERS
     theirs = SPECIFIC in config or "body_parts" in config or one_part
     if "format" in config or "frame" in config or not theirs:
         return None
@@ -162,17 +162,20 @@ class _Conversion:
 
     def part(self, name: str, given: Config, where: str) -> dict[str, Any]:
         """Return the config of one part; nulls are defaults in robosuite."""
-        models = part_models()
         kind = given.get("type")
+        kind = PART_CONTROLLERS.spelled(kind) if kind in PART_CONTROLLERS else kind
         if name == "base" and kind in ("JOINT_VELOCITY", "JOINT_POSITION"):
             kind = "BASE_VELOCITY"
         if kind == "OSC_POSE" and given.get("control_ori") is False:
             kind = "OSC_POSITION"
-        kind = self._check_name("part controller", kind, models, f"{where}type")
+        kind = self._check_name(
+            "part controller", kind, PART_CONTROLLERS, f"{where}type"
+        )
         kind, asked = UNCOUPLED.get(kind, kind), kind
         if kind == JOINTS and given.get("impedance_mode", "fixed") != "fixed":
             kind = VARIABLE_JOINTS
-        fields = set(models[kind].model_fields) - OTHER_UNITS.get(kind, set())
+        fields = set(PART_CONTROLLERS[kind].config.model_fields)
+        fields -= OTHER_UNITS.get(kind, set())
         own = fields | {"type"}
         self._check_keys(given, own, IGNORED_OF_PARTS, where)
         ours: dict[str, Any] = {"type": kind}

@@ -13,6 +13,7 @@ import pinocchio as pin
 from wbc_suite.control.action import ActionPart, Axis, SliceKind, Unit
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.qp import ComTask, FrameTask
+from wbc_suite.registry import Registry
 from wbc_suite.typing import Matrix, Vector
 
 if TYPE_CHECKING:
@@ -133,39 +134,25 @@ def _rotation_vector(values: dict[str, float]) -> Vector:
     return np.array(turn)
 
 
-_KINDS: dict[str, FrameKind] = {}
+def _check(name: str, kind: FrameKind) -> None:
+    known: Sequence[str] = (*AXES, "yaw")
+    for label in kind.labels:
+        if label not in known:
+            raise ConfigError(f"{name}: {UnknownNameError('component', label, known)}")
 
 
-def register_frame_kind(kind: type[Kind]) -> type[Kind]:
+FRAME_KINDS: Registry[FrameKind] = Registry("kind of controlled frame", check=_check)
+"""Kinds of controlled frames by name."""
+
+
+def register_frame_kind(kind: type[Kind], *, replace: bool = False) -> type[Kind]:
     """Register a class of `FrameKind` under its name; also as a decorator.
 
     Raises:
         ConfigError: If the name is taken, or a label is unknown.
     """
-    if kind.name in _KINDS:
-        raise ConfigError(f"A kind of controlled frame '{kind.name}' exists already.")
-    known: Sequence[str] = (*AXES, "yaw")
-    for label in kind.labels:
-        if label not in known:
-            raise ConfigError(str(UnknownNameError("component", label, known)))
-    _KINDS[kind.name] = kind()
+    FRAME_KINDS.register(kind.name, kind(), replace=replace)
     return kind
-
-
-def find_frame_kind(name: str) -> FrameKind:
-    """Return a registered kind.
-
-    Raises:
-        UnknownNameError: If there is none of that name.
-    """
-    if name not in _KINDS:
-        raise UnknownNameError("kind of controlled frame", name, _KINDS)
-    return _KINDS[name]
-
-
-def frame_kind_names() -> tuple[str, ...]:
-    """Return the names of all registered kinds."""
-    return tuple(_KINDS)
 
 
 def set_target(task: GoalTask, row: Vector) -> None:

@@ -1,21 +1,22 @@
 """Composite controllers: what drives a whole robot, and where they are found."""
 
-import importlib
+import importlib.metadata
 from collections.abc import Callable, Mapping
+from functools import cache, reduce
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypeAlias
 
 from wbc_suite import logs
-from wbc_suite.catalogue import Catalogue
+from wbc_suite.catalogue import Catalogue, merge
 from wbc_suite.control.composite.protocols import CompositeController
 from wbc_suite.control.part.registry import (
+    PART_CONTROLLERS,
     PartControllerName,
-    is_part_controller,
-    part_models,
 )
 from wbc_suite.control.robot_parts import hands_of
 from wbc_suite.control.state import RobotState
 from wbc_suite.errors import ConfigError, UnknownNameError
+from wbc_suite.registry import Registry
 from wbc_suite.robot import RobotDescription, load_robot
 from wbc_suite.tomlfile import located, read_json, read_toml
 from wbc_suite.typing import RobotName
@@ -46,10 +47,24 @@ class CompositeKind(NamedTuple):
     check: Check
 
 
-_KINDS: dict[str, CompositeKind] = {}
+COMPOSITES: Registry[CompositeKind] = Registry("composite controller")
+"""Kinds of composite controllers by name."""
 
-_CONVERTERS = ["wbc_suite.compat.robosuite.json_configs:convert"]
-"""Functions that read configs in other projects' layouts, imported when needed."""
+Converter: TypeAlias = Callable[
+    [dict[str, Any], RobotDescription | None, str, Callable[[str], dict[str, Any]]],
+    dict[str, Any] | None,
+]
+
+CONVERTERS: Registry[Converter] = Registry("converter of configs")
+"""Functions that read configs in another layout, by its name.
+
+`(config, robot, source, named)` returns our config of the same meaning, or None for
+what is not in its layout; `named(type)` returns the robot's usual config of a
+composite. Installed packages add theirs by an entry point of the group
+`wbc_suite.config_converters`.
+"""
+
+register_config_converter = CONVERTERS.register
 
 
 def register_composite(
@@ -59,6 +74,7 @@ def register_composite(
     family: str,
     default: DefaultConfig,
     check: Check = lambda config, robot, source: None,
+    replace: bool = False,
 ) -> None:
     """Make a kind of composite controller known under a name, case ignored.
 
@@ -70,25 +86,8 @@ def register_composite(
     Raises:
         ConfigError: If the name is taken.
     """
-    if name.upper() in _KINDS:
-        raise ConfigError(f"A composite controller named '{name}' exists already.")
-    _KINDS[name.upper()] = CompositeKind(build, family, default, check)
-
-
-def register_config_converter(path: str) -> None:
-    """Let `load_composite_controller_config` read another layout of configs.
-
-    Args:
-        path: `module:function` of a function `(config, robot, source, named)`, which
-            returns our config of the same meaning, or None for what is not in its
-            layout. `named(type)` returns the robot's usual config of a composite.
-    """
-    _CONVERTERS.append(path)
-
-
-def composite_names() -> tuple[str, ...]:
-    """Return the names of all registered kinds."""
-    return tuple(sorted(_KINDS))
+    kind = CompositeKind(build, family, default, check)
+    COMPOSITES.register(name, kind, replace=replace)
 
 
 def load_composite_controller_config(
@@ -138,17 +137,38 @@ def _read(
         source = str(controller.get("type"))
         return _converted(dict(controller), source, robot, catalogue), source
     if not isinstance(controller, str | Path | None):
-        raise UnknownNameError("composite controller", controller, _KINDS)
+        raise UnknownNameError("composite controller", controller, COMPOSITES)
     name = controller or (default_composite(robot, catalogue) if robot else "BASIC")
     name = str(name)
     if name.endswith(".json"):
         return _converted(read_json(Path(name)), name, robot, catalogue), name
-    if is_part_controller(name.upper()):
+    if name in PART_CONTROLLERS:
         return _of_arms(name, robot, catalogue), name
     if name.endswith(".toml"):
-        config = read_toml(Path(name))
+        config = _read_file(Path(name), robot, catalogue)
         return {"type": _kind_in(config)} | config, name
     return _named(name, robot, catalogue)
+
+
+def _read_file(
+    path: Path, robot: RobotDescription | None, catalogue: Catalogue
+) -> dict[str, Any]:
+    """Return a file merged with those that it extends.
+
+    The last may extend a composite: the config that the robot has of it.
+    """
+    layers: list[dict[str, Any]] = []
+
+    def base_of(file: Path) -> str | None:
+        layers.append(data := read_toml(file))
+        name = data.get("extends")
+        return None if name is None or name in COMPOSITES else str(name)
+
+    catalogue.chain("controllers", path, kind="controller file", base_of=base_of)
+    if (name := layers[-1].get("extends")) is not None:
+        layers.append(_named(name, robot, catalogue)[0])
+    merged = reduce(merge, reversed(layers))
+    return {key: value for key, value in merged.items() if key != "extends"}
 
 
 def _kind_in(config: Mapping[str, Any]) -> str:
@@ -168,13 +188,20 @@ def _converted(
     def named(name: str) -> dict[str, Any]:
         return _named(name, robot, catalogue)[0]
 
-    for path in _CONVERTERS:
-        module, _, function = path.partition(":")
-        convert = getattr(importlib.import_module(module), function)
-        found = convert(config, robot, source, named)
+    _find_converters()
+    for name in CONVERTERS:
+        found = CONVERTERS[name](config, robot, source, named)
         if found is not None:
             return found
     return config
+
+
+@cache
+def _find_converters() -> None:
+    """Register the converters of installed packages."""
+    for entry in importlib.metadata.entry_points(group="wbc_suite.config_converters"):
+        if entry.name not in CONVERTERS:
+            CONVERTERS.register(entry.name, entry.value)
 
 
 def _of_arms(
@@ -184,7 +211,7 @@ def _of_arms(
     if robot is None:
         raise ConfigError(f"{part}: name the robot: parts depend on it.")
     basic, _ = _named("BASIC", robot, catalogue)
-    arms = {name: {"type": part.upper()} for name in hands_of(robot)}
+    arms = {name: {"type": PART_CONTROLLERS.spelled(part)} for name in hands_of(robot)}
     return basic | {"body_parts": basic["body_parts"] | arms}
 
 
@@ -209,7 +236,8 @@ def _walks(robot: RobotDescription, catalogue: Catalogue) -> bool:
     name = f"{robot.name}_whole_body_id"
     try:
         file = catalogue.find("controllers", name, kind="controller file")
-        _find("WHOLE_BODY_ID").check(read_toml(file), robot, str(file))
+        config = _read_file(file, robot, catalogue)
+        COMPOSITES["WHOLE_BODY_ID"].check(config, robot, str(file))
     except (UnknownNameError, ConfigError):
         return False
     return True
@@ -222,13 +250,13 @@ def _named(
     kind = _find(name)
     if robot is None:
         raise ConfigError(f"Controller '{name}' needs a robot to be configured for.")
-    own_type = {"type": name.upper()}
+    own_type = {"type": COMPOSITES.spelled(name)}
     try:
         stem = f"{robot.name}_{kind.family}"
         file = catalogue.find("controllers", stem, kind="controller file")
     except UnknownNameError:
         return kind.default(robot) | own_type, f"{name} for {robot.name}"
-    config = read_toml(file) | own_type
+    config = _read_file(file, robot, catalogue) | own_type
     if catalogue.is_ours(file):
         try:
             kind.check(config, robot, "")
@@ -254,13 +282,13 @@ def _kind_of(config: Mapping[str, Any]) -> CompositeKind:
     if not isinstance(config.get("type"), str):
         raise ConfigError(
             f"A controller config needs a key 'type', one of: "
-            f"{', '.join(composite_names())}."
+            f"{', '.join(sorted(COMPOSITES))}."
         )
     return _find(config["type"])
 
 
 def _find(name: str) -> CompositeKind:
-    if name.upper() not in _KINDS:
-        known = {**_KINDS, **part_models()}
+    if name not in COMPOSITES:
+        known = {*COMPOSITES, *PART_CONTROLLERS}
         raise UnknownNameError("composite controller or part controller", name, known)
-    return _KINDS[name.upper()]
+    return COMPOSITES[name]

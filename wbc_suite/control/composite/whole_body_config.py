@@ -11,7 +11,7 @@ from pydantic import (
     model_validator,
 )
 
-from wbc_suite.control.composite.frame_kinds import FrameKind, find_frame_kind
+from wbc_suite.control.composite.frame_kinds import FRAME_KINDS, FrameKind
 from wbc_suite.control.composite.reduced_robot import gripper_groups
 from wbc_suite.control.law.joint_laws import JointLawConfig
 from wbc_suite.control.part.feasible_acceleration import weight_shares
@@ -52,7 +52,7 @@ CLOSE_FIT = 0.0025  # m; small arms have links 5 mm apart wherever they are
 
 def _registered(kind: str) -> str:
     try:
-        return find_frame_kind(kind).name
+        return FRAME_KINDS.spelled(kind)
     except UnknownNameError as error:
         raise ValueError(str(error)) from error
 
@@ -100,7 +100,7 @@ class ControlledFrame(FrozenModel):
     @property
     def behaviour(self) -> FrameKind:
         """What frames of the kind have in common."""
-        return find_frame_kind(self.kind)
+        return FRAME_KINDS[self.kind]
 
 
 class PostureConfig(FrozenModel):

@@ -8,38 +8,38 @@ import numpy as np
 
 from wbc_suite.control.loop.acceleration_limits import limit_accelerations
 from wbc_suite.control.loop.records import CompiledRecords, LawKind
+from wbc_suite.registry import Registry
 from wbc_suite.typing import Indices
 
-_KERNELS: list[Any] = []
-"""Registered kernels; the kind of a law is `LawKind.CUSTOM` plus its place here."""
+LAWS: Registry[Any] = Registry("law")
+"""Kernels `(physics, law, drives) -> None` of `wbc_suite.compiling.compiled`, by name.
+
+A kernel writes the accelerations of the law's joints, `drives[law.first : law.last]`,
+to `physics.acceleration[drive.dof]`. The loop then applies the limits of the joints and
+computes the torques.
+"""
+
+register_law = LAWS.register
 
 
-def register_law(kernel: Any) -> int:
-    """Add a law to the control loop; return its kind for `Law`.
-
-    Args:
-        kernel: A function `(physics, law, drives) -> None` of `wbc_suite.compiling.
-            compiled`. It writes the accelerations of the law's joints,
-            `drives[law.first : law.last]`, to `physics.acceleration[drive.dof]`. The
-            loop then applies the limits of the joints and computes the torques.
-            Registering a kernel again returns the same kind.
-    """
-    if kernel not in _KERNELS:
-        _KERNELS.append(kernel)
-    return int(LawKind.CUSTOM) + _KERNELS.index(kernel)
+def law_kind(name: str) -> int:
+    """Return the number of a registered law in records; raises UnknownNameError."""
+    return int(LawKind.CUSTOM) + list(LAWS).index(LAWS.spelled(name))
 
 
 def custom_kernel(kinds: Indices) -> Any:
     """Return one kernel for all registered laws among these kinds, None without any."""
-    return _chain(tuple(np.unique(kinds[kinds >= int(LawKind.CUSTOM)]).tolist()))
+    known = {law_kind(name): LAWS[name] for name in LAWS}
+    own = np.unique(kinds[kinds >= int(LawKind.CUSTOM)]).tolist()
+    return _chain(tuple((kind, known[kind]) for kind in own))
 
 
 @cache
-def _chain(kinds: tuple[int, ...]) -> Any:
-    """Return one kernel for laws of these kinds; it lives on, as its machine code."""
-    run: Any = _no_law if kinds else None
-    for kind in kinds:
-        run = _linked(kind, _KERNELS[kind - int(LawKind.CUSTOM)], run)
+def _chain(kernels: tuple[tuple[int, Any], ...]) -> Any:
+    """Return one kernel for laws by kind; it lives on, as its machine code."""
+    run: Any = _no_law if kernels else None
+    for kind, kernel in kernels:
+        run = _linked(kind, kernel, run)
     return run
 
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
+from wbc_suite.control.law.custom import law_kind
 from wbc_suite.control.loop.records import DRIVE, LAW, LawKind, Records, new_records
 from wbc_suite.control.state import RobotState
 from wbc_suite.errors import ConfigError
@@ -27,7 +28,7 @@ class Law:
     The kernel of each kind stands beside its class; `loop.inverse_dynamics` computes
     torques from the accelerations that all laws ask for.
 
-    The kind selects the kernel: a `LawKind`, or what `register_law` returned.
+    The kind selects the kernel: a `LawKind`, or the name of a registered law.
 
     Attributes:
         record: Its `LAW` record, shape (1,).
@@ -36,11 +37,15 @@ class Law:
 
     Raises:
         ConfigError: If a joint has no actuator.
+        UnknownNameError: If there is no law of a name.
     """
 
     index: int = 0
 
-    def __init__(self, kind: int, state: RobotState, joints: Sequence[str]) -> None:
+    def __init__(
+        self, kind: int | str, state: RobotState, joints: Sequence[str]
+    ) -> None:
+        kind = law_kind(kind) if isinstance(kind, str) else kind
         self.joints = tuple(joints)
         places = {name: i for i, name in enumerate(state.actuators)}
         for name in joints:

@@ -1,7 +1,7 @@
 """Part controllers by name: their classes and the models of their configs."""
 
 from collections.abc import Mapping
-from typing import Any, Literal, TypeAlias, get_args
+from typing import Any, Literal, NamedTuple, TypeAlias, get_args
 
 from pydantic import BaseModel
 
@@ -9,6 +9,7 @@ from wbc_suite.control.part.controller import PartController
 from wbc_suite.control.robot_parts import hands_of, robot_part
 from wbc_suite.control.state import RobotState
 from wbc_suite.errors import ConfigError, UnknownNameError
+from wbc_suite.registry import Registry
 from wbc_suite.robot import RobotDescription
 from wbc_suite.tomlfile import located, parse_model
 
@@ -24,12 +25,33 @@ PartControllerName: TypeAlias = Literal[
 ]
 """Names of the built-in part controllers."""
 
-_KINDS: dict[str, tuple[type[PartController], type[BaseModel]]] = {}
-"""Class of each controller, and the model of its config."""
+
+class PartKind(NamedTuple):
+    """A registered kind of part controller: its class, and the model of its config."""
+
+    controller: type[PartController]
+    config: type[BaseModel]
+
+
+def _check(name: str, kind: PartKind) -> None:
+    field = kind.config.model_fields.get("type")
+    if field is None or name not in get_args(field.annotation):
+        raise ConfigError(
+            f"{kind.config.__name__}: part controller '{name}' needs the field "
+            f"type: Literal['{name}'] = '{name}'."
+        )
+
+
+PART_CONTROLLERS: Registry[PartKind] = Registry("part controller", check=_check)
+"""Part controllers by name."""
 
 
 def register_part_controller(
-    name: str, controller: type[PartController], config: type[BaseModel]
+    name: str,
+    controller: type[PartController],
+    config: type[BaseModel],
+    *,
+    replace: bool = False,
 ) -> None:
     """Add a part controller to those that controller files may name.
 
@@ -42,34 +64,14 @@ def register_part_controller(
     `FrozenModel` for a controller without gripper.
 
     Raises:
-        ConfigError: If the name is taken or not in capitals, or the config's type is
-            not that name.
+        ConfigError: If the name is taken, or the config's type is not that name.
     """
-    if name in _KINDS or name != name.upper():
-        reason = "exists already" if name in _KINDS else "needs a name in capitals"
-        raise ConfigError(f"The part controller '{name}' {reason}.")
-    field = config.model_fields.get("type")
-    if field is None or name not in get_args(field.annotation):
-        raise ConfigError(
-            f"{config.__name__}: part controller '{name}' needs the field "
-            f"type: Literal['{name}'] = '{name}'."
-        )
-    _KINDS[name] = controller, config
-
-
-def is_part_controller(name: object) -> bool:
-    """Whether a part controller of this name is registered."""
-    return name in _KINDS
-
-
-def part_models() -> dict[str, type[BaseModel]]:
-    """Return the config model of each part controller by name."""
-    return {name: model for name, (_, model) in _KINDS.items()}
+    PART_CONTROLLERS.register(name, PartKind(controller, config), replace=replace)
 
 
 def part_controller(config: Any) -> type[PartController]:
     """Return the class of the part controller that a config is for."""
-    return _find(config.type)[0]
+    return PART_CONTROLLERS[config.type].controller
 
 
 def load_part_controller_config(controller: PartControllerName | str) -> dict[str, Any]:
@@ -78,8 +80,8 @@ def load_part_controller_config(controller: PartControllerName | str) -> dict[st
     Raises:
         UnknownNameError: If there is none of this name.
     """
-    _, model = _find(controller)
-    config = model.model_validate({"type": controller})
+    model = PART_CONTROLLERS[controller].config
+    config = model.model_validate({"type": PART_CONTROLLERS.spelled(controller)})
     return config.model_dump(mode="json", exclude_none=True)
 
 
@@ -100,11 +102,12 @@ def parse_part(name: str, given: object, source: str) -> BaseModel:
     if "type" not in given:
         raise ConfigError(f"{source}: missing {located(f'{key}.type', source)}")
     try:
-        _, model = _find(given["type"])
+        kind = PART_CONTROLLERS.spelled(given["type"])
     except UnknownNameError as error:
         where = located(f"{key}.type", source)
         raise ConfigError(f"{source}: {where}: {error}") from error
-    return parse_model(model, given, source=source, within=key)
+    model = PART_CONTROLLERS[kind].config
+    return parse_model(model, {**given, "type": kind}, source=source, within=key)
 
 
 def check_part(name: str, config: Any, robot: RobotDescription) -> None:
@@ -123,7 +126,11 @@ def check_part(name: str, config: Any, robot: RobotDescription) -> None:
     if controller.drives_base and name != "base":
         raise ConfigError(f"{config.type} drives the part 'base', not '{name}'.")
     if is_base and not controller.drives_base:
-        of_bases = [k for k, (kind, _) in _KINDS.items() if kind.drives_base]
+        of_bases = [
+            kind
+            for kind in PART_CONTROLLERS
+            if PART_CONTROLLERS[kind].controller.drives_base
+        ]
         raise ConfigError(
             f"a base is driven by {' or '.join(of_bases)}, not by {config.type}."
         )
@@ -134,9 +141,3 @@ def make_part(name: str, config: Any, state: RobotState) -> PartController:
     """Make the controller of a part that `check_part` has accepted."""
     build: Any = part_controller(config)  # each class has arguments of its own types
     return build(robot_part(state.robot, name), config, state)
-
-
-def _find(name: object) -> tuple[type[PartController], type[BaseModel]]:
-    if not isinstance(name, str) or name not in _KINDS:
-        raise UnknownNameError("part controller", name, _KINDS)
-    return _KINDS[name]

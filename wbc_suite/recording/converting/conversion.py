@@ -6,7 +6,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from wbc_suite.errors import DatasetError, UnknownNameError
+from wbc_suite.errors import DatasetError
 from wbc_suite.executors import Executor, WorkItem
 from wbc_suite.recording.atomic_files import delete_temporaries, temporary_path
 from wbc_suite.recording.converting import lerobot, mcap, minari, npz, robomimic
@@ -19,14 +19,17 @@ from wbc_suite.recording.converting.layout import (
 )
 from wbc_suite.recording.dataset import Dataset
 from wbc_suite.recording.resumable_work import run_pieces, work_folder
+from wbc_suite.registry import Registry
 
-LAYOUTS: Mapping[str, Layout] = {
-    "robomimic": robomimic.LAYOUT,
-    "npz": npz.LAYOUT,
-    "lerobot": lerobot.LAYOUT,
-    "minari": minari.LAYOUT,
-    "mcap": mcap.LAYOUT,
-}
+LAYOUTS: Registry[Layout] = Registry("layout")
+"""Layouts by name: for `wbc-suite convert --to`."""
+
+register_layout = LAYOUTS.register
+register_layout("robomimic", robomimic.LAYOUT)
+register_layout("npz", npz.LAYOUT)
+register_layout("lerobot", lerobot.LAYOUT)
+register_layout("minari", minari.LAYOUT)
+register_layout("mcap", mcap.LAYOUT)
 
 
 def convert(
@@ -38,7 +41,7 @@ def convert(
     executor: Executor | None = None,
     workers: int = 1,
 ) -> Path:
-    """Write a recording in one of `LAYOUTS`; return the path that was written.
+    """Write a recording in one of `LAYOUTS`, or `module:NAME`; return its path.
 
     Without an executor, this process writes one piece. With one, episodes are split
     among `workers`, and finished pieces wait in `OUT.work` until all are finished: a
@@ -50,9 +53,7 @@ def convert(
         DatasetError: If a package is missing, or see `Dataset`.
     """
     source, out = Path(source), Path(out)
-    if layout not in LAYOUTS:
-        raise UnknownNameError("layout", layout, LAYOUTS)
-    chosen = LAYOUTS[layout]
+    chosen = LAYOUTS.find(layout)
     with Dataset(source) as dataset:
         if not len(dataset):
             raise DatasetError(f"'{source}' has no episodes.")
@@ -91,7 +92,7 @@ def convert(
 def convert_piece(item: WorkItem, folder: Path) -> Mapping[str, Any]:
     """Write one piece, under its final name, into the work folder."""
     payload = item.payload
-    layout, piece = LAYOUTS[payload["layout"]], Piece(**payload["piece"])
+    layout, piece = LAYOUTS.find(payload["layout"]), Piece(**payload["piece"])
     written = folder / "written" / payload["out"]
     if not layout.in_pieces:
         shutil.rmtree(written, ignore_errors=True)  # of a worker that died

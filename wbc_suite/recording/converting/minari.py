@@ -25,7 +25,7 @@ from wbc_suite.recording.atomic_files import new_folder, replace_file, write_byt
 from wbc_suite.recording.converting.layout import Layout, Piece, Progress
 from wbc_suite.recording.dataset import Dataset
 from wbc_suite.recording.episode import Episode
-from wbc_suite.registration import BENCHMARKS, environment_id
+from wbc_suite.registration import WITH_ID, environment_id
 
 VERSION = "0.5.4"
 _NAME = re.compile(r"[-\w]+?-v\d+\Z")
@@ -131,7 +131,7 @@ def _env_spec(dataset: Dataset) -> Mapping[str, Any] | None:
         name, arguments = source["env_name"], dict(source.get("env_kwargs", {}))
     except (ValueError, KeyError, TypeError):
         return None
-    if source.get("package") != "wbc_suite" or name not in BENCHMARKS:
+    if source.get("package") != "wbc_suite" or name not in WITH_ID:
         return None
     return {
         "id": environment_id(name),

@@ -10,7 +10,7 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
-from wbc_suite.control import composite_names
+from wbc_suite.control import COMPOSITES
 from wbc_suite.control import load_composite_controller_config as load_ours
 from wbc_suite.control.composite.registry import default_composite
 from wbc_suite.control.robot_parts import hands_of, parts_of
@@ -212,17 +212,4 @@ def _composite(kind: str, robot: RobotDescription | None, arm: str) -> dict[str,
     return {"type": kind, "body_parts": parts}
 
 
-class _Names:
-    """Names of composite controllers, in the form of a dictionary's keys."""
-
-    def __iter__(self) -> Any:
-        return iter(composite_names())
-
-    def __contains__(self, name: object) -> bool:
-        return name in composite_names()
-
-    def __len__(self) -> int:
-        return len(composite_names())
-
-
-ALL_COMPOSITE_CONTROLLERS = _Names()
+ALL_COMPOSITE_CONTROLLERS = COMPOSITES

@@ -19,7 +19,7 @@ from wbc_suite.compat.robosuite.controllers.variable_impedance import (
     GainsFirstController,
 )
 from wbc_suite.compiling import compiled
-from wbc_suite.control.law.custom import register_law
+from wbc_suite.control.law.custom import law_kind, register_law
 from wbc_suite.control.law.osc import OscLaw, write_hand_task
 from wbc_suite.control.loop.physics import Physics
 from wbc_suite.control.loop.records import CompiledRecords
@@ -127,9 +127,7 @@ class UncoupledOscController(GainsFirstController, OscController):
     def _make_law(self, joints: tuple[str, ...], site: str) -> OscLaw:
         law = super()._make_law(joints, site)
         uncoupled = getattr(self.config, "uncouple_pos_ori", True)
-        law.record["kind"] = register_law(
-            uncoupled_osc_law if uncoupled else coupled_osc_law
-        )
+        law.record["kind"] = law_kind("UNCOUPLED_OSC" if uncoupled else "COUPLED_OSC")
         law.record["keep_direction"] = 0.0
         drives = law.drives
         drives["position_min"], drives["position_max"] = -np.inf, np.inf
@@ -137,5 +135,7 @@ class UncoupledOscController(GainsFirstController, OscController):
         return law
 
 
+register_law("UNCOUPLED_OSC", uncoupled_osc_law)
+register_law("COUPLED_OSC", coupled_osc_law)
 for _name in UNCOUPLED.values():
     register_part_controller(_name, UncoupledOscController, UncoupledOscConfig)

@@ -6,7 +6,7 @@ from typing import Any
 from wbc_suite.compat.robosuite.controllers.configs import (
     load_composite_controller_config,
 )
-from wbc_suite.control.part import registry
+from wbc_suite.control.part.registry import PART_CONTROLLERS
 from wbc_suite.errors import UnknownNameError
 from wbc_suite.robot import RobotDescription
 
@@ -52,7 +52,7 @@ def controller_of(config: Any, robot: RobotDescription) -> Any:
 
 def updated(config: dict[str, Any]) -> dict[str, Any]:
     """Return a config of robosuite 1.2 to 1.4, of one arm, in the form of 1.5."""
-    if not registry.is_part_controller(config.get("type")):
+    if config.get("type") not in PART_CONTROLLERS:
         return config
     if "control_delta" not in config:
         return config

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from wbc_suite.benchmark import Benchmark, load_benchmark
+from wbc_suite.benchmark.base import BenchmarkFile
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.errors import ConfigError
-from wbc_suite.tomlfile import read_toml
 
 DEFAULT_WIPE_CONFIG: dict[str, Any] = {
     "arm_limit_collision_penalty": -10.0,
@@ -172,12 +172,10 @@ def _plain(value: Any) -> Any:
     return np.asarray(value).tolist()
 
 
-def _data(name: str) -> dict[str, Any]:
+def _data(name: str) -> Mapping[str, Any]:
     """Return the file of a task of the catalogue, with that which it extends."""
     path = Catalogue().find("tasks", name, kind="benchmark file")
-    data = read_toml(path)
-    base = data.pop("extends", None)
-    return data if base is None else read_toml(path.with_name(f"{base}.toml")) | data
+    return BenchmarkFile.read(path).data
 
 
 def _flat(data: Mapping[str, Any], start: str = "") -> dict[str, Any]:

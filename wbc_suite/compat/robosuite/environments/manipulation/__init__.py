@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from wbc_suite.benchmark import benchmark_names
+from wbc_suite.benchmark import BENCHMARKS
 from wbc_suite.benchmark.wipe import MARK
 from wbc_suite.compat.robosuite.environments.robot_env import ManipulationEnv, RobotEnv
 from wbc_suite.compat.robosuite.environments.task_numbers import DEFAULT_WIPE_CONFIG
@@ -57,6 +57,6 @@ def _make(name: str, bases: Sequence[type]) -> type:
     return type(name, tuple(bases), body)
 
 
-for _name in benchmark_names():
+for _name in BENCHMARKS:
     _base = TwoArmEnv if _name.startswith("TwoArm") else ManipulationEnv
     globals()[_name] = _make(_name, [_base])
