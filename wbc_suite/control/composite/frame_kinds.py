@@ -140,8 +140,14 @@ def register_frame_kind(kind: type[Kind]) -> type[Kind]:
     """Register a class of `FrameKind` under its name; also as a decorator.
 
     Raises:
-        ConfigError: If the name is taken, or a label is unknown.
+        ConfigError: If name or labels are missing, the name is taken, or a label is
+            unknown.
     """
+    if missing := [x for x in ("name", "labels") if not hasattr(kind, x)]:
+        raise ConfigError(
+            f"{kind.__name__}: a kind of controlled frame needs "
+            f"{' and '.join(missing)}."
+        )
     if kind.name in _KINDS:
         raise ConfigError(f"A kind of controlled frame '{kind.name}' exists already.")
     known: Sequence[str] = (*AXES, "yaw")
