@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, ClassVar, TypeVar
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.control.action import ActionPart, Axis, SliceKind, Unit
+from wbc_suite.control.action import FULL_TURN, ActionPart, Axis, SliceKind, Unit
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.qp import ComTask, FrameTask
 from wbc_suite.typing import Matrix, Vector
@@ -67,7 +67,7 @@ class FrameKind:
         """Return the slice of a frame of this kind."""
         absolute = config.input_type == "absolute"
         far = MAX_POSITION if absolute else config.delta_position
-        turn = float(np.pi) if absolute else config.delta_rotation
+        turn = FULL_TURN if absolute else config.delta_rotation
         linear = [label in AXES[:3] for label in self.labels]
         bounds = tuple(far if is_linear else turn for is_linear in linear)
         return ActionPart(
@@ -77,6 +77,7 @@ class FrameKind:
             units=tuple(Unit("m" if is_linear else "rad") for is_linear in linear),
             low=tuple(-bound for bound in bounds),
             high=bounds,
+            wraps=absolute,
         )
 
     def values(self, pose: pin.SE3) -> Vector:

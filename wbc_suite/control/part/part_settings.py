@@ -165,7 +165,13 @@ class SliceInput:
             units = self.scaling.units(units)
         low, high = (tuple(limit.tolist()) for limit in limits)
         self.action = ActionPart(
-            name=name, kind=kind, labels=labels, units=units, low=low, high=high
+            name=name,
+            kind=kind,
+            labels=labels,
+            units=units,
+            low=low,
+            high=high,
+            wraps=kind is SliceKind.POSE and not self.scaled,
         )
 
     def __call__(self, values: Vector) -> Vector:
