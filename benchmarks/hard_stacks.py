@@ -25,18 +25,15 @@ import pinocchio as pin
 import wbc_suite
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp import (
-    AccelerationLimit,
     ComTask,
     Equality,
     FrameEquality,
     FrameTask,
     LinearEquality,
-    PositionLimit,
     PostureTask,
     SelfCollisionLimit,
     Task,
     TaskStack,
-    VelocityLimit,
 )
 
 DT = 0.01  # s
@@ -99,7 +96,7 @@ class HardStack:
         if self.robot.feet and family != "equality" and self.rng.random() < 0.8:
             equalities += [FrameEquality(foot) for foot in self.robot.feet]
             tasks.append(ComTask(level=self._level()))
-        limits = [PositionLimit(), VelocityLimit(), AccelerationLimit()]
+        limits = []
         if self.rng.random() < 0.3:
             limits.append(SelfCollisionLimit.of_robot(self.description, nearest=10))
         self.stack = TaskStack(

@@ -16,13 +16,10 @@ import pinocchio as pin
 import wbc_suite
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp import (
-    AccelerationLimit,
     FrameTask,
-    PositionLimit,
     PostureTask,
     SelfCollisionLimit,
     TaskStack,
-    VelocityLimit,
 )
 
 DT = 5e-3  # s
@@ -40,8 +37,7 @@ def run(ticks: int) -> tuple[list[float], list[float], float, int]:
     configuration = Configuration(model, q)
     hands = [FrameTask("right_eef"), FrameTask("left_eef")]
     limit = SelfCollisionLimit.of_robot(robot, nearest=NEAREST)
-    limits = [PositionLimit(), VelocityLimit(), AccelerationLimit(), limit]
-    stack = TaskStack(configuration, [*hands, PostureTask(1e-2)], limits=limits)
+    stack = TaskStack(configuration, [*hands, PostureTask(1e-2)], limits=[limit])
     rng, homes = np.random.default_rng(0), [hand.target for hand in hands]
     G, h = np.zeros((NEAREST, model.nv)), np.zeros(NEAREST)
     rows, total, least = [], [], np.inf

@@ -142,7 +142,8 @@ class Ours:
             if case.root == "free"
             else VelocityLimit(),
         ]
-        options = {"limits": limits, "curvature_damping": 0.0, "escape": False}
+        options = {"limits": limits, "joint_limits": False}
+        options |= {"curvature_damping": 0.0, "escape": False}
         self.stack = TaskStack(
             self.robot,
             tasks,

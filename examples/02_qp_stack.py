@@ -11,7 +11,7 @@ import numpy as np
 
 import wbc_suite
 from wbc_suite.kinematics import Configuration, Conversion
-from wbc_suite.qp import FrameTask, PositionLimit, PostureTask, TaskStack, VelocityLimit
+from wbc_suite.qp import FrameTask, PostureTask, TaskStack
 from wbc_suite.viewers.watch_page import WatchPage
 
 DT = 0.01  # s
@@ -24,7 +24,6 @@ right, left = FrameTask("right_eef"), FrameTask("left_eef")
 stack = TaskStack(
     configuration,
     tasks=[right, left, PostureTask(1e-2)],
-    limits=[PositionLimit(), VelocityLimit()],
 )
 
 target = configuration.frame_pose("right_eef")

@@ -149,3 +149,9 @@ def test_names_and_labels_of_kinds_are_checked(height):
     with pytest.raises(ConfigError, match="No component named 'w'"):
         register_frame_kind(Wrong)
     assert "wrong" not in FRAME_KINDS
+
+
+def test_a_kind_without_labels_is_refused():
+    kind = type("Nothing", (FrameKind,), {"name": "nothing"})
+    with pytest.raises(ConfigError, match=r"Nothing: .* needs labels"):
+        register_frame_kind(kind)

@@ -285,3 +285,18 @@ def test_torque_limits_limit(alone):
 def test_a_wrong_number_of_values_or_an_empty_range_is_named(alone, settings, word):
     with pytest.raises(ConfigError, match=word):
         arm(alone, "JOINT_POSITION", **settings)
+
+
+@pytest.mark.parametrize(
+    ("kind", "key", "value"),
+    [
+        ("JOINT_POSITION", "qpos_limits", (5.0, 6.0)),
+        ("JOINT_POSITION", "velocity_limits", (8.0, 9.0)),
+        ("JOINT_VELOCITY", "qpos_limits", (-9.0, -8.0)),
+        ("JOINT_TORQUE", "torque_limits", (200.0, 300.0)),
+        ("OSC_POSE", "torque_limits", (-300.0, -200.0)),
+    ],
+)
+def test_limits_outside_the_robots_own_are_refused(alone, kind, key, value):
+    with pytest.raises(ConfigError, match=f"key '{key}': .* nothing in common"):
+        arm(alone, kind, **{key: value})

@@ -57,8 +57,8 @@ def test_absolute_bounds_are_the_limits_of_goals(rig):
     limits = ((0.2, -0.3, 0.1), (0.7, 0.3, 0.6))
     one = rig(input_type="absolute", position_limits=limits)
     part = one.controller.layout["right"]
-    assert part.low == (*limits[0], -np.pi, -np.pi, -np.pi)
-    assert part.high == (*limits[1], np.pi, np.pi, np.pi)
+    assert part.low == (*limits[0], *(-2.0 * np.pi,) * 3)
+    assert part.high == (*limits[1], *(2.0 * np.pi,) * 3)
     assert tuple(map(str, part.units)) == ("m",) * 3 + ("rad",) * 3
 
 

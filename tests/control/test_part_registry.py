@@ -233,3 +233,38 @@ def test_a_controller_with_a_law_of_its_own_runs_in_the_loop(forget):
     expected = start * np.exp(-4.0 * (data.time - begin))
     np.testing.assert_allclose(data.qvel[dofs], expected, rtol=0.02, atol=1e-4)
     env.close()
+
+
+class Incomplete(PartController[JointLaw]):
+    """Lacks most of what it must have."""
+
+    def reset(self, state):
+        """Do nothing."""
+
+
+class OtherConfig(FrozenModel):
+    """A config of its own type."""
+
+    type: Literal["OTHER"] = "OTHER"
+
+
+@pytest.mark.parametrize(
+    ("controller", "message"),
+    [
+        (Incomplete, "Incomplete: .*'OTHER' lacks hold_action, set_goal"),
+        (SwingConfig, "SwingConfig: .*'OTHER' derives from PartController"),
+    ],
+)
+def test_an_incomplete_controller_is_refused_at_registration(controller, message):
+    with pytest.raises(ConfigError, match=message):
+        register_part_controller("OTHER", controller, OtherConfig)
+    assert "OTHER" not in PART_CONTROLLERS
+
+
+def test_a_controller_without_a_law_is_named(swing, monkeypatch):
+    def constructor(self, part, config, state):
+        self.slices = ()
+
+    monkeypatch.setattr(SwingController, "__init__", constructor)
+    with pytest.raises(ConfigError, match="SwingController does not set law"):
+        wbc_suite.make("Lift", robots="Panda", controller_configs="ROCKING")

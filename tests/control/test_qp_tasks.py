@@ -8,6 +8,7 @@ from wbc_suite.control import load_composite_controller_config
 from wbc_suite.control.composite.qp_tasks import distance_limits
 from wbc_suite.control.composite.whole_body_config import read_whole_body
 from wbc_suite.envs.hold_check import alone
+from wbc_suite.errors import ConfigError
 from wbc_suite.robot import load_robot
 
 CUBE = """<mujoco><worldbody><body name="base"><geom type="box" size=".1 .1 .1"/>
@@ -73,3 +74,21 @@ def test_strong_motors_have_no_limit_of_weight(tmp_path):
     path = tmp_path / "pendulum.urdf"
     path.write_text(PENDULUM.format(effort=1.1 * WEIGHT))
     assert config_of(load_robot(path)).limits.weight_shares == {}
+
+
+@pytest.mark.parametrize(
+    ("kind", "robot", "changes", "key"),
+    [
+        (
+            "WHOLE_BODY_IK",
+            "Panda",
+            {"limits": {"positions": {"panda_joint1": (2.0, -2.0)}}},
+            r"limits\.positions\.panda_joint1",
+        ),
+        ("WHOLE_BODY_ID", "GR1FreeBody", {"height": (0.02, -0.15)}, "height"),
+    ],
+)
+def test_a_range_that_ends_before_it_begins_is_refused(kind, robot, changes, key):
+    config = load_composite_controller_config(kind, robot) | changes
+    with pytest.raises(ConfigError, match=f"key '{key}' = .* must not be greater"):
+        load_composite_controller_config(config, robot)

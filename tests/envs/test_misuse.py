@@ -1,5 +1,6 @@
 """What users do to an environment by mistake: an error or a wait, never silence."""
 
+import operator
 import os
 import threading
 
@@ -111,7 +112,7 @@ def test_a_speed_that_cannot_be_ends_the_episode(lift):
     assert "BADQVEL" in info["physics_error"]
 
 
-@pytest.mark.parametrize("timestep", [0.0, -0.002, np.nan])
+@pytest.mark.parametrize("timestep", [0.0, -0.002, np.nan, 1.0, 0.001])
 def test_a_time_step_that_cannot_be_is_an_error(timestep):
     env = wbc_suite.make("Lift", robots="Panda").unwrapped
     env.reset(seed=0)
@@ -124,12 +125,58 @@ def test_a_time_step_that_cannot_be_is_an_error(timestep):
 
 @pytest.mark.parametrize(
     ("array", "value"),
-    [("geom_size", -0.1), ("body_mass", -1.0), ("body_inertia", np.nan)],
+    [("geom_size", -0.1), ("body_mass", -1.0), ("body_inertia", -1e-3)],
 )
 def test_a_size_below_zero_is_named_at_the_reset(array, value):
     env = wbc_suite.make("Lift", robots="Panda").unwrapped
     getattr(env.simulation.model, array)[3] = value
     with pytest.raises(PhysicsError, match=rf"{array} of \w+ '.+' is .*below 0"):
+        env.reset(seed=0)
+
+
+@pytest.mark.parametrize(
+    ("array", "row", "value", "message"),
+    [
+        ("opt.gravity", 2, np.nan, "opt.gravity is .*nan.*, not finite"),
+        ("opt.wind", 0, np.inf, "opt.wind is .*inf.*, not finite"),
+        ("actuator_gainprm", (0, 0), np.nan, "actuator 'robot0_panda_joint1' is .*nan"),
+        ("body_inertia", (3, 0), np.nan, "body_inertia of body .*nan.*, not finite"),
+        ("dof_damping", 2, np.nan, "dof_damping of dof .* is nan, not finite"),
+        ("jnt_range", 1, (1.0, -1.0), "jnt_range of jnt .* ends before it begins"),
+        ("actuator_ctrlrange", 1, (1.0, -1.0), "actuator_ctrlrange .* ends before"),
+    ],
+)
+def test_numbers_that_no_model_has_are_named_at_the_reset(array, row, value, message):
+    env = wbc_suite.make("Lift", robots="Panda").unwrapped
+    operator.attrgetter(array)(env.simulation.model)[row] = value
+    with pytest.raises(PhysicsError, match=message):
+        env.reset(seed=0)
+
+
+@pytest.mark.parametrize(
+    ("array", "row", "value"),
+    [
+        ("opt.gravity", 2, np.nan),
+        ("body_mass", 3, -1.0),
+        ("body_inertia", (3, 0), np.nan),
+        ("geom_size", (3, 0), -0.1),
+        ("jnt_range", 1, (1.0, -1.0)),
+    ],
+)
+def test_numbers_that_no_model_has_end_the_episode_at_the_next_step(array, row, value):
+    env = wbc_suite.make("Lift", robots="Panda").unwrapped
+    env.reset(seed=0)
+    operator.attrgetter(array)(env.simulation.model)[row] = value
+    *_, terminated, _, info = env.step(env.hold_action)
+    assert terminated
+    assert array in info["physics_error"]
+
+
+@pytest.mark.parametrize("gain", ["kp", "kd"])
+def test_a_gain_that_is_no_number_is_named_at_the_reset(gain):
+    env = wbc_suite.make("Lift", robots="Panda").unwrapped
+    env.controllers[0].parts["right"].law.record[gain] = np.nan
+    with pytest.raises(PhysicsError, match=f"'{gain}' of a control law is NaN"):
         env.reset(seed=0)
 
 

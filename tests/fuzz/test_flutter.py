@@ -12,7 +12,6 @@ from test_stacks import ROBOTS, Draw
 
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp import (
-    AccelerationLimit,
     ComTask,
     DampingTask,
     Fallback,
@@ -25,7 +24,6 @@ from wbc_suite.qp import (
     RelativeFrameTask,
     SelfCollisionLimit,
     TaskStack,
-    VelocityLimit,
 )
 
 APART = [SelfCollisionLimit.of_robot(robot) for robot in ROBOTS]
@@ -79,7 +77,7 @@ class Finite(Draw):
     def limits(self):
         gain = self.rng.choice([0.5, 1.0])
         apart = [APART[ROBOTS.index(self.robot)]] if self.rng.random() < 0.5 else []
-        return [PositionLimit(gain=gain), VelocityLimit(), AccelerationLimit(), *apart]
+        return [PositionLimit(gain=gain), *apart]
 
     def feet(self):
         feet = [f.name for f in self.robot.frames if f.role == "foot"]

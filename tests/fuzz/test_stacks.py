@@ -132,7 +132,7 @@ class Draw:
     def limits(self):
         rng = self.rng
         if rng.random() < 0.3:
-            return None
+            return {}
         limits = [
             PositionLimit(
                 gain=rng.choice([0.1, 1.0]), margin=rng.choice([0, 0.1, 9.0])
@@ -142,7 +142,8 @@ class Draw:
         ]
         if self.robot is ROBOTS[0]:
             limits.append(APART)
-        return [limit for limit in limits if rng.random() < 0.8]
+        kept = [limit for limit in limits if rng.random() < 0.8]
+        return {"limits": kept, "joint_limits": False}
 
 
 def check(seed, solver="daqp", ticks=3):
@@ -153,7 +154,7 @@ def check(seed, solver="daqp", ticks=3):
     stack = TaskStack(
         robot,
         [draw.task(k) for k in range(rng.integers(0, 6))],
-        limits=draw.limits(),
+        **draw.limits(),
         equalities=[e for k in range(rng.integers(0, 3)) for e in draw.equalities(k)],
         solver=solver,
         damping=float(rng.choice([1e-9, 1e-3, 1.0])),

@@ -127,7 +127,8 @@ def test_solvers_by_name_agree(humanoid, name, tolerance):
         pull = multipliers[: problem.nv] + problem.rows.T @ multipliers[problem.nv :]
         gradient = problem.H @ x + problem.c + pull
         np.testing.assert_allclose(gradient, 0.0, atol=100 * tolerance)
-    assert given_up <= (2 if name == "proxqp" else 0)  # daqp solves these in a stack
+    allowed = {"proxqp": 2, "clarabel": 1}.get(name, 0)
+    assert given_up <= allowed  # daqp solves these in a stack
 
 
 def random_qp(rng, inequalities):

@@ -10,10 +10,8 @@ from wbc_suite.qp import (
     FloorLimit,
     FrameEquality,
     FrameTask,
-    PositionLimit,
     PostureTask,
     TaskStack,
-    VelocityLimit,
 )
 from wbc_suite.robot import load_robot
 from wbc_suite.robot.collision_capsules import collision_spheres
@@ -122,7 +120,7 @@ def test_a_hand_sent_below_the_floor_rests_above_it(high):
     stack = TaskStack(
         spot.configuration,
         [hand, posture],
-        limits=[limit, PositionLimit(), VelocityLimit(), AccelerationLimit(12.0)],
+        limits=[limit, AccelerationLimit(12.0)],
         equalities=[FrameEquality("base")],
     )
     moves = []

@@ -33,7 +33,7 @@ def test_lower_levels_do_not_leak_into_upper_ones(humanoid, rng):
 
 def test_a_level_is_optimal_among_what_the_upper_leave(humanoid):
     hand, posture = FrameTask("rarm_wrist2_joint"), PostureTask(1.0, level=1)
-    stack = TaskStack(humanoid, [hand, posture], limits=[])
+    stack = TaskStack(humanoid, [hand, posture], joint_limits=False)
     q = humanoid.q.copy()
     q[7:] += 0.1
     posture.set_target(q)

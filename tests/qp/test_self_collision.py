@@ -153,7 +153,7 @@ def attack(seconds: float, seed: int) -> tuple[float, set]:
     stack = TaskStack(
         configuration,
         [*hands, PostureTask(1e-2)],
-        limits=[*default_limits(), limit],
+        limits=[limit],
     )
     least, kinds = np.inf, set()
     start = [hand.target for hand in hands]
@@ -171,12 +171,6 @@ def attack(seconds: float, seed: int) -> tuple[float, set]:
         limit.rows(configuration, DT, G, h)
         least = min(least, limit.distances[0])
     return least, kinds
-
-
-def default_limits():
-    from wbc_suite.qp import AccelerationLimit, PositionLimit, VelocityLimit
-
-    return [PositionLimit(), VelocityLimit(), AccelerationLimit()]
 
 
 @pytest.mark.slow
@@ -201,7 +195,7 @@ def test_a_robot_that_starts_inside_itself_comes_out_smoothly(name, seed):
     configuration = Configuration(model)
     limit = SelfCollisionLimit.of_robot(robot)
     posture = PostureTask(0.1)
-    stack = TaskStack(configuration, [posture], limits=[*default_limits(), limit])
+    stack = TaskStack(configuration, [posture], limits=[limit])
     posture.set_target(ready(robot, model))
     configuration.update(inside_itself(limit, configuration, seed))
     changes, v = [], np.zeros(model.nv)

@@ -1,8 +1,17 @@
 """Solutions of whole stacks: optimality and limits."""
 
 import numpy as np
+import pytest
 
-from wbc_suite.qp import ComTask, FrameTask, LimitKind, PostureTask, TaskStack
+from wbc_suite.errors import ConfigError
+from wbc_suite.qp import (
+    ComTask,
+    FrameTask,
+    LimitKind,
+    PositionLimit,
+    PostureTask,
+    TaskStack,
+)
 
 DT = 5e-3
 FEET = ("rleg_wrist2_joint", "lleg_wrist2_joint")
@@ -113,3 +122,10 @@ def test_reset_makes_a_stack_as_good_as_new(humanoid, rng):
         humanoid.update(humanoid.integrate(stack.solve(dt).dq))
     stack.reset()
     np.testing.assert_array_equal(answers(), first)
+
+
+@pytest.mark.parametrize("interval", [(1.0, -1.0), (np.nan, 1.0), (50.0, 60.0)])
+def test_a_range_that_leaves_nothing_is_refused(arm, interval):
+    name = arm.model.names[2]
+    with pytest.raises(ConfigError, match=f"PositionLimit: .*'{name}'"):
+        TaskStack(arm, [], limits=[PositionLimit(joints={name: interval})])

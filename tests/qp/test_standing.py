@@ -40,8 +40,9 @@ def test_the_centre_of_mass_stops_before_the_toes(standing: Configuration):
     task.set_target(standing.com + np.array([0.5, 0.0, 0.0]))
     limit = SupportLimit(SOLES, margin=0.03)
     equalities = [FrameEquality(foot) for foot in FEET]
+    limits = [VelocityLimit(), limit]
     stack = TaskStack(
-        standing, [task], limits=[VelocityLimit(), limit], equalities=equalities
+        standing, [task], limits=limits, joint_limits=False, equalities=equalities
     )
     for _ in range(250):
         solution = stack.solve(DT)
@@ -61,8 +62,9 @@ def test_the_first_step_keeps_the_pressure_point_in(
     task.set_target(standing.com + np.array([0.5, 0.0, 0.0]))
     limit = SupportLimit(SOLES, margin=0.0, pressure_margin=margin)
     equalities = [FrameEquality(foot) for foot in FEET]
+    limits = [VelocityLimit(), limit]
     stack = TaskStack(
-        standing, [task], limits=[VelocityLimit(), limit], equalities=equalities
+        standing, [task], limits=limits, joint_limits=False, equalities=equalities
     )
     v = stack.solve(DT).v
     model, data = standing.model, standing.model.createData()
@@ -81,7 +83,9 @@ def test_a_motor_carries_no_more_than_its_limit(standing: Configuration):
     task.set_target(standing.com + np.array([0.3, 0.0, -0.3]))
     limits = [VelocityLimit(), WeightLimit({joint: 15.0})]
     equalities = [FrameEquality(foot) for foot in FEET]
-    stack = TaskStack(standing, [task], limits=limits, equalities=equalities)
+    stack = TaskStack(
+        standing, [task], limits=limits, joint_limits=False, equalities=equalities
+    )
     for _ in range(100):
         standing.update(standing.integrate(stack.solve(DT).dq))
     model, data = standing.model, standing.model.createData()

@@ -61,6 +61,38 @@ def test_jacobian_is_minus_the_derivative_of_the_error(humanoid, rng, index):
         np.testing.assert_allclose(J, numeric, atol=2e-7)
 
 
+@pytest.mark.parametrize("behind", [(-1, 0, 0), (-1, 0, 0.1), (-1, 1e-9, 0)])
+def test_looking_at_a_point_behind_turns_round(behind):
+    """A camera on a vertical axis; the chord to the point pulls nowhere there."""
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "pan")
+    model.addFrame(
+        pin.Frame("camera", joint, 0, pin.SE3.Identity(), pin.FrameType.BODY)
+    )
+    camera = Configuration(model, np.zeros(1))
+    task = LookAtTask("camera", target=np.array(behind, dtype=float))
+    stack = TaskStack(camera, [task])
+    assert np.linalg.norm(task.error(camera)) > np.pi - 0.35
+    for _ in range(150):
+        camera.update(camera.integrate(stack.solve(0.01).dq))
+    assert abs(camera.q[0]) == pytest.approx(np.pi, abs=1e-3)
+
+
+def test_the_error_of_looking_is_the_angle_to_the_point(arm, rng):
+    for _ in range(20):
+        point = arm.frame_pose("hand").translation + rng.normal(size=3)
+        task = LookAtTask("hand", axis=(0.0, 0.0, 1.0), target=point)
+        task.bind(arm)
+        pose = arm.frame_pose("hand")
+        way = point - pose.translation
+        angle = np.arccos(pose.rotation[:, 2] @ way / np.linalg.norm(way))
+        if angle < np.pi - 0.35:
+            assert np.linalg.norm(task.error(arm)) == pytest.approx(angle, abs=1e-9)
+        turned = pin.exp3(pose.rotation @ task.error(arm)) @ pose.rotation[:, 2]
+        if angle < np.pi - 0.35:
+            np.testing.assert_allclose(turned, way / np.linalg.norm(way), atol=1e-9)
+
+
 def test_looking_at_a_point_within_the_frame_backs_off(arm):
     start = arm.frame_pose("hand")
     task = LookAtTask("hand", target=start.translation + np.array([1e-3, 0.0, 2e-3]))

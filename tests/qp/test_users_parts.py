@@ -6,11 +6,17 @@ import pytest
 
 from wbc_suite.qp import (
     AccelerationLimit,
+    ComTask,
+    DampingTask,
     Equality,
+    FloorLimit,
+    FrameEquality,
     FrameTask,
     JointTask,
     Kernel,
     LimitKind,
+    LinearEquality,
+    ObstacleLimit,
     PositionLimit,
     PostureTask,
     RowLimit,
@@ -19,6 +25,7 @@ from wbc_suite.qp import (
     TaskStack,
     VelocityLimit,
 )
+from wbc_suite.qp.kernel import kernel_of
 
 DT = 5e-3
 
@@ -92,10 +99,6 @@ def run(stack, seconds):
     return solution
 
 
-def limits(*more):
-    return [PositionLimit(), VelocityLimit(), AccelerationLimit(), *more]
-
-
 def test_a_users_task_is_met_and_reported(arm):
     height = arm.frame_pose("hand").translation[2] + 0.1
     task = HeightTask("hand", height, cost=5.0, max_speed=0.5)
@@ -115,7 +118,7 @@ def test_a_users_limit_holds_a_task_and_is_named_by_its_own_words(arm):
     height = arm.frame_pose("hand").translation[2] + 0.1
     ceiling = CeilingLimit("hand", height - 0.05)
     task = HeightTask("hand", height)
-    stack = TaskStack(arm, [task, PostureTask(1e-3)], limits=limits(ceiling))
+    stack = TaskStack(arm, [task, PostureTask(1e-3)], limits=[ceiling])
     solution = run(stack, 3.0)
     at = arm.frame_pose("hand").translation[2]
     assert at == pytest.approx(height - 0.05, abs=1e-6)
@@ -161,11 +164,91 @@ def test_a_subclass_of_a_compiled_task_is_evaluated_itself(arm):
     np.testing.assert_allclose(*solutions, atol=1e-11)
 
 
-def test_a_subclass_that_declares_its_kernel_stays_compiled(arm):
-    class NamedFrameTask(FrameTask):
+def test_a_subclass_that_overrides_evaluate_may_declare_its_kernel(arm):
+    class NamedFrameTask(OwnFrameTask):
         kernel = Kernel.FRAME
 
     assert TaskStack(arm, [NamedFrameTask("hand")]).is_compiled
+
+
+class SlowFrameTask(FrameTask):
+    """Sets a speed of its own; what it computes is inherited."""
+
+    def __init__(self, frame):
+        super().__init__(frame, max_linear_speed=0.1)
+
+
+def derived(base):
+    """Return a subclass that overrides nothing."""
+    return type(f"Own{base.__name__}", (base,), {})
+
+
+def test_subclasses_inherit_the_kernel(arm):
+    tasks = [SlowFrameTask("hand"), derived(ComTask)(), derived(PostureTask)()]
+    tasks.append(derived(DampingTask)(0.1))
+    limits = [derived(FloorLimit)({})]
+    limits += [derived(x)((), ()) for x in (SelfCollisionLimit, ObstacleLimit)]
+    rows = derived(LinearEquality)(np.zeros((1, arm.nv)))
+    held = derived(FrameEquality)("hand", directions=("yaw",))
+    stack = TaskStack(arm, tasks, limits=limits, equalities=[rows, held])
+    assert stack.is_compiled
+    assert stack.solve(DT).ok
+
+
+@pytest.mark.parametrize("base", [FrameTask, FrameEquality, FloorLimit])
+def test_an_override_anywhere_below_leaves_the_kernel(base):
+    method = "evaluate" if base is FrameTask else "rows"
+    mixin = type("Mixin", (), {method: lambda *arguments: None})
+    between = type("Between", (mixin, base), {})
+    part = object.__new__(type("Below", (between,), {}))
+    assert kernel_of(part) is Kernel.PYTHON
+
+
+def test_a_part_without_a_kernel_is_named_once(arm, caplog):
+    class LoggedTask(HeightTask):
+        """A class that no other test makes a stack of."""
+
+    for _ in range(2):
+        TaskStack(arm, [LoggedTask("hand", 0.3), FrameTask("hand")])
+    (record,) = caplog.records
+    assert "LoggedTask 'height of hand' has no compiled kernel" in record.getMessage()
+
+
+def test_limits_add_to_those_of_joints(arm):
+    """A limit of one's own left joints without any: 44 rad/s, where 2 are allowed."""
+    ceiling = CeilingLimit("hand", 10.0)
+    far = pin.SE3(np.eye(3), np.array([3.0, -2.0, 1.0]))
+    steps = []
+    for given in ([], [ceiling]):
+        task = FrameTask("hand", target=far, max_linear_speed=1e3)
+        steps.append(TaskStack(arm, [task], limits=given).solve(DT).dq)
+    np.testing.assert_allclose(*steps, atol=1e-12)
+    assert np.abs(steps[0]).max() == pytest.approx(50.0 * DT**2)  # acceleration limit
+
+
+@pytest.mark.parametrize("kind", [PositionLimit, VelocityLimit, AccelerationLimit])
+def test_a_joint_limit_takes_the_place_of_its_class(arm, kind):
+    class Own(kind):
+        """Bounds nothing."""
+
+        def apply(self, configuration, bounds):
+            pass
+
+    def bounded(limits):
+        bounds = TaskStack(arm, [], limits=limits).bounds
+        ends = bounds.q_upper, bounds.v_max, bounds.a_max
+        return [bool(np.isfinite(x).any()) for x in ends]
+
+    kinds = [PositionLimit, VelocityLimit, AccelerationLimit]
+    assert bounded([]) == [True, True, True]
+    assert bounded([Own()]) == [x is not kind for x in kinds]
+
+
+def test_without_joint_limits_a_stack_keeps_what_is_listed(arm):
+    stack = TaskStack(arm, [], limits=[VelocityLimit()], joint_limits=False)
+    assert np.isinf(stack.bounds.a_max).all()
+    assert np.isinf(stack.bounds.q_upper).all()
+    assert np.isfinite(stack.bounds.v_max).any()
 
 
 def test_an_error_that_is_not_finite_holds_and_is_reported(arm):
@@ -195,7 +278,7 @@ def test_a_solution_prints_what_tasks_lack_and_what_holds_them(arm):
     height = arm.frame_pose("hand").translation[2] + 0.1
     ceiling = CeilingLimit("hand", height - 0.05)
     task = HeightTask("hand", height)
-    stack = TaskStack(arm, [task, PostureTask(1e-3)], limits=limits(ceiling))
+    stack = TaskStack(arm, [task, PostureTask(1e-3)], limits=[ceiling])
     text = str(run(stack, 3.0))
     assert text.startswith("Solution: solved as stated")
     assert "fastest joint: joint" in text

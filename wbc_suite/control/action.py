@@ -1,5 +1,6 @@
 """Actions: one flat vector of named slices with units and bounds."""
 
+import math
 import textwrap
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
@@ -64,6 +65,15 @@ class Unit:
         return self.symbol if self.scale is None else f"{self.scale:g} {self.symbol}"
 
 
+FULL_TURN = 2.0 * math.pi
+"""Bound of absolute rotation vectors and angles, rad: both vectors of a rotation that
+are shorter than a full turn, r and `r - 2 pi r / |r|`, are within it."""
+
+_VECTOR, _QUATERNION = (Axis.RX, Axis.RY, Axis.RZ), (Axis.QX, Axis.QY, Axis.QZ, Axis.QW)
+
+LONGEST_VALUE = 1e100
+"""Values beyond it are scaled down to it; such rotations have lost all digits."""
+
 CELL = 40
 """Characters in a line of a printed layout's cell."""
 
@@ -73,6 +83,11 @@ class ActionPart:
     """What one controller reads from the action: named values with units and bounds.
 
     Labels are the names of the values: each an `Axis`, a joint, or another word.
+
+    Attributes:
+        wraps: Whether rotation vectors (`rx`, `ry`, `rz`), `yaw` and quaternions in it
+            stand for a rotation as they are. Beyond the bounds they are replaced by
+            values of the same rotation, not clipped.
     """
 
     name: str
@@ -81,6 +96,7 @@ class ActionPart:
     units: tuple[Unit, ...]
     low: tuple[float, ...]
     high: tuple[float, ...]
+    wraps: bool = False
 
     def __post_init__(self) -> None:
         sizes = {len(self.labels), len(self.units), len(self.low), len(self.high)}
@@ -124,6 +140,13 @@ class ActionLayout:
         self._by_name = {s.name: s for s in slices}
         if len(self._by_name) != len(slices):
             raise ConfigError(f"Action slices share a name: {[s.name for s in slices]}")
+        self._rotations = [
+            (np.array(index), labels is _QUATERNION)
+            for s in slices
+            for labels in (_VECTOR, (Axis.YAW,), _QUATERNION)
+            if s.wraps
+            if (index := [s.start + k for k, x in enumerate(s.labels) if x in labels])
+        ]
         self.low = _frozen([x for s in slices for x in s.low])
         self.high = _frozen([x for s in slices for x in s.high])
 
@@ -201,9 +224,20 @@ class ActionLayout:
         return vector
 
     def clip(self, action: Vector) -> tuple[Vector, int]:
-        """Return the action within the bounds, and how many values were outside."""
+        """Return the action within the bounds, and how many values were outside.
+
+        Rotations of slices that wrap are brought into the bounds as they are; they do
+        not count as outside.
+        """
         clipped = np.minimum(np.maximum(action, self.low), self.high)
-        return clipped, int(np.count_nonzero(clipped != action))
+        outside = clipped != action
+        if not outside.any():
+            return clipped, 0
+        for index, is_quaternion in self._rotations:
+            if outside[index].any():
+                clipped[index] = _same_rotation(action[index], is_quaternion)
+                outside[index] = False
+        return clipped, int(np.count_nonzero(outside))
 
     def take(self, action: ArrayLike) -> tuple[Vector, int]:
         """Check and clip an action; see `check` and `clip`."""
@@ -241,6 +275,16 @@ def _table(rows: list[tuple[str, ...]]) -> str:
         for line in zip_longest(*row, fillvalue="")
     ]
     return "\n".join(lines)
+
+
+def _same_rotation(values: Vector, is_quaternion: bool) -> Vector:
+    """Return the unit quaternion, or the rotation vector of at most half a turn."""
+    most = float(np.abs(values).max())
+    values = values / max(1.0, most / LONGEST_VALUE)  # so that squares are finite
+    length = float(np.linalg.norm(values))
+    if is_quaternion:
+        return values / length
+    return values * (math.remainder(length, FULL_TURN) / length)
 
 
 def _frozen(values: list[float]) -> Vector:

@@ -27,7 +27,7 @@ from wbc_suite.control.loop.inverse_dynamics import (
 from wbc_suite.control.loop.mujoco_functions import addresses
 from wbc_suite.control.loop.physics import bind_physics
 from wbc_suite.control.loop.records import gather
-from wbc_suite.envs.watch import PhysicsWatch, check_model
+from wbc_suite.envs.watch import PhysicsWatch, check_laws, check_model
 
 
 class Simulation:
@@ -64,7 +64,8 @@ class Simulation:
         lite: bool = True,
     ) -> None:
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
-        self.model, self.data = model, data
+        check_model(model)
+        self.model, self.data, self._made_for = model, data, float(model.opt.timestep)
         self._watch, self.lite = PhysicsWatch(data), lite
         self.robots = tuple(state for state, _ in pairs)
         self.controllers = tuple(controller for _, controller in pairs)
@@ -139,10 +140,11 @@ class Simulation:
         Raises:
             PhysicsError: If the state or the model has numbers that cannot be.
         """
-        check_model(self.model)
+        check_model(self.model, self._made_for)
         self.forward()
         for state, controller in self.pairs:
             controller.reset(state)
+        check_laws(self._laws, self._drives)
         for source in self._sources:
             begin_source(source, self.data)
         self._left = [0] * len(self.pairs)
@@ -154,8 +156,8 @@ class Simulation:
             PhysicsError: If MuJoCo warns, or the state is not finite; names the
                 warning. The state is left as it was found, for inspection.
         """
-        if not self.timestep > 0.0:
-            check_model(self.model)
+        if self.timestep != self._made_for:
+            check_model(self.model, self._made_for)
         with nullcontext() if self._prepared else announced("the controllers"):
             self._advance(n)
         self._prepared = True

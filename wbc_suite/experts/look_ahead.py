@@ -82,6 +82,7 @@ class LookAhead:
             self._configuration,
             [*self._tasks, self._posture],
             limits=[PositionLimit(), VelocityLimit()],
+            joint_limits=False,
             escape=False,
         )
         low, high = reduced.lowerPositionLimit, reduced.upperPositionLimit

@@ -74,6 +74,7 @@ class GoalProblem:
             self.configuration,
             [*self.tasks, *tasks],
             limits=[*self.limits, *limits],
+            joint_limits=False,
             equalities=self.equalities,
             damping=1e-6,
             curvature_damping=0.02,

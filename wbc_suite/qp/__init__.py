@@ -1,8 +1,10 @@
 """Stacks of QP tasks: what a robot should do, under limits, solved once per tick.
 
+```python
 stack = TaskStack(configuration, [FrameTask("right_hand"), PostureTask(1e-2)])
 solution = stack.solve(dt)
 configuration.update(configuration.integrate(solution.dq))
+```
 """
 
 from wbc_suite.qp.com_task import ComTask

@@ -42,7 +42,7 @@ class Constraints:
         floor_rows: Its first inequality row and the end.
         obstacles: The obstacle limit that a kernel writes.
         obstacle_rows: Its first inequality row and the end.
-        is_compiled: Whether kernels write all rows.
+        python_parts: Limits and equalities whose rows no kernel writes.
     """
 
     def __init__(
@@ -63,7 +63,8 @@ class Constraints:
         self._python_equalities: list[tuple[Equality, slice]] = []
         self._bind_limits(configuration)
         self._bind_equalities(configuration)
-        self.is_compiled = not self._python_limits and not self._python_equalities
+        slow = *self._python_limits, *self._python_equalities
+        self.python_parts = [part for part, _ in slow]
 
     def _bind_limits(self, configuration: Configuration) -> None:
         """Choose what kernels write; limits without capsules and spheres write none."""
@@ -162,7 +163,7 @@ def check_parts(
         raise ConfigError(
             f"TaskStack needs a Configuration, not {type(configuration).__name__}."
         )
-    _check_list("limits", limits if limits is not None else (), "Limit", Limit)
+    _check_list("limits", limits, "Limit", Limit)
     _check_list("equalities", equalities, "Equality", Equality)
     checked = cast("Sequence[Task]", _check_list("tasks", tasks, "Task", Task))
     levels = {task.level for task in checked}

@@ -33,7 +33,7 @@ _RETURN_ANGULAR_SPEED = 1.0  # rad/s
 class Equality(ABC):
     """Rows `A dq = b`, prior to every task: `dim` of them, which reports call `name`.
 
-    A class says in its own body what writes them, see `kernel_of`.
+    What writes them is inherited with `rows`, see `kernel_of`.
     """
 
     kernel: ClassVar[Kernel] = Kernel.PYTHON

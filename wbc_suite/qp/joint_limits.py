@@ -5,6 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from wbc_suite.arguments import check_number
+from wbc_suite.errors import ConfigError
 from wbc_suite.kinematics import Configuration
 from wbc_suite.qp.limit import BoxLimit, JointBounds, joint_values
 
@@ -23,7 +24,8 @@ class PositionLimit(BoxLimit):
         joints: Narrower ranges of single joints by name, rad or m.
 
     Raises:
-        ConfigError: If the gain is out of range or the margin negative.
+        ConfigError: If the gain is out of range, the margin negative, or a range empty
+            or outside the model's.
     """
 
     def __init__(
@@ -36,6 +38,12 @@ class PositionLimit(BoxLimit):
         self.gain = check_number("PositionLimit: gain", gain, above=0.0, most=1.0)
         self.margin = check_number("PositionLimit: margin", margin, least=0.0)
         self.joints = dict(joints or {})
+        for name, (lower, upper) in self.joints.items():
+            if not lower <= upper:
+                raise ConfigError(
+                    f"PositionLimit: the range of '{name}' is {lower} to {upper}, but "
+                    "must not end before it begins."
+                )
 
     def apply(self, configuration: Configuration, bounds: JointBounds) -> None:
         """Take the limits from the model, less the margin."""
@@ -52,6 +60,12 @@ class PositionLimit(BoxLimit):
             bounds.q_upper[i] = min(bounds.q_upper[i], upper - margin)
         for name, (lower, upper) in self.joints.items():
             i = model.joints[configuration.joint_id(name)].idx_v
+            if not (lower <= bounds.q_upper[i] and upper >= bounds.q_lower[i]):
+                raise ConfigError(
+                    f"PositionLimit: '{name}' is in {bounds.q_lower[i]:g} to "
+                    f"{bounds.q_upper[i]:g}, which has nothing in common with "
+                    f"{lower} to {upper}."
+                )
             bounds.q_lower[i] = max(bounds.q_lower[i], lower)
             bounds.q_upper[i] = min(bounds.q_upper[i], upper)
         bounds.q_lower[bounds.q_lower < -_NO_LIMIT] = -np.inf

@@ -1,6 +1,11 @@
 """Which parts of a stack are computed by compiled kernels."""
 
+import logging
+from collections.abc import Iterable
 from enum import IntEnum
+from functools import cache
+
+LOG = logging.getLogger(__name__)
 
 
 class Kernel(IntEnum):
@@ -17,9 +22,33 @@ class Kernel(IntEnum):
 
 
 def kernel_of(part: object) -> Kernel:
-    """Return the kernel that the class of a part declares in its own body.
+    """Return the kernel that computes a task, a limit or an equality.
 
-    Subclasses do not inherit it: what they compute may be another. One that computes
-    the same declares the same.
+    A subclass inherits it, unless it overrides the method that the kernel stands for,
+    `evaluate` of tasks and `rows` of limits and equalities. One that overrides it by
+    an equal one declares `kernel` in its own body.
     """
-    return vars(type(part)).get("kernel", Kernel.PYTHON)
+    kind = type(part)
+    owner = next((c for c in kind.__mro__ if "kernel" in vars(c)), kind)
+    for method in ("evaluate", "rows"):
+        if getattr(kind, method, None) is not getattr(owner, method, None):
+            return Kernel.PYTHON
+    return getattr(kind, "kernel", Kernel.PYTHON)
+
+
+def log_python_parts(parts: Iterable[object]) -> None:
+    """Log, once for each, the parts of a stack that have no kernel."""
+    for part in parts:
+        _log_python_part(type(part), str(getattr(part, "name", "")))
+
+
+@cache
+def _log_python_part(kind: type, name: str) -> None:
+    """Log a part without a kernel: a warning, unless the class is of this package."""
+    ours = kind.__module__.startswith(f"{__package__}.")
+    LOG.log(
+        logging.INFO if ours else logging.WARNING,
+        "TaskStack: %s%s has no compiled kernel, so each tick calls its Python method.",
+        kind.__name__,
+        f" '{name}'" if name else "",
+    )

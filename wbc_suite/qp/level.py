@@ -46,7 +46,7 @@ class Level:
         tasks: Arrays of the tasks.
         qp: Arrays of the problem.
         arrays: What the kernels of `tick` read and write.
-        is_compiled: Whether all tasks have a kernel.
+        python_parts: Tasks without a kernel.
     """
 
     def __init__(
@@ -89,7 +89,8 @@ class Level:
         )
         self._copies = self._attach_rows()
         kernels = *self.tasks.kernel, *self.tasks.joint_kernel
-        self.is_compiled = Kernel.PYTHON not in kernels
+        pairs = zip((*rows, *self._joint_tasks), kernels, strict=True)
+        self.python_parts = [task for task, kernel in pairs if not kernel]
         self.evaluate(configuration, Kernel.CONSTANT)
 
     def reset(self) -> None:

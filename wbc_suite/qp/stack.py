@@ -14,7 +14,7 @@ from wbc_suite.qp.escape import Escape
 from wbc_suite.qp.fallback import Ladder
 from wbc_suite.qp.frame_task import FrameTask
 from wbc_suite.qp.joint_limits import AccelerationLimit, PositionLimit, VelocityLimit
-from wbc_suite.qp.kernel import Kernel
+from wbc_suite.qp.kernel import Kernel, log_python_parts
 from wbc_suite.qp.level import Level, by_level, tick_layout
 from wbc_suite.qp.limit import BoxLimit, Limit, LimitKind, unlimited_bounds
 from wbc_suite.qp.overshoot import OvershootArrays
@@ -34,6 +34,7 @@ from wbc_suite.qp.tick import (
 from wbc_suite.typing import Indices, Matrix, Records, Vector
 
 _SOLVED = TickStatus.SOLVED.value
+_JOINT_LIMITS = PositionLimit, VelocityLimit, AccelerationLimit
 
 
 class TaskStack:
@@ -56,8 +57,10 @@ class TaskStack:
         configuration: The robot; `solve` reads it, the caller moves it.
         tasks: They are bound: frames are resolved, targets that were not set hold the
             present pose.
-        limits: Limits; position, velocity and acceleration limits with their defaults
-            when absent.
+        limits: Limits beside those of joints. One of `PositionLimit`, `VelocityLimit`
+            and `AccelerationLimit` here takes the place of the default of its class.
+        joint_limits: Whether the defaults of these three are added; without them the
+            stack keeps `limits` alone.
         equalities: Rows that are kept exactly, before all tasks.
         solver: "daqp", or a name of qpsolvers.
         damping: Tikhonov term, [cost]^2/rad^2. 1e-3 removes the flutter at singular
@@ -87,7 +90,8 @@ class TaskStack:
         configuration: Configuration,
         tasks: Sequence[Task],
         *,
-        limits: Sequence[Limit] | None = None,
+        limits: Sequence[Limit] = (),
+        joint_limits: bool = True,
         equalities: Sequence[Equality] = (),
         solver: str = "daqp",
         damping: float = 1e-3,
@@ -96,8 +100,9 @@ class TaskStack:
         warm: bool | None = None,
     ) -> None:
         check_parts(configuration, tasks, limits, equalities)
-        if limits is None:
-            limits = (PositionLimit(), VelocityLimit(), AccelerationLimit())
+        if joint_limits:
+            missing = [x for x in _JOINT_LIMITS if not _has(limits, x)]
+            limits = (*(kind() for kind in missing), *limits)
         self.configuration = configuration
         self.tasks, self.equalities = tuple(tasks), tuple(equalities)
         self.solver, self._limits = solver, tuple(limits)
@@ -120,7 +125,9 @@ class TaskStack:
         ]
         rows.fill_constants(self.levels[0].qp)
         self._warm = solver == "daqp" if warm is None else warm
-        self.is_compiled = all(x.is_compiled for x in (rows, *self.levels))
+        own = [part for x in (rows, *self.levels) for part in x.python_parts]
+        self.is_compiled = not own
+        log_python_parts(own)
         self._tick = self._make_arrays(results)
         self.v_previous: Vector = self._tick.v
         past = self._overshoot.damping
@@ -294,6 +301,7 @@ class TaskStack:
             Configuration(self.configuration.model, self.configuration.q),
             self.tasks,
             limits=self._limits,
+            joint_limits=False,
             equalities=self.equalities,
             damping=self.damping,
             curvature_damping=self.curvature_damping,
@@ -325,3 +333,7 @@ class TaskStack:
             position_tolerance=position_tolerance,
             orientation_tolerance=orientation_tolerance,
         )
+
+
+def _has(limits: Sequence[Limit], kind: type[Limit]) -> bool:
+    return any(isinstance(limit, kind) for limit in limits)

@@ -66,8 +66,8 @@ class RowTask(ABC):
         angular_start: First row that is an angle; `dim` when absent.
 
     Attributes:
-        kernel: What computes error and Jacobian. A class says so in its own body; its
-            subclasses, whose error may be another, do not inherit it.
+        kernel: What computes error and Jacobian. Subclasses inherit it, unless they
+            override `evaluate`; see `kernel_of`.
         target_row: Target of a task with a kernel, as the kernel reads it.
         unit: Unit of the rows before `angular_start`, for reports.
 

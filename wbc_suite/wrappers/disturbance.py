@@ -87,7 +87,7 @@ class Disturbance(gymnasium.Wrapper[Any, Any, Any, Any]):
         if pushed:
             executed = self._pushed(executed)
             self._left -= 1
-        executed = np.clip(executed, self._layout.low, self._layout.high)
+        executed, _ = self._layout.clip(executed)
         observation, reward, terminated, truncated, info = self.env.step(executed)
         labels = {"executed": executed, "intended": intended, "disturbed": pushed}
         return observation, float(reward), terminated, truncated, info | labels

@@ -65,6 +65,12 @@ class Flat(gymnasium.Wrapper[Flattened, Flattened, Any, Any]):
         return np.concatenate(parts).astype(np.float32)
 
     def scaled(self, action: Any) -> Flattened:
-        """Return an action of the environment as one between -1 and 1."""
+        """Return an action of the environment as one between -1 and 1.
+
+        Rotations beyond a full turn are wrapped, as `step` of the environment does.
+        """
+        layout = getattr(self.env.unwrapped, "action_layout", None)
+        if layout is not None:
+            action, _ = layout.take(action)
         half = np.where(self._half > 0.0, self._half, 1.0)
         return ((np.asarray(action) - self._middle) / half).astype(np.float32)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, ClassVar, TypeVar
 import numpy as np
 import pinocchio as pin
 
-from wbc_suite.control.action import ActionPart, Axis, SliceKind, Unit
+from wbc_suite.control.action import FULL_TURN, ActionPart, Axis, SliceKind, Unit
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.qp import ComTask, FrameTask
 from wbc_suite.registry import Registry
@@ -68,7 +68,7 @@ class FrameKind:
         """Return the slice of a frame of this kind."""
         absolute = config.input_type == "absolute"
         far = MAX_POSITION if absolute else config.delta_position
-        turn = float(np.pi) if absolute else config.delta_rotation
+        turn = FULL_TURN if absolute else config.delta_rotation
         linear = [label in AXES[:3] for label in self.labels]
         bounds = tuple(far if is_linear else turn for is_linear in linear)
         return ActionPart(
@@ -78,6 +78,7 @@ class FrameKind:
             units=tuple(Unit("m" if is_linear else "rad") for is_linear in linear),
             low=tuple(-bound for bound in bounds),
             high=bounds,
+            wraps=absolute,
         )
 
     def values(self, pose: pin.SE3) -> Vector:
@@ -149,8 +150,14 @@ def register_frame_kind(kind: type[Kind], *, replace: bool = False) -> type[Kind
     """Register a class of `FrameKind` under its name; also as a decorator.
 
     Raises:
-        ConfigError: If the name is taken, or a label is unknown.
+        ConfigError: If name or labels are missing, the name is taken, or a label is
+            unknown.
     """
+    if missing := [x for x in ("name", "labels") if not hasattr(kind, x)]:
+        raise ConfigError(
+            f"{kind.__name__}: a kind of controlled frame needs "
+            f"{' and '.join(missing)}."
+        )
     FRAME_KINDS.register(kind.name, kind(), replace=replace)
     return kind
 

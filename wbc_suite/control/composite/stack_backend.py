@@ -77,7 +77,12 @@ class StackBackend:
         )
         self._support = [x for x in limits if isinstance(x, SupportLimit)]
         make_stack = partial(
-            TaskStack, commanded, limits=limits, equalities=equalities, escape=False
+            TaskStack,
+            commanded,
+            limits=limits,
+            joint_limits=False,
+            equalities=equalities,
+            escape=False,
         )
         self.stack = make_stack([*self._tasks, self._posture])
         self.v: Vector = np.zeros(commanded.nv)

@@ -21,7 +21,7 @@ from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.elements import Name
 from wbc_suite.robot.mjcf_export import STOP_MARGIN
-from wbc_suite.tomlfile import FrozenModel, located, parse_model
+from wbc_suite.tomlfile import FrozenModel, Interval, located, parse_model
 
 __all__ = [
     "ControlledFrame",
@@ -151,7 +151,7 @@ class LimitsConfig(FrozenModel):
     """
 
     position_margin: NonNegativeFloat = STOP_MARGIN
-    positions: dict[Name, tuple[float, float]] = {}
+    positions: dict[Name, Interval] = {}
     velocity_scale: float = Field(default=1.0, gt=0.0, le=1.0)
     acceleration: PositiveFloat = 50.0
     base_acceleration: tuple[PositiveFloat, PositiveFloat] = (5.0, 10.0)

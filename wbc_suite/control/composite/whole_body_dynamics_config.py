@@ -19,7 +19,7 @@ from wbc_suite.locomotion import GaitConfig, TrotConfig
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.elements import Name
 from wbc_suite.robot.sole_inference import ball_radius, guess_sole
-from wbc_suite.tomlfile import FrozenModel, located, parse_model
+from wbc_suite.tomlfile import FrozenModel, Interval, located, parse_model
 
 NOISY_CUTOFF = 25.0
 """Hz; GR1 walks with a delay of 20 ms and noise of 0.05 rad/s at it, not at 40 Hz."""
@@ -119,7 +119,7 @@ class WholeBodyIDConfig(FrozenModel):
     friction: PositiveFloat = 0.6
     velocity_cutoff: PositiveFloat | None = None
     max_walk: tuple[PositiveFloat, PositiveFloat, PositiveFloat] = (1.0, 0.4, 1.0)
-    height: tuple[float, float] = (-0.15, 0.02)
+    height: Interval = (-0.15, 0.02)
     tolerance: tuple[PositiveFloat, PositiveFloat] = (2e-3, 1e-2)
     input_type: InputType = "absolute"
     input_ref_frame: InputFrame = "base"

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from wbc_suite.compiling import compiled, struct
-from wbc_suite.typing import Indices, Vector
+from wbc_suite.typing import Indices, Matrix, Vector
 
 LARGEST = float(mujoco.mjMAXVAL)
 """MuJoCo calls larger numbers bad, as it does NaN."""
@@ -16,7 +16,7 @@ FASTEST = 1e5
 
 @struct
 class CheckedState(NamedTuple):
-    """Arrays that MuJoCo checks in each step, and its counts of warnings."""
+    """Arrays that MuJoCo checks in each step, its warnings, and what it does not."""
 
     qpos: Vector
     qvel: Vector
@@ -26,10 +26,16 @@ class CheckedState(NamedTuple):
     """How often each warning was raised."""
     warnings_before: Indices
     """The same at the last `check_before`."""
+    gravity: Vector
+    masses: Vector
+    inertias: Vector
+    sizes: Vector
+    ranges: Matrix
+    """Of joints, shape (n, 2)."""
 
 
-def checked_state(data: mujoco.MjData) -> CheckedState:
-    """Return the view of a simulation's data that the checks read."""
+def checked_state(model: mujoco.MjModel, data: mujoco.MjData) -> CheckedState:
+    """Return the view of a simulation that the checks read."""
     warnings = data.warning.number
     return CheckedState(
         qpos=data.qpos,
@@ -38,6 +44,11 @@ def checked_state(data: mujoco.MjData) -> CheckedState:
         xfrc_applied=data.xfrc_applied.reshape(-1),
         warnings=warnings,
         warnings_before=np.array(warnings),
+        gravity=model.opt.gravity,
+        masses=model.body_mass,
+        inertias=model.body_inertia.reshape(-1),
+        sizes=model.geom_size.reshape(-1),
+        ranges=model.jnt_range,
     )
 
 
@@ -63,7 +74,24 @@ def _all_usable(state: CheckedState) -> bool:
     if not (is_usable(state.qpos, LARGEST) and is_usable(state.qvel, FASTEST)):
         return False
     forces = is_usable(state.qfrc_applied, LARGEST)
-    return forces and is_usable(state.xfrc_applied, LARGEST)
+    if not (forces and is_usable(state.xfrc_applied, LARGEST)):
+        return False
+    positive = _is_positive(state.masses) and _is_positive(state.inertias)
+    if not (positive and _is_positive(state.sizes)):
+        return False
+    for i in range(state.ranges.shape[0]):
+        if not state.ranges[i, 0] <= state.ranges[i, 1]:
+            return False
+    return is_usable(state.gravity, LARGEST)
+
+
+@compiled
+def _is_positive(values: Vector) -> bool:
+    """Return whether all numbers are 0 or greater."""
+    positive = True
+    for value in values:
+        positive &= value >= 0.0  # not so for NaN
+    return positive
 
 
 @compiled

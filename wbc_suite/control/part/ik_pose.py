@@ -211,6 +211,7 @@ def _pose_part(name: str, config: IkPoseConfig, scaling: InputScaling) -> Action
         units=(*units, *(Unit("quaternion"),) * 4),
         low=(*low.tolist(), *(-1.0,) * 4),
         high=(*high.tolist(), *(1.0,) * 4),
+        wraps=True,
     )
 
 

@@ -21,7 +21,7 @@ from wbc_suite.control.part.part_settings import (
     Range,
     SliceInput,
     apply_torque_settings,
-    limits_of,
+    narrowed,
 )
 from wbc_suite.control.robot_parts import RobotPart
 from wbc_suite.control.state import RobotState
@@ -268,7 +268,9 @@ def _position_limits(
     """Return least and greatest positions, rad or m, infinite where there are none."""
     ranges = [state.robot.joint(j).range or (-np.inf, np.inf) for j in joints]
     low, high = np.array(ranges, dtype=np.float64).reshape(-1, 2).T
-    return _narrowed(low, high, given, "qpos_limits")
+    if given is None:
+        return low, high
+    return narrowed(low, high, given, "qpos_limits")
 
 
 def _velocity_limits(
@@ -277,17 +279,9 @@ def _velocity_limits(
     """Return least and greatest velocities, rad/s or m/s."""
     known = [state.robot.joint(joint).velocity for joint in joints]
     high = np.array([np.inf if x is None else x for x in known], dtype=np.float64)
-    return _narrowed(-high, high, given, "velocity_limits")
-
-
-def _narrowed(
-    low: Vector, high: Vector, given: Range | None, key: str
-) -> tuple[Vector, Vector]:
-    """Return limits within the given ones as well."""
     if given is None:
-        return low, high
-    least, greatest = limits_of(given, len(low), key)
-    return np.maximum(low, least), np.minimum(high, greatest)
+        return -high, high
+    return narrowed(-high, high, given, "velocity_limits")
 
 
 def _narrow(law: Law, low: Vector, high: Vector, velocity: Vector) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 from pydantic import NonNegativeFloat, PositiveFloat
 
-from wbc_suite.control.action import Axis, SliceKind, Unit
+from wbc_suite.control.action import FULL_TURN, Axis, SliceKind, Unit
 from wbc_suite.control.law.osc import OscLaw
 from wbc_suite.control.part.controller import PartController, PoseInput
 from wbc_suite.control.part.hand_goal import (
@@ -95,7 +95,7 @@ class OscController(PartController[OscLaw]):
         self._impedance = Impedance(part.name, AXES, config)
         self._goal, self._step = HandGoal(config), np.zeros(6)
         self._hand_pose, (low, high) = np.zeros(12), self._goal.limits[:, :3]
-        turn = np.full(3, np.pi)
+        turn = np.full(3, FULL_TURN)
         least = np.concatenate([np.maximum(low, -REACH), -turn])[:size]
         greatest = np.concatenate([np.minimum(high, REACH), turn])[:size]
         self._input = SliceInput(

@@ -165,7 +165,13 @@ class SliceInput:
             units = self.scaling.units(units)
         low, high = (tuple(limit.tolist()) for limit in limits)
         self.action = ActionPart(
-            name=name, kind=kind, labels=labels, units=units, low=low, high=high
+            name=name,
+            kind=kind,
+            labels=labels,
+            units=units,
+            low=low,
+            high=high,
+            wraps=kind is SliceKind.POSE and not self.scaled,
         )
 
     def __call__(self, values: Vector) -> Vector:
@@ -208,6 +214,25 @@ def limits_of(given: Range, size: int, key: str) -> tuple[Vector, Vector]:
     return low, high
 
 
+def narrowed(
+    low: Vector, high: Vector, given: Range, key: str
+) -> tuple[Vector, Vector]:
+    """Return limits within the given ones as well, shape (n,) each.
+
+    Raises:
+        ConfigError: If a number of values is wrong, or nothing is left of a range.
+    """
+    least, greatest = limits_of(given, len(low), key)
+    least, greatest = np.maximum(low, least), np.minimum(high, greatest)
+    if not (least <= greatest).all():
+        k = int(np.argmin(least <= greatest))
+        raise ConfigError(
+            f"key '{key}': {given[0]} to {given[1]} has nothing in common with the "
+            f"robot's own {low[k]:g} to {high[k]:g} of value {k}."
+        )
+    return least, greatest
+
+
 def check_axes(input_type: InputType, input_ref_frame: InputFrame) -> None:
     """Raise ValueError for absolute goals in axes that move with the goal."""
     if input_type == "absolute" and input_ref_frame == "eef":
@@ -222,10 +247,10 @@ def apply_torque_settings(law: Law, settings: PartSettings) -> None:
     law.record["observer"] = settings.disturbance_observer
     law.record["compensation"] = float(settings.use_torque_compensation)
     if settings.torque_limits is not None:
-        low, high = limits_of(settings.torque_limits, len(law.joints), "torque_limits")
         drives = law.drives
-        drives["command_min"] = np.maximum(drives["command_min"], low)
-        drives["command_max"] = np.minimum(drives["command_max"], high)
+        own = drives["command_min"], drives["command_max"]
+        low, high = narrowed(*own, settings.torque_limits, "torque_limits")
+        drives["command_min"], drives["command_max"] = low, high
 
 
 def damping_of(kp: Any, ratio: Any) -> Any:

@@ -34,6 +34,16 @@ class PartKind(NamedTuple):
 
 
 def _check(name: str, kind: PartKind) -> None:
+    if not issubclass(kind.controller, PartController):
+        raise ConfigError(
+            f"{kind.controller.__name__}: part controller '{name}' derives from "
+            "PartController."
+        )
+    if missing := sorted(kind.controller.__abstractmethods__):
+        raise ConfigError(
+            f"{kind.controller.__name__}: part controller '{name}' lacks "
+            f"{', '.join(missing)}, see PartController."
+        )
     field = kind.config.model_fields.get("type")
     if field is None or name not in get_args(field.annotation):
         raise ConfigError(
@@ -64,7 +74,8 @@ def register_part_controller(
     `FrozenModel` for a controller without gripper.
 
     Raises:
-        ConfigError: If the name is taken, or the config's type is not that name.
+        ConfigError: If the name is taken, the class lacks a method, or the config's
+            type is not that name.
     """
     PART_CONTROLLERS.register(name, PartKind(controller, config), replace=replace)
 
@@ -138,6 +149,16 @@ def check_part(name: str, config: Any, robot: RobotDescription) -> None:
 
 
 def make_part(name: str, config: Any, state: RobotState) -> PartController:
-    """Make the controller of a part that `check_part` has accepted."""
+    """Make the controller of a part that `check_part` has accepted.
+
+    Raises:
+        ConfigError: If its constructor does not set `law` and `slices`.
+    """
     build: Any = part_controller(config)  # each class has arguments of its own types
-    return build(robot_part(state.robot, name), config, state)
+    made: PartController = build(robot_part(state.robot, name), config, state)
+    if missing := [x for x in ("law", "slices") if not hasattr(made, x)]:
+        raise ConfigError(
+            f"{config.type}: the constructor of {build.__name__} does not set "
+            f"{' and '.join(missing)}, see PartController."
+        )
+    return made
