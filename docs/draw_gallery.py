@@ -28,8 +28,8 @@ HEAD = """# Gallery
 
 Any gripper goes on any arm, and any arm on any base:
 `wbc_suite.load_robot("UR5e", gripper="PandaGripper", base="OmronMobileBase")`.
-`wbc-suite view NAME` shows one in the browser. Variants that look alike share a picture.
-Written by `make gallery`.
+`wbc-suite view NAME` shows one in the browser. Variants that look alike share a
+picture. Written by `make gallery`.
 """
 FIGURE = """\
 <figure><img src="{source}" alt="{name}"><figcaption>{caption}</figcaption></figure>"""

@@ -157,8 +157,8 @@ def _report(
     for name, column in zip(names, 1e3 * errors.T, strict=True):
         moving = column[: -round(REST * RATE)]
         print(
-            f"  {name:<11} at rest {column[-1]:.3f} mm from its target; behind a moving "
-            f"one by {np.median(moving):.2f} mm (median), {moving.max():.2f} mm (worst)"
+            f"  {name:<11} at rest {column[-1]:.3f} mm from its target; while it moves "
+            f"{np.median(moving):.2f} mm behind (median), {moving.max():.2f} mm (worst)"
         )
     median, slowest = np.percentile(1e3 * step_times, [50, 99])
     print(f"  step time   median {median:5.2f} ms, 99 % under {slowest:.2f} ms")
