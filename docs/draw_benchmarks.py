@@ -23,6 +23,9 @@ SIZE = (640, 480)  # pixels; drawn twice as large: smooth edges
 VIEW = View(azimuth=142.0, elevation=-20.0, fov=34.0, margin=1.15)
 VIEWS = {
     "Door": View(azimuth=200.0, elevation=-15.0, fov=34.0, margin=1.3),
+    **dict.fromkeys(
+        ("Stand", "Reach"), View(azimuth=142.0, elevation=-14.0, fov=34.0, margin=0.85)
+    ),
 }
 """Of benchmarks that are seen better from elsewhere."""
 MOMENT = 0.6  # of the steps that the expert takes
@@ -45,9 +48,9 @@ ROBOTS: dict[str, str | list[str]] = {
     "PickPlaceBread": "UR5e",
     "PickPlaceCereal": "XArm7",
     "PickPlaceCan": "IIWA14",
-    "NutAssembly": "GR1FixedLowerBody",
+    "NutAssembly": "XArm7",
     "NutAssemblySingle": "PandaOmron",
-    "NutAssemblySquare": "TiagoDifferential",
+    "NutAssemblySquare": "UR5e",
     "NutAssemblyRound": "SpotWithArm",
     "Door": "Panda",
     "Stand": "GR1FreeBody",
@@ -56,7 +59,7 @@ ROBOTS: dict[str, str | list[str]] = {
     "Carry": "GR1FreeBody",
     "LocoLift": "SpotWithArm",
     "Wipe": "GR1FreeBody",
-    "ToolHang": "SpotWithArmFloating",
+    "ToolHang": "Panda",
     "TwoArmLift": "Baxter",
     "TwoArmPegInHole": ["Panda", "Panda"],
     "TwoArmHandover": "Tiago",
