@@ -2,8 +2,8 @@
 
 Episodes have seeds that were not used for tuning, from 7000 on. An episode counts as a
 success if the benchmark is solved within 500 steps, or 1000 for those with several
-objects. Results are added to docs/experts.json; `--table` writes that into
-docs/experts.md, and measures nothing.
+objects, or their own horizon for robots on feet. Results are added to
+docs/experts.json; `--table` writes that into docs/experts.md, and measures nothing.
 
 Usage: python benchmarks/experts.py [BENCHMARK ...] [--robots R[,R]] [--controller C]
     [--seeds 100] [--base 7000] [--quick] [--json FILE]
@@ -27,12 +27,14 @@ ROOT = Path(__file__).parent.parent
 FOUND = ROOT / "docs" / "experts.json"
 PAGE = ROOT / "docs" / "experts.md"
 LONG = ("TwoArmTransport", "ToolHang", "NutAssembly", "PickPlace")
+ON_FEET = ("Stand", "Reach", "WalkTo", "LocoLift", "Carry")
 ALL = (
     *("Lift", "Stack"),
     *("PickPlaceMilk", "PickPlaceBread", "PickPlaceCereal", "PickPlaceCan"),
     *("NutAssemblySquare", "NutAssemblyRound", "Door", "Wipe"),
     *("TwoArmLift", "TwoArmPegInHole", "TwoArmHandover"),
     *LONG,
+    *ON_FEET,
 )
 
 
@@ -40,7 +42,9 @@ def measure(
     name: str, robots: str | None, controller: str | None, seeds: range
 ) -> dict[str, Any]:
     """Run the expert of a benchmark, and return what it came to."""
-    arguments: dict[str, Any] = {"horizon": 1000 if name in LONG else 500}
+    arguments: dict[str, Any] = {}
+    if name not in ON_FEET:
+        arguments["horizon"] = 1000 if name in LONG else 500
     if robots:
         each = robots.split(",")
         arguments["robots"] = each if len(each) > 1 else robots

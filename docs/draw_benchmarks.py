@@ -1,27 +1,44 @@
-"""Draw every benchmark, each with another robot, and their page: `make gallery`."""
+"""Draw every benchmark while an expert solves it, and their page: `make gallery`."""
 
 import argparse
 from pathlib import Path
 
-import mujoco
 import numpy as np
 from PIL import Image
 
 import wbc_suite
-from wbc_suite.benchmark import BENCHMARKS, load_benchmark
+from wbc_suite.benchmark import BENCHMARKS, ObjectBenchmark, load_benchmark
 from wbc_suite.catalogue import Catalogue
+from wbc_suite.envs import RobotEnv
+from wbc_suite.evaluation import make_policy
 from wbc_suite.sensing.renderer import make_renderer
 from wbc_suite.tomlfile import read_toml
+from wbc_suite.typing import Matrix
+from wbc_suite.viewers.offscreen import View, fit_camera, subject_corners
 
 HERE = Path(__file__).parent
 FOLDER = HERE / "images" / "benchmarks"
 PAGE = HERE / "benchmark_gallery.md"
-AZIMUTH, ELEVATION = 142.0, -20.0  # degrees; 180 looks the robot in the face
-ROOM, NEAR = 4.0, 2.5  # m
-KNEE = 0.45  # m; below stand legs of tables
-SPREAD = 1.5  # m; wider scenes with tables come nearer to the camera than their middle
-SIZE = (320, 240)  # pixels; drawn twice as large: smooth edges
-COLUMNS = 3
+SIZE = (640, 480)  # pixels; drawn twice as large: smooth edges
+VIEW = View(azimuth=142.0, elevation=-20.0, fov=34.0, margin=1.15)
+VIEWS = {
+    "Door": View(azimuth=200.0, elevation=-15.0, fov=34.0, margin=1.3),
+    **dict.fromkeys(
+        ("Stand", "Reach"), View(azimuth=142.0, elevation=-14.0, fov=34.0, margin=0.85)
+    ),
+}
+"""Of benchmarks that are seen better from elsewhere."""
+MOMENT = 0.6  # of the steps that the expert takes
+MOMENTS = {
+    **dict.fromkeys(("Lift", "TwoArmLift", "LocoLift"), 0.97),
+    **dict.fromkeys(("Door", "NutAssemblySquare", "TwoArmPegInHole"), 0.9),
+    **dict.fromkeys(("Stack", "ToolHang", "NutAssemblyRound", "Wipe"), 0.75),
+    **{"Stand": 0.2, "Reach": 0.5, "Carry": 0.7},
+}
+SHADOWS = 0.6  # part of the scene that has shadows: small parts have sharp ones
+NEAR = 0.5  # m; things so near to a hand are in the picture
+SEED = 1
+COLUMNS = 2
 ROBOTS: dict[str, str | list[str]] = {
     "Lift": "GR1",
     "Stack": "Sawyer",
@@ -31,9 +48,9 @@ ROBOTS: dict[str, str | list[str]] = {
     "PickPlaceBread": "UR5e",
     "PickPlaceCereal": "XArm7",
     "PickPlaceCan": "IIWA14",
-    "NutAssembly": "GR1FixedLowerBody",
+    "NutAssembly": "XArm7",
     "NutAssemblySingle": "PandaOmron",
-    "NutAssemblySquare": "TiagoDifferential",
+    "NutAssemblySquare": "UR5e",
     "NutAssemblyRound": "SpotWithArm",
     "Door": "Panda",
     "Stand": "GR1FreeBody",
@@ -42,7 +59,7 @@ ROBOTS: dict[str, str | list[str]] = {
     "Carry": "GR1FreeBody",
     "LocoLift": "SpotWithArm",
     "Wipe": "GR1FreeBody",
-    "ToolHang": "SpotWithArmFloating",
+    "ToolHang": "Panda",
     "TwoArmLift": "Baxter",
     "TwoArmPegInHole": ["Panda", "Panda"],
     "TwoArmHandover": "Tiago",
@@ -76,43 +93,65 @@ def picture_of(name: str) -> Path:
 
 
 def draw(name: str) -> None:
-    """Draw one benchmark as an episode begins, from the front and a little aside."""
-    width, height = SIZE
-    env = wbc_suite.make(name, robots=robot_of(name), compiled=False)
-    env.reset(seed=1)
+    """Draw one benchmark while its expert solves it, from close."""
+    env = wbc_suite.make(name, robots=robot_of(name))
+    steps = round(MOMENTS.get(name, MOMENT) * solve(env, env.horizon))
+    solve(env, steps)
     model, data = env.simulation.model, env.simulation.data
-    view = {"width": 2 * width, "height": 2 * height}
+    camera = fit_camera(VIEWS.get(name, VIEW), subject(env), aspect=SIZE[0] / SIZE[1])
+    model.vis.map.shadowclip = SHADOWS
+    view = {"width": 2 * SIZE[0], "height": 2 * SIZE[1]}
     with make_renderer(model, preset="quality", **view) as renderer:
-        renderer.update_scene(data, viewpoint(model, data))
+        renderer.update_scene(data, camera)
         picture = Image.fromarray(renderer.render())
     env.close()
     small = picture.resize(SIZE, Image.Resampling.LANCZOS)
-    small.save(picture_of(name), quality=88, optimize=True)
+    small.save(picture_of(name), quality=85, optimize=True)
 
 
-def viewpoint(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjvCamera:
-    """Return a camera that sees everything, and tall scenes from knee height up."""
-    shown = (model.geom_group < 3) & (model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE)
-    centers, half = np.split(model.geom_aabb[shown], 2, axis=1)
-    turns = data.geom_xmat[shown].reshape(-1, 3, 3)
-    middles = data.geom_xpos[shown] + np.einsum("gij,gj->gi", turns, centers)
-    reach = np.einsum("gij,gj->gi", np.abs(turns), half)
-    here = np.linalg.norm(middles, axis=1) < ROOM  # what is not used stands far off
-    low, high = (middles - reach)[here].min(0), (middles + reach)[here].max(0)
-    flat = high[2] < 2 * KNEE
-    low[2] = 0.0 if flat else KNEE
-    camera = mujoco.MjvCamera()
-    camera.lookat[:] = 0.5 * (low + high)
-    camera.azimuth, camera.elevation = AZIMUTH, ELEVATION
-    right = np.array([np.sin(np.radians(AZIMUTH)), -np.cos(np.radians(AZIMUTH)), 0.0])
-    wide = float(np.abs(right) @ (high - low)) * SIZE[1] / SIZE[0]
-    tall = float(high[2] - low[2]) + 0.3 * float(
-        np.abs(right[:2][::-1]) @ (high - low)[:2]
+def solve(env: RobotEnv, most: int) -> int:
+    """Let the expert act until it succeeds, or for some steps; return how many."""
+    observation, _ = env.reset(seed=SEED)
+    policy = make_policy("expert", env, SEED)
+    for step in range(most):
+        observation, *_, info = env.step(policy(observation))
+        if info["success"]:
+            return step + 1
+    return most
+
+
+def subject(env: RobotEnv) -> Matrix:
+    """Return points that are in the picture: hands, things near them, or the robot."""
+    model, data = env.simulation.model, env.simulation.data
+    benchmark = env.benchmark
+    assert isinstance(benchmark, ObjectBenchmark)
+    states = [s for s in benchmark.states.values() if s.geoms]
+    hands = [hand.position for hand in benchmark.hands]
+    near = [
+        state
+        for state in states
+        if min((np.linalg.norm(state.position - p) for p in hands), default=np.inf)
+        < NEAR
+    ]
+    shown = {
+        model.body(body).name
+        for hand in benchmark.hands
+        for body in hand.gripper_bodies
+    }
+    shown |= {
+        model.body(model.geom_bodyid[g]).name
+        for state in near or states
+        for g in state.geoms
+    }
+    if hasattr(benchmark, "standing") or not benchmark.hands:
+        shown |= {
+            model.body(b).name
+            for b in range(model.nbody)
+            if model.body(b).name.startswith("robot0_")
+        }
+    return np.concatenate(
+        [subject_corners(model, data, body) for body in sorted(shown)]
     )
-    fitting = 0.48 * max(wide, tall) / np.tan(np.radians(22.5)) + 0.3
-    near = high[:2] - low[:2] - (0.0 if flat else SPREAD)
-    camera.distance = max(fitting, NEAR) + 0.35 * max(*near, 0.0)
-    return camera
 
 
 def cell(name: str) -> tuple[str, str]:

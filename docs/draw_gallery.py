@@ -3,12 +3,13 @@
 import argparse
 from pathlib import Path
 
+import numpy as np
 from PIL import Image
 
 from wbc_suite.catalogue import Catalogue
 from wbc_suite.robot import RobotDescription, load_robot
 from wbc_suite.robot.robot_file import Component, read_robot_file
-from wbc_suite.viewers.offscreen import render_robot
+from wbc_suite.viewers.offscreen import View, render_robot
 
 HERE = Path(__file__).parent
 FOLDER = HERE / "images" / "gallery"
@@ -20,15 +21,18 @@ IN_STRIP = (
     *("UR5e", "Jaco", "InspireRightHand", "RobotiqThreeFingerGripper"),
 )
 DOWN = (0.0, 1.0, 0.0, 0.0)  # grippers reach along +z, and are shown reaching down
+PALM = View(azimuth=215.0, elevation=-14.0)
+EXPOSURE = 0.65  # exponent of brightness for grippers, most of which are black
 SHORT = {"bd": "BD", "pal": "PAL", "pr2": "PR2", "umi": "UMI", "xarm7": "XArm7"}
 HEAD = """# Gallery
 
 Any gripper goes on any arm, and any arm on any base:
 `wbc_suite.load_robot("UR5e", gripper="PandaGripper", base="OmronMobileBase")`.
-`wbc-suite view NAME` shows one in the browser. Written by `make gallery`.
+`wbc-suite view NAME` shows one in the browser. Variants that look alike share a
+picture. Written by `make gallery`.
 """
 FIGURE = """\
-<figure><img src="{source}" alt="{name}"><figcaption>{name}</figcaption></figure>"""
+<figure><img src="{source}" alt="{name}"><figcaption>{caption}</figcaption></figure>"""
 
 
 def subjects() -> dict[str, list[tuple[str, str]]]:
@@ -44,6 +48,21 @@ def subjects() -> dict[str, list[tuple[str, str]]]:
         "Grippers and hands": [(camel(n), f"gripper/{n}") for n in grippers],
         "Bases": [(camel(name), f"base/{name}") for name in bases],
     }
+
+
+def families(rows: list[tuple[str, str]]) -> list[tuple[str, str, list[str]]]:
+    """Put subjects that look alike together: the first one, and names of the others.
+
+    They differ in roots, and in which joints move.
+    """
+    found: dict[object, tuple[str, str, list[str]]] = {}
+    for shown, name in rows:
+        looks = tuple((link.name, link.visual) for link in prepared(name).links)
+        if looks in found:
+            found[looks][2].append(shown)
+        else:
+            found[looks] = (shown, name, [])
+    return [*found.values()]
 
 
 def base_files(catalogue: Catalogue) -> list[tuple[str, Component]]:
@@ -73,7 +92,10 @@ def draw(name: str, path: Path) -> None:
     robot = prepared(name)
     if "ready" not in robot.keyframes:
         robot = robot.model_copy(update={"keyframes": {"ready": {}}})
-    picture = render_robot(robot, size=(2 * SIZE, 2 * SIZE))
+    view = PALM if "hand" in name else "three_quarter"
+    picture = render_robot(robot, view=view, size=(2 * SIZE, 2 * SIZE))
+    if name.startswith("gripper/"):
+        picture = (255.0 * (picture / 255.0) ** EXPOSURE).astype(np.uint8)
     small = Image.fromarray(picture).resize((SIZE, SIZE), Image.Resampling.LANCZOS)
     small.save(path, quality=88, optimize=True)
 
@@ -88,9 +110,10 @@ def page() -> str:
     parts = [HEAD]
     for heading, rows in subjects().items():
         parts.append(f'## {heading}\n\n<div class="gallery">')
-        for shown, name in rows:
+        for shown, name, others in families(rows):
             source = picture_of(name).relative_to(HERE).as_posix()
-            parts.append(FIGURE.format(source=source, name=shown))
+            caption = "<br>".join([f"<b>{shown}</b>", *others] if others else [shown])
+            parts.append(FIGURE.format(source=source, name=shown, caption=caption))
         parts.append("</div>\n")
     return "\n".join(parts)
 
@@ -114,7 +137,7 @@ def main() -> None:
     parser.add_argument("only", nargs="*", help="names to draw; all by default")
     only = {name.casefold() for name in parser.parse_args().only}
     FOLDER.mkdir(parents=True, exist_ok=True)
-    for shown, name in [row for rows in subjects().values() for row in rows]:
+    for shown, name, _ in [f for rows in subjects().values() for f in families(rows)]:
         if not only or shown.casefold() in only:
             print(f"drawing {shown}", flush=True)
             draw(name, picture_of(name))

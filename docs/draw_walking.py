@@ -26,6 +26,7 @@ SECONDS = 7.0
 PUSHED = (3.0, 3.1)  # s
 SIZE = (400, 400)
 SHOWN = (1.04, 2.64, 3.2, 3.52, 4.24, 6.0)  # s; moments of the strip
+FIELD, FIELDS, ASIDE = 0.5, 20, 0.55  # m, number and m, of the rulers on the floor
 ROBOTS = {"GR1FreeBody": (0.3, 200.0, 3.0), "SpotWithArm": (0.6, 450.0, 2.8)}
 """Speed, m/s; push from the right, N; distance of the camera, m."""
 
@@ -37,6 +38,7 @@ class Walk:
         self.speed, self.force, distance = ROBOTS[name]
         robot = load_robot(name)
         spec = empty_arena()
+        mark_floor(spec)
         attach_robot(spec, robot, "robot0_")
         self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
@@ -79,6 +81,20 @@ class Walk:
         self.renderer.update_scene(self.data, self.camera)
         large = Image.fromarray(self.renderer.render())
         return large.resize(SIZE, Image.Resampling.LANCZOS)
+
+
+def mark_floor(spec: mujoco.MjSpec) -> None:
+    """Draw rulers of fields of half a metre on both sides of the way."""
+    for side in (-ASIDE, ASIDE):
+        for k in range(FIELDS):
+            spec.worldbody.add_geom(
+                type=mujoco.mjtGeom.mjGEOM_BOX,
+                size=[FIELD / 2, 0.04, 0.001],
+                pos=[(k - 2) * FIELD, side, 0.0],
+                rgba=[0.16, 0.35, 0.55, 1.0] if k % 2 else [0.95, 0.95, 0.95, 1.0],
+                contype=0,
+                conaffinity=0,
+            )
 
 
 def side_by_side(pictures: list[Image.Image]) -> Image.Image:

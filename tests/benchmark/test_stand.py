@@ -4,6 +4,7 @@ from feet import count, hold, lie_at, make, stand_at
 
 import wbc_suite
 from wbc_suite.errors import ConfigError
+from wbc_suite.evaluation import make_policy
 
 ACTIONS, HOLD = 380, 20
 
@@ -18,28 +19,58 @@ def test_only_all_actions_and_a_rest_are_a_success(env):
     stand_at(env, 0.0, 0.0)
     task = count(env, ACTIONS - 6)  # five actions are taken
     assert not task.success()
-    assert task.reward(shaped=True) == pytest.approx(0.9, abs=0.01)
+    assert task.reward(shaped=True) == pytest.approx(0.95, abs=0.01)
     assert count(env, 1).success()
     assert task.reward(shaped=True) == 1.0
 
 
+def test_a_robot_that_rests_elsewhere_has_no_success_and_less_reward(env):
+    env.reset(seed=0)
+    stand_at(env, 0.0, 0.0)
+    there = env.benchmark.reward(shaped=True)
+    for x, yaw in ((0.12, 0.0), (-0.12, 0.0), (0.0, 0.2), (0.0, -0.2)):
+        stand_at(env, x, 0.0, yaw)
+        task = count(env, 2 * ACTIONS)
+        assert task.standing.rests
+        assert not task.success()
+        assert task.reward(shaped=True) == pytest.approx(
+            there - 0.2 * np.tanh(abs(x)), abs=0.01
+        )
+    stand_at(env, 0.05, 0.0, 0.1)
+    assert count(env, 2 * HOLD).success()
+
+
+def test_the_way_back_is_observed_and_begins_at_zero(env):
+    for seed in (3, 4):
+        seen, _ = env.reset(seed=seed)
+        assert np.abs(seen["robot_to_start"]).max() < 1e-3
+        stand_at(env, 1.0, 0.5, np.pi / 2)
+        seen, *_ = env.step(env.hold_action)
+        assert seen["robot_to_start"] == pytest.approx(
+            [-0.5, 1.0, -np.pi / 2], abs=0.02
+        )
+
+
 @pytest.mark.slow
-def test_spot_withstands_the_pushes_and_the_episode_succeeds(env):
-    env.reset(seed=1)
-    successes = []
-    for _ in range(env.horizon):
-        *_, terminated, _, info = env.step(env.hold_action)
-        assert not terminated
-        successes.append(info["success"])
-    assert not any(successes[: ACTIONS - 1])
-    assert successes[-1]
+def test_holding_does_not_solve_it_and_returning_does(env):
+    solved = {"hold": 0, "expert": 0}
+    for name in solved:
+        for seed in (1, 2):
+            seen, _ = env.reset(seed=seed)
+            policy = make_policy(name, env, seed)
+            for _ in range(env.horizon):
+                seen, *_, info = env.step(policy(seen))
+                if info["success"]:
+                    solved[name] += 1
+                    break
+    assert solved == {"hold": 0, "expert": 2}
 
 
 def test_pushes_act_on_the_trunk_for_a_tenth_of_a_second(env):
     env.reset(seed=3)
     data, trunk = env.simulation.data, env.benchmark.standing.trunk
     first = env.benchmark.pushes[0]
-    assert 200.0 <= np.linalg.norm(first.force) <= 400.0
+    assert 150.0 <= np.linalg.norm(first.force) <= 300.0
     before, after = int(first.start / 0.05), int(np.ceil(first.stop / 0.05))
     speed = 0.0
     for k in range(after + 1):
@@ -90,7 +121,7 @@ def test_the_reward_falls_with_tilt_and_speed(env):
     still = env.benchmark.reward(shaped=True)
     env.simulation.data.qvel[0] = 0.5
     moving = env.benchmark.reward(shaped=True)
-    assert moving == pytest.approx(still - 0.3 * np.tanh(1.0), abs=0.01)
+    assert moving == pytest.approx(still - 0.25 * np.tanh(1.0), abs=0.01)
 
 
 def test_robots_on_bases_are_refused():

@@ -1,5 +1,6 @@
 """Episodes are played as asked, whoever plays them."""
 
+import numpy as np
 import pytest
 
 from wbc_suite.errors import ConfigError, UnknownNameError
@@ -9,7 +10,8 @@ from wbc_suite.evaluation import (
     plan_rollouts,
     run_rollouts,
 )
-from wbc_suite.executors import Processes, Serial, run_items
+from wbc_suite.evaluation.results import collect
+from wbc_suite.executors import Outcome, Processes, Serial, run_items
 from wbc_suite.recording import Dataset
 
 CASE = Case(
@@ -118,3 +120,67 @@ class Closing:
 
 def _fields(case):
     return {name: getattr(case, name) for name in case.__slots__}
+
+
+class Faulty:
+    """Fails in three of four episodes, each time in another way."""
+
+    def __init__(self, env, rng):
+        self.env, self.kind = env, env.np_random_seed % 8
+
+    def __call__(self, observation):
+        action = self.env.hold_action
+        match self.kind:
+            case 1:
+                raise ValueError("no idea")
+            case 2:
+                return action[:-1]
+            case 3:
+                action[2] = np.nan
+            case 4:
+                while True:  # a policy that hangs
+                    pass
+            case 5:
+                return "left"
+            case 6:
+                raise ConfigError("not configured")
+        return action
+
+
+def test_a_failing_policy_loses_its_episode_and_no_other(tmp_path):
+    fields = _fields(CASE) | {"policy": f"{__name__}:Faulty", "action_time": 0.5}
+    case = Case(**fields)
+    items = plan_rollouts([case], seeds=range(60), chunk=30)
+    outcomes = run_items(run_rollouts, items, folder=tmp_path, executor=Serial())
+    results = collect({case: items}, outcomes, seconds=1.0)
+    figures = results.figures()
+    assert figures["episodes"] == 60
+    assert figures["failed_items"] == 0
+    assert [e["seed"] for e in results.episodes[case]] == [*range(60)]
+    assert figures["cases"][0]["errors"] == {
+        "exception": 8 + 7 + 7,  # of 1, 5 and 6
+        "action of a wrong shape": 8,
+        "action not finite": 8,
+        "action out of time": 7,
+    }
+    told = {e["seed"] % 8: e["text"] for e in figures["errors"]}
+    assert told[1] == "ValueError: no idea"
+    assert told[2] == "An action has shape (7,); the environment's is (8,)."
+    assert told[3] == "1 of 8 values."
+    assert told[6] == "ConfigError: not configured"
+    lengths = {e["seed"] % 8: e["steps"] for e in results.episodes[case]}
+    assert lengths[0] == lengths[7] == 5
+
+
+def test_an_episode_out_of_time_and_a_dead_worker_are_failures(tmp_path):
+    case = Case(**_fields(CASE) | {"policy": "hold", "episode_time": 1e-9})
+    (item,) = plan_rollouts([case], seeds=range(2), chunk=2)
+    (outcome,) = run_items(run_rollouts, [item], folder=tmp_path, executor=Serial())
+    for found, kind in (
+        (outcome, "episode out of time"),
+        (Outcome(name=item.name, error="It died."), "worker died"),
+    ):
+        figures = collect({case: [item]}, [found], seconds=1.0).figures()
+        assert figures["episodes"] == 2
+        assert figures["success_rate"] == 0.0
+        assert figures["cases"][0]["errors"] == {kind: 2}

@@ -5,6 +5,7 @@ import pinocchio as pin
 import pytest
 
 import wbc_suite
+from wbc_suite.benchmark import BENCHMARKS, load_benchmark
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.evaluation import make_policy
 from wbc_suite.experts import EXPERTS, expert, register_expert
@@ -41,6 +42,31 @@ def test_the_expert_solves_its_benchmark(name):
         assert success, f"seed {seed}"
         assert min(rewards) >= 0.0
         assert rewards[-1] == 1.0 > max(rewards[:-1])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "robots"),
+    [
+        ("Stand", ["Spot"]),
+        ("Reach", ["SpotWithArm", "GR1FreeBody"]),
+        ("WalkTo", ["Spot", "GR1FreeBody"]),
+        ("LocoLift", ["SpotWithArm", "GR1FreeBody"]),
+        ("Carry", ["GR1FreeBody"]),
+    ],
+)
+def test_robots_on_their_feet_have_experts(name, robots):
+    for robot in robots:
+        env = wbc_suite.make(name, robots=robot, reward_shaping=True)
+        rewards, success = solve(env, 1)
+        assert success, robot
+        assert rewards[-1] == 1.0 > max(rewards[:-1])
+
+
+def test_each_benchmark_has_an_expert():
+    for name in BENCHMARKS:
+        benchmark = type(load_benchmark(name))
+        assert {k.__name__ for k in benchmark.__mro__} & {*EXPERTS}, name
 
 
 @pytest.mark.slow

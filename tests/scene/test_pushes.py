@@ -70,6 +70,19 @@ def test_the_impulse_does_not_depend_on_how_steps_are_grouped(period):
     assert not data.xfrc_applied.any()
 
 
+def test_pushes_come_from_one_side_within_the_spread():
+    for spread in (0.0, 0.5, 1.0):
+        config = CONFIG.model_copy(update={"spread": spread})
+        for seed in range(5):
+            rng = np.random.default_rng(seed)
+            pushes = draw_pushes(config, rng, body=1, until=60.0)
+            force = np.array([push.force[:2] for push in pushes])
+            directions = force / np.linalg.norm(force, axis=1, keepdims=True)
+            least = (directions @ directions.T).min()
+            assert least >= np.cos(2.0 * spread) - 1e-9
+            assert (least < 0.999) == (spread > 0.0)
+
+
 def test_without_pushes_other_forces_are_left_alone():
     model = mujoco.MjModel.from_xml_string(BALL)
     data = mujoco.MjData(model)

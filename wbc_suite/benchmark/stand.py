@@ -14,6 +14,7 @@ from wbc_suite.benchmark.standing import (
     StandingConfig,
     add_floor_cameras,
     arrange_on_feet,
+    wrapped,
 )
 from wbc_suite.control import RobotState
 from wbc_suite.robot import RobotDescription
@@ -23,18 +24,23 @@ from wbc_suite.sensing.reading import Reading, computed
 from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Vector
 
+MEMORY = 4
+"""Entries of user data: actions that are taken, and the place of the start."""
+
 
 class RewardConfig(FrozenModel):
     """Numbers of the reward; see `Stand.progress`."""
 
     upright: NonNegativeFloat
     rest: NonNegativeFloat
+    back: NonNegativeFloat
     speed_scale: PositiveFloat
+    back_scale: PositiveFloat
 
     @model_validator(mode="after")
     def _stays_below_one(self) -> "RewardConfig":
-        if self.upright + self.rest >= 1.0:
-            raise ValueError("upright + rest must be below 1")
+        if self.upright + self.rest + self.back >= 1.0:
+            raise ValueError("upright + rest + back must be below 1")
         return self
 
 
@@ -46,6 +52,8 @@ class StandConfig(ObjectBenchmarkConfig):
         pushes: Pushes on the trunk.
         until: When the last push has ended, s from the start.
         actions: Actions before a success; the pushes end earlier.
+        near: Greatest distance of the trunk from its start at a success, m.
+        facing: Greatest angle of its heading to that at the start, rad.
         reward: Numbers of the reward.
     """
 
@@ -53,11 +61,13 @@ class StandConfig(ObjectBenchmarkConfig):
     pushes: PushConfig
     until: PositiveFloat
     actions: PositiveInt
+    near: PositiveFloat
+    facing: PositiveFloat
     reward: RewardConfig
 
 
 class Stand(ObjectBenchmark):
-    """The robot is to withstand pushes from random directions, and to come to rest.
+    """The robot is to withstand pushes, and to rest where it stood at the start.
 
     Args:
         path: `tasks/stand.toml`, or a file of the same form.
@@ -82,7 +92,7 @@ class Stand(ObjectBenchmark):
         """Add cameras."""
         self.standing.reserve(spec)
         self._entry = spec.nuserdata
-        spec.nuserdata += 1
+        spec.nuserdata += MEMORY
         add_floor_cameras(spec)
 
     def objects(self) -> Sequence[SceneObject]:
@@ -95,26 +105,49 @@ class Stand(ObjectBenchmark):
         """Look up the robot."""
         super().bind(model, data, robots)
         self.standing.bind(model, data, robots[0])
-        self._taken: Vector = data.userdata[self._entry : self._entry + 1]
+        memory: Vector = data.userdata[self._entry : self._entry + MEMORY]
+        self._taken, self._start = memory[:1], memory[1:]
 
     def reset(self, rng: np.random.Generator) -> None:
-        """Draw the pushes."""
+        """Draw the pushes, and note where the robot stands."""
         config, body = self.config, self.standing.trunk
         self.pushes = draw_pushes(config.pushes, rng, body=body, until=config.until)
+        x, y, _ = self.standing.position.tolist()
+        self._start[:] = x, y, self.standing.heading
 
     def observables(self) -> dict[str, Reading]:
-        """Return the share of the actions that are taken, `progress`."""
+        """Return the share of the actions that are taken, and the way back.
+
+        `robot_to_start` is the way forward and left, m, and the turn, rad, in the
+        heading of the robot.
+        """
         share = 1.0 / self.config.actions
-        return {"progress": computed(1, lambda: min(share * self._taken.item(0), 1.0))}
+        return {
+            "progress": computed(1, lambda: min(share * self._taken.item(0), 1.0)),
+            "robot_to_start": computed(3, self.way_back),
+        }
+
+    def way_back(self) -> tuple[float, float, float]:
+        """Return the way to the start: forward and left, m, and the turn, rad."""
+        x, y, heading = self._start.tolist()
+        turn = wrapped(heading - self.standing.heading)
+        return *self.standing.offset_to(x, y), turn
+
+    @property
+    def is_back(self) -> bool:
+        """Whether the robot is where it stood at the start, and faces as it did."""
+        forward, left, turn = self.way_back()
+        near = math.hypot(forward, left) < self.config.near
+        return near and abs(turn) < self.config.facing
 
     def after_step(self) -> None:
-        """Note a fall, and how long the robot has rested after all actions."""
+        """Note a fall, and how long the robot has rested at its start in the end."""
         self._taken[0] += 1.0
         done = self._taken[0] > self.config.actions - self.config.standing.hold
-        self.standing.observe(done and self.standing.rests)
+        self.standing.observe(done and self.is_back and self.standing.rests)
 
     def success(self) -> bool:
-        """Whether the robot has not fallen in all actions and rests on its feet now."""
+        """Whether the robot has not fallen in all actions and rests at its start."""
         return self.standing.held
 
     def failure(self) -> str | None:
@@ -124,14 +157,16 @@ class Stand(ObjectBenchmark):
     def progress(self) -> float:
         """Return the shaped reward.
 
-        With the tilt t and the speed v of the trunk, it is 0 after a fall, and else
+        With the tilt t and the speed v of the trunk, and its distance d from the start,
+        it is 0 after a fall, and else
 
             upright max(cos t, 0) + rest (1 - tanh(speed_scale v))
+            + back (1 - tanh(back_scale d))
         """
         numbers, standing = self.config.reward, self.standing
         if standing.fall() is not None:
             return 0.0
         still = 1.0 - math.tanh(numbers.speed_scale * standing.speed)
-        return (
-            numbers.upright * max(math.cos(standing.tilt), 0.0) + numbers.rest * still
-        )
+        away = math.tanh(numbers.back_scale * math.hypot(*self.way_back()[:2]))
+        reward = numbers.upright * max(math.cos(standing.tilt), 0.0)
+        return reward + numbers.rest * still + numbers.back * (1.0 - away)

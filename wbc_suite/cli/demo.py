@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 RATE = 50  # Hz, of actions
 PERIOD = 4.0  # s, of one figure
+POINTS = 90  # of a drawn figure
 REST = 1.0  # s, standing still at the end
 FRAMES_PER_SECOND = 10
 ARM = 0.6  # m; length of an arm that moves through the whole figure
@@ -107,6 +108,13 @@ def _reach(
     layout = env.action_layout
     start = layout.unpack(env.hold_action)
     model, data = env.simulation.model, env.simulation.data
+    curves = [
+        Mark(
+            position=start[name][:3] + size * _mirrored(_figure(t), name), radius=0.006
+        )
+        for name, size in sizes.items()
+        for t in np.linspace(0.0, PERIOD, POINTS)
+    ]
     errors, step_times, pictures = [], [], []
     with Camera(model, data, width=480, height=480, subject="robot0_") as camera:
         for step in range(round(seconds * RATE)):
@@ -124,7 +132,7 @@ def _reach(
             errors.append([frames[name]["position_error"] for name in sizes])
             if step % (RATE // FRAMES_PER_SECOND) == 0:
                 marks = [Mark(position=goal[:3]) for goal in goals.values()]
-                pictures.append(camera.take(data, marks))
+                pictures.append(camera.take(data, [*curves, *marks]))
     return np.array(errors), np.array(step_times), pictures
 
 
@@ -150,8 +158,8 @@ def _report(
     for name, column in zip(names, 1e3 * errors.T, strict=True):
         moving = column[: -round(REST * RATE)]
         print(
-            f"  {name:<11} behind its moving target by {np.median(moving):5.2f} mm "
-            f"(median), {moving.max():5.2f} mm (worst); at rest {column[-1]:.3f} mm"
+            f"  {name:<11} at rest {column[-1]:.3f} mm from its target; while it moves "
+            f"{np.median(moving):.2f} mm behind (median), {moving.max():.2f} mm (worst)"
         )
     median, slowest = np.percentile(1e3 * step_times, [50, 99])
     print(f"  step time   median {median:5.2f} ms, 99 % under {slowest:.2f} ms")

@@ -5,6 +5,7 @@ import json
 import sys
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -82,6 +83,13 @@ WorkersOption = Annotated[
 FilmsOption = Annotated[
     int, typer.Option(min=0, help="Failures of each case to film for the report.")
 ]
+ActionTimeOption = Annotated[
+    float,
+    typer.Option(min=0.0, help="Most time of the policy for an action, s; 0: any."),
+]
+EpisodeTimeOption = Annotated[
+    float, typer.Option(min=0.0, help="Most time of an episode, s; 0: any.")
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print only JSON.")]
 
 
@@ -99,6 +107,8 @@ def evaluate(
     stop: StopOption = True,
     record: RecordOption = False,
     films: FilmsOption = 0,
+    action_time: ActionTimeOption = 60.0,
+    episode_time: EpisodeTimeOption = 3600.0,
     output: OutputOption = Path("artifacts/evaluation"),
     executor: ExecutorOption = "process",
     workers: WorkersOption = None,
@@ -108,6 +118,8 @@ def evaluate(
 ) -> None:
     """Run many episodes and report success rates; a stopped command can continue.
 
+    An episode in which the policy raises an error, gives an invalid action or takes too
+    long is a failure, and its kind of error is reported; the others go on.
     Writes summary.json, eval_info.json (LeRobot's fields) and report.html. Example:
     wbc-suite evaluate Lift Door --robots Panda --robots UR5e --policy my_module:Policy
     """
@@ -121,9 +133,10 @@ def evaluate(
     arguments |= {"terminate_on_success": stop}
     if horizon is not None:
         arguments["horizon"] = horizon
-    cases = _cases(
-        benchmarks, robots, controller, policy, arguments=arguments, record=record
-    )
+    cases = [
+        replace(case, record=record, action_time=action_time, episode_time=episode_time)
+        for case in _cases(benchmarks, robots, controller, policy, arguments=arguments)
+    ]
     items = {}
     for case in cases:
         seeds: Sequence[int] = episode_seeds(case.benchmark, episodes, base=base_seed)
@@ -194,7 +207,6 @@ def _cases(
     policies: Sequence[str],
     *,
     arguments: dict[str, str | int | float | bool],
-    record: bool,
 ) -> "list[Case]":
     """Return every combination; raise an error at once for an unknown robot."""
     from wbc_suite import load_robot
@@ -209,7 +221,6 @@ def _cases(
             robots=tuple(name.strip() for name in together.split(",")),
             controller=controller,
             policy=policy,
-            record=record,
             arguments=tuple(sorted(arguments.items())),
         )
         for policy, benchmark, together, controller in every
@@ -250,6 +261,7 @@ def _print_tables(results: "Results") -> None:
         low, high = s.wilson
         shares = f"{s.success_rate:.1%}", f"{low:.1%} to {high:.1%}"
         broken = f" ({s.physics_errors} diverged)" if s.physics_errors else ""
+        broken += "".join(f" ({n} {kind})" for kind, n in s.errors.items())
         steps = f"{s.mean_steps:.0f}{broken}", f"{s.steps_per_second:.0f}"
         row = str(s.episodes), *shares, f"{s.mean_return:.3g}", *steps
         table.add_row(printable(case.title), *row)

@@ -10,11 +10,17 @@ from wbc_suite.evaluation.policies import (
     replicate,
 )
 from wbc_suite.evaluation.policy_socket import PolicyServer
-from wbc_suite.evaluation.rollouts import Case, plan_rollouts, run_rollouts
+from wbc_suite.evaluation.results import episodes_of
+from wbc_suite.evaluation.rollouts import (
+    Case,
+    ErrorKind,
+    PolicyError,
+    plan_rollouts,
+    run_rollouts,
+)
 from wbc_suite.evaluation.seeds import episode_seed, episode_seeds
 from wbc_suite.evaluation.statistics import (
     Summary,
-    episodes_of,
     interquartile_mean,
     probability_of_improvement,
     stratified_bootstrap,
@@ -26,7 +32,9 @@ __all__ = [
     "POLICIES",
     "Case",
     "Comparison",
+    "ErrorKind",
     "Policy",
+    "PolicyError",
     "PolicyServer",
     "Summary",
     "check_policy",

@@ -3,10 +3,11 @@
 import datetime
 import html
 import platform
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from importlib import resources
 from importlib.metadata import version
 from string import Template
+from typing import Any
 
 from wbc_suite.evaluation.results import Results
 from wbc_suite.evaluation.rollouts import Case
@@ -112,11 +113,7 @@ def _comparisons(results: Results) -> str:
 
 def _failures(results: Results) -> str:
     reasons = {
-        case.title: [
-            str(e["physics_error"] or e["failure"] or "not solved in time")
-            for e in episodes
-            if not e["succeeded"]
-        ]
+        case.title: [_reason(e) for e in episodes if not e["succeeded"]]
         for case, episodes in results.episodes.items()
     }
     rows = [
@@ -136,6 +133,13 @@ def _failures(results: Results) -> str:
     return _table(("case", "reason", "episodes"), rows) + (
         f'<div class="films">{films}</div>'
     )
+
+
+def _reason(episode: Mapping[str, Any]) -> str:
+    """Return why an episode was no success."""
+    if error := episode.get("error"):
+        return f"{error['kind']}: {error['text']}"
+    return str(episode["physics_error"] or episode["failure"] or "not solved in time")
 
 
 def _percent(interval: Interval, *, sign: bool = False) -> str:

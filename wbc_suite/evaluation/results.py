@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 
 from wbc_suite.evaluation.comparison import Comparison, compare
-from wbc_suite.evaluation.rollouts import Case
+from wbc_suite.evaluation.rollouts import Case, ErrorKind, failed_episode
 from wbc_suite.evaluation.statistics import (
     Summary,
-    episodes_of,
     interquartile_mean,
     stratified_bootstrap,
     success_interval,
@@ -85,6 +84,12 @@ class Results:
                 ),
             }
         return overall | {
+            "errors": [
+                {"case": case.title, "seed": e["seed"]} | e["error"]
+                for case, episodes in self.episodes.items()
+                for e in episodes
+                if e.get("error")
+            ],
             "failed_items": self.failed,
             "seconds": round(self.seconds, 2),
             "cases": [_case(c) | asdict(s) for c, s in self.summaries.items()],
@@ -104,7 +109,7 @@ def collect(
     """Collect the outcomes of `run_rollouts` by case."""
     by_name = {outcome.name: outcome for outcome in outcomes}
     played = {
-        case: episodes_of(by_name[item.name] for item in mine)
+        case: [e for item in mine for e in episodes_of(item, by_name[item.name])]
         for case, mine in items.items()
     }
     played = {case: episodes for case, episodes in played.items() if episodes}
@@ -116,6 +121,16 @@ def collect(
         failed=sum(outcome.error is not None for outcome in outcomes),
         seconds=seconds,
     )
+
+
+def episodes_of(item: WorkItem, outcome: Outcome) -> list[dict[str, Any]]:
+    """Return the episodes of an item of `run_rollouts`; they failed if it failed."""
+    if outcome.error is None:
+        return outcome.result["episodes"]
+    return [
+        failed_episode(seed, ErrorKind.WORKER, outcome.error)
+        for seed in item.payload["seeds"]
+    ]
 
 
 def _comparisons(

@@ -6,16 +6,20 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
+from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
 import gymnasium
+import numpy as np
 
 from wbc_suite.envs import RobotEnv, make
-from wbc_suite.errors import ConfigError
-from wbc_suite.evaluation.policies import make_policy
+from wbc_suite.errors import ConfigError, WbcError, shortened
+from wbc_suite.evaluation.policies import Policy, make_policy
+from wbc_suite.evaluation.time_limit import TimeLimitExceeded, time_limit
 from wbc_suite.executors import WorkItem
 from wbc_suite.recording.dataset import parts_folder
+from wbc_suite.typing import Vector
 from wbc_suite.wrappers import DataCollection
 
 
@@ -24,7 +28,9 @@ class Case:
     """An environment and the policy that acts in it.
 
     Benchmark and controller are names or files. `arguments` are further ones of
-    `wbc_suite.make`, plain JSON data, sorted.
+    `wbc_suite.make`, plain JSON data, sorted. `action_time` and `episode_time` are the
+    most wall time of the policy for an action (the first may compile), and of an
+    episode, s; 0 for no limit.
     """
 
     benchmark: str
@@ -32,6 +38,8 @@ class Case:
     controller: str | None = None
     policy: str = "random"
     record: bool = False
+    action_time: float = 60.0
+    episode_time: float = 3600.0
     arguments: tuple[tuple[str, str | int | float | bool], ...] = ()
 
     @property
@@ -74,8 +82,9 @@ def run_rollouts(item: WorkItem, folder: Path) -> dict[str, Any]:
     """Run an item; return `episodes`, one dictionary per episode.
 
     An episode counts as a success if the benchmark is solved at any step (`succeeded`),
-    or at the last step (`success`). A physics error ends it as a failure. Recordings go
-    to `episodes` in the folder, one file per item.
+    or at the last step (`success`). A physics error ends it as a failure. So does an
+    error of the policy, whose kind and text are in `error`; other episodes go on.
+    Recordings go to `episodes` in the folder, one file per item.
     """
     payload = item.payload
     env = inner = make_case(payload)
@@ -85,13 +94,60 @@ def run_rollouts(item: WorkItem, folder: Path) -> dict[str, Any]:
         shutil.rmtree(parts_folder(path), ignore_errors=True)
         env = DataCollection(inner, path)
     try:
-        episodes = [
-            run_episode(env, inner, seed, payload["policy"])
-            for seed in payload["seeds"]
-        ]
+        episodes = [_attempt(env, inner, seed, payload) for seed in payload["seeds"]]
     finally:
         env.close()
     return {"episodes": episodes}
+
+
+class ErrorKind(StrEnum):
+    """What ended an episode in which the policy failed."""
+
+    EXCEPTION = "exception"
+    NOT_FINITE = "action not finite"
+    SHAPE = "action of a wrong shape"
+    ACTION_TIME = "action out of time"
+    EPISODE_TIME = "episode out of time"
+    WORKER = "worker died"
+
+
+class PolicyError(WbcError, RuntimeError):
+    """A policy gave no valid action."""
+
+    def __init__(self, kind: ErrorKind, text: str) -> None:
+        super().__init__(text)
+        self.kind = kind
+
+
+def failed_episode(seed: int, kind: ErrorKind, text: str) -> dict[str, Any]:
+    """Return the figures of an episode in which the policy failed."""
+    return {
+        "seed": seed,
+        "success": False,
+        "succeeded": False,
+        "return": 0.0,
+        "max_reward": 0.0,
+        "steps": 0,
+        "seconds": 0.0,
+        "physics_error": None,
+        "failure": None,
+        "error": {"kind": kind, "text": shortened(text, 300)},
+    }
+
+
+def _attempt(
+    env: gymnasium.Env[Any, Any], inner: RobotEnv, seed: int, payload: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Run an episode; an error of the policy makes it a failure."""
+    limits = {key: payload[key] for key in ("action_time", "episode_time")}
+    try:
+        return run_episode(env, inner, seed, payload["policy"], **limits)
+    except PolicyError as error:
+        return failed_episode(seed, error.kind, str(error))
+    except WbcError:
+        raise  # there is no such policy or environment: no episode can be played
+    except Exception as error:  # noqa: BLE001 - a policy may raise anything
+        return failed_episode(seed, ErrorKind.EXCEPTION, _text_of(error))
 
 
 def make_case(payload: Mapping[str, Any], **more: Any) -> RobotEnv:
@@ -113,10 +169,17 @@ def run_episode(
     *,
     begin: Callable[[], None] = lambda: None,
     after_step: Callable[[], None] = lambda: None,
+    action_time: float = 0.0,
+    episode_time: float = 0.0,
 ) -> dict[str, Any]:
     """Run an episode of a policy; `begin` is called after the reset.
 
-    It ends as the environment says, or where the policy is `finished`.
+    It ends as the environment says, or where the policy is `finished`. For the limits
+    of time see `Case`.
+
+    Raises:
+        PolicyError: If the policy raises an error, or an action is not finite, has a
+            wrong shape or takes too long.
     """
     observation, info = env.reset(seed=seed)
     begin()
@@ -125,7 +188,10 @@ def run_episode(
     with ExitStack() as stack:
         stack.callback(getattr(policy, "close", lambda: None))
         while not over:
-            action = policy(observation)
+            if 0.0 < episode_time < time.perf_counter() - start:
+                text = f"It took more than {episode_time:g} s."
+                raise PolicyError(ErrorKind.EPISODE_TIME, text)
+            action = _action(policy, observation, inner, action_time)
             observation, reward, terminated, truncated, info = env.step(action)
             rewards.append(float(reward))
             succeeded = succeeded or bool(info["success"])
@@ -141,4 +207,31 @@ def run_episode(
         "seconds": round(time.perf_counter() - start, 4),
         "physics_error": info.get("physics_error"),
         "failure": info.get("failure"),
+        "error": None,
     }
+
+
+def _action(
+    policy: Policy, observation: Mapping[str, Any], env: RobotEnv, seconds: float
+) -> Vector:
+    """Return the action of a policy, checked; raises PolicyError."""
+    try:
+        with time_limit(seconds):
+            action = np.asarray(policy(observation), dtype=np.float64)
+    except TimeLimitExceeded:
+        text = f"An action took more than {seconds:g} s."
+        raise PolicyError(ErrorKind.ACTION_TIME, text) from None
+    except Exception as error:
+        raise PolicyError(ErrorKind.EXCEPTION, _text_of(error)) from error
+    wanted = env.action_space.shape
+    if action.shape != wanted:
+        text = f"An action has shape {action.shape}; the environment's is {wanted}."
+        raise PolicyError(ErrorKind.SHAPE, text)
+    if not np.isfinite(action).all():
+        text = f"{np.count_nonzero(~np.isfinite(action))} of {action.size} values."
+        raise PolicyError(ErrorKind.NOT_FINITE, text)
+    return action
+
+
+def _text_of(error: Exception) -> str:
+    return f"{type(error).__name__}: {error}"

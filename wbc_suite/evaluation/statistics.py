@@ -3,7 +3,8 @@
 SciPy is imported where it is used: that takes half a second.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections import Counter
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
@@ -11,7 +12,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wbc_suite.errors import ConfigError
-from wbc_suite.executors import Outcome
 from wbc_suite.typing import Vector
 
 CONFIDENCE = 0.95
@@ -32,6 +32,7 @@ class Summary:
         mean_return: Mean of the sums of rewards.
         iqm_return: Mean of the middle half of them, and its bootstrap interval.
         physics_errors: Number of episodes that a physics error ended.
+        errors: Number of episodes that an error of the policy ended, by kind.
         steps_per_second: Per worker, policy included.
     """
 
@@ -45,12 +46,8 @@ class Summary:
     iqm_return_interval: Interval
     mean_steps: float
     physics_errors: int
+    errors: dict[str, int]
     steps_per_second: float
-
-
-def episodes_of(outcomes: Iterable[Outcome]) -> list[dict[str, Any]]:
-    """Return the episodes of `run_rollouts`; failed items have none."""
-    return [e for outcome in outcomes for e in outcome.result.get("episodes", [])]
 
 
 def summarise(episodes: Sequence[dict[str, Any]]) -> Summary:
@@ -70,6 +67,7 @@ def summarise(episodes: Sequence[dict[str, Any]]) -> Summary:
         iqm_return_interval=stratified_bootstrap([returns], interquartile_mean),
         mean_steps=steps / len(distinct),
         physics_errors=sum(e["physics_error"] is not None for e in distinct),
+        errors=dict(Counter(e["error"]["kind"] for e in distinct if e.get("error"))),
         steps_per_second=steps / max(sum(float(e["seconds"]) for e in distinct), 1e-9),
     )
 

@@ -69,6 +69,11 @@ class Arm:
         self.coupled = False
 
     @property
+    def goal(self) -> pin.SE3 | None:
+        """Present goal of the frame of the grasp; None before the hand is moved."""
+        return self._goal if self._moves else None
+
+    @property
     def pose(self) -> pin.SE3:
         """Measured pose T_wh of the frame of the present grasp."""
         return self._port.measure() * self._offset(self.grasp)

@@ -6,24 +6,32 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from wbc_suite.benchmark import (
+    Carry,
     Door,
     Lift,
+    LocoLift,
     NutAssembly,
     ObjectBenchmark,
     PickPlace,
+    Reach,
     Stack,
+    Stand,
     ToolHang,
     TwoArmHandover,
     TwoArmLift,
     TwoArmPegInHole,
     TwoArmTransport,
+    WalkTo,
     Wipe,
 )
 from wbc_suite.envs import RobotEnv
 from wbc_suite.errors import UnknownNameError
+from wbc_suite.experts.carry import carry
 from wbc_suite.experts.door import door
 from wbc_suite.experts.lift import lift
+from wbc_suite.experts.loco_lift import loco_lift
 from wbc_suite.experts.nut_assembly import nut_assembly
+from wbc_suite.experts.on_feet import reach, stand, walk_to
 from wbc_suite.experts.pick_place import pick_place
 from wbc_suite.experts.stack import stack
 from wbc_suite.experts.tool_hang import tool_hang
@@ -62,7 +70,7 @@ def expert(
 
     Raises:
         UnknownNameError: If the benchmark has no expert.
-        ConfigError: If the action has no poses of hands.
+        ConfigError: If the action has neither poses of hands nor a walk.
     """
     benchmark = env.benchmark
     known = dict(EXPERTS[name] for name in EXPERTS)
@@ -81,14 +89,19 @@ def expert(
     return drive
 
 
+register_expert(Carry, carry)
 register_expert(Door, door)
 register_expert(Lift, lift)
+register_expert(LocoLift, loco_lift)
 register_expert(NutAssembly, nut_assembly)
 register_expert(PickPlace, pick_place)
+register_expert(Reach, reach)
 register_expert(Stack, stack)
+register_expert(Stand, stand)
 register_expert(ToolHang, tool_hang)
 register_expert(TwoArmHandover, two_arm_handover)
 register_expert(TwoArmLift, two_arm_lift)
 register_expert(TwoArmPegInHole, two_arm_peg_in_hole)
+register_expert(WalkTo, walk_to)
 register_expert(Wipe, wipe)
 register_expert(TwoArmTransport, two_arm_transport)

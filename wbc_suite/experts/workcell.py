@@ -16,6 +16,7 @@ from wbc_suite.envs import RobotEnv
 from wbc_suite.errors import ConfigError
 from wbc_suite.experts.arm import Arm
 from wbc_suite.experts.mobile_base import MobileBase, mobile_base
+from wbc_suite.experts.walker import Walker, walker_of
 from wbc_suite.scene.objects import ObjectState
 from wbc_suite.scene.objects.grasp_site import GraspSite
 from wbc_suite.sensing.hands import Hand, pairs_in_contact
@@ -34,10 +35,11 @@ class Workcell(Generic[B]):
     Attributes:
         benchmark: The environment's benchmark.
         arms: One for each hand of the benchmark that the action moves.
+        walker: What walks a robot on its feet; None for other robots.
         rng: Generator of the episode.
 
     Raises:
-        ConfigError: If the action has no pose of a hand.
+        ConfigError: If the action has neither the pose of a hand nor a walk.
     """
 
     def __init__(self, env: RobotEnv, benchmark: B, rng: np.random.Generator) -> None:
@@ -52,7 +54,10 @@ class Workcell(Generic[B]):
             prefix: mobile_base(env, state, self._between_hands(state))
             for prefix, state in {a.state.prefix: a.state for a in self.arms}.items()
         }
-        if not self.arms:
+        self.walker: Walker | None = walker_of(
+            env, getattr(benchmark, "standing", None)
+        )
+        if not self.arms and self.walker is None:
             names = ", ".join(s.name for s in env.action_layout.slices)
             raise ConfigError(
                 f"An expert needs a controller of hand poses, such as OSC_POSE; this "
@@ -64,7 +69,7 @@ class Workcell(Generic[B]):
         action = self._env.hold_action
         for arm in self.arms:
             arm.write(action, self.period)
-        for base in filter(None, self._bases.values()):
+        for base in filter(None, (self.walker, *self._bases.values())):
             base.write(action)
         return action
 

@@ -23,11 +23,14 @@ class PushConfig(FrozenModel):
         interval: Least and greatest time from the start of one push to that of the
             next, and from the start of an episode to the first, s.
         duration: Duration of each, s.
+        spread: Greatest angle of a push to a direction that is drawn for each episode,
+            rad; at most pi, which is any direction.
     """
 
     force: tuple[Newtons, Newtons]
     interval: tuple[PositiveFloat, PositiveFloat]
     duration: PositiveFloat = 0.1
+    spread: float = Field(default=math.pi, ge=0.0, le=math.pi)
 
     @field_validator("force", "interval")
     @classmethod
@@ -59,9 +62,10 @@ def draw_pushes(
 ) -> tuple[Push, ...]:
     """Draw the pushes of an episode that end before `until`, s."""
     pushes: list[Push] = []
+    middle = rng.uniform(-math.pi, math.pi)
     start = float(rng.uniform(*config.interval))
     while start + config.duration <= until:
-        angle = rng.uniform(-math.pi, math.pi)
+        angle = middle + rng.uniform(-config.spread, config.spread)
         size = rng.uniform(*config.force)
         force = (size * math.cos(angle), size * math.sin(angle), 0.0)
         stop = start + config.duration
