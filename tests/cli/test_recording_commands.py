@@ -7,6 +7,7 @@ import pytest
 from PIL import Image
 
 from wbc_suite.cli import main
+from wbc_suite.experts import EXPERTS
 from wbc_suite.recording import Dataset
 
 
@@ -59,7 +60,8 @@ def test_a_film_that_cannot_be_written_is_said_before_anything_is_played(
 
 
 @pytest.mark.slow
-def test_a_benchmark_without_an_expert_is_refused(command, tmp_path):
+def test_a_benchmark_without_an_expert_is_refused(command, tmp_path, monkeypatch):
+    monkeypatch.delitem(EXPERTS._items, "reach")
     code, _, err = command(
         "record", "Reach", "--robots", "SpotWithArm", "--out", tmp_path / "a.hdf5"
     )

@@ -137,7 +137,8 @@ def test_letting_go_over_the_target_does_not_lower_the_reward():
         assert min(rewards[reached:]) > 0.5, name
 
 
-def test_a_benchmark_without_an_expert_is_named():
+def test_a_benchmark_without_an_expert_is_named(monkeypatch):
+    monkeypatch.delitem(EXPERTS._items, "reach")
     env = wbc_suite.make("Reach", robots="SpotWithArm")
     env.reset(seed=0)
     with pytest.raises(UnknownNameError, match="No expert named 'Reach'"):
