@@ -1,62 +1,120 @@
-"""Draw the picture of the teleoperation page: needs Chromium and playwright."""
+"""Draw the teleoperation page: GR1 lifts the cube by drags of its right hand.
+
+Needs Chromium and playwright. `film` gives what the browser shows on the way.
+"""
 
 import io
 import shutil
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
-import numpy as np
 import pinocchio as pin
 from PIL import Image
-from playwright.sync_api import sync_playwright
+from playwright.sync_api import Page, sync_playwright
 
 import wbc_suite
+from wbc_suite.devices.action_ports import limb_ports
+from wbc_suite.envs import RobotEnv
+from wbc_suite.evaluation import make_policy
+from wbc_suite.typing import Vector
 from wbc_suite.viewers.page_server import PageServer
 from wbc_suite.viewers.teleop_page import TeleopPage
 from wbc_suite.viewers.teleop_session import TeleopSession
 
 FILE = Path(__file__).parent / "images" / "teleop.jpg"
+HAND = "right_hand"
+SEED = 0
 RATE = 100.0  # Hz
-FLAGS = ["--no-sandbox", "--enable-unsafe-swiftshader", "--use-angle=swiftshader"]
-MOVES = {"right_hand": (0.06, -0.06, 0.14), "left_hand": (0.0, 0.06, 0.05)}
-PULL = np.array([0.10, -0.40, 0.02])  # m, of the right hand: the torso gives way
+SIZE = (1280, 800)  # pixels
+PACE = 0.1  # s, between two drags
+LOADING = 25.0  # s; the environment's light comes last
+FLAGS = [
+    "--no-sandbox",
+    "--enable-unsafe-swiftshader",
+    "--use-angle=swiftshader",
+    "--ignore-gpu-blocklist",
+    "--disable-background-networking",
+]
 
 
-def main() -> None:
-    """Move both of GR1's hands far, and keep what the browser shows."""
-    env = wbc_suite.make("Lift", robots="GR1", control_freq=RATE, horizon=10**7)
-    session = TeleopSession(env, period=1.0 / RATE)
+def drags() -> list[tuple[pin.SE3, Vector]]:
+    """Return poses of the hand in the world and positions of its gripper.
+
+    They are those of the expert, which lifts the cube of the same scene.
+    """
+    env = wbc_suite.make(
+        "Lift", robots="GR1", controller_configs="WHOLE_BODY_IK", horizon=10**7
+    )
+    assert isinstance(env, RobotEnv)
+    observation, _ = env.reset(seed=SEED)
+    policy, info = make_policy("expert", env, SEED), dict[str, Any]()
+    port, layout = limb_ports(env)[HAND], env.action_layout
+    found = []
+    while not info.get("success"):
+        action = policy(observation)
+        pose = port.decode(action[layout[HAND].start : layout[HAND].stop])
+        gripper = layout["right_gripper"]
+        found.append((pose, action[gripper.start : gripper.stop]))
+        observation, *_, info = env.step(action)
+    env.close()
+    return found
+
+
+@contextmanager
+def page_of(session: TeleopSession) -> Iterator[Page]:
+    """Open the page of a session in a browser."""
     page = TeleopPage(session, PageServer(port=0), label="GR1 · Lift")
     page.start()
-    session.start()
-    for name, offset in MOVES.items():
-        _pull(session, name, np.array(offset))
-    _pull(session, "right_hand", PULL)
     with sync_playwright() as playwright:
         chromium = shutil.which("chromium")
         browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
-        tab = browser.new_page(viewport={"width": 1280, "height": 800})
+        width, height = SIZE
+        tab = browser.new_page(viewport={"width": width, "height": height})
         tab.set_default_timeout(120_000)
         tab.goto(page.site.url)
-        time.sleep(25.0)  # the environment's light comes last
+        time.sleep(LOADING)
         notice = tab.get_by_text("Software WebGL").locator("xpath=../..")
         notice.locator("button").first.dispatch_event("click")
         time.sleep(8.0)
-        picture = Image.open(io.BytesIO(tab.screenshot()))
+        yield tab
         browser.close()
-    session.stop()
     page.stop()
-    picture.convert("RGB").save(FILE, quality=82, optimize=True)
 
 
-def _pull(session: TeleopSession, name: str, offset: np.ndarray) -> None:
-    """Drag a hand for two seconds, as fast as a browser sends."""
-    target = session.snapshot.limbs[name].target
-    session.grab(name, 0, target)
-    for part in np.linspace(0.0, 1.0, 40):
-        place = target.translation + part * offset
-        session.drag(name, 0, pin.SE3(target.rotation, place))
-        time.sleep(0.05)
+def film(every: int = 1) -> Iterator[Image.Image]:
+    """Yield what the page shows after each drag, or every so many of them."""
+    env = wbc_suite.make("Lift", robots="GR1", control_freq=RATE, horizon=10**7)
+    session = TeleopSession(env, period=1.0 / RATE, seed=SEED)
+    for limb in session.limbs.values():  # a browser that draws slowly is not gone
+        limb.ownership.timeout = 300.0
+    session.start()
+    with page_of(session) as tab:
+        session.grab(HAND, 0, session.snapshot.limbs[HAND].target)
+        for k, (pose, gripper) in enumerate(drags()):
+            session.drag(HAND, 0, pose)
+            for index, value in enumerate(gripper):
+                session.set_gripper("right_gripper", index, float(value))
+            time.sleep(PACE)
+            if k % every == 0:
+                yield _screenshot(tab)
+        session.release(HAND, 0)
+        time.sleep(3.0)  # figures of the last seconds are shown
+        yield _screenshot(tab)
+    session.stop()
+    env.close()
+
+
+def _screenshot(tab: Page) -> Image.Image:
+    return Image.open(io.BytesIO(tab.screenshot())).convert("RGB")
+
+
+def main() -> None:
+    """Draw the page once the cube is lifted."""
+    *_, last = film(every=1000)
+    last.save(FILE, quality=82, optimize=True)
 
 
 if __name__ == "__main__":

@@ -34,7 +34,8 @@ ROBOTS = {"GR1FreeBody": (0.3, 200.0, 3.0), "SpotWithArm": (0.6, 450.0, 2.8)}
 class Walk:
     """One robot that walks in the studio."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, *, size: tuple[int, int] = SIZE) -> None:
+        self._size = size
         self.speed, self.force, distance = ROBOTS[name]
         robot = load_robot(name)
         spec = empty_arena()
@@ -58,7 +59,7 @@ class Walk:
         self.camera.azimuth, self.camera.elevation = 150.0, -8.0
         self.camera.distance = distance
         self.height = 0.8 * self.trunk.xpos[2]
-        width, height = SIZE
+        width, height = size
         self.renderer = make_renderer(
             self.model, width=2 * width, height=2 * height, preset="quality"
         )
@@ -80,7 +81,7 @@ class Walk:
         self.camera.lookat[2] = self.height
         self.renderer.update_scene(self.data, self.camera)
         large = Image.fromarray(self.renderer.render())
-        return large.resize(SIZE, Image.Resampling.LANCZOS)
+        return large.resize(self._size, Image.Resampling.LANCZOS)
 
 
 def mark_floor(spec: mujoco.MjSpec) -> None:
