@@ -263,3 +263,37 @@ def test_a_closed_renderer_is_gone_without_the_collector():
         assert len(alive()) == before
     finally:
         gc.enable()
+
+
+@pytest.mark.slow
+def test_pictures_are_changed_as_other_observations_are():
+    crop = {"crop": (20, 24), "delay": 0.1, "dropout": 0.0}
+    env = wbc_suite.make(
+        "Lift",
+        robots="Panda",
+        **SEEN,
+        observables={
+            "agentview_image": crop,
+            "agentview_depth": {"active": False},
+        },
+    )
+    first, _ = env.reset(seed=0)
+    assert env.observation_space.contains(first)
+    assert first["agentview_image"].shape == (20, 24, 3)
+    assert "agentview_depth" not in first
+    action = env.hold_action
+    action[:3] = 1.0
+    for _ in range(2):
+        late = env.step(action)[0]["agentview_image"]
+        np.testing.assert_array_equal(late, first["agentview_image"])
+    kept = copy.deepcopy(env)
+    moved = [one.step(action)[0]["agentview_image"] for one in (env, kept)]
+    np.testing.assert_array_equal(*moved)
+    assert np.abs(moved[0].astype(int) - first["agentview_image"]).max() > 20
+    env.observables.modify("agentview_image", crop=None, delay=0.0)
+    assert env.observation()["agentview_image"].shape == (40, 32, 3)
+    with pytest.raises(ConfigError, match="crop"):
+        env.observables.modify("agentview_image", crop=(50, 20))
+    with pytest.raises(UnknownNameError, match="agentview_picture"):
+        env.observables.modify("agentview_picture", delay=0.1)
+    env.close()

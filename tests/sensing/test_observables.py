@@ -175,3 +175,17 @@ def test_wrong_changes_are_named_and_change_nothing():
     with pytest.raises(ConfigError, match="already"):
         slide.seen.add("x", lambda m, d: reading.joint_positions([0]), group="all")
     assert slide.seen.changes == {}
+
+
+def test_samples_that_are_lost_leave_the_value_before():
+    kept, lost = Slide(dropout=0.5).step(40), Slide(dropout=1.0).step(3)
+    assert_array_equal(lost, 0.0)
+    late = 0.05 * np.arange(1, 41) - kept
+    assert 0.0 < late.max() < 0.03  # a few of the 25 samples of a period
+    with pytest.raises(ConfigError, match="dropout"):
+        Slide(dropout=1.5)
+
+
+def test_values_have_no_crop():
+    with pytest.raises(ConfigError, match="'x' is no picture"):
+        Slide(crop=(2, 2))

@@ -99,3 +99,19 @@ def test_one_hand_also_answers_to_the_datasets_name():
     model = mujoco.MjModel.from_xml_string(text.format(one + two))
     with pytest.raises(UnknownNameError, match="Did you mean 'r_left_eye_in_hand'"):
         camera_id(model, "r_eye_in_hand")
+
+
+def test_points_and_normals_of_the_background_are_none():
+    text = SCENE.format(radius=0.25).replace('<geom name="wall" type="plane"', "<!--")
+    text = text.replace('rgba="0 0 1 1"/>', "-->")
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    cameras, view = Cameras(model, data, (), preset="fast"), {"width": 64, "height": 48}
+    ball = cameras.segmentation("above", level="element", **view)[..., 0] > 0
+    assert 50 < ball.sum() < ball.size
+    for found in (cameras.point_cloud, cameras.normals):
+        values = found("above", **view)
+        np.testing.assert_array_equal(np.isfinite(values).all(axis=-1), ball)
+        assert np.isnan(values[~ball]).all()
+    cameras.close()

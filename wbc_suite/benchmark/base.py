@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from pathlib import Path
-from typing import Any, Protocol, TypeAlias, TypeVar
+from typing import Any, Protocol, TypeAlias, TypeVar, runtime_checkable
 
 import mujoco
 import numpy as np
@@ -149,6 +149,14 @@ class Benchmark(Protocol):
         `success` is the present value of `success()`, if known.
         """
         ...
+
+
+@runtime_checkable
+class ResumableBenchmark(Protocol):
+    """A benchmark with colours or attributes that follow from its user data."""
+
+    def resume(self) -> None:
+        """Follow user data that a saved state has written."""
 
 
 BENCHMARKS: Registry[Callable[..., Benchmark]] = Registry("benchmark")

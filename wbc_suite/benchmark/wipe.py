@@ -187,6 +187,10 @@ class Wipe(ObjectBenchmark):
         if self._newly_wiped:
             self.wipe(near | before)
 
+    def resume(self) -> None:
+        """Draw the marks that are left in a saved state."""
+        self.wipe(self.wiped)
+
     def _contacts(self) -> tuple[list[Vector], float, bool]:
         """Return contact points of hands and table, (2,) each, force and collision."""
         points: list[Vector] = []

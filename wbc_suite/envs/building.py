@@ -185,9 +185,15 @@ def simulate(
 
 
 def make_observables(
-    benchmark: Benchmark, simulation: Simulation, config: EnvConfig
+    benchmark: Benchmark,
+    simulation: Simulation,
+    config: EnvConfig,
+    cameras: Cameras,
 ) -> Observables:
-    """Return the observables of robots, sensors and objects, changed as asked."""
+    """Return the observables of robots, sensors and objects, changed as asked.
+
+    Changes of observed pictures are made in `cameras`.
+    """
     groups = {
         f"{state.prefix}proprio-state": proprioception(state)
         for state in simulation.robots
@@ -201,7 +207,7 @@ def make_observables(
         groups["object-state"] = benchmark.observables()
         if (arena := arena_of(benchmark)) is not None:
             groups["object-state"] |= readings_of_things(arena, simulation.model)
-    observables = Observables(simulation.model, simulation.data, groups)
+    observables = Observables(simulation.model, simulation.data, groups, cameras)
     for key, changes in (config.observables or {}).items():
         observables.modify(key, **changes)
     return observables

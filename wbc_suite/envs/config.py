@@ -128,7 +128,7 @@ class EnvConfig(FrozenModel):
         use_sensor_obs: Whether robots' sensors are observed: joint torques, wrists,
             IMU, fingers, feet.
         observables: Changes of observations by key, such as `{"cube_pos": {"delay":
-            0.05}}`; see `wbc_suite.sensing.observables.Change`.
+            0.05}}`; see `wbc_suite.sensing.change.Change`.
         use_camera_obs: Whether cameras are observed.
         camera_names: The observed cameras: one name, or several.
         camera_heights: Pixels; one number for all cameras, or one for each.

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wbc_suite.benchmark import Benchmark, load_benchmark
+from wbc_suite.benchmark.base import ResumableBenchmark
 from wbc_suite.envs.building import (
     action_space,
     compose,
@@ -25,6 +26,7 @@ from wbc_suite.envs.building import (
     use_sampler,
 )
 from wbc_suite.envs.config import EnvArguments, checked_seed, parse_env_config
+from wbc_suite.envs.physics_states import PhysicsStates
 from wbc_suite.envs.states import EnvState, write_physics, write_scene
 from wbc_suite.envs.thread_lock import one_thread_at_a_time, thread_lock
 from wbc_suite.errors import ConfigError, PhysicsError
@@ -53,7 +55,8 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         lock: Held by the thread that uses the environment; others wait.
         action_layout: Slices of the action.
         simulation: Model, data and `tick`.
-        observables: Observations but pictures; changes, adds and removes them.
+        observables: Observations but pictures; changes, adds and removes them, and
+            changes pictures.
         cameras: Pictures of the scene, and projections of points into them.
         beginning: State of the random generator, and physics state if the episode began
             with `reset_to`; with the actions they determine the episode.
@@ -81,11 +84,11 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         self.controllers = self.simulation.controllers
         self.action_layout = joint_layout(self.controllers)
         self.action_space = action_space(self.action_layout)
-        self.observables = make_observables(
-            self.benchmark, self.simulation, self.config
-        )
         self.cameras, self._display = make_cameras(self.simulation, self.config)
-        self._spaces: tuple[ObservationBuffer, gymnasium.spaces.Dict] | None = None
+        self.observables = make_observables(
+            self.benchmark, self.simulation, self.config, self.cameras
+        )
+        self._spaces: tuple[Any, Any, gymnasium.spaces.Dict] | None = None
         self._substeps = count_substeps(self.simulation, self.config)
         self.metadata = {**self.metadata, "render_fps": round(self.config.control_freq)}
         self.horizon = self.config.horizon or self.benchmark.horizon
@@ -94,6 +97,7 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         self._begun, self._process = False, os.getpid()
         given = self.config.randomisation
         self._randomiser = None if given is None else given.bind(self)
+        self._states = PhysicsStates(self.simulation, given, self.action_layout.size)
         self._start(np.random.default_rng(0))
         self._begun = False
 
@@ -187,10 +191,13 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
     @property
     def observation_space(self) -> gymnasium.spaces.Dict:  # pyright: ignore[reportIncompatibleVariableOverride] - it changes with what is observed
         """Space of the observations, by key."""
-        if self._spaces is None or self._spaces[0] is not self.observation_buffer:
-            spaces = {**self.observation_buffer.space.spaces, **self.cameras.space}
-            self._spaces = self.observation_buffer, gymnasium.spaces.Dict(spaces)
-        return self._spaces[1]
+        now = self.observation_buffer, self.cameras.space
+        if self._spaces is None or any(
+            a is not b for a, b in zip(self._spaces, now, strict=False)
+        ):
+            spaces = {**now[0].space.spaces, **now[1]}
+            self._spaces = *now, gymnasium.spaces.Dict(spaces)
+        return self._spaces[2]
 
     @property
     def hold_action(self) -> Vector:
@@ -235,13 +242,52 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         return self.observation()
 
     def reset_to(self, physics: ArrayLike) -> Observation:
-        """Start an episode at a physics state: time, qpos, qvel in one vector.
+        """Start an episode in a saved world, in the midst of its episode too.
 
-        All else, such as sizes of objects, is drawn as at a reset. For errors see
-        `write_physics`.
+        `physics` is a `physics_state` of this environment or of another one of the same
+        description. Objects and randomisation are as they were drawn there, and the
+        references of controllers as they were set: the recorded actions go on as they
+        did. With another controller references start from the state; another
+        randomisation is drawn anew. The horizon counts from here, and delayed
+        observations begin with the present values.
+
+        Time, qpos and qvel alone are taken too, as in robosuite's datasets; all else
+        is then drawn as at a reset.
+
+        Raises:
+            ConfigError: If the state is of another scene, or has numbers that cannot
+                be; see `write_physics`.
         """
-        self._start(self.np_random, physics)
+        self.restore(physics)
         return self.observation()
+
+    def restore(self, physics: ArrayLike) -> None:
+        """Do what `reset_to` does, but leave the observation in its buffer."""
+        self._start(self.np_random, physics)
+
+    def check_state(self, physics: ArrayLike) -> None:
+        """Raise ConfigError if a physics state is of another scene, or none at all."""
+        self._states.read(physics)
+
+    @one_thread_at_a_time
+    def show_state(self, physics: ArrayLike) -> None:
+        """Write a physics state for observations, reward and pictures, without a step.
+
+        The benchmark sees it as the state after the one before. What the scene drew
+        stays. For errors see `reset_to`.
+        """
+        saved, simulation = self._states.read(physics), self.simulation
+        user = simulation.data.userdata
+        before = user.copy()
+        write_physics(simulation.model, simulation.data, saved.values)
+        after, user[:] = user.copy(), before
+        simulation.forward()
+        self.benchmark.after_step()
+        if saved.origin is not None:
+            user[:] = after
+            if isinstance(self.benchmark, ResumableBenchmark):
+                self.benchmark.resume()
+        self.observables.update()
 
     def begin_at(
         self, began_with: Mapping[str, Any], placed: ArrayLike | None = None
@@ -258,15 +304,32 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
 
     @property
     def physics_state(self) -> Vector:
-        """Time, qpos and qvel in one vector, as `reset_to` takes it."""
-        data = self.simulation.data
-        return np.concatenate([[data.time], data.qpos, data.qvel])
+        """The present world in one vector, as `reset_to` takes it, a copy.
+
+        It begins with time, qpos and qvel; for the rest see `physics_states`. Values
+        written directly into the model are not part of it.
+        """
+        now = self._first + self._steps * self._substeps
+        waiting = ((due - now, action) for due, action in self._waiting)
+        return self._states.write(waiting, self.latency // self._substeps)
 
     @property
     def scene_xml(self) -> str:
         """The scene as MJCF text, with plain colours in place of computed textures."""
         benchmark = load_benchmark(self._given[0], arena=self.config.arena)
         return write_scene(compose(benchmark, self.robots, self.config))
+
+    def __repr__(self) -> str:
+        """Return benchmark, robots, controllers and rate of actions."""
+        robots = zip(self.robots, self.controllers, strict=True)
+        driven = [f"{robot.name} by {_name_of(c)}" for robot, c in robots]
+        values, rate = self.action_layout.size, self.config.control_freq
+        return (
+            f"<{type(self).__name__} {self.benchmark.name}: {', '.join(driven)}; "
+            f"{values} values of an action, {rate:g} Hz>"
+        )
+
+    __str__ = __repr__
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the arguments and the episode up to now."""
@@ -282,8 +345,9 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
     @one_thread_at_a_time
     def _start(self, rng: np.random.Generator, given: ArrayLike | None = None) -> None:
         """Bring robots, objects and controllers to the start of an episode."""
-        self._begun = True
-        placed = None if given is None else np.array(given, dtype=np.float64)
+        saved = None if given is None else self._states.read(given)
+        self._begun = False  # until all of this has succeeded
+        placed = None if saved is None else saved.values
         self.beginning: tuple[Mapping[str, Any], Vector | None]
         self.beginning = rng.bit_generator.state, placed
         self._taken: list[Vector] = []
@@ -292,22 +356,36 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         if self._randomiser is not None:
             self._randomiser.restore()
         mujoco.mj_resetData(simulation.model, simulation.data)
+        draw = self._states.scene_generator(saved, rng)
         for posture in self._postures:
-            posture.write(rng)
-        self.benchmark.reset(rng)
+            posture.write(draw)
+        self.benchmark.reset(draw)
+        self._states.compare_draws(saved)
         if self._randomiser is not None:
-            self._randomiser.apply(rng)
-        if placed is not None:
-            write_physics(simulation.model, simulation.data, placed)
+            self._randomiser.apply(self._states.randomisation_generator(saved, rng))
+        if saved is not None:
+            write_physics(simulation.model, simulation.data, saved.values)
+            if isinstance(self.benchmark, ResumableBenchmark):
+                self.benchmark.resume()
         simulation.start()
+        if saved is not None:
+            self._states.resume(saved)
+        self._steps, self._first, self._broken = 0, self._step_number(), ""
+        if saved is not None and saved.waiting is not None:
+            for left, *action in saved.waiting:
+                self._waiting.append((self._first + int(left), np.array(action)))
         pushes = *self.benchmark.pushes, *self.pushes
         self._schedule = PushSchedule(pushes, simulation.data, simulation.timestep)
-        self._steps, self._broken = 0, ""
         self.observables.start(rng)
+        self._begun = True
+
+    def _step_number(self) -> int:
+        """Return how many physics steps the episode of the present state has taken."""
+        return max(0, round(self.simulation.data.time / self.simulation.timestep))
 
     def _drive(self, action: Vector) -> None:
         """Advance physics by one step; actions take effect after their latency."""
-        now = (self._steps - 1) * self._substeps
+        now = self._first + (self._steps - 1) * self._substeps
         end = now + self._substeps
         self._waiting.append((now + self.latency, action))
         while self._waiting and self._waiting[0][0] < end:
@@ -341,3 +419,9 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
             before = state.prefix if len(self.controllers) > 1 else ""
             info |= {before + k: v for k, v in controller.info(state).items()}
         return info
+
+
+def _name_of(controller: Any) -> str:
+    """Return the registered name of a composite controller, or its class's."""
+    config = getattr(controller, "config", None)
+    return str(getattr(config, "type", type(controller).__name__))

@@ -9,7 +9,11 @@ import numpy as np
 
 from wbc_suite.compiling import announced, as_argument, is_compiling, plain
 from wbc_suite.control import CompositeController, RobotState, SteppedController
-from wbc_suite.control.composite.protocols import TickedController, solver_of_body
+from wbc_suite.control.composite.protocols import (
+    ResumableController,
+    TickedController,
+    solver_of_body,
+)
 from wbc_suite.control.composite.tick import WholeBodyArrays
 from wbc_suite.control.dynamics.arrays import for_plain_python
 from wbc_suite.control.dynamics.state_source import (
@@ -17,6 +21,7 @@ from wbc_suite.control.dynamics.state_source import (
     make_state_source,
     read_all_sensors,
     source_for_plain_python,
+    source_memory,
     use_all_feet,
 )
 from wbc_suite.control.loop.advance import advance, advance_custom_laws
@@ -27,7 +32,9 @@ from wbc_suite.control.loop.inverse_dynamics import (
 from wbc_suite.control.loop.mujoco_functions import addresses
 from wbc_suite.control.loop.physics import bind_physics
 from wbc_suite.control.loop.records import gather
+from wbc_suite.control.memory import Memory
 from wbc_suite.envs.watch import PhysicsWatch, check_laws, check_model
+from wbc_suite.typing import Vector
 
 
 class Simulation:
@@ -50,6 +57,7 @@ class Simulation:
     Attributes:
         compiled: Whether the whole loop is compiled: not if a controller computes
             commands itself, see `SteppedController`.
+        memory: Numbers of laws, controllers and sensors that outlive a step.
         loop_calls: Number of calls of the loop in the last tick. Before each but the
             first a controller has run in Python.
     """
@@ -70,7 +78,8 @@ class Simulation:
         self.robots = tuple(state for state, _ in pairs)
         self.controllers = tuple(controller for _, controller in pairs)
         self.pairs = tuple(pairs)
-        self._left, self._prepared = [0] * len(pairs), False
+        self._left = np.zeros(len(pairs), dtype=np.int64)
+        self._prepared = False
         self.loop_calls = 1
         self._stepped = [(r, c) for r, c in pairs if isinstance(c, SteppedController)]
         compiled = compiled and is_compiling()
@@ -107,8 +116,20 @@ class Simulation:
             laws, drives = self._laws.view(np.recarray), self._drives.view(np.recarray)
             kernels = *kernels[:-1], tuple(map(for_plain_python, bodies)) or None
             self._law_arguments = physics, laws, drives, *kernels
+        self.memory = self._make_memory()
         with announced("the control loop"):
             self._call_loop(0)
+
+    def _make_memory(self) -> Memory:
+        """Return what laws, controllers and sensors go on from."""
+        laws = [law for controller in self.controllers for law in controller.laws]
+        parts = [array for law in laws for array in law.memory]
+        for controller in self.controllers:
+            if isinstance(controller, ResumableController):
+                parts += controller.memory
+        for source in self._sources:
+            parts += source_memory(source)
+        return Memory([self._left, *parts])
 
     def _loop_ticks(
         self,
@@ -147,7 +168,14 @@ class Simulation:
         check_laws(self._laws, self._drives)
         for source in self._sources:
             begin_source(source, self.data)
-        self._left = [0] * len(self.pairs)
+        self._left[:] = 0
+
+    def resume(self, memory: Vector) -> None:
+        """Let controllers go on from values of `memory`, after `start`."""
+        self.memory.write(memory)
+        for state, controller in self.pairs:
+            if isinstance(controller, ResumableController):
+                controller.resume(state)
 
     def tick(self, n: int) -> None:
         """Advance n physics steps with the controllers in the loop.
@@ -174,11 +202,11 @@ class Simulation:
                     if self._left[k] <= 0:
                         with self._watch:
                             self._left[k] = controller.prepare(state)
-                    steps = min(steps, self._left[k])
+                    steps = min(steps, int(self._left[k]))
             done = self._call_loop(steps)
             self.loop_calls += 1
             n -= done
-            self._left = [left - done for left in self._left]
+            self._left -= done
             if done < steps:
                 with self._watch:
                     for ticked in self._ticked.values():

@@ -13,6 +13,12 @@ from wbc_suite.control.loop.state_checks import FASTEST
 from wbc_suite.errors import ConfigError
 from wbc_suite.typing import Vector
 
+PHYSICS = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+"""Signature of the part of a physics state that is MuJoCo's; time, qpos, qvel first."""
+
+ORIGIN = 24
+"""Numbers at the end of a physics state; see `physics_states.Origin`."""
+
 _QUATERNION = {
     int(mujoco.mjtJoint.mjJNT_FREE): slice(3, 7),
     int(mujoco.mjtJoint.mjJNT_BALL): slice(0, 4),
@@ -63,18 +69,33 @@ class BoundRandomiser(Protocol):
         ...
 
 
+def motion_size(model: mujoco.MjModel) -> int:
+    """Return how many numbers time, qpos and qvel are: the first of a physics state."""
+    return 1 + model.nq + model.nv
+
+
+def physics_size(model: mujoco.MjModel) -> int:
+    """Return how many numbers of a physics state are MuJoCo's."""
+    return mujoco.mj_stateSize(model, PHYSICS)
+
+
 def write_physics(model: mujoco.MjModel, data: mujoco.MjData, state: ArrayLike) -> None:
-    """Write a physics state: time, qpos and qvel, as in datasets.
+    """Write what a physics state says of MuJoCo's; see `PhysicsStates`.
 
     Raises:
         ConfigError: If its size is wrong, a value is not finite, a speed is beyond
             `FASTEST`, or a quaternion is not of length 1 within 10 %.
     """
-    size = 1 + model.nq + model.nv
-    values = check_array("A physics state", state, (size,))
+    values = check_array("A physics state", state, None)
+    short, full = motion_size(model), physics_size(model)
+    if values.ndim != 1 or not (values.size == short or values.size >= full + ORIGIN):
+        raise ConfigError(
+            f"A physics state has shape {values.shape}, but must have ({short},), "
+            f"which is time, qpos and qvel, or at least ({full + ORIGIN},)."
+        )
     if not np.isfinite(values).all():
         raise ConfigError("A physics state must be finite.")
-    qpos, qvel = np.split(values[1:], [model.nq])
+    qpos, qvel = values[1 : 1 + model.nq], values[1 + model.nq : short]
     if np.abs(qvel).max(initial=0.0) > FASTEST:
         raise ConfigError(f"A physics state has a speed above {FASTEST:g}.")
     for joint in map(model.joint, range(model.njnt)):
@@ -83,7 +104,10 @@ def write_physics(model: mujoco.MjModel, data: mujoco.MjData, state: ArrayLike) 
             raise ConfigError(
                 f"A physics state has the quaternion {quat} for joint '{joint.name}'."
             )
-    data.time, data.qpos[:], data.qvel[:] = values[0], qpos, qvel
+    if values.size == short:
+        data.time, data.qpos[:], data.qvel[:] = values[0], qpos, qvel
+    else:
+        mujoco.mj_setState(model, data, values[:full], PHYSICS)
 
 
 def write_scene(spec: mujoco.MjSpec) -> str:

@@ -3,9 +3,10 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from enum import IntEnum
-from typing import ClassVar, NamedTuple, TypeAlias
+from typing import Any, ClassVar, NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wbc_suite.compiling import compiled, struct
 from wbc_suite.kinematics import Configuration
@@ -83,6 +84,11 @@ class RowLimit(ABC):
 
     def reset(self) -> None:  # noqa: B027, may be empty
         """Discard memory of earlier ticks; called by a stack's `reset`."""
+
+    @property
+    def memory(self) -> tuple[NDArray[Any], ...]:
+        """Arrays of numbers of earlier ticks, views; by default there are none."""
+        return ()
 
     def subject(self, row: int) -> object:
         """Return what a row of the last tick limits: a value that prints itself."""

@@ -2,8 +2,10 @@
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wbc_suite.arguments import check_array, check_number
 from wbc_suite.compiling import as_argument
@@ -195,6 +197,16 @@ class TaskStack:
         for values in self._overshoot:
             values[:] = 0.0
         self._last = None
+
+    @property
+    def memory(self) -> tuple[NDArray[Any], ...]:
+        """What a tick leaves for the next one, as views; all else is set before it."""
+        tick, levels = self._tick, self.levels
+        held = self._constraints.held_arrays.target
+        past = [x for level in levels for x in (level.qp.side, level.tasks.mu)]
+        limits = [x for limit in self._limits for x in getattr(limit, "memory", ())]
+        own = tick.v, *past, tick.pressure_damping, *self._overshoot, held
+        return *own, *limits
 
     def prepare(self, dt: float) -> None:
         """Evaluate tasks, limits and equalities that have no kernel."""

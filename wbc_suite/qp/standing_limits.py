@@ -2,9 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from wbc_suite.arguments import check_number
 from wbc_suite.errors import ConfigError
@@ -87,17 +89,25 @@ class SupportLimit(RowLimit):
         self.pressure_margin = pressure_margin
         self._edges = 4 * len(self.soles)  # at most
         self.dim = self._edges * (1 if pressure_margin is None else 2)
-        self.reset()
+        self._has_moved, self._before = np.zeros(1), np.zeros(0)
+        self._place: Matrix = np.full((4 * len(self.soles), 3), np.inf)
+        self._hull_place: Matrix = self._place.copy()  # that the hull is of
 
     def reset(self) -> None:
         """Forget how the robot moved and where the soles were."""
-        self._before: Vector | None = None
-        self._place: Matrix = np.full((4 * len(self.soles), 3), np.nan)
+        self._has_moved[0], self._place[:] = 0.0, np.inf
+
+    @property
+    def memory(self) -> tuple[NDArray[Any], ...]:
+        """Whether and where the robot was at the last tick, and where the soles are."""
+        return self._has_moved, self._before, self._place
 
     def bind(self, configuration: Configuration) -> None:
         """Resolve the frames of the soles."""
         self._frames = [configuration.frame_id(sole.frame) for sole in self.soles]
         self._mass = pin.computeTotalMass(configuration.model)
+        if self._before.size != configuration.nq:
+            self._before = np.zeros(configuration.nq)
         self._update(configuration)
 
     def rows(
@@ -129,8 +139,9 @@ class SupportLimit(RowLimit):
 
     def _last_step(self, configuration: Configuration, dt: float) -> Vector:
         """Return how the robot came here from the last tick, shape (nv,)."""
-        before, self._before = self._before, configuration.q.copy()
-        if before is None:
+        before, has_moved = self._before.copy(), bool(self._has_moved[0])
+        self._before[:], self._has_moved[0] = configuration.q, 1.0
+        if not has_moved:
             return np.zeros(configuration.nv)
         step = pin.difference(configuration.model, before, self._before)
         fast = float(np.abs(step[configuration.root_linear]).max(initial=0.0))
@@ -145,9 +156,11 @@ class SupportLimit(RowLimit):
                 for sole, pose in zip(self.soles, poses, strict=True)
             ]
         )
-        if np.abs(place - self._place).max() < MOVED:
+        if np.abs(place - self._place).max() >= MOVED:
+            self._place[:] = place
+        if np.array_equal(self._place, self._hull_place):
             return
-        self._place = place
+        self._hull_place[:], place = self._place, self._place
         self._forward = poses[0].rotation[:2, 0]
         hull = convex_hull(place[:, :2])
         along = np.roll(hull, -1, axis=0) - hull

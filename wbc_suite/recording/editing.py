@@ -16,6 +16,7 @@ from wbc_suite.recording.dataset import (
     part_files,
     parts_folder,
 )
+from wbc_suite.recording.env_source import differences
 from wbc_suite.recording.episode import Episode, Fact
 from wbc_suite.recording.episode_store import locked
 from wbc_suite.recording.hdf5_check import check_files
@@ -76,12 +77,14 @@ def merge(sources: Sequence[str | Path], out: str | Path) -> int:
     out = Path(out)
     with ExitStack() as opened:
         datasets = [opened.enter_context(Dataset(source)) for source in sources]
-        origins = {str(d.header.get("env_args", "")) for d in datasets}
-        if len(origins) > 1:
-            raise DatasetError(
-                "These are recordings of different environments: "
-                + "; ".join(sorted(o[:120] for o in origins))
-            )
+        origins = [str(d.header.get("env_args", "")) for d in datasets]
+        for dataset, origin in zip(datasets, origins, strict=True):
+            if origin != origins[0]:
+                raise DatasetError(
+                    "These are recordings of different environments: of "
+                    f"'{datasets[0].path}' and '{dataset.path}', "
+                    f"{differences(origins[0], origin)}."
+                )
         wanted: dict[Fact, tuple[Dataset, str]] = {}  # by uid
         for dataset in datasets:
             for name in dataset.names:

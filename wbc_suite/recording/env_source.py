@@ -14,7 +14,7 @@ from wbc_suite.benchmark import BENCHMARKS
 from wbc_suite.control import load_composite_controller_config
 from wbc_suite.envs import RobotEnv
 from wbc_suite.envs.config import EnvConfig
-from wbc_suite.errors import DatasetError, WbcError
+from wbc_suite.errors import DatasetError, WbcError, shortened
 from wbc_suite.recording.dataset import Dataset
 from wbc_suite.recording.episode import Fact
 
@@ -22,6 +22,7 @@ PACKAGE = "wbc_suite"
 GYM_TYPE = 2  # type of Gymnasium environments in robomimic's `env_args`
 PACKAGES = ("mujoco", "pin", "numpy", "gymnasium", "h5py", "daqp")
 MAX_TEXT = 1_000_000  # characters of env_args
+SHOWN_KEYS = 5  # of those that differ
 _SHOWN = {"render_mode", "render_camera", "render_size", "render_preset", "skin"}
 """Arguments of rendering, which do not change an episode."""
 _PATH = re.compile(r"[/\\:]|\.(toml|json|xml|urdf|py)\Z", re.IGNORECASE)
@@ -130,6 +131,28 @@ def _lasting_name(benchmark: str) -> str:
     if benchmark.endswith(".toml"):
         return str(Path(benchmark).resolve())
     return BENCHMARKS.spelled(benchmark) if benchmark in BENCHMARKS else benchmark
+
+
+def differences(one: str, other: str) -> str:
+    """Return which keys of two `env_args` differ, with both values, in words."""
+    first, second = (_flat(_parse_json(text or "{}")) for text in (one, other))
+    found = [
+        f"{key} is {first.get(key, 'absent')} and {second.get(key, 'absent')}"
+        for key in sorted(first.keys() | second.keys())
+        if first.get(key, "absent") != second.get(key, "absent")
+    ]
+    return "; ".join(found[:SHOWN_KEYS])
+
+
+def _flat(value: Any, path: str = "") -> dict[str, str]:
+    """Return the values of nested dictionaries by their keys, shortened."""
+    if not isinstance(value, dict):
+        return {path or "env_args": shortened(json.dumps(value), 60)}
+    found: dict[str, str] = {}
+    for key, inner in value.items():
+        outer = "" if key == "env_kwargs" else f"{path}.{key}" if path else str(key)
+        found |= _flat(inner, outer)
+    return found
 
 
 def header_of(env: Any) -> dict[str, Fact]:

@@ -16,6 +16,7 @@ from typing import IO, Self
 from wbc_suite.errors import DatasetError
 from wbc_suite.recording.atomic_files import check_folder, delete_temporaries
 from wbc_suite.recording.dataset import Dataset, part_files, parts_folder
+from wbc_suite.recording.env_source import differences
 from wbc_suite.recording.episode import Episode, Fact
 from wbc_suite.recording.hdf5_writer import uncompressed_bytes, write_dataset
 
@@ -99,11 +100,12 @@ class Store:
         if not self.path.exists() and not part_files(self.path):
             return
         with Dataset(self.path) as dataset:
-            theirs = dataset.header.get("env_args", "")
-            if theirs != self._header.get("env_args", ""):
+            theirs = str(dataset.header.get("env_args", ""))
+            ours = str(self._header.get("env_args", ""))
+            if theirs != ours:
                 raise DatasetError(
-                    f"'{self.path}' has episodes of another environment "
-                    f"({str(theirs)[:120]}); choose another file."
+                    f"'{self.path}' has episodes of another environment: there and "
+                    f"here {differences(theirs, ours)}. Choose another file."
                 )
             self._closed = len(dataset)
             last = max((int(n.removeprefix("demo_")) for n in dataset.names), default=0)

@@ -19,12 +19,14 @@ from wbc_suite.recording.episode import Column, Episode, Fact, fingerprint, piec
 
 SCHEMA_VERSION = 1
 PICTURE_BYTES = 10_000  # rows of at least so many are pictures, and are compressed
+STATES = "states"  # are compressed too: most of their numbers seldom change
+CHUNK_BYTES = 1 << 16
 
 
 def uncompressed_bytes(episode: Episode) -> int:
     """Return how many bytes of an episode are stored without compression."""
-    columns = episode.columns.values()
-    return sum(column.nbytes for column in columns if not _compression(column))
+    columns = episode.columns.items()
+    return sum(column.nbytes for name, column in columns if not _storage(name, column))
 
 
 def write_dataset(
@@ -66,7 +68,7 @@ def write_dataset(
 def _write_episode(group: h5py.Group, episode: Episode) -> None:
     for name, column in episode.columns.items():
         stored = group.create_dataset(
-            name, column.shape, column.dtype, **_compression(column)
+            name, column.shape, column.dtype, **_storage(name, column)
         )
         for begin, piece in pieces(column):
             stored[begin : begin + len(piece)] = piece
@@ -77,11 +79,16 @@ def _write_episode(group: h5py.Group, episode: Episode) -> None:
     group.attrs["sha256"] = fingerprint(episode.columns, episode.final_state)
 
 
-def _compression(column: Column) -> dict[str, Any]:
-    if column.dtype != np.uint8 or column[:1].nbytes < PICTURE_BYTES:
+def _storage(name: str, column: Column) -> dict[str, Any]:
+    """Return how a column is compressed; nothing where it is not."""
+    row, high = column[:1].nbytes, 1
+    if name == STATES and row:
+        high = min(max(1, CHUNK_BYTES // row), len(column))
+    elif column.dtype != np.uint8 or row < PICTURE_BYTES:
         return {}
-    chunk = (1, *column.shape[1:])
-    return {"chunks": chunk, "compression": "gzip", "compression_opts": 1}
+    chunk = (high, *column.shape[1:])
+    shuffled = {"shuffle": True} if name == STATES else {}
+    return {"chunks": chunk, "compression": "gzip", "compression_opts": 1} | shuffled
 
 
 @contextmanager

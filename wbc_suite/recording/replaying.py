@@ -11,8 +11,8 @@ import numpy as np
 
 from wbc_suite import logs
 from wbc_suite.envs import RobotEnv
-from wbc_suite.envs.states import write_physics
-from wbc_suite.errors import DatasetError, WbcError
+from wbc_suite.envs.states import motion_size
+from wbc_suite.errors import ConfigError, DatasetError, WbcError
 from wbc_suite.recording.episode import Episode
 from wbc_suite.typing import Vector
 
@@ -26,13 +26,13 @@ class Divergence:
     """Difference of a replay by actions from the recording."""
 
     steps: int  # actions played
-    largest: float  # of all numbers of the state, m, rad, m/s, rad/s
+    largest: float  # of time, qpos and qvel; s, m, rad, m/s, rad/s
     first: int | None  # action with the first difference after it; None without any
     success: bool  # at the end of the replay
 
     @property
     def exact(self) -> bool:
-        """Whether every bit of every state is as it was recorded."""
+        """Whether every bit of time, qpos and qvel is as it was recorded."""
         return self.first is None
 
 
@@ -40,18 +40,19 @@ def start_as(env: RobotEnv, episode: Episode) -> None:
     """Reset the environment to the start of a recorded episode.
 
     With the recorded state of the random generator the start is equal to the bit, sizes
-    of objects included. Without it, the physics state is set. Raises DatasetError if
+    of objects included. Without it, the first state is restored. Raises DatasetError if
     the state, or the names of joints, do not fit the environment.
     """
     if "states" not in episode.columns or not episode.length:
         raise DatasetError(f"'{episode.name}' has no states to start from.")
     state = episode.columns["states"][0]
-    if state.size != env.physics_state.size:
+    try:
+        env.check_state(state)
+    except ConfigError as error:
         raise DatasetError(
-            f"'{episode.name}' has states of {state.size} numbers, but those of "
-            f"this environment have {env.physics_state.size}: robot or objects differ, "
-            "so it cannot be replayed here."
-        )
+            f"'{episode.name}' has states of {state.size} numbers, but those of this "
+            f"environment are others: {error}"
+        ) from error
     _check_joints(env, episode)
     generator = episode.facts.get("rng_state")
     try:
@@ -72,21 +73,21 @@ def start_as(env: RobotEnv, episode: Episode) -> None:
 def play_states(env: RobotEnv, episode: Episode) -> Iterator[int]:
     """Set the simulation to every recorded state; yield the number of each."""
     start_as(env, episode)
-    simulation = env.simulation
     last = () if episode.final_state is None else (episode.final_state,)
     for k, state in enumerate((*episode.columns["states"], *last)):
-        write_physics(simulation.model, simulation.data, state)
-        simulation.forward()
-        env.benchmark.after_step()
-        env.observables.update()
+        env.show_state(state)
         yield k
 
 
 def play_actions(
     env: RobotEnv, episode: Episode
 ) -> Iterator[tuple[int, Vector, dict[str, Any]]]:
-    """Apply the actions; yield number, difference of the state after it, and `info`."""
+    """Apply the actions; yield number, difference after it, and `info`.
+
+    The difference from the recording is that of time, qpos and qvel.
+    """
     start_as(env, episode)
+    size = motion_size(env.simulation.model)
     states, actions = episode.columns["states"], episode.columns["actions"]
     if actions.shape[1] != env.action_layout.size:
         raise DatasetError(
@@ -97,8 +98,8 @@ def play_actions(
     for k, action in enumerate(actions):
         *_, info = env.advance(action)
         after = states[k + 1] if k + 1 < len(states) else episode.final_state
-        now = env.physics_state
-        yield k, now - (now if after is None else after), info
+        now = env.physics_state[:size]
+        yield k, now - (now if after is None else after[:size]), info
         if "physics_error" in info:
             return
 

@@ -1,6 +1,6 @@
 """Cameras of a scene: pictures, depths, segmentations, projections."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc_suite.control import RobotState
+from wbc_suite.sensing.change import Change
+from wbc_suite.sensing.picture_channels import Picture, PictureChannel
 from wbc_suite.sensing.projection import Projection, camera_id
 from wbc_suite.sensing.renderer import Renderer, RenderPreset, make_renderer
 from wbc_suite.sensing.segmentation import Labels, SegmentationLevel
 from wbc_suite.typing import Array
-
-Picture = NDArray[Any]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -42,7 +42,8 @@ class Cameras:
 
     Attributes:
         labels: Numbers of segmentations, and their names.
-        space: Spaces of the observed pictures, by key.
+        observed: Keys of the observed pictures, inactive ones included.
+        space: Spaces of the observed pictures, by key; another one after a change.
 
     Raises:
         UnknownNameError: If there is no such camera.
@@ -62,10 +63,14 @@ class Cameras:
         self._requests = tuple(requests)
         self._renderers: dict[tuple[int, int], Renderer] = {}
         self._stale: set[tuple[int, int]] = set()
-        self.space: dict[str, gymnasium.Space[Any]] = {}
+        self._drawn: dict[str, gymnasium.spaces.Box] = {}
         for request in self._requests:
             camera_id(model, request.name)  # an error if there is no such camera
-            self.space |= self._spaces(request)
+            self._drawn |= self._spaces(request)
+        self.observed = tuple(self._drawn)
+        self.space: dict[str, gymnasium.Space[Any]] = dict(self._drawn)
+        self._channels: dict[str, PictureChannel] = {}
+        self._rng = np.random.default_rng(0)
 
     @property
     def far(self) -> float:
@@ -78,19 +83,73 @@ class Cameras:
         return tuple(self._model.camera(i).name for i in range(self._model.ncam))
 
     def observation(self) -> dict[str, Picture]:
-        """Return the observed pictures, by key."""
+        """Return the observed pictures, by key, with the changes applied."""
         pictures: dict[str, Picture] = {}
         for request in self._requests:
-            renderer = self._aim(request.name, request.width, request.height)
-            pictures[f"{request.name}_image"] = renderer.render()
-            if request.depth or request.segmentations:
-                renderer.draw_surfaces()
-            if request.depth:
-                pictures[f"{request.name}_depth"] = self._read_depth(renderer)
-            for level in request.segmentations:
-                key = request.segmentation_key(level)
-                pictures[key] = self._read_labels(renderer, level)
+            pictures |= self._draw(request)
+        time = float(self._data.time)
+        for key, channel in self._channels.items():
+            if key in pictures:
+                pictures[key] = channel.show(pictures[key], time, self._rng)
         return pictures
+
+    def _draw(self, request: CameraRequest) -> dict[str, Picture]:
+        """Return the active pictures of a camera."""
+        image, depth = f"{request.name}_image", f"{request.name}_depth"
+        keys = {request.segmentation_key(x): x for x in request.segmentations}
+        levels = {key: level for key, level in keys.items() if key in self.space}
+        pictures: dict[str, Picture] = {}
+        if not {image, depth, *levels} & self.space.keys():
+            return pictures
+        renderer = self._aim(request.name, request.width, request.height)
+        if image in self.space:
+            pictures[image] = renderer.render()
+        if depth in self.space or levels:
+            renderer.draw_surfaces()
+        if depth in self.space:
+            pictures[depth] = self._read_depth(renderer)
+        for key, level in levels.items():
+            pictures[key] = self._read_labels(renderer, level)
+        return pictures
+
+    def change(self, key: str, change: Change | None) -> None:
+        """Change an observed picture from now on; None shows it as it is drawn.
+
+        Raises:
+            ConfigError: If the crop is larger than the picture; then nothing changes.
+        """
+        channel = None if change is None else PictureChannel(change, self._drawn[key])
+        old = self._channels.pop(key, None)
+        space, active = dict(self.space), change is None or change.active
+        space[key] = self._drawn[key] if channel is None else channel.space
+        if channel is not None:
+            if old is not None and old.space == channel.space:
+                kept, channel.state = channel.state, old.state
+                if old.change.filter is not channel.change.filter:
+                    channel.state.filter = kept.filter
+            self._channels[key] = channel
+        self.space = {k: space[k] for k in self.observed if k in space}
+        if not active:
+            del self.space[key]
+
+    def start(self, rng: np.random.Generator) -> None:
+        """Start an episode; changes draw from a generator that `rng` spawns."""
+        if self._channels:
+            self._rng = rng.spawn(1)[0]
+        for channel in self._channels.values():
+            channel.start()
+
+    def state(self) -> dict[str, Any]:
+        """Return the state of changed pictures, as `restore` takes it."""
+        channels = {key: channel.state for key, channel in self._channels.items()}
+        return {"channels": channels, "rng": self._rng}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Continue from a state."""
+        self._rng = state["rng"]
+        for key, saved in state["channels"].items():
+            if key in self._channels:
+                self._channels[key].state = saved
 
     def black(self) -> dict[str, Picture]:
         """Return black pictures in place of the observed ones, by key."""
@@ -120,14 +179,27 @@ class Cameras:
         return Projection.of(self._model, self._data, index, width=width, height=height)
 
     def point_cloud(self, camera: str, *, width: int, height: int) -> Array:
-        """Return the point of the world at each pixel, m, shape (height, width, 3)."""
+        """Return the point of the world at each pixel, m, shape (height, width, 3).
+
+        Where the background is seen it is NaN: `np.isfinite(points[..., 0])` is the
+        mask of what has a surface.
+        """
         depth = self.depth(camera, width=width, height=height)
-        return self.projection(camera, width=width, height=height).point_cloud(depth)
+        projection = self.projection(camera, width=width, height=height)
+        return self._seen(projection.point_cloud(depth), depth)
 
     def normals(self, camera: str, *, width: int, height: int) -> Array:
-        """Return surface normals in the world, shape (height, width, 3)."""
+        """Return surface normals in the world, shape (height, width, 3).
+
+        NaN where the background is seen.
+        """
         depth = self.depth(camera, width=width, height=height)
-        return self.projection(camera, width=width, height=height).normals(depth)
+        projection = self.projection(camera, width=width, height=height)
+        return self._seen(projection.normals(depth), depth)
+
+    def _seen(self, values: Array, depth: NDArray[np.float32]) -> Array:
+        """Return values of pixels, NaN where the depth is that of the background."""
+        return np.where(depth < self.far, values, np.nan)
 
     def upload_textures(self) -> None:
         """Draw next pictures with the present textures of the model."""
@@ -163,9 +235,9 @@ class Cameras:
         depth = renderer.read_depth()
         return np.minimum(depth, np.float32(self.far), out=depth)[..., None]
 
-    def _spaces(self, request: CameraRequest) -> dict[str, gymnasium.Space[Any]]:
+    def _spaces(self, request: CameraRequest) -> dict[str, gymnasium.spaces.Box]:
         box, size = gymnasium.spaces.Box, (request.height, request.width)
-        spaces: dict[str, gymnasium.Space[Any]] = {
+        spaces: dict[str, gymnasium.spaces.Box] = {
             f"{request.name}_image": box(0, 255, (*size, 3), np.uint8)
         }
         if request.depth:

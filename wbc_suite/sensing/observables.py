@@ -1,65 +1,32 @@
 """Observations that are sampled, delayed, noisy, filtered, added or left out.
 
 Unchanged observations are read once a control period, changed ones after every physics
-step.
+step. Pictures are drawn when they are observed, and changed by `Cameras`.
 """
 
 import copy
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, TypeAlias
 
 import mujoco
 import numpy as np
 
-from wbc_suite.arguments import check_number
 from wbc_suite.errors import ConfigError, UnknownNameError
+from wbc_suite.sensing.cameras import Cameras
+from wbc_suite.sensing.change import Change
 from wbc_suite.sensing.observation_buffer import ObservationBuffer
 from wbc_suite.sensing.reading import Reading
 from wbc_suite.typing import Vector
 
-Noise: TypeAlias = Callable[[Vector, np.random.Generator], Vector]
-Delay: TypeAlias = float | Callable[[np.random.Generator], float]
-Filter: TypeAlias = Callable[[Vector], Vector]
 Maker: TypeAlias = Callable[[mujoco.MjModel, mujoco.MjData], Reading]
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Change:
-    """How an observation differs from the true value; see `sensing.noise`.
-
-    Attributes:
-        delay: s, or a function that draws one for each sample.
-        filter: Function that returns filtered values; its `reset` is called at a reset.
-        sampling_rate: Samples per second; None for one per physics step.
-        enabled: Whether samples are taken; otherwise the last value is kept.
-        active: Whether the key is part of observations and of their space.
-    """
-
-    noise: Noise | None = None
-    delay: Delay = 0.0
-    filter: Filter | None = None
-    sampling_rate: float | None = None
-    enabled: bool = True
-    active: bool = True
-
-    def __post_init__(self) -> None:
-        if not callable(self.delay):
-            check_number("An observation's delay", self.delay, least=0.0)
-        if self.sampling_rate is not None:
-            check_number("An observation's sampling_rate", self.sampling_rate, above=0)
-        for name in ("noise", "filter"):
-            value = getattr(self, name)
-            if value is not None and not callable(value):
-                raise ConfigError(
-                    f"An observation's {name} must be a function or None, "
-                    f"not {value!r:.60}."
-                )
 
 
 class Observables:
     """All observations of one simulation but pictures, by key, by the group's key.
+
+    Changes of the pictures that `cameras` observes are made here too.
 
     Attributes:
         buffer: The last observation; a new one after keys were added or removed.
@@ -71,8 +38,9 @@ class Observables:
         model: mujoco.MjModel,
         data: mujoco.MjData,
         groups: Mapping[str, Mapping[str, Reading]],
+        cameras: Cameras | None = None,
     ) -> None:
-        self._model, self._data = model, data
+        self._model, self._data, self._cameras = model, data, cameras
         self._groups = {name: dict(group) for name, group in groups.items()}
         self._added: dict[str, tuple[str, Maker]] = {}
         self.changes: dict[str, Change] = {}
@@ -82,8 +50,9 @@ class Observables:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Keys of all observations, inactive ones included."""
-        return tuple(key for group in self._groups.values() for key in group)
+        """Keys of all observations, inactive ones and pictures included."""
+        own = tuple(key for group in self._groups.values() for key in group)
+        return *own, *(self._cameras.observed if self._cameras else ())
 
     def modify(self, key: str, **changes: Any) -> None:
         """Change an observation from now on; see `Change`.
@@ -99,9 +68,15 @@ class Observables:
                 raise UnknownNameError("change", name, tuple(Change.__slots__))
         before = self.changes.get(key, Change())
         now = replace(before, **changes)
+        if self._cameras is not None and key in self._cameras.observed:
+            self._cameras.change(key, None if now == Change() else now)
+        elif now.crop is not None:
+            raise ConfigError(f"'{key}' is no picture, so it has no crop.")
         self.changes[key] = now
         if now == Change():
             del self.changes[key]
+        if self._cameras is not None and key in self._cameras.observed:
+            return
         if now.active != before.active:
             self._rebuild()
         self._connect(key)
@@ -130,6 +105,8 @@ class Observables:
         self.buffer.update()
         for channel in self._channels.values():
             channel.start(self.buffer.values, self._rng)
+        if self._cameras is not None:
+            self._cameras.start(self._rng)
         self._show()
 
     @property
@@ -155,6 +132,7 @@ class Observables:
             "changes": self.changes,
             "channels": {k: c.state for k, c in self._channels.items()},
             "rng": self._rng,
+            "pictures": self._cameras.state() if self._cameras else None,
         }
 
     def prepare(self, state: Mapping[str, Any]) -> None:
@@ -171,6 +149,8 @@ class Observables:
         for key, saved in state["channels"].items():
             if key in self._channels:
                 self._channels[key].state = saved
+        if self._cameras is not None and state["pictures"] is not None:
+            self._cameras.restore(state["pictures"])
         self.update()
 
     def _show(self) -> None:
@@ -249,13 +229,18 @@ class _Channel:
     def sample(self, values: Vector, rng: np.random.Generator) -> None:
         """Take a sample if one is due, and release those whose delay is over."""
         self._step += 1
-        if self._change.enabled and self._step % self._period == 0:
+        if self._change.enabled and self._step % self._period == 0 and self._kept(rng):
             delay = self._change.delay
             wait = delay(rng) if callable(delay) else delay
             due = self._step + round(wait / self._timestep)
             self._coming.append((due, self._taken(values, rng)))
         while any(due <= self._step for due, _ in self._coming):
             self._shown = self._coming.popleft()[1]
+
+    def _kept(self, rng: np.random.Generator) -> bool:
+        """Return whether a sample is not lost."""
+        dropout = self._change.dropout
+        return not dropout or rng.uniform() >= dropout
 
     def show(self, values: Vector) -> None:
         """Write the observed values over the true ones."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from wbc_suite.arguments import check_number
 from wbc_suite.envs import RobotEnv
+from wbc_suite.envs.states import motion_size
 from wbc_suite.errors import ConfigError, DatasetError
 from wbc_suite.recording import Dataset
 from wbc_suite.recording.recorder import Recorder
@@ -115,7 +116,8 @@ class Playback(gymnasium.Wrapper[Any, Any, Any, Any]):
         over = self._taken == self._episode.length
         after = self._episode.final_state if over else columns["states"][k + 1]
         if after is not None:
-            difference = np.abs(self._inner.physics_state - after).max()
+            size = motion_size(self._inner.simulation.model)
+            difference = np.abs((self._inner.physics_state - after)[:size]).max()
             info = info | {"playback_error": float(difference)}
         return observation, float(reward), terminated, truncated or over, info
 
@@ -125,15 +127,16 @@ class DemoStart(gymnasium.Wrapper[Any, Any, Any, Any]):
 
     Args:
         env: One of our environments, unwrapped or wrapped.
-        demonstrations: Physics states of each demonstration, shape (n, 1 + nq + nv):
-            time, qpos, qvel, as in datasets.
+        demonstrations: Physics states of each demonstration, shape (n, size), such as
+            the column `states` of a dataset: the world of an episode is that of its
+            state. States of time, qpos and qvel alone keep the scene that was drawn.
         share: Share of episodes that start there; the others start as usual.
         window: Number of last states to draw from at first; None for all.
         growth: Number of states that the window grows by with each episode, towards the
             beginnings of demonstrations: a curriculum.
 
     Raises:
-        ConfigError: If there is no state, or one has a wrong size.
+        ConfigError: If there is no state, or one is of another scene.
     """
 
     def __init__(
@@ -151,12 +154,14 @@ class DemoStart(gymnasium.Wrapper[Any, Any, Any, Any]):
             raise ConfigError(f"DemoStart needs a RobotEnv, not {inner}.")
         self._inner: RobotEnv = inner
         self._demonstrations = [np.array(d, dtype=np.float64) for d in demonstrations]
-        size = inner.physics_state.size
         for states in self._demonstrations:
-            if states.ndim != 2 or states.shape[1] != size or not len(states):
+            try:
+                inner.check_state(states[0] if states.ndim == 2 else np.zeros(0))
+            except (ConfigError, IndexError) as error:
                 raise ConfigError(
-                    f"A demonstration has shape {states.shape}, and needs (n, {size})."
-                )
+                    f"A demonstration has shape {states.shape}, and needs (n, "
+                    f"{inner.physics_state.size}): {error}"
+                ) from error
         if not self._demonstrations:
             raise ConfigError("DemoStart needs a demonstration.")
         self._share = check_number("DemoStart: share", share, least=0.0, most=1.0)

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple, Protocol, TypeAlias
 
+from wbc_suite.control.memory import Parts
 from wbc_suite.control.reasons import Reason
 from wbc_suite.typing import Matrix, Vector
 
@@ -36,6 +37,14 @@ class IkBackend(Protocol):
 
     def reset(self) -> None:
         """Discard the state of earlier ticks; held frames stay where they are."""
+
+    @property
+    def memory(self) -> Parts:
+        """What outlives a tick; views."""
+        ...
+
+    def resume(self) -> None:
+        """Go on from values that were written into `memory`, after a reset."""
 
     def set_targets(self, targets: Matrix) -> None:
         """Set the targets of all controlled frames: poses, [R p] rows, shape (n, 12).

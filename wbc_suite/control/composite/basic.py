@@ -9,6 +9,7 @@ from pydantic import BaseModel, InstanceOf
 from wbc_suite.control.action import ActionLayout
 from wbc_suite.control.law.joint_laws import JointLaw, JointLawConfig
 from wbc_suite.control.law.law import Law, ServoLaw
+from wbc_suite.control.memory import Parts
 from wbc_suite.control.part.controller import (
     UNTIL_NEXT_ACTION,
     PartController,
@@ -93,6 +94,17 @@ class BasicController:
         standing = (part.standing for part in self.parts.values())
         self.standing = next((found for found in standing if found is not None), None)
         self.reset(state)
+
+    @property
+    def memory(self) -> Parts:
+        """What parts and contact forces remember; views."""
+        parts = [array for part in self.parts.values() for array in part.memory]
+        return *parts, *(self.standing.memory if self.standing else ())
+
+    def resume(self, state: RobotState) -> None:
+        """Go on from values that were written into `memory`."""
+        for part in self.parts.values():
+            part.resume(state)
 
     def reset(self, state: RobotState) -> None:
         """Hold every part where it is."""

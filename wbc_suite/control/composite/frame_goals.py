@@ -16,6 +16,7 @@ from wbc_suite.control.composite.frame_targets import (
     write_turn,
 )
 from wbc_suite.control.composite.whole_body_config import GoalsConfig
+from wbc_suite.control.memory import Parts
 from wbc_suite.kinematics import Configuration
 from wbc_suite.kinematics.forward import RobotArrays, compute_joint_poses
 from wbc_suite.linear_algebra import copy_vector
@@ -192,6 +193,15 @@ class FrameGoals:
     def base(self) -> pin.SE3:
         """Pose of the robot's base, as commanded."""
         return pose_of(self._arrays.base)
+
+    @property
+    def memory(self) -> Parts:
+        """Goals, homes and base; views."""
+        return self._arrays.goal, self._arrays.home, self._arrays.base
+
+    def resume(self) -> None:
+        """Take the goals that were written into `memory`."""
+        self.poses = [pose_of(row) for row in self._arrays.goal]
 
     def reset(self, poses: Sequence[pin.SE3], base: pin.SE3) -> None:
         """Take the present poses of the frames in the world as goals."""

@@ -50,6 +50,12 @@ class HybridMobileBase(BasicController):
         self.layout = ActionLayout((*self.layout.slices, MODE))
         self.reset(state)
 
+    def resume(self, state: RobotState) -> None:
+        """Go on from values that were written into `memory`; laws name the frame."""
+        super().resume(state)
+        records = [hand.law.record for hand, _ in self._hands]
+        self._in_world = any(record["reference"][0] == WORLD for record in records)
+
     def reset(self, state: RobotState) -> None:
         """Hold every part where it is, hands relative to the base."""
         for hand, own in self._hands:

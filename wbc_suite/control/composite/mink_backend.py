@@ -13,6 +13,7 @@ from wbc_suite.control.composite.whole_body_config import (
     ControlledFrame,
     WholeBodyIKConfig,
 )
+from wbc_suite.control.memory import Parts
 from wbc_suite.control.reasons import NoSolution, Reason
 from wbc_suite.kinematics import Configuration, Conversion
 from wbc_suite.qp import ActiveLimit, LimitKind, ObstacleLimit
@@ -81,6 +82,15 @@ class MinkBackend:
         self._place()
         for task in self._held:
             task.set_target_from_configuration(self._configuration)
+
+    @property
+    def memory(self) -> Parts:
+        """Nothing: mink's tasks keep no numbers."""
+        return ()
+
+    def resume(self) -> None:
+        """Hold feet where they are commanded."""
+        self.reset()
 
     def set_targets(self, targets: Matrix) -> None:
         """Set the targets of all controlled frames."""

@@ -7,6 +7,7 @@ from wbc_suite.control.composite.tick import WholeBodyArrays
 from wbc_suite.control.dynamics.arrays import WholeBodyDynamics
 from wbc_suite.control.dynamics.state_source import StateSourceConfig
 from wbc_suite.control.law.law import Law
+from wbc_suite.control.memory import Parts
 from wbc_suite.control.state import RobotState
 from wbc_suite.typing import Vector
 
@@ -56,6 +57,22 @@ class SteppedController(CompositeController, Protocol):
         is a servo.
         """
         ...
+
+
+@runtime_checkable
+class ResumableController(CompositeController, Protocol):
+    """A composite controller whose references saved states hold.
+
+    Others start from the robot's state where a saved state is restored.
+    """
+
+    @property
+    def memory(self) -> Parts:
+        """Its arrays that outlive a tick, but those of its laws; views."""
+        ...
+
+    def resume(self, state: RobotState) -> None:
+        """Go on from values that were written into `memory`, after a reset."""
 
 
 @runtime_checkable

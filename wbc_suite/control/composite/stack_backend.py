@@ -19,6 +19,7 @@ from wbc_suite.control.composite.qp_tasks import (
 from wbc_suite.control.composite.torque_limiter import TorqueLimiter
 from wbc_suite.control.composite.whole_body_config import WholeBodyIKConfig
 from wbc_suite.control.law.joint_laws import JointLaw
+from wbc_suite.control.memory import Parts
 from wbc_suite.control.part.spline_reference import SplineReference
 from wbc_suite.control.reasons import Reason
 from wbc_suite.kinematics import Configuration
@@ -105,6 +106,17 @@ class StackBackend:
         self.stack.reset()
         self._joint_stack.reset()
         self.v[:] = 0.0
+
+    @property
+    def memory(self) -> Parts:
+        """What outlives a tick; views."""
+        held = [held.target_row.values for held in self._held]
+        return self.v, *self.stack.memory, *held
+
+    def resume(self) -> None:
+        """Take what held frames hold, which was written into `memory`."""
+        for held in self._held:
+            held.target_row.set(held.target_row.values)
 
     def set_targets(self, targets: Matrix) -> None:
         """Set the targets of all controlled frames."""

@@ -29,6 +29,7 @@ from wbc_suite.control.composite.qp_tasks import (
     weight_limits,
 )
 from wbc_suite.control.composite.whole_body_config import WholeBodyIKConfig
+from wbc_suite.control.memory import Parts
 from wbc_suite.control.part.stance_controller import soles_of
 from wbc_suite.kinematics import Configuration
 from wbc_suite.planning import (
@@ -126,18 +127,33 @@ class WaypointPlanner:
         )
         self._search = GoalSearch(problem, clearance, self._planner)
         progress = progress_arrays(config, configuration.nq, configuration.nv, dt)
-        self._state, self._trail = progress.state, Trail(progress)
+        self._progress, self._state = progress, progress.state
+        self._trail = Trail(progress)
         self.argument = as_argument(progress)
+        self._posture = configuration.q.copy()
         self.reset(configuration.q)
 
     def reset(self, posture: Vector) -> None:
         """Drop all plans; prefer a posture, until a search has found another."""
-        self._posture = posture
+        self._posture[:] = posture
         self._frames.posture.goal[:] = posture
         self._motion: Motion | None = None
         self._search.stop()
         for name in self._state.dtype.names or ():
             self._state[name] = 0
+
+    @property
+    def memory(self) -> Parts:
+        """Progress towards the goals, and preferred postures; views."""
+        names = set(self._state.dtype.names or ()) - {"recorded"}
+        state = [self._state[name] for name in sorted(names)]
+        return *state, self._progress.error, self._posture, self._frames.posture.goal
+
+    def resume(self) -> None:
+        """Plan anew where a motion was on its way."""
+        if self._state["is_planning"][0]:
+            self._state["is_planning"] = 0
+            self.renew()
 
     def renew(self) -> None:
         """Note that goals have changed."""

@@ -35,6 +35,7 @@ from wbc_suite.control.dynamics.standing import Standing
 from wbc_suite.control.law.joint_laws import JointLaw
 from wbc_suite.control.law.law import Law
 from wbc_suite.control.loop.records import readable
+from wbc_suite.control.memory import Parts
 from wbc_suite.control.part.feasible_acceleration import greatest_leads
 from wbc_suite.control.part.gripper import GripperController
 from wbc_suite.control.part.spline_reference import SplineReference, window_length
@@ -195,6 +196,23 @@ class WholeBodyIK:
             stiffness=config.joint_law.kp,
             motion=motion,
         )
+
+    @property
+    def memory(self) -> Parts:
+        """What outlives a tick; views. A planned motion is not part of it."""
+        parts = [array for gripper in self._grippers for array in gripper.memory]
+        own = self._configuration.q, self._state["countdown"]
+        references = *self._reference.memory, *self._goals.memory
+        solved = *self._planner.memory, *self._backend.memory
+        standing = self.standing.memory if self.standing else ()
+        return *own, *references, *solved, *parts, *standing
+
+    def resume(self, state: RobotState) -> None:
+        """Go on from values that were written into `memory`."""
+        self._configuration.refresh()
+        self._goals.resume()
+        self._planner.resume()
+        self._backend.resume()
 
     def reset(self, state: RobotState) -> None:
         """Hold the robot where it is."""

@@ -14,11 +14,12 @@ from wbc_suite.control.composite.whole_body_dynamics_config import (
     WholeBodyIDConfig,
     read_dynamics,
 )
-from wbc_suite.control.dynamics.arrays import Stage, make_dynamics
+from wbc_suite.control.dynamics.arrays import Stage, make_dynamics, memory_of
 from wbc_suite.control.dynamics.qp_fallback import QpFallback
 from wbc_suite.control.dynamics.standing import chain, limits_of, make_foot
 from wbc_suite.control.law.law import Law
 from wbc_suite.control.loop.records import LawKind
+from wbc_suite.control.memory import Parts
 from wbc_suite.control.part.base_velocity import (
     BaseVelocityConfig,
     BaseVelocityController,
@@ -178,6 +179,17 @@ class WholeBodyID:
             for joint in robot.groups.get(group, ())
         }
         return np.array([weights.get(j, posture.weight) for j in self._law.joints])
+
+    @property
+    def memory(self) -> Parts:
+        """What outlives a tick; views."""
+        others = (*self._grippers, *([self._base] if self._base else []))
+        parts = [array for part in others for array in part.memory]
+        return *memory_of(self.dynamics), *self._goals.memory, *parts
+
+    def resume(self, state: RobotState) -> None:
+        """Go on from values that were written into `memory`."""
+        self._goals.resume()
 
     def reset(self, state: RobotState) -> None:
         """Stand where the robot is."""

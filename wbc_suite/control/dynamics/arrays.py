@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wbc_suite.compiling import readable, struct
+from wbc_suite.control.memory import Parts
 from wbc_suite.locomotion.gait import Gait, Measured, Plan, make_measured, make_plan
 from wbc_suite.qp.active_set import QpArrays, make_qp_arrays
 from wbc_suite.typing import Indices, Matrix, Records, Vector
@@ -51,6 +52,11 @@ STATE = np.dtype(
         ("root_weight", "f8", (2,)),  # of position and attitude of the root that tracks
     ]
 )
+
+
+_REMEMBERED = ("mass", "ticks", "unsolved", "trunk_height")
+_FALL = ("fell", "fell_by_tilt", "tilt", "drop")
+"""Fields of the state that outlive a tick."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -283,6 +289,20 @@ def make_dynamics(
         plan=make_plan(f),
         tracked=tracked or still_motion(np.zeros(7), np.zeros(n)),
         qp=_make_qp(rows, edges, n),
+    )
+
+
+def memory_of(body: WholeBodyDynamics) -> Parts:
+    """Return what outlives a tick, but goals of hands and a motion; views."""
+    gait, state, terms = body.gait, body.state, body.terms
+    return (
+        *(state[name] for name in (*_REMEMBERED, *_FALL)),
+        *(gait.state[name] for name in gait.state.dtype.names or ()),
+        *(gait.nominal, gait.offset, gait.lift, gait.lift_yaw, gait.goal, gait.swings),
+        *(terms.v, terms.a, terms.com, body.last_velocity, body.load, body.torque),
+        *(body.start, body.reference, body.travel, body.command),
+        *(body.posture, body.upright_pose),
+        *(body.plan.load, body.plan.margin, body.plan.footstep, body.qp.side),
     )
 
 

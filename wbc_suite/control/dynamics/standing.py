@@ -12,12 +12,14 @@ from wbc_suite.control.dynamics.arrays import (
     Tracked,
     WholeBodyDynamics,
     make_dynamics,
+    memory_of,
     still_motion,
 )
 from wbc_suite.control.dynamics.qp_fallback import QpFallback
 from wbc_suite.control.dynamics.state_source import StateSourceConfig
 from wbc_suite.control.law.law import Law
 from wbc_suite.control.loop.records import LawKind
+from wbc_suite.control.memory import Parts
 from wbc_suite.control.state import RobotState
 from wbc_suite.locomotion.gait import TrotConfig, make_gait
 from wbc_suite.qp.solution import Fallback
@@ -79,6 +81,13 @@ class Standing:
             own["stiffness"] = stiffness
             own["root_weight"] = POSITION_WEIGHT, TRUNK_WEIGHT
         self._qp = QpFallback(self.dynamics.qp)
+
+    @property
+    def memory(self) -> Parts:
+        """What outlives a tick; views."""
+        motion = self.dynamics.tracked
+        own = motion.start, motion.joints, motion.since
+        return *memory_of(self.dynamics), *(own if self._stays else ())
 
     def reset(self, state: RobotState) -> None:
         """Forget the last step; stay where the robot is, if there is no motion."""

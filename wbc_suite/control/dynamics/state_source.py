@@ -18,6 +18,7 @@ from wbc_suite.control.dynamics.arrays import (
 )
 from wbc_suite.control.loop.physics import Physics
 from wbc_suite.control.loop.rigid_body import rotated, rotation
+from wbc_suite.control.memory import Parts
 from wbc_suite.locomotion.base_estimator import (
     BaseEstimate,
     EstimatorNoise,
@@ -207,6 +208,15 @@ def begin_source(source: StateSource, data: mujoco.MjData) -> None:
     at, dof = int(state["root_qpos"]), int(state["root_dof"])
     source.last_v[:], source.last_R[:] = data.qvel[dof : dof + 3], root
     begin_estimate(source.estimate, data.qpos[at : at + 3], root, source.last_v)
+
+
+def source_memory(source: StateSource) -> Parts:
+    """Return what outlives a step; views."""
+    filtered = source.estimate._asdict()
+    for name in ("noise", "F", "H", "work"):
+        del filtered[name]
+    own = source.state["count"], source.readings, source.last_v, source.last_R
+    return *own, *filtered.values()
 
 
 def source_for_plain_python(source: StateSource) -> StateSource:

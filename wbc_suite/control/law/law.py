@@ -7,6 +7,7 @@ import numpy as np
 
 from wbc_suite.control.law.custom import law_kind
 from wbc_suite.control.loop.records import DRIVE, LAW, LawKind, Records, new_records
+from wbc_suite.control.memory import Parts
 from wbc_suite.control.state import RobotState
 from wbc_suite.errors import ConfigError
 from wbc_suite.typing import Indices, Vector
@@ -20,6 +21,12 @@ LEAST_SHARE = 0.1
 
 FOREVER = np.inf
 """s; a reference that moves until it is replaced."""
+
+_TIMES = ("since", "duration")
+_HAND = ("reference", "start", "shift", "turn", "kp", "kd")
+_REFERENCES = ("position", "velocity", "acceleration", "jerk", "kp", "kd")
+_OBSERVER = ("command", "desired", "last_velocity", "saturation", "disturbance")
+"""Fields of records that a goal or a step changes."""
 
 
 class Law:
@@ -92,6 +99,18 @@ class Law:
         drives["implicit_inertia"] = np.where(
             added > LEAST_SHARE * m.dof_M0[dof], added, 0.0
         )
+
+    @property
+    def memory(self) -> Parts:
+        """Fields of its records that outlive a step; views."""
+        record, kind = self.record, int(self.record["kind"][0])
+        fields = _TIMES
+        if kind == LawKind.OSC or kind >= LawKind.CUSTOM:
+            fields = *fields, *_HAND
+        if kind >= LawKind.CUSTOM:
+            fields = *fields, "parameters"
+        drives = [self.drives[name] for name in (*_REFERENCES, *_OBSERVER)]
+        return *(record[name] for name in fields), *drives
 
     def reset(self, state: RobotState) -> None:
         """Reset the disturbance observer."""

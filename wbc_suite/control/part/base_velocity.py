@@ -8,6 +8,7 @@ from pydantic import Field, PositiveFloat
 from wbc_suite.control.action import Axis, SliceKind, Unit
 from wbc_suite.control.law.joint_laws import VelocityLaw
 from wbc_suite.control.loop.records import LawKind
+from wbc_suite.control.memory import Parts
 from wbc_suite.control.part.controller import PartController
 from wbc_suite.control.part.part_settings import (
     PartSettings,
@@ -98,14 +99,19 @@ class BaseVelocityController(PartController[VelocityLaw]):
         self.slices = (self._input.action,)
         self.goal: Vector = np.zeros(3)
 
+    @property
+    def memory(self) -> Parts:
+        """The commanded velocities, a view."""
+        return (self.goal,)
+
     def reset(self, state: RobotState) -> None:
         """Stand still."""
-        self.goal = np.zeros(3)
+        self.goal[:] = 0.0
         self.law.halt(state)
 
     def set_goal(self, values: Vector, period: float) -> None:
         """Take velocities, shape (3,), or (2,) without sideways."""
-        self.goal = np.zeros(3)
+        self.goal[:] = 0.0
         self.goal[self._axes] = self._input(values)
         now, _ = self.law.commanded()
         duration = float((np.abs(self.goal - now) / self._accelerations).max())

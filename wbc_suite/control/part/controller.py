@@ -10,6 +10,7 @@ import pinocchio as pin
 from wbc_suite.control.action import ActionPart
 from wbc_suite.control.dynamics.standing import Standing
 from wbc_suite.control.law.law import Law
+from wbc_suite.control.memory import Parts
 from wbc_suite.control.robot_parts import RobotPart
 from wbc_suite.control.state import RobotState
 from wbc_suite.robot import RobotDescription
@@ -82,6 +83,17 @@ class PartController(ABC, Generic[LawType]):
     @abstractmethod
     def set_goal(self, values: Vector, period: float) -> None:
         """Take the values of all slices; the next ones come after a period, s."""
+
+    @property
+    def memory(self) -> Parts:
+        """Its arrays that outlive an action, but those of its law; views.
+
+        States of environments hold their values. By default there are none.
+        """
+        return ()
+
+    def resume(self, state: RobotState) -> None:
+        """Go on from values that were written into `memory`, after a reset."""
 
     def prepare(self, state: RobotState) -> int:
         """Do what is due now; return for how many physics steps that is enough."""

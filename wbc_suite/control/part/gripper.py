@@ -7,6 +7,7 @@ import numpy as np
 
 from wbc_suite.control.action import ActionPart, SliceKind, Unit
 from wbc_suite.control.law.law import ServoLaw
+from wbc_suite.control.memory import Parts
 from wbc_suite.control.part.controller import PartController
 from wbc_suite.control.part.part_settings import GripConfig
 from wbc_suite.control.state import RobotState
@@ -68,6 +69,11 @@ class GripperController(PartController[ServoLaw]):
             int(np.flatnonzero(self._synergy == k)[0]) for k in range(count)
         ]
         self.goal: Vector = np.zeros(count)
+
+    @property
+    def memory(self) -> Parts:
+        """The goal, a view."""
+        return (self.goal,)
 
     def reset(self, state: RobotState) -> None:
         """Take the present opening as the goal."""

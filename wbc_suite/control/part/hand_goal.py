@@ -9,6 +9,7 @@ from pydantic import BaseModel, model_validator
 from wbc_suite.compiling import compiled
 from wbc_suite.control.law.pose_interpolation import pose_vector, vector_pose
 from wbc_suite.control.loop.rigid_body import matrix_product
+from wbc_suite.control.memory import Parts
 from wbc_suite.control.part.part_settings import (
     ROUNDING,
     GoalUpdate,
@@ -82,6 +83,11 @@ class HandGoal:
         self._reference_axes = np.eye(3)
         self.vector = pose_vector(pin.SE3.Identity())
         self.start = self.vector.copy()
+
+    @property
+    def memory(self) -> Parts:
+        """Goal and start; views."""
+        return self.vector, self.start
 
     @property
     def pose(self) -> pin.SE3:

@@ -10,6 +10,7 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat
 from wbc_suite.control.action import ActionPart, Axis, SliceKind, Unit
 from wbc_suite.control.law.joint_laws import JointLaw
 from wbc_suite.control.law.pose_interpolation import pose_vector
+from wbc_suite.control.memory import Parts
 from wbc_suite.control.part.approach import approach_pose
 from wbc_suite.control.part.controller import PartController
 from wbc_suite.control.part.feasible_acceleration import feasible_accelerations
@@ -123,19 +124,28 @@ class IkPoseController(PartController[JointLaw]):
         self._scaling = InputScaling(3, config, config.output_min, config.output_max)
         self.slices = (_pose_part(part.name, config, self._scaling),)
         self._goal = HandGoal(config)
-        self._due = 0.0
+        self._due = np.zeros(1)  # time of the next solve, s
 
     @property
     def goal(self) -> pin.SE3:
         """Pose to go to, in the reference's axes."""
         return self._goal.pose
 
+    @property
+    def memory(self) -> Parts:
+        """Goal, the time of the next solve, and what the last one left."""
+        return *self._goal.memory, self._due, *self._ik.memory
+
+    def resume(self, state: RobotState) -> None:
+        """Take the posture that is preferred, and the configuration solved last."""
+        self._ik.resume()
+
     def reset(self, state: RobotState) -> None:
         """Hold the hand where it is, and the posture that it has."""
         self._ik.reset(state)
         self._goal.reset(pose_vector(self._hand()))
         self.law.aim(state.data.qpos[self.law.drives["qpos"]])
-        self._due = state.time
+        self._due[:] = state.time
 
     def set_goal(self, values: Vector, period: float) -> None:
         """Take a position and a quaternion, x y z w, shape (7,)."""
@@ -155,10 +165,10 @@ class IkPoseController(PartController[JointLaw]):
     def prepare(self, state: RobotState) -> int:
         """Solve when it is time to; return how many physics steps are left."""
         step = float(state.model.opt.timestep)
-        left = round((self._due - state.time) / step)
+        left = round((self._due.item() - state.time) / step)
         if left > 0:
             return left
-        self._due = state.time + self._steps * step
+        self._due[:] = state.time + self._steps * step
         self.law.aim(*self._ik.solve(state, self._reference() * self.goal))
         return self._steps
 
@@ -257,6 +267,7 @@ class _PartIk:
             max_linear_speed=UNLIMITED,
             max_angular_speed=UNLIMITED,
         )
+        self._rest = self._configuration.q.copy()
         self._posture = PostureTask(
             motion.posture_cost, gain=motion.posture_gain, level=1
         )
@@ -275,12 +286,24 @@ class _PartIk:
             self._configuration, self._places, speeds, period, mean=mean
         )
 
+    @property
+    def memory(self) -> Parts:
+        """Configuration, spline, QP and preferred posture; views."""
+        q, rest = self._configuration.q, self._rest
+        return q, rest, *self._spline.memory, *self._stack.memory
+
+    def resume(self) -> None:
+        """Compute what follows from values that were written into `memory`."""
+        self._configuration.refresh()
+        self._posture.set_target(self._rest)
+
     def reset(self, state: RobotState) -> None:
         """Start from rest; the present posture becomes the preferred one."""
         self._configuration.q[self._places] = state.data.qpos[self._addresses]
         self._configuration.refresh()
         self._stack.reset()
-        self._posture.set_target(self._configuration.q)
+        self._rest[:] = self._configuration.q
+        self._posture.set_target(self._rest)
         self._spline.reset()
 
     def solve(self, state: RobotState, goal: pin.SE3) -> Matrix:

@@ -6,6 +6,7 @@ import numpy as np
 from pydantic import BaseModel, NonNegativeFloat
 
 from wbc_suite.control.action import ActionPart, SliceKind, Unit
+from wbc_suite.control.memory import Parts
 from wbc_suite.control.part.part_settings import damping_of, limits_of, spread
 from wbc_suite.tomlfile import FROZEN
 from wbc_suite.typing import Vector
@@ -57,10 +58,10 @@ class Impedance:
         kd_limits = limits_of(config.kd_limits, size, "kd_limits")
         ratio = spread(config.damping_ratio, size, "damping_ratio")
         self._mode = config.impedance_mode
-        self.kp = spread(config.kp, size, "kp")
+        self.kp: Vector = spread(config.kp, size, "kp").copy()
         self.kd: Vector = damping_of(self.kp, ratio)
         if config.kd is not None:
-            self.kd = spread(config.kd, size, "kd")
+            self.kd = spread(config.kd, size, "kd").copy()
         stiffness = _slice(f"{name}_kp", SliceKind.STIFFNESS, labels, kp_limits)
         damping = _slice(f"{name}_kd", SliceKind.DAMPING, labels, kd_limits)
         self.slices: tuple[ActionPart, ...] = ()
@@ -78,10 +79,15 @@ class Impedance:
         size = len(self.kp)
         if self._mode == "fixed":
             return
-        self.kp = values[:size].copy()
-        self.kd = damping_of(self.kp, 1.0)
+        self.kp[:] = values[:size]
+        self.kd[:] = damping_of(self.kp, 1.0)
         if self._mode == "variable":
-            self.kd = values[size:].copy()
+            self.kd[:] = values[size:]
+
+    @property
+    def memory(self) -> Parts:
+        """Gains that the action sets; views."""
+        return (self.kp, self.kd)[: 2 if self.slices else 0]
 
     @property
     def hold_action(self) -> Vector:

@@ -12,6 +12,7 @@ from pydantic import PositiveFloat
 from wbc_suite.control.action import SliceKind, Unit
 from wbc_suite.control.law.joint_laws import JointLaw, VelocityLaw
 from wbc_suite.control.law.law import Law, TorqueLaw
+from wbc_suite.control.memory import Parts
 from wbc_suite.control.part.controller import PartController
 from wbc_suite.control.part.impedance import Gains, Impedance, ImpedanceSettings
 from wbc_suite.control.part.part_settings import (
@@ -120,9 +121,14 @@ class JointPositionController(PartController[JointLaw]):
         self.slices = (self._input.action, *gains.slices)
         self.goal: Vector = np.zeros(len(part.joints))
 
+    @property
+    def memory(self) -> Parts:
+        """Goal and gains; views."""
+        return self.goal, *self._impedance.memory
+
     def reset(self, state: RobotState) -> None:
         """Hold the joints where they are."""
-        self.goal = state.data.qpos[self.law.drives["qpos"]]
+        self.goal[:] = state.data.qpos[self.law.drives["qpos"]]
         self.law.aim(self.goal)
 
     def set_goal(self, values: Vector, period: float) -> None:
@@ -134,7 +140,7 @@ class JointPositionController(PartController[JointLaw]):
         if self._input.scaled:
             self._step(self._input.scaling(values[:size]))
         else:
-            self.goal = self._input(values[:size])
+            self.goal[:] = self._input(values[:size])
         self.law.move(self.goal, self.config.ramp(period))
 
     @property
@@ -149,7 +155,7 @@ class JointPositionController(PartController[JointLaw]):
         if self.config.goal_update_mode == "achieved":
             start = self._state.data.qpos[self.law.drives["qpos"]]
         moves = np.abs(step) >= ROUNDING
-        self.goal = np.where(moves, self._input.clip(start + step), self.goal)
+        self.goal[moves] = self._input.clip(start + step)[moves]
 
 
 class JointVelocityController(PartController[VelocityLaw]):
@@ -182,14 +188,19 @@ class JointVelocityController(PartController[VelocityLaw]):
         self.slices = (self._input.action,)
         self.goal: Vector = np.zeros(len(part.joints))
 
+    @property
+    def memory(self) -> Parts:
+        """The commanded velocities, a view."""
+        return (self.goal,)
+
     def reset(self, state: RobotState) -> None:
         """Stand still."""
-        self.goal = np.zeros(len(self.law.joints))
+        self.goal[:] = 0.0
         self.law.halt(state)
 
     def set_goal(self, values: Vector, period: float) -> None:
         """Take velocities, shape (n,)."""
-        self.goal = self._input(values)
+        self.goal[:] = self._input(values)
         self.law.set_speed(self.goal, duration=self.config.ramp(period))
 
     @property
@@ -224,14 +235,19 @@ class JointTorqueController(PartController[TorqueLaw]):
         self.slices = (self._input.action,)
         self.goal: Vector = np.zeros(len(part.joints))
 
+    @property
+    def memory(self) -> Parts:
+        """The commanded torques, a view."""
+        return (self.goal,)
+
     def reset(self, state: RobotState) -> None:
         """Command zero torque."""
-        self.goal = np.zeros(len(self.law.joints))
+        self.goal[:] = 0.0
         self.law.aim(self.goal)
 
     def set_goal(self, values: Vector, period: float) -> None:
         """Take torques, shape (n,)."""
-        self.goal = self._input(values)
+        self.goal[:] = self._input(values)
         self.law.move(self.goal, self.config.ramp(period))
 
     @property

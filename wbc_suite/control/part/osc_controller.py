@@ -8,6 +8,7 @@ from pydantic import NonNegativeFloat, PositiveFloat
 
 from wbc_suite.control.action import FULL_TURN, Axis, SliceKind, Unit
 from wbc_suite.control.law.osc import OscLaw
+from wbc_suite.control.memory import Parts
 from wbc_suite.control.part.controller import PartController, PoseInput
 from wbc_suite.control.part.hand_goal import (
     HandGoal,
@@ -156,6 +157,11 @@ class OscController(PartController[OscLaw]):
         else:
             self._goal.set(self._pose_of(values[:size]))
         self.law.set_goal(self._goal.vector, start=start, duration=ramp)
+
+    @property
+    def memory(self) -> Parts:
+        """Goal, the pose from which turns are limited, and gains."""
+        return *self._goal.memory, *self._impedance.memory
 
     @property
     def goal(self) -> pin.SE3:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wbc_suite.compiling import as_argument, compiled, struct
+from wbc_suite.control.memory import Parts
 from wbc_suite.kinematics import Configuration
 from wbc_suite.kinematics.forward import RobotArrays
 from wbc_suite.kinematics.tangent_space import (
@@ -118,6 +119,13 @@ class SplineReference:
         self.start: Vector = self._arrays.points[0]
         self.since: Vector = self._arrays.since
         self.reset()
+
+    @property
+    def memory(self) -> Parts:
+        """What outlives a solve, and the motion until the next; views."""
+        arrays = self._arrays
+        past = arrays.window, arrays.points, arrays.rates
+        return *past, arrays.motion, arrays.root, arrays.since
 
     def reset(self) -> None:
         """Stand still where the robot is."""

@@ -143,6 +143,8 @@ class MujocoEnv(Observing):
             write_xml=lambda: scene_as_it_is(core),
             cameras=core.cameras,
             start=core.simulation.start,
+            read=lambda: core.physics_state,
+            restore=core.restore,
         )
 
     def _load_model(self) -> None:
@@ -280,7 +282,7 @@ class MujocoEnv(Observing):
         if self._xml_processor is not None:
             xml_string = self._xml_processor(xml_string)
         scene = load_scene(xml_string, self.sim.model._model)
-        self.env.begin(None)
+        scene.begin(self.env)
         scene.write(self.sim.model._model)
         self.env.simulation.start()
         self.env.cameras.close()

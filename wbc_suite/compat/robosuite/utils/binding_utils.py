@@ -2,15 +2,15 @@
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import mujoco
 import numpy as np
 
 from wbc_suite.arguments import check_array
-from wbc_suite.envs.states import write_physics
-from wbc_suite.errors import UnknownNameError
+from wbc_suite.envs.states import motion_size, write_physics
+from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.typing import Array, Vector
 
 KINDS = "body|joint|geom|site|light|camera|actuator|sensor|tendon|mesh"
@@ -198,31 +198,40 @@ class MjData:
 
 @dataclass(slots=True)
 class MjSimState:
-    """Time, s, and the arrays qpos and qvel."""
+    """Time, s, and the arrays qpos and qvel.
+
+    `rest` is what else the world of an environment consists of: what its scene drew,
+    marks that are wiped, references of controllers. It is empty where there is none.
+    """
 
     time: float
     qpos: Vector
     qvel: Vector
+    rest: Vector = field(default_factory=lambda: np.zeros(0))
 
     @classmethod
     def from_flattened(cls, array: Any, sim: "MjSim") -> "MjSimState":
-        """Return the state of a vector: time, qpos, qvel."""
+        """Return the state of a vector: time, qpos, qvel, and perhaps the rest."""
         model = sim.model._model
-        size = 1 + model.nq + model.nv
-        values = check_array("A physics state", array, (size,))
-        return cls(
-            float(values[0]), values[1 : 1 + model.nq], values[1 + model.nq :].copy()
-        )
+        size = motion_size(model)
+        values = np.array(check_array("A physics state", array, None))
+        if values.ndim != 1 or values.size < size:
+            raise ConfigError(
+                f"A physics state has shape {values.shape}, but must have ({size},)."
+            )
+        qpos, qvel = np.split(values[1:size], [model.nq])
+        return cls(float(values[0]), qpos, qvel, values[size:])
 
     def flatten(self) -> Vector:
-        """Return time, qpos, qvel as one vector."""
-        return np.concatenate([[self.time], self.qpos, self.qvel])
+        """Return time, qpos, qvel and the rest as one vector."""
+        return np.concatenate([[self.time], self.qpos, self.qvel, self.rest])
 
 
 class MjSim:
     """A simulation: `model`, `data`, and what advances them.
 
-    `cameras` renders, if there is one; `start` runs after a state was written.
+    `cameras` renders, if there is one. Of an environment, `start` runs after time, qpos
+    and qvel were written, `read` returns a whole state and `restore` writes it.
     """
 
     def __init__(
@@ -234,10 +243,13 @@ class MjSim:
         write_xml: Callable[[], str] | None = None,
         cameras: Any = None,
         start: Callable[[], None] | None = None,
+        read: Callable[[], Vector] | None = None,
+        restore: Callable[[Vector], None] | None = None,
     ) -> None:
         self.model = MjModel(model, aliases, write_xml)
         self.data = MjData(self.model, mujoco.MjData(model) if data is None else data)
         self._cameras, self._start = cameras, start
+        self._read, self._restore = read, restore
         self.next_step: Callable[[], None] | None = None
 
     @classmethod
@@ -276,6 +288,8 @@ class MjSim:
     def get_state(self) -> MjSimState:
         """Return the physics state, copied."""
         data = self.data._data
+        if self._read is not None:
+            return MjSimState.from_flattened(self._read(), self)
         return MjSimState(float(data.time), data.qpos.copy(), data.qvel.copy())
 
     def set_state(self, value: MjSimState) -> None:
@@ -283,8 +297,16 @@ class MjSim:
         self.set_state_from_flattened(value.flatten())
 
     def set_state_from_flattened(self, value: Any) -> None:
-        """Write time, qpos and qvel; controllers start from there."""
-        write_physics(self.model._model, self.data._data, value)
+        """Restore the world of a state of `get_state`.
+
+        Of time, qpos and qvel alone the scene stays as it is drawn, and controllers
+        start from there.
+        """
+        model = self.model._model
+        if self._restore is not None and np.size(value) > motion_size(model):
+            self._restore(value)
+            return
+        write_physics(model, self.data._data, value)
         if self._start is not None:
             self._start()
 
