@@ -375,7 +375,7 @@ class TestActionsOfWholeBodyDynamics:
 
     def controller(self):
         goals = np.zeros((2, 12))
-        goals[:, [0, 4, 8]] = 1.0
+        goals[:, [0, 5, 10]] = 1.0  # rotation and position, by rows of (3, 4)
         self.calls = []
         slices = {"walk": slice(0, 3), "height": slice(3, 4), "grip": slice(4, 5)}
         gripper = record(
