@@ -5,11 +5,13 @@ from types import SimpleNamespace
 
 import mujoco
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from wbc_suite.benchmark import load_benchmark
 from wbc_suite.benchmark.arrangement import with_default
 from wbc_suite.benchmark.carry import Carry
+from wbc_suite.benchmark.falls import fall_of
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark
 from wbc_suite.benchmark.reach import Reach
 from wbc_suite.benchmark.standing import arrange_on_feet
@@ -236,3 +238,65 @@ def test_benchmarks_on_feet_take_robots_with_a_free_root_and_feet(
         return
     with pytest.raises(ConfigError, match=refused):
         arrange_on_feet("Test", robots, "default", places, hands=hands)
+
+
+PRESSING = """
+<mujoco>
+  <option timestep="0.002"/>
+  <worldbody>
+    <geom name="table" type="box" size="1 1 .1" pos="0 0 -.1"/>
+    <body name="finger" pos=".1 .2 .049"><freejoint/>
+      <geom name="tip" type="sphere" size=".05" mass="1"/></body>
+    <body name="elbow" pos="{elbow} 0 .049"><freejoint/>
+      <geom name="elbow" type="sphere" size=".05" mass="2"/></body>
+    <body name="stone" pos=".5 .5 .049"><freejoint/>
+      <geom name="stone" type="sphere" size=".05" mass="3"/></body>
+  </worldbody>
+</mujoco>
+"""
+
+
+@pytest.mark.parametrize("collided", [True, False])
+def test_hands_press_on_the_table_and_other_parts_collide_with_it(collided):
+    model = mujoco.MjModel.from_xml_string(
+        PRESSING.format(elbow=0.0 if collided else 9)
+    )
+    data = mujoco.MjData(model)
+    for _ in range(500):
+        mujoco.mj_step(model, data)
+    tip, elbow = (model.geom(name).id for name in ("tip", "elbow"))
+    task = stub(
+        model=model,
+        data=data,
+        hands=[stub(owns=lambda geom: geom == tip)],
+        _table=model.geom("table").id,
+        _robot_geoms={tip, elbow},
+        _wrench=np.zeros(6),
+    )
+    points, force, found = Wipe._contacts(task)
+    assert found == collided
+    np.testing.assert_allclose(points, [[0.1, 0.2]], atol=1e-3)
+    assert force == pytest.approx(9.81, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("tilt", "height", "root", "fell"),
+    [
+        (0.99, 0.8, "free", False),
+        (1.01, 0.8, "free", True),
+        (-1.01, 0.8, "free", True),
+        (0.0, 0.41, "free", False),
+        (0.0, 0.39, "free", True),
+        (1.5, 0.1, "planar", False),
+    ],
+)
+def test_a_robot_has_fallen_when_it_tilts_by_1_rad_or_lost_half_its_height(
+    tilt, height, root, fell
+):
+    robot = stub(name="Spot", root=stub(kind=root, pos=(0.0, 0.0, 0.8)))
+    pose = pin.SE3(pin.exp3(np.array([tilt, 0.0, 0.0])), np.array([1.0, 2.0, height]))
+    found = fall_of([stub(robot=robot, root_pose=pose)])
+    assert (found is not None) == fell
+    if fell:
+        assert f"{math.degrees(abs(tilt)):.0f} degrees" in found
+        assert f"{100 * (1 - height / 0.8):.0f} % lower" in found

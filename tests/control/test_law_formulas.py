@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import mujoco
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from wbc_suite.compiling import plain
@@ -22,8 +23,10 @@ from wbc_suite.control.composite.progress import (
     record_state,
     watch_progress,
 )
+from wbc_suite.control.composite.whole_body_dynamics import WholeBodyID
 from wbc_suite.control.dynamics import solve_tick, terms
 from wbc_suite.control.law import osc
+from wbc_suite.control.law.pose_interpolation import interpolate_pose, pose_vector
 from wbc_suite.control.loop import acceleration_limits as limits
 from wbc_suite.control.part.joint_controllers import JointPositionController
 from wbc_suite.control.part.osc_controller import OscConfig
@@ -332,3 +335,89 @@ def test_poses_have_six_values_and_positions_three():
         low, high = config.outputs()
         assert (np.size(low), np.size(high)) == (size, size)
         np.testing.assert_allclose(low, np.negative(high))
+
+
+@pytest.mark.parametrize(
+    ("since", "duration", "phase", "rate"),
+    [
+        (0.0, 0.0, 1.0, 0.0),
+        (0.1, 0.4, 0.25, 2.5),
+        (0.4, 0.4, 1.0, 2.5),
+        (0.5, 0.4, 1, 0),
+    ],
+)
+def test_the_goal_of_a_hand_moves_at_constant_velocities(since, duration, phase, rate):
+    start, body = pin.SE3.Random(), pin.SE3.Random()
+    shift, turn = np.array([0.3, -0.2, 0.1]), np.array([0.2, 0.5, -0.4])
+    law = record(
+        since=since,
+        duration=duration,
+        start=pose_vector(start),
+        shift=shift,
+        turn=turn,
+    )
+    R, p, twist = np.full((3, 3), 7.0), np.full(3, 7.0), np.full(6, 7.0)
+    axes, place = body.rotation.copy(), body.translation.copy()
+    plain(interpolate_pose)(law, axes, place, R, p, twist)
+    moved = pin.SE3(
+        start.rotation @ pin.exp3(phase * turn), start.translation + phase * shift
+    )
+    goal = body * moved
+    np.testing.assert_allclose(R, goal.rotation, atol=1e-12)
+    np.testing.assert_allclose(p, goal.translation, atol=1e-12)
+    np.testing.assert_allclose(twist[:3], rate * body.rotation @ shift, atol=1e-12)
+    spin = rate * body.rotation @ start.rotation @ turn
+    np.testing.assert_allclose(twist[3:], spin, atol=1e-12)
+
+
+class TestActionsOfWholeBodyDynamics:
+    """`WHOLE_BODY_ID` hands its action to goals, references, base and commands."""
+
+    def controller(self):
+        goals = np.zeros((2, 12))
+        goals[:, [0, 5, 10]] = 1.0  # rotation and position, by rows of (3, 4)
+        self.calls = []
+        slices = {"walk": slice(0, 3), "height": slice(3, 4), "grip": slice(4, 5)}
+        gripper = record(
+            name="grip", set_goal=lambda *given: self.calls.append(("grip", *given))
+        )
+        return record(
+            _goals=record(set=lambda action: self.calls.append("goals")),
+            _time_references=lambda period: self.calls.append(("references", period)),
+            _base=None,
+            layout=slices,
+            config=record(
+                feet=("left", "right"),
+                frames=[record(max_linear_speed=0.5, max_angular_speed=2.0)] * 2,
+            ),
+            dynamics=record(
+                command=np.zeros(4),
+                start=np.zeros((2, 12)),
+                reference=goals.copy(),
+                goal=goals.copy(),
+                travel=np.full((2, 2), 9.0),
+            ),
+            _grippers=[gripper],
+        )
+
+    def test_an_action_sets_all_that_it_names(self):
+        made, action = self.controller(), np.arange(1.0, 6.0)
+        WholeBodyID.set_goal(made, action, 0.1)
+        assert self.calls[:2] == ["goals", ("references", 0.1)]
+        name, grip, period = self.calls[2]
+        assert (name, grip.tolist(), period) == ("grip", [5.0], 0.1)
+        np.testing.assert_array_equal(made.dynamics.command, [1.0, 2.0, 3.0, 4.0])
+
+    @pytest.mark.parametrize(
+        ("way", "turn", "time"),
+        [(0.0, 0.0, 0.05), (0.2, 0.0, 0.4), (0.0, 1.0, 0.5), (0.2, 1.0, 0.5)],
+    )
+    def test_references_travel_no_faster_than_they_may(self, way, turn, time):
+        made = self.controller()
+        goal = pin.SE3(pin.exp3(np.array([0.0, turn, 0.0])), np.array([0.0, way, 0.0]))
+        made.dynamics.goal[1] = np.column_stack(
+            [goal.rotation, goal.translation]
+        ).ravel()
+        WholeBodyID._time_references(made, 0.05)
+        np.testing.assert_array_equal(made.dynamics.start, made.dynamics.reference)
+        np.testing.assert_allclose(made.dynamics.travel, [[0.0, 0.05], [0.0, time]])

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from test_planners import BIPED, DT, QUADRUPED, SOLE, Pendulum, biped, quadruped
 
-from wbc_suite.locomotion import TrotConfig, WalkConfig, plan_trot, plan_walk
+from wbc_suite.compiling import plain
+from wbc_suite.locomotion import TrotConfig, WalkConfig, plan_trot, plan_walk, walk
 from wbc_suite.locomotion.gait import GRAVITY, Mode, heading_axes
 from wbc_suite.locomotion.soles import keep_in_soles
 
@@ -191,10 +192,10 @@ def test_a_pushed_robot_lands_earlier_but_never_at_once():
     """Place and time of a step are fixed 60 ms before it ends."""
     robot = moving(biped, WALK)
     state, shortened = robot.gait.state, 0
-    for push in range(4):
+    for _ in range(4):
         while not 0.15 < state["since"][0] < 0.3:
             robot.run(DT, (0.2, 0.0, 0.0))
-        robot.v[1] += 0.35 * (-1) ** push
+        robot.v[1] += 0.4 if state["stance"][0] == 0 else -0.4  # beyond the foot
         for _ in range(60):
             since, before = float(state["since"][0]), float(state["duration"][0])
             robot.run(DT, (0.2, 0.0, 0.0))
@@ -205,7 +206,28 @@ def test_a_pushed_robot_lands_earlier_but_never_at_once():
                 shortened += after < 0.45
             if since > before - 0.06 + DT and state["since"][0] > since:
                 assert after == before
-    assert shortened > 3
+    assert shortened > 1
+
+
+@pytest.mark.parametrize(
+    ("since", "beyond", "duration"),
+    [(0.05, 0.3, 0.22), (0.3, 0.3, 0.36), (0.4, 0.3, 0.46), (0.3, 0.0, 0.5)],
+)
+def test_a_step_ends_as_soon_as_it_may_where_the_dcm_runs_away(since, beyond, duration):
+    """What legs cannot reach costs ten times its length; a change of time 0.3 / s."""
+    robot = moving(biped, WALK)
+    state, omega = robot.gait.state[0], np.sqrt(GRAVITY / 0.78)
+    state["since"], state["duration"] = since, 0.5
+    stance = int(state["stance"])
+    foot, side = robot.measured.foot[stance, :2], 1.0 if stance == 0 else -1.0
+    zmp, landing = foot.copy(), np.array([0.0, 0.05 * side])
+    out = np.array([0.0, side * beyond])
+    inside = np.add(landing, [0.0, -0.2 * side]) * np.exp(-omega * (0.5 - since))
+    dcm = zmp + (out if beyond else inside)
+    plain(walk._choose_duration)(
+        robot.gait, robot.measured, dcm, zmp, landing, omega, True
+    )
+    assert state["duration"] == pytest.approx(duration)
 
 
 def test_a_step_lands_where_the_dcm_is_that_of_the_periodic_walk():
