@@ -139,7 +139,9 @@ def test_two_recordings_into_one_file_at_once_are_refused(tmp_path):
 
 
 def test_another_environments_episodes_are_not_added(small_recording):
-    with pytest.raises(DatasetError, match=r'another env.*env_name is ".*" and "Stack"'):
+    with pytest.raises(
+        DatasetError, match=r'another env.*env_name is ".*" and "Stack"'
+    ):
         Store(small_recording, {"env_args": '{"env_name": "Stack"}'})
 
 
