@@ -64,17 +64,24 @@ class CylinderController(PartController[OscLaw]):
             ),
         )
 
+        self.values, self.grasp = np.zeros(3), np.eye(3)
+
+    @property
+    def memory(self) -> tuple[np.ndarray, ...]:
+        """What saved states hold of it, beside the law's records."""
+        return self.values, self.grasp
+
     def reset(self, state: RobotState) -> None:
         """Hold the hand where it is, and the posture that the arm has."""
         self.law.drives["position"] = state.data.qpos[self.law.drives["qpos"]]
         pose = self.law.site_pose(state)
-        self.values = cylindrical(pose.translation)
-        self.grasp = pin.exp3(np.array([0, 0, -self.values[1]])) @ pose.rotation
+        self.values[:] = cylindrical(pose.translation)
+        self.grasp[:] = pin.exp3(np.array([0, 0, -self.values[1]])) @ pose.rotation
         self.law.set_goal(pose)
 
     def set_goal(self, values: np.ndarray, period: float) -> None:
         """Move the goal evenly in the time until the next action."""
-        self.values = values.copy()
+        self.values[:] = values
         goal = self.pose(values)
         self.law.set_goal(goal, start=self.law.target_pose()[0], duration=period)
 

@@ -1,12 +1,14 @@
 """Scripts of robosuite's users, robomimic's calls and datasets' env_args run here."""
 
 import json
+import re
 
 import h5py
 import numpy as np
 import pytest
 
 from wbc_suite.compat import robosuite
+from wbc_suite.compat.robosuite.environments.scene_text import WRITTEN
 from wbc_suite.errors import ConfigError, DatasetError, UnknownNameError
 
 KWARGS = {
@@ -161,3 +163,45 @@ def test_names_are_listed_and_unknown_ones_told():
         robosuite.make("Lif", robots="Panda")
     with pytest.raises(ConfigError, match="Did you mean 'control_freq'"):
         robosuite.make("Lift", robots="Panda", control_frequ=20)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["Door", "Lift", "TwoArmPegInHole"])
+@pytest.mark.parametrize("ways", ["text", "state", "edited text"])
+def test_texts_and_states_restore_what_a_scene_drew(name, ways):
+    robots = ["Panda", "Panda"] if name.startswith("TwoArm") else "Panda"
+    quiet = {"has_offscreen_renderer": False, "use_camera_obs": False}
+    env, fresh = (robosuite.make(name, robots=robots, **quiet) for _ in range(2))
+    env.reset()
+    rng = np.random.default_rng(0)
+    actions = rng.uniform(-0.3, 0.3, (8, env.action_dim))
+    for action in actions[:4]:
+        env.step(action)
+    text, state = env.sim.model.get_xml(), env.sim.get_state().flatten()
+    model = env.sim.model._model
+    drawn = {field: getattr(model, field).copy() for field in WRITTEN}
+    fresh.reset()
+    tolerance = 0.0
+    if ways == "edited text":  # without what the scene was drawn with
+        tolerance, other = 1e-4, text.replace("wbc_suite_drawn_with", "another_text")
+        with pytest.raises(DatasetError, match="not this environment's"):
+            fresh.reset_from_xml_string(other)
+        text = re.sub(r"<text [^>]*/>", "", text)
+    if ways != "state":
+        fresh.reset_from_xml_string(text)
+        fresh.sim.reset()
+    if ways != "edited text":
+        fresh.sim.set_state_from_flattened(state)
+        fresh.sim.forward()
+    there = fresh.sim.model._model
+    for field, values in drawn.items():
+        np.testing.assert_allclose(getattr(there, field), values, atol=tolerance)
+    if ways != "edited text":
+        np.testing.assert_array_equal(fresh.sim.get_state().flatten(), state)
+        for action in actions[4:]:
+            for one in (env, fresh):
+                one.step(action)
+        found = [one.sim.get_state().flatten() for one in (env, fresh)]
+        np.testing.assert_array_equal(*found)
+    for one in (env, fresh):
+        one.close()

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import wbc_suite
+from wbc_suite.envs.states import motion_size
 from wbc_suite.errors import ConfigError, DescriptionError, PhysicsError
 from wbc_suite.scene.objects import MjcfObject
 
@@ -90,7 +91,7 @@ def test_states_that_cannot_be_are_refused(lift, place, value, message):
     env.reset(seed=0)
     state = env.physics_state
     if place == "qvel":
-        state[-1] = value
+        state[motion_size(env.simulation.model) - 1] = value
     else:
         model = env.simulation.model
         free = next(

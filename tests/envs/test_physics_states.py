@@ -138,6 +138,7 @@ def test_whole_body_inverse_kinematics_goes_on_from_its_references(robots):
         np.testing.assert_array_equal(fresh.physics_state, env.physics_state)
 
 
+@pytest.mark.slow
 def test_rows_of_a_recording_are_worlds(doors, tmp_path):
     env, fresh = doors
     with DataCollection(env, tmp_path / "door.hdf5") as recorded:
@@ -192,12 +193,12 @@ def test_a_scene_that_draws_otherwise_is_refused(doors):
 def test_another_controller_starts_from_the_world_of_a_state(lifts):
     """As where demonstrations of one controller are starts of another."""
     state, arrays, *_ = saved_midway(lifts[0])
-    other = wbc_suite.make("Lift", robots="Panda", controller_configs="JOINT_POSITION")
+    other = wbc_suite.make("Lift", robots="Panda", controller_configs="OSC_POSITION")
     other.reset_to(state)
     assert differing(arrays, arrays_of(other)) == []
     before = other.simulation.data.qpos.copy()
     other.step(other.hold_action)
-    assert np.abs(other.simulation.data.qpos - before).max() < 0.05
+    assert np.abs(other.simulation.data.qpos - before).max() < 0.2
 
 
 def test_time_positions_and_velocities_alone_keep_what_a_reset_draws(lifts):
@@ -256,6 +257,14 @@ def test_shown_states_wipe_marks_and_change_no_episode():
     env.show_state(state)
     assert env.benchmark.portion == 0.3
     np.testing.assert_array_equal(env.simulation.model.geom_rgba, colors)
+
+
+def test_states_of_a_start_do_not_depend_on_what_was_before(lifts):
+    used, new = lifts[0], wbc_suite.make("Lift", robots="Panda")
+    saved_midway(used)
+    for env in (used, new):
+        env.reset(seed=5)
+    np.testing.assert_array_equal(used.physics_state, new.physics_state)
 
 
 def test_generators_are_words_and_back():

@@ -274,7 +274,7 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         """Write a physics state for observations, reward and pictures, without a step.
 
         The benchmark sees it as the state after the one before. What the scene drew
-        stays. For errors see `reset_to`.
+        stays, and no episode begins. For errors see `reset_to`.
         """
         saved, simulation = self._states.read(physics), self.simulation
         user = simulation.data.userdata
@@ -285,6 +285,7 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         self.benchmark.after_step()
         if saved.origin is not None:
             user[:] = after
+            self._states.resume(saved)
             if isinstance(self.benchmark, ResumableBenchmark):
                 self.benchmark.resume()
         self.observables.update()

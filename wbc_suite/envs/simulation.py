@@ -117,6 +117,7 @@ class Simulation:
             kernels = *kernels[:-1], tuple(map(for_plain_python, bodies)) or None
             self._law_arguments = physics, laws, drives, *kernels
         self.memory = self._make_memory()
+        self._new = self.memory.read()
         with announced("the control loop"):
             self._call_loop(0)
 
@@ -163,6 +164,7 @@ class Simulation:
         """
         check_model(self.model, self._made_for)
         self.forward()
+        self.memory.write(self._new)  # nothing is left of an episode before
         for state, controller in self.pairs:
             controller.reset(state)
         check_laws(self._laws, self._drives)

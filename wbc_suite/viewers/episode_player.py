@@ -22,7 +22,7 @@ class Clip:
     """One episode, ready to be displayed.
 
     Attributes:
-        states: Physics states, shape (n, 1 + nq + nv), n >= 1.
+        states: Physics states, shape (n, size), n >= 1.
         times: Their times since the first, s, shape (n,).
         effort: Norm of the action at each state, scaled to 0 .. 1, shape (n,).
         rewards: Reward of each action, shape (n,).

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc_suite.envs import RobotEnv
-from wbc_suite.envs.states import write_physics
 from wbc_suite.viewers.episode_player import SPEEDS, Clip, EpisodePlayer, PlayerStatus
 from wbc_suite.viewers.model_scene import ModelScene, robot_box
 from wbc_suite.viewers.page_server import PageServer
@@ -78,8 +77,7 @@ class ReplayPage:
             if clip is not self._clip:
                 self._insert(clip)
             state = clip.states[status.frame]
-            write_physics(simulation.model, simulation.data, state)
-            simulation.forward()
+            self._env.show_state(state)
             self._scene.update(simulation.data.xpos, simulation.data.xquat)
         if panel or clip is not self._clip:
             self._update_panel(status)

@@ -8,7 +8,6 @@ import mujoco
 
 from wbc_suite.devices.mjgui import open_window
 from wbc_suite.envs import RobotEnv
-from wbc_suite.envs.states import write_physics
 from wbc_suite.viewers.episode_player import EpisodePlayer
 
 PERIOD = 1.0 / 60.0  # s, between frames
@@ -46,8 +45,7 @@ def show_in_window(
             with window.lock():
                 status = player.advance()
                 if status.clip is not None:
-                    write_physics(model, data, status.clip.states[status.frame])
-                    mujoco.mj_forward(model, data)
+                    env.show_state(status.clip.states[status.frame])
             window.sync()
             time.sleep(max(0.0, due - time.monotonic()))
 

@@ -25,7 +25,7 @@ FOREVER = np.inf
 _TIMES = ("since", "duration")
 _HAND = ("reference", "start", "shift", "turn", "kp", "kd")
 _REFERENCES = ("position", "velocity", "acceleration", "jerk", "kp", "kd")
-_OBSERVER = ("command", "desired", "last_velocity", "saturation", "disturbance")
+_OBSERVER = ("desired", "last_velocity", "saturation", "disturbance")
 """Fields of records that a goal or a step changes."""
 
 

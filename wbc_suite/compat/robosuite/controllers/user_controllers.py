@@ -13,6 +13,7 @@ from wbc_suite.compat.robosuite.controllers.part_view import (
 from wbc_suite.control import RobotState
 from wbc_suite.control.composite.basic import BasicController, default_basic_config
 from wbc_suite.control.composite.registry import register_composite
+from wbc_suite.control.memory import Parts
 from wbc_suite.typing import Vector
 
 REGISTERED_COMPOSITE_CONTROLLERS_DICT: dict[str, type["CompositeController"]] = {}
@@ -207,6 +208,13 @@ class _Adapter:
 
     def info(self, state: RobotState) -> dict[str, Any]:
         return self._inner.info(state)
+
+    @property
+    def memory(self) -> Parts:
+        return self._inner.memory
+
+    def resume(self, state: RobotState) -> None:
+        self._inner.resume(state)
 
     def reset(self, state: RobotState) -> None:
         self._inner.reset(state)
