@@ -102,7 +102,7 @@ def reports() -> dict[Path, dict[str, Any]]:
     }
 
 
-WORDS = ("case", "side", "ratio", "what")
+WORDS = ("case", "side", "ratio", "what", "met")
 """Columns of text."""
 
 
@@ -134,14 +134,25 @@ def about(ratios: dict[str, dict[str, Any]]) -> str:
 
 
 def goals(ratios: dict[str, dict[str, Any]]) -> str:
-    """Return the goals beside what was found; not measured is empty."""
-    rows = []
+    """Return the goals beside what was found, and whether they are met.
+
+    What was not measured is empty.
+    """
+    rows, missed = [], 0
     for words, wanted in (("at most", GOALS), ("at least", AT_LEAST)):
         for name, limit, text in wanted:
             note = ratios.get(name, {})
-            found = [cell(note.get("found")), note.get("date", "")]
-            rows.append([f"`{name}`", text, f"{words} {limit:.3g}", *found])
-    return table(["ratio", "what", "goal", "found", "date"], rows)
+            found, met = note.get("found"), ""
+            if found is not None:
+                over = (
+                    found / limit - 1.0 if words == "at most" else 1.0 - found / limit
+                )
+                met = "yes" if over <= 0.0 else f"**no**, by {100.0 * over:.0f} %"
+                missed += over > 0.0
+            shown = [cell(found), met, note.get("date", "")]
+            rows.append([f"`{name}`", text, f"{words} {limit:.3g}", *shown])
+    head = ["ratio", "what", "goal", "found", "met", "date"]
+    return f"{missed} of {len(rows)} goals are missed.\n\n{table(head, rows)}"
 
 
 def contents() -> str:

@@ -3,12 +3,13 @@
 Machine code is kept on disk, in one folder for each state of the package's kernels.
 """
 
+import inspect
 import logging
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import partial
+from functools import cache, partial
 from types import FunctionType
 from typing import Any, TypeVar, cast
 
@@ -66,6 +67,33 @@ compiled_each_time = partial(compiled, kept=False)
 compiled_inline = partial(compiled, inline="always")
 
 
+def as_pointer(kernel: Function, *arguments: Any) -> Function:
+    """Return a kernel as a value that other kernels call, whichever kernel it is.
+
+    Kernels for equal types of arguments are one type, so that the caller is compiled
+    once for all of them.
+
+    Args:
+        kernel: What `compiled` returned, a function that returns nothing.
+        arguments: Examples of its arguments.
+    """
+    if _numba.DISABLE_JIT:
+        return kernel
+    return _pointer(kernel, types.void(*map(_untyped.typeof, arguments)))
+
+
+@cache
+def _pointer(kernel: Any, signature: Any) -> Any:
+    """Compile a kernel for a signature; it lives on, as its machine code."""
+    previous = _numba.CACHE_DIR
+    _numba.CACHE_DIR = str(cache_folder())
+    try:
+        make = _untyped.cfunc(signature, cache=True, error_model="numpy")
+        return make(kernel.py_func)
+    finally:
+        _numba.CACHE_DIR = previous
+
+
 def is_compiling() -> bool:
     """Return whether numba compiles kernels: not under `NUMBA_DISABLE_JIT=1`."""
     return not _numba.DISABLE_JIT
@@ -78,7 +106,7 @@ def readable(records: Records) -> Records:
 
 def plain(kernel: Any) -> Any:
     """Return a kernel, and all kernels that it calls, as plain Python functions."""
-    function = kernel if isinstance(kernel, FunctionType) else kernel.py_func
+    function = getattr(kernel, "py_func", None) or inspect.unwrap(kernel)
     names = dict(function.__globals__)
     for name in set(function.__code__.co_names) & set(names):
         if any(names[name] is kernel for kernel in _KERNELS):

@@ -76,17 +76,22 @@ def test_the_page_shows_each_goal_once_with_its_figure(tmp_path, monkeypatch):
     monkeypatch.setattr(write_benchmarks, "RATIOS", tmp_path / "ratios.json")
     about = {"date": "2026-01-02", "machine": "m", "versions": {"mujoco": "4.0"}}
     first = {"ratios": {"GR1/mink": 0.123, "GR1/placo": 0.9, "x": 1.0}, "about": about}
+    first["ratios"]["Tiago/mink"] = 0.25
     write_benchmarks.merged({Path("a.py"): first})
     later = {"ratios": {"GR1/placo": 0.8}, "about": about | {"date": "2026-03-04"}}
     ratios = write_benchmarks.merged({Path("a.py"): later})
-    lines = write_benchmarks.goals(ratios).splitlines()[2:]
+    lines = write_benchmarks.goals(ratios).splitlines()
+    assert lines[0] == "1 of 13 goals are missed."
+    lines = lines[4:]
     assert len(lines) == len(write_benchmarks.GOALS) + len(write_benchmarks.AT_LEAST)
     (mink,) = (line for line in lines if "`GR1/mink`" in line)
-    assert mink.endswith("| at most 0.2 | 0.123 | 2026-01-02 |")  # kept
+    assert mink.endswith("| at most 0.2 | 0.123 | yes | 2026-01-02 |")  # kept
+    (tiago,) = (line for line in lines if "`Tiago/mink`" in line)
+    assert "| at most 0.2 | 0.25 | **no**, by 25 % |" in tiago
     (placo,) = (line for line in lines if "`GR1/placo`" in line)
-    assert placo.endswith("| 0.8 | 2026-03-04 |")
+    assert placo.endswith("| 0.8 | yes | 2026-03-04 |")
     (reset,) = (line for line in lines if "`Lift/Panda/reset/1ms`" in line)
-    assert reset.endswith("| at most 1 |  |  |")  # not measured
+    assert reset.endswith("| at most 1 |  |  |  |")  # not measured
     assert "x" not in ratios
 
 

@@ -31,11 +31,19 @@ def test_robots_are_listed_with_and_without_their_base(monkeypatch, capsys):
     found = printed(["list", "robots"], monkeypatch, capsys)["robots"]
     robots = {row["name"]: row for row in found}
     panda, mobile = robots["Panda"], robots["PandaOmron"]
-    assert float(panda["kg"]) > 250  # the pedestal is of steel
-    assert panda["bare kg"] == mobile["bare kg"]
-    assert 15 < float(panda["bare kg"]) < 20  # Franka: 18 kg with its hand
-    assert (mobile["dof"], mobile["bare dof"]) == ("9", "8")
+    assert panda["kg"] == panda["bare kg"] == mobile["bare kg"]
+    assert 15 < panda["kg"] < 20  # Franka: 18 kg with its hand, and no pedestal
+    assert 2 < robots["Arx5"]["kg"] < 5  # ARX: 3.35 kg without a gripper
+    assert mobile["kg"] > 90  # its base drives
+    assert (mobile["dof"], mobile["bare dof"]) == (9, 8)
     assert robots["GR1"]["kg"] == robots["GR1"]["bare kg"]
+    assert all(row["kg"] < 300 and isinstance(row["dof"], int) for row in found)
+
+
+def test_masses_are_numbers(monkeypatch, capsys):
+    found = printed(["list", "bases"], monkeypatch, capsys)["bases"]
+    (mount,) = (row for row in found if row["name"] == "RethinkMount")
+    assert mount["kg"] > 250  # of steel
 
 
 def test_check(monkeypatch, capsys):

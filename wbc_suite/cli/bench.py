@@ -46,6 +46,13 @@ def bench(
     from wbc_suite.envs import RobotEnv
     from wbc_suite.timing import time_frames
 
+    options.check_names(
+        benchmarks=[benchmark],
+        robots=options.robot_names(robots or ()),
+        controllers=[controller],
+        gripper=gripper,
+        base=base,
+    )
     arguments = options.environment_arguments(
         robots=robots, controller=controller, gripper=gripper, base=base
     )

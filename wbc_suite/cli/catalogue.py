@@ -19,7 +19,7 @@ from wbc_suite.cli.output import print
 from wbc_suite.errors import printable
 
 Kind = Literal["robots", "grippers", "bases", "benchmarks", "controllers"]
-Row: TypeAlias = tuple[str, ...]
+Row: TypeAlias = tuple[str | int | float, ...]
 
 
 def list_catalogue(
@@ -29,7 +29,10 @@ def list_catalogue(
     as_json: JsonOption = False,
     catalogue: CatalogueOption = None,
 ) -> None:
-    """List robots, grippers, bases, benchmarks and controllers."""
+    """List robots, grippers, bases, benchmarks and controllers.
+
+    Masses are those of the robots themselves, without a pedestal.
+    """
     from rich.console import Console
     from rich.table import Table
 
@@ -54,8 +57,12 @@ def list_catalogue(
             side = "right" if column.endswith(("dof", "kg")) else "left"
             table.add_column(column, justify=side, no_wrap=column == "name")
         for row in rows(catalogued.files(folder)):
-            table.add_row(*map(printable, row))
+            table.add_row(*(printable(_shown(value)) for value in row))
         console.print(table)
+
+
+def _shown(value: str | int | float) -> str:
+    return f"{value:.2f}" if isinstance(value, float) else str(value)
 
 
 def _robots(files: Sequence[Path]) -> Iterator[Row]:
@@ -63,9 +70,9 @@ def _robots(files: Sequence[Path]) -> Iterator[Row]:
 
     for file in files:
         robot, bare = load_robot(file), load_robot(file, base="NullMount")
-        numbers = (str(robot.dof), f"{robot.mass:.1f}")
-        alone = (str(bare.dof), f"{bare.mass:.1f}")
-        yield robot.name, robot.title, *numbers, *alone, robot.root.kind
+        own = bare if robot.root.kind == "fixed" else robot  # without a pedestal
+        numbers = robot.dof, round(own.mass, 3), bare.dof, round(bare.mass, 3)
+        yield robot.name, robot.title, *numbers, robot.root.kind
 
 
 def _components(files: Sequence[Path]) -> Iterator[Row]:
@@ -79,14 +86,15 @@ def _components(files: Sequence[Path]) -> Iterator[Row]:
         is_base = header.kind == "base"
         fits = component.root.kind if is_base else header.side or "both"
         mass = sum(link.mass for link in component.links)
-        yield header.name, header.title, fits, f"{mass:.2f}"
+        yield header.name, header.title, fits, round(mass, 3)
 
 
 def _benchmarks(files: Sequence[Path]) -> Iterator[Row]:
-    from wbc_suite.tomlfile import read_toml
+    from wbc_suite.benchmark.base import BenchmarkFile
 
-    for content in map(read_toml, files):
-        yield content["name"], content["title"]
+    for file in files:
+        content = BenchmarkFile.read(file).data
+        yield str(content.get("name", file.stem)), str(content.get("title", ""))
 
 
 def _controllers(files: Sequence[Path]) -> Iterator[Row]:
@@ -96,15 +104,13 @@ def _controllers(files: Sequence[Path]) -> Iterator[Row]:
     for name in COMPOSITES:
         yield name, "for any robot; its file, if it has one, is listed below"
     for name in PART_CONTROLLERS:
-        about = (
-            str(PART_CONTROLLERS[name].config.__doc__).split("\n")[0].partition(";")[0]
-        )
-        yield name, f"for one part: {about}"
+        about, *_ = str(PART_CONTROLLERS[name].config.__doc__).splitlines()
+        yield name, f"for one part: {about.partition(';')[0]}"
     for file in files:
         yield file.stem, _controlled(read_toml(file))
 
 
-ALONE = ("bare dof", "bare kg")  # without base or pedestal
+ALONE = ("bare dof", "bare kg")  # without a base that drives, too
 _LISTS = {
     "robots": ("robots", ("name", "", "dof", "kg", *ALONE, "root"), _robots),
     "grippers": ("robots/gripper", ("name", "", "side", "kg"), _components),
@@ -116,6 +122,8 @@ _LISTS = {
 
 
 def _controlled(content: dict[str, Any]) -> str:
+    if "extends" in content:
+        return f"changes {content['extends']}"
     if "body_parts" in content:
         parts = content["body_parts"].items()
         return ", ".join(f"{name}: {part['type']}" for name, part in parts)
@@ -147,8 +155,8 @@ def check_file(
     from wbc_suite.tomlfile import read_toml
 
     content = read_toml(file) if file.suffix == ".toml" else {"component": None}
-    controls = not content.keys().isdisjoint(("body_parts", "frame", "gait"))
-    if "name" in content:
+    controls = _controls(file, content)
+    if "name" in content or ("extends" in content and not controls):
         from wbc_suite.benchmark import load_benchmark
 
         benchmark = load_benchmark(file)
@@ -172,6 +180,20 @@ def check_file(
         print(f"{file}: fine. {found}")
 
 
+def _controls(file: Path, content: dict[str, Any]) -> bool:
+    """Whether a TOML file is that of a controller."""
+    from wbc_suite.catalogue import Catalogue
+    from wbc_suite.control import COMPOSITES
+
+    base = content.get("extends")
+    named = isinstance(base, str) and Catalogue().holds("controllers", base)
+    return (
+        not content.keys().isdisjoint(("body_parts", "frame", "gait"))
+        or base in COMPOSITES
+        or named
+    )
+
+
 def _robot(file: Path, **options: Any) -> str:
     from wbc_suite.envs.hold_check import hold_faults
     from wbc_suite.robot import load_robot
@@ -183,7 +205,7 @@ def _robot(file: Path, **options: Any) -> str:
     computed = robot.to_pinocchio()
     return (
         f"Robot '{robot.name}': {len(robot.links)} links, {robot.dof} dof, "
-        f"{robot.mass:.1f} kg, {robot.root.kind} root; MuJoCo and Pinocchio models "
+        f"{robot.weight_text}, {robot.root.kind} root; MuJoCo and Pinocchio models "
         f"with nv = {simulated.nv} and {computed.nv}."
     )
 

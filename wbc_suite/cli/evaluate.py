@@ -16,7 +16,9 @@ from wbc_suite.cli.options import (
     CatalogueOption,
     ExecutorOption,
     HostOption,
+    check_names,
     progress,
+    robot_names,
     write_file,
 )
 from wbc_suite.cli.output import print
@@ -28,7 +30,8 @@ if TYPE_CHECKING:
     from wbc_suite.executors import Outcome, WorkItem
 
 BenchmarksArgument = Annotated[
-    list[str], typer.Argument(help="One or more benchmarks.")
+    list[str],
+    typer.Argument(help="One or more benchmarks: names, files or module:Name."),
 ]
 RobotsOption = Annotated[
     list[str],
@@ -183,6 +186,7 @@ def serve_policy(
     """
     from wbc_suite.evaluation import PolicyServer, replicate
 
+    check_names(policies=[policy])
     begin = replicate(policy, trust_files=trust_files)
     with PolicyServer(begin, host=host, port=port, connections=connections) as server:
         print(f"{policy}: {server.address}\nPress Ctrl-C to stop.", flush=True)
@@ -208,16 +212,23 @@ def _cases(
     *,
     arguments: dict[str, str | int | float | bool],
 ) -> "list[Case]":
-    """Return every combination; raise an error at once for an unknown robot."""
-    from wbc_suite import load_robot
+    """Return every combination; raise an error at once for an unknown name."""
+    from wbc_suite.benchmark import BENCHMARKS
     from wbc_suite.evaluation import Case
 
-    for name in {name.strip() for together in robots for name in together.split(",")}:
-        load_robot(name)
+    check_names(
+        benchmarks=benchmarks,
+        robots=sorted({*robot_names(robots)}),
+        controllers=controllers or (),
+        policies=policies,
+    )
+    spelled = {
+        name: BENCHMARKS.spelled(name) for name in benchmarks if name in BENCHMARKS
+    }
     every = itertools.product(policies, benchmarks, robots, controllers or [None])
     return [
         Case(
-            benchmark=benchmark,
+            benchmark=spelled.get(benchmark, benchmark),
             robots=tuple(name.strip() for name in together.split(",")),
             controller=controller,
             policy=policy,

@@ -40,6 +40,14 @@ def expert(
     from wbc_suite.evaluation import summarise
     from wbc_suite.evaluation.rollouts import run_episode
 
+    options.check_names(
+        benchmarks=[benchmark],
+        robots=options.robot_names(robots or ()),
+        controllers=[controller],
+        policies=["expert"],
+        gripper=gripper,
+        base=base,
+    )
     arguments = options.environment_arguments(
         robots=robots, controller=controller, gripper=gripper, base=base
     )

@@ -55,11 +55,18 @@ def multiply(
 
     with Dataset(file) as dataset:
         source = EnvSource.parse(str(dataset.header.get("env_args", "")))
-        rebuild(
-            dataset, trust_files=trust_files
-        ).close()  # refuses what must not be made
+        env = rebuild(dataset, trust_files=trust_files)  # refuses what must not be made
+        env.close()
     given: dict[str, Any] = options.environment_arguments(
         robots=robots, controller=controller, gripper=gripper, base=base
+    )
+    asked, own = benchmark or source.benchmark, source.arguments.get("robots", [])
+    options.check_names(
+        benchmarks=[asked],
+        robots=options.robot_names(robots or ([own] if isinstance(own, str) else own)),
+        controllers=[controller],
+        gripper=gripper,
+        base=base,
     )
     recorded = dict(source.arguments)
     if robots:
@@ -67,7 +74,7 @@ def multiply(
     if horizon:
         given["horizon"] = horizon
     plan = Plan(
-        benchmark=benchmark or source.benchmark,
+        benchmark=asked,
         arguments=recorded | given | {"terminate_on_success": True},
         policy=str(file.resolve()),
         noise=noise,

@@ -3,7 +3,7 @@
 import os
 import threading
 import tomllib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
@@ -121,6 +121,42 @@ PortOption = Annotated[
 def robot_names(given: Sequence[str]) -> list[str]:
     """Return the robots of an option that is repeated, or has commas."""
     return [name.strip() for names in given for name in names.split(",")]
+
+
+def check_names(
+    *,
+    benchmarks: Sequence[str] = (),
+    robots: Sequence[str] = (),
+    controllers: Sequence[str | None] = (),
+    policies: Sequence[str] = (),
+    devices: Collection[str] = (),
+    gripper: str | None = None,
+    base: str | None = None,
+) -> None:
+    """Raise an error for a name or file that is wrong, before work begins.
+
+    Experts are looked up for all benchmarks, controllers for all robots, which are
+    those of the benchmarks where none is given. A policy's place may also take one of
+    `devices`.
+    """
+    from wbc_suite.benchmark import load_benchmark
+    from wbc_suite.control import load_composite_controller_config
+    from wbc_suite.robot import load_robot
+
+    made = [load_benchmark(name) for name in benchmarks]
+    robots = robots or sorted({name for benchmark in made for name in benchmark.robots})
+    loaded = [load_robot(name, gripper=chosen(gripper), base=base) for name in robots]
+    for controller in filter(None, controllers):
+        for robot in loaded:
+            load_composite_controller_config(controller, robot)
+    if policies:
+        from wbc_suite.evaluation import check_policy
+        from wbc_suite.experts import find_expert
+
+        for policy in policies:
+            check_policy(policy, devices)
+            for benchmark in made if policy == "expert" else ():
+                find_expert(benchmark)
 
 
 def _add_to_catalogue(folders: list[Path] | None) -> list[Path]:

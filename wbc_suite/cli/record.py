@@ -109,11 +109,22 @@ def record(
     continues if it is run again. Example: wbc-suite record Lift --episodes 1000
     --only-success --noise 0.1 --recoveries 3 -o lift.hdf5
     """
-    from wbc_suite.devices import is_device
+    from wbc_suite.benchmark import load_benchmark
+    from wbc_suite.devices import DEVICES, is_device
     from wbc_suite.evaluation.generation import Plan
     from wbc_suite.recording.episode_control import RecordingPlan
 
-    by_hand, named = is_device(device), options.robot_names(robots or ["Panda"])
+    by_hand = is_device(device)
+    options.check_names(
+        benchmarks=[benchmark],
+        robots=options.robot_names(robots or ()),
+        controllers=[controller],
+        policies=[] if by_hand else [device],
+        devices=DEVICES,
+        gripper=gripper,
+        base=base,
+    )
+    named = options.robot_names(robots or load_benchmark(benchmark).robots)
     rate = rate or (BY_HAND if by_hand else BY_POLICY)
     controller = controller or (default_controller(*named) if by_hand else None)
     arguments = options.environment_arguments(

@@ -18,6 +18,7 @@ from wbc_suite.cli.options import (
     RobotsOption,
     ScaleOption,
     SkinOption,
+    check_names,
     chosen,
     device_options,
     robot_names,
@@ -99,6 +100,13 @@ def teleop(
     from wbc_suite.wrappers import DataCollection
 
     names = robot_names([*(robots or ["GR1"]), *(others or ())])
+    check_names(
+        benchmarks=[benchmark],
+        robots=names,
+        controllers=[controller],
+        gripper=gripper,
+        base=base,
+    )
     pairs = [*(device_option or []), *tls_options(tls_cert, tls_key)]
     make = None if device is None else device_maker(device, pairs)
     stages = stages_of(device, scale=scale, mirror=mirror)

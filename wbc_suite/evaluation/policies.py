@@ -1,6 +1,6 @@
 """Policies by name: our own, a user's own functions and classes, and served ones."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -46,22 +46,26 @@ register_policy("random", random)
 register_policy("expert", expert)
 
 
-def check_policy(name: str) -> None:
-    """Raise what `make_policy` raises for a name, as far as it is known without it."""
+def check_policy(name: str, devices: Collection[str] = ()) -> None:
+    """Raise what `make_policy` would raise for a name, before there is an environment.
+
+    The message of an unknown name lists `devices`, too.
+    """
     if name.endswith(RECORDING) and not Path(name).is_file():
         raise ConfigError(
             f"The policy '{name}' cannot be found: there is no such file."
         )
     if not name.startswith(SCHEME) and not name.endswith(RECORDING):
-        _maker(name)
+        _maker(name, devices)
 
 
-def _maker(name: str) -> PolicyMaker:
+def _maker(name: str, devices: Collection[str] = ()) -> PolicyMaker:
     try:
         return POLICIES.find(name)
     except UnknownNameError:
-        known = (*POLICIES, "package.module:Name", "FILE.hdf5")
-        raise UnknownNameError("policy", name, known) from None
+        known = (*POLICIES, *devices, "package.module:Name", "FILE.hdf5")
+        kind = "policy or device" if devices else "policy"
+        raise UnknownNameError(kind, name, known) from None
 
 
 def make_policy(name: str, env: RobotEnv, seed: int) -> Policy:

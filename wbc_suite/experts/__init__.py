@@ -1,7 +1,7 @@
 """Experts: scripted policies that solve the benchmarks, with any robot that can."""
 
 from wbc_suite.experts.multiplication import Multiplied
-from wbc_suite.experts.registry import EXPERTS, expert, register_expert
+from wbc_suite.experts.registry import EXPERTS, expert, find_expert, register_expert
 from wbc_suite.experts.workcell import Steps, Workcell
 
 __all__ = [
@@ -10,5 +10,6 @@ __all__ = [
     "Steps",
     "Workcell",
     "expert",
+    "find_expert",
     "register_expert",
 ]

@@ -6,6 +6,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from wbc_suite.benchmark import (
+    Benchmark,
     Carry,
     Door,
     Lift,
@@ -60,6 +61,20 @@ def register_expert(benchmark: type, expert: Expert, *, replace: bool = False) -
     EXPERTS.register(benchmark.__name__, (benchmark, expert), replace=replace)
 
 
+def find_expert(benchmark: Benchmark) -> tuple[Expert, ObjectBenchmark]:
+    """Return the expert of a benchmark's class, and the benchmark.
+
+    Raises:
+        UnknownNameError: If neither its class nor one that it derives from has one.
+    """
+    known = dict(EXPERTS[name] for name in EXPERTS)
+    kinds = type(benchmark).__mro__
+    program = next((known[kind] for kind in kinds if kind in known), None)
+    if program is None or not isinstance(benchmark, ObjectBenchmark):
+        raise UnknownNameError("expert", benchmark.name, EXPERTS)
+    return program, benchmark
+
+
 def expert(
     env: RobotEnv, rng: np.random.Generator
 ) -> Callable[[Mapping[str, Any]], Vector]:
@@ -72,12 +87,7 @@ def expert(
         UnknownNameError: If the benchmark has no expert.
         ConfigError: If the action has neither poses of hands nor a walk.
     """
-    benchmark = env.benchmark
-    known = dict(EXPERTS[name] for name in EXPERTS)
-    kinds = type(benchmark).__mro__
-    program = next((known[kind] for kind in kinds if kind in known), None)
-    if program is None or not isinstance(benchmark, ObjectBenchmark):
-        raise UnknownNameError("expert", benchmark.name, EXPERTS)
+    program, benchmark = find_expert(env.benchmark)
     cell = Workcell(env, benchmark, rng)
     steps = program(cell)
 

@@ -25,10 +25,12 @@ from wbc_suite.locomotion.gait import (
     make_measured,
     make_plan,
 )
+from wbc_suite.locomotion.gaits import GAITS, register_gait
 from wbc_suite.locomotion.trot import plan_trot
 from wbc_suite.locomotion.walk import plan_walk
 
 __all__ = [
+    "GAITS",
     "BaseEstimate",
     "EstimatorNoise",
     "Gait",
@@ -47,4 +49,5 @@ __all__ = [
     "plan_trot",
     "plan_walk",
     "propagate",
+    "register_gait",
 ]

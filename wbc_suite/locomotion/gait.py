@@ -8,8 +8,9 @@ that reads where the centre of mass and the feet are and writes which feet stand
 the others swing, and how the centre of mass has to accelerate.
 """
 
+from collections.abc import Sequence
 from enum import IntEnum
-from typing import Annotated, Literal, NamedTuple, TypeAlias
+from typing import Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat
@@ -22,13 +23,6 @@ GRAVITY = 9.81
 """m/s^2."""
 
 
-class GaitKind(IntEnum):
-    """Which function plans."""
-
-    TROT = 0
-    WALK = 1
-
-
 class Mode(IntEnum):
     """Whether feet are lifted."""
 
@@ -36,7 +30,22 @@ class Mode(IntEnum):
     STEP = 1
 
 
-class TrotConfig(FrozenModel):
+class GaitConfig(FrozenModel):
+    """Numbers of a gait; those of your own derive from it.
+
+    A subclass has `type: Literal[NAME] = NAME`, and floats or whether to do something:
+    its planner reads them from the gait's `settings`.
+    """
+
+    type: str
+
+    def misfit(self, soles: Sequence[bool]) -> str:
+        """Return which feet it needs if these do not fit; told which are soles."""
+        del soles
+        return ""
+
+
+class TrotConfig(GaitConfig):
     """A trot: diagonal pairs of feet swing in turn.
 
     Attributes:
@@ -51,7 +60,7 @@ class TrotConfig(FrozenModel):
         recover: Whether it does.
     """
 
-    type: Literal["trot"] = "trot"
+    type: Literal["trot"] = "trot"  # pyright: ignore[reportIncompatibleVariableOverride] - narrower
     period: PositiveFloat = 0.5
     duty: float = Field(default=0.5, gt=0.0, lt=1.0)
     apex: PositiveFloat = 0.07
@@ -61,8 +70,14 @@ class TrotConfig(FrozenModel):
     speed: PositiveFloat = 0.25
     recover: bool = True
 
+    def misfit(self, soles: Sequence[bool]) -> str:
+        """Return that it needs four feet, if there are not four."""
+        return (
+            "" if len(soles) == 4 else f"a gait of type '{self.type}' needs four feet"
+        )
 
-class WalkConfig(FrozenModel):
+
+class WalkConfig(GaitConfig):
     """A walk of two feet that tracks the divergent component of motion.
 
     Attributes:
@@ -83,7 +98,7 @@ class WalkConfig(FrozenModel):
             soles.
     """
 
-    type: Literal["walk"] = "walk"
+    type: Literal["walk"] = "walk"  # pyright: ignore[reportIncompatibleVariableOverride] - narrower
     step: PositiveFloat = 0.5
     shortest: PositiveFloat = 0.22
     double_support: PositiveFloat = 0.08
@@ -99,19 +114,25 @@ class WalkConfig(FrozenModel):
     gain: PositiveFloat = 4.0
     recover: bool = True
 
-
-GaitConfig: TypeAlias = Annotated[TrotConfig | WalkConfig, Field(discriminator="type")]
-
-SETTINGS = np.dtype(
-    [("kind", "i8")]
-    + [
-        (name, "f8")
-        for name in sorted(
-            {*TrotConfig.model_fields, *WalkConfig.model_fields} - {"type"}
+    def misfit(self, soles: Sequence[bool]) -> str:
+        """Return that it needs two soles, if there are not two."""
+        if list(soles) == [True, True]:
+            return ""
+        return (
+            f"a gait of type '{self.type}' needs two feet, left and right, with a "
+            "'sole' each: heel, toes, right, left, in m"
         )
-    ]
-)
-"""The fields of both configs; those of the other kind are zero."""
+
+
+def settings_of(config: GaitConfig) -> np.dtype[np.void]:
+    """Return the fields of all configs; those that a config lacks are zero.
+
+    Gaits whose configs add no field share the machine code of ours.
+    """
+    fields = {*TrotConfig.model_fields, *WalkConfig.model_fields}
+    fields |= {*type(config).model_fields}
+    return np.dtype([(name, "f8") for name in sorted(fields - {"type"})])
+
 
 STATE = np.dtype(
     [
@@ -192,7 +213,7 @@ class Gait(NamedTuple):
     """Settings and state of a gait.
 
     Attributes:
-        settings: `SETTINGS` record, shape (1,).
+        settings: Record of the numbers of its config, see `settings_of`, shape (1,).
         state: `STATE` record, shape (1,).
         sole: Edges of a sole about its middle: heel, toes, right, left, m, (n, 4).
         nominal: Feet about the centre of mass in heading axes, m, shape (n, 2).
@@ -214,7 +235,7 @@ class Gait(NamedTuple):
     swings: Indices
 
 
-def make_gait(config: TrotConfig | WalkConfig, soles: Matrix) -> Gait:
+def make_gait(config: GaitConfig, soles: Matrix) -> Gait:
     """Return a gait that has not begun.
 
     Args:
@@ -223,8 +244,7 @@ def make_gait(config: TrotConfig | WalkConfig, soles: Matrix) -> Gait:
             (n, 4); zero for points. A walk has the left foot first.
     """
     n = len(soles)
-    settings = np.zeros(1, SETTINGS)
-    settings["kind"] = GaitKind.WALK if config.type == "walk" else GaitKind.TROT
+    settings = np.zeros(1, settings_of(config))
     for name in type(config).model_fields:
         if name != "type":
             settings[name] = getattr(config, name)

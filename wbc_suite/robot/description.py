@@ -72,6 +72,24 @@ class RobotDescription(Elements):
         return sum(link.mass for link in self.links)
 
     @cached_property
+    def moving_mass(self) -> float:
+        """Mass of the links that a joint or the root moves, kg: not of a pedestal."""
+        moving = set[str]()
+        for link in self.links:  # parents come first
+            if link.parent is None:
+                moves = self.root.kind != "fixed"
+            else:
+                moves = link.joint is not None or link.parent in moving
+            moving |= {link.name} if moves else set()
+        return sum(link.mass for link in self.links if link.name in moving)
+
+    @property
+    def weight_text(self) -> str:
+        """The mass in words, such as `278.4 kg, 3.0 kg of which move`."""
+        total, moving = f"{self.mass:.1f} kg", f"{self.moving_mass:.1f} kg"
+        return total if moving == total else f"{total}, {moving} of which move"
+
+    @cached_property
     def hands(self) -> dict[str, str]:
         """Frame of each hand by side, or by frame name if it has no side.
 

@@ -42,7 +42,7 @@ class RobotPage:
         self.scene = ModelScene(site.server, self.model)
         site.server.gui.add_markdown(
             f"**{robot.title or robot.name}**  \n"
-            f"{robot.dof} joints, {robot.mass:.1f} kg, {robot.root.kind} root"
+            f"{robot.dof} joints, {robot.weight_text}, {robot.root.kind} root"
         )
         names = {**{name: name for name in robot.keyframes}, "zero": None}
         postures = site.server.gui.add_button_group("Posture", tuple(names))

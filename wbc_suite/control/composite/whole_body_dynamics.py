@@ -14,7 +14,12 @@ from wbc_suite.control.composite.whole_body_dynamics_config import (
     WholeBodyIDConfig,
     read_dynamics,
 )
-from wbc_suite.control.dynamics.arrays import Stage, make_dynamics, memory_of
+from wbc_suite.control.dynamics.arrays import (
+    Stage,
+    make_dynamics,
+    memory_of,
+    plan_nothing,
+)
 from wbc_suite.control.dynamics.qp_fallback import QpFallback
 from wbc_suite.control.dynamics.standing import chain, limits_of, make_foot
 from wbc_suite.control.law.law import Law
@@ -28,7 +33,7 @@ from wbc_suite.control.part.gripper import GripperController
 from wbc_suite.control.robot_parts import RobotPart
 from wbc_suite.control.state import RobotState
 from wbc_suite.kinematics import Configuration
-from wbc_suite.locomotion import TrotConfig, begin_gait, make_gait
+from wbc_suite.locomotion import GAITS, TrotConfig, begin_gait, make_gait
 from wbc_suite.locomotion.gait import Mode
 from wbc_suite.qp.solution import Fallback
 from wbc_suite.typing import Indices, Vector
@@ -100,6 +105,7 @@ class WholeBodyID:
 
     def _make_dynamics(self, state: RobotState) -> Any:
         config, drives = self.config, self._law.drives
+        gait = config.gait
         root, place = np.full(6, -1), 0
         if config.feet:
             joint = state.model.joint(f"{state.prefix}root")
@@ -119,7 +125,8 @@ class WholeBodyID:
         is_base = np.isin(self._law.joints, self._base.law.joints if self._base else ())
         dynamics = make_dynamics(
             feet=feet,
-            gait=make_gait(config.gait or TrotConfig(), edges.reshape(-1, 4)),
+            gait=make_gait(gait or TrotConfig(), edges.reshape(-1, 4)),
+            planner=plan_nothing if gait is None else GAITS[gait.type].plan,
             qpos=drives["qpos"],
             dofs=np.concatenate([root, drives["dof"]]),
             nv=state.model.nv,

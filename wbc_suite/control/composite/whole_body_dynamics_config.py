@@ -4,7 +4,13 @@ from collections.abc import Collection, Iterator, Mapping
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
+from pydantic import (
+    Field,
+    NonNegativeFloat,
+    PositiveFloat,
+    SerializeAsAny,
+    model_validator,
+)
 
 from wbc_suite.control.composite.whole_body_config import (
     ControlledFrame,
@@ -15,7 +21,7 @@ from wbc_suite.control.composite.whole_body_config import (
 )
 from wbc_suite.control.dynamics.state_source import StateSourceConfig
 from wbc_suite.errors import ConfigError, UnknownNameError
-from wbc_suite.locomotion import GaitConfig, TrotConfig
+from wbc_suite.locomotion import GAITS, GaitConfig, TrotConfig
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.elements import Name
 from wbc_suite.robot.sole_inference import ball_radius, guess_sole
@@ -112,7 +118,7 @@ class WholeBodyIDConfig(FrozenModel):
     type: str = "WHOLE_BODY_ID"
     frames: tuple[ControlledFrame, ...] = Field(default=(), alias="frame")
     feet: tuple[FootConfig, ...] = Field(default=(), alias="foot", max_length=8)
-    gait: GaitConfig | None = None
+    gait: SerializeAsAny[GaitConfig] | None = None
     upright: tuple[UprightConfig, ...] = ()
     posture: StanceConfig = StanceConfig()
     sensors: StateSourceConfig = StateSourceConfig()
@@ -139,15 +145,8 @@ class WholeBodyIDConfig(FrozenModel):
             if self.feet:
                 raise ValueError("feet need a [gait]: type 'walk' or 'trot'")
             return self
-        if self.gait.type == "walk" and (
-            len(self.feet) != 2 or any(foot.sole is None for foot in self.feet)
-        ):
-            raise ValueError(
-                "a gait of type 'walk' needs two feet, left and right, with a 'sole' "
-                "each: heel, toes, right, left, in m"
-            )
-        if self.gait.type == "trot" and len(self.feet) != 4:
-            raise ValueError("a gait of type 'trot' needs four feet")
+        if fault := self.gait.misfit([foot.sole is not None for foot in self.feet]):
+            raise ValueError(fault)
         return self
 
 
@@ -223,7 +222,7 @@ def check_dynamics(
 ) -> None:
     """Raise what `read_dynamics` raises; without a robot only the format's rules."""
     if robot is None:
-        parse_model(WholeBodyIDConfig, config, source=source)
+        _parse(config, source)
     else:
         read_dynamics(config, robot, source)
 
@@ -237,7 +236,7 @@ def read_dynamics(
         ConfigError: If it breaks a rule of the format, names what the robot does not
             have, or has feet where the root is not free.
     """
-    read = parse_model(WholeBodyIDConfig, config, source=source)
+    read = _parse(config, source)
     _check_root(read, robot, source)
     for key, kind, name, known in _names(read, robot):
         if name not in known:
@@ -245,6 +244,26 @@ def read_dynamics(
             where = f"{source}: {located(key, source)}"
             raise ConfigError(f"{where}: {robot.name}: {unknown}")
     return read
+
+
+def _parse(config: Mapping[str, Any], source: str) -> WholeBodyIDConfig:
+    gait = config.get("gait")
+    if isinstance(gait, Mapping):
+        config = {**config, "gait": _parse_gait(gait, source)}
+    return parse_model(WholeBodyIDConfig, config, source=source)
+
+
+def _parse_gait(given: Mapping[str, Any], source: str) -> GaitConfig:
+    """Return the numbers of the gait that a table names by `type`."""
+    if "type" not in given:
+        raise ConfigError(f"{source}: missing {located('gait.type', source)}")
+    try:
+        name = GAITS.spelled(given["type"])
+    except UnknownNameError as error:
+        where = located("gait.type", source)
+        raise ConfigError(f"{source}: {where}: {error}") from error
+    given = {**given, "type": name}
+    return parse_model(GAITS[name].config, given, source=source, within="gait")
 
 
 def _names(

@@ -7,9 +7,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wbc_suite.compiling import readable, struct
+from wbc_suite.compiling import (
+    announced,
+    as_argument,
+    as_pointer,
+    compiled,
+    plain,
+    readable,
+    struct,
+)
 from wbc_suite.control.memory import Parts
 from wbc_suite.locomotion.gait import Gait, Measured, Plan, make_measured, make_plan
+from wbc_suite.locomotion.gaits import Planner
 from wbc_suite.qp.active_set import QpArrays, make_qp_arrays
 from wbc_suite.typing import Indices, Matrix, Records, Vector
 
@@ -57,6 +66,13 @@ STATE = np.dtype(
 _REMEMBERED = ("mass", "ticks", "unsolved", "trunk_height")
 _FALL = ("fell", "fell_by_tilt", "tilt", "drop")
 """Fields of the state that outlive a tick."""
+
+
+@compiled
+def plan_nothing(
+    gait: Gait, measured: Measured, command: Vector, dt: float, plan: Plan
+) -> None:
+    """Be the planner of a robot that does not step."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -187,7 +203,8 @@ class WholeBodyDynamics(NamedTuple):
         command: Forward, left (m/s), turn (rad/s), height (m), shape (4,).
         torque: Torques of contact forces and loads at the joints, J^T f, shape (n,).
         last_velocity: Velocity as measured at the last tick, shape (6 + n,).
-        gait: The gait.
+        planner: Says which feet stand and swing; `as_pointer` of a gait's kernel.
+        gait: Its numbers and state.
         measured: What its planner reads.
         plan: What it writes.
         tracked: The motion that is tracked without steps, if any is.
@@ -223,6 +240,7 @@ class WholeBodyDynamics(NamedTuple):
     command: Vector
     torque: Vector
     last_velocity: Vector
+    planner: Planner
     gait: Gait
     measured: Measured
     plan: Plan
@@ -234,6 +252,7 @@ def make_dynamics(
     *,
     feet: Sequence[Foot],
     gait: Gait,
+    planner: Planner = plan_nothing,
     qpos: Indices,
     dofs: Indices,
     nv: int,
@@ -284,6 +303,7 @@ def make_dynamics(
         command=np.zeros(4),
         torque=np.zeros(n),
         last_velocity=np.zeros(6 + n),
+        planner=_planner(planner, gait, feet=f),
         gait=gait,
         measured=make_measured(f),
         plan=make_plan(f),
@@ -304,6 +324,14 @@ def memory_of(body: WholeBodyDynamics) -> Parts:
         *(body.posture, body.upright_pose),
         *(body.plan.load, body.plan.margin, body.plan.footstep, body.qp.side),
     )
+
+
+def _planner(planner: Planner, gait: Gait, *, feet: int) -> Planner:
+    """Return a planner as the loop calls it, the same type for all of them."""
+    values = gait, make_measured(feet), np.zeros(4), 0.0, make_plan(feet)
+    arguments = (as_argument(x) if isinstance(x, tuple) else x for x in values)
+    with announced("the gait"):
+        return as_pointer(planner, *arguments)
 
 
 def _make_state(*, is_free: bool) -> Records:
@@ -343,7 +371,9 @@ def for_plain_python(body: WholeBodyDynamics) -> WholeBodyDynamics:
         settings=body.gait.settings.view(np.recarray),
         state=body.gait.state.view(np.recarray),
     )
-    return body._replace(state=body.state.view(np.recarray), gait=gait)
+    return body._replace(
+        state=body.state.view(np.recarray), gait=gait, planner=plain(body.planner)
+    )
 
 
 def _make_terms(n: int, edges: int) -> Terms:

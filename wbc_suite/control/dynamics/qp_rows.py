@@ -12,11 +12,11 @@ from wbc_suite.control.dynamics.terms import (
 )
 from wbc_suite.control.loop.physics import Physics
 from wbc_suite.control.loop.rigid_body import matrix_product, rotated, rotation
-from wbc_suite.locomotion.gait import GaitKind, Mode
+from wbc_suite.locomotion.gait import Mode
 from wbc_suite.qp.lie import exp3, log3, saturate
 from wbc_suite.typing import Matrix, Vector
 
-_WALK, _STEP = int(GaitKind.WALK), int(Mode.STEP)
+_STEP = int(Mode.STEP)
 
 CONTACT = (100.0, 60.0)
 """Weight of the rows that keep a foot at rest, and their damping, 1/s."""
@@ -166,8 +166,7 @@ def _yield(body: WholeBodyDynamics, least: float) -> float:
     A biped that steps has the edge of one sole behind it in every step: its steps
     keep the balance.
     """
-    gait = body.gait
-    if gait.settings[0].kind == _WALK and gait.state[0].mode == _STEP:
+    if body.site.shape[0] == 2 and body.gait.state[0].mode == _STEP:
         return 1.0
     inside = (body.plan.margin[0] - EDGE[0]) / (EDGE[1] - EDGE[0])
     return min(max(inside, least), 1.0)

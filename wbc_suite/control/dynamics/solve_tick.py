@@ -14,13 +14,10 @@ from wbc_suite.control.dynamics.tracking import track_motion
 from wbc_suite.control.loop.physics import Physics
 from wbc_suite.control.loop.rigid_body import rotation
 from wbc_suite.linear_algebra import cholesky, dot, solve_lower, solve_upper
-from wbc_suite.locomotion.gait import GRAVITY, GaitKind
-from wbc_suite.locomotion.trot import plan_trot
-from wbc_suite.locomotion.walk import plan_walk
+from wbc_suite.locomotion.gait import GRAVITY
 from wbc_suite.qp.active_set import solve_warm
 from wbc_suite.typing import Vector
 
-_WALK = int(GaitKind.WALK)
 _STATED, _SOLVED = int(Stage.STATED), int(Stage.SOLVED)
 _UNSOLVED = int(Stage.UNSOLVED)
 
@@ -75,10 +72,8 @@ def solve_whole_body(physics: Physics, body: WholeBodyDynamics) -> bool:
         body.plan.margin[0] = 1.0
     elif state.tracks == 1:
         track_motion(physics, body)
-    elif body.gait.settings[0].kind == _WALK:
-        plan_walk(body.gait, body.measured, body.command, state.dt, body.plan)
     else:
-        plan_trot(body.gait, body.measured, body.command, state.dt, body.plan)
+        body.planner(body.gait, body.measured, body.command, state.dt, body.plan)
     if state.is_free == 1 and state.tracks == 0:
         _watch_fall(physics, body)
     state_qp(physics, body)
