@@ -5,11 +5,12 @@ from collections.abc import Sequence
 
 import mujoco
 import numpy as np
-from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
+from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
 from wbc_suite.benchmark.base import Source, load_config
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
 from wbc_suite.benchmark.standing import (
+    ROUNDING,
     Standing,
     StandingConfig,
     add_floor_cameras,
@@ -21,7 +22,6 @@ from wbc_suite.scene import Push, PushConfig, draw_pushes
 from wbc_suite.scene.objects import SceneObject
 from wbc_suite.sensing.reading import Reading, computed
 from wbc_suite.tomlfile import FrozenModel
-from wbc_suite.typing import Vector
 
 
 class RewardConfig(FrozenModel):
@@ -45,14 +45,14 @@ class StandConfig(ObjectBenchmarkConfig):
         standing: Falls and rest.
         pushes: Pushes on the trunk.
         until: When the last push has ended, s from the start.
-        actions: Actions before a success; the pushes end earlier.
+        duration: Time before a success, s; the pushes end earlier.
         reward: Numbers of the reward.
     """
 
     standing: StandingConfig
     pushes: PushConfig
     until: PositiveFloat
-    actions: PositiveInt
+    duration: PositiveFloat
     reward: RewardConfig
 
 
@@ -81,8 +81,6 @@ class Stand(ObjectBenchmark):
     def furnish(self, spec: mujoco.MjSpec) -> None:
         """Add cameras."""
         self.standing.reserve(spec)
-        self._entry = spec.nuserdata
-        spec.nuserdata += 1
         add_floor_cameras(spec)
 
     def objects(self) -> Sequence[SceneObject]:
@@ -95,7 +93,6 @@ class Stand(ObjectBenchmark):
         """Look up the robot."""
         super().bind(model, data, robots)
         self.standing.bind(model, data, robots[0])
-        self._taken: Vector = data.userdata[self._entry : self._entry + 1]
 
     def reset(self, rng: np.random.Generator) -> None:
         """Draw the pushes."""
@@ -103,14 +100,14 @@ class Stand(ObjectBenchmark):
         self.pushes = draw_pushes(config.pushes, rng, body=body, until=config.until)
 
     def observables(self) -> dict[str, Reading]:
-        """Return the share of the actions that are taken, `progress`."""
-        share = 1.0 / self.config.actions
-        return {"progress": computed(1, lambda: min(share * self._taken.item(0), 1.0))}
+        """Return the share of the time that has passed, `progress`."""
+        share = 1.0 / self.config.duration
+        return {"progress": computed(1, lambda: min(share * self.data.time, 1.0))}
 
     def after_step(self) -> None:
-        """Note a fall, and how long the robot has rested after all actions."""
-        self._taken[0] += 1.0
-        done = self._taken[0] > self.config.actions - self.config.standing.hold
+        """Note a fall, and how long the robot has rested in the end."""
+        left = self.config.duration - self.data.time
+        done = left <= self.config.standing.hold + ROUNDING
         self.standing.observe(done and self.standing.rests)
 
     def success(self) -> bool:

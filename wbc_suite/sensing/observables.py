@@ -5,6 +5,7 @@ step.
 """
 
 import copy
+import math
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -23,6 +24,8 @@ Noise: TypeAlias = Callable[[Vector, np.random.Generator], Vector]
 Delay: TypeAlias = float | Callable[[np.random.Generator], float]
 Filter: TypeAlias = Callable[[Vector], Vector]
 Maker: TypeAlias = Callable[[mujoco.MjModel, mujoco.MjData], Reading]
+
+ROUNDING = 1e-6  # samples
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -215,7 +218,7 @@ class _Channel:
         self._change, self._place, self._bound = change, place, bound
         self._timestep, self._step = timestep, 0
         rate = change.sampling_rate
-        self._period = 1 if rate is None else max(1, round(1.0 / (rate * timestep)))
+        self._samples_per_step = 1.0 if rate is None else min(1.0, rate * timestep)
         self._filter = copy.deepcopy(change.filter)
         self._shown: Vector = np.zeros(place.stop - place.start)
         self._coming: deque[tuple[int, Vector]] = deque()
@@ -249,13 +252,21 @@ class _Channel:
     def sample(self, values: Vector, rng: np.random.Generator) -> None:
         """Take a sample if one is due, and release those whose delay is over."""
         self._step += 1
-        if self._change.enabled and self._step % self._period == 0:
+        if self._change.enabled and self._is_due():
             delay = self._change.delay
             wait = delay(rng) if callable(delay) else delay
             due = self._step + round(wait / self._timestep)
             self._coming.append((due, self._taken(values, rng)))
         while any(due <= self._step for due, _ in self._coming):
             self._shown = self._coming.popleft()[1]
+
+    def _is_due(self) -> bool:
+        """Return whether a sample falls into the last step; on average at the rate."""
+        before, after = (
+            math.floor(step * self._samples_per_step + ROUNDING)
+            for step in (self._step - 1, self._step)
+        )
+        return after > before
 
     def show(self, values: Vector) -> None:
         """Write the observed values over the true ones."""
