@@ -6,9 +6,9 @@ import tomllib
 import types
 import typing
 from pathlib import Path
-from typing import Annotated, Any, TypeAlias, TypeVar
+from typing import Any, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from wbc_suite.errors import ConfigError, did_you_mean, join_first, shortened
 
@@ -36,16 +36,6 @@ class FrozenModel(BaseModel):
     """Base of models that are read from a file."""
 
     model_config = FROZEN
-
-
-def _ordered(interval: tuple[float, float]) -> tuple[float, float]:
-    if not interval[0] <= interval[1]:
-        raise ValueError("the first number must not be greater than the second")
-    return interval
-
-
-Interval: TypeAlias = Annotated[tuple[float, float], AfterValidator(_ordered)]
-"""Least and greatest value."""
 
 
 def read_toml(path: Path) -> dict[str, Any]:

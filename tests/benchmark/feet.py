@@ -46,7 +46,8 @@ def hold(env, steps, **parts):
 
 
 def count(env, steps):
-    """Let the benchmark look at the same state as after some steps."""
+    """Let the benchmark look at the same state as after some steps, as time goes by."""
     for _ in range(steps):
+        env.simulation.data.time += 1.0 / env.config.control_freq
         env.benchmark.after_step()
     return env.benchmark

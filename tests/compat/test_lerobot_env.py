@@ -100,6 +100,16 @@ def test_success_is_told_in_the_step_that_ends_the_episode():
     env.close()
 
 
+def test_lerobot_sees_the_rate_of_actions():
+    """Its films of an evaluation are written at `metadata["render_fps"]`."""
+    (env,) = make_env(1, cfg=SimpleNamespace(task="Lift"), control_freq=30)[
+        "wbc_suite"
+    ].values()
+    env.reset(seed=[0])
+    assert env.metadata["render_fps"] == 30
+    env.close()
+
+
 @pytest.mark.slow
 def test_cameras_are_pixels_with_channels_last():
     env = LeRobotEnv("Lift", cameras=["agentview"], size=48)

@@ -90,5 +90,5 @@ def test_strong_motors_have_no_limit_of_weight(tmp_path):
 )
 def test_a_range_that_ends_before_it_begins_is_refused(kind, robot, changes, key):
     config = load_composite_controller_config(kind, robot) | changes
-    with pytest.raises(ConfigError, match=f"key '{key}' = .* must not be greater"):
+    with pytest.raises(ConfigError, match=f"key '{key}' = .*lower end must come first"):
         load_composite_controller_config(config, robot)

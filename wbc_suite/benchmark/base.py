@@ -72,7 +72,7 @@ class Benchmark(Protocol):
 
     Attributes:
         title: The task in a few words, in the imperative.
-        horizon: Default number of actions in an episode.
+        horizon: Default number of actions in an episode, at 20 actions a second.
         robots: Default robots.
         gripper: Default gripper of the robots; None for their own.
         pushes: Forces on bodies in this episode, drawn at a reset.

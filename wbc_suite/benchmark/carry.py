@@ -6,11 +6,16 @@ from typing import ClassVar
 
 import mujoco
 import numpy as np
-from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
+from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
 from wbc_suite.benchmark.base import Source, load_config
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
-from wbc_suite.benchmark.standing import Standing, StandingConfig, arrange_on_feet
+from wbc_suite.benchmark.standing import (
+    ROUNDING,
+    Standing,
+    StandingConfig,
+    arrange_on_feet,
+)
 from wbc_suite.benchmark.two_arm_lift import HANDLES, POT, WALL, PotConfig
 from wbc_suite.control import RobotState
 from wbc_suite.robot import RobotDescription
@@ -32,20 +37,21 @@ from wbc_suite.typing import Vector
 
 FROM, TO, FLOOR = "table_from", "table_to", "floor"
 ALONE, SPOILED, MEMORY = 0, 1, 2
-"""Places of the benchmark's own user data, and their number."""
+"""Places of the benchmark's own user data, and their number: when the pot began to lack
+a hand, s, 0 if it does not; whether it was not carried."""
 
 
 class CarryingConfig(FrozenModel):
     """What counts as carried and put down.
 
     Attributes:
-        alone: Actions in a row for which a pot off the tables may lack a hand.
+        alone: Time for which a pot off the tables may lack a hand, s.
         tilt: Greatest tilt of the pot when it is put down, rad.
         margin: Least distance of the pot's middle from the table's edges, m.
         speed: Greatest speed of the pot when it is put down, m/s.
     """
 
-    alone: PositiveInt
+    alone: PositiveFloat
     tilt: PositiveFloat
     margin: PositiveFloat
     speed: PositiveFloat
@@ -191,12 +197,12 @@ class Carry(ObjectBenchmark):
         """Note falls, how the pot is moved, and how long it has been put down."""
         below = self.supports()
         alone = not below and self.hands_at_pot() < len(self.hands)
-        self._memory[ALONE] = self._memory[ALONE] + 1.0 if alone else 0.0
+        now = self.data.time
+        self._memory[ALONE] = (self._memory.item(ALONE) or now) if alone else 0.0
+        long = now - self._memory[ALONE] >= self.config.carrying.alone - ROUNDING
         if below == {self._from}:
             self._memory[SPOILED] = 0.0
-        elif self._memory[ALONE] > self.config.carrying.alone or (
-            below - {self._from, self._to}
-        ):
+        elif (alone and long) or below - {self._from, self._to}:
             self._memory[SPOILED] = 1.0
         down = self.carried and self.is_put_down()
         self.standing.observe(down and self.standing.stands)

@@ -53,7 +53,7 @@ class ObjectBenchmarkConfig(BaseModel):
     Attributes:
         format: Version of the file format.
         title: The task in a few words.
-        horizon: Actions in an episode.
+        horizon: Actions in an episode, at 20 actions a second.
         places: Position of each robot, m.
         one_table: Whether `table`, if there is one, is the only table.
         arena: The scene around it; None for an empty floor.

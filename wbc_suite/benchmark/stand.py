@@ -5,11 +5,12 @@ from collections.abc import Sequence
 
 import mujoco
 import numpy as np
-from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
+from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
 from wbc_suite.benchmark.base import Source, load_config
 from wbc_suite.benchmark.object_benchmark import ObjectBenchmark, ObjectBenchmarkConfig
 from wbc_suite.benchmark.standing import (
+    ROUNDING,
     Standing,
     StandingConfig,
     add_floor_cameras,
@@ -24,8 +25,8 @@ from wbc_suite.sensing.reading import Reading, computed
 from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Vector
 
-MEMORY = 4
-"""Entries of user data: actions that are taken, and the place of the start."""
+PLACE = 3
+"""Entries of user data: x and y of the start, m, and the heading there, rad."""
 
 
 class RewardConfig(FrozenModel):
@@ -51,7 +52,7 @@ class StandConfig(ObjectBenchmarkConfig):
         standing: Falls and rest.
         pushes: Pushes on the trunk.
         until: When the last push has ended, s from the start.
-        actions: Actions before a success; the pushes end earlier.
+        duration: Time before a success, s; the pushes end earlier.
         near: Greatest distance of the trunk from its start at a success, m.
         facing: Greatest angle of its heading to that at the start, rad.
         reward: Numbers of the reward.
@@ -60,7 +61,7 @@ class StandConfig(ObjectBenchmarkConfig):
     standing: StandingConfig
     pushes: PushConfig
     until: PositiveFloat
-    actions: PositiveInt
+    duration: PositiveFloat
     near: PositiveFloat
     facing: PositiveFloat
     reward: RewardConfig
@@ -92,7 +93,7 @@ class Stand(ObjectBenchmark):
         """Add cameras."""
         self.standing.reserve(spec)
         self._entry = spec.nuserdata
-        spec.nuserdata += MEMORY
+        spec.nuserdata += PLACE
         add_floor_cameras(spec)
 
     def objects(self) -> Sequence[SceneObject]:
@@ -105,8 +106,7 @@ class Stand(ObjectBenchmark):
         """Look up the robot."""
         super().bind(model, data, robots)
         self.standing.bind(model, data, robots[0])
-        memory: Vector = data.userdata[self._entry : self._entry + MEMORY]
-        self._taken, self._start = memory[:1], memory[1:]
+        self._start: Vector = data.userdata[self._entry : self._entry + PLACE]
 
     def reset(self, rng: np.random.Generator) -> None:
         """Draw the pushes, and note where the robot stands."""
@@ -116,14 +116,14 @@ class Stand(ObjectBenchmark):
         self._start[:] = x, y, self.standing.heading
 
     def observables(self) -> dict[str, Reading]:
-        """Return the share of the actions that are taken, and the way back.
+        """Return the share of the time that has passed, and the way back.
 
         `robot_to_start` is the way forward and left, m, and the turn, rad, in the
         heading of the robot.
         """
-        share = 1.0 / self.config.actions
+        share = 1.0 / self.config.duration
         return {
-            "progress": computed(1, lambda: min(share * self._taken.item(0), 1.0)),
+            "progress": computed(1, lambda: min(share * self.data.time, 1.0)),
             "robot_to_start": computed(3, self.way_back),
         }
 
@@ -142,8 +142,8 @@ class Stand(ObjectBenchmark):
 
     def after_step(self) -> None:
         """Note a fall, and how long the robot has rested at its start in the end."""
-        self._taken[0] += 1.0
-        done = self._taken[0] > self.config.actions - self.config.standing.hold
+        left = self.config.duration - self.data.time
+        done = left <= self.config.standing.hold + ROUNDING
         self.standing.observe(done and self.is_back and self.standing.rests)
 
     def success(self) -> bool:

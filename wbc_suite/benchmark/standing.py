@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import mujoco
 import numpy as np
-from pydantic import Field, PositiveFloat, PositiveInt
+from pydantic import Field, PositiveFloat
 
 from wbc_suite.benchmark.arrangement import arrange_one
 from wbc_suite.benchmark.object_benchmark import Places
@@ -20,7 +20,9 @@ from wbc_suite.typing import Vector
 
 FLOOR = "floor"
 MEMORY = 4
-"""Entries of user data: count; whether the robot fell, with which tilt and how low."""
+"""Entries of user data: when a condition began to hold, s, 0 if it does not; whether
+the robot fell, with which tilt and how low."""
+ROUNDING = 1e-6  # s
 
 
 class StandingConfig(FrozenModel):
@@ -31,14 +33,15 @@ class StandingConfig(FrozenModel):
         sink: Height that the trunk has lost when a robot has fallen, m.
         speed: Greatest speed of the trunk at rest, m/s.
         turn: Greatest angular speed of the trunk at rest, rad/s.
-        hold: Actions for which the condition of success must hold.
+        hold: Time for which the condition of success must hold, from the end of the
+            first action after which it does, s.
     """
 
     tilt: float = Field(gt=0.0, lt=math.pi)
     sink: PositiveFloat
     speed: PositiveFloat
     turn: PositiveFloat
-    hold: PositiveInt
+    hold: PositiveFloat
 
 
 class StartConfig(FrozenModel):
@@ -116,7 +119,7 @@ class Standing:
         self.config = config
 
     def reserve(self, spec: mujoco.MjSpec) -> None:
-        """Reserve user data: a count, and whether and how the robot fell."""
+        """Reserve user data: a time, and whether and how the robot fell."""
         self._entry = spec.nuserdata
         spec.nuserdata += MEMORY
 
@@ -201,17 +204,20 @@ class Standing:
         return slow and self.stands
 
     def observe(self, holds: bool) -> None:
-        """Note a fall, and for how many actions in a row a condition holds."""
+        """Note a fall, and since when a condition holds."""
         sunk = self.state.robot.root.pos[2] - self.position.item(2)
         falls = self.tilt > self.config.tilt or sunk > self.config.sink
         if falls and not self._memory[1]:
             self._memory[1:] = 1.0, self.tilt, sunk
-        self._memory[0] = self._memory[0] + 1.0 if holds and self.stands else 0.0
+        since = self._memory.item(0) or self._data.time
+        self._memory[0] = since if holds and self.stands else 0.0
 
     @property
     def held(self) -> bool:
-        """Whether the condition has held for `hold` actions, without a fall."""
-        return self._memory.item(0) >= self.config.hold and not self._memory[1]
+        """Whether the condition has held for `hold` seconds, without a fall."""
+        since, fell, *_ = self._memory.tolist()
+        long = self._data.time - since >= self.config.hold - ROUNDING
+        return since > 0.0 and long and not fell
 
     def fall(self) -> str | None:
         """Return how the robot fell in this episode, or None if it has not."""

@@ -81,7 +81,7 @@ def _times(env: "RobotEnv", actions: int) -> "dict[str, Vector]":
 
     layout, rng = env.action_layout, np.random.default_rng(0)
     simulation, found = env.simulation, Block()
-    substeps = round(1.0 / (env.config.control_freq * simulation.timestep))
+    substeps = env.config.substeps
     env.reset(seed=0)
     env.step(env.hold_action)  # compiles
     for k in range(BLOCKS):

@@ -144,6 +144,7 @@ class LazyVectorEnv(VectorEnv[Any, Any, Any]):
     def _env(self) -> VectorEnv[Any, Any, Any]:
         if self._made is None:
             self._made = self._make()
+            self.metadata = self._made.metadata  # with the rate
         return self._made
 
 

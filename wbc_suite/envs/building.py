@@ -120,6 +120,7 @@ def compose(
         if config.use_sensor_obs:
             add_contact_sensors(spec, robot, robot_prefix(i))
     benchmark.equip(spec, robots)
+    spec.option.timestep = config.timestep
     return spec
 
 
@@ -275,18 +276,6 @@ def make_cameras(simulation: Simulation, config: EnvConfig) -> tuple[Cameras, Di
     if config.render_mode:
         camera_id(simulation.model, config.render_camera)
     return cameras, Display(simulation, cameras, config)
-
-
-def count_substeps(simulation: Simulation, config: EnvConfig) -> int:
-    """Return the physics steps of a control period; ConfigError if not whole."""
-    period = 1.0 / (config.control_freq * simulation.timestep)
-    count = round(period)
-    if count < 1 or abs(period - count) > 1e-6:
-        raise ConfigError(
-            f"control_freq {config.control_freq:g} must divide "
-            f"{1.0 / simulation.timestep:g}, the physics steps per second."
-        )
-    return count
 
 
 def joint_layout(controllers: tuple[CompositeController, ...]) -> ActionLayout:

@@ -1,5 +1,6 @@
 """Arguments of an environment, checked once."""
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias, TypedDict
@@ -25,6 +26,12 @@ from wbc_suite.sensing.renderer import RenderPreset
 from wbc_suite.sensing.segmentation import SegmentationLevel
 from wbc_suite.tomlfile import FrozenModel, parse_model
 from wbc_suite.typing import RobotName
+
+RATE = 20.0
+"""Hz; rate of actions that horizons of benchmarks are given for, and the default."""
+
+LONGEST_STEP = 0.002
+"""s; gains of servos and contacts are made for it."""
 
 Pixels: TypeAlias = Annotated[int, Field(gt=0, le=8192)]
 Segmentations: TypeAlias = SegmentationLevel | tuple[SegmentationLevel, ...] | None
@@ -113,13 +120,14 @@ class EnvConfig(FrozenModel):
         skin: "meshes" draws robots with the meshes of installed packages, a folder with
             those found there.
         initialization_noise: "default", None, or `{"type": ..., "magnitude": ...}`.
-        control_freq: Actions per second; an action may last 10 s.
+        control_freq: Actions per second, from 0.1; see `timestep`.
         lite_physics: Whether contacts, accelerations and sensors are those of MuJoCo's
             last step, one step behind the positions; otherwise they are computed
             again, which costs one more step.
         compiled: Whether the control loop is compiled; the plain one can be debugged,
             and gives the same states.
-        horizon: Actions in an episode; the benchmark's own when absent.
+        horizon: Actions in an episode; when absent the benchmark's own, which is that
+            of 20 actions a second, and of the same duration at other rates.
         reward_shaping: Whether the reward is shaped, or given for success only.
         reward_scale: Factor on the reward.
         terminate_on_success: Whether success ends the episode.
@@ -154,7 +162,7 @@ class EnvConfig(FrozenModel):
     base_types: Any = "default"
     skin: str | Path | None = None
     initialization_noise: NoiseConfig | Literal["default"] | None = "default"
-    control_freq: float = Field(default=20.0, ge=0.1, le=1e5)
+    control_freq: float = Field(default=RATE, ge=0.1, le=1e5)
     lite_physics: bool = True
     compiled: bool = True
     horizon: PositiveInt | None = None
@@ -226,6 +234,24 @@ class EnvConfig(FrozenModel):
                     "one for all, or one for each"
                 )
         return self
+
+    @property
+    def substeps(self) -> int:
+        """Physics steps of an action."""
+        return max(1, math.ceil(1.0 / (self.control_freq * LONGEST_STEP) - 1e-9))
+
+    @property
+    def timestep(self) -> float:
+        """Duration of a physics step, s: 2 ms, or a little less.
+
+        It is the longest of at most 2 ms of which an action takes a whole number: 17
+        steps of 1.961 ms at 30 Hz, 25 of 2 ms at 20 Hz.
+        """
+        period = 1.0 / self.control_freq
+        timestep = period / self.substeps
+        if int(period / timestep) < self.substeps:  # by rounding
+            timestep = math.nextafter(timestep, 0.0)
+        return timestep
 
     @property
     def camera_name_list(self) -> list[str]:

@@ -17,7 +17,6 @@ from wbc_suite.benchmark.base import ResumableBenchmark
 from wbc_suite.envs.building import (
     action_space,
     compose,
-    count_substeps,
     joint_layout,
     make_cameras,
     make_observables,
@@ -25,7 +24,7 @@ from wbc_suite.envs.building import (
     simulate,
     use_sampler,
 )
-from wbc_suite.envs.config import EnvArguments, checked_seed, parse_env_config
+from wbc_suite.envs.config import RATE, EnvArguments, checked_seed, parse_env_config
 from wbc_suite.envs.physics_states import PhysicsStates
 from wbc_suite.envs.states import EnvState, write_physics, write_scene
 from wbc_suite.envs.thread_lock import one_thread_at_a_time, thread_lock
@@ -89,9 +88,11 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
             self.benchmark, self.simulation, self.config, self.cameras
         )
         self._spaces: tuple[Any, Any, gymnasium.spaces.Dict] | None = None
-        self._substeps = count_substeps(self.simulation, self.config)
-        self.metadata = {**self.metadata, "render_fps": round(self.config.control_freq)}
-        self.horizon = self.config.horizon or self.benchmark.horizon
+        self._substeps = self.config.substeps
+        rate = self.config.control_freq
+        fps = int(rate) if rate.is_integer() else rate
+        self.metadata = {**self.metadata, "render_fps": fps}
+        self.horizon = self.config.horizon or self._own_horizon()
         self._steps, self._broken, self.latency = 0, "", 0
         self.pushes: tuple[Push, ...] = ()
         self._begun, self._process = False, os.getpid()
@@ -100,6 +101,10 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
         self._states = PhysicsStates(self.simulation, given, self.action_layout.size)
         self._start(np.random.default_rng(0))
         self._begun = False
+
+    def _own_horizon(self) -> int:
+        """Return the benchmark's horizon, which takes as long at any rate."""
+        return max(1, round(self.benchmark.horizon * self.config.control_freq / RATE))
 
     @one_thread_at_a_time
     def reset(
@@ -416,6 +421,7 @@ class RobotEnv(gymnasium.Env[Observation, Any]):
 
     def _info(self, clipped: int, success: bool) -> dict[str, Any]:
         info = {"success": success, "is_success": success, "clipped": clipped}
+        info["control_freq"] = self.config.control_freq
         for state, controller in self.simulation.pairs:
             before = state.prefix if len(self.controllers) > 1 else ""
             info |= {before + k: v for k, v in controller.info(state).items()}

@@ -19,13 +19,14 @@ class Mp4Writer:
         self,
         path: Path,
         *,
-        rate: int,
+        rate: float,
         extra: str,
         options: dict[str, str] | None = None,
     ) -> None:
         self._av = import_extra("av", extra)
         self._file = self._av.open(str(path), "w")
-        self._rate, self._options = rate, options or {}
+        self._rate = Fraction(rate).limit_denominator(1001)  # as of 30000/1001 Hz
+        self._options = options or {}
         self._stream, self._count = None, 0
 
     def add(self, picture: NDArray[np.uint8]) -> None:
@@ -37,7 +38,7 @@ class Mp4Writer:
             self._stream.height, self._stream.width = picture.shape[:2]
             self._stream.pix_fmt = "yuv420p"
         frame = self._av.VideoFrame.from_ndarray(np.ascontiguousarray(picture))
-        frame.pts, frame.time_base = self._count, Fraction(1, self._rate)
+        frame.pts, frame.time_base = self._count, 1 / self._rate
         self._file.mux(self._stream.encode(frame))
         self._count += 1
 

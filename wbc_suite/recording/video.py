@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -55,7 +56,7 @@ def write_video(pictures: Iterable[Picture], path: Path, *, rate: float) -> None
         if path.suffix.lower() in PILLOW:
             _write_animation(pictures, temporary, rate)
             return
-        with closing(Mp4Writer(temporary, rate=round(rate), extra="video")) as writer:
+        with closing(Mp4Writer(temporary, rate=rate, extra="video")) as writer:
             for picture in pictures:
                 writer.add(picture)
 
@@ -98,15 +99,17 @@ def write_sheet(dataset: Dataset, path: Path, *, camera: str = "agentview") -> N
 
 
 def _write_animation(pictures: Iterable[Picture], path: Path, rate: float) -> None:
-    images = (Image.fromarray(picture) for picture in pictures)
-    first = next(images, None)
-    if first is None:
+    images = [Image.fromarray(picture) for picture in pictures]
+    if not images:
         raise DatasetError("There are no pictures for a video.")
+    unit = 10 if path.suffix.lower() == ".gif" else 1  # ms
+    ends = [unit * round(1000.0 * k / (rate * unit)) for k in range(len(images) + 1)]
+    first, *others = images
     first.save(
         path,
         format=PILLOW[path.suffix.lower()],
         save_all=True,
-        append_images=images,
-        duration=round(1000.0 / rate),
+        append_images=others,
+        duration=[b - a for a, b in pairwise(ends)],
         loop=0,
     )

@@ -5,6 +5,7 @@ step. Pictures are drawn when they are observed, and changed by `Cameras`.
 """
 
 import copy
+import math
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -21,6 +22,8 @@ from wbc_suite.sensing.reading import Reading
 from wbc_suite.typing import Vector
 
 Maker: TypeAlias = Callable[[mujoco.MjModel, mujoco.MjData], Reading]
+
+ROUNDING = 1e-6  # samples
 
 
 class Observables:
@@ -195,7 +198,7 @@ class _Channel:
         self._change, self._place, self._bound = change, place, bound
         self._timestep, self._step = timestep, 0
         rate = change.sampling_rate
-        self._period = 1 if rate is None else max(1, round(1.0 / (rate * timestep)))
+        self._samples_per_step = 1.0 if rate is None else min(1.0, rate * timestep)
         self._filter = copy.deepcopy(change.filter)
         self._shown: Vector = np.zeros(place.stop - place.start)
         self._coming: deque[tuple[int, Vector]] = deque()
@@ -229,7 +232,7 @@ class _Channel:
     def sample(self, values: Vector, rng: np.random.Generator) -> None:
         """Take a sample if one is due, and release those whose delay is over."""
         self._step += 1
-        if self._change.enabled and self._step % self._period == 0 and self._kept(rng):
+        if self._change.enabled and self._is_due() and self._kept(rng):
             delay = self._change.delay
             wait = delay(rng) if callable(delay) else delay
             due = self._step + round(wait / self._timestep)
@@ -241,6 +244,14 @@ class _Channel:
         """Return whether a sample is not lost."""
         dropout = self._change.dropout
         return not dropout or rng.uniform() >= dropout
+
+    def _is_due(self) -> bool:
+        """Return whether a sample falls into the last step; on average at the rate."""
+        before, after = (
+            math.floor(step * self._samples_per_step + ROUNDING)
+            for step in (self._step - 1, self._step)
+        )
+        return after > before
 
     def show(self, values: Vector) -> None:
         """Write the observed values over the true ones."""

@@ -7,7 +7,8 @@ import contextlib
 import importlib
 
 SIMULATION_TIMESTEP = 0.002
-"""Duration of a physics step, s."""
+"""Duration of a physics step, s, of which a control period at 20 Hz is a multiple; at
+other rates `env.model_timestep` is a little shorter."""
 USING_INSTANCE_RANDOMIZATION = False
 ENABLE_NUMBA = True
 CACHE_NUMBA = True

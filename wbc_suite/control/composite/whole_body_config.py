@@ -21,7 +21,8 @@ from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.elements import Name
 from wbc_suite.robot.mjcf_export import STOP_MARGIN
-from wbc_suite.tomlfile import FrozenModel, Interval, located, parse_model
+from wbc_suite.robot.shapes import Interval
+from wbc_suite.tomlfile import FrozenModel, located, parse_model
 
 __all__ = [
     "ControlledFrame",

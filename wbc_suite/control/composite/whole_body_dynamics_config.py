@@ -24,8 +24,9 @@ from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.locomotion import GAITS, GaitConfig, TrotConfig
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.elements import Name
+from wbc_suite.robot.shapes import Interval
 from wbc_suite.robot.sole_inference import ball_radius, guess_sole
-from wbc_suite.tomlfile import FrozenModel, Interval, located, parse_model
+from wbc_suite.tomlfile import FrozenModel, located, parse_model
 
 NOISY_CUTOFF = 25.0
 """Hz; GR1 walks with a delay of 20 ms and noise of 0.05 rad/s at it, not at 40 Hz."""

@@ -123,8 +123,10 @@ def _finish(dataset: Dataset, out: Path, pieces: Sequence[Mapping[str, Any]]) ->
     write_bytes(out / "meta/stats.json", json.dumps(stats, indent=1).encode())
 
 
-def _rate(dataset: Dataset) -> int:
-    return round(float(dataset.header.get("control_freq", 20.0)))
+def _rate(dataset: Dataset) -> float:
+    """Return the actions per second, an integer where it is a whole number."""
+    rate = float(dataset.header.get("control_freq", 20.0))
+    return int(rate) if rate.is_integer() else rate
 
 
 def _task(dataset: Dataset) -> str:
@@ -159,7 +161,7 @@ def _vectors(episode: Episode) -> dict[str, NDArray[np.float32]]:
 
 
 def _frames(
-    arrow: Any, columns: Mapping[str, Any], number: int, start: int, rate: int
+    arrow: Any, columns: Mapping[str, Any], number: int, start: int, rate: float
 ) -> Any:
     table = {
         name: arrow.FixedSizeListArray.from_arrays(column.ravel(), column.shape[1])
@@ -285,7 +287,7 @@ def _write_table(parquet: Any, table: Any, path: Path) -> None:
     replace_file(path, lambda temporary: parquet.write_table(table, temporary))
 
 
-def _open_video(path: Path, rate: int) -> Mp4Writer:
+def _open_video(path: Path, rate: float) -> Mp4Writer:
     """Open a video with a key frame every other picture, as LeRobot writes it."""
     path.parent.mkdir(parents=True, exist_ok=True)
     return Mp4Writer(path, rate=rate, extra="lerobot", options={"g": "2", "crf": "23"})

@@ -132,7 +132,7 @@ def _start_time(episode: Episode) -> int:
 
 def _since_start(episode: Episode, rate: float) -> NDArray[np.int64]:
     """Return simulated times of the actions since the first one, ns."""
-    even = np.arange(episode.length, dtype=np.int64) * round(SECOND / rate)
+    even = np.round(np.arange(episode.length) * (SECOND / rate)).astype(np.int64)
     if "states" not in episode.columns or not episode.length:
         return even
     time = episode.columns["states"][:, 0]

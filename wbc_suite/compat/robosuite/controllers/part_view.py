@@ -15,7 +15,10 @@ class PartController:
     Attributes:
         name: Type of the controller.
         control_dim: Number of its action values.
+        period: Time between two actions, s.
     """
+
+    period = 0.05
 
     def __init__(self, name: str, part: Any, state: RobotState) -> None:
         self.part_name, self._part, self._state = name, part, state
@@ -104,7 +107,7 @@ class PartController:
 
     def set_goal(self, action: Any) -> None:
         """Take values of its slices of the action."""
-        self._part.set_goal(np.asarray(action, np.float64), 0.05)
+        self._part.set_goal(np.asarray(action, np.float64), self.period)
 
     def reset_goal(self) -> None:
         """Hold the part where it is."""

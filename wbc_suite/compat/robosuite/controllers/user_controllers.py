@@ -32,6 +32,8 @@ class CompositeController:
     """
 
     name = "BASIC"
+    period = 0.05
+    """Time between two actions, s."""
 
     def __init__(self, sim: Any, robot_model: Any, grippers: Any) -> None:
         self.sim, self.robot_model, self.grippers = sim, robot_model, grippers
@@ -64,6 +66,12 @@ class CompositeController:
             n: part_controller(n, p, state) for n, p in parts.items()
         }
 
+    def set_period(self, period: float) -> None:
+        """Set the time between two actions, s."""
+        self.period = period
+        for part in self.part_controllers.values():
+            part.period = period
+
     def _validate_composite_controller_specific_config(self) -> None:
         """Check the specific config; by default anything is right."""
 
@@ -80,7 +88,7 @@ class CompositeController:
 
     def set_goal(self, all_action: Any) -> None:
         """Take an action."""
-        self._inner.set_goal(np.asarray(all_action, np.float64))
+        self._inner.set_goal(np.asarray(all_action, np.float64), self.period)
 
     def reset(self) -> None:
         """Hold all parts where they are."""
@@ -220,6 +228,7 @@ class _Adapter:
         self._inner.reset(state)
 
     def set_goal(self, action: Vector, period: float = 0.05) -> None:
+        self.user.set_period(period)
         self.user.set_goal(action)
 
     def prepare(self, state: RobotState) -> int:

@@ -96,6 +96,7 @@ class Robot(Measured):
         self.composite_controller: CompositeController = view_of(
             controller, state, models
         )
+        self.composite_controller.set_period(1.0 / self.control_freq)
         hands = {hand.name: hand for hand in hands_of(state)}
         self.eef_site_id = {arm: hands[arm].site for arm in self.arms}
         q, v = state.joint_addresses(self._joints(grippers=False))
