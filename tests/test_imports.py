@@ -13,6 +13,7 @@ MODULES = sorted(p for p in PACKAGE.rglob("*.py") if "_catalogue" not in p.parts
 
 BASE = (
     "errors",
+    "files",
     "typing",
     "arguments",
     "timing",

@@ -6,7 +6,6 @@ from typing import Annotated, Literal
 import pytest
 from pydantic import Field, ValidationError
 
-from wbc_suite import tomlfile
 from wbc_suite.errors import ConfigError, DescriptionError
 from wbc_suite.tomlfile import FrozenModel, load_model, parse_model, parse_toml
 
@@ -121,16 +120,12 @@ def test_text_that_is_not_toml_is_refused(text, expected):
         parse_toml(text, source="f")
 
 
-def test_files_that_cannot_be_read_are_named(tmp_path, monkeypatch):
+def test_files_that_cannot_be_read_are_named(tmp_path):
     path = tmp_path / "f.toml"
     with pytest.raises(ConfigError, match=r"f\.toml: cannot be read \(No such file"):
         load_model(File, path)
     path.write_bytes(b"\xff\xfe")
-    with pytest.raises(ConfigError, match=r"f\.toml: not a readable TOML file"):
-        load_model(File, path)
-    path.write_text("format = 1")
-    monkeypatch.setattr(tomlfile, "MAX_BYTES", 9)
-    with pytest.raises(ConfigError, match="has 10 bytes; at most 9 are read"):
+    with pytest.raises(ConfigError, match=r"f\.toml: is not text in UTF-8"):
         load_model(File, path)
 
 

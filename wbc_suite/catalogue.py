@@ -8,12 +8,12 @@ command line or the variable `WBC_SUITE_CATALOGUE`; its files take precedence.
 
 import os
 import tempfile
-import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from wbc_suite.errors import ConfigError, UnknownNameError
+from wbc_suite.tomlfile import read_toml
 
 ENVIRONMENT_VARIABLE = "WBC_SUITE_CATALOGUE"
 
@@ -66,8 +66,8 @@ def _key(name: str) -> str:
 def _own_name(path: Path) -> str:
     """Return the name that a file declares, or its stem."""
     try:
-        content = tomllib.loads(path.read_text("utf-8"))
-    except (OSError, ValueError, RecursionError):
+        content = read_toml(path)
+    except ConfigError:
         return path.stem  # listing names must not fail because of one file
     headers = (content, *map(content.get, ("assembly", "component")))
     names = (header.get("name") for header in headers if isinstance(header, dict))

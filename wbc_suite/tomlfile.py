@@ -10,10 +10,14 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from wbc_suite.errors import ConfigError, did_you_mean, join_first, shortened
-
-MAX_BYTES = 4_000_000
-"""Largest file that is read; the largest in the catalogue has about 60 kB."""
+from wbc_suite.errors import (
+    ConfigError,
+    WbcError,
+    did_you_mean,
+    join_first,
+    shortened,
+)
+from wbc_suite.files import read_text
 
 MAX_DEPTH = 30  # parts of a dotted key
 SHOWN = 8  # faults in a message
@@ -43,28 +47,6 @@ def read_toml(path: Path) -> dict[str, Any]:
     return parse_toml(read_text(path), source=str(path))
 
 
-def read_bytes(path: Path, *, most: int) -> bytes:
-    """Read a file; raises ConfigError if it is missing or too large."""
-    try:
-        size = path.stat().st_size
-        if size > most:
-            raise ConfigError(
-                f"{path}: the file has {size} bytes; at most {most} are read. Is this "
-                "the right file?"
-            )
-        return path.read_bytes()
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be read ({error.strerror}).") from error
-
-
-def read_text(path: Path) -> str:
-    """Read a text file; raises ConfigError if missing, too large or not UTF-8."""
-    try:
-        return read_bytes(path, most=MAX_BYTES).decode("utf-8")
-    except UnicodeDecodeError as error:
-        raise ConfigError(f"{path}: not a readable TOML file: {error}") from error
-
-
 def parse_toml(text: str, *, source: str) -> dict[str, Any]:
     """Parse TOML text; raises ConfigError."""
     if _DEEP_KEY.search(text):  # which costs tomllib a time that is quadratic
@@ -79,14 +61,20 @@ def parse_toml(text: str, *, source: str) -> dict[str, Any]:
 
 def read_json(path: Path) -> dict[str, Any]:
     """Parse one JSON file that holds an object; raises ConfigError."""
-    text = read_text(path)
+    return parse_json(read_text(path), source=str(path), parse_constant=_no_constant)
+
+
+def parse_json(
+    text: str, *, source: str, error: type[WbcError] = ConfigError, **options: Any
+) -> dict[str, Any]:
+    """Parse an object of JSON, with options of `json.loads`; raises an `error`."""
     try:
-        found = json.loads(text, parse_constant=_no_constant)
-    except (ValueError, RecursionError) as error:
-        raise ConfigError(f"{path}: not a readable JSON file: {error}") from error
+        found = json.loads(text, **options)
+    except (ValueError, RecursionError) as cause:
+        raise error(f"{source}: not readable JSON: {cause}") from cause
     if not isinstance(found, dict):
         kind = type(found).__name__
-        raise ConfigError(f"{path}: holds {kind}, not an object {{...}}.")
+        raise error(f"{source}: holds {kind}, not an object {{...}}.")
     return found
 
 

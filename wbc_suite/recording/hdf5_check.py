@@ -19,6 +19,7 @@ import h5py
 
 import wbc_suite
 from wbc_suite.errors import DatasetError
+from wbc_suite.files import check_file
 from wbc_suite.recording import hdf5_reader
 
 CPU_SECONDS = 10  # processor time for the start and for small files, s
@@ -38,9 +39,9 @@ def open_safely(path: Path, *, checked: bool = False) -> h5py.File:
     Raises:
         DatasetError: If it is missing, no HDF5 file or too damaged to be read.
     """
-    if not path.is_file():
+    if not path.exists():
         raise DatasetError(f"There is no file '{path}'.")
-    size = path.stat()
+    size = check_file(path, error=DatasetError)
     held = getattr(size, "st_blocks", size.st_size) * 512
     if size.st_size > SPARSE_FROM and held * SPARSE < size.st_size:
         raise DatasetError(f"'{path}' declares {size.st_size} bytes, but holds {held}.")

@@ -10,6 +10,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from wbc_suite.errors import ConfigError, DescriptionError, UnknownNameError
+from wbc_suite.files import read_text
 from wbc_suite.robot.elements import (
     Camera,
     Contacts,
@@ -23,7 +24,7 @@ from wbc_suite.robot.elements import (
 )
 from wbc_suite.robot.mirror import Mirror, reflect_component
 from wbc_suite.robot.shapes import Posed, as_table
-from wbc_suite.tomlfile import FrozenModel, parse_model, parse_toml, read_text
+from wbc_suite.tomlfile import FrozenModel, parse_model, parse_toml
 
 
 class Header(FrozenModel):
