@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Literal
 
 import mujoco
 import numpy as np
-from pydantic import BaseModel, PositiveInt
+from pydantic import PositiveInt
 
 from wbc_suite.benchmark.arrangement import (
     Places,
@@ -47,7 +47,7 @@ SLIP = 0.2  # m/s, between a hand and what it holds, at most
 BELOW_ONE = float(np.nextafter(1.0, 0.0))
 
 
-class ObjectBenchmarkConfig(BaseModel):
+class ObjectBenchmarkConfig(FrozenModel):
     """Contents of every file in `tasks/`.
 
     Attributes:
@@ -59,7 +59,6 @@ class ObjectBenchmarkConfig(BaseModel):
         arena: The scene around it; None for an empty floor.
     """
 
-    model_config = FrozenModel.model_config
     one_table: ClassVar[bool] = True
 
     format: Literal[1]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from wbc_suite.catalogue import user_config
 from wbc_suite.devices.web_server import reachable_name
-from wbc_suite.errors import DeviceError
+from wbc_suite.errors import ConfigError, DeviceError
 from wbc_suite.files import check_file, read_bytes
 
 BEGIN, END = (f"-----{word} CERTIFICATE-----" for word in ("BEGIN", "END"))
@@ -40,11 +40,11 @@ def server_context(certificate: Path, key: Path) -> ssl.SSLContext:
     """
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.minimum_version = ssl.TLSVersion.TLSv1_2
-    for file in (certificate, key):
-        check_file(file, most=MAX_BYTES, error=DeviceError)
     try:
+        for file in (certificate, key):
+            check_file(file, most=MAX_BYTES)
         context.load_cert_chain(certificate, key, password="")  # else it is asked for
-    except (OSError, ssl.SSLError) as error:
+    except (OSError, ssl.SSLError, ConfigError) as error:
         raise DeviceError(
             f"Certificate '{certificate}' with key '{key}' cannot be used: {error}. "
             "Both must be PEM files without a password. If they were made by this "

@@ -196,12 +196,22 @@ def _check_element(element: Element, where: str) -> None:
 
 
 def _check_numbers(element: Element, where: str) -> None:
-    """Refuse NaN, for which MuJoCo only prints a warning."""
+    """Refuse NaN, for which MuJoCo only prints a warning, and infinite numbers."""
     for key, value in element.items():
-        if key not in ("name", "file") and "nan" in value.lower().split():
+        words = () if key in ("name", "file") else value.split()
+        if any(_is_wrong(word, key) for word in words):
             raise DescriptionError(
-                f'{where}: {key}="{value:.80}" contains NaN; give numbers.'
+                f'{where}: {key}="{value:.80}" has a number that is not finite.'
             )
+
+
+def _is_wrong(word: str, key: str) -> bool:
+    """Whether a word is NaN or infinite; ranges may be infinite."""
+    try:
+        number = float(word)
+    except ValueError:
+        return False
+    return math.isnan(number) or (math.isinf(number) and not key.endswith("range"))
 
 
 def _product(text: str) -> float:
