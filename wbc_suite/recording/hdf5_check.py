@@ -103,9 +103,9 @@ def _reason(code: int, seconds: int, messages: bytes) -> str:
 def read_files() -> None:
     """Read the files named by standard input, in the child; write a line for each."""
     seconds = int(sys.argv[1])
-    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    _limit(resource.RLIMIT_CPU, seconds)
+    _limit(resource.RLIMIT_AS, MEMORY_BYTES)
+    _limit(resource.RLIMIT_CORE, 0)
     try:
         for name in sys.stdin.buffer.read().split(b"\0"):
             with suppress(*TOLERATED):
@@ -113,6 +113,12 @@ def read_files() -> None:
             os.write(1, b"\n")
     except MemoryError:
         sys.exit(OUT_OF_MEMORY)
+
+
+def _limit(kind: int, value: int) -> None:
+    """Lower a limit of this process, which may have a lower one."""
+    known = [x for x in resource.getrlimit(kind) if x != resource.RLIM_INFINITY]
+    resource.setrlimit(kind, (min(value, *known),) * 2)
 
 
 def _read_structure(path: Path) -> None:
