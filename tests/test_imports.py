@@ -14,6 +14,7 @@ MODULES = sorted(p for p in PACKAGE.rglob("*.py") if "_catalogue" not in p.parts
 BASE = (
     "errors",
     "logs",
+    "files",
     "typing",
     "arguments",
     "timing",

@@ -2,6 +2,7 @@
 
 from typing import Annotated, Literal
 
+import numpy as np
 import pytest
 from pydantic import Field, ValidationError
 
@@ -52,7 +53,7 @@ def test_a_file_becomes_a_frozen_model(tmp_path):
     ("text", "expected"),
     [
         ("", "f.toml: missing key 'format'"),
-        ("format = 2", "f.toml: key 'format' = 2: Input should be 1."),
+        ("format = 2", "f.toml: key 'format' = 2: must be 1."),
         (
             "format = 1\nitm = 3",
             "f.toml: unknown key 'itm'. Did you mean 'item'? "
@@ -60,7 +61,7 @@ def test_a_file_becomes_a_frozen_model(tmp_path):
         ),
         (
             'format = 1\n[[item]]\n[[item]]\nmode = "fats"',
-            "f.toml: key 'item[1].mode' = 'fats': Input should be 'slow' or 'fast'. "
+            "f.toml: key 'item[1].mode' = 'fats': must be 'slow' or 'fast'. "
             "Did you mean 'fast'?",
         ),
         (
@@ -70,7 +71,7 @@ def test_a_file_becomes_a_frozen_model(tmp_path):
         ),
         (
             'format = 1\n[[item]]\nform = { shape = "round", radius = -1 }',
-            "f.toml: key 'item[0].form.radius' = -1: Input should be greater than 0.",
+            "f.toml: key 'item[0].form.radius' = -1: must be greater than 0.",
         ),
         (
             'format = 1\n[[item]]\nform = { shape = "square", size = 1, radius = 2 }',
@@ -78,7 +79,7 @@ def test_a_file_becomes_a_frozen_model(tmp_path):
         ),
         (
             'format = 1\n[table.a]\nmode = "slo"',
-            "f.toml: key 'table.a.mode' = 'slo': Input should be 'slow' or 'fast'. "
+            "f.toml: key 'table.a.mode' = 'slo': must be 'slow' or 'fast'. "
             "Did you mean 'slow'?",
         ),
     ],
@@ -120,16 +121,12 @@ def test_text_that_is_not_toml_is_refused(text, expected):
         parse_toml(text, source="f")
 
 
-def test_files_that_cannot_be_read_are_named(tmp_path, monkeypatch):
+def test_files_that_cannot_be_read_are_named(tmp_path):
     path = tmp_path / "f.toml"
     with pytest.raises(ConfigError, match=r"f\.toml: cannot be read \(No such file"):
         load_model(File, path)
     path.write_bytes(b"\xff\xfe")
-    with pytest.raises(ConfigError, match=r"f\.toml: not a readable TOML file"):
-        load_model(File, path)
-    path.write_text("format = 1")
-    monkeypatch.setattr(tomlfile, "MAX_BYTES", 9)
-    with pytest.raises(ConfigError, match="has 10 bytes; at most 9 are read"):
+    with pytest.raises(ConfigError, match=r"f\.toml: is not text in UTF-8"):
         load_model(File, path)
 
 
@@ -204,3 +201,35 @@ def test_dotted_keys_of_a_usual_depth_are_read():
     key = ".".join(["a"] * 20)
     text = f"{key} = 1\n# {'.'.join(['b'] * 25)}\n"
     assert list(parse_toml(text, source="f")) == ["a"]
+
+
+class Numbers(FrozenModel):
+    real: float = 0.0
+    whole: int = 0
+    truth: bool = False
+    pair: tuple[float, int] = (0.0, 0)
+    either: float | tuple[float, float] | None = None
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        *(("real", v) for v in ("1", True, [1.0])),
+        *(("whole", v) for v in ("1", True, 1.5, np.True_)),
+        *(("truth", v) for v in ("true", 1, 0.0, "yes")),
+        *(("pair", v) for v in (["1", 2], [1, "2"], [True, 2])),
+        *(("either", v) for v in ("1", True, ["1", 2])),
+    ],
+)
+def test_nothing_is_converted_to_a_number(key, value):
+    with pytest.raises(ConfigError, match=rf"key '{key}(\[\d\])?' = "):
+        parse_model(Numbers, {key: value}, source="f")
+    with pytest.raises(ValidationError):
+        Numbers(**{key: value})
+
+
+def test_numbers_of_numpy_and_whole_ones_are_numbers():
+    data = {"real": np.float32(2.0), "whole": np.int64(3), "truth": np.True_}
+    found = parse_model(Numbers, data | {"pair": [1, 2.0]}, source="f")
+    assert found == Numbers(real=2.0, whole=3, truth=True, pair=(1.0, 2))
+    assert parse_model(Numbers, {"either": 1}, source="f").either == 1.0

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from wbc_suite.errors import ConfigError, UnknownNameError
+from wbc_suite.files import read_text
 
 ENVIRONMENT_VARIABLE = "WBC_SUITE_CATALOGUE"
 
@@ -85,8 +86,8 @@ def merge(base: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
 def _own_name(path: Path) -> str:
     """Return the name that a file declares, or its stem."""
     try:
-        return _declared_name(path.read_text("utf-8")) or path.stem
-    except (OSError, ValueError, RecursionError):
+        return _declared_name(read_text(path)) or path.stem
+    except (ConfigError, ValueError, RecursionError):
         return path.stem  # listing names must not fail because of one file
 
 

@@ -8,12 +8,18 @@ import typing
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+import numpy as np
+from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError
+from pydantic_core import CoreSchema, core_schema
 
-from wbc_suite.errors import ConfigError, did_you_mean, join_first, shortened
-
-MAX_BYTES = 4_000_000
-"""Largest file that is read; the largest in the catalogue has about 60 kB."""
+from wbc_suite.errors import (
+    ConfigError,
+    WbcError,
+    did_you_mean,
+    join_first,
+    shortened,
+)
+from wbc_suite.files import read_text
 
 MAX_DEPTH = 30  # parts of a dotted key
 SHOWN = 8  # faults in a message
@@ -26,43 +32,55 @@ _VALUE = re.compile(rf"\s*({_DOTTED})\s*=")
 
 M = TypeVar("M", bound=BaseModel)
 
-FROZEN = ConfigDict(
-    frozen=True, extra="forbid", allow_inf_nan=False, populate_by_name=True
-)
-"""Configuration of models that are read from a file: frozen, no unknown keys."""
+
+def _whole(value: Any) -> Any:
+    if isinstance(value, str | bool | np.bool_):
+        raise ValueError("must be a whole number")
+    return value
+
+
+def _truth(value: Any) -> Any:
+    if not isinstance(value, bool | np.bool_):
+        raise ValueError("must be true or false")
+    return bool(value)
+
+
+_CHECKED = {"int": _whole, "bool": _truth}
+
+
+def _unconverted(schema: Any) -> Any:
+    """Return a part of a schema whose numbers take neither texts nor booleans."""
+    match schema:
+        case {"type": "float"}:
+            return schema | {"strict": True}  # takes whole numbers, and NumPy's
+        case {"type": "int" | "bool" as kind}:
+            return core_schema.no_info_before_validator_function(_CHECKED[kind], schema)
+        case dict():
+            return {key: _unconverted(value) for key, value in schema.items()}
+        case list():
+            return [_unconverted(item) for item in schema]
+        case _:
+            return schema
 
 
 class FrozenModel(BaseModel):
-    """Base of models that are read from a file."""
+    """Base of models that are read from a file; a text is no number, and true not 1."""
 
-    model_config = FROZEN
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", allow_inf_nan=False, populate_by_name=True
+    )
+
+    @classmethod
+    def __get_pydantic_core_schema__(
+        cls, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Return the schema in which nothing is converted to a number."""
+        return _unconverted(handler(source))
 
 
 def read_toml(path: Path) -> dict[str, Any]:
     """Parse one TOML file; raises ConfigError."""
     return parse_toml(read_text(path), source=str(path))
-
-
-def read_bytes(path: Path, *, most: int) -> bytes:
-    """Read a file; raises ConfigError if it is missing or too large."""
-    try:
-        size = path.stat().st_size
-        if size > most:
-            raise ConfigError(
-                f"{path}: the file has {size} bytes; at most {most} are read. Is this "
-                "the right file?"
-            )
-        return path.read_bytes()
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be read ({error.strerror}).") from error
-
-
-def read_text(path: Path) -> str:
-    """Read a text file; raises ConfigError if missing, too large or not UTF-8."""
-    try:
-        return read_bytes(path, most=MAX_BYTES).decode("utf-8")
-    except UnicodeDecodeError as error:
-        raise ConfigError(f"{path}: not a readable TOML file: {error}") from error
 
 
 def parse_toml(text: str, *, source: str) -> dict[str, Any]:
@@ -79,14 +97,20 @@ def parse_toml(text: str, *, source: str) -> dict[str, Any]:
 
 def read_json(path: Path) -> dict[str, Any]:
     """Parse one JSON file that holds an object; raises ConfigError."""
-    text = read_text(path)
+    return parse_json(read_text(path), source=str(path), parse_constant=_no_constant)
+
+
+def parse_json(
+    text: str, *, source: str, error: type[WbcError] = ConfigError, **options: Any
+) -> dict[str, Any]:
+    """Parse an object of JSON, with options of `json.loads`; raises an `error`."""
     try:
-        found = json.loads(text, parse_constant=_no_constant)
-    except (ValueError, RecursionError) as error:
-        raise ConfigError(f"{path}: not a readable JSON file: {error}") from error
+        found = json.loads(text, **options)
+    except (ValueError, RecursionError) as cause:
+        raise error(f"{source}: not readable JSON: {cause}") from cause
     if not isinstance(found, dict):
         kind = type(found).__name__
-        raise ConfigError(f"{path}: holds {kind}, not an object {{...}}.")
+        raise error(f"{source}: holds {kind}, not an object {{...}}.")
     return found
 
 
@@ -116,20 +140,24 @@ def parse_model(
     try:
         return model.model_validate(data)
     except ValidationError as failure:
-        lines, found = _lines(source), failure.errors()
-        faults = [_explain(model, item, within, lines) for item in found[:SHOWN]]
+        text, found = _text(source), failure.errors()
+        faults = [_explain(model, item, within, text) for item in found[:SHOWN]]
+        faults[:-1] = [fault.removesuffix(".") for fault in faults[:-1]]
         faults += [""] * (len(found) - len(faults))
         shown = join_first(faults, limit=SHOWN, separator="; ")
         raise error(f"{source}: {shown}") from failure
 
 
-def _lines(source: str) -> dict[str, int]:
-    """Return where keys stand in a TOML file, by keys as `_resolve` writes them."""
+def _text(source: str) -> str:
+    """Return the content of a TOML file; nothing if the source is none."""
     path = Path(source)
-    if path.suffix != ".toml" or not path.is_file():
-        return {}
+    return read_text(path) if path.suffix == ".toml" and path.is_file() else ""
+
+
+def _lines(text: str) -> dict[str, int]:
+    """Return where keys stand in a TOML file, by keys as `_resolve` writes them."""
     table, counts, lines = "", dict[str, int](), dict[str, int]()
-    for number, line in enumerate(read_text(path).splitlines(), 1):
+    for number, line in enumerate(text.splitlines(), 1):
         if header := _TABLE.match(line):
             table = ""
             *parents, last = _parts(header[2])
@@ -149,7 +177,29 @@ def _lines(source: str) -> dict[str, int]:
 
 def located(key: str, source: str) -> str:
     """Return `key 'a.b' (line 3)`, the line of a key in a TOML file, if it is one."""
-    return f"key '{key}'{_line(key, _lines(source))}"
+    return f"key '{key}'{_line(key, _lines(_text(source)))}"
+
+
+_NAMED = re.compile(r"""\bname\s*=\s*["']([\w.-]+)["']""")
+_QUOTED = re.compile(r"(group |keyframe |)'([\w.-]+)'")
+
+
+def _with_lines(message: str, text: str) -> str:
+    """Add the line of each item, keyframe and group that a message quotes by name."""
+    named = dict[str, int]()
+    for number, line in enumerate(text.splitlines(), 1):
+        for name in _NAMED.findall(line):
+            named.setdefault(name, number)
+    for key, number in _lines(text).items():
+        table, _, name = key.partition(".")
+        if table in ("keyframe", "groups"):
+            named[f"{table.removesuffix('s')} {name}"] = number
+
+    def located(found: re.Match[str]) -> str:
+        number = named.pop(found[1] + found[2], None)
+        return found[0] + (f" (line {number})" if number else "")
+
+    return _QUOTED.sub(located, message)
 
 
 def _parts(key: str) -> list[str]:
@@ -163,32 +213,62 @@ def _line(key: str, lines: dict[str, int]) -> str:
     return f" (line {lines[key]})" if key else ""
 
 
-def _explain(
-    model: type[BaseModel], item: Any, within: str, lines: dict[str, int]
-) -> str:
+_RULES = {
+    "float_type": "must be a number",
+    "int_type": "must be a whole number",
+    "int_from_float": "must be a whole number",
+    "int_parsing_size": "must be a smaller number",
+    "finite_number": "must be a finite number",
+    "string_type": "must be a text",
+    "tuple_type": "must be a list",
+    "list_type": "must be a list",
+    "dict_type": "must be a table",
+    "model_type": "must be a table",
+    "model_attributes_type": "must be a table",
+    "path_type": "must be the path of a file",
+    "string_pattern_mismatch": "must have the form {pattern}",
+    "string_too_short": "must have {min_length} characters or more",
+    "string_too_long": "must have {max_length} characters or less",
+    "too_short": "must have {min_length} items or more, not {actual_length}",
+    "too_long": "must have {max_length} items or less, not {actual_length}",
+}
+"""What is allowed, by pydantic's types of errors."""
+
+
+def _explain(model: type[BaseModel], item: Any, within: str, text: str) -> str:
     """Return one of pydantic's `ErrorDetails` as a sentence with the nearest name."""
     loc: tuple[int | str, ...] = item["loc"]
+    kind, given, context = item["type"], item["input"], item.get("ctx", {})
     own, _ = _resolve(loc, model)
     key = ".".join(filter(None, (within, own)))
-    line = _line(key, lines)
-    if item["type"] == "extra_forbidden":
+    if kind.startswith("union_tag"):  # the key that says which table it is
+        key += "." + str(context["discriminator"]).strip("'")
+        given = context.get("tag")
+    line = _line(key, _lines(text))
+    if kind == "extra_forbidden":
         _, tables = _resolve(loc[:-1], model)
         known = [f.alias or n for m in tables for n, f in m.model_fields.items()]
         hint = did_you_mean(str(loc[-1]), known)
         return f"unknown key '{key}'{line}.{hint} Known: {', '.join(sorted(known))}"
-    if item["type"] == "missing":
+    if kind in ("missing", "union_tag_not_found"):
         return f"missing key '{key}'{line}"
     message, hint = str(item["msg"]).removeprefix("Value error, "), ""
-    if item["type"] in ("literal_error", "enum") and isinstance(item["input"], str):
-        options = str(item["ctx"]["expected"]).replace("'", "").replace(" or ", ", ")
-        hint = did_you_mean(item["input"], options.split(", "))
-    value = shortened(repr(item["input"]))
-    where = f"key '{key}' = {value}{line}: " if key else ""
-    return f"{where}{message}.{hint}"
+    message = message.replace("Input should be", "must be")
+    expected = str(context.get("expected") or context.get("expected_tags", ""))
+    if expected:
+        message = f"must be {'one of ' * (kind == 'union_tag_invalid')}{expected}"
+        options = expected.replace("'", "").replace(" or ", ", ").split(", ")
+        hint = did_you_mean(given, options) if isinstance(given, str) else ""
+    if kind in _RULES:
+        message = _RULES[kind].format_map(context)
+    message = message.removesuffix(".") + "." * (not message.endswith("?")) + hint
+    if not key:
+        return _with_lines(message, text)
+    return f"key '{key}' = {shortened(repr(given))}{line}: {message}"
 
 
 _TYPE_NAME = re.compile(
-    r"(constrained-|tuple\[|literal\[|list\[).*|float|int|str|bool|none"
+    r"(constrained-|function-|tuple\[|literal\[|list\[).*|float|int|str|bool|none"
 )
 """Pydantic's names of types, which stand among the keys of a location."""
 

@@ -17,6 +17,7 @@ from wbc_suite.cli.demo import demo
 from wbc_suite.cli.options import robot_names
 from wbc_suite.robot import load_robot
 
+EXAMPLES = Path(__file__).parents[2] / "examples/robots"
 FILES = [
     path
     for folder in ("robots", "tasks", "controllers")
@@ -94,6 +95,24 @@ def test_every_file_of_the_catalogue_passes_its_check(wbc_suite_command, path):
     code, out, err = wbc_suite_command("check", path)
     assert (code, err) == (0, "")
     assert "fine" in out
+
+
+def test_check_prints_what_an_import_inferred(wbc_suite_command):
+    arm = EXAMPLES / "six_axis_arm.urdf"
+    code, out, _ = wbc_suite_command("check", arm)
+    lines = out.splitlines()
+    assert code == 0
+    assert [line.split()[0] for line in lines[1:] if line[2] != " "] == (
+        ["root", "groups", "hands", "gripper", "ready"]
+    )
+    assert "  root      fixed, first link 'base'" in lines
+    assert any(
+        line.startswith("  groups    right_arm: shoulder_pan, ") for line in lines
+    )
+    assert "            right_gripper: left_finger_joint" in lines
+    assert "  hands     right: frame 'right_tcp' on link 'palm'" in lines
+    code, out, _ = wbc_suite_command("check", arm, "--json")
+    assert json.loads(out)["inferred"]["root"] == ["fixed, first link 'base'"]
 
 
 def test_the_export_as_mjcf_compiles_elsewhere(wbc_suite_command, tmp_path):

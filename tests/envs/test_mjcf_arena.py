@@ -14,6 +14,7 @@ import wbc_suite
 from wbc_suite.errors import ConfigError, DatasetError, UnknownNameError
 from wbc_suite.recording import Dataset, rebuild
 from wbc_suite.recording.replaying import divergence
+from wbc_suite.scene import ArenaConfig, empty_arena
 from wbc_suite.wrappers import DataCollection
 
 THINGS = {"drawer_joint", "cupboard_door_joint", "mug_pos", "mug_quat"}
@@ -123,6 +124,29 @@ def test_a_benchmark_file_names_the_scene_its_surface_and_its_things(kitchen):
     seen, _ = wbc_suite.make(file).reset(seed=0)
     assert set(seen) & THINGS == {"drawer_joint"}
     assert seen["cube_pos"][2] > COUNTER
+
+
+def test_the_step_and_gravity_of_a_scene_do_not_count(tmp_path):
+    kitchen = write_kitchen(tmp_path)
+    other = '<mujoco><option timestep="1" gravity="0 0 5"/>'
+    kitchen.write_text(kitchen.read_text().replace("<mujoco>", other, 1))
+    option = ArenaConfig(file=kitchen).build().option
+    assert option.timestep == empty_arena().option.timestep
+    assert option.gravity.tolist() == [0.0, 0.0, -9.81]
+
+
+@pytest.mark.parametrize("name", ["../scene.xml", "/etc/passwd", "up/scene.xml"])
+def test_a_benchmark_file_names_no_scene_outside_of_its_folder(tmp_path, name):
+    kitchen = write_kitchen(tmp_path)
+    folder = kitchen.parent / "mine"
+    folder.mkdir()
+    (folder / "up").symlink_to(kitchen.parent, target_is_directory=True)
+    lift = (wbc_suite.catalogue.Catalogue().find("tasks", "lift", kind="")).read_text()
+    (folder / "x.toml").write_text(f'{lift}\n[arena]\nfile = "{name}"\n')
+    with pytest.raises(
+        ConfigError, match=r"'arena.file' .line \d+.*outside the folder"
+    ):
+        wbc_suite.benchmark.load_benchmark(folder / "x.toml")
 
 
 @pytest.mark.slow

@@ -1,6 +1,8 @@
 # ruff: noqa: E501 - a table of cases reads best with one case a line
 """Bad input: one clear error each, which names the place and what would be right."""
 
+import re
+
 import pytest
 
 import wbc_suite
@@ -115,6 +117,10 @@ def test_each_fault_is_reported_in_one_sentence(load, case):
         load(GOOD.replace(old, new, 1))
     message = str(caught.value)
     assert "arm.toml" in message
+    assert re.search(r"line \d+\b", message), message
+    assert not re.search(
+        r"pydantic|tag using|Input|Value error|[a-z?]\.[.;]", message
+    ), message
     for word in words:
         assert word in message, message
     assert len(message) < 700
@@ -129,10 +135,46 @@ def test_a_huge_file_is_refused(tmp_path):
         load_robot(path)
 
 
+@pytest.mark.parametrize("value", ['"1"', "true", "[1]", "1979-05-27", "{ kg = 1 }"])
+def test_only_a_number_is_a_number(load, value):
+    with pytest.raises(ConfigError, match=r"'link\[1\]\.mass' .* must be a number"):
+        load(GOOD.replace("mass = 1.0", f"mass = {value}"))
+
+
+SHAPES = {
+    "{ radius = 0.04 }": "missing key 'link[1].visual[0].shape' (line 15)",
+    "3": "'link[1].visual[0]' = 3 (line 15): must be a table",
+    '{ shape = "box", size = [1, 2] }': "missing key 'link[1].visual[0].size[2]'",
+    '{ shape = "box", size = "big" }': "'big' (line 15): must be a list",
+    "{ shape = 4 }": "shape' = '4' (line 15): must be one of 'box', 'sphere'",
+}
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_a_shape_that_is_none_is_told_in_our_words(load, shape):
+    old = GOOD[GOOD.index("visual = [") : GOOD.index(']\n[[link]]\nname = "fore')]
+    with pytest.raises(ConfigError) as caught:
+        load(GOOD.replace(old, f"visual = [{shape}"))
+    assert SHAPES[shape] in str(caught.value)
+    assert "tag" not in str(caught.value)
+
+
+def test_a_fault_of_a_part_is_told_with_its_own_file_and_line(tmp_path):
+    heavy = GOOD.replace("[0.01, 0.01, 0.002,", "[0.01, 0.01, 0.03,")
+    (tmp_path / "arm.toml").write_text(heavy)
+    path = tmp_path / "two.toml"
+    part = '[[part]]\nname = "a"\ncomponent = "arm.toml"\nside = "left"\n'
+    path.write_text(f'format = 1\n[assembly]\nname = "Two"\n{part}')
+    with pytest.raises(
+        ConfigError, match=r"arm\.toml: link 'upper' \(line 9\): the pri"
+    ):
+        load_robot(path)
+
+
 def test_a_binary_file_is_refused(tmp_path):
     path = tmp_path / "arm.toml"
     path.write_bytes(bytes(range(256)))
-    with pytest.raises(ConfigError, match="not a readable TOML"):
+    with pytest.raises(ConfigError, match="is not text in UTF-8"):
         load_robot(path)
 
 

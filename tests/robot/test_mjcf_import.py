@@ -238,7 +238,7 @@ FAULTS = {
         body('<joint name="j"/><geom type="mesh"/>'),
         "MuJoCo refuses it.* valid meshid",
     ),
-    "no number": (body('<joint axis="0 nan 1"/>'), "contains NaN; give numbers"),
+    "no number": (body('<joint axis="0 nan 1"/>'), "has a number that is not finite"),
     "outside include": (
         '<mujoco><include file="../secret.xml"/></mujoco>',
         "lies outside the folder",
@@ -253,6 +253,55 @@ def test_what_does_not_fit_gets_one_clear_error(tmp_path, text, message):
     with pytest.raises(ConfigError, match=message) as caught:
         read_mjcf(path)
     assert str(path) in str(caught.value)
+
+
+@pytest.mark.parametrize("value", ["inf", "-inf", "1e999", "NaN", "-nan"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        '<mujoco><option gravity="0 0 {}"/><worldbody><body/></worldbody></mujoco>',
+        '<mujoco><option timestep="{}"/><worldbody><body/></worldbody></mujoco>',
+        '<mujoco><worldbody><body><geom size="{}"/></body></worldbody></mujoco>',
+        '<mujoco><worldbody><body pos="0 {} 0"/></worldbody></mujoco>',
+    ],
+)
+def test_numbers_are_finite(text, value, tmp_path):
+    with pytest.raises(DescriptionError, match=r"\(line 1\): .* not finite"):
+        read_mjcf(write(tmp_path, text.format(value)))
+
+
+@pytest.mark.parametrize(
+    "geom", ['size="-0.1"', 'size="0.1" mass="-1"', 'size="0.1" density="-1"']
+)
+def test_a_negative_mass_or_size_is_refused(geom, tmp_path):
+    text = f"<mujoco><worldbody><body><geom {geom}/></body></worldbody></mujoco>"
+    with pytest.raises(DescriptionError, match=r"positive|negative"):
+        read_mjcf(write(tmp_path, text))
+
+
+RADIAN = '<compiler angle="radian"/>'
+
+
+@pytest.mark.parametrize(
+    ("given", "found"),
+    [
+        ("-inf inf", None),
+        ("-1e300 1e5", None),
+        ("-1 inf", (-1.0, 1e4)),
+        ("-1 2", (-1.0, 2.0)),
+    ],
+)
+def test_an_infinite_end_of_a_range_is_none(given, found, tmp_path):
+    text = body(f'<joint name="j" range="{given}"/>', RADIAN)
+    assert read_mjcf(write(tmp_path, text)).joint("j").range == found
+
+
+def test_a_reversed_range_is_endless_as_in_mujoco_and_told(tmp_path, caplog):
+    path = write(tmp_path, body('<joint name="j" range="2 -2"/>', RADIAN))
+    assert read_mjcf(path).joint("j").range is None
+    assert "the reversed range from 2 to -2 of joint 'j', endless" in caplog.text
+    with pytest.raises(DescriptionError, match="reversed range from 2 to -2"):
+        read_mjcf(path, strict=True)
 
 
 LEFT_OUT = {

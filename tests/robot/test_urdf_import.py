@@ -473,7 +473,7 @@ BAD = BODY.replace('izz="0.1"', 'izz="0.3"')
 FAULTS = {
     "loop": (
         one_arm(TWO, joint("a", "l0", "l1") + joint("b", "l1", "l0")),
-        "'l0', 'l1' form a loop",
+        r"'l0' \(line 1\), 'l1' \(line 1\) form a loop",
     ),
     "missing parent": (
         one_arm(TWO, joint("a", "bse", "l0")),
@@ -481,11 +481,11 @@ FAULTS = {
     ),
     "two parents": (
         one_arm(TWO, joint("a", "base", "l0") + joint("b", "l1", "l0")),
-        "'l0' is the child of two joints, 'a' and 'b'",
+        r"'l0' is the child of two joints, joint 'a' \(line 1\) and joint 'b' ",
     ),
     "two roots": (
         one_arm(TWO, joint("a", "base", "l0")),
-        "2 links have no parent: 'base', 'l1'",
+        r"2 links have no parent: 'base' \(line 1\), 'l1'",
     ),
     "duplicated link": (one_arm(TWO + TWO), "two links are named 'l0'"),
     "duplicated joint": (
@@ -499,13 +499,13 @@ FAULTS = {
             + joint("b", "l0", "l1", kind="floating")
             + joint("c", "l1", "l2"),
         ),
-        "joint 'b' is floating: only the joint",
+        r"joint 'b' \(line 1\) is floating: only the joint",
     ),
     "unknown type": (
         one_arm(
             f'<link name="l0">{BODY}</link>', joint("a", "base", "l0", kind="spherical")
         ),
-        "joint 'a': unknown type 'spherical'",
+        r"joint 'a' \(line 1\): unknown type 'spherical'",
     ),
     "mimic circle": (
         one_arm(
@@ -520,7 +520,7 @@ FAULTS = {
             f'<link name="l0">{BODY}</link>',
             joint("a", "base", "l0", inner='<origin xyz="0 nan 0"/>'),
         ),
-        "joint 'a': <origin xyz=\"0 nan 0\"> must be 3 finite numbers",
+        "joint 'a' .*: <origin xyz=\"0 nan 0\"> must be 3 finite numbers",
     ),
     "no URDF": ("<mujoco/>", "begins with <robot>, not <mujoco>.* name it .xml"),
     "xacro": ('<robot name="r"><xacro:include/></robot>', "expand it first"),
@@ -551,6 +551,7 @@ POINT = (
     '<inertial><mass value="1"/>'
     '<inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/></inertial>'
 )
+REVERSED = 'lower="2" upper="-1" effort="5" velocity="1"'
 MENDED = {
     "unphysical inertia": (
         one_arm(f'<link name="l0">{BAD}</link>', joint("a", "base", "l0")),
@@ -573,21 +574,28 @@ MENDED = {
             "</visual></link>",
             joint("a", "base", "l0"),
         ),
-        "link 'l0', visual: <sphere> has the radius 0",
+        r"link 'l0' \(line 1\), visual: <sphere> has the radius 0",
     ),
     "inertial without a tensor": (
         one_arm(
             '<link name="l0"><inertial><mass value="1"/></inertial></link>',
             joint("a", "base", "l0"),
         ),
-        "link 'l0': <inertial> (needs <mass> and|without <mass> or) <inertia>",
+        r"link 'l0' .*: <inertial> (needs <mass> and|without <mass> or) <inertia>",
     ),
     "follower of nothing": (
         one_arm(
             f'<link name="l0">{BODY}</link>',
             joint("a", "base", "l0", inner='<mimic joint="b"/>'),
         ),
-        "joint 'a' follows 'b', which is no moving joint",
+        r"joint 'a' \(line 1\) follows 'b', which is no moving joint",
+    ),
+    "reversed range": (
+        one_arm(
+            f'<link name="l0">{BODY}</link>',
+            joint("a", "base", "l0", kind="revolute", inner=f"<limit {REVERSED}/>"),
+        ),
+        r"ranges .* reversed; mended: a from -1 to 2\.|range from 2.0 to -1.0 is rev",
     ),
 }
 
@@ -787,13 +795,47 @@ def test_a_tensor_without_mass_is_kept(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "limit", ["", '<limit effort="1" velocity="1"/>', '<limit lower="1" upper="-1"/>']
+    "limit",
+    ["", '<limit effort="1" velocity="1"/>', '<limit lower="1e9" upper="-1e9"/>'],
 )
 def test_joints_without_a_range_are_endless(tmp_path, limit, caplog):
     own = joint("a", "base", "l0", kind="revolute", inner=limit)
     path = write(tmp_path, one_arm(f'<link name="l0">{BODY}</link>', own))
     assert read_urdf(path).joint("a").range is None
     assert "no range for these joints, which are endless: a" in caplog.text
+
+
+@pytest.mark.parametrize("text", ['lower="-1" upper="2"', REVERSED])
+def test_a_range_is_that_of_the_file_in_either_order(text, tmp_path):
+    own = joint("a", "base", "l0", kind="revolute", inner=f"<limit {text}/>")
+    robot = read_urdf(write(tmp_path, one_arm(f'<link name="l0">{BODY}</link>', own)))
+    assert robot.joint("a").range == (-1.0, 2.0)
+    assert robot.to_mjspec().compile().jnt_range.tolist() == [[-1.0, 2.0]]
+
+
+def test_a_range_that_is_not_used_and_new_names_are_warnings(tmp_path, caplog):
+    own = joint("a-1", "base", "l 0", inner='<limit lower="-1" upper="2"/>')
+    path = write(tmp_path, one_arm(f'<link name="l 0">{BODY}</link>', own))
+    assert read_urdf(path).joint("a_1").range is None
+    said = [r.getMessage() for r in caplog.records if r.levelname == "WARNING"]
+    assert any(
+        "not used, since" in text and "a_1 from -1 to 2" in text for text in said
+    )
+    assert any("link 'l 0' to 'l_0', joint 'a-1' to 'a_1'" in text for text in said)
+
+
+def test_a_fault_has_the_line_of_its_element(tmp_path):
+    text = one_arm(
+        f'\n<link name="l0">{BODY.replace("1", "-1", 1)}</link>',
+        "\n" + joint("a", "base", "l0"),
+    )
+    with pytest.raises(
+        DescriptionError, match=r"link 'l0' \(line 2\): key 'mass' = -1"
+    ):
+        read_urdf(write(tmp_path, text))
+    text = text.replace('"l0"/>', '"l1"/>').replace('"-1"', '"1"')
+    with pytest.raises(DescriptionError, match=r"joint 'a' \(line 3\): its child link"):
+        read_urdf(write(tmp_path, text))
 
 
 def test_a_floating_joint_below_a_solid_link_is_the_root(tmp_path, caplog):
@@ -812,7 +854,7 @@ def test_a_part_that_floats_beside_the_robot_is_held_fixed(tmp_path, caplog):
     path = write(tmp_path, one_arm(TWO, parts))
     assert read_urdf(path).joint_names == ("a",)
     assert "Link 'l1' floats beside the robot: held fixed" in caplog.text
-    with pytest.raises(DescriptionError, match="joint 'b' is floating"):
+    with pytest.raises(DescriptionError, match=r"joint 'b' \(line 1\) is floating"):
         read_urdf(path, strict=True)
 
 

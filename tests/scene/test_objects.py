@@ -141,6 +141,14 @@ def test_a_users_mjcf_becomes_a_thing(tmp_path):
     assert model.geom("cup_wall").bodyid[0] == model.body("cup").id
 
 
+def test_the_step_and_gravity_of_a_users_mjcf_do_not_count(tmp_path):
+    other = "<mujoco><option timestep='1' gravity='0 0 5'/>"
+    path = written(tmp_path, MUG.replace("<mujoco>", other, 1))
+    model, *_ = simulate(MjcfObject(name="cup", path=path))
+    assert model.opt.timestep == empty_arena().option.timestep
+    assert model.opt.gravity.tolist() == [0.0, 0.0, -9.81]
+
+
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [

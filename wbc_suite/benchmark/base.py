@@ -16,6 +16,7 @@ from wbc_suite.control import RobotState
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.registry import Registry
 from wbc_suite.robot import RobotDescription
+from wbc_suite.robot.xml_files import real_path
 from wbc_suite.scene import ArenaConfig, Push, TableConfig
 from wbc_suite.sensing.reading import Reading
 from wbc_suite.tomlfile import located, parse_model, read_toml
@@ -252,8 +253,16 @@ def parse_arena(arena: Arena, *, source: Path | None = None) -> ArenaConfig:
     config = parse_model(
         ArenaConfig, keys, source=str(source or "make()"), within="arena"
     )
-    folder = Path() if source is None else source.parent
-    return config.model_copy(update={"file": folder / config.file})
+    if source is None:
+        return config
+    file, folder = source.parent / config.file, real_path(source.parent)
+    if not real_path(file).is_relative_to(folder):
+        where = f"{source}: {located('arena.file', str(source))}"
+        raise ConfigError(
+            f"{where} = '{config.file}' lies outside the folder {folder} and is not "
+            "read. Copy it into that folder, or name it by the argument `arena`."
+        )
+    return config.model_copy(update={"file": file})
 
 
 def load_config(model: type[C], source: Source) -> C:

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Literal
 
 import mujoco
 import numpy as np
-from pydantic import BaseModel, PositiveInt
+from pydantic import PositiveInt
 
 from wbc_suite import logs
 from wbc_suite.benchmark.arrangement import (
@@ -47,7 +47,7 @@ SLIP = 0.2  # m/s, between a hand and what it holds, at most
 BELOW_ONE = float(np.nextafter(1.0, 0.0))
 
 
-class ObjectBenchmarkConfig(BaseModel):
+class ObjectBenchmarkConfig(FrozenModel):
     """Contents of every file in `tasks/`.
 
     Attributes:
@@ -61,7 +61,6 @@ class ObjectBenchmarkConfig(BaseModel):
             `make_sampler`.
     """
 
-    model_config = FrozenModel.model_config
     one_table: ClassVar[bool] = True
 
     format: Literal[1]

@@ -4,7 +4,7 @@ import json
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeAlias, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, get_args
 
 import typer
 
@@ -17,6 +17,9 @@ from wbc_suite.cli.options import (
 )
 from wbc_suite.cli.output import print
 from wbc_suite.errors import printable
+
+if TYPE_CHECKING:
+    from wbc_suite.robot import RobotDescription
 
 Kind = Literal["robots", "grippers", "bases", "benchmarks", "controllers"]
 Row: TypeAlias = tuple[str | int | float, ...]
@@ -147,14 +150,15 @@ def check_file(
 ) -> None:
     """Check a robot, benchmark or controller file, and print a summary.
 
-    A robot's models are built for both engines. A robot in a URDF or MJCF file is also
-    simulated for a second in the posture `ready`, with warnings for what falls or
-    moves. The first error names the file, the key, the value and the rule. A JSON file
-    is a controller config of robosuite; it needs --robot.
+    A robot's models are built for both engines. Of a robot in a URDF or MJCF file it
+    also prints what was inferred, and simulates a second in the posture `ready`, with
+    warnings for what falls or moves. The first error names the file, the key, the value
+    and the rule. A JSON file is a controller config of robosuite; it needs --robot.
     """
     from wbc_suite.tomlfile import read_toml
 
     content = read_toml(file) if file.suffix == ".toml" else {"component": None}
+    inferred: dict[str, list[str]] = {}
     controls = _controls(file, content)
     if "name" in content or ("extends" in content and not controls):
         from wbc_suite.benchmark import load_benchmark
@@ -173,11 +177,15 @@ def check_file(
         meshes = sum(len(pieces) for pieces in skin.link.values())
         found = f"Skin: {len(skin.link)} links, {meshes} meshes of {skin.provider}."
     else:
-        found = _robot(file, root=root, mesh_root=mesh_root, strict=strict)
+        found, inferred = _robot(file, root=root, mesh_root=mesh_root, strict=strict)
     if as_json:
-        print(json.dumps({"file": str(file), "fine": True, "summary": found}))
-    else:
-        print(f"{file}: fine. {found}")
+        fields = {"inferred": inferred} if inferred else {}
+        print(json.dumps({"file": str(file), "fine": True, "summary": found} | fields))
+        return
+    print(f"{file}: fine. {found}")
+    for key, items in inferred.items():
+        print(f"  {key.ljust(8)}  {items.pop(0) if items else 'none'}")
+        print("".join(f"{' ' * 12}{item}\n" for item in items), end="")
 
 
 def _controls(file: Path, content: dict[str, Any]) -> bool:
@@ -194,7 +202,8 @@ def _controls(file: Path, content: dict[str, Any]) -> bool:
     )
 
 
-def _robot(file: Path, **options: Any) -> str:
+def _robot(file: Path, **options: Any) -> tuple[str, dict[str, list[str]]]:
+    """Return a summary of a robot, and what was inferred if its file is not ours."""
     from wbc_suite.envs.hold_check import hold_faults
     from wbc_suite.robot import load_robot
 
@@ -203,11 +212,29 @@ def _robot(file: Path, **options: Any) -> str:
         print(f"Warning: {fault}", file=sys.stderr)
     simulated = robot.to_mjspec().compile()
     computed = robot.to_pinocchio()
-    return (
+    summary = (
         f"Robot '{robot.name}': {len(robot.links)} links, {robot.dof} dof, "
         f"{robot.weight_text}, {robot.root.kind} root; MuJoCo and Pinocchio models "
         f"with nv = {simulated.nv} and {computed.nv}."
     )
+    return summary, {} if file.suffix == ".toml" else _inferred(robot)
+
+
+def _inferred(robot: "RobotDescription") -> dict[str, list[str]]:
+    """Return what an import inferred, as texts."""
+    from wbc_suite.robot.gripper_inference import infer_grippers
+
+    grippers, ready = infer_grippers(robot), robot.keyframe("ready")
+    return {
+        "root": [f"{robot.root.kind}, first link '{robot.links[0].name}'"],
+        "groups": [f"{name}: {', '.join(own)}" for name, own in robot.groups.items()],
+        "hands": [
+            f"{side}: frame '{frame}' on link '{robot.link_of(frame)}'"
+            for side, frame in robot.hands.items()
+        ],
+        "gripper": [f"{name}: {found.reason}" for name, found in grippers.items()],
+        "ready": [", ".join(f"{name} {q:.3g}" for name, q in ready.items())],
+    }
 
 
 def print_schema(

@@ -9,9 +9,11 @@ from pathlib import Path
 
 from wbc_suite.catalogue import user_config
 from wbc_suite.devices.web_server import reachable_name
-from wbc_suite.errors import DeviceError
+from wbc_suite.errors import ConfigError, DeviceError
+from wbc_suite.files import check_file, read_bytes
 
 BEGIN, END = (f"-----{word} CERTIFICATE-----" for word in ("BEGIN", "END"))
+MAX_BYTES = 1_000_000  # of a certificate or key
 DAYS = 825  # of validity of a certificate; the most that browsers accept
 
 
@@ -39,8 +41,10 @@ def server_context(certificate: Path, key: Path) -> ssl.SSLContext:
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.minimum_version = ssl.TLSVersion.TLSv1_2
     try:
+        for file in (certificate, key):
+            check_file(file, most=MAX_BYTES)
         context.load_cert_chain(certificate, key, password="")  # else it is asked for
-    except (OSError, ssl.SSLError) as error:
+    except (OSError, ssl.SSLError, ConfigError) as error:
         raise DeviceError(
             f"Certificate '{certificate}' with key '{key}' cannot be used: {error}. "
             "Both must be PEM files without a password. If they were made by this "
@@ -56,7 +60,8 @@ def fingerprint(certificate: Path) -> str:
         DeviceError: If the file holds none.
     """
     try:
-        text = certificate.read_text("utf-8", errors="replace")
+        content = read_bytes(certificate, most=MAX_BYTES, error=DeviceError)
+        text = content.decode("utf-8", errors="replace")
         der = ssl.PEM_cert_to_DER_cert(text[text.index(BEGIN) : text.index(END)] + END)
     except ValueError as error:
         raise DeviceError(

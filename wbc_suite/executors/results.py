@@ -7,8 +7,10 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from wbc_suite.errors import DatasetError
+from wbc_suite.errors import ConfigError, DatasetError
 from wbc_suite.executors.executor import Executor, Outcome, Work, WorkItem
+from wbc_suite.files import read_text
+from wbc_suite.tomlfile import parse_json
 
 MAX_BYTES = 64 << 20  # larger result files are not read
 
@@ -46,12 +48,10 @@ class ResultFolder:
         """Return an item's result; None if it has none, or had another payload."""
         path = self._path(item)
         try:
-            if path.stat().st_size > MAX_BYTES:
-                return None
-            record = json.loads(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError, RecursionError):
+            record = parse_json(read_text(path, most=MAX_BYTES), source=str(path))
+        except ConfigError:
             return None
-        if not isinstance(record, dict) or record.get("error") is not None:
+        if record.get("error") is not None:
             return None
         same = record.get("payload") == json.loads(json.dumps(item.payload))
         result = record.get("result")

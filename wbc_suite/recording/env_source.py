@@ -17,6 +17,7 @@ from wbc_suite.envs.config import EnvConfig
 from wbc_suite.errors import DatasetError, WbcError, shortened
 from wbc_suite.recording.dataset import Dataset
 from wbc_suite.recording.episode import Fact
+from wbc_suite.tomlfile import parse_json
 
 PACKAGE = "wbc_suite"
 GYM_TYPE = 2  # type of Gymnasium environments in robomimic's `env_args`
@@ -69,7 +70,7 @@ class EnvSource:
         if not env_args:
             raise DatasetError("The dataset does not name its environment.")
         fields = _parse_json(env_args)
-        if not isinstance(fields, dict) or "env_name" not in fields:
+        if "env_name" not in fields:
             raise DatasetError("`env_args` does not name an environment.")
         name, arguments = fields["env_name"], fields.get("env_kwargs", {})
         if not isinstance(name, str) or not isinstance(arguments, dict):
@@ -193,13 +194,9 @@ def rebuild(dataset: Dataset, *, trust_files: bool = False, **changes: Any) -> R
     return source.build(trust_files=trust_files, **changes)
 
 
-def _parse_json(text: str) -> Any:
-    try:
-        return json.loads(text[:MAX_TEXT])
-    except (ValueError, RecursionError) as error:
-        raise DatasetError(
-            f"The description of its environment is not JSON: {error}."
-        ) from error
+def _parse_json(text: str) -> dict[str, Any]:
+    source = "The description of its environment"
+    return parse_json(text[:MAX_TEXT], source=source, error=DatasetError)
 
 
 def _version(package: str) -> str:

@@ -19,6 +19,7 @@ import h5py
 
 import wbc_suite
 from wbc_suite.errors import DatasetError
+from wbc_suite.files import check_file
 from wbc_suite.recording import hdf5_reader
 
 CPU_SECONDS = 10  # processor time for the start and for small files, s
@@ -38,9 +39,9 @@ def open_safely(path: Path, *, checked: bool = False) -> h5py.File:
     Raises:
         DatasetError: If it is missing, no HDF5 file or too damaged to be read.
     """
-    if not path.is_file():
+    if not path.exists():
         raise DatasetError(f"There is no file '{path}'.")
-    size = path.stat()
+    size = check_file(path, error=DatasetError)
     held = getattr(size, "st_blocks", size.st_size) * 512
     if size.st_size > SPARSE_FROM and held * SPARSE < size.st_size:
         raise DatasetError(f"'{path}' declares {size.st_size} bytes, but holds {held}.")
@@ -102,9 +103,9 @@ def _reason(code: int, seconds: int, messages: bytes) -> str:
 def read_files() -> None:
     """Read the files named by standard input, in the child; write a line for each."""
     seconds = int(sys.argv[1])
-    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    _limit(resource.RLIMIT_CPU, seconds)
+    _limit(resource.RLIMIT_AS, MEMORY_BYTES)
+    _limit(resource.RLIMIT_CORE, 0)
     try:
         for name in sys.stdin.buffer.read().split(b"\0"):
             with suppress(*TOLERATED):
@@ -112,6 +113,12 @@ def read_files() -> None:
             os.write(1, b"\n")
     except MemoryError:
         sys.exit(OUT_OF_MEMORY)
+
+
+def _limit(kind: int, value: int) -> None:
+    """Lower a limit of this process, which may have a lower one."""
+    known = [x for x in resource.getrlimit(kind) if x != resource.RLIM_INFINITY]
+    resource.setrlimit(kind, (min(value, *known),) * 2)
 
 
 def _read_structure(path: Path) -> None:

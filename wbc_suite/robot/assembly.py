@@ -124,6 +124,7 @@ class _Builder:
         self._path, self._catalogue, self._finder = path, catalogue, skins
         self._mounts: dict[str, Mount] = {}
         self._headers: list[Header] = []
+        self._read: dict[Path, Component] = {}
         self._links: list[Link] = []
         self._excludes: list[tuple[str, str]] = []
         self._fields: dict[str, Any] = {key: [] for key in LISTS}
@@ -187,6 +188,7 @@ class _Builder:
         component = read_robot_file(path, self._catalogue)
         if not isinstance(component, Component):
             raise DescriptionError(f"{path}: a part must be a component.")
+        self._read[path] = component
         return component
 
     def _prefix(self, part: Part, component: Component, *, shared: bool) -> str:
@@ -238,9 +240,15 @@ class _Builder:
             "contacts": {"exclude": (*self._excludes, *assembly.contacts.exclude)},
         }
         fields = locked(fields, assembly.lock)
-        return parse_model(
-            RobotDescription, fields, source=str(self._path), error=DescriptionError
-        )
+        source = str(self._path)
+        try:
+            return parse_model(
+                RobotDescription, fields, source=source, error=DescriptionError
+            )
+        except DescriptionError:
+            for path, component in self._read.items():  # names its file, if it can
+                describe_component(component, source=str(path))
+            raise
 
 
 def _joined(texts: Iterable[str]) -> str:

@@ -9,7 +9,6 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import (
     AfterValidator,
-    BaseModel,
     BeforeValidator,
     Field,
     PositiveInt,
@@ -17,7 +16,7 @@ from pydantic import (
 )
 
 from wbc_suite.robot.shapes import Axis, Posed, Quaternion, Real, Shape, Vector3
-from wbc_suite.tomlfile import FROZEN, FrozenModel
+from wbc_suite.tomlfile import FrozenModel
 
 Name: TypeAlias = Annotated[
     str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=80)
@@ -298,10 +297,8 @@ class Root(Posed):
         )
 
 
-class Elements(BaseModel):
+class Elements(FrozenModel):
     """The elements of a component and of a robot; keys of tables are singular."""
-
-    model_config = FROZEN
 
     materials: dict[Name, Rgba] = {}
     links: tuple[Link, ...] = Field(alias="link")

@@ -15,6 +15,7 @@ from wbc_suite.robot.name_words import (
     KIND_OF,
     kind_of,
     side_of,
+    words_in,
     words_of,
 )
 from wbc_suite.robot.shape_geometry import farthest_point
@@ -104,7 +105,7 @@ def infer_limbs(links: Sequence[Link]) -> tuple[Limb, ...]:
 
 def _traits(links: Sequence[Link]) -> dict[str, _Traits]:
     """Return kind, side and top of each moving link, by name."""
-    parents = _moving_parents(links)
+    parents, said = _moving_parents(links), _words(links)
     owners, driving = list(parents.values()), _planar_base(links, parents)
     named = _named_kinds(links, parents)
     traits: dict[str, _Traits] = {}
@@ -113,11 +114,11 @@ def _traits(links: Sequence[Link]) -> dict[str, _Traits]:
             continue
         parent = parents[link.name]
         above = traits.get(parent or "", _Traits())
-        words = [*words_of(link.joint.name), *words_of(link.name)]
+        words = [*said[link.joint.name], *said[link.name]]
         kind = named[link.name]
         if link.name in driving:
             kind = "base"
-        elif _is_finger(words_of(link.joint.name), words_of(link.name)):
+        elif _is_finger(said[link.joint.name], said[link.name]):
             kind = "gripper"
         if kind is None and above.kind == "arm" and owners.count(parent) > 1:
             kind = "gripper"
@@ -138,6 +139,12 @@ def _traits(links: Sequence[Link]) -> dict[str, _Traits]:
     return traits
 
 
+def _words(links: Sequence[Link]) -> dict[str, list[str]]:
+    """Return the words in the names of links and joints."""
+    joints = [link.joint.name for link in links if link.joint is not None]
+    return words_in([*(link.name for link in links), *joints])
+
+
 def _is_finger(joint: Sequence[str], link: Sequence[str]) -> bool:
     """Whether one is: joint `arm_hand_index`, or link `finger_2` of joint `arm_9`."""
     part = next((w for w in joint if w in KIND_OF), "arm")
@@ -154,13 +161,13 @@ def _named_kinds(
     What carries only legs is a leg, and what carries a left and a right arm a torso: a
     long chain with a side is an arm even if no word says so.
     """
-    kinds: dict[str, str | None] = {}
+    kinds, said = dict[str, str | None](), _words(links)
     arms: dict[str, set[str]] = {}  # sides of the arms from a link on
     length: dict[str, int] = {}  # joints from a link on
     for link in reversed(links):
         if link.joint is None:
             continue
-        words = [*words_of(link.joint.name), *words_of(link.name)]
+        words = [*said[link.joint.name], *said[link.name]]
         kind = kind_of(words)
         below = [name for name, own in parents.items() if own == link.name]
         arms[link.name] = set[str]().union(*(arms[name] for name in below))
@@ -233,7 +240,7 @@ def infer_frames(
         for tip in _tips(links, limb) if role else ():
             name = limb.name.replace(limb.kind, str(role))
             if limb.kind == "leg":
-                side = side_of(words_of(tip.name), pairs=True)
+                side = side_of(_words(links)[tip.name], pairs=True)
                 name = "_".join(filter(None, (side, role)))
             placed = _placed(links, limb, tip, given)
             if any(frame.name == name for frame in given):
@@ -290,9 +297,9 @@ def _tips(links: Sequence[Link], limb: Limb) -> list[Link]:
         foot = END_WORDS["leg"].intersection(words_of(tip.name))
         return limb.kind == "leg" and bool(foot), _depth(tip.name, above)
 
-    found: dict[str, Link] = {}
+    found, said = dict[str, Link](), _words(links)
     for tip in tips:
-        side = side_of(words_of(tip.name), pairs=True)
+        side = side_of(said[tip.name], pairs=True)
         key = f"{side} {tops[tip.name]}" if limb.kind == "leg" else ""
         if key not in found or rank(tip) > rank(found[key]):
             found[key] = tip

@@ -1,7 +1,7 @@
 """Common steps of the URDF and MJCF import: names, checks, inferred groups."""
 
 import re
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -37,6 +37,8 @@ LinkFields: TypeAlias = dict[str, Any]  # fields of one `Link`, before validatio
 
 MAX_NAME = 70
 """Characters kept of a name in the file; our limit of 80 leaves room for a suffix."""
+UNLIMITED_RANGE = 1e4
+"""A position limit at least as large, in rad or m, means that there is none."""
 CARRIER_MASS, END_MASS = 1e-10, 1e-3
 """Mass in kg of a moving link for which the file has none, if it carries others."""
 GYRATION = 0.03  # radius of gyration of such a link, m
@@ -54,6 +56,7 @@ class NameTable:
 
     def __init__(self) -> None:
         self._taken: set[str] = set(RESERVED)
+        self._renamed: list[str] = []
 
     def take(self, original: str, kind: str) -> str:
         """Return a unique name close to the original; `kind` is a suffix if needed."""
@@ -67,7 +70,17 @@ class NameTable:
         self._taken.add(name)
         if name != original:
             LOG.info("The %s '%s' is imported as '%s'.", kind, original, name)
+            self._renamed.append(f"{kind} '{original}' to '{name}'")
         return name
+
+    def report(self, source: Path) -> None:
+        """Log which names are not those of the file."""
+        if self._renamed:
+            LOG.warning(
+                "%s: renamed, since a name has letters, digits and '_', and only one "
+                "item has it: %s.",
+                *(source, join_first(self._renamed, limit=12)),
+            )
 
 
 def describe_import(
@@ -78,6 +91,7 @@ def describe_import(
     links: Sequence[LinkFields],
     frames: Sequence[dict[str, Any]],
     names: NameTable,
+    lines: Mapping[str, str] | None = None,
     strict: bool = False,
     **others: Any,
 ) -> RobotDescription:
@@ -86,14 +100,16 @@ def describe_import(
     Groups, end effectors and a `ready` posture are inferred unless `others` has them.
     Inertias that no body can have are replaced by the nearest possible ones with a
     warning, or refused if the import is `strict`. An implausible inertia is only a
-    warning, since some meshes may not be read.
+    warning, since some meshes may not be read. Messages tell the `lines` of links.
 
     Raises:
         DescriptionError: If the robot is inconsistent, or unphysical and `strict`.
     """
+    names.report(source)
     checked: list[Link] = []
     for fields in _without_chains(links):
         where = f"{source}: link '{fields['name']}'"
+        where += (lines or {}).get(fields["name"], "")
         checked.append(parse_model(Link, fields, source=where, error=DescriptionError))
     checked = _with_masses(_filled(checked, source, strict), source, strict=strict)
     checked = _physical(checked, source, strict=strict)

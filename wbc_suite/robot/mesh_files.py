@@ -2,6 +2,7 @@
 
 import hashlib
 import importlib.util
+import io
 import os
 from contextlib import suppress
 from pathlib import Path
@@ -11,6 +12,7 @@ import numpy as np
 
 from wbc_suite.catalogue import user_cache
 from wbc_suite.errors import ConfigError, DescriptionError
+from wbc_suite.files import check_file, read_bytes
 from wbc_suite.robot.shapes import SkinMesh, Vector3, cached_by_shape
 from wbc_suite.typing import Indices, Matrix
 
@@ -56,22 +58,17 @@ def read_points(path: Path) -> Matrix:
     Raises:
         DescriptionError: If it is not a mesh.
     """
-    size = path.stat().st_size
-    if size > MAX_BYTES:
-        raise DescriptionError(
-            f"{path}: the mesh has {size} bytes; at most {MAX_BYTES} are read."
-        )
     if path.suffix.lower() not in READABLE:
         try:
             return np.unique(_read_mesh(path, (1.0, 1.0, 1.0))[0], axis=0)
         except ConfigError as error:
             raise DescriptionError(str(error)) from error
+    data = read_bytes(path, most=MAX_BYTES, error=DescriptionError)
     try:
-        data = path.read_bytes()
         count = int.from_bytes(data[HEADER - 4 : HEADER], "little")  # in a binary STL
         if path.suffix.lower() == ".obj":
             points = _text_points(data, b"v")
-        elif size == HEADER + count * TRIANGLE.itemsize:
+        elif len(data) == HEADER + count * TRIANGLE.itemsize:
             records = np.frombuffer(data, dtype=TRIANGLE, offset=HEADER)
             points = records["corners"].reshape(-1, 3)
         else:
@@ -100,7 +97,7 @@ def skin_triangles(shape: SkinMesh) -> tuple[Matrix, Indices]:
         ConfigError: If the file is not a mesh, or the extra `skins` is not installed.
     """
     path = Path(shape.file)
-    state = path.stat()
+    state = check_file(path, most=MAX_BYTES)
     key = f"{CACHE_VERSION} {path} {state.st_size} {state.st_mtime_ns} {shape.scale}"
     name = hashlib.sha256(key.encode()).hexdigest()[:32]
     kept = user_cache() / "skins" / f"{name}.npz"
@@ -119,11 +116,12 @@ def skin_triangles(shape: SkinMesh) -> tuple[Matrix, Indices]:
 
 def _read_mesh(path: Path, scale: Vector3) -> tuple[Matrix, Indices]:
     """Read a file; equal points are merged, so that decimation keeps the surface."""
-    if path.stat().st_size > MAX_BYTES:
-        raise ConfigError(f"{path}: the mesh is larger than {MAX_BYTES} bytes.")
+    # by its content, since trimesh would open the files that a path's file names
+    content = io.BytesIO(read_bytes(path, most=MAX_BYTES))
     trimesh = _import_extra("trimesh")
     try:
-        mesh = trimesh.load_mesh(path, skip_materials=True)
+        kind = path.suffix[1:].lower()
+        mesh = trimesh.load_mesh(content, file_type=kind, skip_materials=True)
         mesh.merge_vertices(merge_tex=True, merge_norm=True)
         factor, times, _ = str(mesh.units).partition(" * ")  # "0.0254 * meters"
         metres = float(factor) if times else 1.0

@@ -5,15 +5,23 @@ the requested sizes are computed before compilation.
 """
 
 import math
-import struct
+from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import mujoco
 
 from wbc_suite.errors import ConfigError, DescriptionError
-from wbc_suite.robot.xml_files import Element, inside, model_root, read_xml
+from wbc_suite.robot.mjcf_files import Model, ModelFiles
+from wbc_suite.robot.xml_files import (
+    MAX_DEPTH,
+    Element,
+    at_line,
+    model_root,
+    parse_xml,
+    real_path,
+)
 
-MAX_FILES = 50  # largest number of XML files that include one another
 MAX_ELEMENTS = 20_000
 """Largest number of elements, including generated ones; a kitchen has 5,000.
 MuJoCo takes 3 s to compile 20,000, and over a minute for 120,000."""
@@ -24,7 +32,6 @@ MAX_POINTS = 20_000_000
 MAX_ROWS = 100_000  # largest number of keys or user numbers
 MAX_MESH_PARAMETER = 500
 """Largest parameter of a builtin mesh: the number of faces grows with its square."""
-MAX_FILE = 200_000_000  # largest mesh or picture file, bytes
 
 _GENERATORS = ("replicate", "composite", "flexcomp")
 _POINTS = (
@@ -34,7 +41,6 @@ _POINTS = (
 _ROWS = ("nkey", "nuserdata")
 _HINTS = ("memory", "njmax", "nconmax", "nstack")
 """Sizes that MuJoCo chooses itself; those of a file are ignored."""
-_PNG = b"\x89PNG\r\n\x1a\n"
 
 
 def compile_mjcf(
@@ -51,23 +57,10 @@ def compile_mjcf(
         ConfigError: If it is not MJCF, or names a file outside the folder.
         DescriptionError: If it exceeds a limit, or MuJoCo refuses it.
     """
-    folder = Path(root) if root else model_root(path, ())
-    roots = _included(path, folder)
-    total = sum(_element_count(root, path) for root in roots)
-    if total > MAX_ELEMENTS:
-        raise DescriptionError(
-            f"{path}: {total:.6g} elements, including generated ones; at most "
-            f"{MAX_ELEMENTS} are allowed."
-        )
-    for top in roots:
-        if top.find("extension") is not None or top.find(".//plugin") is not None:
-            raise DescriptionError(f"{path}: plugins run code and are not loaded.")
-        _check_referenced_files(top, path, folder)
-        for element in top.iter():
-            _check_size(element, path)
-            _check_numbers(element, path)
+    files = ModelFiles(path, Path(root) if root else model_root(path, ()))
+    _check_model(files.read(), path, files.where)
     try:
-        spec = mujoco.MjSpec.from_file(str(path))
+        spec = mujoco.MjSpec.from_file(str(real_path(path)))
         for hint in _HINTS:
             setattr(spec, hint, -1)
         return spec.compile(), spec
@@ -75,79 +68,114 @@ def compile_mjcf(
         raise DescriptionError(f"{path}: MuJoCo refuses it: {error}") from error
 
 
-def _included(path: Path, folder: Path) -> list[Element]:
-    """Return the root elements of a file and of the files that it includes."""
-    roots: dict[Path, Element] = {}
-    waiting = [path]
-    while waiting:
-        file = waiting.pop()
-        resolved = inside(folder, file, source=path)
-        if resolved in roots:
-            continue
-        root = read_xml(resolved)
-        if not roots and root.tag != "mujoco":
-            hint = " It looks like URDF: name it .urdf." if root.tag == "robot" else ""
-            raise ConfigError(
-                f"{path}: an MJCF file begins with <mujoco>, not <{root.tag}>.{hint}"
-            )
-        roots[resolved] = root
-        if len(roots) > MAX_FILES:
-            raise ConfigError(f"{path}: it includes more than {MAX_FILES} files.")
-        for element in (*root.iter("include"), *root.iter("model")):
-            waiting.append(path.parent / element.get("file", ""))
-    return list(roots.values())
+def compile_text(text: str, *, source: str) -> mujoco.MjModel:
+    """Compile MJCF text, which must name no files; errors as `compile_mjcf`."""
+    root = parse_xml(text.encode(), source=source, only_utf8=True)
 
+    def where(element: Element) -> str:
+        return f"{source}: <{element.tag}>{at_line(element)}"
 
-def _check_referenced_files(root: Element, path: Path, outer: Path) -> None:
-    """Refuse meshes, textures and the like from outside the outer folder."""
-    keys = ("meshdir", "texturedir", "assetdir")
-    folders = [e.get(key, "") for e in root.iter("compiler") for key in keys]
     for element in root.iter():
-        for key, name in element.items():
-            if key.startswith("file") and name:
-                for folder in ("", *filter(None, folders)):
-                    file = path.parent / folder / name
-                    if file.exists():  # MuJoCo reports a missing file
-                        _check_file(inside(outer, file, source=path), source=path)
-
-
-def _check_file(file: Path, *, source: Path) -> None:
-    """Refuse a mesh or picture with too many bytes or pixels."""
+        if any(key.startswith("file") for key in element.attrib):
+            raise ConfigError(f"{where(element)} names a file, which is not read.")
+    _check_model(Model(root, {}, 0), Path(source), where)
     try:
-        if not file.is_file():
-            return  # MuJoCo reports a missing file
-        size = file.stat().st_size
-        with file.open("rb") as stream:
-            head = stream.read(24)
-    except OSError as error:
-        raise DescriptionError(f"{source}: '{file}': {error.strerror}.") from error
-    pixels = 0
-    if head.startswith(_PNG) and len(head) == 24:
-        pixels = math.prod(struct.unpack(">II", head[16:]))
-    if size > MAX_FILE or pixels > MAX_POINTS:
+        return mujoco.MjModel.from_xml_string(text)
+    except (ValueError, RuntimeError, MemoryError) as error:
+        raise DescriptionError(f"{source}: MuJoCo refuses it: {error}") from error
+
+
+def _check_model(model: Model, path: Path, where: Callable[[Element], str]) -> None:
+    """Refuse a model that asks for too much; `where` tells where an element is."""
+    total = _Counter(model, where).size().elements
+    if total > MAX_ELEMENTS:
         raise DescriptionError(
-            f"{source}: '{file.name}' has {size} bytes"
-            + (f" and {pixels} pixels" if pixels else "")
-            + f"; at most {MAX_FILE} bytes and {MAX_POINTS} pixels are allowed."
+            f"{path}: {total:.6g} elements, including generated and attached ones; at "
+            f"most {MAX_ELEMENTS} are allowed."
         )
 
 
-def _element_count(element: Element, path: Path) -> float:
-    """Return the number of elements that an element and its children generate."""
-    inner = sum(_element_count(child, path) for child in element)
-    if element.tag not in _GENERATORS:
-        return 1 + inner
+class _Size(NamedTuple):
+    """Elements that MuJoCo makes of an element with all below it, and their levels."""
+
+    elements: float
+    depth: int
+
+
+class _Counter:
+    """Checks the elements of a model, and counts what MuJoCo makes of them."""
+
+    def __init__(self, model: Model, where: Callable[[Element], str]) -> None:
+        self._root, self._where = model.root, where
+        self._attached = {
+            name: _Counter(own, where).size() for name, own in model.attached.items()
+        }
+        bodies = (e for e in model.root.iter() if e.tag in ("body", "frame"))
+        self._named = {body.get("name"): body for body in bodies}
+        self._sizes: dict[Element, _Size | None] = {}
+
+    def size(self) -> _Size:
+        """Return the size of the model, with that of the models that it reads.
+
+        Raises:
+            DescriptionError: If an element exceeds a limit.
+        """
+        own = self._size(self._root, 0)
+        read = sum(size.elements for size in self._attached.values())
+        return _Size(own.elements + read, own.depth)
+
+    def _size(self, element: Element, level: int) -> _Size:
+        size = self._sizes.get(element, _Size(0.0, 0))
+        if size is None or level + size.depth > MAX_DEPTH:
+            raise DescriptionError(
+                f"{self._where(element)} holds itself, or is nested deeper than "
+                f"{MAX_DEPTH} levels."
+            )
+        if element in self._sizes:
+            return size
+        where = self._where(element)
+        _check_element(element, where)
+        self._sizes[element] = None  # is being counted
+        made, depth = 0.0, 0
+        if element.tag == "attach":
+            made, depth = self._copied(element, level + 1)
+        for child in element:
+            inner = self._size(child, level + 1)
+            made, depth = made + inner.elements, max(depth, inner.depth)
+        if element.tag in _GENERATORS:
+            made = max(_copies(element, where), 1.0) * max(made, 1.0)
+        self._sizes[element] = size = _Size(1.0 + made, 1 + depth)
+        return size
+
+    def _copied(self, element: Element, level: int) -> _Size:
+        """Return the size of what an `<attach>` copies."""
+        name = element.get("model")
+        if name is not None:
+            return self._attached.get(name, _Size(0.0, 0))  # MuJoCo reports it
+        name = element.get("body") or element.get("frame")
+        if name not in self._named:
+            raise DescriptionError(
+                f"{self._where(element)} copies '{name}', which is no body or frame "
+                "that is written in this model."
+            )
+        return self._size(self._named[name], level)
+
+
+def _copies(element: Element, where: str) -> float:
     made = _product(element.get("count", "1"))
     if not made <= MAX_COPIES:
         raise DescriptionError(
-            f'{path}: <{element.tag} count="{element.get("count")}"> makes more than '
+            f'{where} with count="{element.get("count")}" makes more than '
             f"{MAX_COPIES} elements."
         )
-    return 1 + max(made, 1.0) * max(inner, 1.0)
+    return made
 
 
-def _check_size(element: Element, path: Path) -> None:
+def _check_element(element: Element, where: str) -> None:
     """Refuse an element that requests more memory or time than any robot needs."""
+    if element.tag in ("extension", "plugin"):
+        raise DescriptionError(f"{where}: plugins run code and are not loaded.")
+    _check_numbers(element, where)
     points = math.prod(_product(element.get(key, "1")) for key in _POINTS)
     sizes: list[tuple[str, float, float]] = [("points", points, MAX_POINTS)]
     sizes += [
@@ -163,19 +191,27 @@ def _check_size(element: Element, path: Path) -> None:
     for key, size, most in sizes:
         if not size <= most:
             raise DescriptionError(
-                f"{path}: <{element.tag}> asks for {key} of {size:.6g}; at most {most} "
-                "are allowed."
+                f"{where} asks for {key} of {size:.6g}; at most {most} are allowed."
             )
 
 
-def _check_numbers(element: Element, path: Path) -> None:
-    """Refuse NaN, for which MuJoCo only prints a warning."""
+def _check_numbers(element: Element, where: str) -> None:
+    """Refuse NaN, for which MuJoCo only prints a warning, and infinite numbers."""
     for key, value in element.items():
-        if key not in ("name", "file") and "nan" in value.lower().split():
+        words = () if key in ("name", "file") else value.split()
+        if any(_is_wrong(word, key) for word in words):
             raise DescriptionError(
-                f'{path}: <{element.tag} {key}="{value:.80}"> contains NaN; give '
-                "numbers."
+                f'{where}: {key}="{value:.80}" has a number that is not finite.'
             )
+
+
+def _is_wrong(word: str, key: str) -> bool:
+    """Whether a word is NaN or infinite; ranges may be infinite."""
+    try:
+        number = float(word)
+    except ValueError:
+        return False
+    return math.isnan(number) or (math.isinf(number) and not key.endswith("range"))
 
 
 def _product(text: str) -> float:

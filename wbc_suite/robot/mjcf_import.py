@@ -12,7 +12,12 @@ from wbc_suite import logs
 from wbc_suite.errors import DescriptionError, join_first
 from wbc_suite.robot.contact_pairs import exclude_by_sampling, exclude_overlapping
 from wbc_suite.robot.description import RobotDescription
-from wbc_suite.robot.importing import LinkFields, NameTable, describe_import
+from wbc_suite.robot.importing import (
+    UNLIMITED_RANGE,
+    LinkFields,
+    NameTable,
+    describe_import,
+)
 from wbc_suite.robot.inertia import inertia_fields
 from wbc_suite.robot.mjcf_compile import compile_mjcf
 from wbc_suite.robot.mjcf_export import SENSOR_TYPES
@@ -194,6 +199,11 @@ class _Importer:
             if count:
                 LOG.warning("%s: %d %s act in MuJoCo only.", path, count, what)
         faults = list(not_represented(m, self._joints, self._sites))
+        for j in self._joints:
+            low, high = m.jnt_range[j]
+            if low > high:
+                text = f"the reversed range from {low:g} to {high:g} of joint"
+                faults.append(f"{text} '{_joint_name(m, j)}', endless in MuJoCo, too")
         if faults and self._strict:
             shown = join_first(faults, separator="; ")
             raise DescriptionError(f"{path}: not supported: {shown}.")
@@ -287,8 +297,8 @@ class _Importer:
         }
         if fields["stiffness"] > 0.0 and j not in self._balls:
             fields["springref"] = float(m.qpos_spring[m.jnt_qposadr[j]])
-        if m.jnt_limited[j]:
-            low, high = m.jnt_range[j].tolist()
+        low, high = np.clip(m.jnt_range[j], -UNLIMITED_RANGE, UNLIMITED_RANGE).tolist()
+        if m.jnt_limited[j] and (low, high) != (-UNLIMITED_RANGE, UNLIMITED_RANGE):
             fields["range"] = (-high, high) if j in self._balls else (low, high)
         if efforts.get(j, 0.0) > 0.0:
             fields["effort"] = efforts[j]

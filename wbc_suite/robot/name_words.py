@@ -1,7 +1,7 @@
 """Words in the names of links, joints and frames: the kind and the side of a limb."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Sequence
 
 FINGERS = {"finger", "fingers", "thumb"}
 KINDS = {
@@ -43,14 +43,42 @@ END_WORDS = {kind: set(words.split()) for kind, words in ENDINGS.items()}
 """Words in the names of frames and links at the end of a limb."""
 
 
+_PART = re.compile(r"left|right|[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
+_OPPOSITE = {"l": "r", "r": "l"}
+
+
 def words_of(name: str) -> list[str]:
     """Split a name: `LHipYaw` is l, hip, yaw; `leftarm_1` left, arm; `LARM` l, arm."""
-    parts = re.findall(r"left|right|[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)
-    words: list[str] = []
-    for word in (part.lower() for part in parts):
-        sided = word[0] in SIDE_OF and word not in KIND_OF and word[1:] in KIND_OF
-        words += [word[0], word[1:]] if sided else [word]
-    return words
+    return [word for _, word in _placed_words(name)]
+
+
+def _placed_words(name: str) -> Iterator[tuple[int, str]]:
+    """Yield the words of a name with the places where they begin."""
+    for part in _PART.finditer(name):
+        start, word = part.start(), part[0].lower()
+        if word[0] in SIDE_OF and word not in KIND_OF and word[1:] in KIND_OF:
+            yield start, word[0]
+            start, word = start + 1, word[1:]
+        yield start, word
+
+
+def words_in(names: Collection[str]) -> dict[str, list[str]]:
+    """Return the words of names, without `l` and `r` that are no sides.
+
+    These are a side where the same name with the other letter exists: `l_wrist` beside
+    `r_wrist`, but not `l1` to `l6` alone.
+    """
+    known = {name.casefold() for name in names}
+
+    def is_kept(name: str, place: int, word: str) -> bool:
+        other = _OPPOSITE.get(word, "")
+        swapped = f"{name[:place]}{other}{name[place + 1 :]}".casefold()
+        return not other or swapped in known
+
+    return {
+        name: [w for place, w in _placed_words(name) if is_kept(name, place, w)]
+        for name in names
+    }
 
 
 def side_of(words: Sequence[str], *, pairs: bool) -> str:

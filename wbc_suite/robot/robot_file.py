@@ -12,6 +12,7 @@ from pydantic import Field
 
 from wbc_suite.catalogue import Catalogue, merge
 from wbc_suite.errors import ConfigError, DescriptionError
+from wbc_suite.files import read_text
 from wbc_suite.robot.elements import (
     Camera,
     Contacts,
@@ -25,7 +26,7 @@ from wbc_suite.robot.elements import (
 )
 from wbc_suite.robot.mirror import Mirror, reflect_component
 from wbc_suite.robot.shapes import Posed, as_table
-from wbc_suite.tomlfile import FrozenModel, parse_model, parse_toml, read_text
+from wbc_suite.tomlfile import FrozenModel, parse_model, parse_toml
 
 
 class Header(FrozenModel):

@@ -10,9 +10,9 @@ from collections.abc import Callable
 from functools import lru_cache, partial
 from typing import Annotated, Any, Literal, TypeAlias, TypeVar, cast
 
-from pydantic import AfterValidator, BaseModel, Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
-from wbc_suite.tomlfile import FROZEN
+from wbc_suite.tomlfile import FrozenModel
 
 S = TypeVar("S")
 T = TypeVar("T")
@@ -86,10 +86,8 @@ def _convert_rpy(data: Any) -> Any:
             raise ValueError("'rpy' needs three angles in radians")
 
 
-class Posed(BaseModel):
+class Posed(FrozenModel):
     """An item with a pose; files may have `rpy` (radians) instead of `quat`."""
-
-    model_config = FROZEN
 
     pos: Vector3 = (0.0, 0.0, 0.0)
     quat: Quaternion = (1.0, 0.0, 0.0, 0.0)
@@ -102,7 +100,7 @@ def as_table(data: Any) -> dict[str, Any]:
     return dict(cast("dict[str, Any]", data)) if isinstance(data, dict) else {}
 
 
-class ShapeFields(BaseModel):
+class ShapeFields(FrozenModel):
     """Fields of every shape: pose, colour and contact parameters.
 
     Attributes:
@@ -111,8 +109,6 @@ class ShapeFields(BaseModel):
         solref: Time constant in s and damping ratio of the contact.
         margin: Distance in m at which contacts become active.
     """
-
-    model_config = FROZEN
 
     pos: Vector3 = (0.0, 0.0, 0.0)
     quat: Quaternion = (1.0, 0.0, 0.0, 0.0)

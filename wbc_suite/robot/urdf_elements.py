@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from wbc_suite import logs
 from wbc_suite.errors import ConfigError, DescriptionError, did_you_mean, join_first
-from wbc_suite.robot.xml_files import Element, read_xml
+from wbc_suite.robot.xml_files import Element, at_line, read_xml
 from wbc_suite.typing import Vector
 
 LOG = logs.logger(__name__)
@@ -40,7 +40,7 @@ class Branch:
     @property
     def where(self) -> str:
         """The joint, for error messages."""
-        return "" if self.joint is None else f"joint '{self.joint.get('name')}'"
+        return "" if self.joint is None else place_of(self.joint)
 
     @property
     def pose(self) -> pin.SE3:
@@ -48,6 +48,11 @@ class Branch:
         if self.joint is None:
             return pin.SE3.Identity()
         return pose_of(self.joint, where=self.where)
+
+
+def place_of(element: Element) -> str:
+    """Return kind, name and line of an element, for messages."""
+    return f"{element.tag} '{element.get('name')}'{at_line(element)}"
 
 
 def read_tree(path: Path) -> tuple[Element, tuple[Branch, ...]]:
@@ -69,14 +74,14 @@ def read_tree(path: Path) -> tuple[Element, tuple[Branch, ...]]:
         LOG.warning("%s: it has no link 'world', which is the world.", path)
         links["world"] = Element("link", name="world")
     above: dict[str, tuple[str, Element]] = {}
-    for name, joint in joints.items():
+    for joint in joints.values():
         parent = _end(joint, "parent", links, path)
         child = _end(joint, "child", links, path)
         if child in above:
-            other = above[child][1].get("name")
             raise DescriptionError(
-                f"{path}: link '{child}' is the child of two joints, '{other}' and "
-                f"'{name}'; a link has one parent."
+                f"{path}: link '{child}' is the child of two joints, "
+                f"{place_of(above[child][1])} and {place_of(joint)}; a link has one "
+                "parent."
             )
         above[child] = (parent, joint)
     return robot, tuple(_depth_first(links, above, path))
@@ -111,9 +116,12 @@ def _by_name(robot: Element, tag: str, path: Path) -> dict[str, Element]:
     for element in robot.findall(tag):
         name = element.get("name")
         if not name:
-            raise DescriptionError(f"{path}: a <{tag}> has no name.")
+            raise DescriptionError(f"{path}: a <{tag}>{at_line(element)} has no name.")
         if name in found:
-            raise DescriptionError(f"{path}: two {tag}s are named '{name}'.")
+            raise DescriptionError(
+                f"{path}: two {tag}s are named '{name}':{at_line(found[name])} and"
+                f"{at_line(element)}."
+            )
         found[name] = element
     return found
 
@@ -123,8 +131,8 @@ def _end(joint: Element, tag: str, links: dict[str, Element], path: Path) -> str
     name = "" if element is None else element.get("link", "")
     if name not in links:
         raise DescriptionError(
-            f"{path}: joint '{joint.get('name')}': its {tag} link '{name}' does not "
-            f"exist.{did_you_mean(name, links)}"
+            f"{path}: {place_of(joint)}: its {tag} link '{name}' does not exist."
+            f"{did_you_mean(name, links)}"
         )
     return name
 
@@ -138,7 +146,7 @@ def _depth_first(
         below.setdefault(parent, []).append(child)
     roots = [name for name in links if name not in above]
     if len(roots) > 1:
-        shown = join_first([f"'{name}'" for name in roots])
+        shown = join_first([f"'{name}'{at_line(links[name])}" for name in roots])
         raise DescriptionError(
             f"{path}: {len(roots)} links have no parent: {shown}. A robot has one "
             "root; join them by fixed joints."
@@ -151,7 +159,7 @@ def _depth_first(
         parent, joint = above.get(name, (None, None))
         yield Branch(link=links[name], joint=joint, parent=parent)
         stack.extend(reversed(below.get(name, [])))
-    loop = [f"'{name}'" for name in links if name not in seen]
+    loop = [f"'{n}'{at_line(link)}" for n, link in links.items() if n not in seen]
     if loop:
         raise DescriptionError(f"{path}: the links {join_first(loop)} form a loop.")
 

@@ -11,6 +11,7 @@ from wbc_suite.errors import DescriptionError, did_you_mean, join_first
 from wbc_suite.robot.contact_pairs import exclude_by_sampling, exclude_overlapping
 from wbc_suite.robot.description import RobotDescription
 from wbc_suite.robot.importing import (
+    UNLIMITED_RANGE,
     LinkFields,
     NameTable,
     describe_import,
@@ -22,17 +23,22 @@ from wbc_suite.robot.urdf_elements import (
     Branch,
     number,
     numbers,
+    place_of,
     pose_of,
     read_tree,
 )
 from wbc_suite.robot.urdf_export import ROOT_TYPES, UNLIMITED
 from wbc_suite.robot.urdf_import_shapes import MeshFolder, UrdfShapes
-from wbc_suite.robot.xml_files import Element, model_root
+from wbc_suite.robot.xml_files import Element, at_line, model_root
 
 LOG = logs.logger(__name__)
 
-UNLIMITED_RANGE = 1e4
-"""A position limit at least as large, in rad or m, means that there is none."""
+ENDLESS = "the file has no range for these joints, which are endless"
+REVERSED = "the ranges of these joints are reversed; mended"
+CONTINUOUS = (
+    "the ranges of these joints are not used, since the file calls them continuous "
+    "(make them revolute to have limits)"
+)
 FEET = 4
 """A robot with so many feet is free if the file does not attach it to the world."""
 JOINT_TYPES = {"revolute": "hinge", "continuous": "hinge", "prismatic": "slide"}
@@ -105,7 +111,7 @@ class _Importer:
         self._names = NameTable()
         self._links: dict[str, str] = {}
         self._joints: dict[str, str] = {}
-        self._endless: list[str] = []
+        self._ranges: dict[str, list[str]] = {}
         self.rooted = False
 
     def robot(self, name: str, path: Path) -> RobotDescription:
@@ -119,11 +125,8 @@ class _Importer:
                 original = branch.joint.get("name", "")
                 self._joints[original] = self._names.take(original, "joint")
         links = [self._link(branch, first=branch is kept[0]) for branch in kept]
-        if self._endless:
-            LOG.warning(
-                "%s: the file has no range for these joints, which are endless: %s.",
-                *(path, join_first(self._endless, limit=12)),
-            )
+        for text, joints in self._ranges.items():
+            LOG.warning("%s: %s: %s.", path, text, join_first(joints, limit=12))
         return describe_import(
             name=name,
             source=path,
@@ -132,6 +135,7 @@ class _Importer:
             frames=self._frames(branches, frames),
             materials=self._shapes.colors,
             names=self._names,
+            lines={self._links[b.name]: at_line(b.link) for b in kept},
             strict=self._strict,
         )
 
@@ -178,7 +182,8 @@ class _Importer:
 
     def _link(self, branch: Branch, *, first: bool) -> LinkFields:
         fields: LinkFields = {"name": self._links[branch.name]}
-        fields |= _inertial(branch.link, f"link '{branch.name}'", strict=self._strict)
+        where = place_of(branch.link)
+        fields |= _inertial(branch.link, where, strict=self._strict)
         fields |= self._shapes.of(branch.link)
         if first or branch.joint is None:
             return fields
@@ -195,10 +200,10 @@ class _Importer:
             "name": self._joints[joint.get("name", "")],
             "type": JOINT_TYPES[kind],
             "axis": _axis(joint, where),
-            **_limits(joint, kind, where),
+            **_limits(joint, where),
         }
-        if kind != "continuous" and "range" not in fields:
-            self._endless.append(fields["name"])
+        if limits := self._range(joint, kind, where):
+            fields["range"] = limits
         dynamics = joint.find("dynamics")
         if dynamics is not None:
             for ours, key in (("damping", "damping"), ("frictionloss", "friction")):
@@ -211,6 +216,41 @@ class _Importer:
                 "offset": number(mimic, "offset", where=where, default=0.0),
             }
         return fields
+
+    def _range(
+        self, joint: Element, kind: str, where: str
+    ) -> tuple[float, float] | None:
+        """Return the range of a joint, and note what is not as it should be.
+
+        One that is missing, empty at zero or huge means an endless joint.
+        """
+        limit = joint.find("limit")
+        low, high = (
+            0.0 if limit is None else number(limit, key, where=where, default=0.0)
+            for key in ("lower", "upper")
+        )
+        name = self._joints[joint.get("name", "")]
+        if low == high != 0.0:
+            raise DescriptionError(
+                f"{where}: it cannot move from {low} to {high}. Correct 'lower' and "
+                "'upper', or make it fixed, or continuous if it is unlimited."
+            )
+        if low > high and self._strict:
+            raise DescriptionError(
+                f"{where}: its range from {low} to {high} is reversed. Swap 'lower' "
+                "and 'upper'."
+            )
+        note = REVERSED if low > high else None
+        low, high = min(low, high), max(low, high)
+        endless = low == high or max(-low, high) >= UNLIMITED_RANGE
+        shown = name if endless else f"{name} from {low:g} to {high:g}"
+        if kind == "continuous":
+            note = None if endless else CONTINUOUS
+        elif endless:
+            note = ENDLESS
+        if note:
+            self._ranges.setdefault(note, []).append(shown)
+        return None if endless or kind == "continuous" else (low, high)
 
     def _leader(self, mimic: Element, where: str) -> str | None:
         """Return the joint that another follows; None if it does not move."""
@@ -273,11 +313,8 @@ def _axis(joint: Element, where: str) -> list[float]:
     return (axis / length).tolist()
 
 
-def _limits(joint: Element, kind: str, where: str) -> dict[str, Any]:
-    """Read `<limit>`; an effort or velocity <= 0, and huge limits, mean no limit.
-
-    A range that is missing, empty at zero or reversed means an endless joint.
-    """
+def _limits(joint: Element, where: str) -> dict[str, Any]:
+    """Read effort and velocity of `<limit>`; none if they are <= 0, or huge."""
     limit = joint.find("limit")
     if limit is None:
         return {}
@@ -286,15 +323,6 @@ def _limits(joint: Element, kind: str, where: str) -> dict[str, Any]:
         value = number(limit, key, where=where, default=0.0)
         if 0.0 < value < UNLIMITED:
             fields[key] = value
-    low = number(limit, "lower", where=where, default=0.0)
-    high = number(limit, "upper", where=where, default=0.0)
-    if low == high != 0.0:
-        raise DescriptionError(
-            f"{where}: it cannot move from {low} to {high}. Correct 'lower' and "
-            "'upper', or make it fixed, or continuous if it is unlimited."
-        )
-    if kind != "continuous" and low < high and max(-low, high) < UNLIMITED_RANGE:
-        fields["range"] = (low, high)
     return fields
 
 

@@ -16,7 +16,7 @@ from wbc_suite.robot.mesh_files import COLLADA, GLTF, READABLE, can_read, read_p
 from wbc_suite.robot.poses import pose_fields
 from wbc_suite.robot.shape_geometry import fit_hull
 from wbc_suite.robot.shapes import SkinMesh
-from wbc_suite.robot.urdf_elements import numbers, pose_of
+from wbc_suite.robot.urdf_elements import numbers, place_of, pose_of
 from wbc_suite.robot.xml_files import MAX_ABOVE, Element
 from wbc_suite.typing import Vector
 
@@ -125,7 +125,7 @@ class UrdfShapes:
             original, color = material.get("name", ""), material.find("color")
             if color is not None and original not in self._materials:
                 name = names.take(original, "material")
-                rgba = numbers(color, "rgba", 4, where=f"material '{original}'")
+                rgba = numbers(color, "rgba", 4, where=place_of(material))
                 self._materials[original] = name
                 self.colors[name] = tuple(np.clip(rgba, 0.0, 1.0).tolist())
 
@@ -160,7 +160,7 @@ class UrdfShapes:
             file = None if form is None else self._meshes.find(form.get("filename", ""))
             if form is None or file is None:
                 return
-            where = f"link '{link.get('name')}'"
+            where = place_of(link)
             try:
                 scale = tuple(_scale(form, where).tolist())
                 pose = pose_fields(pose_of(item, where=where))
@@ -179,7 +179,7 @@ class UrdfShapes:
 
     def _shapes(self, item: Element, link: Element) -> Iterator[dict[str, Any]]:
         """Yield the shape of an item, or nothing for one that is left out."""
-        where = f"link '{link.get('name')}', {item.tag}"
+        where = f"{place_of(link)}, {item.tag}"
         try:
             shape = self._shape(item, where)
         except DescriptionError as error:

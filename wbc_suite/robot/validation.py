@@ -30,7 +30,8 @@ def check_description(robot: "RobotDescription") -> None:
         *_group_faults(robot),
     ]
     if faults:
-        raise ValueError(join_first(faults, separator="; "))
+        shown = [fault.removesuffix(".") for fault in faults]
+        raise ValueError(join_first(shown, separator="; "))
 
 
 def _unknown(kind: str, name: str, known: Collection[str], where: str) -> str:
@@ -72,14 +73,14 @@ def _mass_faults(robot: "RobotDescription") -> Iterator[str]:
 
 
 def _name_faults(robot: "RobotDescription") -> Iterator[str]:
-    owner: dict[str, str] = dict.fromkeys(RESERVED, "reserved name")
+    owner: dict[str, str] = dict.fromkeys(RESERVED, "a reserved name")
     items = [("link", link.name) for link in robot.links]
     items += [("joint", name) for name in robot.joint_names]
     items += [("frame", frame.name) for frame in robot.frames]
     for kind, name in items:
         if name in owner:
-            yield f"{kind} '{name}' repeats the name of a {owner[name]}"
-        owner.setdefault(name, kind)
+            yield f"{kind} '{name}' repeats {owner[name]}"
+        owner.setdefault(name, f"the name of a {kind}")
     for kind, own in (
         ("camera", robot.cameras),
         ("sensor", robot.sensors),

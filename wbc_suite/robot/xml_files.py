@@ -1,17 +1,20 @@
 """Read XML files from untrusted sources: no entities, limited size and depth."""
 
+import codecs
+import os
 import re
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TypeAlias
+from typing import TypeAlias, cast
 from xml.etree import ElementTree
 from xml.parsers import expat
 
 from wbc_suite.errors import ConfigError
-from wbc_suite.tomlfile import read_bytes
+from wbc_suite.files import read_bytes
 
 MAX_BYTES = 8_000_000
 """Largest XML file that is read; large humanoids have about 200 kB."""
+MAX_ELEMENTS = 100_000  # largest number of elements of a file
 MAX_DEPTH = 400  # largest nesting depth; MJCF nests one body per link of a chain
 
 ROBOT_FOLDERS = ("urdf", "urdfs", "robots", "mjcf", "xml")
@@ -22,26 +25,74 @@ PACKAGE = re.compile(r"^(?:package|model):///?([^/]+)/.*$", re.DOTALL)
 
 Element: TypeAlias = ElementTree.Element
 
+_DECLARED = re.compile(rb"""<\?xml\s[^>]*?\bencoding\s*=\s*["']([\w.:-]{1,40})["']""")
+_WIDE = {
+    **{codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"},
+    **{b"<\0": "utf-16-le", b"\0<": "utf-16-be"},
+}
+"""Encodings that the first two bytes of a file show."""
+_SLOW = ("idna", "punycode")
+"""Python's codecs for host names, whose time is quadratic."""
 
-def read_xml(path: Path) -> Element:
-    """Parse one XML file into elements.
 
-    A document type declaration is refused, because it can define entities that grow
-    without bound or read other files. Namespace prefixes need no declaration.
+class _Located(ElementTree.Element):
+    """An element with the line of its start tag."""
+
+    __slots__ = ("line",)
+
+    line: int
+
+
+def at_line(element: Element) -> str:
+    """Return " (line 3)", where an element of a file begins, for messages."""
+    line = getattr(element, "line", 0)
+    return f" (line {line})" if line else ""
+
+
+def read_xml(path: Path, *, only_utf8: bool = False) -> Element:
+    """Parse one XML file into elements; see `parse_xml`.
 
     Raises:
         ConfigError: If the file is missing, too large, too deep or not plain XML.
     """
-    parser, builder, depth = expat.ParserCreate(), ElementTree.TreeBuilder(), 0
+    data = read_bytes(path, most=MAX_BYTES)
+    return parse_xml(data, source=str(path), only_utf8=only_utf8)
+
+
+def parse_xml(data: bytes, *, source: str, only_utf8: bool = False) -> Element:
+    """Parse XML in the encoding that it declares, one of Python's, into elements.
+
+    A document type declaration is refused, because it can define entities that grow
+    without bound or read other files. Namespace prefixes need no declaration. With
+    `only_utf8`, text is refused that a reader of UTF-8, as MuJoCo is, would understand
+    differently.
+
+    Raises:
+        ConfigError: If it is too deep, has too many elements or is not plain XML.
+    """
+    stripped = data.lstrip()
+    text = _decoded(stripped, source)
+    content = text.encode("utf-8")
+    if only_utf8 and content != stripped.removeprefix(codecs.BOM_UTF8):
+        raise ConfigError(
+            f"{source}: it is not in UTF-8, as MuJoCo needs it. Save it in UTF-8."
+        )
+    before = data[: len(data) - len(stripped)].count(b"\n")
+    parser = expat.ParserCreate("utf-8")
+    builder = ElementTree.TreeBuilder(_Located)
+    depth = count = 0
 
     def start(tag: str, attributes: dict[str, str]) -> None:
-        nonlocal depth
-        depth += 1
+        nonlocal depth, count
+        depth, count = depth + 1, count + 1
         if depth > MAX_DEPTH:
             raise ConfigError(
-                f"{path}: elements are nested deeper than {MAX_DEPTH} levels."
+                f"{source}: elements are nested deeper than {MAX_DEPTH} levels."
             )
-        builder.start(tag, attributes)
+        if count > MAX_ELEMENTS:
+            raise ConfigError(f"{source}: it has more than {MAX_ELEMENTS} elements.")
+        element = cast("_Located", builder.start(tag, attributes))
+        element.line = parser.CurrentLineNumber + before
 
     def end(tag: str) -> None:
         nonlocal depth
@@ -50,17 +101,44 @@ def read_xml(path: Path) -> Element:
 
     def refuse(*_: object) -> None:
         raise ConfigError(
-            f"{path}: a document type declaration (<!DOCTYPE ...>) is not allowed, "
+            f"{source}: a document type declaration (<!DOCTYPE ...>) is not allowed, "
             "because it can read other files. Remove it."
         )
 
     parser.StartElementHandler, parser.EndElementHandler = start, end
     parser.StartDoctypeDeclHandler = refuse
     try:
-        parser.Parse(read_bytes(path, most=MAX_BYTES).lstrip(), True)
+        parser.Parse(content, True)
     except expat.ExpatError as error:
-        raise ConfigError(f"{path}: not well-formed XML: {error}.") from error
+        reason, line = expat.ErrorString(error.code), error.lineno + before
+        raise ConfigError(
+            f"{source}: not well-formed XML: {reason} (line {line})."
+        ) from error
     return builder.close()
+
+
+def _decoded(data: bytes, source: str) -> str:
+    """Return the text of a file without a byte order mark; raises ConfigError."""
+    declared = _DECLARED.match(data)
+    name = _WIDE.get(data[:2]) or (declared[1].decode() if declared else "utf-8")
+    try:
+        if codecs.lookup(name).name in _SLOW:
+            raise LookupError(name)
+        text = data.removeprefix(codecs.BOM_UTF8).decode(name)
+        text.encode("utf-8")  # some codecs make halves of characters
+        if declared and not text.startswith("<?xml"):
+            raise UnicodeError("it is in another one")
+    except LookupError as error:
+        raise ConfigError(
+            f"{source}: it declares the encoding '{name}', which is unknown. Save it "
+            "in UTF-8, and declare that."
+        ) from error
+    except UnicodeError as error:
+        raise ConfigError(
+            f"{source}: it cannot be read as '{name}', the encoding that it "
+            f"{'declares' if declared else 'has by default'}: {error}."
+        ) from error
+    return text
 
 
 def model_root(file: Path, references: Iterable[str]) -> Path:
@@ -70,7 +148,7 @@ def model_root(file: Path, references: Iterable[str]) -> Path:
     with meshes, the folder above `urdf` and the like, and one of `COLLECTIONS` further
     up; or the folder of that name around them if a reference is `package://NAME/...`.
     """
-    folder, *above = file.resolve().parents
+    folder, *above = real_path(file).parents
     close = (folder, *above[:3])
     package = next((p for p in close if (p / "package.xml").is_file()), None)
     holder = (p for p in close if any((p / m).is_dir() for m in MESH_FOLDERS))
@@ -83,12 +161,17 @@ def model_root(file: Path, references: Iterable[str]) -> Path:
     return next((p for p in named if root.is_relative_to(p)), root)
 
 
+def real_path(path: Path) -> Path:
+    """Return a path with resolved links, also if these form a loop."""
+    return Path(os.path.realpath(path))
+
+
 def inside(root: Path, path: Path, *, source: Path) -> Path:
     """Return a path with resolved links; raises ConfigError outside of a folder."""
-    resolved = path.resolve()
-    if not resolved.is_relative_to(root.resolve()):
+    resolved, root = real_path(path), real_path(root)
+    if not resolved.is_relative_to(root):
         raise ConfigError(
-            f"{source}: the file '{path}' lies outside the folder {root.resolve()} and "
+            f"{source}: the file '{path}' lies outside the folder {root} and "
             "is not read. Copy it into that folder, or give a folder that encloses "
             "both by --mesh-root."
         )

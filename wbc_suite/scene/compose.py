@@ -61,9 +61,9 @@ def _on_the_floor(robot: RobotDescription) -> RobotDescription:
     if (abs(height) < LANDED) if stands else (height > -GROUNDED):
         return robot
     log.warning(
-        "%s has its lowest point %.3f m above the floor, and is moved onto it. Set "
+        "%s has its lowest point %.3f m %s the floor, and is moved onto it. Set "
         "[root] pos in its file.",
-        *(robot.name, height),
+        *(robot.name, abs(height), "below" if height < 0.0 else "above"),
     )
     x, y, z = robot.root.pos
     return robot.with_root(robot.root.kind, pos=(x, y, z - height))

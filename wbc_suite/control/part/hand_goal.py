@@ -4,7 +4,7 @@ from typing import Self
 
 import numpy as np
 import pinocchio as pin
-from pydantic import BaseModel, model_validator
+from pydantic import model_validator
 
 from wbc_suite.compiling import compiled
 from wbc_suite.control.law.pose_interpolation import pose_vector, vector_pose
@@ -21,11 +21,11 @@ from wbc_suite.control.part.part_settings import (
 )
 from wbc_suite.linear_algebra import copy_rows
 from wbc_suite.qp.lie import exp3, log3
-from wbc_suite.tomlfile import FROZEN
+from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Matrix, Vector
 
 
-class HandSettings(BaseModel):
+class HandSettings(FrozenModel):
     """Settings of controllers that move the goal of a hand, beside `PartSettings`.
 
     Attributes:
@@ -37,8 +37,6 @@ class HandSettings(BaseModel):
         orientation_limits: Least and greatest components of the rotation vector from
             the orientation at the start to a goal's, axes of the reference, rad.
     """
-
-    model_config = FROZEN
 
     input_type: InputType = "delta"
     input_ref_frame: InputFrame = "base"

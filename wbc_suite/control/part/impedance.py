@@ -3,19 +3,19 @@
 from typing import Literal, TypeAlias
 
 import numpy as np
-from pydantic import BaseModel, NonNegativeFloat
+from pydantic import NonNegativeFloat
 
 from wbc_suite.control.action import ActionPart, SliceKind, Unit
 from wbc_suite.control.memory import Parts
 from wbc_suite.control.part.part_settings import damping_of, limits_of, spread
-from wbc_suite.tomlfile import FROZEN
+from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Vector
 
 Gains: TypeAlias = NonNegativeFloat | tuple[NonNegativeFloat, ...]
 """One gain for all axes or joints, or one for each."""
 
 
-class ImpedanceSettings(BaseModel):
+class ImpedanceSettings(FrozenModel):
     """Settings of controllers with stiffness and damping, beside `PartSettings`.
 
     Attributes:
@@ -28,8 +28,6 @@ class ImpedanceSettings(BaseModel):
         kp_limits: Least and greatest stiffness of an action, 1/s^2.
         kd_limits: Least and greatest damping of an action, 1/s.
     """
-
-    model_config = FROZEN
 
     impedance_mode: Literal["fixed", "variable_kp", "variable"] = "fixed"
     kp: Gains = 150.0

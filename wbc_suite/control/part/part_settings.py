@@ -4,12 +4,12 @@ from collections.abc import Sequence
 from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
-from pydantic import BaseModel, Field, NonNegativeFloat
+from pydantic import Field, NonNegativeFloat
 
 from wbc_suite.control.action import ActionPart, SliceKind, Unit
 from wbc_suite.control.law.law import Law
 from wbc_suite.errors import ConfigError
-from wbc_suite.tomlfile import FROZEN, FrozenModel
+from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import Vector
 
 InputType = Literal["delta", "absolute"]
@@ -43,7 +43,7 @@ class GripConfig(FrozenModel):
     speed: Annotated[float, Field(gt=0.0)] | None = None
 
 
-class PartSettings(BaseModel):
+class PartSettings(FrozenModel):
     """Settings of every part controller that reads the action.
 
     Attributes:
@@ -63,8 +63,6 @@ class PartSettings(BaseModel):
         use_torque_compensation: Whether gravity and Coriolis forces are compensated.
         gripper: The gripper at the end of the part.
     """
-
-    model_config = FROZEN
 
     input_type: InputType = "delta"
     input_min: Numbers = -1.0

@@ -34,6 +34,8 @@ from wbc_suite.recording.dataset import Dataset
 from wbc_suite.recording.episode import Episode
 from wbc_suite.recording.extras import import_extra
 from wbc_suite.recording.mp4_writer import Mp4Writer
+from wbc_suite.robot.shapes import as_table
+from wbc_suite.tomlfile import parse_json
 
 CHUNK = 1000  # files in a folder
 MOMENTS = ("min", "max", "mean", "std")
@@ -241,8 +243,9 @@ def _info(dataset: Dataset, first: Episode, frames: int) -> dict[str, Any]:
     features["timestamp"] = {"dtype": "float32", "shape": [1], "names": None}
     for name in ("frame_index", "episode_index", "index", "task_index"):
         features[name] = {"dtype": "int64", "shape": [1], "names": None}
-    source = json.loads(str(dataset.header.get("env_args", "{}")))
-    robots = source.get("env_kwargs", {}).get("robots", "unknown")
+    text = str(dataset.header.get("env_args", "{}"))
+    source = parse_json(text, source="env_args", error=DatasetError)
+    robots = as_table(source.get("env_kwargs")).get("robots", "unknown")
     place = "chunk-{chunk_index:03d}/file-{file_index:03d}"
     return {
         "codebase_version": "v3.0",

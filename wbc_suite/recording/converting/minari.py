@@ -105,7 +105,7 @@ def _action_space(dataset: Dataset, first: Episode) -> dict[str, Any]:
     try:
         low, high = json.loads(str(dataset.header["action_bounds"]))
         bounds = np.array([low, high], dtype=np.float64)
-    except (KeyError, ValueError, TypeError):
+    except (KeyError, ValueError, TypeError, OverflowError, RecursionError):
         return space
     if bounds.shape != (2, *space["shape"]):
         return space
@@ -129,7 +129,7 @@ def _env_spec(dataset: Dataset) -> Mapping[str, Any] | None:
     try:
         source = json.loads(str(dataset.header.get("env_args", "{}")))
         name, arguments = source["env_name"], dict(source.get("env_kwargs", {}))
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError, RecursionError):
         return None
     if source.get("package") != "wbc_suite" or name not in WITH_ID:
         return None

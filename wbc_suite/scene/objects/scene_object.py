@@ -277,6 +277,7 @@ class MjcfObject:
             own.delete(joint)
         for key in list(own.keys):
             own.delete(key)
+        own.option = spec.option  # the scene's count
         if not body.name:
             body.name = self.name
         frame = spec.worldbody.add_frame()

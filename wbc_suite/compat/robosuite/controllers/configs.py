@@ -5,7 +5,6 @@ keys of its type.
 """
 
 import copy
-import json
 from collections.abc import Collection
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ from wbc_suite.control.composite.registry import default_composite
 from wbc_suite.control.robot_parts import hands_of, parts_of
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.robot import RobotDescription, load_robot
+from wbc_suite.tomlfile import read_json
 
 PART_CONTROLLER_INFO = {
     "JOINT_VELOCITY": "Joint Velocity",
@@ -127,7 +127,7 @@ def load_part_controller_config(
         return copy.deepcopy(PARTS[kind])
     if custom_fpath is None:
         raise ConfigError("load_part_controller_config: name a file or a type.")
-    return _read(custom_fpath)
+    return read_json(Path(custom_fpath))
 
 
 def load_composite_controller_config(
@@ -140,7 +140,7 @@ def load_composite_controller_config(
     """
     name = None if controller is None else str(controller)
     if name is not None and name.endswith(".json"):
-        return _read(name)
+        return read_json(Path(name))
     description = described(robot) if isinstance(robot, str) else robot
     if name is None and description is not None:
         name = default_composite(description)
@@ -184,13 +184,6 @@ def refactor_composite_controller_config(
         own = copy.deepcopy(controller_config) | {"gripper": {"type": "GRIP"}}
         config["body_parts"][arm] = own
     return config
-
-
-def _read(path: str | Path) -> dict[str, Any]:
-    try:
-        return json.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise ConfigError(f"{path}: not a controller file: {error}") from error
 
 
 def _composite(kind: str, robot: RobotDescription | None, arm: str) -> dict[str, Any]:

@@ -10,7 +10,8 @@ from wbc_suite.envs import RobotEnv
 from wbc_suite.envs.building import compose
 from wbc_suite.envs.physics_states import WORDS, Origin, generator_of
 from wbc_suite.envs.states import write_scene
-from wbc_suite.errors import DatasetError
+from wbc_suite.errors import ConfigError, DatasetError
+from wbc_suite.robot.mjcf_compile import compile_text
 
 WRITTEN = (
     *("body_pos", "body_quat", "body_mass", "body_inertia", "body_ipos", "body_iquat"),
@@ -68,11 +69,9 @@ def load_scene(text: str, model: mujoco.MjModel) -> Scene:
         DatasetError: If it is no MJCF, or has other elements.
     """
     try:
-        found = mujoco.MjModel.from_xml_string(text)
-    except ValueError as error:
-        raise DatasetError(
-            f"The recording's scene cannot be read: {error}. Actions do not need it."
-        ) from error
+        found = compile_text(text, source="The recording's scene")
+    except ConfigError as error:
+        raise DatasetError(f"{error} Actions do not need it.") from error
     same = all(getattr(found, n) == getattr(model, n) for n in COUNTED)
     names = found.names.replace(ORIGIN.encode() + b"\0", b"")
     if not same or names != model.names:

@@ -1,6 +1,5 @@
 """Robots and grippers of ours as trees of MJCF elements, for scenes made by hand."""
 
-import tomllib
 import xml.etree.ElementTree as ET
 from functools import cache
 from typing import Any
@@ -9,6 +8,7 @@ from wbc_suite.catalogue import Catalogue
 from wbc_suite.compat.robosuite.models.base import SECTIONS, MujocoModel, MujocoXML
 from wbc_suite.compat.robosuite.utils.mjcf_utils import add_prefix
 from wbc_suite.robot import RobotDescription
+from wbc_suite.tomlfile import read_toml
 
 
 class DescribedModel(MujocoXML, MujocoModel):  # pyright: ignore[reportIncompatibleVariableOverride] - subclasses define `name`
@@ -40,7 +40,7 @@ def choices_of(robot: str) -> dict[str, str]:
     if not catalogue.holds("robots", robot):
         return found
     path = catalogue.find("robots", robot, kind="robot")
-    for part in tomllib.loads(path.read_text("utf-8")).get("part", ()):
+    for part in read_toml(path).get("part", ()):
         folder, _, stem = str(part.get("component", "")).partition("/")
         names = catalogue.names(f"robots/{folder}")
         if "choice" in part and stem in names:

@@ -18,6 +18,7 @@ from wbc_suite.catalogue import Catalogue
 from wbc_suite.errors import ConfigError
 from wbc_suite.robot import RobotDescription
 from wbc_suite.robot.elements import Camera, Frame, Mount, Sensor, Synergy
+from wbc_suite.robot.mjcf_compile import compile_mjcf
 from wbc_suite.robot.toml_export import write_toml
 from wbc_suite.scene.compose import ROBOT_VIEW
 from wbc_suite.typing import Vector
@@ -44,7 +45,7 @@ def gripper_file(gripper: Any) -> str:
         ConfigError: If no joint has a position actuator.
     """
     robot, name = gripper.description, type(gripper).__name__
-    model = mujoco.MjModel.from_xml_path(gripper.own_file)
+    model, _ = compile_mjcf(Path(gripper.own_file))
     ranges = {
         model.joint(model.actuator_trnid[a, 0]).name: model.actuator_ctrlrange[a]
         for a in range(model.nu)
@@ -81,7 +82,7 @@ def gripper_file(gripper: Any) -> str:
 @lru_cache
 def collision_names(path: str) -> dict[str, str]:
     """Return the names that colliding geoms of a file get in our scenes."""
-    model, counts, found = mujoco.MjModel.from_xml_path(path), {}, {}
+    (model, _), counts, found = compile_mjcf(Path(path)), {}, {}
     for index in range(model.ngeom):
         if not model.geom_contype[index] and not model.geom_conaffinity[index]:
             continue

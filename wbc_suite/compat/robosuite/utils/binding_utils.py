@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -11,6 +12,7 @@ import numpy as np
 from wbc_suite.arguments import check_array
 from wbc_suite.envs.states import motion_size, write_physics
 from wbc_suite.errors import ConfigError, UnknownNameError
+from wbc_suite.files import check_file
 from wbc_suite.typing import Array, Vector
 
 KINDS = "body|joint|geom|site|light|camera|actuator|sensor|tendon|mesh"
@@ -260,6 +262,7 @@ class MjSim:
     @classmethod
     def from_xml_file(cls, xml_file: str) -> "MjSim":
         """Compile an MJCF file."""
+        check_file(Path(xml_file))
         return cls(mujoco.MjModel.from_xml_path(xml_file))
 
     def reset(self) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from wbc_suite.errors import ConfigError
+from wbc_suite.robot.xml_files import read_xml
 from wbc_suite.typing import Vector
 
 RED, GREEN, BLUE, CYAN = [1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 1], [0, 1, 1, 1]
@@ -267,11 +267,7 @@ def parse_file(fname: str | Path) -> tuple[Element, Path]:
     Raises:
         ConfigError: If it cannot be read.
     """
-    path = Path(fname).resolve()
-    try:
-        root = ET.fromstring(path.read_text(encoding="utf-8"))
-    except (OSError, ET.ParseError) as error:
-        raise ConfigError(f"{fname}: not readable as MJCF: {error}") from error
+    root, path = read_xml(Path(fname), only_utf8=True), Path(fname).resolve()
     compiler = root.find("compiler")
     dirs = {} if compiler is None else compiler.attrib
     for element in root.iter():

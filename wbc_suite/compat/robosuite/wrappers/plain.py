@@ -1,13 +1,14 @@
 """The base of wrappers, and those that change looks, physics or starts."""
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 
 from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.randomisation import Randomisation
+from wbc_suite.recording.hdf5_check import open_safely
 
 _OF_CAMERAS = ("camera_position", "camera_rotation", "camera_fovy")
 _OF_LIGHTS = ("light_position", "light_brightness")
@@ -197,7 +198,7 @@ class DemoSamplerWrapper(Wrapper):
         self._rng, self._window = env.rng, open_loop_initial_window_width
         self._every, self._more = open_loop_increment_freq, open_loop_window_increment
         self._resets = 0
-        with h5py.File(demo_path) as file:
+        with open_safely(Path(demo_path)) as file:
             data: Any = file["data"]
             names = list(data)[: None if num_traj < 0 else num_traj]
             self._states = [np.array(data[name]["states"]) for name in names]
