@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from test_planners import BIPED, DT, QUADRUPED, SOLE, Pendulum, biped, quadruped
 
-from wbc_suite.compiling import plain
 from wbc_suite.locomotion import TrotConfig, WalkConfig, plan_trot, plan_walk, walk
 from wbc_suite.locomotion.gait import GRAVITY, Mode, heading_axes
 from wbc_suite.locomotion.soles import keep_in_soles
@@ -224,7 +223,7 @@ def test_a_step_ends_as_soon_as_it_may_where_the_dcm_runs_away(since, beyond, du
     out = np.array([0.0, side * beyond])
     inside = np.add(landing, [0.0, -0.2 * side]) * np.exp(-omega * (0.5 - since))
     dcm = zmp + (out if beyond else inside)
-    plain(walk._choose_duration)(
+    walk._choose_duration(
         robot.gait, robot.measured, dcm, zmp, landing, omega, True
     )
     assert state["duration"] == pytest.approx(duration)
