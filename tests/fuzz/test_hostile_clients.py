@@ -293,14 +293,20 @@ def garbage(port):
     ]
 
 
-def policy_requests(fifo):
-    """Return requests to a policy's socket that no client of ours sends."""
+def policy_requests(fifo, *, token):
+    """Return requests to a policy's socket that no client of ours sends.
+
+    Without its token, if it has one, no episode begins either.
+    """
     lift = {"seed": 0, "benchmark": "Lift", "robots": "Panda"}
     named = ({"robots": fifo}, {"benchmark": fifo}, {"controller_configs": fifo})
     named += ({"arena": fifo}, {"gripper_types": fifo}, {"benchmark": "os:system"})
     resets = [json.dumps({"reset": lift | each}).encode() + b"\n" for each in named]
     observe = b'{"observation": {}}\n'
+    lacking = ({}, {"token": ""}, {"token": "guess"}, {"token": None}, {"token": [1]})
+    begun = [json.dumps(each | {"reset": lift}).encode() + b"\n" for each in lacking]
     return [
+        *(reset + observe for reset in begun if token),
         *(reset + observe for reset in resets),
         observe,
         b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n" + resets[0] + observe,
@@ -318,7 +324,7 @@ def attack(served, listener, fifo):
     for data in garbage(listener.port):
         made.request(data)
     if address.startswith("socket://"):
-        for data in policy_requests(fifo):
+        for data in policy_requests(fifo, token="@" in address):
             made.request(data)
     elif "?token=" in address:
         attack_with_token(made)
@@ -438,7 +444,7 @@ def try_stream(address):
     with connect(url, ssl=context, max_size=None) as client:
         client.send(json.dumps(FRAME))
         with contextlib.suppress(TimeoutError):
-            while True:
+            for _ in range(30):  # a headset's page gets the scene all the time
                 said = client.recv(timeout=0.5)
                 assert isinstance(said, bytes) or "error" not in json.loads(said), said
 
