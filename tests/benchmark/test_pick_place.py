@@ -6,7 +6,6 @@ from sorted_goals import goals, put_at
 import wbc_suite
 from wbc_suite.benchmark import load_benchmark
 from wbc_suite.benchmark.pick_place import GROCERIES
-from wbc_suite.errors import ConfigError
 from wbc_suite.scene.placement import Region, UniformSampler
 
 
@@ -70,13 +69,6 @@ def test_a_variant_says_only_what_differs():
     assert can.config.objects == ("Can",)
     assert can.config.source == full.config.source
     assert can.config.name == "PickPlaceCan"
-
-
-def test_a_file_extends_only_its_neighbours(tmp_path):
-    path = tmp_path / "mine.toml"
-    path.write_text('extends = "../pick_place"\nname = "PickPlace"\n')
-    with pytest.raises(ConfigError, match="same folder"):
-        load_benchmark(path)
 
 
 @pytest.mark.parametrize(

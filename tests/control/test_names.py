@@ -42,6 +42,47 @@ def test_the_name_of_a_part_controller_stands_for_all_arms():
         load_composite_controller_config("OSC_POS", "GR1")
 
 
+@pytest.fixture
+def soft(tmp_path):
+    path = tmp_path / "soft.toml"
+    path.write_text('extends = "BASIC"\n[body_parts.right]\nkp = 99\n')
+    return path
+
+
+def test_a_controller_file_extends_what_the_robot_has(soft):
+    for robot in ("Panda", "Tiago"):  # without a file, and with one
+        plain = load_composite_controller_config("BASIC", robot)
+        found = load_composite_controller_config(soft, robot)
+        right = {"right": plain["body_parts"]["right"] | {"kp": 99}}
+        assert found == plain | {"body_parts": plain["body_parts"] | right}
+
+
+def test_a_controller_file_extends_one_beside_it_or_of_the_catalogue(soft):
+    stiff = soft.with_name("stiff.toml")
+    stiff.write_text('extends = "soft"\n[body_parts.right]\ndamping_ratio = 2.0\n')
+    found = load_composite_controller_config(stiff, "Panda")
+    assert (found["type"], found["body_parts"]["right"]["kp"]) == ("BASIC", 99)
+    assert found["body_parts"]["right"]["damping_ratio"] == 2.0
+    free = soft.with_name("free.toml")
+    free.write_text('extends = "gr1_whole_body_ik"\n[posture]\nweight = 0.5\n')
+    ours = load_composite_controller_config("WHOLE_BODY_IK", "GR1")
+    found = load_composite_controller_config(free, "GR1")
+    posture = ours.get("posture", {}) | {"weight": 0.5}
+    assert found == ours | {"posture": posture}
+
+
+def test_a_part_of_another_type_replaces_that_of_the_base(soft):
+    soft.write_text('extends = "basic"\n[body_parts.right]\ntype = "joint_velocity"\n')
+    found = load_composite_controller_config(soft, "PandaOmron")
+    assert found["body_parts"]["right"] == {"type": "joint_velocity"}
+
+
+def test_a_base_that_does_not_exist_is_named_with_its_line(soft):
+    soft.write_text('format = 1\nextends = "BASICC"\n')
+    with pytest.raises(ConfigError, match=r"soft.toml: key 'extends' \(line 2\)"):
+        load_composite_controller_config(soft, "Panda")
+
+
 def convert(config, robot, source, named):
     """Read `{"arms": type}`, another layout."""
     if "arms" not in config:

@@ -15,7 +15,8 @@ from wbc_suite.envs.building import (
 )
 from wbc_suite.envs.config import parse_env_config
 from wbc_suite.envs.states import write_physics, write_scene
-from wbc_suite.errors import ConfigError
+from wbc_suite.errors import ConfigError, WbcError
+from wbc_suite.scene.placement import SAMPLERS, UniformSampler, register_sampler
 
 
 def layout(low, high):
@@ -62,6 +63,52 @@ def test_a_users_sampler_replaces_the_benchmarks():
     benchmark, sampler = load_benchmark("Lift"), Sampler()
     use_sampler(benchmark, parse_env_config({"placement_initializer": sampler}))
     assert benchmark.sampler is sampler
+
+
+CORNER = {"x": [0.1, 0.1], "y": [0.2, 0.2]}
+TABLE = {"type": "Uniform", "names": ["cube"], "region": CORNER, "origin": [0, 0, 0.8]}
+
+
+def test_a_sampler_is_made_of_its_name_or_table(forget):
+    forget(SAMPLERS, "mine")
+    register_sampler("mine", Sampler)
+    benchmark = load_benchmark("Lift")
+    use_sampler(benchmark, parse_env_config({"placement_initializer": "Mine"}))
+    assert type(benchmark.sampler) is Sampler
+    use_sampler(benchmark, parse_env_config({"placement_initializer": TABLE}))
+    assert isinstance(benchmark.sampler, UniformSampler)
+    assert benchmark.sampler.region.x == (0.1, 0.1)
+    both = {"type": "sequential", "samplers": [TABLE, {"type": "mine"}]}
+    use_sampler(benchmark, parse_env_config({"placement_initializer": both}))
+    first, second = benchmark.sampler.samplers
+    assert (type(first), type(second)) == (UniformSampler, Sampler)
+
+
+@pytest.mark.parametrize(
+    ("given", "fault"),
+    [
+        ("unifrom", "No sampler named 'unifrom'. Did you mean 'uniform'"),
+        ({"names": ["cube"]}, "No sampler named 'None'"),
+        ({"type": "os.path:join"}, "No sampler named 'os.path:join'"),
+        (TABLE | {"regin": CORNER}, "sampler 'Uniform': .*'regin'"),
+        (TABLE | {"region": {"x": [0, 1]}}, "sampler: missing key 'region.y'"),
+    ],
+)
+def test_a_fault_of_a_sampler_is_named(given, fault):
+    config = parse_env_config({"placement_initializer": given})
+    with pytest.raises(WbcError, match=fault):
+        use_sampler(load_benchmark("Lift"), config)
+
+
+def test_a_sampler_in_a_benchmarks_file_replaces_its_own(tmp_path):
+    path = tmp_path / "corner.toml"
+    path.write_text(
+        'extends = "lift"\n[placement]\ntype = "uniform"\nnames = ["cube"]\n'
+        "origin = [0, 0, 0.8]\nregion = { x = [0.1, 0.1], y = [0.2, 0.2] }\n"
+    )
+    benchmark = load_benchmark(path)
+    use_sampler(benchmark, parse_env_config({}))
+    assert benchmark.sampler.region.x == (0.1, 0.1)
 
 
 def test_a_benchmark_without_objects_takes_no_sampler():

@@ -95,7 +95,7 @@ def test_any_object_with_sample_is_a_sampler(sampler):
         ({"robots": 3}, "a robot is a name"),
         ({"robots": ["Panda", None]}, "a robot is a name"),
         ({"controller_configs": ["BASIC", "BASIC"]}, "2 entries for 1 robot"),
-        ({"placement_initializer": "anywhere"}, "a method `sample`"),
+        ({"placement_initializer": 3}, "a method `sample`"),
         ({"randomisation": 0.1}, "wbc_suite.randomisation.Randomisation"),
         ({"control_freq": 0}, "control_freq"),
         ({"control_freq": float("nan")}, "control_freq"),

@@ -248,7 +248,7 @@ def test_users_own_samplers_place_the_things():
         np.testing.assert_allclose(seen["cube_pos"][:2], [0.1, 0.2], atol=1e-9)
         np.testing.assert_allclose(other["cube_pos"][:2], [0.1, 0.2], atol=1e-9)
     with pytest.raises(ConfigError, match="method `sample`"):
-        wbc_suite.make("Lift", placement_initializer="here")
+        wbc_suite.make("Lift", placement_initializer=3)
 
 
 @pytest.mark.slow

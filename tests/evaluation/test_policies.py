@@ -6,8 +6,13 @@ import types
 import numpy as np
 import pytest
 
-from wbc_suite.errors import ConfigError
-from wbc_suite.evaluation import POLICIES, make_policy
+from wbc_suite.errors import ConfigError, WbcError
+from wbc_suite.evaluation import (
+    POLICIES,
+    check_policy,
+    make_policy,
+    register_policy,
+)
 
 
 class Part:
@@ -71,6 +76,28 @@ def test_a_policy_of_a_users_module_gets_environment_and_generator(monkeypatch):
 def test_modules_and_functions_that_do_not_exist_are_named(name):
     with pytest.raises(ConfigError, match=f"policy '{name}' cannot be found"):
         make(name, Lift())
+
+
+def test_a_policy_of_ones_own_is_registered_by_one_line(forget):
+    forget(POLICIES, "still")
+    register_policy("still", lambda env, rng: lambda _: env.hold_action)
+    env = Lift()
+    np.testing.assert_array_equal(make("Still", env)({}), env.hold_action)
+
+
+@pytest.mark.parametrize(
+    ("name", "fault"),
+    [
+        ("hodl", "Did you mean 'hold'"),
+        ("os.path:joyn", "'os.path:joyn' cannot be found"),
+        ("none.hdf5", "no such file"),
+    ],
+)
+def test_a_policys_name_is_checked_without_an_environment(name, fault):
+    with pytest.raises(WbcError, match=fault):
+        check_policy(name)
+    for fine in ("expert", "os.path:join", "socket://nowhere:1"):
+        check_policy(fine)
 
 
 def test_every_policy_is_a_factory():

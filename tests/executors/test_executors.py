@@ -8,12 +8,14 @@ import pytest
 
 from wbc_suite.errors import ConfigError, DatasetError, UnknownNameError
 from wbc_suite.executors import (
+    EXECUTORS,
     Outcome,
     Processes,
     ResultFolder,
     Serial,
     WorkItem,
     make_executor,
+    register_executor,
     run_items,
 )
 
@@ -150,6 +152,12 @@ def test_executors_have_names():
         make_executor("proces")
     with pytest.raises(ConfigError, match="must be at least 1"):
         make_executor("process", workers=0)
+
+
+def test_an_executor_of_ones_own_is_registered_by_one_line(forget):
+    forget(EXECUTORS, "mine")
+    register_executor("mine", lambda workers: ("mine", workers))
+    assert make_executor("Mine", workers=2) == ("mine", 2)
 
 
 @pytest.mark.parametrize(("name", "package"), [("ray", "ray"), ("slurm", "submitit")])

@@ -223,9 +223,7 @@ def test_a_step_ends_as_soon_as_it_may_where_the_dcm_runs_away(since, beyond, du
     out = np.array([0.0, side * beyond])
     inside = np.add(landing, [0.0, -0.2 * side]) * np.exp(-omega * (0.5 - since))
     dcm = zmp + (out if beyond else inside)
-    walk._choose_duration(
-        robot.gait, robot.measured, dcm, zmp, landing, omega, True
-    )
+    walk._choose_duration(robot.gait, robot.measured, dcm, zmp, landing, omega, True)
     assert state["duration"] == pytest.approx(duration)
 
 

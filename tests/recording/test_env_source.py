@@ -87,6 +87,9 @@ def test_an_environment_of_another_package_is_refused():
         {"base_types": "module:Base"},
         {"arena": "scene"},
         {"arena": {"file": "scene"}},
+        {"controller_configs": {"type": "own:Controller"}},
+        {"placement_initializer": "own:Sampler"},
+        {"placement_initializer": {"type": "own:Sampler"}},
     ],
 )
 def test_paths_are_refused_wherever_they_stand(arguments):
@@ -94,11 +97,26 @@ def test_paths_are_refused_wherever_they_stand(arguments):
         parse(**arguments).build()
 
 
-def test_a_benchmark_that_is_a_path_is_refused():
-    with pytest.raises(DatasetError, match="names a file"):
-        parse("/tmp/task.toml").build()
-    with pytest.raises(DatasetError, match="names a file"):
-        parse("module:Benchmark").build()
+@pytest.mark.parametrize("name", ["/tmp/task.toml", "own_tasks:Mine"])
+def test_a_benchmark_that_is_a_path_or_a_module_is_refused(name):
+    with pytest.raises(DatasetError, match="names a file or a module"):
+        parse(name).build()
+
+
+@pytest.mark.parametrize("name", ["lift", "Lift"])
+def test_a_registered_benchmark_is_recorded_as_it_is_spelled(name):
+    with wbc_suite.make(name, robots="Panda") as env:
+        assert EnvSource.of(env).benchmark == "Lift"
+
+
+def test_a_benchmark_of_a_file_is_recorded_with_its_path(tmp_path, monkeypatch):
+    (tmp_path / "high.toml").write_text('extends = "lift"\nhorizon = 9\n')
+    monkeypatch.chdir(tmp_path)
+    with wbc_suite.make("high.toml", robots="Panda") as env:
+        source = EnvSource.of(env)
+    assert source.benchmark == str(tmp_path / "high.toml")
+    with source.build(trust_files=True) as again:
+        assert again.horizon == 9
 
 
 def test_a_trusted_path_is_read_and_its_error_is_reported():

@@ -8,10 +8,15 @@ import numpy as np
 import pytest
 from random_episodes import HEADER, make_episode
 
-from wbc_suite.errors import DatasetError
+from wbc_suite.errors import DatasetError, UnknownNameError
 from wbc_suite.executors import Serial
 from wbc_suite.recording import Dataset, Store
-from wbc_suite.recording.converting import LAYOUTS, convert
+from wbc_suite.recording.converting import (
+    LAYOUTS,
+    Layout,
+    convert,
+    register_layout,
+)
 from wbc_suite.recording.converting.layout import split_dataset, whole_dataset
 
 
@@ -63,6 +68,20 @@ def test_an_empty_recording_is_refused(tmp_path, layout):
     with pytest.raises(DatasetError, match="no episodes"):
         convert(path, tmp_path / "out", layout)
     assert not (tmp_path / "out").exists()
+
+
+def test_a_layout_of_ones_own_is_registered_by_one_line(
+    uneven_recording, tmp_path, forget
+):
+    def write(dataset, piece, path, progress):
+        path.write_text(" ".join(piece.names))
+
+    forget(LAYOUTS, "names")
+    register_layout("names", Layout(begin=lambda path: None, write=write))
+    written = convert(uneven_recording, tmp_path / "names.txt", "Names")
+    assert written.read_text() == " ".join(f"demo_{k}" for k in range(7))
+    with pytest.raises(UnknownNameError, match="Did you mean 'names'"):
+        convert(uneven_recording, tmp_path / "out", "nams")
 
 
 @pytest.mark.parametrize("layout", ["robomimic", "npz", "minari"])
