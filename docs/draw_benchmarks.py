@@ -63,7 +63,7 @@ ROBOTS: dict[str, str | list[str]] = {
     "TwoArmLift": "Baxter",
     "TwoArmPegInHole": ["Panda", "Panda"],
     "TwoArmHandover": "Tiago",
-    "TwoArmTransport": ["PandaDexRH", "PandaDexLH"],
+    "TwoArmTransport": ["Panda", "Panda"],
 }
 """Robots that are drawn at each benchmark."""
 

@@ -21,7 +21,7 @@ FILE = Path(__file__).parent / "images" / "film.webp"
 SIZE = (640, 400)
 RATE = 10  # pictures a second
 PART = 33  # pictures of each part
-BENCHMARK, ROBOTS = "TwoArmTransport", ["PandaDexRH", "PandaDexLH"]
+BENCHMARK, ROBOTS = "TwoArmTransport", ["Panda", "Panda"]
 
 
 def teleoperation() -> Iterator[Image.Image]:

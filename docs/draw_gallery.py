@@ -18,7 +18,7 @@ STRIP = HERE / "images" / "strip.jpg"
 SIZE = 240  # pixels; drawn twice as large for smooth edges
 IN_STRIP = (
     *("GR1", "SpotWithArm", "Tiago", "PandaOmron", "Baxter", "Sawyer"),
-    *("UR5e", "Jaco", "InspireRightHand", "RobotiqThreeFingerGripper"),
+    *("UR5e", "Jaco", "InspireRightHand", "RobotiqThreeFingerDexterousGripper"),
 )
 DOWN = (0.0, 1.0, 0.0, 0.0)  # grippers reach along +z, and are shown reaching down
 PALM = View(azimuth=215.0, elevation=-14.0)

@@ -6,8 +6,8 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 CLOCK = r"(?:perf_counter|monotonic|time\.time)\(\)"
 ASSERTED = re.compile(rf"assert [^\n]*{CLOCK} - |assert [^\n]*\b(?:spent|elapsed) <")
-OTHERS = {"tests/devices/test_web_server.py", "tests/browser/screens.py"}
-"""One that is to be mended, and one whose time is that of a person, not of a clock."""
+OTHERS = {"tests/browser/screens.py"}
+"""Its time is that of a person, not of a clock."""
 
 
 def test_no_test_asserts_a_wall_clock_time():

@@ -13,10 +13,10 @@ from enum import IntEnum
 from typing import Literal, NamedTuple
 
 import numpy as np
-from pydantic import BaseModel, Field, NonNegativeFloat, PositiveFloat
+from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from wbc_suite.compiling import compiled, readable, struct
-from wbc_suite.tomlfile import FROZEN
+from wbc_suite.tomlfile import FrozenModel
 from wbc_suite.typing import CompiledRecords, Indices, Matrix, Records, Vector
 
 GRAVITY = 9.81
@@ -30,14 +30,12 @@ class Mode(IntEnum):
     STEP = 1
 
 
-class GaitConfig(BaseModel):
+class GaitConfig(FrozenModel):
     """Numbers of a gait; those of your own derive from it.
 
     A subclass has `type: Literal[NAME] = NAME`, and floats or whether to do something:
     its planner reads them from the gait's `settings`.
     """
-
-    model_config = FROZEN
 
     type: str
 
