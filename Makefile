@@ -66,9 +66,10 @@ clients: $(CLIENTS:%=client-%) ## run the examples of examples/clients, each in 
 $(CLIENTS:%=client-%): client-%: .venv-client-%/.installed
 	.venv-client-$*/bin/python examples/clients/$*.py
 
-pictures: $(VENV)/.installed ## draw the pictures of the README and of walking anew
+pictures: $(VENV)/.installed-dev ## draw the pictures and the film of the README and of walking anew (needs Chromium)
 	$(PY) docs/draw_pictures.py
 	$(PY) docs/draw_walking.py
+	$(PY) docs/draw_film.py
 
 gallery: $(VENV)/.installed ## draw every robot, gripper and base for the README, and every benchmark
 	$(PY) docs/draw_gallery.py $(ARGS)
