@@ -41,7 +41,7 @@ def headset():
 
 
 class NoRedirect(urllib.request.HTTPRedirectHandler):
-    def redirect_request(self, *_):
+    def redirect_request(self, req, fp, code, msg, headers, newurl):
         return None
 
 

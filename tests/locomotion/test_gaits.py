@@ -22,7 +22,7 @@ from wbc_suite.locomotion import (
 class ShowConfig(TrotConfig):
     """A trot that leaves a mark in `gait.state.progress`, which a trot does not use."""
 
-    type: Literal["show"] = "show"
+    type: Literal["show"] = "show"  # pyright: ignore - as the guide says
 
 
 @compiled
@@ -74,7 +74,7 @@ def test_a_gait_is_checked_at_registration_and_where_it_is_named(show):
 class AmbleConfig(GaitConfig):
     """Has a number that no other gait has."""
 
-    type: Literal["amble"] = "amble"
+    type: Literal["amble"] = "amble"  # pyright: ignore - as the guide says
     stride: PositiveFloat = 0.3
 
 

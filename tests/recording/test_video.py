@@ -100,7 +100,7 @@ def test_a_sheet_has_12_episodes_at_most(tmp_path):
         for seed in range(14):
             episode = make_episode(seed)
             shown = {"obs/agentview_image": np.zeros((5, 8, 8, 3), dtype=np.uint8)}
-            store.add(replace(episode, columns=episode.columns | shown))
+            store.add(replace(episode, columns={**episode.columns, **shown}))
     with Dataset(path) as dataset:
         write_sheet(dataset, tmp_path / "a.png")
     with Image.open(tmp_path / "a.png") as sheet:

@@ -167,7 +167,7 @@ def _check_rows(model: mujoco.MjModel, name: str, valid: Any, rule: str) -> None
     if valid.all():
         return
     row, part = int(np.argwhere(~valid)[0, 0]), name.partition("_")[0]
-    find = getattr(model, part, None)
+    find: Any = getattr(model, part, None)
     owner = (find(row).name if callable(find) else "") or f"number {row}"
     raise PhysicsError(
         f"{name} of {part} '{owner}' is {getattr(model, name)[row]}, {rule}."

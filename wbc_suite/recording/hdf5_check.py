@@ -118,7 +118,8 @@ def read_files() -> None:
 def _limit(kind: int, value: int) -> None:
     """Lower a limit of this process, which may have a lower one."""
     known = [x for x in resource.getrlimit(kind) if x != resource.RLIM_INFINITY]
-    resource.setrlimit(kind, (min(value, *known),) * 2)
+    least = min([value, *known])
+    resource.setrlimit(kind, (least, least))
 
 
 def _read_structure(path: Path) -> None:
