@@ -28,7 +28,7 @@ from harness.trials import Case
 
 from wbc_suite.cli.options import tracked
 from wbc_suite.errors import WbcError
-from wbc_suite.registration import BENCHMARKS
+from wbc_suite.registration import WITH_ID
 
 ROOT = Path(__file__).parent.parent
 FOUND = ROOT / "docs" / "accelerators.json"
@@ -37,8 +37,8 @@ ROBOTS = ("GR1", "SpotWithArm", "Tiago")
 WALKING = "GR1FreeBody"
 """GR1 as it walks, where it is not the usual robot and GR1 on its stand is refused."""
 CASES = (
-    *BENCHMARKS,
-    *(f"{name}-{robot}" for robot in ROBOTS for name in BENCHMARKS),
+    *WITH_ID,
+    *(f"{name}-{robot}" for robot in ROBOTS for name in WITH_ID),
     *(f"{name}-{WALKING}" for name in ("LocoLift", "WalkTo")),
 )
 ENGINES = {"warp": "mujoco_warp", "mjx": "MJX"}
@@ -90,7 +90,7 @@ def table(engine: str, found: dict[str, Row]) -> str:
     lines = [f"{ENGINES[engine]}, {len(stepped)} cases. {costs(stepped)}", ""]
     lines.append("| benchmark | " + " | ".join(["usual robots", *ROBOTS]) + " |")
     lines.append("|---|" + "---|" * (1 + len(ROBOTS)))
-    for benchmark in BENCHMARKS:
+    for benchmark in WITH_ID:
         cases = benchmark, *robot_cases(benchmark)
         cells = [shown(found.get(case)) for case in cases]
         lines.append(f"| {benchmark} | " + " | ".join(cells) + " |")

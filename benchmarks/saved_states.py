@@ -24,7 +24,7 @@ import numpy as np
 from harness.report import Report, options
 
 import wbc_suite
-from wbc_suite.benchmark import benchmark_names
+from wbc_suite.benchmark import BENCHMARKS
 from wbc_suite.envs import RobotEnv
 from wbc_suite.envs.states import motion_size
 from wbc_suite.errors import UnknownNameError
@@ -159,7 +159,7 @@ def main() -> None:
     parser.add_argument("--episodes", type=int, default=20)
     parser.add_argument("--base", type=int, default=8000, help="the first seed")
     given = parser.parse_args()
-    chosen = given.benchmarks or benchmark_names()
+    chosen = given.benchmarks or sorted(BENCHMARKS)
     if given.quick:
         chosen = given.benchmarks or ("Lift", "Door", "WalkTo")
     count, report = 2 if given.quick else given.episodes, Report()

@@ -4,7 +4,7 @@ import pytest
 from harness.engines import PYTHON, step_in, write_models
 
 import wbc_suite
-from wbc_suite.registration import BENCHMARKS
+from wbc_suite.registration import WITH_ID
 
 CONTACT = 1e-2
 """Greatest difference of positions after 100 steps in contact, m or rad: the
@@ -12,7 +12,7 @@ solvers of float32 and float64 stop at other places."""
 EXACT = ("Door", "Lift", "TwoArmPegInHole", "Wipe")
 """Where nothing touches, or a cube rests."""
 ROBOTS = ("GR1", "SpotWithArm", "Tiago")
-CASES = (*BENCHMARKS, *(f"Lift-{robot}" for robot in ROBOTS))
+CASES = (*WITH_ID, *(f"Lift-{robot}" for robot in ROBOTS))
 
 pytestmark = [
     *(pytest.mark.peer, pytest.mark.slow),

@@ -52,8 +52,6 @@ OPTIONS = {
         ("evaluate Lift --robots Panda,Pandda", ROBOT),
         ("evaluate Lift --policy exprt", NOTHING.format("policy", "exprt", "expert")),
         ("evaluate Lift --policy none.hdf5", "there is no such file"),
-        ("evaluate Stand --policy expert", "No expert named 'Stand'"),
-        ("expert Stand", "No expert named 'Stand'"),
         ("evaluate no_such_module:Task", "no_such_module:Task' cannot be found"),
         ("record -o a --device keybord", "device named 'keybord'. Did you mean 'key"),
         ("serve-policy exprt", NOTHING.format("policy", "exprt", "expert")),

@@ -64,10 +64,10 @@ def test_a_controller_file_extends_one_beside_it_or_of_the_catalogue(soft):
     assert (found["type"], found["body_parts"]["right"]["kp"]) == ("BASIC", 99)
     assert found["body_parts"]["right"]["damping_ratio"] == 2.0
     free = soft.with_name("free.toml")
-    free.write_text('extends = "gr1_whole_body_ik"\n[posture]\nweight = 0.5\n')
+    free.write_text('extends = "gr1_whole_body_ik"\n[posture]\nspeed = 0.5\n')
     ours = load_composite_controller_config("WHOLE_BODY_IK", "GR1")
     found = load_composite_controller_config(free, "GR1")
-    posture = ours.get("posture", {}) | {"weight": 0.5}
+    posture = ours.get("posture", {}) | {"speed": 0.5}
     assert found == ours | {"posture": posture}
 
 

@@ -442,7 +442,7 @@ def test_a_biped_of_unknown_soles_is_warned_of(alone, caplog):
     ("changes", "message"),
     [
         ({"solve_hertz": 100}, "Did you mean 'solve_hz'"),
-        ({"frame": []}, "at least 1 item"),
+        ({"frame": []}, "1 items or more"),
         ({"frame": [{"name": "a"}]}, "'frame' is needed"),
         ({"frame": [{"name": "a", "frame": "eef", "kind": "poze"}]}, "'pose'"),
         ({"input_ref_frame": "eef"}, "needs input_type 'delta'"),

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from wbc_suite.evaluation import episode_seed, episode_seeds
-from wbc_suite.registration import BENCHMARKS
+from wbc_suite.registration import WITH_ID
 
 
 def test_more_episodes_change_no_earlier_seed():
@@ -18,7 +18,7 @@ def test_every_scene_has_a_seed_of_its_own():
     seeds = [
         seed
         for base in (0, 1, 7000)
-        for name in BENCHMARKS
+        for name in WITH_ID
         for seed in episode_seeds(name, 400, base=base)
     ]
     assert len(set(seeds)) == len(seeds)

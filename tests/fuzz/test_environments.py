@@ -190,6 +190,7 @@ FINE = {
     "gripper_types": ["None"],
     "base_types": ["None"],
     "horizon": ["None"],
+    "control_freq": ["3.5"],
     "initialization_noise": ["None"],
     "reward_scale": ["3.5"],
     "render_mode": ["None"],

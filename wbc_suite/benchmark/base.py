@@ -54,7 +54,7 @@ class BenchmarkFile:
         def base_of(file: Path) -> str | None:
             layers.append(data := read_toml(file))
             if isinstance(arena := data.get("arena"), dict) and "file" in arena:
-                data["arena"] = arena | {"file": str(file.parent / str(arena["file"]))}
+                data["arena"] = arena | {"file": _inside(file, str(arena["file"]))}
             base = data.pop("extends", None)
             return None if base is None else str(base)
 
@@ -244,7 +244,7 @@ def _made(build: Callable[..., Benchmark], name: str, arena: Arena | None) -> Be
 
 
 def parse_arena(arena: Arena, *, source: Path | None = None) -> ArenaConfig:
-    """Check an arena; its file is relative to that of the source, if there is one.
+    """Check an arena; `source` is the file that errors name, if there is one.
 
     Raises:
         ConfigError: Names the key, its value and what is allowed.
@@ -253,16 +253,23 @@ def parse_arena(arena: Arena, *, source: Path | None = None) -> ArenaConfig:
     config = parse_model(
         ArenaConfig, keys, source=str(source or "make()"), within="arena"
     )
-    if source is None:
-        return config
-    file, folder = source.parent / config.file, real_path(source.parent)
+    return config
+
+
+def _inside(source: Path, name: str) -> str:
+    """Return the path of an arena's file that a benchmark's file names.
+
+    Raises:
+        ConfigError: If it lies outside of that file's folder.
+    """
+    file, folder = source.parent / name, real_path(source.parent)
     if not real_path(file).is_relative_to(folder):
         where = f"{source}: {located('arena.file', str(source))}"
         raise ConfigError(
-            f"{where} = '{config.file}' lies outside the folder {folder} and is not "
-            "read. Copy it into that folder, or name it by the argument `arena`."
+            f"{where} = '{name}' lies outside the folder {folder} and is not read. "
+            "Copy it into that folder, or name it by the argument `arena`."
         )
-    return config.model_copy(update={"file": file})
+    return str(file)
 
 
 def load_config(model: type[C], source: Source) -> C:

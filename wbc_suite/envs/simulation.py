@@ -163,11 +163,11 @@ class Simulation:
             PhysicsError: If the state or the model has numbers that cannot be.
         """
         check_model(self.model, self._made_for)
+        check_laws(self._laws, self._drives)
         self.forward()
         self.memory.write(self._new)  # nothing is left of an episode before
         for state, controller in self.pairs:
             controller.reset(state)
-        check_laws(self._laws, self._drives)
         for source in self._sources:
             begin_source(source, self.data)
         self._left[:] = 0
