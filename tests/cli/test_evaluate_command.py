@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from wbc_suite.cli.app import app
-from wbc_suite.errors import UnknownNameError
+from wbc_suite.errors import ConfigError, UnknownNameError
 from wbc_suite.evaluation import episode_seeds
 
 SHORT = ["evaluate", "Lift", "--controller", "JOINT_POSITION", "--horizon", "4"]
@@ -79,12 +79,29 @@ def test_success_ends_an_episode_unless_asked_otherwise(tmp_path):
     assert lengths[0] < lengths[1] == 80.0
 
 
-def test_command_says_what_failed(tmp_path):
-    command = ["evaluate", "Lift", "--controller", "NOTHING", "--executor", "serial"]
-    result = CliRunner().invoke(app, [*command, "--chunk", "400", "-o", str(tmp_path)])
+def test_command_knows_at_once_that_a_controller_is_missing(tmp_path):
+    command = ["evaluate", "Lift", "--controller", "NOTHING", "-o", str(tmp_path)]
+    result = CliRunner().invoke(app, command)
+    assert isinstance(result.exception, UnknownNameError)
+    assert "NOTHING" in str(result.exception)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_command_says_what_failed(tmp_path, monkeypatch):
+    def make_case(payload):
+        raise ConfigError("no such table")
+
+    monkeypatch.setattr("wbc_suite.evaluation.rollouts.make_case", make_case)
+    command = ["evaluate", "Lift", "--executor", "serial", "--episodes", "3"]
+    result = CliRunner().invoke(app, [*command, "-o", str(tmp_path)])
     assert result.exit_code == 1
-    assert "NOTHING" in result.output
+    assert "no such table" in result.output
     assert "1 of 1 items failed" in result.output
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert (summary["episodes"], summary["cases"][0]["errors"]) == (
+        3,
+        {"work item failed": 3},
+    )
 
 
 @pytest.mark.slow

@@ -178,7 +178,7 @@ def test_an_episode_out_of_time_and_a_dead_worker_are_failures(tmp_path):
     (outcome,) = run_items(run_rollouts, [item], folder=tmp_path, executor=Serial())
     for found, kind in (
         (outcome, "episode out of time"),
-        (Outcome(name=item.name, error="It died."), "worker died"),
+        (Outcome(name=item.name, error="It died."), "work item failed"),
     ):
         figures = collect({case: [item]}, [found], seconds=1.0).figures()
         assert figures["episodes"] == 2

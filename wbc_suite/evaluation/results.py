@@ -128,7 +128,7 @@ def episodes_of(item: WorkItem, outcome: Outcome) -> list[dict[str, Any]]:
     if outcome.error is None:
         return outcome.result["episodes"]
     return [
-        failed_episode(seed, ErrorKind.WORKER, outcome.error)
+        failed_episode(seed, ErrorKind.ITEM, outcome.error)
         for seed in item.payload["seeds"]
     ]
 

@@ -108,7 +108,7 @@ class ErrorKind(StrEnum):
     SHAPE = "action of a wrong shape"
     ACTION_TIME = "action out of time"
     EPISODE_TIME = "episode out of time"
-    WORKER = "worker died"
+    ITEM = "work item failed"
 
 
 class PolicyError(WbcError, RuntimeError):
