@@ -23,7 +23,6 @@ from wbc_suite.recording.env_source import PACKAGE, EnvSource
 from wbc_suite.recording.episode import Episode, Fact
 from wbc_suite.recording.hdf5_writer import write_dataset
 from wbc_suite.sensing.proprioception import gripper_groups
-from wbc_suite.tomlfile import parse_json
 
 ROBOSUITE_TYPE = 1
 """Type of robosuite's environments in robomimic's `env_args`."""
@@ -67,11 +66,12 @@ def _header(header: Mapping[str, Fact]) -> dict[str, Fact]:
     arguments = {key: value for key, value in given if key not in _OTHER_ARGUMENTS}
     arguments["conventions"] = PACKAGE
     if "controller_config" in header:
-        controllers = parse_json(
-            str(header["controller_config"]),
-            source="controller_config",
-            error=DatasetError,
-        )
+        try:
+            controllers = json.loads(str(header["controller_config"]))
+        except (ValueError, RecursionError) as error:
+            raise DatasetError(f"controller_config: not readable JSON: {error}") from (
+                error
+            )
         arguments["controller_configs"] = controllers
     fields = json.loads(replace(source, arguments=arguments).text)
     text = json.dumps(fields | {"type": ROBOSUITE_TYPE}, sort_keys=True)
