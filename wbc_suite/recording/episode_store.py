@@ -16,7 +16,6 @@ from typing import IO, Self
 from wbc_suite.errors import DatasetError
 from wbc_suite.recording.atomic_files import check_folder, delete_temporaries
 from wbc_suite.recording.dataset import Dataset, part_files, parts_folder
-from wbc_suite.recording.env_source import differences
 from wbc_suite.recording.episode import Episode, Fact
 from wbc_suite.recording.hdf5_writer import uncompressed_bytes, write_dataset
 
@@ -103,6 +102,8 @@ class Store:
             theirs = str(dataset.header.get("env_args", ""))
             ours = str(self._header.get("env_args", ""))
             if theirs != ours:
+                from wbc_suite.recording.env_source import differences
+
                 raise DatasetError(
                     f"'{self.path}' has episodes of another environment: there and "
                     f"here {differences(theirs, ours)}. Choose another file."
