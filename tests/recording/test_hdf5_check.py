@@ -189,3 +189,13 @@ def test_a_sparse_file_is_refused(tmp_path):
         file.truncate(2 << 30)
     with pytest.raises(DatasetError, match="declares 2147483648 bytes"):
         open_safely(path, checked=True)
+
+
+def test_the_child_imports_no_robots():
+    """It starts for each file that is opened."""
+    code = (
+        "import sys, wbc_suite.recording.hdf5_check;"
+        "print([m for m in sys.modules if m in ('numba', 'mujoco', 'pydantic')])"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert run.stdout.strip() == "[]", run.stderr
