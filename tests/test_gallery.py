@@ -40,12 +40,13 @@ def check_picture(path, size, name, most=30_000):
 
 
 def test_the_page_shows_the_catalogue(gallery):
-    assert gallery.PAGE.read_text(encoding="utf-8") == gallery.page()
+    page = gallery.page()
+    assert gallery.PAGE.read_text(encoding="utf-8") == page
     for robot in ("GR1", "Panda", "OmronMobileBase", "InspireRightHand"):
-        assert f'alt="{robot}"' in gallery.page()
+        assert f'alt="{robot}"' in page
     for rows in gallery.subjects().values():
         for shown, _ in rows:
-            assert re.search(rf">{shown}<", gallery.page()), shown
+            assert re.search(rf">{shown}<", page), shown
 
 
 def test_variants_that_look_alike_share_a_picture(gallery):
