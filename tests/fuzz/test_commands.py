@@ -53,7 +53,7 @@ WORDS = [  # ours: one line
     "teleop Lift --robots nope",
     "teleop Lift --controller nope",
     "teleop Lift --controller nope.toml",
-    "teleop --rate 33",
+    "teleop --rate 300",
     "describe-action nope",
     "describe-action Panda --controller x",
 ]
