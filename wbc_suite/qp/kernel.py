@@ -1,11 +1,12 @@
 """Which parts of a stack are computed by compiled kernels."""
 
-import logging
 from collections.abc import Iterable
 from enum import IntEnum
 from functools import cache
 
-LOG = logging.getLogger(__name__)
+from wbc_suite import logs
+
+LOG = logs.logger(__name__)
 
 
 class Kernel(IntEnum):
