@@ -100,7 +100,7 @@ class Released:
         self.limb = LimbTarget(LimbPipeline(port, PipelineConfig(), dt=0.01))
         far = pin.SE3(pin.exp3(np.array([0, 0, turn])), np.array([away, 0.0, 0.0]))
         self.limb.stages.place(far)
-        assert self.limb.drag(1, far, now=0.0)
+        assert self.limb.drag(1, far, now=0.0, grab=True)
         self.limb.stages.place(far)
         self.limb.release(1)
 
@@ -161,5 +161,5 @@ def test_a_target_stays_where_the_controller_reports_it_as_reached_or_it_is_held
 )
 def test_poses_that_cannot_be_take_no_limb(T, valid):
     target = limb("x", LimbKind.POSE, pin.SE3.Identity())
-    assert target.drag(1, T, now=0.0) == valid
+    assert target.drag(1, T, now=0.0, grab=True) == valid
     assert target.ownership.holder(0.0) == (1 if valid else None)

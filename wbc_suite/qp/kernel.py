@@ -1,5 +1,6 @@
 """Which parts of a stack are computed by compiled kernels."""
 
+import logging
 from collections.abc import Iterable
 from enum import IntEnum
 from functools import cache
