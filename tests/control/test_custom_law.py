@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wbc_suite.compiling import compiled
-from wbc_suite.control.law.custom import custom_kernel, register_law
+from wbc_suite.control.law.custom import register_law
 from wbc_suite.control.law.joint_laws import JointLaw
 from wbc_suite.control.law.law import Law
 from wbc_suite.control.loop.records import LawKind
@@ -82,7 +82,6 @@ def test_a_kernel_has_one_kind():
     kind = register_law(oscillator)
     assert kind == register_law(oscillator) >= LawKind.CUSTOM
     assert register_law(brake) != kind
-    assert custom_kernel(np.array([int(LawKind.JOINT), int(LawKind.OSC)])) is None
 
 
 def test_joint_limits_hold_for_a_registered_law(alone):
