@@ -2,13 +2,12 @@
 
 import math
 from collections.abc import Sequence
-from contextlib import nullcontext
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from wbc_suite.compiling import announced, as_argument, is_compiling, plain
+from wbc_suite.compiling import as_argument, is_compiling, plain
 from wbc_suite.control import CompositeController, RobotState, SteppedController
 from wbc_suite.control.composite.protocols import TickedController, solver_of_body
 from wbc_suite.control.composite.tick import WholeBodyArrays
@@ -68,7 +67,7 @@ class Simulation:
         self.robots = tuple(state for state, _ in pairs)
         self.controllers = tuple(controller for _, controller in pairs)
         self.pairs = tuple(pairs)
-        self._left, self._prepared = [0] * len(pairs), False
+        self._left = [0] * len(pairs)
         self.loop_calls = 1
         self._stepped = [(r, c) for r, c in pairs if isinstance(c, SteppedController)]
         compiled = compiled and is_compiling()
@@ -105,8 +104,7 @@ class Simulation:
         states = *addresses(model, data), addresses(model, believed)[1]
         self._first = *states, self._physics, as_argument(self._watch.state)
         self._last = ticks, tuple(map(as_argument, self._sources)) or None
-        with announced("the control loop"):
-            self._call_loop(0)
+        self._call_loop(0)
 
     def _loop_ticks(
         self,
@@ -155,9 +153,7 @@ class Simulation:
         """
         if not self.timestep > 0.0:
             check_model(self.model)
-        with nullcontext() if self._prepared else announced("the controllers"):
-            self._advance(n)
-        self._prepared = True
+        self._advance(n)
         if not self.lite:
             self._refresh()
 
@@ -195,7 +191,11 @@ class Simulation:
         needed = self._laws[[*DECIDING]].tobytes()
         if needed != self._needed:
             kernels, self._owner = bind_kernels(
-                self._laws, self._physics, self._bodies, compiled=not self._runs_plain
+                self._laws,
+                self._physics,
+                self._bodies,
+                self._last[0],
+                compiled=not self._runs_plain,
             )
             records = *self._records, kernels, self._bodies
             self._law_arguments = self._physics, *records
