@@ -52,5 +52,5 @@ def test_ten_minutes_at_100_hz_are_recorded_and_closed_in_little_memory(tmp_path
         env=os.environ | {"PYTHONPATH": paths},
     ).stdout
     grown, file = map(float, told.split())
-    assert file > 2.0 * MOST
+    assert file > 1.5 * MOST
     assert grown < MOST
