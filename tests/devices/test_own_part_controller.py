@@ -7,20 +7,20 @@ import numpy as np
 import pytest
 
 import wbc_suite
-from wbc_suite.control.part import registry
+from wbc_suite.control.part.registry import PART_CONTROLLERS
 from wbc_suite.devices import DeviceState, LimbInput, Pipeline, PipelineConfig
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "11_own_part_controller.py"
 
 
 @pytest.fixture
-def env():
+def env(forget):
+    forget(PART_CONTROLLERS, "CYLINDER")
     runpy.run_path(str(EXAMPLE))
     env = wbc_suite.make("Lift", robots="Panda", controller_configs="CYLINDER")
     env.reset(seed=0)
     yield env
     env.close()
-    del registry._KINDS["CYLINDER"]
 
 
 @pytest.mark.slow

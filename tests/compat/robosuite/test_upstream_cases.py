@@ -196,7 +196,11 @@ def test_wrappers(suite, tmp_path):
     [folder] = tmp_path.iterdir()
     [file] = folder.glob("state_*.npz")
     data = np.load(file, allow_pickle=True)
-    assert data["states"].shape == (3, 1 + env.sim.model.nq + env.sim.model.nv)
+    size = 1 + env.sim.model.nq + env.sim.model.nv
+    assert data["states"].shape == (3, len(env.sim.get_state().flatten()))
+    np.testing.assert_array_equal(
+        np.diff(data["states"][:, :size], axis=0)[:, 0] > 0.0, True
+    )
     assert data["action_infos"][0]["actions"].shape == (7,)
     assert (folder / "model.xml").read_text().startswith("<mujoco")
     varied = wrappers.DomainRandomizationWrapper(env, seed=0, randomize_color=False)

@@ -13,7 +13,7 @@ from wbc_suite.compat.robosuite.wrappers.plain import Wrapper
 class DataCollectionWrapper(Wrapper):
     """Writes a folder for each episode: `model.xml`, `ep_meta.json`, `state_*.npz`.
 
-    A state file holds `states` (time, qpos, qvel), `action_infos`, whether the task was
+    A state file holds `states` (of `flatten`), `action_infos`, whether the task was
     `successful` in one of its steps, and `env`.
     """
 
