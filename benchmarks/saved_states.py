@@ -1,10 +1,9 @@
 """Saved states: whether a world that is restored from a recording is the one it was.
 
-Episodes are recorded into a file: by the benchmark's expert, where there is one for its
-default robots, else by random actions and by actions that hold all goals, in turn. A
-state of each, at a random step, is read from the file and restored in another
-environment, which has never seen the episode. Its model and its data are compared with
-those of the recording at that step; then the recorded actions are continued.
+Episodes of the benchmark's expert are recorded into a file. A state of each, at a
+random step, is read from the file and restored in another environment, which has never
+seen the episode. Its model and its data are compared with those of the recording at
+that step; then the recorded actions are continued.
 
 A world is equal if all arrays of the model are, and all those of the data that follow
 from the state or decide the next step; contacts, accelerations and sensors are one step
@@ -27,16 +26,12 @@ import wbc_suite
 from wbc_suite.benchmark import BENCHMARKS
 from wbc_suite.envs import RobotEnv
 from wbc_suite.envs.states import motion_size
-from wbc_suite.errors import UnknownNameError
 from wbc_suite.evaluation.policies import make_policy
 from wbc_suite.recording import Dataset
 from wbc_suite.wrappers import DataCollection
 
 LONG = ("TwoArmTransport", "ToolHang", "NutAssembly", "PickPlace")
 """Benchmarks with several objects, which experts solve within 1000 steps, not 500."""
-
-WITHOUT_EXPERT = 150
-"""Actions of an episode without an expert."""
 
 OF_DATA = (
     *("time", "qpos", "qvel", "act", "qacc_warmstart", "ctrl", "qfrc_applied"),
@@ -65,15 +60,6 @@ def unequal(one: Arrays, other: Arrays) -> list[str]:
     return [name for name, x in one.items() if not np.array_equal(x, other[name])]
 
 
-def policy_of(env: RobotEnv, seed: int) -> tuple[str, Any]:
-    """Return name and policy of an episode that has begun."""
-    try:
-        return "expert", make_policy("expert", env, seed)
-    except UnknownNameError:
-        name = ("random", "hold")[seed % 2]
-        return name, make_policy(name, env, seed)
-
-
 def end_of(info: dict[str, Any]) -> tuple[Any, ...]:
     """Return how an episode ended."""
     return info["success"], info.get("failure"), "physics_error" in info
@@ -83,17 +69,16 @@ def record(env: Any, seed: int, rng: np.random.Generator) -> dict[str, Any]:
     """Record an episode; return its end, and a world in its midst."""
     inner, info = env.unwrapped, {"success": False}
     observation, _ = env.reset(seed=seed)
-    name, policy = policy_of(inner, seed)
-    most = inner.horizon if name == "expert" else WITHOUT_EXPERT
+    policy = make_policy("expert", inner, seed)
     # The step is drawn as the episode goes on: each is as likely as any other.
     step, world = 0, arrays_of(inner)
-    for k in range(most):
+    for k in range(inner.horizon):
         if k > 0 and rng.uniform() < 1.0 / (k + 1):
             step, world = k, arrays_of(inner)
         observation, _, terminated, truncated, info = env.step(policy(observation))
         if terminated or truncated:
             break
-    return {"policy": name, "end": end_of(info), "step": step, "world": world}
+    return {"end": end_of(info), "step": step, "world": world}
 
 
 def restore(env: RobotEnv, episode: Any, found: dict[str, Any]) -> dict[str, Any]:
@@ -138,7 +123,6 @@ def measure(name: str, seeds: range, folder: Path) -> dict[str, Any]:
     return {
         "case": name,
         "side": " and ".join(robot.name for robot in fresh.robots),
-        "policy": ", ".join(sorted({found["policy"] for found in recorded})),
         "episodes": len(results),
         "solved": sum(bool(found["end"][0]) for found in recorded),
         "steps": sum(sizes),
@@ -170,7 +154,7 @@ def main() -> None:
             report.rows.append(row)
             print(row, flush=True)
     counts = ("episodes", "solved", "worlds_equal", "ends_same", "ends_exact")
-    report.show("Saved states", ("case", "side", "policy", *counts))
+    report.show("Saved states", ("case", "side", *counts))
     total = {name: sum(row[name] for row in report.rows) for name in counts}
     print(total)
     report.write(given.json)

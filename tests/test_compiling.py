@@ -114,9 +114,8 @@ as_argument(Lost(np.zeros(3)))
 import mujoco
 from wbc_suite.compiling import as_argument
 from wbc_suite.control.loop.state_checks import CheckedState, checked_state
-spec = mujoco.MjSpec()
-data = mujoco.MjData(spec.compile())
-as_argument(checked_state(data))
+model = mujoco.MjSpec().compile()
+as_argument(checked_state(model, mujoco.MjData(model)))
 """
     root = str(Path(__file__).parent.parent)
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}

@@ -32,6 +32,7 @@ USAGE = [  # typer's own words: a usage line and a box
     "view Panda --port 99999",
     "teleop --rate 1",
     "teleop --rate nan",
+    "teleop --rate 300",
     "teleop --seed a",
     "doctor x",
     "--nope",
@@ -53,7 +54,6 @@ WORDS = [  # ours: one line
     "teleop Lift --robots nope",
     "teleop Lift --controller nope",
     "teleop Lift --controller nope.toml",
-    "teleop --rate 300",
     "describe-action nope",
     "describe-action Panda --controller x",
 ]

@@ -8,6 +8,7 @@ import pytest
 from pydantic import ValidationError
 
 import wbc_suite
+from wbc_suite.envs.states import motion_size
 from wbc_suite.errors import ConfigError
 from wbc_suite.randomisation import Randomisation
 
@@ -180,7 +181,9 @@ def test_a_latency_of_several_periods_is_a_queue_of_actions():
         if k >= 55 and (k - 55) % 25 == 0:
             prompt.controllers[0].set_goal(actions[began], 0.05)
         prompt.simulation.tick(1)
-    np.testing.assert_array_equal(late.physics_state, prompt.physics_state)
+    motion = slice(motion_size(late.simulation.model))  # the rest differs with the rate
+    one, other = late.physics_state[motion], prompt.physics_state[motion]
+    np.testing.assert_array_equal(one, other)
 
     kept, twin = late.get_state(), copy.deepcopy(late)
     futures = []
