@@ -69,7 +69,9 @@ $(CLIENTS:%=client-%): client-%: .venv-client-%/.installed
 pictures: $(VENV)/.installed-dev ## draw the pictures and the film of the README and of walking anew (needs Chromium)
 	$(PY) docs/draw_pictures.py
 	$(PY) docs/draw_walking.py
+	$(PY) docs/draw_teleop.py
 	$(PY) docs/draw_film.py
+	$(PY) docs/draw_saturation.py
 
 gallery: $(VENV)/.installed ## draw every robot, gripper and base for the README, and every benchmark
 	$(PY) docs/draw_gallery.py $(ARGS)

@@ -27,7 +27,6 @@ BENCHMARK, ROBOTS = "TwoArmTransport", ["Panda", "Panda"]
 def teleoperation() -> Iterator[Image.Image]:
     """Yield pictures of the page while a cube is lifted."""
     pictures = [*draw_teleop.film()]
-    pictures[-1].save(draw_teleop.FILE, quality=82, optimize=True)
     for k in range(PART):
         yield pictures[min(round(k * len(pictures) / (PART - 5)), len(pictures) - 1)]
 
@@ -75,7 +74,7 @@ def main() -> None:
         append_images=film[1:],
         duration=round(1000 / RATE),
         loop=0,
-        quality=50,
+        quality=75,
         method=6,
     )
 

@@ -27,7 +27,7 @@ from wbc_suite.viewers.teleop_session import TeleopSession
 FILE = Path(__file__).parent / "images" / "teleop.jpg"
 HAND = "right_hand"
 SEED = 0
-RATE = 100.0  # Hz
+RATE = 50.0  # Hz; 100 is too many beside a browser that draws by software
 SIZE = (1280, 800)  # pixels
 PACE = 0.1  # s, between two drags
 LOADING = 25.0  # s; the environment's light comes last

@@ -155,8 +155,9 @@ def _state_html(snapshot: Snapshot, info: SessionInfo) -> str:
         text = " ".join(text for text, is_possible in hints.items() if is_possible)
         hint = f"<div style='margin-bottom:.5em;font-size:.88em'>{text}</div>"
     return (
-        "<div style='display:flex;justify-content:space-between;margin:.3em 0 .5em;"
-        f"padding:.2em .5em;border-left:.3em solid {colour};background:{colour}22'>"
+        "<div style='display:flex;flex-wrap:wrap;justify-content:space-between;"
+        f"gap:0 1em;margin:.3em 0 .5em;padding:.2em .5em;"
+        f"border-left:.3em solid {colour};background:{colour}22'>"
         f"<span style='font-weight:600'>{html.escape(state)}</span>"
         f"<span style='opacity:.75;font-size:.88em'>{attempts}</span></div>{hint}"
     )
