@@ -1,4 +1,4 @@
-"""Draw the teleoperation page: GR1 lifts the cube by drags of its right hand.
+"""Draw the teleoperation page: GR1 lifts the cube with its right hand, and walks.
 
 Needs Chromium and playwright. `film` gives what the browser shows on the way.
 """
@@ -24,12 +24,13 @@ from wbc_suite.viewers.page_server import PageServer
 from wbc_suite.viewers.teleop_page import TeleopPage
 from wbc_suite.viewers.teleop_session import TeleopSession
 
-FILE = Path(__file__).parent / "images" / "teleop.jpg"
+IMAGES = Path(__file__).parent / "images"
 HAND = "right_hand"
 SEED = 0
 RATE = 50.0  # Hz; 100 is too many beside a browser that draws by software
 SIZE = (1280, 800)  # pixels
 PACE = 0.1  # s, between two drags
+WALKED = 3.0  # s
 LOADING = 25.0  # s; the environment's light comes last
 FLAGS = [
     "--no-sandbox",
@@ -64,9 +65,14 @@ def drags() -> list[tuple[pin.SE3, Vector]]:
 
 
 @contextmanager
-def page_of(session: TeleopSession) -> Iterator[Page]:
-    """Open the page of a session in a browser."""
-    page = TeleopPage(session, PageServer(port=0), label="GR1 · Lift")
+def page_of(robot: str) -> Iterator[tuple[TeleopSession, Page]]:
+    """Teleoperate a robot, and open its page in a browser."""
+    env = wbc_suite.make("Lift", robots=robot, control_freq=RATE, horizon=10**7)
+    session = TeleopSession(env, period=1.0 / RATE, seed=SEED)
+    for limb in session.limbs.values():  # a browser that draws slowly is not gone
+        limb.ownership.timeout = 300.0
+    session.start()
+    page = TeleopPage(session, PageServer(port=0), label=f"{robot} · Lift")
     page.start()
     with sync_playwright() as playwright:
         chromium = shutil.which("chromium")
@@ -79,19 +85,16 @@ def page_of(session: TeleopSession) -> Iterator[Page]:
         notice = tab.get_by_text("Software WebGL").locator("xpath=../..")
         notice.locator("button").first.dispatch_event("click")
         time.sleep(8.0)
-        yield tab
+        yield session, tab
         browser.close()
     page.stop()
+    session.stop()
+    env.close()
 
 
 def film(every: int = 1) -> Iterator[Image.Image]:
     """Yield what the page shows after each drag, or every so many of them."""
-    env = wbc_suite.make("Lift", robots="GR1", control_freq=RATE, horizon=10**7)
-    session = TeleopSession(env, period=1.0 / RATE, seed=SEED)
-    for limb in session.limbs.values():  # a browser that draws slowly is not gone
-        limb.ownership.timeout = 300.0
-    session.start()
-    with page_of(session) as tab:
+    with page_of("GR1") as (session, tab):
         session.grab(HAND, 0, session.snapshot.limbs[HAND].target)
         for k, (pose, gripper) in enumerate(drags()):
             session.drag(HAND, 0, pose)
@@ -103,8 +106,19 @@ def film(every: int = 1) -> Iterator[Image.Image]:
         session.release(HAND, 0)
         time.sleep(3.0)  # figures of the last seconds are shown
         yield _screenshot(tab)
-    session.stop()
-    env.close()
+
+
+def walking() -> Image.Image:
+    """Return what the page shows while a key is held that walks backwards."""
+    with page_of("GR1FreeBody") as (_, tab):
+        tab.get_by_label("Balance").click()
+        tab.mouse.move(300, 300)  # off the words that explain it
+        tab.get_by_text("Lift a cube").scroll_into_view_if_needed()
+        tab.keyboard.down("s")
+        time.sleep(WALKED)
+        picture = _screenshot(tab)
+        tab.keyboard.up("s")
+    return picture
 
 
 def _screenshot(tab: Page) -> Image.Image:
@@ -112,9 +126,10 @@ def _screenshot(tab: Page) -> Image.Image:
 
 
 def main() -> None:
-    """Draw the page once the cube is lifted."""
-    *_, last = film(every=1000)
-    last.save(FILE, quality=82, optimize=True)
+    """Draw the page once the cube is lifted, and while the robot walks."""
+    *_, lifted = film(every=1000)
+    for name, picture in (("teleop", lifted), ("teleop_walking", walking())):
+        picture.save(IMAGES / f"{name}.jpg", quality=82, optimize=True)
 
 
 if __name__ == "__main__":
