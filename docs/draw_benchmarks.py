@@ -36,6 +36,7 @@ MOMENTS = {
     **{"Stand": 0.2, "Reach": 0.5, "Carry": 0.7},
 }
 SHADOWS = 0.6  # part of the scene that has shadows: small parts have sharp ones
+ON_FEET = 2.5  # the same for robots on feet, whose floor has specks beyond it
 NEAR = 0.5  # m; things so near to a hand are in the picture
 SEED = 1
 COLUMNS = 2
@@ -99,7 +100,8 @@ def draw(name: str) -> None:
     solve(env, steps)
     model, data = env.simulation.model, env.simulation.data
     camera = fit_camera(VIEWS.get(name, VIEW), subject(env), aspect=SIZE[0] / SIZE[1])
-    model.vis.map.shadowclip = SHADOWS
+    on_feet = hasattr(env.benchmark, "standing")
+    model.vis.map.shadowclip = ON_FEET if on_feet else SHADOWS
     view = {"width": 2 * SIZE[0], "height": 2 * SIZE[1]}
     with make_renderer(model, preset="quality", **view) as renderer:
         renderer.update_scene(data, camera)
